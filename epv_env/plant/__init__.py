@@ -1,0 +1,1 @@
+"""The valve itself: parameters, state equations, fast event-exact simulation."""

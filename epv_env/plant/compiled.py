@@ -1,0 +1,27 @@
+"""How plant code is compiled: one place for the flags, the inlining and the cache key.
+
+`fast` arithmetic (fused multiply-add, reciprocals) is safe for reproducibility because every lane of
+every batch runs through the very same machine code: see integrate.LANES.
+"""
+
+import hashlib
+from pathlib import Path
+
+import numba
+
+FLAGS = {"fastmath": {"nnan", "ninf", "nsz", "contract", "arcp"}, "error_model": "numpy"}
+
+inlined = numba.njit(forceinline=True, **FLAGS)
+"""Decorator for the small functions that the kernels absorb."""
+
+
+def source_digest() -> str:
+    """Digest of the plant's sources.
+
+    Numba's disk cache notices a change in a kernel's own file only. A kernel that closes over this
+    digest is compiled anew when any equation it inlines has changed.
+    """
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()

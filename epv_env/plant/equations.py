@@ -1,0 +1,201 @@
+"""The state equations of the valve, each once (report eqs 5-16 as corrected in docs/model.md).
+
+Everything else - simulation, calibration, environment, diagnosis, SciPy reference - calls these.
+SI units; symbols are those of docs/model.md. Functions take named tuples of numbers (one valve) and
+are inlined into the kernels of integrate.py.
+"""
+
+from typing import NamedTuple
+
+from epv_env.plant.compiled import inlined
+from epv_env.plant.effects import Effects, effective_seat_diameter
+from epv_env.plant.flow import mass_flux
+
+QUARTER_PI = 0.7853981633974483
+
+
+class State(NamedTuple):
+    """State q (eq. 1), the supply pressure, and what has passed through so far.
+
+    The report's seven states are p2 .. I. p1 is the input chamber's pressure, a disturbance in the
+    report and here a state because a reservoir sags. The last four are running integrals, carried so
+    that mass and energy balances can be read off exactly.
+    """
+
+    p2: float
+    """Output chamber (circuit) pressure [Pa absolute]."""
+    p3: float
+    """Control chamber pressure [Pa absolute]."""
+    xPV: float
+    """Stroke of the protection valve piston, 0 = shut [m]."""
+    vPV: float
+    """Speed of the piston [m/s]."""
+    xMV: float
+    """Stroke of the magnet valve armature, xMVmax = pulled in [m]."""
+    vMV: float
+    """Speed of the armature [m/s]."""
+    I: float  # noqa: E741 - the report's symbol
+    """Solenoid current [A]."""
+    p1: float
+    """Input chamber pressure [Pa absolute]."""
+    air_in_PV: float
+    """Air passed from the input to the output chamber [kg]."""
+    air_in_MV: float
+    """Air passed from the input to the control chamber [kg]."""
+    air_vented: float
+    """Air passed from the control chamber to ambient [kg]."""
+    coil_energy: float
+    """Electrical energy taken by the coil [J]."""
+
+
+class Inputs(NamedTuple):
+    """What acts on the valve from outside, constant or linear in time over one period."""
+
+    U: float
+    """Solenoid voltage [V]."""
+    sigma_S: float
+    """Air consumed from the circuit [kg/s]."""
+    p1_slope: float
+    """Imposed rate of the supply pressure, for a recorded p1 [Pa/s]."""
+    refill: float
+    """Air that the compressor delivers to the reservoirs [kg/s]."""
+
+
+class Coefficients(NamedTuple):
+    """Parameters as the equations use them: report symbols, and products folded once per valve."""
+
+    cPV: float
+    xPV0: float
+    kPV: float
+    xPVmax: float
+    ePV: float
+    """Coefficient of restitution of the piston's stops [-]."""
+    piston_area: float
+    """pi/4 d1^2 [m^2]."""
+    seat_diameter: float
+    """d2 [m]."""
+    mPV_inverse: float
+    """1/mPV [1/kg]."""
+    curtain_PV: float
+    """alphaPV pi d2: effective opening per stroke [m]."""
+    cMV: float
+    xMV0: float
+    kMV: float
+    xMVmax: float
+    eMV: float
+    """Coefficient of restitution of the armature's stops [-]."""
+    mMV_inverse: float
+    """1/mMV [1/kg]."""
+    curtain_in: float
+    """alphaMV pi dMVin [m]."""
+    orifice_in: float
+    """alphaMV pi/4 dMVin^2 [m^2]."""
+    curtain_exh: float
+    """alphaMV pi dMVexh [m]."""
+    orifice_exh: float
+    """alphaMV pi/4 dMVexh^2 [m^2]."""
+    kink_in: float
+    """Stroke above which the inlet's bore is the smaller area [m]."""
+    kink_exh: float
+    """Stroke below which the exhaust's bore is the smaller area [m]."""
+    R: float
+    RML: float
+    gap_reluctance: float
+    """1/(mu0 A_MB): reluctance per metre of air gap [A/(V s m)]."""
+    N_squared: float
+    """Turns squared [-]."""
+    N_squared_inverse: float
+    RT_V2: float
+    """R T_env / V2 [Pa/kg]."""
+    RT_V3: float
+    """R T_env / V3 [Pa/kg]."""
+    RT_V1: float
+    """R T_env / V1 of the reservoirs [Pa/kg]; 0 for a supply that does not sag."""
+    inverse_sqrt_RT: float
+    """1/sqrt(R T_env) [s/m]."""
+    p_env: float
+
+
+@inlined
+def piston_force(q, c, effects, extended):
+    """Net force on the PV piston, opening positive [N] (eq. 22; eq. 9 with the cone effect).
+
+    The control pressure p3 acts on the whole back; p1 on the ring, p2 on the seat.
+    """
+    seat = c.seat_diameter
+    if extended:
+        seat = effective_seat_diameter(q.xPV, q.p1, q.p2, seat, effects)
+    seat_area = QUARTER_PI * seat * seat
+    pressure = (q.p1 - q.p3) * c.piston_area - (q.p1 - q.p2) * seat_area
+    return pressure - c.cPV * (q.xPV + c.xPV0) - c.kPV * q.vPV
+
+
+@inlined
+def reluctance_inverse(q, c):
+    """1/Rm of the magnetic loop [V s/A]: the air gap closes as the armature is pulled in."""
+    return 1.0 / (c.RML + (c.xMVmax - q.xMV) * c.gap_reluctance)
+
+
+@inlined
+def armature_force(q, c, inverse_Rm):
+    """Net force on the MV armature, pull-in positive [N] (eq. 11)."""
+    flux_linkage = q.I * inverse_Rm
+    magnetic = 0.5 * c.N_squared * flux_linkage * flux_linkage * c.gap_reluctance
+    return magnetic - c.cMV * (q.xMV + c.xMV0) - c.kMV * q.vMV
+
+
+@inlined
+def current_rate(q, u, c, inverse_Rm):
+    """dI/dt [A/s] (eq. 12 with the sign of docs/model.md, correction 6)."""
+    motion = q.I * q.vMV * c.gap_reluctance * inverse_Rm
+    return (u.U - c.R * q.I) * c.N_squared_inverse / inverse_Rm - motion
+
+
+@inlined
+def flow_PV(q, c):
+    """Mass flow from the input to the output chamber through the PV seat [kg/s] (eq. 6)."""
+    return c.curtain_PV * q.xPV * mass_flux(q.p1, q.p2, c.inverse_sqrt_RT)
+
+
+@inlined
+def flow_inlet(q, c):
+    """Mass flow from the input to the control chamber [kg/s] (eq. 7): smaller of curtain, orifice."""
+    area = min(c.curtain_in * q.xMV, c.orifice_in)
+    return area * mass_flux(q.p1, q.p3, c.inverse_sqrt_RT)
+
+
+@inlined
+def flow_exhaust(q, c):
+    """Mass flow from the control chamber to ambient [kg/s] (the exhaust that eq. 7 leaves out)."""
+    area = min(c.curtain_exh * (c.xMVmax - q.xMV), c.orifice_exh)
+    return area * mass_flux(q.p3, c.p_env, c.inverse_sqrt_RT)
+
+
+@inlined
+def derivative(q, u, c, effects, free_PV, free_MV, extended):
+    """Rates of all states (eqs 5-12), and the two forces that decide whether a stop holds.
+
+    free_PV, free_MV: 1.0 where the mover may move, 0.0 where a stop holds it. extended: a literal
+    bool; False compiles the effects away. Returns (State of rates, piston force, armature force).
+    """
+    force_PV = piston_force(q, c, effects, extended)
+    inverse_Rm = reluctance_inverse(q, c)
+    force_MV = armature_force(q, c, inverse_Rm)
+    through_PV = flow_PV(q, c)
+    inlet = flow_inlet(q, c)
+    exhaust = flow_exhaust(q, c)
+    rates = State(
+        p2=c.RT_V2 * (through_PV - u.sigma_S),
+        p3=c.RT_V3 * (inlet - exhaust),
+        xPV=q.vPV * free_PV,
+        vPV=force_PV * c.mPV_inverse * free_PV,
+        xMV=q.vMV * free_MV,
+        vMV=force_MV * c.mMV_inverse * free_MV,
+        I=current_rate(q, u, c, inverse_Rm),
+        p1=u.p1_slope + c.RT_V1 * (u.refill - through_PV - inlet),
+        air_in_PV=through_PV,
+        air_in_MV=inlet,
+        air_vented=exhaust,
+        coil_energy=u.U * q.I,
+    )
+    return rates, force_PV, force_MV

@@ -1,0 +1,67 @@
+"""Mass flux of air through an orifice: subcritical, choked and reversed, in one branch-free form.
+
+The isentropic flux (report eqs 13, 14 with m1/V1 = p1/(R T1), see docs/model.md) is
+
+    flux = pu * sqrt(2 k / ((k - 1) R T) * (r^(2/k) - r^((k+1)/k)))      [kg/(s m^2)],  r = pd/pu
+
+limited from below at the critical ratio. The bracket vanishes linearly at r = 1, so bracket/(1 - r) is
+smooth and a polynomial in 1 - r replaces both powers; `MAX_RELATIVE_ERROR` bounds what that costs.
+"""
+
+import math
+
+import numpy as np
+from numpy.polynomial import Polynomial, chebyshev
+
+from epv_env.plant.compiled import inlined
+
+KAPPA = 1.4
+"""Adiabatic exponent of air (Table 5)."""
+
+CRITICAL_RATIO = (2 / (KAPPA + 1)) ** (KAPPA / (KAPPA - 1))
+"""Pressure ratio below which the orifice chokes, 0.528."""
+
+LAMINAR_DROP = 5e-4
+"""Relative pressure drop 1 - r below which the flux is linear in the drop.
+
+At r = 1 the square root has infinite slope, which no real orifice shows (its flow turns laminar) and
+no integrator can follow. Below 0.9995 the flux is the isentropic one."""
+
+MAX_RELATIVE_ERROR = 2e-8
+"""Bound on the polynomial's relative error in flux over all r (tests/plant/test_flow.py proves it)."""
+
+_DEGREE = 7
+_LARGEST_DROP = 1 - CRITICAL_RATIO
+
+
+def bracket_over_drop(drop: np.ndarray) -> np.ndarray:
+    """2k/(k-1) (r^(2/k) - r^((k+1)/k)) / (1 - r) for drop = 1 - r > 0, exactly [-]."""
+    ratio = 1 - np.asarray(drop)
+    bracket = ratio ** (2 / KAPPA) - ratio ** ((KAPPA + 1) / KAPPA)
+    return 2 * KAPPA / (KAPPA - 1) * bracket / drop
+
+
+def _fit() -> tuple[float, ...]:
+    """Chebyshev interpolation of `bracket_over_drop` on the subcritical range, as plain powers."""
+    nodes = (chebyshev.chebpts1(_DEGREE + 1) + 1) / 2 * _LARGEST_DROP
+    return tuple(Polynomial.fit(nodes, bracket_over_drop(nodes), _DEGREE).convert().coef.tolist())
+
+
+_C0, _C1, _C2, _C3, _C4, _C5, _C6, _C7 = _fit()
+
+
+@inlined
+def mass_flux(p_a, p_b, inverse_sqrt_RT):
+    """Mass flux from side a to side b [kg/(s m^2)]; negative when p_b is the higher pressure.
+
+    p_a, p_b: absolute pressures [Pa], positive. inverse_sqrt_RT: 1/sqrt(R T) upstream [s/m].
+    """
+    upstream = max(p_a, p_b)
+    downstream = min(p_a, p_b)
+    drop = min(1.0 - downstream / upstream, _LARGEST_DROP)
+    bracket = _C0 + drop * (
+        _C1 + drop * (_C2 + drop * (_C3 + drop * (_C4 + drop * (_C5 + drop * (_C6 + drop * _C7)))))
+    )
+    turbulence = min(drop * (1.0 / LAMINAR_DROP), 1.0)
+    flux = upstream * inverse_sqrt_RT * math.sqrt(bracket * drop * turbulence)
+    return flux if p_a > p_b else -flux

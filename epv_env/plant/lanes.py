@@ -1,0 +1,104 @@
+"""Packing: the only place that knows in which row of a table a named quantity lies.
+
+A table is an array [row, lane] whose columns are valves, so that a loop over lanes reads and writes
+whole SIMD registers. The kernels work on one such table per block, the workspace, with these rows.
+"""
+
+import numpy as np
+
+from epv_env.plant.compiled import inlined
+from epv_env.plant.effects import Effects
+from epv_env.plant.equations import Coefficients, Inputs, State
+
+LANES = 16
+"""Valves per block. LLVM vectorises a loop of this known length without run-time checks."""
+
+N_STATE = len(State._fields)
+N_COEFFICIENT = len(Coefficients._fields)
+N_EFFECT = len(Effects._fields)
+N_INPUT = len(Inputs._fields)
+
+STATE = 0
+"""First row of the state; the next groups follow."""
+TRIAL = STATE + N_STATE
+"""First row of the state after the step on trial."""
+COEFFICIENT = TRIAL + N_STATE
+EFFECT = COEFFICIENT + N_COEFFICIENT
+INPUT = EFFECT + N_EFFECT
+FORCE = INPUT + N_INPUT
+"""Forces on the piston at the start, middle and end of the step, then on the armature [N]."""
+N_FORCE = 6
+REMAINING = FORCE + N_FORCE
+"""Time left in the period [s]."""
+HINT = REMAINING + 1
+"""Largest next step [s]."""
+EVENT = HINT + 1
+"""1 where the step on trial met an event, else 0."""
+LOWEST = EVENT + 1
+"""Least p2 so far [Pa]."""
+HIGHEST = LOWEST + 1
+"""Greatest p2 so far [Pa]."""
+N_ROW = HIGHEST + 1
+
+
+@inlined
+def new_workspace():
+    """Working memory of one block. One array of literal shape: LLVM then sees that no rows overlap."""
+    return np.empty((N_ROW, LANES))
+
+
+def _generated(name: str, arguments: str, body: str, **names):
+    """An inlined function from source text: one expression per field, so that no field is typed twice.
+
+    LLVM vectorises plain indexing; a loop over the fields of a tuple would go through memory.
+    """
+    namespace = dict(names)
+    exec(f"def {name}({arguments}):\n    {body}\n", namespace)
+    return inlined(namespace[name])
+
+
+def _reader(kind):
+    """Function (table, first, lane) -> the `kind` that starts at row `first` of column `lane`."""
+    items = ", ".join(f"table[first + {row}, lane]" for row in range(len(kind._fields)))
+    return _generated("read", "table, first, lane", f"return kind({items})", kind=kind)
+
+
+def _per_field(expression: str) -> str:
+    """The expression for each field of State, '@' standing for the field."""
+    return ", ".join(expression.replace("@", field) for field in State._fields)
+
+
+state_at = _reader(State)
+coefficients_at = _reader(Coefficients)
+effects_at = _reader(Effects)
+inputs_at = _reader(Inputs)
+
+store_state = _generated(
+    "store_state",
+    "table, first, lane, q",
+    "; ".join(f"table[first + {row}, lane] = q.{name}" for row, name in enumerate(State._fields)),
+)
+"""Write a State from row `first` of column `lane` on."""
+
+chosen_state = _generated(
+    "chosen_state",
+    "condition, q, other",
+    f"return State({_per_field('q.@ if condition else other.@')})",
+    State=State,
+)
+"""q where the condition holds, else other, without a branch."""
+
+moved = _generated(
+    "moved", "q, rates, h", f"return State({_per_field('q.@ + h * rates.@')})", State=State
+)
+"""q + h * rates, field by field."""
+
+
+@inlined
+def copy_rows(source, source_row, source_lane, target, target_row, target_lane, n_rows):
+    """Copy n_rows rows of one block of lanes from table to table."""
+    for row in range(n_rows):
+        for lane in range(LANES):
+            target[target_row + row, target_lane + lane] = source[
+                source_row + row, source_lane + lane
+            ]

@@ -1,0 +1,124 @@
+"""The parameters of the valve: the rows of Tables 5-7 and the sets of values made from them."""
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from types import MappingProxyType
+from typing import Any
+
+
+class ParameterError(ValueError):
+    """A parameter is unknown, not a number, or outside the domain in which the model means anything."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """One row of the report's parameter tables. Units are SI."""
+
+    symbol: str
+    unit: str
+    value: float
+    domain: tuple[float, float] | None
+    """Expected range (Tables 6, 7); None for a physical constant."""
+    group: str
+    """'known', 'partially known', 'unknown' (section 5.1), 'unmodelled' or 'environment'."""
+    sensitive: bool
+    """Whether Tables 8 and 9 class the model as sensitive to it."""
+    source: str
+    meaning: str
+
+
+@cache
+def _data() -> dict[str, Any]:
+    text = resources.files(__package__).joinpath("parameters.json").read_text(encoding="utf-8")
+    return json.loads(text)
+
+
+@cache
+def table() -> Mapping[str, Parameter]:
+    """Every parameter by its symbol, in the order of the report."""
+    rows = (
+        Parameter(**{**row, "domain": tuple(row["domain"]) if row["domain"] else None})
+        for row in _data()["parameters"]
+    )
+    return MappingProxyType({row.symbol: row for row in rows})
+
+
+def sensitive_symbols() -> tuple[str, ...]:
+    """Symbols that Tables 8 and 9 class as Sensitive."""
+    return tuple(symbol for symbol, row in table().items() if row.sensitive)
+
+
+def confidence_intervals() -> dict[str, tuple[float, float]]:
+    """The 95 % intervals of Table 14 for the four calibrated parameters."""
+    return {symbol: (low, high) for symbol, (low, high) in _data()["confidence95"]["intervals"].items()}
+
+
+def checked_value(symbol: str, value: Any) -> float:
+    """The value as a float, if `symbol` exists and its domain holds it; else ParameterError."""
+    row = table().get(symbol)
+    if row is None:
+        raise ParameterError(
+            f"unknown parameter {symbol!r}: known symbols are {', '.join(table())}"
+        )
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        try:
+            value = value.item()  # a NumPy scalar
+        except (AttributeError, ValueError):
+            raise ParameterError(f"parameter {symbol} is {value!r}: give one number [{row.unit}]") from None
+    low, high = row.domain if row.domain else (row.value, row.value)
+    if not low <= value <= high:
+        remedy = "give a value inside it" if row.domain else "leave this constant out"
+        raise ParameterError(
+            f"parameter {symbol} = {value:g} {row.unit} is outside its domain "
+            f"[{low:g}, {high:g}] ({row.source}): {remedy}"
+        )
+    return float(value)
+
+
+class Parameters(Mapping[str, float]):
+    """An immutable, complete and checked set of values by symbol.
+
+    >>> Parameters.calibrated().replace(alphaMV=0.7)["alphaMV"]
+    0.7
+    """
+
+    def __init__(self, values: Mapping[str, float]):
+        """values: a value for every symbol of `table()`. Raises ParameterError."""
+        missing = [symbol for symbol in table() if symbol not in values]
+        if missing:
+            raise ParameterError(f"missing parameters: {', '.join(missing)}: give every symbol")
+        self._values = {symbol: checked_value(symbol, value) for symbol, value in values.items()}
+
+    @classmethod
+    def nominal(cls) -> "Parameters":
+        """The values of Tables 5-7, on which the report's sensitivity study stands."""
+        return cls({symbol: row.value for symbol, row in table().items()})
+
+    @classmethod
+    def calibrated(cls) -> "Parameters":
+        """Table 12's estimates with the cone model removed (section 6.1): the default plant."""
+        return cls.nominal().replace(**_data()["calibrated"]["values"])
+
+    @classmethod
+    def initial_guess(cls) -> "Parameters":
+        """Table 10: where the report's calibration started."""
+        return cls.nominal().replace(**_data()["initial_guess"]["values"])
+
+    def replace(self, **changes: float) -> "Parameters":
+        """A copy with some values changed. Raises ParameterError."""
+        return Parameters({**self._values, **changes})
+
+    def __getitem__(self, symbol: str) -> float:
+        return self._values[symbol]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __repr__(self) -> str:
+        return f"Parameters({self._values})"

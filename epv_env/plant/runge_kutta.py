@@ -1,0 +1,42 @@
+"""One classical Runge-Kutta step of the whole state, with the movers that a stop holds kept still."""
+
+from epv_env.plant.compiled import inlined
+from epv_env.plant.equations import State, derivative
+from epv_env.plant.lanes import moved
+
+
+@inlined
+def is_held(x, v, x_max, force):
+    """Whether a stop holds a mover: at rest on it and pressed against it."""
+    at_low = (x <= 0.0) & (force <= 0.0)
+    at_high = (x >= x_max) & (force >= 0.0)
+    return (v == 0.0) & (at_low | at_high)
+
+
+@inlined
+def held_still(rates, free_PV, free_MV):
+    """The rates with those of held movers set to zero."""
+    return State(
+        rates.p2, rates.p3,
+        rates.xPV * free_PV, rates.vPV * free_PV,
+        rates.xMV * free_MV, rates.vMV * free_MV,
+        rates.I, rates.p1,
+        rates.air_in_PV, rates.air_in_MV, rates.air_vented, rates.coil_energy,
+    )  # fmt: skip
+
+
+@inlined
+def remaining_stages(q, k1, u, c, effects, free_PV, free_MV, h, extended):
+    """Stages 2 to 4 and their sum.
+
+    k1: rates at q. Returns the state after h [s], and each mover's force in mid-step and at the end,
+    which tell whether and when a stop lets go.
+    """
+    k2, _, _ = derivative(moved(q, k1, 0.5 * h), u, c, effects, free_PV, free_MV, extended)
+    k3, mid_PV, mid_MV = derivative(
+        moved(q, k2, 0.5 * h), u, c, effects, free_PV, free_MV, extended
+    )
+    k4, end_PV, end_MV = derivative(moved(q, k3, h), u, c, effects, free_PV, free_MV, extended)
+    sixth, third = h / 6.0, h / 3.0
+    end = moved(moved(moved(moved(q, k1, sixth), k2, third), k3, third), k4, sixth)
+    return end, mid_PV, mid_MV, end_PV, end_MV

@@ -1,0 +1,73 @@
+"""Simulating one valve on given inputs: recordings, tests, figures."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from epv_env.plant.equations import Inputs, State
+from epv_env.plant.integrate import DEFAULT_STEP
+from epv_env.plant.valves import Valves
+
+
+class SimulationError(RuntimeError):
+    """The integrator gave a valve up; its parameters or inputs are not physical."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trajectory:
+    """A simulated run; every array has shape (samples,) or, for n valves, (samples, n). SI units."""
+
+    time: NDArray
+    U: NDArray
+    state: State
+
+
+def energised(p: Mapping[str, float], *, p1: float, p2: float, U: float) -> State:
+    """Steady state with the coil on: armature pulled in, p3 = p1, PV shut (SI units)."""
+    return State(
+        p2=p2, p3=p1, xPV=0.0, vPV=0.0, xMV=p["xMVmax"], vMV=0.0, I=U / p["R"], p1=p1,
+        air_in_PV=0.0, air_in_MV=0.0, air_vented=0.0, coil_energy=0.0,
+    )  # fmt: skip
+
+
+def simulate(
+    p: Mapping[str, ArrayLike],
+    *,
+    initial: State,
+    U: ArrayLike,
+    period: float,
+    sigma_S: ArrayLike = 0.0,
+    p1: ArrayLike | None = None,
+    reservoir_volume: float = np.inf,
+    step: float = DEFAULT_STEP,
+) -> Trajectory:
+    """Run one valve (or n variants of it at once) through a sampled voltage.
+
+    p: parameters by symbol, scalars or arrays (n,). initial: state at time 0. U [V], sigma_S [kg/s]:
+    shape (samples,) or (samples, n); value k holds from sample k to k + 1. p1 [Pa]: recorded supply,
+    (samples,), taken linear between samples; None keeps the initial one. period: time between samples
+    [s]. Returns the states at the samples, the first being `initial`. Raises SimulationError.
+    """
+    U = np.asarray(U, dtype=float)
+    n = max(np.size(value) for value in (*p.values(), *initial, U[0]))
+    valves = Valves(n, step=step)
+    valves.set_parameters(np.arange(n), p, reservoir_volume)
+    for field, value in zip(valves.state, initial, strict=True):
+        field[:] = value
+    columns = [value[:, None] if (value := np.asarray(x, float)).ndim == 1 else value for x in (U, sigma_S)]
+    slope = np.zeros((len(U), 1))
+    if p1 is not None:
+        valves.state.p1[:] = np.asarray(p1)[0]
+        slope[:-1, 0] = np.diff(p1) / period
+    later = valves.record(Inputs(columns[0], columns[1], slope, np.zeros((1, 1))), period)
+    if not np.all(np.isfinite(later.p2)):
+        raise SimulationError(
+            "the plant could not be integrated: check that pressures are positive (an empty circuit "
+            "cannot be consumed from) and that parameters lie in their domains"
+        )
+    state = State(*(np.concatenate([np.broadcast_to(first, (1, n)), rest[:-1]]) for first, rest in zip(initial, later, strict=True)))
+    if n == 1:
+        state = State(*(field[:, 0] for field in state))
+    return Trajectory(time=np.arange(len(U)) * period, U=U, state=state)

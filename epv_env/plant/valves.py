@@ -1,0 +1,121 @@
+"""A batch of valves: the NumPy side of the compiled integrator."""
+
+import os
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from epv_env.plant import integrate
+from epv_env.plant.coefficients import coefficients, effect_sizes, needs_extended
+from epv_env.plant.equations import Inputs, State
+from epv_env.plant.lanes import LANES, N_INPUT, N_STATE
+from epv_env.plant.parameters import Parameters
+
+LANES_PER_TASK = 4 * LANES
+"""Fewest lanes worth a thread of their own."""
+
+
+@cache
+def _pool(process_id: int) -> ThreadPoolExecutor:
+    """One pool per process: a forked child must not wait for its parent's threads."""
+    return ThreadPoolExecutor(available_cores(), thread_name_prefix="epv-plant")
+
+
+def available_cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class Valves:
+    """State and parameters of n valves, advanced together.
+
+    Each valve's trajectory is the same to the bit whatever n, its place in the batch, and threads.
+    """
+
+    def __init__(self, n: int, *, step: float = integrate.DEFAULT_STEP, threads: int | None = None):
+        """n: number of valves. step: largest integration step [s]. threads: None = all cores."""
+        self.n = n
+        self.step = step
+        self.threads = available_cores() if threads is None else threads
+        lanes = -(-n // LANES) * LANES
+        calibrated = Parameters.calibrated()
+        self._coefficients = np.repeat(coefficients(calibrated), lanes, axis=1)
+        self._effects = np.repeat(effect_sizes(calibrated), lanes, axis=1)
+        self._state = np.zeros((N_STATE, lanes))
+        State(*self._state).p1[:] = State(*self._state).p2[:] = State(*self._state).p3[:] = 1e5
+        self._inputs = np.zeros((N_INPUT, lanes))
+        self._duration = np.zeros(lanes)
+        self._lowest = np.full(lanes, np.inf)
+        self._highest = np.full(lanes, -np.inf)
+        self._extended = False
+
+    @property
+    def state(self) -> State:
+        """Views of the state, one array of shape (n,) per field; writing to them sets the state."""
+        return State(*self._state[:, : self.n])
+
+    @property
+    def inputs(self) -> Inputs:
+        """Views of the inputs that the next `advance` applies, shape (n,)."""
+        return Inputs(*self._inputs[:, : self.n])
+
+    @property
+    def lowest_p2(self) -> NDArray:
+        """Least p2 since `forget_extremes` [Pa], shape (n,)."""
+        return self._lowest[: self.n]
+
+    @property
+    def highest_p2(self) -> NDArray:
+        """Greatest p2 since `forget_extremes` [Pa], shape (n,)."""
+        return self._highest[: self.n]
+
+    def forget_extremes(self) -> None:
+        """Start the running extremes of p2 anew."""
+        self._lowest[:] = np.inf
+        self._highest[:] = -np.inf
+
+    def set_parameters(
+        self, where: ArrayLike, p: Mapping[str, ArrayLike], reservoir_volume: ArrayLike = np.inf
+    ) -> None:
+        """Give the valves at the indices `where` (m,) the values p (scalars or arrays (m,))."""
+        self._coefficients[:, where] = coefficients(p, reservoir_volume)
+        self._effects[:, where] = effect_sizes(p)
+        self._extended = needs_extended(self._effects)
+
+    def advance(self, duration: ArrayLike) -> None:
+        """Apply `inputs` for `duration` [s], one for all or one per valve (n,)."""
+        self._duration[: self.n] = duration
+        self._run(self._inputs[None], self._duration[None], np.empty((0, *self._state.shape)))
+
+    def record(self, inputs: Inputs, period: float) -> State:
+        """Apply a series of inputs, each for `period` [s], and keep every state.
+
+        inputs: fields that broadcast to (samples, n). Returns fields of shape (samples, n): the state
+        after each period. A valve that cannot be integrated becomes NaN.
+        """
+        fields = np.broadcast_arrays(*inputs, np.empty((1, self.n)))[:-1]
+        table = np.zeros((fields[0].shape[0], N_INPUT, self._state.shape[1]))
+        table[:, :, : self.n] = np.stack(fields, axis=1)
+        duration = np.zeros((table.shape[0], table.shape[2]))
+        duration[:, : self.n] = period
+        out = np.empty((table.shape[0], *self._state.shape))
+        self._run(table, duration, out)
+        return State(*out[:, :, : self.n].transpose(1, 0, 2))
+
+    def _run(self, inputs: NDArray, duration: NDArray, out: NDArray) -> None:
+        run = integrate.run_extended if self._extended else integrate.run_nominal
+
+        def work(first: int, last: int) -> None:
+            run(self._state, self._coefficients, self._effects, inputs, duration, self._lowest,
+                self._highest, out, self.step, first, last)  # fmt: skip
+
+        lanes = self._state.shape[1]
+        tasks = min(self.threads, lanes // LANES_PER_TASK)
+        if tasks <= 1:
+            work(0, lanes)
+            return
+        edges = np.linspace(0, lanes // LANES, tasks + 1).astype(int) * LANES
+        list(_pool(os.getpid()).map(work, edges[:-1], edges[1:]))
