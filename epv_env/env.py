@@ -1,0 +1,128 @@
+"""EPValve-v0 and EPValvePWM-v0: one valve as a Gymnasium environment."""
+
+from typing import Any, ClassVar, SupportsFloat
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from epv_env.actions import PWM, OnOff
+from epv_env.infos import single_info
+from epv_env.observation import observation_space
+from epv_env.plant.plantfile import load_plant
+from epv_env.plant.supply import BAR
+from epv_env.render import Renderer, Snapshot
+from epv_env.settings import make_settings, with_options
+from epv_env.task import LimitingTask
+
+GRAM = 1e-3
+
+
+class _ValveEnv(gymnasium.Env[NDArray, Any]):
+    """Keep the circuit pressure within ±500 mbar of a target while consumers draw air.
+
+    Observation: Box, float32, the ECU's readings as `epv_env.observation.LAYOUT` lists them. Reward:
+    the sum of `epv_env.reward.RewardTerms`. Terminates when the circuit is empty (p2 below 1.5 bar),
+    never otherwise; Gymnasium's time limit truncates after 10 s. info: see `epv_env.infos`.
+
+    Arguments, all optional:
+        plant: path of a plant file (docs/data.md), a Plant, or None for the report's calibration.
+        parameters: "exact" (the plant's own), the name of a region ("confidence", "ten_percent",
+            "sensitive_ten_percent", "domain"), or {symbol: value or (low, high)} in SI units.
+        supply: None for two reservoirs that sag, a constant pressure [bar absolute], or a Supply.
+        scenario: name of a consumption scenario (`epv_env.plant.consumption.SCENARIOS`) or "mixed".
+        target_bar, p2_bar, p3_bar: value or (low, high) [bar absolute].
+        control_period: time between decisions [s].
+        supply_voltage, settling_time, sensor_noise, weights, drop_bar: see `epv_env.settings`.
+    reset(options=...) takes parameters, supply, scenario, target_bar, p2_bar and p3_bar for one episode.
+    Raises ValueError subclasses with one clear sentence for what cannot be used.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array", "human"], "render_fps": 50}
+    action_form: ClassVar[type[OnOff] | type[PWM]]
+
+    def __init__(
+        self,
+        *,
+        plant: Any = None,
+        control_period: float | None = None,
+        render_mode: str | None = None,
+        **options: Any,
+    ):
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise ValueError(f"unknown render_mode {render_mode!r}: use 'rgb_array' or 'human'")
+        period = self.action_form.default_period if control_period is None else control_period
+        self.plant = load_plant(plant)
+        self.settings = make_settings(self.plant, control_period=period, **options)
+        self.render_mode = render_mode
+        self.action = self.action_form(period)
+        self.action_space = self.action.space()
+        self.observation_space = observation_space()
+        self.task = LimitingTask(1, self.settings, threads=1)
+        self._renderer: Renderer | None = None
+        self._consumption = 0.0
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray, dict[str, Any]]:
+        super().reset(seed=seed)
+        settings = with_options(self.settings, options, self.plant) if options else self.settings
+        observation = self.task.begin(np.array([0]), [self.np_random], [settings])[0]
+        self._consumption = 0.0
+        if self._renderer is not None:
+            self._renderer.reset()
+        if self.render_mode == "human":
+            self.render()
+        return observation, {}
+
+    def step(self, action: Any) -> tuple[NDArray, SupportsFloat, bool, bool, dict[str, Any]]:
+        on_time, asked = self.action.decode(np.asarray(action)[None])
+        result = self.task.step(on_time, asked)
+        self._consumption = float(result.consumption[0])
+        if self.render_mode == "human":
+            self.render()
+        info = single_info(result)
+        return result.observation[0], float(result.reward[0]), bool(result.failed[0]), False, info
+
+    def snapshot(self) -> Snapshot:
+        """The true state at this instant, for pictures and logs (a controller must not see it)."""
+        state = self.task.valves.state
+        p = self.task.parameters[0]
+        if p is None:
+            raise RuntimeError("there is no episode yet: call reset() first")
+        return Snapshot(
+            time_s=float(self.task.time()[0]),
+            p1_bar=float(state.p1[0]) / BAR,
+            p2_bar=float(state.p2[0]) / BAR,
+            p3_bar=float(state.p3[0]) / BAR,
+            target_bar=float(self.task.target[0]),
+            xPV_fraction=float(state.xPV[0]) / p["xPVmax"],
+            xMV_fraction=float(state.xMV[0]) / p["xMVmax"],
+            I_A=float(state.I[0]),
+            coil_on=bool(self.task.valves.inputs.U[0] > 0),
+            sigma_S_g_per_s=self._consumption / GRAM,
+        )
+
+    def render(self) -> Any:
+        """An RGB frame (rgb_array), or None (human: a window; None: nothing)."""
+        if self.render_mode is None:
+            gymnasium.logger.warn("render() without a render_mode: pass render_mode to make()")
+            return None
+        if self._renderer is None:
+            self._renderer = Renderer(self.render_mode, self.metadata["render_fps"])
+        return self._renderer.draw(self.snapshot())
+
+    def close(self) -> None:
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+
+class EPValveEnv(_ValveEnv):
+    __doc__ = (_ValveEnv.__doc__ or "") + "Action: Discrete(2), 0 = coil off (the PV opens), 1 = on (it shuts)."
+    action_form = OnOff
+
+
+class EPValvePWMEnv(_ValveEnv):
+    __doc__ = (_ValveEnv.__doc__ or "") + "Action: Box [-1, 1]: (action + 1) / 2 is the share of the PWM period with the coil on."
+    action_form = PWM

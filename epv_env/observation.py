@@ -1,0 +1,87 @@
+"""What the controller sees: the readings of an ECU, normalised. This order is a contract.
+
+Decision 2026-11-21: no true state, parameter or consumption is ever observed; changes over past samples
+stand for the rates that an ECU would compute.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+P2_LAGS = (1, 2, 4, 8)
+"""Control periods over which changes of the measured p2 are observed."""
+P3_LAGS = (1, 4)
+"""The same for p3."""
+HISTORY = max(*P2_LAGS, *P3_LAGS) + 1
+"""Readings of p2 and p3 that are kept, the newest first."""
+
+LONGEST_WAIT = 0.2
+"""Time since the last switching at which its observation saturates [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantity:
+    """One entry of the observation: (value - centre) / scale, clipped to ±limit."""
+
+    name: str
+    unit: str
+    centre: float
+    scale: float
+    limit: float
+
+
+def _layout() -> tuple[Quantity, ...]:
+    def quantity(name: str, unit: str, centre: float, scale: float, limit: float) -> Quantity:
+        return Quantity(name=name, unit=unit, centre=centre, scale=scale, limit=limit)
+
+    return (
+        quantity("p2_error", "bar", 0.0, 0.5, 32.0),
+        quantity("target", "bar", 8.0, 4.0, 2.5),
+        quantity("p1", "bar", 10.0, 4.0, 2.5),
+        quantity("p3", "bar", 8.0, 4.0, 2.5),
+        quantity("I", "A", 0.3, 0.3, 5.0),
+        quantity("action", "1", 0.5, 0.5, 1.0),
+        quantity("since_switching", "s", LONGEST_WAIT / 2, LONGEST_WAIT / 2, 1.0),
+        *(quantity(f"p2_change_{lag}", "bar", 0.0, 0.1, 160.0) for lag in P2_LAGS),
+        *(quantity(f"p3_change_{lag}", "bar", 0.0, 0.5, 32.0) for lag in P3_LAGS),
+    )
+
+
+LAYOUT = _layout()
+"""Entries of the observation in their order."""
+
+INDEX = {quantity.name: row for row, quantity in enumerate(LAYOUT)}
+"""Row of each entry."""
+
+_CENTRE = np.array([quantity.centre for quantity in LAYOUT])
+_SCALE = np.array([quantity.scale for quantity in LAYOUT])
+_LIMIT = np.array([quantity.limit for quantity in LAYOUT], dtype=np.float32)
+
+
+def observation_space() -> gymnasium.spaces.Box:
+    """The finite box of one observation, float32."""
+    return gymnasium.spaces.Box(-_LIMIT, _LIMIT, dtype=np.float32)
+
+
+def encode(values: dict[str, NDArray]) -> NDArray:
+    """Observations (n, entries) float32 from physical values (n,) by name, in bar, A and s."""
+    columns = np.stack([values[quantity.name] for quantity in LAYOUT], axis=-1)
+    return np.clip((columns - _CENTRE) / _SCALE, -_LIMIT, _LIMIT).astype(np.float32)
+
+
+def decode(observations: NDArray, name: str) -> NDArray:
+    """One entry of observations (n, entries) in its unit, (n,)."""
+    row = INDEX[name]
+    return observations[..., row] * LAYOUT[row].scale + LAYOUT[row].centre
+
+
+def contract(control_period: float) -> dict[str, Any]:
+    """The layout as data, for a policy that leaves this package: order, units, scaling, period."""
+    return {
+        "format": "epv-observation/1",
+        "control_period_s": control_period,
+        "entries": [vars(quantity) for quantity in LAYOUT],
+    }

@@ -1,0 +1,127 @@
+"""Regions of parameter space from which plants are drawn: fixed, a box, or a joint confidence region."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epv_env.plant.parameters import (
+    ParameterError,
+    Parameters,
+    checked_value,
+    confidence_intervals,
+    sensitive_symbols,
+    table,
+)
+
+CALIBRATED_SYMBOLS = ("alphaMV", "alphaPV", "RML", "R")
+"""The four parameters that the report calibrates (Tables 10, 12, 14)."""
+
+REGIONS = ("exact", "confidence", "ten_percent", "sensitive_ten_percent", "domain")
+"""Named regions around a plant (`Region.named`)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Region:
+    """Plants around a centre. Empty boxes and covariance: the centre alone."""
+
+    centre: Parameters
+    boxes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Symbols that vary on their own, uniformly between two ends (SI units)."""
+    symbols: tuple[str, ...] = ()
+    """Symbols that vary jointly, uniformly in the ellipsoid of `covariance` around the centre."""
+    covariance: NDArray | None = None
+    """Covariance of the joint symbols, shape (k, k), SI units."""
+    chi_square: float = 0.0
+    """Squared Mahalanobis radius of the ellipsoid (for 95 % of four parameters: 9.49)."""
+
+    def __post_init__(self) -> None:
+        for symbol, (low, high) in self.boxes.items():
+            if not low <= high:
+                raise ParameterError(f"range of {symbol} is [{low:g}, {high:g}]: give low <= high")
+            checked_value(symbol, low)
+            checked_value(symbol, high)
+        if self.covariance is not None:
+            k = len(self.symbols)
+            if self.covariance.shape != (k, k) or np.any(np.linalg.eigvalsh(self.covariance) < 0):
+                raise ParameterError(
+                    f"the joint region's covariance must be a positive semi-definite {k} x {k} "
+                    f"matrix, one row per symbol of {self.symbols}"
+                )
+
+    @classmethod
+    def named(cls, name: str, centre: Parameters) -> "Region":
+        """One of REGIONS around the centre.
+
+        "confidence": Table 14's intervals, moved to the centre; "ten_percent": +-10 % of the four
+        calibrated parameters; "sensitive_ten_percent": +-10 % of every parameter that Tables 8 and 9
+        class as Sensitive; "domain": the full domains of the four.
+        """
+        if name == "exact":
+            return cls(centre=centre)
+        if name == "confidence":
+            reference = Parameters.calibrated()
+            boxes = {
+                symbol: (low + centre[symbol] - reference[symbol], high + centre[symbol] - reference[symbol])
+                for symbol, (low, high) in confidence_intervals().items()
+            }
+        elif name == "ten_percent":
+            boxes = _relative(centre, CALIBRATED_SYMBOLS, 0.1)
+        elif name == "sensitive_ten_percent":
+            boxes = _relative(centre, sensitive_symbols(), 0.1)
+        elif name == "domain":
+            boxes = {s: table()[s].domain or (centre[s], centre[s]) for s in CALIBRATED_SYMBOLS}
+        else:
+            raise ParameterError(
+                f"unknown parameter region {name!r}: choose one of {', '.join(REGIONS)}, or give "
+                "values and (low, high) ranges by symbol"
+            )
+        return cls(centre=centre, boxes=boxes)
+
+    @classmethod
+    def from_choices(cls, choices: Mapping[str, Any], centre: Parameters) -> "Region":
+        """Exact values and (low, high) ranges by symbol; what is not named stays at the centre."""
+        exact: dict[str, float] = {}
+        boxes: dict[str, tuple[float, float]] = {}
+        for symbol, choice in choices.items():
+            if isinstance(choice, (tuple, list, np.ndarray)):
+                if len(choice) != 2:
+                    raise ParameterError(f"range of {symbol} is {choice!r}: give (low, high)")
+                boxes[symbol] = (checked_value(symbol, choice[0]), checked_value(symbol, choice[1]))
+            else:
+                exact[symbol] = checked_value(symbol, choice)
+        return cls(centre=centre.replace(**exact), boxes=boxes)
+
+    def draw(self, rng: np.random.Generator) -> Parameters:
+        """One plant of the region."""
+        changes = {symbol: float(rng.uniform(*ends)) for symbol, ends in self.boxes.items()}
+        if self.covariance is not None:
+            changes |= dict(zip(self.symbols, self._joint(rng), strict=True))
+        return self.centre.replace(**changes)
+
+    def _joint(self, rng: np.random.Generator) -> list[float]:
+        """A uniform point of the ellipsoid, by scaling a direction; kept inside the domains."""
+        k = len(self.symbols)
+        direction = rng.standard_normal(k)
+        radius = np.sqrt(self.chi_square) * rng.uniform() ** (1 / k) / np.linalg.norm(direction)
+        values, vectors = np.linalg.eigh(self.covariance)
+        offset = vectors @ (np.sqrt(np.maximum(values, 0)) * direction) * radius
+        domains = [table()[symbol].domain or (-np.inf, np.inf) for symbol in self.symbols]
+        return [
+            float(np.clip(self.centre[symbol] + change, low, high))
+            for symbol, change, (low, high) in zip(self.symbols, offset, domains, strict=True)
+        ]
+
+
+def _relative(
+    centre: Parameters, symbols: tuple[str, ...], share: float
+) -> dict[str, tuple[float, float]]:
+    """Boxes of +-share around the centre, cut at the domains."""
+    boxes = {}
+    for symbol in symbols:
+        low, high = table()[symbol].domain or (-np.inf, np.inf)
+        value = centre[symbol]
+        boxes[symbol] = (max(value * (1 - share), low), min(value * (1 + share), high))
+    return boxes

@@ -1,0 +1,86 @@
+"""Where the input chamber's air comes from: constant, recorded, or reservoirs with a compressor."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+BAR = 1e5
+
+
+@dataclass(frozen=True, kw_only=True)
+class Supply:
+    """The supply of the input chamber, the same rule for every valve of a batch.
+
+    Two 40-litre reservoirs feed the report's bench (section 3). Air drawn through the valve lowers their
+    pressure; a compressor that starts at `cut_in` and stops at `cut_out` refills them.
+    """
+
+    pressure: tuple[float, float]
+    """Range from which an episode's first p1 is drawn [Pa absolute]; equal ends fix it."""
+    volume: float = np.inf
+    """V1 of the reservoirs [m^3]; infinite: the supply does not sag."""
+    cut_in: float = 0.0
+    """Pressure at which the compressor starts [Pa absolute]."""
+    cut_out: float = 0.0
+    """Pressure at which the compressor stops [Pa absolute]."""
+    delivery: float = 0.0
+    """Air that the running compressor delivers [kg/s]."""
+    recording: tuple[NDArray, NDArray] | None = None
+    """Recorded time [s] and p1 [Pa absolute], held constant beyond its ends."""
+
+    def __post_init__(self) -> None:
+        low, high = self.pressure
+        if not 0 < low <= high:
+            raise ValueError(
+                f"supply pressure range [{low:g}, {high:g}] Pa is empty or not positive: "
+                "give 0 < low <= high, absolute"
+            )
+        if self.cut_in > self.cut_out:
+            raise ValueError(
+                f"compressor cut-in {self.cut_in:g} Pa is above its cut-out {self.cut_out:g} Pa: "
+                "give cut_in <= cut_out"
+            )
+
+    @classmethod
+    def constant(cls, pressure_bar: float) -> "Supply":
+        """A supply that holds one pressure [bar absolute] whatever is drawn."""
+        return cls(pressure=(pressure_bar * BAR, pressure_bar * BAR))
+
+    @classmethod
+    def reservoirs(
+        cls, pressure_bar: tuple[float, float] = (10.5, 12.5), volume_litres: float = 80.0
+    ) -> "Supply":
+        """Two 40-litre reservoirs and a compressor of 5 g/s between 10.5 and 12.5 bar absolute.
+
+        The delivery is that of a truck's single-cylinder compressor at idle, about 250 litres/min.
+        """
+        return cls(
+            pressure=(pressure_bar[0] * BAR, pressure_bar[1] * BAR),
+            volume=volume_litres * 1e-3,
+            cut_in=10.5 * BAR,
+            cut_out=12.5 * BAR,
+            delivery=5e-3,
+        )
+
+    @classmethod
+    def recorded(cls, time_s: NDArray, pressure_bar: NDArray) -> "Supply":
+        """A measured p1 [bar absolute], linear between its samples."""
+        time, pressure = np.asarray(time_s, float), np.asarray(pressure_bar, float) * BAR
+        if time.ndim != 1 or time.shape != pressure.shape or np.any(np.diff(time) <= 0):
+            raise ValueError("a recorded supply needs increasing times and one pressure for each")
+        return cls(pressure=(pressure[0], pressure[0]), recording=(time, pressure))
+
+    def draw(self, rng: np.random.Generator) -> float:
+        """An episode's first p1 [Pa]."""
+        return float(rng.uniform(*self.pressure))
+
+    def slope(self, time: NDArray, period: float) -> NDArray:
+        """Imposed dp1/dt over the period that starts at `time` [Pa/s], shape of time."""
+        if self.recording is None:
+            return np.zeros_like(time)
+        return (np.interp(time + period, *self.recording) - np.interp(time, *self.recording)) / period
+
+    def compressor_runs(self, p1: NDArray, ran: NDArray) -> NDArray:
+        """Whether the compressor runs now (two-point control with memory), boolean array."""
+        return (p1 < self.cut_in) | (ran & (p1 < self.cut_out))

@@ -1,0 +1,140 @@
+"""The renderer: composes the frame, and hands it out as an array or shows it in a window."""
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epv_env.render.canvas import Canvas, load_pygame
+from epv_env.render.palette import BAD, CARD, EDGE, GOOD, INK, MUTED, PAGE
+from epv_env.render.section import draw_section, draw_section_background
+from epv_env.render.section import AREA as SECTION_AREA
+from epv_env.render.snapshot import Snapshot
+from epv_env.render.strip import Strip
+
+if TYPE_CHECKING:
+    import pygame
+
+WIDTH, HEIGHT = 1280, 720
+"""Size of the frame [px]."""
+HEADER_AREA = (0, 0, WIDTH, 64)
+SECTION_CARD = (20, 68, 664, 704)
+STRIP_CARD = (680, 68, 1260, 704)
+MOVING = 0.01
+"""Stroke fraction from which the piston counts as off its seat [-]."""
+
+
+def phase(snapshot: Snapshot) -> tuple[str, str]:
+    """Name of what the valve is doing, and a sentence on it."""
+    is_open = snapshot.xPV_fraction > MOVING
+    if snapshot.coil_on:
+        if is_open:
+            return "Closing", "coil on: p_3 rises until it shuts the PV"
+        return "Holding", "coil on: p_3 keeps the PV shut, p_2 only falls by consumption"
+    if is_open:
+        return "Filling", "coil off: PV open, p_2 rises towards p_1"
+    return "Venting", "coil off: p_3 falls until p_1 and p_2 lift the piston"
+
+
+class Renderer:
+    """Draws snapshots, one frame each.
+
+    `is_open` turns False when the user shuts the window (mode 'human'); `draw` then does nothing.
+    """
+
+    def __init__(
+        self,
+        mode: Literal["rgb_array", "human"],
+        fps: int,
+        *,
+        tolerance_bar: float = 0.5,
+        window_s: float = 3.0,
+    ):
+        """fps: frames per second of the window. tolerance_bar: half width of the shaded band [bar].
+
+        window_s: time that the strip chart shows [s]. Raises DependencyNotInstalled on first drawing.
+        """
+        if mode not in ("rgb_array", "human"):
+            raise ValueError(f"render mode {mode!r} is unknown: use 'rgb_array' or 'human'")
+        self.mode = mode
+        self.fps = fps
+        self.is_open = True
+        self._strip = Strip(tolerance_bar=tolerance_bar, window_s=window_s)
+        self._canvas: Canvas | None = None
+        self._window: pygame.Surface | None = None
+        self._clock: pygame.time.Clock | None = None
+
+    def reset(self) -> None:
+        """Forget the strip chart's history: a new episode begins."""
+        self._strip.reset()
+
+    def draw(self, snapshot: Snapshot) -> NDArray[np.uint8] | None:
+        """Draw one frame. Mode 'rgb_array': returns it, uint8 (720, 1280, 3). 'human': shows it."""
+        if not self.is_open:
+            return None
+        self._strip.append(snapshot)
+        canvas = self._compose(snapshot)
+        if self.mode == "rgb_array":
+            return canvas.image()
+        self._show(canvas)
+        return None
+
+    def close(self) -> None:
+        """Shut the window and free the memory. May be called twice."""
+        if self._window is not None:
+            load_pygame().display.quit()
+        self._canvas = self._window = self._clock = None
+        self.is_open = False
+
+    def _compose(self, snapshot: Snapshot) -> Canvas:
+        if self._canvas is None:
+            self._canvas = Canvas(WIDTH, HEIGHT)
+            self._draw_background(self._canvas)
+        canvas = self._canvas
+        areas = (HEADER_AREA, SECTION_AREA, self._strip.area)
+        for area in areas:
+            canvas.clear(area)
+        self._draw_header(canvas, snapshot)
+        draw_section(canvas, snapshot)
+        self._strip.draw(canvas)
+        for area in areas:
+            canvas.sharpen(area)
+        return canvas
+
+    def _draw_background(self, canvas: Canvas) -> None:
+        canvas.rectangle((0, 0, WIDTH, HEIGHT), PAGE)
+        for card in (SECTION_CARD, STRIP_CARD):
+            canvas.rectangle(card, CARD, radius=10)
+            canvas.rectangle(card, EDGE, radius=10, outline=1)
+        draw_section_background(canvas)
+        self._strip.draw_background(canvas)
+        canvas.keep_as_background()
+
+    def _draw_header(self, canvas: Canvas, snapshot: Snapshot) -> None:
+        name, sentence = phase(snapshot)
+        canvas.rectangle((20, 18, 124, 50), INK, radius=8)
+        canvas.text(name, (72, 34), 22, CARD, align=0.5)
+        canvas.text(sentence, (138, 34), 20, INK)
+        deviation = snapshot.p2_bar - snapshot.target_bar
+        inside = abs(deviation) <= self._strip.tolerance_bar
+        canvas.rectangle((900, 18, 1122, 50), GOOD if inside else BAD, radius=8)
+        # The font's hyphen stands for a minus: it is as wide as the plus is not.
+        words = f"p_2 – target  {deviation:+.2f} bar".replace("-", "–")
+        canvas.text(words, (1011, 34), 20, CARD, align=0.5)
+        width = canvas.text(f"{snapshot.time_s:.3f} s", (1258, 34), 22, INK, align=1.0)
+        canvas.text("time", (1250 - width, 34), 18, MUTED, align=1.0)
+
+    def _show(self, canvas: Canvas) -> None:
+        pygame = load_pygame()
+        if self._window is None:
+            pygame.display.init()
+            self._window = pygame.display.set_mode((WIDTH, HEIGHT))
+            pygame.display.set_caption("Electro-pneumatic protection valve")
+            self._clock = pygame.time.Clock()
+        if any(event.type == pygame.QUIT for event in pygame.event.get()):
+            self.close()
+            return
+        assert self._window is not None and self._clock is not None
+        self._window.blit(canvas.frame, (0, 0))
+        pygame.display.flip()
+        self._clock.tick(self.fps)

@@ -1,0 +1,86 @@
+"""The reward: the ±500 mbar band of control aim C1, the breakdown of C2, and what control costs."""
+
+from dataclasses import dataclass, fields
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+BAND_BAR = 0.5
+"""Tolerance of control aim C1 (section 2.3)."""
+
+REFERENCE_PERIOD = 5e-3
+"""Control period to which the weights refer [s]; other periods scale the running terms."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RewardWeights:
+    """Price of each term; every term is zero at best. Running terms are per 5 ms."""
+
+    band: float = 1.0
+    """Outside target ±500 mbar at any instant of the period (C1)."""
+    tracking: float = 0.25
+    """|p2 - target| at the end of the period, in units of 500 mbar."""
+    breakdown: float = 0.25
+    """Largest shortfall of p2 below the target in the period, in units of 500 mbar (C2)."""
+    switching: float = 0.1
+    """Each switching of the coil (wear)."""
+    vented_air: float = 2.0
+    """Each gram of air blown off by the magnet valve."""
+    failure: float = 100.0
+    """An empty circuit, which ends the episode."""
+
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            if not (np.isfinite(value) and value >= 0):
+                raise ValueError(
+                    f"reward weight {entry.name} = {value!r} must be a finite price of at least 0"
+                )
+
+
+class RewardTerms(NamedTuple):
+    """What each weight contributed, already weighted and negative; arrays of shape (n,)."""
+
+    band: NDArray
+    tracking: NDArray
+    breakdown: NDArray
+    switching: NDArray
+    vented_air: NDArray
+    failure: NDArray
+
+    def total(self) -> NDArray:
+        """The reward (n,)."""
+        return (
+            self.band + self.tracking + self.breakdown + self.switching + self.vented_air
+            + self.failure
+        )  # fmt: skip
+
+
+def reward_terms(
+    weights: RewardWeights,
+    *,
+    period: float,
+    error_bar: NDArray,
+    highest_error_bar: NDArray,
+    lowest_error_bar: NDArray,
+    switchings: NDArray,
+    vented_kg: NDArray,
+    failed: NDArray,
+) -> RewardTerms:
+    """Reward terms of one control period.
+
+    error_bar: p2 - target at its end; highest/lowest_error_bar: its extremes within the period [bar].
+    switchings: coil switchings; vented_kg: air blown off [kg]; failed: whether the circuit is empty.
+    """
+    scale = period / REFERENCE_PERIOD
+    outside = np.maximum(highest_error_bar, -lowest_error_bar) > BAND_BAR
+    shortfall = np.maximum(-lowest_error_bar, 0.0)
+    return RewardTerms(
+        band=-weights.band * scale * outside,
+        tracking=-weights.tracking * scale / BAND_BAR * np.abs(error_bar),
+        breakdown=-weights.breakdown * scale / BAND_BAR * shortfall,
+        switching=-weights.switching * switchings,
+        vented_air=-weights.vented_air * 1e3 * vented_kg,
+        failure=-weights.failure * failed,
+    )

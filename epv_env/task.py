@@ -1,0 +1,250 @@
+"""Limiting the circuit pressure: n episodes side by side. The environments are adapters to this.
+
+An episode depends on its seed and its settings alone, not on its place in the batch: it draws from
+generators of its own, one for the plant, one for the disturbance, one for the noise, so that two
+settings compared under one seed meet the same consumption and the same noise.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epv_env.observation import HISTORY, LONGEST_WAIT, P2_LAGS, P3_LAGS, encode
+from epv_env.plant.consumption import Profiles, draw_profile
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.sensors import SENSORS
+from epv_env.plant.simulate import energised
+from epv_env.plant.supply import BAR
+from epv_env.plant.valves import Valves
+from epv_env.reward import BAND_BAR, RewardTerms, reward_terms
+from epv_env.settings import Settings
+
+EMPTY_CIRCUIT_BAR = 1.5
+"""Circuit pressure at which an episode fails: the consumers could no longer draw their flow."""
+
+MEASURED = ("p1", "p2", "p3", "I")
+NOISE_BLOCK = 256
+"""Samples of noise drawn at a time for each episode."""
+
+
+class StepResult(NamedTuple):
+    """One control period of every episode; arrays of shape (n,) unless said otherwise."""
+
+    observation: NDArray
+    """(n, entries) float32."""
+    reward: NDArray
+    terms: RewardTerms
+    failed: NDArray
+    """The circuit is empty: the only physical failure that ends an episode."""
+    deviation_bar: NDArray
+    """p2 - target of largest magnitude within the period."""
+    switchings: NDArray
+    vented_kg: NDArray
+    consumption: NDArray
+    """Mean consumption of the period [kg/s]."""
+    succeeded: NDArray
+    """Settled and never outside the band since."""
+
+
+@dataclass(kw_only=True)
+class _Streams:
+    """An episode's own generators."""
+
+    plant: np.random.Generator
+    disturbance: np.random.Generator
+    noise: np.random.Generator
+
+    @classmethod
+    def of(cls, rng: np.random.Generator) -> "_Streams":
+        seed = int(rng.integers(2**63))
+        plant, disturbance, noise = (np.random.default_rng((seed, stream)) for stream in range(3))
+        return cls(plant=plant, disturbance=disturbance, noise=noise)
+
+
+class LimitingTask:
+    """n episodes of pressure limiting, advanced one control period at a time."""
+
+    def __init__(self, n: int, settings: Settings, *, threads: int | None = None):
+        """n: episodes. settings: of an episode begun without others. threads: None = all cores."""
+        self.n = n
+        self.settings = settings
+        self.period = settings.control_period
+        self.valves = Valves(n, threads=threads)
+        self.parameters: list[Parameters | None] = [None] * n
+        self.target = np.zeros(n)
+        """Target pressure [bar absolute]."""
+        self.steps = np.zeros(n, dtype=np.int64)
+        self.violated = np.zeros(n, dtype=bool)
+        self._supplies = [settings.supply] * n
+        self._special_supply = False
+        self._consumption = Profiles(n)
+        self._compressor = np.zeros(n, dtype=bool)
+        self._coil = np.ones(n, dtype=bool)
+        self._action = np.ones(n)
+        self._waited = np.zeros(n)
+        self._noise: list[np.random.Generator | None] = [None] * n
+        self._noise_block = np.zeros((n, NOISE_BLOCK, len(MEASURED)))
+        self._p2_history = np.zeros((n, HISTORY))
+        self._p3_history = np.zeros((n, HISTORY))
+        self._reading = {name: np.zeros(n) for name in MEASURED}
+
+    def time(self) -> NDArray:
+        """Time since each episode's start [s]."""
+        return self.steps * self.period
+
+    def begin(
+        self, where: NDArray, rngs: list[np.random.Generator], settings: list[Settings]
+    ) -> NDArray:
+        """Start new episodes at the indices `where`, one generator and one Settings for each.
+
+        Returns all observations (n, entries); those of other episodes are as they were.
+        """
+        for index, rng, chosen in zip(where, rngs, settings, strict=True):
+            self._begin_one(int(index), _Streams.of(rng), chosen)
+        self._special_supply = any(s is not self.settings.supply for s in self._supplies)
+        return self._observe(np.asarray(where), fresh=True)
+
+    def _begin_one(self, i: int, streams: _Streams, settings: Settings) -> None:
+        p = settings.region.draw(streams.plant)
+        self.parameters[i] = p
+        self._supplies[i] = settings.supply
+        p1 = settings.supply.draw(streams.plant)
+        target = streams.plant.uniform(*settings.target_bar)
+        drop = streams.plant.uniform(*settings.drop_bar)
+        p2 = target - drop if settings.p2_bar is None else streams.plant.uniform(*settings.p2_bar)
+        start = energised(p, p1=p1, p2=p2 * BAR, U=settings.supply_voltage)
+        if settings.p3_bar is not None:
+            start = start._replace(p3=streams.plant.uniform(*settings.p3_bar) * BAR)
+        self.valves.set_parameters(np.array([i]), p, settings.supply.volume)
+        for field, value in zip(self.valves.state, start, strict=True):
+            field[i] = value
+        self.target[i] = target
+        self.steps[i] = 0
+        self.violated[i] = False
+        self._consumption.start(i, draw_profile(settings.scenario, streams.disturbance))
+        self._compressor[i] = False
+        self._coil[i] = True
+        self._action[i] = 1.0
+        self._waited[i] = LONGEST_WAIT
+        self._noise[i] = streams.noise
+
+    def step(self, on_time: NDArray, action: NDArray) -> StepResult:
+        """Energise each coil for the first `on_time` (n,) of the period [s], then switch it off.
+
+        action: (n,) the fraction that was asked for, as the next observation shows it.
+        """
+        switchings = self._switch(on_time, action)
+        time = self.time()
+        consumption = self._consumption.mean_flow(time, self.period)
+        vented = self.valves.state.air_vented.copy()
+        self._drive(on_time, time, consumption)
+        self.steps += 1
+
+        error = self.valves.state.p2 / BAR - self.target
+        highest = self.valves.highest_p2 / BAR - self.target
+        lowest = self.valves.lowest_p2 / BAR - self.target
+        deviation = np.where(highest > -lowest, highest, lowest)
+        failed = ~(self.valves.state.p2 > EMPTY_CIRCUIT_BAR * BAR)  # true for NaN, too
+        settled = self.time() > self.settings.settling_time
+        self.violated |= settled & ~(np.abs(deviation) <= BAND_BAR)
+        vented_kg = self.valves.state.air_vented - vented
+        terms = reward_terms(
+            self.settings.weights,
+            period=self.period,
+            error_bar=error,
+            highest_error_bar=highest,
+            lowest_error_bar=lowest,
+            switchings=switchings,
+            vented_kg=vented_kg,
+            failed=failed,
+        )
+        return StepResult(
+            observation=self._observe(np.arange(self.n), fresh=False),
+            reward=terms.total(),
+            terms=terms,
+            failed=failed,
+            deviation_bar=deviation,
+            switchings=switchings,
+            vented_kg=vented_kg,
+            consumption=consumption,
+            succeeded=settled & ~self.violated & ~failed,
+        )
+
+    def _switch(self, on_time: NDArray, action: NDArray) -> NDArray:
+        """Count the coil's switchings in this period and remember its last state."""
+        begins_on = on_time > 0
+        ends_on = on_time >= self.period
+        switchings = (begins_on != self._coil).astype(np.int64) + (begins_on != ends_on)
+        self._coil = ends_on
+        self._action = action.astype(float)
+        self._waited = np.where(switchings > 0, 0.0, self._waited) + self.period
+        return switchings
+
+    def _drive(self, on_time: NDArray, time: NDArray, consumption: NDArray) -> None:
+        """Advance the plant through the part with the coil on, then the part with it off."""
+        inputs = self.valves.inputs
+        inputs.sigma_S[:] = consumption
+        self._supply_air(time)
+        self.valves.forget_extremes()
+        inputs.U[:] = np.where(on_time > 0, self.settings.supply_voltage, 0.0)
+        whole = (on_time <= 0) | (on_time >= self.period)
+        self.valves.advance(np.where(whole, self.period, on_time))
+        if not np.all(whole):
+            inputs.U[:] = 0.0
+            self.valves.advance(np.where(whole, 0.0, self.period - on_time))
+
+    def _supply_air(self, time: NDArray) -> None:
+        """Set what the compressor delivers and what a recorded supply does."""
+        inputs, p1 = self.valves.inputs, self.valves.state.p1
+        if not self._special_supply:
+            supply = self.settings.supply
+            self._compressor = supply.compressor_runs(p1, self._compressor)
+            inputs.refill[:] = supply.delivery * self._compressor
+            inputs.p1_slope[:] = supply.slope(time, self.period)
+            return
+        for i, supply in enumerate(self._supplies):
+            self._compressor[i] = supply.compressor_runs(p1[i], self._compressor[i])
+            inputs.refill[i] = supply.delivery * self._compressor[i]
+            inputs.p1_slope[i] = supply.slope(time[i : i + 1], self.period)[0]
+
+    def _observe(self, where: NDArray, *, fresh: bool) -> NDArray:
+        """Read the sensors of the episodes `where` and encode all observations.
+
+        fresh: these episodes have just begun, so that their past is their present.
+        """
+        for name, values in self._read(where).items():
+            self._reading[name][where] = values
+        for history, name in ((self._p2_history, "p2"), (self._p3_history, "p3")):
+            if fresh:
+                history[where] = self._reading[name][where, None]
+            else:
+                history[:, 1:] = history[:, :-1].copy()
+                history[:, 0] = self._reading[name]
+        p2, p3 = self._p2_history, self._p3_history
+        values = {
+            "p2_error": p2[:, 0] - self.target,
+            "target": self.target,
+            "p1": self._reading["p1"],
+            "p3": p3[:, 0],
+            "I": self._reading["I"],
+            "action": self._action,
+            "since_switching": np.minimum(self._waited, LONGEST_WAIT),
+        }
+        values |= {f"p2_change_{lag}": p2[:, 0] - p2[:, lag] for lag in P2_LAGS}
+        values |= {f"p3_change_{lag}": p3[:, 0] - p3[:, lag] for lag in P3_LAGS}
+        return encode(values)
+
+    def _read(self, where: NDArray) -> dict[str, NDArray]:
+        """Sensor readings of the episodes `where` [bar, A]."""
+        place = self.steps[where] % NOISE_BLOCK
+        for i in where[place == 0]:
+            rng = self._noise[i]
+            if rng is not None and self.settings.sensor_noise:
+                self._noise_block[i] = rng.standard_normal((NOISE_BLOCK, len(MEASURED)))
+        normal = self._noise_block[where, place]
+        state = self.valves.state
+        true = {name: getattr(state, name)[where] / BAR for name in ("p1", "p2", "p3")}
+        true["I"] = state.I[where]
+        return {name: SENSORS[name].measure(true[name], normal[:, k]) for k, name in enumerate(MEASURED)}

@@ -1,0 +1,171 @@
+"""EPValve-v0 and EPValvePWM-v0 as native vector environments: n valves in one compiled batch."""
+
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium.utils.seeding import np_random
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from epv_env.actions import PWM, OnOff
+from epv_env.infos import batch_info
+from epv_env.observation import observation_space
+from epv_env.plant.plantfile import load_plant
+from epv_env.settings import OptionError, make_settings, with_options
+from epv_env.task import LimitingTask
+
+
+class _ValveVectorEnv(gymnasium.vector.VectorEnv):
+    """n environments side by side, each exactly as it would be alone.
+
+    Sub-environment i, seeded with seed + i as in SyncVectorEnv, gives the same trajectory to the bit as
+    the single environment with that seed. Arguments as for the single environment, and:
+        num_envs: number of valves.
+        max_episode_steps: control periods after which an episode is truncated; None: never.
+        autoreset_mode: an AutoresetMode or its value. NEXT_STEP is Gymnasium's default, SAME_STEP is
+            what stable-baselines3 needs, DISABLED leaves resets to options={"reset_mask": mask}.
+        threads: threads of the plant; None uses every core.
+    reset(options=...): as for the single environment; a list gives one value for each sub-environment.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
+    action_form: ClassVar[type[OnOff] | type[PWM]]
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        max_episode_steps: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        plant: Any = None,
+        control_period: float | None = None,
+        threads: int | None = None,
+        render_mode: str | None = None,
+        **options: Any,
+    ):
+        if num_envs < 1:
+            raise OptionError(f"num_envs = {num_envs}: give at least 1")
+        if render_mode is not None:
+            raise OptionError("the vector environment does not render: use gymnasium.make instead")
+        self.mode = AutoresetMode(autoreset_mode)
+        self.metadata = {**self.metadata, "autoreset_mode": self.mode}
+        period = self.action_form.default_period if control_period is None else control_period
+        self.plant = load_plant(plant)
+        self.settings = make_settings(self.plant, control_period=period, **options)
+        self.num_envs = num_envs
+        self.max_episode_steps = max_episode_steps
+        self.render_mode = None
+        self.action = self.action_form(period)
+        self.single_action_space = self.action.space()
+        self.single_observation_space = observation_space()
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.task = LimitingTask(num_envs, self.settings, threads=threads)
+        self._rngs = [np_random(None)[0] for _ in range(num_envs)]
+        self._done = np.zeros(num_envs, dtype=bool)
+        self._every = np.ones(num_envs, dtype=bool)
+
+    def reset(
+        self,
+        *,
+        seed: int | list[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[NDArray, dict[str, Any]]:
+        """Start all episodes, or those of options["reset_mask"] (n,) bool."""
+        options = dict(options or {})
+        mask = self._checked_mask(options.pop("reset_mask", self._every))
+        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int) else seed
+        if seeds is not None and len(seeds) != self.num_envs:
+            raise OptionError(f"got {len(seeds)} seeds for {self.num_envs} environments: give one each")
+        where = np.flatnonzero(mask)
+        for i in where if seeds is not None else ():
+            if seeds[i] is not None:
+                self._rngs[i] = np_random(seeds[i])[0]
+        return self._begin(where, options), {}
+
+    def step(
+        self, actions: NDArray
+    ) -> tuple[NDArray, NDArray, NDArray, NDArray, dict[str, Any]]:
+        stale = self._done
+        if self.mode is AutoresetMode.DISABLED and np.any(stale):
+            raise OptionError(
+                f"sub-environment {np.flatnonzero(stale)[0]} has ended: reset it with "
+                "options={'reset_mask': mask} before the next step"
+            )
+        result = self.task.step(*self.action.decode(actions))
+        observation, reward, terminated = result.observation, result.reward, result.failed
+        if self.max_episode_steps is None:
+            truncated = np.zeros(self.num_envs, dtype=bool)
+        else:
+            truncated = self.task.steps >= self.max_episode_steps
+        infos: dict[str, Any] = batch_info(result)
+        valid = self._every
+        if self.mode is AutoresetMode.NEXT_STEP and np.any(stale):
+            observation = self._begin(np.flatnonzero(stale), {})
+            reward, terminated, truncated = (
+                np.where(stale, 0, value).astype(value.dtype)
+                for value in (reward, terminated, truncated)
+            )
+            valid = ~stale
+            infos = {key: np.where(stale, 0, value).astype(value.dtype) for key, value in infos.items()}
+        infos |= {f"_{key}": valid for key in infos}
+        self._done = terminated | truncated
+        if self.mode is AutoresetMode.SAME_STEP and np.any(self._done):
+            observation = self._restart(observation, infos)
+        return observation, reward, terminated, truncated, infos
+
+    def _restart(self, observation: NDArray, infos: dict[str, Any]) -> NDArray:
+        """Begin the ended episodes anew within the step that ended them."""
+        ended = self._done
+        final = {key: value for key, value in infos.items() if not key.startswith("_")}
+        infos["final_obs"] = np.full(self.num_envs, None, dtype=object)
+        for i in np.flatnonzero(ended):
+            infos["final_obs"][i] = observation[i]
+        infos["final_info"] = {}
+        for key, value in final.items():
+            infos["final_info"][key] = np.where(ended, value, 0).astype(value.dtype)
+            infos["final_info"][f"_{key}"] = ended
+            infos[key] = np.where(ended, 0, value).astype(value.dtype)
+            infos[f"_{key}"] = ~ended
+        infos["_final_obs"] = infos["_final_info"] = ended
+        observation = self._begin(np.flatnonzero(ended), {})
+        return observation
+
+    def _begin(self, where: NDArray, options: dict[str, Any]) -> NDArray:
+        """Start the episodes at `where` and return all observations."""
+        settings = [
+            with_options(self.settings, self._own(options, i), self.plant) if options else self.settings
+            for i in where
+        ]
+        self._done = self._done.copy()
+        self._done[where] = False
+        return self.task.begin(where, [self._rngs[i] for i in where], settings)
+
+    def _own(self, options: dict[str, Any], i: int) -> dict[str, Any]:
+        """The options of sub-environment i: lists hold one value for each."""
+        for key, value in options.items():
+            if isinstance(value, list) and len(value) != self.num_envs:
+                raise OptionError(
+                    f"option {key} lists {len(value)} values for {self.num_envs} environments: "
+                    "give one each, or one (low, high) tuple for all"
+                )
+        return {key: value[i] if isinstance(value, list) else value for key, value in options.items()}
+
+    def _checked_mask(self, mask: NDArray) -> NDArray:
+        if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != bool:
+            raise OptionError(f"reset_mask must be a boolean array of shape ({self.num_envs},)")
+        if not mask.any():
+            raise OptionError("reset_mask selects no environment: set at least one True")
+        return mask
+
+
+class EPValveVectorEnv(_ValveVectorEnv):
+    __doc__ = (_ValveVectorEnv.__doc__ or "") + "Actions: MultiDiscrete, 0 = coil off, 1 = on."
+    action_form = OnOff
+
+
+class EPValvePWMVectorEnv(_ValveVectorEnv):
+    __doc__ = (_ValveVectorEnv.__doc__ or "") + "Actions: Box [-1, 1], (n, 1), see EPValvePWMEnv."
+    action_form = PWM
