@@ -1,7 +1,7 @@
 """Gymnasium environments of an electro-pneumatic protection valve.
 
-    import gymnasium, epv_env
-    env = gymnasium.make("EPValve-v0")
+import gymnasium, epv_env
+env = gymnasium.make("EPValve-v0")
 """
 
 from gymnasium.envs.registration import register, registry

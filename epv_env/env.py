@@ -119,10 +119,14 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
 
 
 class EPValveEnv(_ValveEnv):
-    __doc__ = (_ValveEnv.__doc__ or "") + "Action: Discrete(2), 0 = coil off (the PV opens), 1 = on (it shuts)."
+    __doc__ = (
+        _ValveEnv.__doc__ or ""
+    ) + "Action: Discrete(2), 0 = coil off (the PV opens), 1 = on (it shuts)."
     action_form = OnOff
 
 
 class EPValvePWMEnv(_ValveEnv):
-    __doc__ = (_ValveEnv.__doc__ or "") + "Action: Box [-1, 1]: (action + 1) / 2 is the share of the PWM period with the coil on."
+    __doc__ = (
+        _ValveEnv.__doc__ or ""
+    ) + "Action: Box [-1, 1]: (action + 1) / 2 is the share of the PWM period with the coil on."
     action_form = PWM

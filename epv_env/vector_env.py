@@ -78,16 +78,16 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         mask = self._checked_mask(options.pop("reset_mask", self._every))
         seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int) else seed
         if seeds is not None and len(seeds) != self.num_envs:
-            raise OptionError(f"got {len(seeds)} seeds for {self.num_envs} environments: give one each")
+            raise OptionError(
+                f"got {len(seeds)} seeds for {self.num_envs} environments: give one each"
+            )
         where = np.flatnonzero(mask)
         for i in where if seeds is not None else ():
             if seeds[i] is not None:
                 self._rngs[i] = np_random(seeds[i])[0]
         return self._begin(where, options), {}
 
-    def step(
-        self, actions: NDArray
-    ) -> tuple[NDArray, NDArray, NDArray, NDArray, dict[str, Any]]:
+    def step(self, actions: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray, dict[str, Any]]:
         stale = self._done
         if self.mode is AutoresetMode.DISABLED and np.any(stale):
             raise OptionError(
@@ -109,7 +109,9 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
                 for value in (reward, terminated, truncated)
             )
             valid = ~stale
-            infos = {key: np.where(stale, 0, value).astype(value.dtype) for key, value in infos.items()}
+            infos = {
+                key: np.where(stale, 0, value).astype(value.dtype) for key, value in infos.items()
+            }
         infos |= {f"_{key}": valid for key in infos}
         self._done = terminated | truncated
         if self.mode is AutoresetMode.SAME_STEP and np.any(self._done):
@@ -136,7 +138,9 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
     def _begin(self, where: NDArray, options: dict[str, Any]) -> NDArray:
         """Start the episodes at `where` and return all observations."""
         settings = [
-            with_options(self.settings, self._own(options, i), self.plant) if options else self.settings
+            with_options(self.settings, self._own(options, i), self.plant)
+            if options
+            else self.settings
             for i in where
         ]
         self._done = self._done.copy()
@@ -151,7 +155,9 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
                     f"option {key} lists {len(value)} values for {self.num_envs} environments: "
                     "give one each, or one (low, high) tuple for all"
                 )
-        return {key: value[i] if isinstance(value, list) else value for key, value in options.items()}
+        return {
+            key: value[i] if isinstance(value, list) else value for key, value in options.items()
+        }
 
     def _checked_mask(self, mask: NDArray) -> NDArray:
         if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != bool:

@@ -56,7 +56,10 @@ STICK_SPEED = 5e-3
 RELEASE_MARGIN = 1e-7
 """Time by which a located release is overstepped, so that the next step finds the mover free [s]."""
 
-MAX_STEPS = 200_000
+SHORTEST_STEP = 1e-10
+"""Every step makes at least this much progress [s]."""
+
+MAX_STEPS = 20_000
 """Steps per period after which a lane is given up (its state becomes NaN)."""
 
 _UNLOCATED = 1e9  # a step hint that never binds
@@ -64,14 +67,13 @@ _UNLOCATED = 1e9  # a step hint that never binds
 
 @inlined
 def _landed(x, v, x_max, restitution):
-    """Position and speed after a possible impact on a stop."""
+    """Position, within the stops, and speed after a possible impact on one of them."""
     low = (x <= LANDING) & (v < 0.0)
     high = (x >= x_max - LANDING) & (v > 0.0)
     rebound = -restitution * v
     rebound = rebound if abs(rebound) > STICK_SPEED else 0.0
-    x = 0.0 if low else (x_max if high else x)
-    v = rebound if low | high else v
-    return x, v
+    x = 0.0 if low else (x_max if high else min(max(x, 0.0), x_max))
+    return x, rebound if low | high else v
 
 
 @inlined
@@ -116,9 +118,7 @@ def _locate(start, trial, h, c, work, lane):
     if is_held(start.xMV, start.vMV, c.xMVmax, work[FORCE + 3, lane]):
         at = release(work[FORCE + 3, lane], work[FORCE + 4, lane], work[FORCE + 5, lane])
         released = min(released, at)
-    if released < fraction:
-        return min(released * h + RELEASE_MARGIN, h)
-    return max(fraction * h, 1e-10)
+    return max(min(fraction * h, released * h + RELEASE_MARGIN), SHORTEST_STEP)
 
 
 @inlined
@@ -186,12 +186,14 @@ def _locate_events(work):
 
 @inlined
 def _run_block(work, step, extended):
-    """Step every lane of a block until its remaining time is used up."""
+    """Step every lane of a block until its remaining time is used up; give up those that do not end."""
     for _ in range(MAX_STEPS):
         _try_steps(work, step, extended)
         if not _locate_events(work):
             return
-    work[:N_STATE] = np.nan
+    for lane in range(LANES):
+        if not work[REMAINING, lane] <= 0.0:
+            work[:N_STATE, lane] = np.nan
 
 
 @inlined

@@ -53,7 +53,9 @@ def sensitive_symbols() -> tuple[str, ...]:
 
 def confidence_intervals() -> dict[str, tuple[float, float]]:
     """The 95 % intervals of Table 14 for the four calibrated parameters."""
-    return {symbol: (low, high) for symbol, (low, high) in _data()["confidence95"]["intervals"].items()}
+    return {
+        symbol: (low, high) for symbol, (low, high) in _data()["confidence95"]["intervals"].items()
+    }
 
 
 def checked_value(symbol: str, value: Any) -> float:
@@ -67,7 +69,9 @@ def checked_value(symbol: str, value: Any) -> float:
         try:
             value = value.item()  # a NumPy scalar
         except (AttributeError, ValueError):
-            raise ParameterError(f"parameter {symbol} is {value!r}: give one number [{row.unit}]") from None
+            raise ParameterError(
+                f"parameter {symbol} is {value!r}: give one number [{row.unit}]"
+            ) from None
     low, high = row.domain if row.domain else (row.value, row.value)
     if not low <= value <= high:
         remedy = "give a value inside it" if row.domain else "leave this constant out"

@@ -96,7 +96,9 @@ def _decode(content: dict[str, Any]) -> Plant:
         raise ParameterError("parameters must be an object of values by symbol")
     parameters = Parameters.calibrated().replace(**given)
     region = content.get("region", {})
-    boxes = {symbol: (float(low), float(high)) for symbol, (low, high) in region.get("boxes", {}).items()}
+    boxes = {
+        symbol: (float(low), float(high)) for symbol, (low, high) in region.get("boxes", {}).items()
+    }
     joint = region.get("joint")
     if joint is None:
         decoded = Region(centre=parameters, boxes=boxes)

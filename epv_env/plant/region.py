@@ -64,7 +64,10 @@ class Region:
         if name == "confidence":
             reference = Parameters.calibrated()
             boxes = {
-                symbol: (low + centre[symbol] - reference[symbol], high + centre[symbol] - reference[symbol])
+                symbol: (
+                    low + centre[symbol] - reference[symbol],
+                    high + centre[symbol] - reference[symbol],
+                )
                 for symbol, (low, high) in confidence_intervals().items()
             }
         elif name == "ten_percent":

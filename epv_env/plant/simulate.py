@@ -56,7 +56,9 @@ def simulate(
     valves.set_parameters(np.arange(n), p, reservoir_volume)
     for field, value in zip(valves.state, initial, strict=True):
         field[:] = value
-    columns = [value[:, None] if (value := np.asarray(x, float)).ndim == 1 else value for x in (U, sigma_S)]
+    columns = [
+        value[:, None] if (value := np.asarray(x, float)).ndim == 1 else value for x in (U, sigma_S)
+    ]
     slope = np.zeros((len(U), 1))
     if p1 is not None:
         valves.state.p1[:] = np.asarray(p1)[0]
@@ -67,7 +69,12 @@ def simulate(
             "the plant could not be integrated: check that pressures are positive (an empty circuit "
             "cannot be consumed from) and that parameters lie in their domains"
         )
-    state = State(*(np.concatenate([np.broadcast_to(first, (1, n)), rest[:-1]]) for first, rest in zip(initial, later, strict=True)))
+    state = State(
+        *(
+            np.concatenate([np.broadcast_to(first, (1, n)), rest[:-1]])
+            for first, rest in zip(initial, later, strict=True)
+        )
+    )
     if n == 1:
         state = State(*(field[:, 0] for field in state))
     return Trajectory(time=np.arange(len(U)) * period, U=U, state=state)

@@ -1,0 +1,72 @@
+# Needs make and Python 3.11 or later; everything else goes into .venv.
+PYTHON ?= python3
+# The oldest promised numpy, scipy and numba have wheels for Python 3.11 only.
+PYTHON_OLDEST ?= $(PYTHON)
+
+VENV := .venv
+OLDEST := .venv-oldest
+PY := $(VENV)/bin/python
+PACKAGES := epv_env identification controllers training
+
+MAKEFLAGS += --no-print-directory
+.DEFAULT_GOAL := help
+.PHONY: help venv train test test-oldest bench lint check format wheel clean
+
+help: ## list the targets
+	@sed -n 's/^\([a-z][a-z-]*\):.*## /\1	/p' Makefile | while IFS='	' read -r name text; do \
+		printf '%-12s %s\n' "$$name" "$$text"; done
+
+venv: $(VENV)/.installed ## create .venv with the pinned packages and this project
+
+# An environment whose installation was interrupted has no stamp and is made anew.
+$(VENV)/.locked: requirements.lock
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or later is needed")'
+	$(PYTHON) -m venv --clear $(VENV)
+	$(PY) -m pip install -r requirements.lock
+	@touch $@
+
+$(VENV)/.installed: $(VENV)/.locked pyproject.toml
+	$(PY) -m pip install --no-deps -e .
+	@touch $@
+
+$(OLDEST)/.locked: requirements-oldest.lock
+	@$(PYTHON_OLDEST) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11) and "Python 3.11 is needed: set PYTHON_OLDEST")'
+	$(PYTHON_OLDEST) -m venv --clear $(OLDEST)
+	$(OLDEST)/bin/python -m pip install -r requirements-oldest.lock
+	@touch $@
+
+$(OLDEST)/.installed: $(OLDEST)/.locked pyproject.toml
+	$(OLDEST)/bin/python -m pip install --no-deps -e .
+	@touch $@
+
+train: $(VENV)/.installed ## train the PPO controller; options in ARGS="..."
+	$(PY) training/train_ppo.py $(ARGS)
+
+test: $(VENV)/.installed ## run the tests; options in ARGS="..."
+	$(PY) -m pytest $(ARGS)
+
+# Its own numba cache: the two numba versions would overwrite each other's files.
+test-oldest: $(OLDEST)/.installed ## run the plant and environment tests on the oldest core packages
+	NUMBA_CACHE_DIR=$(CURDIR)/$(OLDEST)/numba-cache \
+		$(OLDEST)/bin/python -m pytest tests/plant tests/env -m "not training"
+
+bench: $(VENV)/.installed ## measure the speed of the plant simulation
+	$(PY) -m tests.benchmarks.plant
+
+lint: $(VENV)/.installed ## check format, style and types
+	$(PY) -m ruff format --check .
+	$(PY) -m ruff check .
+	$(PY) -m pyright
+
+check: lint test ## lint, then test
+
+format: $(VENV)/.installed ## format the code and fix what ruff can fix
+	$(PY) -m ruff check --fix .
+	$(PY) -m ruff format .
+
+wheel: $(VENV)/.installed ## build the wheel into dist/
+	$(PY) -m pip wheel --no-deps -w dist .
+
+clean: ## remove build outputs and caches (the environments stay)
+	rm -rf build dist .pytest_cache .ruff_cache .hypothesis $(OLDEST)/numba-cache
+	find $(PACKAGES) tests -name __pycache__ -prune -exec rm -rf {} +
