@@ -1,8 +1,8 @@
 """Limiting the circuit pressure: n episodes side by side. The environments are adapters to this.
 
 An episode depends on its seed and its settings alone, not on its place in the batch: it draws from
-generators of its own, one for the plant, one for the disturbance, one for the noise, so that two
-settings compared under one seed meet the same consumption and the same noise.
+generators of its own, one for the plant's parameters, one for pressures, target and consumption, one
+for the noise, so that two plants compared under one seed meet the same disturbance and noise.
 """
 
 from dataclasses import dataclass
@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.observation import HISTORY, LONGEST_WAIT, P2_LAGS, P3_LAGS, encode
-from epv_env.plant.consumption import Profiles, draw_profile
+from epv_env.plant.consumption import Profile, Profiles, draw_profile
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.sensors import SENSORS
 from epv_env.plant.simulate import energised
-from epv_env.plant.supply import BAR
+from epv_env.plant.supply import BAR, Supply
 from epv_env.plant.valves import Valves
 from epv_env.reward import BAND_BAR, RewardTerms, reward_terms
 from epv_env.settings import Settings
@@ -24,7 +24,8 @@ from epv_env.settings import Settings
 EMPTY_CIRCUIT_BAR = 1.5
 """Circuit pressure at which an episode fails: the consumers could no longer draw their flow."""
 
-MEASURED = ("p1", "p2", "p3", "I")
+PRESSURES = ("p1", "p2", "p3")
+MEASURED = (*PRESSURES, "I")
 NOISE_BLOCK = 256
 """Samples of noise drawn at a time for each episode."""
 
@@ -48,19 +49,36 @@ class StepResult(NamedTuple):
     """Settled and never outside the band since."""
 
 
-@dataclass(kw_only=True)
-class _Streams:
-    """An episode's own generators."""
+@dataclass(frozen=True, kw_only=True)
+class _Start:
+    """Everything random about one episode but its noise."""
 
-    plant: np.random.Generator
-    disturbance: np.random.Generator
+    parameters: Parameters
+    p1: float
+    p2: float
+    p3: float
+    target: float
+    consumption: Profile
     noise: np.random.Generator
+    supply: Supply
 
     @classmethod
-    def of(cls, rng: np.random.Generator) -> "_Streams":
+    def draw(cls, rng: np.random.Generator, settings: Settings) -> "_Start":
+        """Draw an episode; rng gives one seed, from which the three streams of the episode come."""
         seed = int(rng.integers(2**63))
         plant, disturbance, noise = (np.random.default_rng((seed, stream)) for stream in range(3))
-        return cls(plant=plant, disturbance=disturbance, noise=noise)
+        p1 = settings.supply.draw(disturbance)
+        target = disturbance.uniform(*settings.target_bar)
+        drop = disturbance.uniform(*settings.drop_bar)
+        p2 = target - drop if settings.p2_bar is None else disturbance.uniform(*settings.p2_bar)
+        p3 = p1 if settings.p3_bar is None else disturbance.uniform(*settings.p3_bar) * BAR
+        return cls(
+            parameters=settings.region.draw(plant),
+            p1=p1, p2=p2 * BAR, p3=p3, target=target,
+            consumption=draw_profile(settings.scenario, disturbance),
+            noise=noise,
+            supply=settings.supply,
+        )  # fmt: skip
 
 
 class LimitingTask:
@@ -101,34 +119,32 @@ class LimitingTask:
 
         Returns all observations (n, entries); those of other episodes are as they were.
         """
-        for index, rng, chosen in zip(where, rngs, settings, strict=True):
-            self._begin_one(int(index), _Streams.of(rng), chosen)
+        where = np.asarray(where)
+        starts = [_Start.draw(rng, chosen) for rng, chosen in zip(rngs, settings, strict=True)]
+        p = {
+            symbol: np.array([start.parameters[symbol] for start in starts])
+            for symbol in starts[0].parameters
+        }
+        volumes = np.array([start.supply.volume for start in starts])
+        self.valves.set_parameters(where, p, volumes)
+        p1, p2, p3 = (np.array([getattr(start, name) for start in starts]) for name in PRESSURES)
+        initial = energised(p, p1=p1, p2=p2, U=self.settings.supply_voltage)._replace(p3=p3)
+        for field, value in zip(self.valves.state, initial, strict=True):
+            field[where] = value
+        for i, start in zip(where.tolist(), starts, strict=True):
+            self.parameters[i] = start.parameters
+            self.target[i] = start.target
+            self._supplies[i] = start.supply
+            self._consumption.start(i, start.consumption)
+            self._noise[i] = start.noise
+        self.steps[where] = 0
+        self.violated[where] = False
+        self._compressor[where] = False
+        self._coil[where] = True
+        self._action[where] = 1.0
+        self._waited[where] = LONGEST_WAIT
         self._special_supply = any(s is not self.settings.supply for s in self._supplies)
-        return self._observe(np.asarray(where), fresh=True)
-
-    def _begin_one(self, i: int, streams: _Streams, settings: Settings) -> None:
-        p = settings.region.draw(streams.plant)
-        self.parameters[i] = p
-        self._supplies[i] = settings.supply
-        p1 = settings.supply.draw(streams.plant)
-        target = streams.plant.uniform(*settings.target_bar)
-        drop = streams.plant.uniform(*settings.drop_bar)
-        p2 = target - drop if settings.p2_bar is None else streams.plant.uniform(*settings.p2_bar)
-        start = energised(p, p1=p1, p2=p2 * BAR, U=settings.supply_voltage)
-        if settings.p3_bar is not None:
-            start = start._replace(p3=streams.plant.uniform(*settings.p3_bar) * BAR)
-        self.valves.set_parameters(np.array([i]), p, settings.supply.volume)
-        for field, value in zip(self.valves.state, start, strict=True):
-            field[i] = value
-        self.target[i] = target
-        self.steps[i] = 0
-        self.violated[i] = False
-        self._consumption.start(i, draw_profile(settings.scenario, streams.disturbance))
-        self._compressor[i] = False
-        self._coil[i] = True
-        self._action[i] = 1.0
-        self._waited[i] = LONGEST_WAIT
-        self._noise[i] = streams.noise
+        return self._observe(where, fresh=True)
 
     def step(self, on_time: NDArray, action: NDArray) -> StepResult:
         """Energise each coil for the first `on_time` (n,) of the period [s], then switch it off.
@@ -245,7 +261,7 @@ class LimitingTask:
                 self._noise_block[i] = rng.standard_normal((NOISE_BLOCK, len(MEASURED)))
         normal = self._noise_block[where, place]
         state = self.valves.state
-        true = {name: getattr(state, name)[where] / BAR for name in ("p1", "p2", "p3")}
+        true = {name: getattr(state, name)[where] / BAR for name in PRESSURES}
         true["I"] = state.I[where]
         return {
             name: SENSORS[name].measure(true[name], normal[:, k]) for k, name in enumerate(MEASURED)

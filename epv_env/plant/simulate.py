@@ -24,8 +24,13 @@ class Trajectory:
     state: State
 
 
-def energised(p: Mapping[str, float], *, p1: float, p2: float, U: float) -> State:
-    """Steady state with the coil on: armature pulled in, p3 = p1, PV shut (SI units)."""
+def energised(
+    p: Mapping[str, ArrayLike], *, p1: ArrayLike, p2: ArrayLike, U: ArrayLike
+) -> State:
+    """Steady state with the coil on: armature pulled in, p3 = p1, PV shut (SI units).
+
+    Arguments are numbers, or arrays (n,) for n valves.
+    """
     return State(
         p2=p2, p3=p1, xPV=0.0, vPV=0.0, xMV=p["xMVmax"], vMV=0.0, I=U / p["R"], p1=p1,
         air_in_PV=0.0, air_in_MV=0.0, air_vented=0.0, coil_energy=0.0,

@@ -1,0 +1,1 @@
+"""Controllers of the valve, classic and learned, behind one protocol."""

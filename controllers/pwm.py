@@ -1,0 +1,70 @@
+"""PWM control: a cascade of PI (circuit pressure) and P (control pressure) sets the coil's duty."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controllers.pwm_design import Design
+from epv_env.observation import decode
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.supply import BAR
+
+QUARTER_PI = np.pi / 4
+
+
+@dataclass(kw_only=True)
+class PWM:
+    """Holds p3 near where the protection valve opens, as far as the circuit's error asks; rests else.
+
+    While p2 is high enough the coil stays on and nothing switches. Below `engage_below` the cascade
+    takes over until p2 is above `rest_above`.
+    """
+
+    design: Design
+    parameters: Parameters
+    """The plant it was designed on: areas and spring place the opening pressure (eq. 22)."""
+    engage_below: float
+    """p2 - target below which the cascade starts [bar]."""
+    rest_above: float
+    """p2 - target above which the coil stays on [bar]."""
+    depth: float
+    """Most that p3 is asked to lie below the opening pressure [bar]; it limits how far the valve opens."""
+    setpoint: float = 0.0
+    """Error at which the cascade aims [bar]."""
+    control_period: float = 20e-3
+    """Period of the PWM [s]."""
+    name: str = "PWM"
+    environment: str = "EPValvePWM-v0"
+    _integral: NDArray = field(default_factory=lambda: np.zeros(0), repr=False)
+    _working: NDArray = field(default_factory=lambda: np.zeros(0, dtype=bool), repr=False)
+
+    def reset(self, n: int) -> None:
+        """Integrators empty, all resting."""
+        self._integral = np.zeros(n)
+        self._working = np.zeros(n, dtype=bool)
+
+    def opening_pressure(self, p1: NDArray, p2: NDArray) -> NDArray:
+        """p3 at which the protection valve begins to open [bar] (eq. 22 at rest)."""
+        p = self.parameters
+        piston, seat = QUARTER_PI * p["d1"] ** 2, QUARTER_PI * p["d2"] ** 2
+        return p1 - ((p1 - p2) * seat + p["cPV"] * p["xPV0"] / BAR) / piston
+
+    def act(self, observations: NDArray) -> NDArray:
+        """Actions (n, 1) in [-1, 1]: 2 duty - 1."""
+        error = decode(observations, "p2_error")
+        p1, p3 = decode(observations, "p1"), decode(observations, "p3")
+        p2 = error + decode(observations, "target")
+        self._working = np.where(self._working, error < self.rest_above, error < self.engage_below)
+
+        deviation = error - self.setpoint
+        asked = self.design.outer_gain * (deviation + self._integral)
+        wanted_p3 = self.opening_pressure(p1, p2) + np.maximum(asked, -self.depth)
+        duty = self.design.duty + self.design.inner_gain * (wanted_p3 - p3)
+        duty = np.where(self._working, duty, 1.0)
+        inside = (
+            (duty > 0) & (duty < 1) & (asked > -self.depth)
+        )  # conditional integration against wind-up
+        grown = self._integral + deviation * self.control_period / self.design.integral_time
+        self._integral = np.where(inside, grown, np.where(self._working, self._integral, 0.0))
+        return (2 * np.clip(duty, 0.0, 1.0) - 1)[:, None].astype(np.float32)

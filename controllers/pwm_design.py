@@ -1,0 +1,150 @@
+"""Design of the PWM controller: linearise the averaged valve, shape the loop with python-control.
+
+Averaged over a PWM period, the control chamber fills for the duty d and vents for the rest, the piston
+stands where its spring balances p3, and the circuit integrates the flow. Around an operating point with
+the protection valve a little open this is an integrator behind a lag:
+
+    d(p3)/dt = a p3 + b d,   d(p2)/dt = g p3          (deviations)
+
+closed by a cascade at the PWM period: p3 by a gain, p2 by a PI around it, which takes the slow lag of
+the control chamber out of the outer loop.
+"""
+
+from dataclasses import dataclass
+
+import control
+import numpy as np
+from scipy.optimize import brentq
+
+from epv_env.plant.coefficients import coefficients
+from epv_env.plant.equations import Coefficients
+from epv_env.plant.flow import mass_flux
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.supply import BAR
+
+QUARTER_PI = np.pi / 4
+OPENING = 0.05
+"""Share of the stroke at which the plant is linearised: barely open, where the loop works."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OperatingPoint:
+    """Where the averaged valve rests barely open, and its linearisation there. SI units."""
+
+    p3: float
+    duty: float
+    """Duty that holds p3."""
+    a: float
+    """Slope of dp3/dt over p3 [1/s]."""
+    b: float
+    """Slope of dp3/dt over duty [Pa/s]."""
+    g: float
+    """Slope of dp2/dt over p3 [1/s]; negative: a lower p3 opens the valve."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Design:
+    """Gains of the cascade, and what the outer loop promises."""
+
+    inner_gain: float
+    """Duty per bar of control pressure [1/bar]."""
+    outer_gain: float
+    """Bar of control pressure per bar of circuit pressure [1]."""
+    integral_time: float
+    """Tn of the outer PI [s]."""
+    duty: float
+    """Duty that holds the operating point."""
+    gain_margin: float
+    """Factor."""
+    phase_margin: float
+    """Degrees."""
+    crossover: float
+    """Gain crossover [rad/s]."""
+
+
+def _static_stroke(p3: float, p1: float, p2: float, c: Coefficients) -> float:
+    """Stroke at which the spring balances the pressures, within the stops [m] (eq. 22 at rest)."""
+    seat_area = QUARTER_PI * c.seat_diameter**2
+    force = (p1 - p3) * c.piston_area - (p1 - p2) * seat_area
+    return float(np.clip(force / c.cPV - c.xPV0, 0.0, c.xPVmax))
+
+
+def _p3_rate(p3: float, duty: float, p1: float, c: Coefficients) -> float:
+    """Averaged dp3/dt [Pa/s]: the armature's flights are short against the period (eq. 7)."""
+    fill = c.orifice_in * mass_flux(p1, p3, c.inverse_sqrt_RT)
+    vent = c.orifice_exh * mass_flux(p3, c.p_env, c.inverse_sqrt_RT)
+    return c.RT_V3 * (duty * fill - (1 - duty) * vent)
+
+
+def linearise(p: Parameters, *, p1: float, p2: float) -> OperatingPoint:
+    """The averaged plant at a supply p1 and circuit pressure p2 [Pa absolute]."""
+    c = Coefficients(*coefficients(p)[:, 0].tolist())
+    stroke = OPENING * c.xPVmax
+    p3 = brentq(lambda x: _static_stroke(x, p1, p2, c) - stroke, c.p_env, p1)
+    duty = brentq(lambda d: _p3_rate(p3, d, p1, c), 0.0, 1.0)
+    small = 1e-3 * p3
+    flux = mass_flux(p1, p2, c.inverse_sqrt_RT)
+    opening_slope = -c.piston_area / c.cPV  # of the static stroke between its stops
+    return OperatingPoint(
+        p3=p3,
+        duty=duty,
+        a=(_p3_rate(p3 + small, duty, p1, c) - _p3_rate(p3 - small, duty, p1, c)) / (2 * small),
+        b=(_p3_rate(p3, duty + 1e-3, p1, c) - _p3_rate(p3, duty - 1e-3, p1, c)) / 2e-3,
+        g=c.RT_V2 * c.curtain_PV * opening_slope * flux,
+    )
+
+
+def inner_loop(point: OperatingPoint, inner_gain: float, period: float) -> control.StateSpace:
+    """From the wanted p3 to p2, both in bar, with p3 fed back; sampled with a zero-order hold."""
+    continuous = control.ss(
+        [[point.a, 0.0], [point.g, 0.0]], [[point.b / BAR], [0.0]], [[0.0, 1.0]], 0
+    )
+    sampled = control.sample_system(continuous, period, method="zoh")
+    feedback = sampled.A - inner_gain * sampled.B @ np.array([[1.0, 0.0]])
+    return control.ss(feedback, inner_gain * sampled.B, sampled.C, 0, period)
+
+
+def outer_loop(
+    point: OperatingPoint, inner_gain: float, gain: float, integral_time: float, period: float
+) -> control.TransferFunction:
+    """Open outer loop with the PI; the sign makes it positive, since a lower p3 raises p2."""
+    pi = control.tf([1.0, period / integral_time - 1.0], [1.0, -1.0], period)
+    return -gain * pi * control.ss2tf(inner_loop(point, inner_gain, period))
+
+
+def design(
+    p: Parameters,
+    *,
+    p1: float,
+    p2: float,
+    inner_time: float,
+    phase_margin: float,
+    integral_time: float,
+    period: float,
+) -> Design:
+    """The largest outer gain that keeps `phase_margin` [degrees], found on the discrete loop.
+
+    p1, p2: operating pressures [Pa absolute]. inner_time: time constant wanted of the p3 loop [s].
+    integral_time: Tn of the outer PI [s]. period: of the PWM [s]. Raises ValueError where no gain
+    keeps the margin.
+    """
+    point = linearise(p, p1=p1, p2=p2)
+    pole, drift = np.exp(-period / inner_time), np.exp(point.a * period)
+    inner_gain = (drift - pole) / ((drift - 1) / point.a * point.b / BAR)
+    frequency = np.geomspace(0.1, np.pi / period, 400)
+    unit = outer_loop(point, inner_gain, 1.0, integral_time, period)(
+        np.exp(1j * frequency * period)
+    )
+    for gain in np.geomspace(3.0, 1e-2, 80):
+        margin, phase, _, crossover = map(
+            float, control.margin(control.frd(gain * unit, frequency))
+        )
+        if margin > 1 and phase >= phase_margin:
+            return Design(
+                inner_gain=float(inner_gain), outer_gain=float(gain), integral_time=integral_time,
+                duty=point.duty, gain_margin=margin, phase_margin=phase, crossover=crossover,
+            )  # fmt: skip
+    raise ValueError(
+        f"no gain keeps a phase margin of {phase_margin:g} degrees with an integral time of "
+        f"{integral_time:g} s at a period of {period:g} s: ask for less, or integrate more slowly"
+    )

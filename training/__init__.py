@@ -1,0 +1,1 @@
+"""Training and honest comparison of controllers."""

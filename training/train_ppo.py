@@ -1,0 +1,143 @@
+"""Train PPO to limit the circuit pressure, then compare it with hysteresis and PWM control.
+
+    python training/train_ppo.py
+
+writes policy, configuration, table and figures into runs/ppo and prints the table.
+"""
+
+import argparse
+import json
+import platform
+import sys
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from controllers.learned import load_policy
+from controllers.tuned import tuned_controllers
+from epv_env.plant.consumption import check_scenario
+from epv_env.plant.files import write_text
+from epv_env.plant.plantfile import Plant, load_plant
+from training.cli import fail_clearly, writable_folder
+from training.evaluate import Comparison, as_text, compare
+
+CONFIG_FILE = "config.json"
+QUICK = {"timesteps": 65_536, "episodes": 16, "duration": 2.0}
+"""What --quick does: everything, too short to learn anything."""
+
+
+def parse(arguments: list[str] | None) -> argparse.Namespace:
+    """The command line's options, checked."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--out", type=writable_folder, default=Path("runs/ppo"), help="folder of results")
+    parser.add_argument("--timesteps", type=int, default=4_000_000, help="environment steps to train")
+    parser.add_argument("--episodes", type=int, default=256, help="evaluation episodes per plant set")
+    parser.add_argument("--duration", type=float, default=10.0, help="length of one of them [s]")
+    parser.add_argument("--seed", type=int, default=0, help="of the training")
+    parser.add_argument("--plant", default=None, help="plant file; default: the report's calibration")
+    parser.add_argument("--scenario", default="mixed", help="consumption scenario")
+    parser.add_argument("--device", default="cpu", help="torch device; cpu is fastest for so small a net")
+    parser.add_argument("--resume", action="store_true", help="go on from the folder's checkpoint")
+    parser.add_argument("--quick", action="store_true", help="a run of seconds that shows that all works")
+    chosen = parser.parse_args(arguments)
+    if chosen.quick:
+        vars(chosen).update(QUICK)
+    for name in ("timesteps", "episodes", "duration"):
+        if getattr(chosen, name) <= 0:
+            parser.error(f"--{name} must be positive")
+    return chosen
+
+
+def configuration(chosen: argparse.Namespace, plant: Plant, hyperparameters: Any) -> dict[str, Any]:
+    """What a stranger needs to repeat the run."""
+    from training.ppo import settings_as_data
+
+    packages = ("gymnasium", "numba", "numpy", "stable-baselines3", "torch")
+    return {
+        "options": {name: str(v) if isinstance(v, Path) else v for name, v in vars(chosen).items()},
+        "hyperparameters": settings_as_data(hyperparameters),
+        "plant": {"name": plant.name, "parameters": dict(plant.parameters), "provenance": plant.provenance},
+        "versions": {"python": platform.python_version(), **{p: version(p) for p in packages}},
+        "written": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def check_resume(chosen: argparse.Namespace) -> None:
+    """A folder with a checkpoint is continued only if that is asked for, and only with its options."""
+    path = chosen.out / CONFIG_FILE
+    if not path.exists():
+        if chosen.resume:
+            raise ValueError(f"nothing to resume in {chosen.out}: leave --resume out")
+        return
+    if not chosen.resume:
+        return
+    earlier = json.loads(path.read_text(encoding="utf-8"))["options"]
+    for name in ("seed", "plant", "scenario"):
+        if earlier[name] != getattr(chosen, name):
+            raise ValueError(
+                f"{chosen.out} was trained with --{name} {earlier[name]}, not "
+                f"{getattr(chosen, name)}: resume with the same, or choose another --out"
+            )
+
+
+def evaluate(chosen: argparse.Namespace, plant: Plant) -> Comparison:
+    """The comparison on unseen scenarios, with a progress bar."""
+    contenders = [load_policy(chosen.out), *tuned_controllers(plant.parameters)]
+    with tqdm(total=100, desc="evaluation", unit="%", bar_format="{l_bar}{bar}| {elapsed}<{remaining} {postfix}") as bar:
+
+        def show(what: str, share: float) -> None:
+            bar.set_postfix_str(what)
+            bar.update(100 * share - bar.n)
+
+        return compare(
+            contenders, plant=plant, scenario=chosen.scenario, episodes=chosen.episodes,
+            duration=chosen.duration, progress=show,
+        )  # fmt: skip
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Command line; returns the exit status."""
+    chosen = parse(arguments)
+    plant = load_plant(chosen.plant)
+    check_scenario(chosen.scenario)
+    check_resume(chosen)
+
+    from training.policy_files import save_policy  # torch takes seconds to import: only now
+    from training.ppo import Hyperparameters, save_model, train
+
+    hyperparameters = Hyperparameters()
+    config = configuration(chosen, plant, hyperparameters)
+    write_text(chosen.out / CONFIG_FILE, json.dumps(config, indent=1) + "\n")
+    model, log = train(
+        hyperparameters, folder=chosen.out, plant=plant, scenario=chosen.scenario,
+        timesteps=chosen.timesteps, seed=chosen.seed, device=chosen.device, resume=chosen.resume,
+    )  # fmt: skip
+    save_model(model, chosen.out / "model.zip")
+    save_policy(model, chosen.out, control_period=5e-3, provenance=config)
+
+    comparison = evaluate(chosen, plant)
+    report(comparison, log.rows, chosen.out)
+    return 0
+
+
+def report(comparison: Comparison, curve: list[dict[str, float]], folder: Path) -> None:
+    """Write table and figures, and print the table."""
+    from training import plots
+
+    table = comparison.table
+    write_text(folder / "table.csv", table.to_csv(index=False))
+    write_text(folder / "table.json", table.to_json(orient="records", indent=1) + "\n")
+    plots.learning_curve(curve, folder / "learning_curve.png")
+    plots.episode_overlay(comparison.traces, folder / "episode.png")
+    plots.excursion_distribution(comparison, folder / "excursions.png")
+    print(as_text(table))
+    if curve:
+        rate = curve[-1]["timesteps"] / max(curve[-1]["seconds"], 1e-9)
+        print(f"\ntrained {curve[-1]['timesteps']:.0f} steps at {rate:.0f} steps/s; results in {folder}")
+
+
+if __name__ == "__main__":
+    sys.exit(fail_clearly(main))

@@ -1,0 +1,94 @@
+"""Tune the classic controllers: the same budget, scenarios and objective for each.
+
+    python training/tune.py --trials 150 --out controllers/tuned.json
+
+The objective is the mean return on the training scenarios, the very reward that PPO maximises.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+import optuna
+from optuna.trial import Trial
+from tqdm import tqdm
+
+from controllers.tuned import KINDS, Tuning, build, save_tunings
+from epv_env.observation import P2_LAGS
+from epv_env.plant.parameters import Parameters
+from training.cli import fail_clearly, writable_file
+from training.rollout import run_episodes
+
+TUNING_SEED = 1_000_000
+"""First seed of the tuning scenarios; evaluations use others."""
+
+
+def search_space(kind: str, trial: Trial) -> dict[str, Any]:
+    """The quantities searched for a kind of controller, with their ranges."""
+    if kind == "PWM":
+        return {
+            "inner_time": trial.suggest_float("inner_time", 0.01, 0.06, log=True),
+            "phase_margin": trial.suggest_float("phase_margin", 20.0, 60.0),
+            "integral_time": trial.suggest_float("integral_time", 0.2, 3.0, log=True),
+            "depth": trial.suggest_float("depth", 0.03, 0.8, log=True),
+            "setpoint": trial.suggest_float("setpoint", -0.3, 0.2),
+            "engage_below": trial.suggest_float("engage_below", -0.4, 0.3),
+            "rest_above": trial.suggest_float("rest_above", -0.3, 0.4),
+        }
+    values: dict[str, Any] = {
+        "open_below": trial.suggest_float("open_below", -0.45, 0.3),
+        "shut_above": trial.suggest_float("shut_above", -0.45, 0.45),
+    }
+    if kind == "hysteresis, extrapolating":
+        values["open_lookahead"] = trial.suggest_float("open_lookahead", 0.0, 0.15)
+        values["shut_lookahead"] = trial.suggest_float("shut_lookahead", 0.0, 0.06)
+        values["lag"] = trial.suggest_categorical("lag", list(P2_LAGS))
+    return values
+
+
+def tune(
+    kind: str, *, trials: int, episodes: int, duration: float, seed: int, options: dict[str, Any]
+) -> Tuning:
+    """Search one kind of controller. Values that contradict each other cost a trial."""
+    parameters = Parameters.calibrated()
+    seeds = list(range(TUNING_SEED, TUNING_SEED + episodes))
+
+    def objective(trial: Trial) -> float:
+        try:
+            controller = build(kind, search_space(kind, trial), parameters)
+        except ValueError as contradiction:
+            raise optuna.TrialPruned(str(contradiction)) from None
+        metrics, _ = run_episodes(controller, seeds=seeds, duration=duration, options=options)
+        return float(metrics.episode_return.mean())
+
+    study = optuna.create_study(
+        direction="maximize", sampler=optuna.samplers.TPESampler(seed=seed, multivariate=True)
+    )
+    with tqdm(total=trials, desc=f"{kind:27s}", unit="trial") as bar:
+        study.optimize(objective, n_trials=trials, callbacks=[lambda *_: bar.update()])
+    return Tuning(values=study.best_params, trials=trials, mean_return=study.best_value)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Command line; returns the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--trials", type=int, default=150, help="evaluations for each controller")
+    parser.add_argument("--episodes", type=int, default=128, help="episodes of one evaluation")
+    parser.add_argument("--duration", type=float, default=6.0, help="length of an episode [s]")
+    parser.add_argument("--seed", type=int, default=0, help="of the search")
+    parser.add_argument("--out", type=writable_file, required=True, help="JSON file to write")
+    chosen = parser.parse_args(arguments)
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    options = {"parameters": "confidence"}
+    settings = {"trials": chosen.trials, "episodes": chosen.episodes, "duration": chosen.duration}
+    tunings = {kind: tune(kind, **settings, seed=chosen.seed, options=options) for kind in KINDS}
+    search = {"method": "Optuna TPE on the mean return", **settings, "seed": chosen.seed, **options}
+    save_tunings(tunings, Path(chosen.out), search)
+    for kind, tuning in tunings.items():
+        print(f"{kind}: mean return {tuning.mean_return:.1f} with {tuning.values}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(fail_clearly(main))
