@@ -8,6 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 
+class ActionError(ValueError):
+    """An action is not one of the action space."""
+
+
 @dataclass(frozen=True)
 class OnOff:
     """Discrete(2): the coil is off (0, the PV opens) or on (1, it shuts) for the whole period."""
@@ -22,8 +26,10 @@ class OnOff:
 
     def decode(self, actions: NDArray) -> tuple[NDArray, NDArray]:
         """Time on [s] and commanded fraction for actions (n,)."""
-        on = np.asarray(actions).reshape(len(actions)).astype(float)
-        return on * self.period, on
+        on = np.asarray(actions).reshape(len(actions)) == 1
+        if not np.all(on | (np.asarray(actions).reshape(len(actions)) == 0)):
+            raise ActionError(f"actions {actions!r} are not all 0 (coil off) or 1 (coil on)")
+        return np.where(on, self.period, 0.0), on.astype(float)
 
 
 @dataclass(frozen=True)
@@ -45,6 +51,8 @@ class PWM:
 
     def decode(self, actions: NDArray) -> tuple[NDArray, NDArray]:
         """Time on [s] and realised fraction for actions (n, 1)."""
+        if not np.all(np.isfinite(actions)):
+            raise ActionError(f"actions {actions!r} are not all finite: give numbers in [-1, 1]")
         duty = np.clip((np.asarray(actions, float).reshape(len(actions)) + 1) / 2, 0.0, 1.0)
         slots = max(round(self.period / self.resolution), 1)
         duty = np.rint(duty * slots) / slots

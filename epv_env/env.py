@@ -23,7 +23,8 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
 
     Observation: Box, float32, the ECU's readings as `epv_env.observation.LAYOUT` lists them. Reward:
     the sum of `epv_env.reward.RewardTerms`. Terminates when the circuit is empty (p2 below 1.5 bar),
-    never otherwise; Gymnasium's time limit truncates after 10 s. info: see `epv_env.infos`.
+    never otherwise; Gymnasium's time limit truncates after 2000 (PWM: 500) control periods, 10 s at the
+    default period. info: see `epv_env.infos`.
 
     Arguments, all optional:
         plant: path of a plant file (docs/data.md), a Plant, or None for the report's calibration.

@@ -10,13 +10,16 @@ from epv_env.plant.consumption import MIXED, check_scenario
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
-from epv_env.plant.supply import Supply
+from epv_env.plant.supply import BAR, Supply
 from epv_env.reward import RewardWeights
 
 Range = tuple[float, float]
 
 PRESSURE_LIMITS_BAR = (1.0, 16.0)
 """Range of the pressure sensors (Table 1), bar absolute."""
+
+EMPTY_CIRCUIT_BAR = 1.5
+"""Circuit pressure at which an episode fails: the consumers could no longer draw their flow."""
 
 OPTIONS = ("parameters", "scenario", "supply", "target_bar", "p2_bar", "p3_bar")
 """Keys that reset(options=...) understands, beside Gymnasium's "reset_mask"."""
@@ -48,18 +51,22 @@ def as_region(value: Any, plant: Plant) -> Region:
     if isinstance(value, Mapping):
         return Region.from_choices(value, plant.parameters)
     if value == "confidence":
+        if not plant.region.varies:
+            raise OptionError(
+                f"plant {plant.name!r} has no confidence region: give ranges by symbol, or a plant "
+                "file from identification"
+            )
         return plant.region
     return Region.named(value, plant.parameters)
 
 
 def as_supply(value: Any) -> Supply:
-    """A Supply, from itself, a constant pressure [bar absolute] or None (sagging reservoirs)."""
+    """A Supply, from itself, a constant pressure or range [bar absolute], or None (reservoirs)."""
     if value is None:
         return Supply.reservoirs()
     if isinstance(value, Supply):
         return value
-    low, _ = as_range("supply", value)
-    return Supply.constant(low)
+    return Supply.constant(*as_range("supply", value))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,9 +93,28 @@ class Settings:
 
     def __post_init__(self) -> None:
         check_scenario(self.scenario)
-        if not 0.5e-3 <= self.control_period <= 1.0:
+        if not 0.5e-3 <= self.control_period <= 0.1:
             raise OptionError(
-                f"control_period = {self.control_period:g} s must lie between 0.5 ms and 1 s"
+                f"control_period = {self.control_period:g} s must lie between 0.5 ms and 100 ms"
+            )
+        if not 0 <= self.settling_time < np.inf:
+            raise OptionError(f"settling_time = {self.settling_time!r} s must be at least 0")
+        if not isinstance(self.weights, RewardWeights):
+            raise OptionError(f"weights is {self.weights!r}: give a RewardWeights")
+        self._check_pressures()
+
+    def _check_pressures(self) -> None:
+        """A target must be reachable from below, and no episode may begin with an empty circuit."""
+        if self.target_bar[1] * BAR > self.supply.pressure[0]:
+            raise OptionError(
+                f"target_bar up to {self.target_bar[1]:g} bar exceeds the supply's least pressure, "
+                f"{self.supply.pressure[0] / BAR:g} bar: lower the target or raise the supply"
+            )
+        first = self.target_bar[0] - self.drop_bar[1] if self.p2_bar is None else self.p2_bar[0]
+        if first <= EMPTY_CIRCUIT_BAR:
+            raise OptionError(
+                f"episodes could begin with p2 = {first:g} bar, and the circuit counts as empty at "
+                f"{EMPTY_CIRCUIT_BAR:g} bar: raise target_bar or p2_bar, or lower drop_bar"
             )
         if not 0 < self.supply_voltage <= 32:
             raise OptionError(
@@ -104,6 +130,7 @@ def make_settings(
     target_bar: Any = (6.0, 9.5),
     p2_bar: Any = None,
     p3_bar: Any = None,
+    drop_bar: Any = (0.0, 2.0),
     **rest: Any,
 ) -> Settings:
     """Settings from what a user writes; see `EPValveEnv` for the arguments."""
@@ -113,6 +140,7 @@ def make_settings(
         target_bar=as_range("target_bar", target_bar),
         p2_bar=None if p2_bar is None else as_range("p2_bar", p2_bar),
         p3_bar=None if p3_bar is None else as_range("p3_bar", p3_bar),
+        drop_bar=as_range("drop_bar", drop_bar, (0.0, 16.0)),
         **rest,
     )
 

@@ -13,16 +13,14 @@ from numpy.typing import NDArray
 
 from epv_env.observation import HISTORY, LONGEST_WAIT, P2_LAGS, P3_LAGS, encode
 from epv_env.plant.consumption import Profile, Profiles, draw_profile
+from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.sensors import SENSORS
 from epv_env.plant.simulate import energised
 from epv_env.plant.supply import BAR, Supply
 from epv_env.plant.valves import Valves
 from epv_env.reward import BAND_BAR, RewardTerms, reward_terms
-from epv_env.settings import Settings
-
-EMPTY_CIRCUIT_BAR = 1.5
-"""Circuit pressure at which an episode fails: the consumers could no longer draw their flow."""
+from epv_env.settings import EMPTY_CIRCUIT_BAR, Settings
 
 PRESSURES = ("p1", "p2", "p3")
 MEASURED = (*PRESSURES, "I")
@@ -38,7 +36,7 @@ class StepResult(NamedTuple):
     reward: NDArray
     terms: RewardTerms
     failed: NDArray
-    """The circuit is empty: the only physical failure that ends an episode."""
+    """The circuit is empty, or the plant left what can be integrated: what ends an episode."""
     deviation_bar: NDArray
     """p2 - target of largest magnitude within the period."""
     switchings: NDArray
@@ -154,18 +152,19 @@ class LimitingTask:
         switchings = self._switch(on_time, action)
         time = self.time()
         consumption = self._consumption.mean_flow(time, self.period)
-        vented = self.valves.state.air_vented.copy()
+        before = State(*(field.copy() for field in self.valves.state))
         self._drive(on_time, time, consumption)
+        lost = self._restore_lost(before)
         self.steps += 1
 
         error = self.valves.state.p2 / BAR - self.target
         highest = self.valves.highest_p2 / BAR - self.target
         lowest = self.valves.lowest_p2 / BAR - self.target
         deviation = np.where(highest > -lowest, highest, lowest)
-        failed = ~(self.valves.state.p2 > EMPTY_CIRCUIT_BAR * BAR)  # true for NaN, too
+        failed = lost | (self.valves.state.p2 <= EMPTY_CIRCUIT_BAR * BAR)
         settled = self.time() > self.settings.settling_time
-        self.violated |= settled & ~(np.abs(deviation) <= BAND_BAR)
-        vented_kg = self.valves.state.air_vented - vented
+        self.violated |= settled & (np.abs(deviation) > BAND_BAR)
+        vented_kg = self.valves.state.air_vented - before.air_vented
         terms = reward_terms(
             self.settings.weights,
             period=self.period,
@@ -210,6 +209,18 @@ class LimitingTask:
         if not np.all(whole):
             inputs.U[:] = 0.0
             self.valves.advance(np.where(whole, 0.0, self.period - on_time))
+
+    def _restore_lost(self, before: State) -> NDArray:
+        """Put valves that could not be integrated back where they were, and say which (n,).
+
+        Their episodes fail; a learner must not meet a NaN.
+        """
+        lost = np.isnan(self.valves.state.p2)
+        if np.any(lost):
+            for field, earlier in zip(self.valves.state, before, strict=True):
+                field[lost] = earlier[lost]
+            self.valves.lowest_p2[lost] = self.valves.highest_p2[lost] = before.p2[lost]
+        return lost
 
     def _supply_air(self, time: NDArray) -> None:
         """Set what the compressor delivers and what a recorded supply does."""

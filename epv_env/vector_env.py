@@ -27,7 +27,8 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         autoreset_mode: an AutoresetMode or its value. NEXT_STEP is Gymnasium's default, SAME_STEP is
             what stable-baselines3 needs, DISABLED leaves resets to options={"reset_mask": mask}.
         threads: threads of the plant; None uses every core.
-    reset(options=...): as for the single environment; a list gives one value for each sub-environment.
+    reset(options=...): as for the single environment; a list gives one value for each
+    sub-environment, None standing for the constructor's.
     """
 
     metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
@@ -76,7 +77,8 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         """Start all episodes, or those of options["reset_mask"] (n,) bool."""
         options = dict(options or {})
         mask = self._checked_mask(options.pop("reset_mask", self._every))
-        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int) else seed
+        single = isinstance(seed, (int, np.integer))
+        seeds = [int(seed) + i for i in range(self.num_envs)] if single else seed
         if seeds is not None and len(seeds) != self.num_envs:
             raise OptionError(
                 f"got {len(seeds)} seeds for {self.num_envs} environments: give one each"
@@ -101,7 +103,7 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         else:
             truncated = self.task.steps >= self.max_episode_steps
         infos: dict[str, Any] = batch_info(result)
-        valid = self._every
+        valid = self._every.copy()
         if self.mode is AutoresetMode.NEXT_STEP and np.any(stale):
             observation = self._begin(np.flatnonzero(stale), {})
             reward, terminated, truncated = (
@@ -155,9 +157,8 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
                     f"option {key} lists {len(value)} values for {self.num_envs} environments: "
                     "give one each, or one (low, high) tuple for all"
                 )
-        return {
-            key: value[i] if isinstance(value, list) else value for key, value in options.items()
-        }
+        own = {k: value[i] if isinstance(value, list) else value for k, value in options.items()}
+        return {key: value for key, value in own.items() if value is not None}
 
     def _checked_mask(self, mask: NDArray) -> NDArray:
         if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != bool:

@@ -32,16 +32,28 @@ QUICK = {"timesteps": 65_536, "episodes": 16, "duration": 2.0}
 def parse(arguments: list[str] | None) -> argparse.Namespace:
     """The command line's options, checked."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--out", type=writable_folder, default=Path("runs/ppo"), help="folder of results")
-    parser.add_argument("--timesteps", type=int, default=4_000_000, help="environment steps to train")
-    parser.add_argument("--episodes", type=int, default=256, help="evaluation episodes per plant set")
+    parser.add_argument(
+        "--out", type=writable_folder, default=Path("runs/ppo"), help="folder of results"
+    )
+    parser.add_argument(
+        "--timesteps", type=int, default=4_000_000, help="environment steps to train"
+    )
+    parser.add_argument(
+        "--episodes", type=int, default=256, help="evaluation episodes per plant set"
+    )
     parser.add_argument("--duration", type=float, default=10.0, help="length of one of them [s]")
     parser.add_argument("--seed", type=int, default=0, help="of the training")
-    parser.add_argument("--plant", default=None, help="plant file; default: the report's calibration")
+    parser.add_argument(
+        "--plant", default=None, help="plant file; default: the report's calibration"
+    )
     parser.add_argument("--scenario", default="mixed", help="consumption scenario")
-    parser.add_argument("--device", default="cpu", help="torch device; cpu is fastest for so small a net")
+    parser.add_argument(
+        "--device", default="cpu", help="torch device; cpu is fastest for so small a net"
+    )
     parser.add_argument("--resume", action="store_true", help="go on from the folder's checkpoint")
-    parser.add_argument("--quick", action="store_true", help="a run of seconds that shows that all works")
+    parser.add_argument(
+        "--quick", action="store_true", help="a run of seconds that shows that all works"
+    )
     chosen = parser.parse_args(arguments)
     if chosen.quick:
         vars(chosen).update(QUICK)
@@ -59,7 +71,11 @@ def configuration(chosen: argparse.Namespace, plant: Plant, hyperparameters: Any
     return {
         "options": {name: str(v) if isinstance(v, Path) else v for name, v in vars(chosen).items()},
         "hyperparameters": settings_as_data(hyperparameters),
-        "plant": {"name": plant.name, "parameters": dict(plant.parameters), "provenance": plant.provenance},
+        "plant": {
+            "name": plant.name,
+            "parameters": dict(plant.parameters),
+            "provenance": plant.provenance,
+        },
         "versions": {"python": platform.python_version(), **{p: version(p) for p in packages}},
         "written": datetime.now(UTC).isoformat(timespec="seconds"),
     }
@@ -86,7 +102,12 @@ def check_resume(chosen: argparse.Namespace) -> None:
 def evaluate(chosen: argparse.Namespace, plant: Plant) -> Comparison:
     """The comparison on unseen scenarios, with a progress bar."""
     contenders = [load_policy(chosen.out), *tuned_controllers(plant.parameters)]
-    with tqdm(total=100, desc="evaluation", unit="%", bar_format="{l_bar}{bar}| {elapsed}<{remaining} {postfix}") as bar:
+    with tqdm(
+        total=100,
+        desc="evaluation",
+        unit="%",
+        bar_format="{l_bar}{bar}| {elapsed}<{remaining} {postfix}",
+    ) as bar:
 
         def show(what: str, share: float) -> None:
             bar.set_postfix_str(what)
@@ -136,7 +157,9 @@ def report(comparison: Comparison, curve: list[dict[str, float]], folder: Path) 
     print(as_text(table))
     if curve:
         rate = curve[-1]["timesteps"] / max(curve[-1]["seconds"], 1e-9)
-        print(f"\ntrained {curve[-1]['timesteps']:.0f} steps at {rate:.0f} steps/s; results in {folder}")
+        print(
+            f"\ntrained {curve[-1]['timesteps']:.0f} steps at {rate:.0f} steps/s; results in {folder}"
+        )
 
 
 if __name__ == "__main__":

@@ -61,7 +61,7 @@ def effect_sizes(p: Mapping[str, ArrayLike]) -> NDArray:
     return np.ascontiguousarray(np.broadcast_arrays(*np.atleast_1d(*rows)), dtype=float)
 
 
-def needs_extended(effects: NDArray) -> bool:
-    """Whether any effect is switched on (rows a1, a2; RT is a property of the gas)."""
+def has_effects(effects: NDArray) -> NDArray:
+    """Which valves have an effect switched on, boolean (valve,); RT is a property of the gas."""
     sizes = Effects(*effects)
-    return bool(np.any(sizes.a1) or np.any(sizes.a2))
+    return (sizes.a1 != 0) | (sizes.a2 != 0)

@@ -154,16 +154,17 @@ def _try_steps(work, step, extended):
             end.p2, end.p3, xPV, vPV, xMV, vMV, end.I, end.p1,
             end.air_in_PV, end.air_in_MV, end.air_vented, end.coil_energy,
         )  # fmt: skip
+        reached = chosen_state(event, q, landed)
         store_state(work, TRIAL, lane, end)
-        store_state(work, STATE, lane, chosen_state(event, q, landed))
+        store_state(work, STATE, lane, reached)
         work[REMAINING, lane] = remaining if event else remaining - h
         work[HINT, lane] = h if event else _UNLOCATED
         work[EVENT, lane] = 1.0 if event else 0.0
         work[FORCE, lane], work[FORCE + 1, lane], work[FORCE + 2, lane] = force_PV, mid_PV, end_PV
         work[FORCE + 3, lane], work[FORCE + 4, lane] = force_MV, mid_MV
         work[FORCE + 5, lane] = end_MV
-        work[LOWEST, lane] = min(work[LOWEST, lane], end.p2)
-        work[HIGHEST, lane] = max(work[HIGHEST, lane], end.p2)
+        work[LOWEST, lane] = min(work[LOWEST, lane], reached.p2)
+        work[HIGHEST, lane] = max(work[HIGHEST, lane], reached.p2)
 
 
 @inlined

@@ -44,7 +44,8 @@ class Plant:
 def load_plant(source: "Plant | str | PathLike[str] | None") -> Plant:
     """A Plant from itself, a plant file, or (None) the report's calibration.
 
-    Raises PlantFileError for a file that is missing, not JSON, of another version or incomplete.
+    Raises PlantFileError for a file that is missing, not JSON, of another version or malformed. A
+    parameter that the file does not name has the report's calibrated value.
     """
     if isinstance(source, Plant):
         return source
@@ -67,9 +68,14 @@ def load_plant(source: "Plant | str | PathLike[str] | None") -> Plant:
         )
     try:
         return _decode(content)
-    except (KeyError, TypeError, ValueError) as error:
-        what = f"field {error} is missing" if isinstance(error, KeyError) else str(error)
-        raise PlantFileError(f"plant file {path}: {what}") from None
+    except ParameterError as error:
+        raise PlantFileError(f"plant file {path}: {error}") from None
+    except KeyError as error:
+        raise PlantFileError(f"plant file {path}: field {error} is missing: add it") from None
+    except (TypeError, ValueError, AttributeError) as error:
+        raise PlantFileError(
+            f"plant file {path} is not of the form that docs/data.md describes ({error})"
+        ) from None
 
 
 def save_plant(plant: Plant, path: str | PathLike[str]) -> None:

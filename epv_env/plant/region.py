@@ -44,12 +44,30 @@ class Region:
             checked_value(symbol, low)
             checked_value(symbol, high)
         if self.covariance is not None:
-            k = len(self.symbols)
-            if self.covariance.shape != (k, k) or np.any(np.linalg.eigvalsh(self.covariance) < 0):
-                raise ParameterError(
-                    f"the joint region's covariance must be a positive semi-definite {k} x {k} "
-                    f"matrix, one row per symbol of {self.symbols}"
-                )
+            self._check_joint(self.covariance)
+
+    def _check_joint(self, covariance: NDArray) -> None:
+        k = len(self.symbols)
+        for symbol in self.symbols:
+            checked_value(symbol, self.centre[symbol] if symbol in self.centre else np.nan)
+        proper = (
+            covariance.shape == (k, k)
+            and bool(np.all(np.isfinite(covariance)))
+            and np.allclose(covariance, covariance.T, rtol=1e-9, atol=0.0)
+            and bool(np.all(np.linalg.eigvalsh(covariance) >= 0))
+        )
+        if not proper:
+            raise ParameterError(
+                f"the joint region's covariance must be a symmetric, positive semi-definite {k} x {k} "
+                f"matrix, one row per symbol of {self.symbols}"
+            )
+        if not 0 <= self.chi_square < np.inf:
+            raise ParameterError(f"the joint region's chi_square = {self.chi_square} must be >= 0")
+
+    @property
+    def varies(self) -> bool:
+        """Whether there is anything to draw."""
+        return bool(self.boxes) or self.covariance is not None
 
     @classmethod
     def named(cls, name: str, centre: Parameters) -> "Region":

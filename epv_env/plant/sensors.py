@@ -30,8 +30,9 @@ class Sensor:
     def measure(self, value: NDArray, standard_normal: NDArray) -> NDArray:
         """The reading for a true value and a standard normal draw of the same shape."""
         margin = self.accuracy * self.high
-        steps = np.rint((value + self.noise * standard_normal) / self.resolution)
-        return np.clip(steps * self.resolution, self.low - margin, self.high + margin)
+        steps = np.rint((value - self.low + self.noise * standard_normal) / self.resolution)
+        reading = self.low + steps * self.resolution
+        return np.clip(reading, self.low - margin, self.high + margin)
 
 
 SENSORS: dict[str, Sensor] = {

@@ -24,9 +24,7 @@ class Trajectory:
     state: State
 
 
-def energised(
-    p: Mapping[str, ArrayLike], *, p1: ArrayLike, p2: ArrayLike, U: ArrayLike
-) -> State:
+def energised(p: Mapping[str, ArrayLike], *, p1: ArrayLike, p2: ArrayLike, U: ArrayLike) -> State:
     """Steady state with the coil on: armature pulled in, p3 = p1, PV shut (SI units).
 
     Arguments are numbers, or arrays (n,) for n valves.

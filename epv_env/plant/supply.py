@@ -43,9 +43,10 @@ class Supply:
             )
 
     @classmethod
-    def constant(cls, pressure_bar: float) -> "Supply":
-        """A supply that holds one pressure [bar absolute] whatever is drawn."""
-        return cls(pressure=(pressure_bar * BAR, pressure_bar * BAR))
+    def constant(cls, low_bar: float, high_bar: float | None = None) -> "Supply":
+        """A supply that holds one pressure whatever is drawn from it: low_bar, or a draw for every
+        episode from low_bar to high_bar [bar absolute]."""
+        return cls(pressure=(low_bar * BAR, (low_bar if high_bar is None else high_bar) * BAR))
 
     @classmethod
     def reservoirs(
@@ -69,7 +70,8 @@ class Supply:
         time, pressure = np.asarray(time_s, float), np.asarray(pressure_bar, float) * BAR
         if time.ndim != 1 or time.shape != pressure.shape or np.any(np.diff(time) <= 0):
             raise ValueError("a recorded supply needs increasing times and one pressure for each")
-        return cls(pressure=(pressure[0], pressure[0]), recording=(time, pressure))
+        first = float(np.interp(0.0, time, pressure))
+        return cls(pressure=(first, first), recording=(time, pressure))
 
     def draw(self, rng: np.random.Generator) -> float:
         """An episode's first p1 [Pa]."""

@@ -1,7 +1,7 @@
 """A batch of valves: the NumPy side of the compiled integrator."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from epv_env.plant import integrate
-from epv_env.plant.coefficients import coefficients, effect_sizes, needs_extended
+from epv_env.plant.coefficients import coefficients, effect_sizes, has_effects
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.lanes import LANES, N_INPUT, N_STATE
 from epv_env.plant.parameters import Parameters
@@ -50,7 +50,7 @@ class Valves:
         self._duration = np.zeros(lanes)
         self._lowest = np.full(lanes, np.inf)
         self._highest = np.full(lanes, -np.inf)
-        self._extended = False
+        self._with_effects = np.zeros(lanes, dtype=bool)
 
     @property
     def state(self) -> State:
@@ -83,7 +83,7 @@ class Valves:
         """Give the valves at the indices `where` (m,) the values p (scalars or arrays (m,))."""
         self._coefficients[:, where] = coefficients(p, reservoir_volume)
         self._effects[:, where] = effect_sizes(p)
-        self._extended = needs_extended(self._effects)
+        self._with_effects = has_effects(self._effects)
 
     def advance(self, duration: ArrayLike) -> None:
         """Apply `inputs` for `duration` [s], one for all or one per valve (n,)."""
@@ -106,7 +106,27 @@ class Valves:
         return State(*out[:, :, : self.n].transpose(1, 0, 2))
 
     def _run(self, inputs: NDArray, duration: NDArray, out: NDArray) -> None:
-        run = integrate.run_extended if self._extended else integrate.run_nominal
+        """Run both kernels if valves with and without effects are mixed, each on its own valves.
+
+        So a valve's trajectory does not depend, to the bit, on its companions' effects.
+        """
+        if not np.any(self._with_effects):
+            self._run_with(integrate.run_nominal, inputs, duration, out)
+            return
+        if np.all(self._with_effects[: self.n]):
+            self._run_with(integrate.run_extended, inputs, duration, out)
+            return
+        nominal = np.where(self._with_effects, 0.0, duration)
+        extended = np.where(self._with_effects, duration, 0.0)
+        self._run_with(integrate.run_nominal, inputs, nominal, out)
+        others = np.empty_like(out)
+        self._run_with(integrate.run_extended, inputs, extended, others)
+        out[:, :, self._with_effects] = others[:, :, self._with_effects]
+
+    def _run_with(
+        self, run: Callable[..., None], inputs: NDArray, duration: NDArray, out: NDArray
+    ) -> None:
+        """Run one kernel on all lanes, shared among threads."""
 
         def work(first: int, last: int) -> None:
             run(self._state, self._coefficients, self._effects, inputs, duration, self._lowest,
