@@ -33,9 +33,7 @@ class Hysteresis:
 
     def __post_init__(self) -> None:
         if self.lag not in P2_LAGS:
-            raise ValueError(
-                f"lag = {self.lag}: the observation holds changes over {P2_LAGS} periods"
-            )
+            raise ValueError(f"lag = {self.lag}: the observation holds changes over {P2_LAGS} periods")
         if self.open_below > self.shut_above:
             raise ValueError(
                 f"open_below = {self.open_below:g} bar exceeds shut_above = {self.shut_above:g} bar: "

@@ -29,7 +29,7 @@ class PWM:
     rest_above: float
     """p2 - target above which the coil stays on [bar]."""
     depth: float
-    """Most that p3 is asked to lie below the opening pressure [bar]; it limits how far the valve opens."""
+    """Most that p3 is asked to lie below the opening pressure [bar]: limits how far the PV opens."""
     setpoint: float = 0.0
     """Error at which the cascade aims [bar]."""
     control_period: float = 20e-3

@@ -10,11 +10,13 @@ closed by a cascade at the PWM period: p3 by a gain, p2 by a PI around it, which
 the control chamber out of the outer loop.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import control
 import numpy as np
-from scipy.optimize import brentq
+from numpy.typing import NDArray
+from scipy.optimize import root_scalar
 
 from epv_env.plant.coefficients import coefficients
 from epv_env.plant.equations import Coefficients
@@ -76,12 +78,17 @@ def _p3_rate(p3: float, duty: float, p1: float, c: Coefficients) -> float:
     return c.RT_V3 * (duty * fill - (1 - duty) * vent)
 
 
+def _root(function: Callable[[float], float], low: float, high: float) -> float:
+    """Zero of a function that changes sign between low and high."""
+    return float(root_scalar(function, bracket=(low, high)).root)
+
+
 def linearise(p: Parameters, *, p1: float, p2: float) -> OperatingPoint:
     """The averaged plant at a supply p1 and circuit pressure p2 [Pa absolute]."""
     c = Coefficients(*coefficients(p)[:, 0].tolist())
     stroke = OPENING * c.xPVmax
-    p3 = brentq(lambda x: _static_stroke(x, p1, p2, c) - stroke, c.p_env, p1)
-    duty = brentq(lambda d: _p3_rate(p3, d, p1, c), 0.0, 1.0)
+    p3 = _root(lambda x: _static_stroke(x, p1, p2, c) - stroke, c.p_env, p1)
+    duty = _root(lambda d: _p3_rate(p3, d, p1, c), 0.0, 1.0)
     small = 1e-3 * p3
     flux = mass_flux(p1, p2, c.inverse_sqrt_RT)
     opening_slope = -c.piston_area / c.cPV  # of the static stroke between its stops
@@ -94,22 +101,20 @@ def linearise(p: Parameters, *, p1: float, p2: float) -> OperatingPoint:
     )
 
 
-def inner_loop(point: OperatingPoint, inner_gain: float, period: float) -> control.StateSpace:
-    """From the wanted p3 to p2, both in bar, with p3 fed back; sampled with a zero-order hold."""
-    continuous = control.ss(
-        [[point.a, 0.0], [point.g, 0.0]], [[point.b / BAR], [0.0]], [[0.0, 1.0]], 0
-    )
-    sampled = control.sample_system(continuous, period, method="zoh")
-    feedback = sampled.A - inner_gain * sampled.B @ np.array([[1.0, 0.0]])
-    return control.ss(feedback, inner_gain * sampled.B, sampled.C, 0, period)
-
-
 def outer_loop(
-    point: OperatingPoint, inner_gain: float, gain: float, integral_time: float, period: float
-) -> control.TransferFunction:
-    """Open outer loop with the PI; the sign makes it positive, since a lower p3 raises p2."""
-    pi = control.tf([1.0, period / integral_time - 1.0], [1.0, -1.0], period)
-    return -gain * pi * control.ss2tf(inner_loop(point, inner_gain, period))
+    point: OperatingPoint, inner_gain: float, integral_time: float, period: float, z: NDArray
+) -> NDArray:
+    """Frequency response of the open outer loop at unit gain, at the points z (k,) of the z-plane.
+
+    The valve, sampled with a zero-order hold, with p3 fed back through inner_gain, behind the PI. The
+    sign makes it positive, since a lower p3 raises p2.
+    """
+    continuous = control.ss([[point.a, 0.0], [point.g, 0.0]], [[point.b / BAR], [0.0]], [[0.0, 1.0]], 0)
+    valve = control.sample_system(continuous, period, method="zoh")
+    A, B = np.asarray(valve.A), np.asarray(valve.B)
+    closed = control.ss(A - inner_gain * B @ np.array([[1.0, 0.0]]), inner_gain * B, valve.C, 0, period)
+    pi = 1 + period / integral_time / (z - 1)
+    return -pi * closed(z)
 
 
 def design(
@@ -132,13 +137,9 @@ def design(
     pole, drift = np.exp(-period / inner_time), np.exp(point.a * period)
     inner_gain = (drift - pole) / ((drift - 1) / point.a * point.b / BAR)
     frequency = np.geomspace(0.1, np.pi / period, 400)
-    unit = outer_loop(point, inner_gain, 1.0, integral_time, period)(
-        np.exp(1j * frequency * period)
-    )
+    unit = outer_loop(point, inner_gain, integral_time, period, np.exp(1j * frequency * period))
     for gain in np.geomspace(3.0, 1e-2, 80):
-        margin, phase, _, crossover = map(
-            float, control.margin(control.frd(gain * unit, frequency))
-        )
+        margin, phase, _, crossover = map(float, control.margin(control.frd(gain * unit, frequency)))
         if margin > 1 and phase >= phase_margin:
             return Design(
                 inner_gain=float(inner_gain), outer_gain=float(gain), integral_time=integral_time,

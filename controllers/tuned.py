@@ -60,7 +60,7 @@ KINDS = ("hysteresis", "hysteresis, extrapolating", "PWM")
 def load_tunings(path: str | PathLike[str] | None = None) -> dict[str, Tuning]:
     """Tunings by kind, from a file or (None) those that come with the package."""
     if path is None:
-        text = resources.files(__package__).joinpath("tuned.json").read_text(encoding="utf-8")
+        text = resources.files("controllers").joinpath("tuned.json").read_text(encoding="utf-8")
     else:
         text = Path(path).read_text(encoding="utf-8")
     content = json.loads(text)
@@ -72,9 +72,7 @@ def load_tunings(path: str | PathLike[str] | None = None) -> dict[str, Tuning]:
     return {kind: Tuning(**entry) for kind, entry in content["controllers"].items()}
 
 
-def save_tunings(
-    tunings: dict[str, Tuning], path: str | PathLike[str], search: dict[str, Any]
-) -> None:
+def save_tunings(tunings: dict[str, Tuning], path: str | PathLike[str], search: dict[str, Any]) -> None:
     """Write tunings and how they were searched, whole or not at all."""
     content = {
         "format": FORMAT,

@@ -1,6 +1,6 @@
 """EPValve-v0 and EPValvePWM-v0: one valve as a Gymnasium environment."""
 
-from typing import Any, ClassVar, SupportsFloat
+from typing import Any, ClassVar, Literal, SupportsFloat
 
 import gymnasium
 import numpy as np
@@ -39,7 +39,7 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
     Raises ValueError subclasses with one clear sentence for what cannot be used.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array", "human"], "render_fps": 50}
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array", "human"], "render_fps": 50}  # noqa: RUF012
     action_form: ClassVar[type[OnOff] | type[PWM]]
 
     def __init__(
@@ -47,7 +47,7 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
         *,
         plant: Any = None,
         control_period: float | None = None,
-        render_mode: str | None = None,
+        render_mode: Literal["rgb_array", "human"] | None = None,
         **options: Any,
     ):
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
@@ -56,6 +56,7 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
         self.plant = load_plant(plant)
         self.settings = make_settings(self.plant, control_period=period, **options)
         self.render_mode = render_mode
+        self._mode: Literal["rgb_array", "human"] | None = render_mode
         self.action = self.action_form(period)
         self.action_space = self.action.space()
         self.observation_space = observation_space()
@@ -106,11 +107,11 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
 
     def render(self) -> Any:
         """An RGB frame (rgb_array), or None (human: a window; None: nothing)."""
-        if self.render_mode is None:
+        if self._mode is None:
             gymnasium.logger.warn("render() without a render_mode: pass render_mode to make()")
             return None
         if self._renderer is None:
-            self._renderer = Renderer(self.render_mode, self.metadata["render_fps"])
+            self._renderer = Renderer(self._mode, self.metadata["render_fps"])
         return self._renderer.draw(self.snapshot())
 
     def close(self) -> None:

@@ -37,11 +37,11 @@ class SB3VectorEnv(VecEnv):
         super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
 
     def reset(self) -> np.ndarray:
-        seeds = list(self._seeds) if any(seed is not None for seed in self._seeds) else None
+        seeds: Any = list(self._seeds)  # Gymnasium's base class knows of one seed only
         options = self._options
         if any(options):
             keys = {key for chosen in options for key in chosen}
-            merged = {key: [chosen.get(key) for chosen in options] for key in keys}
+            merged = {key: [chosen.get(key) for chosen in options] for key in sorted(keys)}
         else:
             merged = None
         observation, _ = self.env.reset(seed=seeds, options=merged)
@@ -97,9 +97,7 @@ class SB3VectorEnv(VecEnv):
             raise ValueError("attributes are shared by all sub-environments: leave indices out")
 
 
-def make_sb3_env(
-    identifier: str = "EPValve-v0", num_envs: int = 256, **options: Any
-) -> SB3VectorEnv:
+def make_sb3_env(identifier: str = "EPValve-v0", num_envs: int = 256, **options: Any) -> SB3VectorEnv:
     """A batch of `num_envs` valves for stable-baselines3; options as for gymnasium.make_vec."""
     env = gymnasium.make_vec(
         identifier,

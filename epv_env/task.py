@@ -274,6 +274,4 @@ class LimitingTask:
         state = self.valves.state
         true = {name: getattr(state, name)[where] / BAR for name in PRESSURES}
         true["I"] = state.I[where]
-        return {
-            name: SENSORS[name].measure(true[name], normal[:, k]) for k, name in enumerate(MEASURED)
-        }
+        return {name: SENSORS[name].measure(true[name], normal[:, k]) for k, name in enumerate(MEASURED)}

@@ -77,14 +77,9 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         """Start all episodes, or those of options["reset_mask"] (n,) bool."""
         options = dict(options or {})
         mask = self._checked_mask(options.pop("reset_mask", self._every))
-        single = isinstance(seed, (int, np.integer))
-        seeds = [int(seed) + i for i in range(self.num_envs)] if single else seed
-        if seeds is not None and len(seeds) != self.num_envs:
-            raise OptionError(
-                f"got {len(seeds)} seeds for {self.num_envs} environments: give one each"
-            )
+        seeds = self._seeds(seed)
         where = np.flatnonzero(mask)
-        for i in where if seeds is not None else ():
+        for i in where:
             if seeds[i] is not None:
                 self._rngs[i] = np_random(seeds[i])[0]
         return self._begin(where, options), {}
@@ -111,9 +106,7 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
                 for value in (reward, terminated, truncated)
             )
             valid = ~stale
-            infos = {
-                key: np.where(stale, 0, value).astype(value.dtype) for key, value in infos.items()
-            }
+            infos = {key: np.where(stale, 0, value).astype(value.dtype) for key, value in infos.items()}
         infos |= {f"_{key}": valid for key in infos}
         self._done = terminated | truncated
         if self.mode is AutoresetMode.SAME_STEP and np.any(self._done):
@@ -140,9 +133,7 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
     def _begin(self, where: NDArray, options: dict[str, Any]) -> NDArray:
         """Start the episodes at `where` and return all observations."""
         settings = [
-            with_options(self.settings, self._own(options, i), self.plant)
-            if options
-            else self.settings
+            with_options(self.settings, self._own(options, i), self.plant) if options else self.settings
             for i in where
         ]
         self._done = self._done.copy()
@@ -159,6 +150,16 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
                 )
         own = {k: value[i] if isinstance(value, list) else value for k, value in options.items()}
         return {key: value for key, value in own.items() if value is not None}
+
+    def _seeds(self, seed: int | list[int | None] | None) -> list[int | None]:
+        """One seed for each sub-environment, as SyncVectorEnv gives them."""
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, (int, np.integer)):
+            return [int(seed) + i for i in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise OptionError(f"got {len(seed)} seeds for {self.num_envs} environments: give one each")
+        return list(seed)
 
     def _checked_mask(self, mask: NDArray) -> NDArray:
         if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != bool:

@@ -128,8 +128,8 @@ def as_text(table: pd.DataFrame) -> str:
     """The table as it is printed, one block for each plant set."""
     blocks = []
     for plants, meaning in PLANTS.items():
-        rows = table[table["plants"] == plants]
-        shown = rows[list(HEADINGS)].rename(columns=HEADINGS)
+        rows = table.loc[table["plants"] == plants]
+        shown = rows.loc[:, list(HEADINGS)].rename(columns=HEADINGS)
         shown = shown.assign(**{"C1 stayed": [f"{value:.1%}" for value in rows["C1_stayed"]]})
         blocks.append(f"{plants}: {meaning}\n" + shown.to_string(index=False, float_format="%.3f"))
     return "\n\n".join(blocks)

@@ -7,6 +7,7 @@ import matplotlib as mpl
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.figure import Figure
 
 from epv_env.reward import BAND_BAR
 from training.evaluate import Comparison
@@ -15,7 +16,7 @@ from training.rollout import Trace
 COLOURS = plt.rcParams["axes.prop_cycle"].by_key()["color"]
 
 
-def save_figure(figure: plt.Figure, path: Path) -> None:
+def save_figure(figure: Figure, path: Path) -> None:
     """Write a PNG and free the figure."""
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=130, bbox_inches="tight")
@@ -45,7 +46,8 @@ def episode_overlay(traces: dict[str, Trace], path: Path) -> None:
         rows + 2, 1, figsize=(9, 3.4 + 0.7 * rows), sharex=True,
         height_ratios=[4, *([0.7] * rows), 1],
     )  # fmt: skip
-    target = next(iter(traces.values())).target_bar
+    first = next(iter(traces.values()))
+    target = first.target_bar
     axes[0].axhspan(target - BAND_BAR, target + BAND_BAR, color="0.92", label="target ±500 mbar")
     axes[0].axhline(target, color="0.5", lw=0.8)
     for (name, trace), colour, coil in zip(traces.items(), COLOURS, axes[1:-1], strict=False):
@@ -56,7 +58,7 @@ def episode_overlay(traces: dict[str, Trace], path: Path) -> None:
     axes[0].set_ylabel("circuit pressure p2\n[bar absolute]")
     axes[0].legend(fontsize=8, ncols=3, loc="lower right")
     axes[1].set_title("coil: 1 on (valve shuts), 0 off (valve opens); PWM: duty", fontsize=8)
-    axes[-1].plot(trace.time, trace.consumption_g_per_s, color="0.3")
+    axes[-1].plot(first.time, first.consumption_g_per_s, color="0.3")
     axes[-1].set_ylabel("consumption\n[g/s]")
     axes[-1].set_xlabel("time [s]")
     figure.align_ylabels([axes[0], axes[-1]])

@@ -13,9 +13,7 @@ from epv_env.observation import contract
 from epv_env.plant.files import write_bytes, write_text
 
 
-def save_policy(
-    model: PPO, folder: Path, *, control_period: float, provenance: dict[str, Any]
-) -> None:
+def save_policy(model: PPO, folder: Path, *, control_period: float, provenance: dict[str, Any]) -> None:
     """Write the actor's weights and what its inputs and outputs mean.
 
     Raises TypeError for a policy that is not a plain multilayer perceptron with tanh layers.

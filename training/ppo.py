@@ -130,7 +130,7 @@ class TrainingLog(BaseCallback):
         """Write checkpoint and learning curve."""
         save_model(self.model, self._folder / CHECKPOINT_FILE)
         text = io.StringIO()
-        writer = csv.DictWriter(text, CURVE_COLUMNS)
+        writer: csv.DictWriter[str] = csv.DictWriter(text, list(CURVE_COLUMNS))
         writer.writeheader()
         writer.writerows(self.rows)
         write_text(self._folder / CURVE_FILE, text.getvalue())
@@ -176,7 +176,7 @@ def train(
     env = make_training_env(h, plant=plant, scenario=scenario, seed=seed)
     model = make_model(h, env, seed=seed, device=device)
     if resume and checkpoint.exists():
-        model.set_parameters(checkpoint, device=device)
+        model.set_parameters(str(checkpoint), device=device)
         done = int(read_curve(folder / CURVE_FILE)[-1]["timesteps"])
         env.seed(seed + done)
     log = TrainingLog(folder, timesteps, quiet=quiet)

@@ -30,9 +30,7 @@ class Trace:
     consumption_g_per_s: NDArray
 
 
-def make_env(
-    controller: Controller, n: int, **options: Any
-) -> EPValveVectorEnv | EPValvePWMVectorEnv:
+def make_env(controller: Controller, n: int, **options: Any) -> EPValveVectorEnv | EPValvePWMVectorEnv:
     """The controller's environment, n valves, without autoreset or time limit."""
     return gymnasium.make_vec(
         controller.environment,

@@ -31,21 +31,17 @@ QUICK = {"timesteps": 65_536, "episodes": 16, "duration": 2.0}
 
 def parse(arguments: list[str] | None) -> argparse.Namespace:
     """The command line's options, checked."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser = argparse.ArgumentParser(
+        description="Train PPO and compare it with hysteresis and PWM control."
+    )
     parser.add_argument(
         "--out", type=writable_folder, default=Path("runs/ppo"), help="folder of results"
     )
-    parser.add_argument(
-        "--timesteps", type=int, default=4_000_000, help="environment steps to train"
-    )
-    parser.add_argument(
-        "--episodes", type=int, default=256, help="evaluation episodes per plant set"
-    )
+    parser.add_argument("--timesteps", type=int, default=4_000_000, help="environment steps to train")
+    parser.add_argument("--episodes", type=int, default=256, help="evaluation episodes per plant set")
     parser.add_argument("--duration", type=float, default=10.0, help="length of one of them [s]")
     parser.add_argument("--seed", type=int, default=0, help="of the training")
-    parser.add_argument(
-        "--plant", default=None, help="plant file; default: the report's calibration"
-    )
+    parser.add_argument("--plant", default=None, help="plant file; default: the report's calibration")
     parser.add_argument("--scenario", default="mixed", help="consumption scenario")
     parser.add_argument(
         "--device", default="cpu", help="torch device; cpu is fastest for so small a net"
@@ -150,16 +146,14 @@ def report(comparison: Comparison, curve: list[dict[str, float]], folder: Path) 
 
     table = comparison.table
     write_text(folder / "table.csv", table.to_csv(index=False))
-    write_text(folder / "table.json", table.to_json(orient="records", indent=1) + "\n")
+    write_text(folder / "table.json", json.dumps(table.to_dict(orient="records"), indent=1) + "\n")
     plots.learning_curve(curve, folder / "learning_curve.png")
     plots.episode_overlay(comparison.traces, folder / "episode.png")
     plots.excursion_distribution(comparison, folder / "excursions.png")
     print(as_text(table))
     if curve:
         rate = curve[-1]["timesteps"] / max(curve[-1]["seconds"], 1e-9)
-        print(
-            f"\ntrained {curve[-1]['timesteps']:.0f} steps at {rate:.0f} steps/s; results in {folder}"
-        )
+        print(f"\ntrained {curve[-1]['timesteps']:.0f} steps at {rate:.0f} steps/s; results in {folder}")
 
 
 if __name__ == "__main__":

@@ -66,13 +66,17 @@ def tune(
         direction="maximize", sampler=optuna.samplers.TPESampler(seed=seed, multivariate=True)
     )
     with tqdm(total=trials, desc=f"{kind:27s}", unit="trial") as bar:
-        study.optimize(objective, n_trials=trials, callbacks=[lambda *_: bar.update()])
+
+        def count(*_: Any) -> None:
+            bar.update()
+
+        study.optimize(objective, n_trials=trials, callbacks=[count])
     return Tuning(values=study.best_params, trials=trials, mean_return=study.best_value)
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Command line; returns the exit status."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser = argparse.ArgumentParser(description="Tune the classic controllers.")
     parser.add_argument("--trials", type=int, default=150, help="evaluations for each controller")
     parser.add_argument("--episodes", type=int, default=128, help="episodes of one evaluation")
     parser.add_argument("--duration", type=float, default=6.0, help="length of an episode [s]")

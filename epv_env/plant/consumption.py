@@ -155,7 +155,5 @@ class Profiles:
         present = self._applications[:, self._now, self._all]
         following = self._applications[:, np.minimum(self._now + 1, APPLICATIONS - 1), self._all]
         taken = _passed(present, begin, begin + period)
-        taken += np.where(
-            self._now + 1 < APPLICATIONS, _passed(following, begin, begin + period), 0
-        )
+        taken += np.where(self._now + 1 < APPLICATIONS, _passed(following, begin, begin + period), 0)
         return self._leak + taken / period

@@ -11,16 +11,17 @@ from typing import NamedTuple
 
 from epv_env.plant.compiled import inlined
 from epv_env.plant.flow import KAPPA
+from epv_env.plant.values import Value
 
 
 class Effects(NamedTuple):
     """Sizes of the effects; 0 is off."""
 
-    a1: float
+    a1: Value
     """Cone model of the PV jet (`local_gas_speed`, eq. 15): constant angle [rad]."""
-    a2: float
+    a2: Value
     """Cone model: angle per gas speed [rad s/m]."""
-    RT: float
+    RT: Value
     """R T of the supply air, which turns a pressure ratio into a gas speed [J/kg]."""
 
 

@@ -8,8 +8,9 @@ are inlined into the kernels of integrate.py.
 from typing import NamedTuple
 
 from epv_env.plant.compiled import inlined
-from epv_env.plant.effects import Effects, effective_seat_diameter
+from epv_env.plant.effects import effective_seat_diameter
 from epv_env.plant.flow import mass_flux
+from epv_env.plant.values import Value
 
 QUARTER_PI = 0.7853981633974483
 
@@ -22,98 +23,98 @@ class State(NamedTuple):
     that mass and energy balances can be read off exactly.
     """
 
-    p2: float
+    p2: Value
     """Output chamber (circuit) pressure [Pa absolute]."""
-    p3: float
+    p3: Value
     """Control chamber pressure [Pa absolute]."""
-    xPV: float
+    xPV: Value
     """Stroke of the protection valve piston, 0 = shut [m]."""
-    vPV: float
+    vPV: Value
     """Speed of the piston [m/s]."""
-    xMV: float
+    xMV: Value
     """Stroke of the magnet valve armature, xMVmax = pulled in [m]."""
-    vMV: float
+    vMV: Value
     """Speed of the armature [m/s]."""
-    I: float  # noqa: E741 - the report's symbol
+    I: Value  # noqa: E741 - the report's symbol
     """Solenoid current [A]."""
-    p1: float
+    p1: Value
     """Input chamber pressure [Pa absolute]."""
-    air_in_PV: float
+    air_in_PV: Value
     """Air passed from the input to the output chamber [kg]."""
-    air_in_MV: float
+    air_in_MV: Value
     """Air passed from the input to the control chamber [kg]."""
-    air_vented: float
+    air_vented: Value
     """Air passed from the control chamber to ambient [kg]."""
-    coil_energy: float
+    coil_energy: Value
     """Electrical energy taken by the coil [J]."""
 
 
 class Inputs(NamedTuple):
     """What acts on the valve from outside, constant or linear in time over one period."""
 
-    U: float
+    U: Value
     """Solenoid voltage [V]."""
-    sigma_S: float
+    sigma_S: Value
     """Air consumed from the circuit [kg/s]."""
-    p1_slope: float
+    p1_slope: Value
     """Imposed rate of the supply pressure, for a recorded p1 [Pa/s]."""
-    refill: float
+    refill: Value
     """Air that the compressor delivers to the reservoirs [kg/s]."""
 
 
 class Coefficients(NamedTuple):
     """Parameters as the equations use them: report symbols, and products folded once per valve."""
 
-    cPV: float
-    xPV0: float
-    kPV: float
-    xPVmax: float
-    ePV: float
+    cPV: Value
+    xPV0: Value
+    kPV: Value
+    xPVmax: Value
+    ePV: Value
     """Coefficient of restitution of the piston's stops [-]."""
-    piston_area: float
+    piston_area: Value
     """pi/4 d1^2 [m^2]."""
-    seat_diameter: float
+    seat_diameter: Value
     """d2 [m]."""
-    mPV_inverse: float
+    mPV_inverse: Value
     """1/mPV [1/kg]."""
-    curtain_PV: float
+    curtain_PV: Value
     """alphaPV pi d2: effective opening per stroke [m]."""
-    cMV: float
-    xMV0: float
-    kMV: float
-    xMVmax: float
-    eMV: float
+    cMV: Value
+    xMV0: Value
+    kMV: Value
+    xMVmax: Value
+    eMV: Value
     """Coefficient of restitution of the armature's stops [-]."""
-    mMV_inverse: float
+    mMV_inverse: Value
     """1/mMV [1/kg]."""
-    curtain_in: float
+    curtain_in: Value
     """alphaMV pi dMVin [m]."""
-    orifice_in: float
+    orifice_in: Value
     """alphaMV pi/4 dMVin^2 [m^2]."""
-    curtain_exh: float
+    curtain_exh: Value
     """alphaMV pi dMVexh [m]."""
-    orifice_exh: float
+    orifice_exh: Value
     """alphaMV pi/4 dMVexh^2 [m^2]."""
-    kink_in: float
+    kink_in: Value
     """Stroke above which the inlet's bore is the smaller area [m]."""
-    kink_exh: float
+    kink_exh: Value
     """Stroke below which the exhaust's bore is the smaller area [m]."""
-    R: float
-    RML: float
-    gap_reluctance: float
+    R: Value
+    RML: Value
+    gap_reluctance: Value
     """1/(mu0 A_MB): reluctance per metre of air gap [A/(V s m)]."""
-    N_squared: float
+    N_squared: Value
     """Turns squared [-]."""
-    N_squared_inverse: float
-    RT_V2: float
+    N_squared_inverse: Value
+    RT_V2: Value
     """R T_env / V2 [Pa/kg]."""
-    RT_V3: float
+    RT_V3: Value
     """R T_env / V3 [Pa/kg]."""
-    RT_V1: float
+    RT_V1: Value
     """R T_env / V1 of the reservoirs [Pa/kg]; 0 for a supply that does not sag."""
-    inverse_sqrt_RT: float
+    inverse_sqrt_RT: Value
     """1/sqrt(R T_env) [s/m]."""
-    p_env: float
+    p_env: Value
 
 
 @inlined

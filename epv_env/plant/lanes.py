@@ -99,6 +99,4 @@ def copy_rows(source, source_row, source_lane, target, target_row, target_lane, 
     """Copy n_rows rows of one block of lanes from table to table."""
     for row in range(n_rows):
         for lane in range(LANES):
-            target[target_row + row, target_lane + lane] = source[
-                source_row + row, source_lane + lane
-            ]
+            target[target_row + row, target_lane + lane] = source[source_row + row, source_lane + lane]

@@ -8,6 +8,8 @@ from importlib import resources
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 
 class ParameterError(ValueError):
     """A parameter is unknown, not a number, or outside the domain in which the model means anything."""
@@ -32,7 +34,7 @@ class Parameter:
 
 @cache
 def _data() -> dict[str, Any]:
-    text = resources.files(__package__).joinpath("parameters.json").read_text(encoding="utf-8")
+    text = resources.files("epv_env.plant").joinpath("parameters.json").read_text(encoding="utf-8")
     return json.loads(text)
 
 
@@ -53,25 +55,16 @@ def sensitive_symbols() -> tuple[str, ...]:
 
 def confidence_intervals() -> dict[str, tuple[float, float]]:
     """The 95 % intervals of Table 14 for the four calibrated parameters."""
-    return {
-        symbol: (low, high) for symbol, (low, high) in _data()["confidence95"]["intervals"].items()
-    }
+    return {symbol: (low, high) for symbol, (low, high) in _data()["confidence95"]["intervals"].items()}
 
 
 def checked_value(symbol: str, value: Any) -> float:
     """The value as a float, if `symbol` exists and its domain holds it; else ParameterError."""
     row = table().get(symbol)
     if row is None:
-        raise ParameterError(
-            f"unknown parameter {symbol!r}: known symbols are {', '.join(table())}"
-        )
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        try:
-            value = value.item()  # a NumPy scalar
-        except (AttributeError, ValueError):
-            raise ParameterError(
-                f"parameter {symbol} is {value!r}: give one number [{row.unit}]"
-            ) from None
+        raise ParameterError(f"unknown parameter {symbol!r}: known symbols are {', '.join(table())}")
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+        raise ParameterError(f"parameter {symbol} is {value!r}: give one number [{row.unit}]")
     low, high = row.domain if row.domain else (row.value, row.value)
     if not low <= value <= high:
         remedy = "give a value inside it" if row.domain else "leave this constant out"

@@ -49,7 +49,7 @@ class Region:
     def _check_joint(self, covariance: NDArray) -> None:
         k = len(self.symbols)
         for symbol in self.symbols:
-            checked_value(symbol, self.centre[symbol] if symbol in self.centre else np.nan)
+            checked_value(symbol, self.centre.get(symbol, np.nan))
         proper = (
             covariance.shape == (k, k)
             and bool(np.all(np.isfinite(covariance)))
@@ -119,15 +119,15 @@ class Region:
         """One plant of the region."""
         changes = {symbol: float(rng.uniform(*ends)) for symbol, ends in self.boxes.items()}
         if self.covariance is not None:
-            changes |= dict(zip(self.symbols, self._joint(rng), strict=True))
+            changes |= dict(zip(self.symbols, self._joint(rng, self.covariance), strict=True))
         return self.centre.replace(**changes)
 
-    def _joint(self, rng: np.random.Generator) -> list[float]:
+    def _joint(self, rng: np.random.Generator, covariance: NDArray) -> list[float]:
         """A uniform point of the ellipsoid, by scaling a direction; kept inside the domains."""
         k = len(self.symbols)
         direction = rng.standard_normal(k)
         radius = np.sqrt(self.chi_square) * rng.uniform() ** (1 / k) / np.linalg.norm(direction)
-        values, vectors = np.linalg.eigh(self.covariance)
+        values, vectors = np.linalg.eigh(covariance)
         offset = vectors @ (np.sqrt(np.maximum(values, 0)) * direction) * radius
         domains = [table()[symbol].domain or (-np.inf, np.inf) for symbol in self.symbols]
         return [

@@ -33,9 +33,7 @@ def remaining_stages(q, k1, u, c, effects, free_PV, free_MV, h, extended):
     which tell whether and when a stop lets go.
     """
     k2, _, _ = derivative(moved(q, k1, 0.5 * h), u, c, effects, free_PV, free_MV, extended)
-    k3, mid_PV, mid_MV = derivative(
-        moved(q, k2, 0.5 * h), u, c, effects, free_PV, free_MV, extended
-    )
+    k3, mid_PV, mid_MV = derivative(moved(q, k2, 0.5 * h), u, c, effects, free_PV, free_MV, extended)
     k4, end_PV, end_MV = derivative(moved(q, k3, h), u, c, effects, free_PV, free_MV, extended)
     sixth, third = h / 6.0, h / 3.0
     end = moved(moved(moved(moved(q, k1, sixth), k2, third), k3, third), k4, sixth)

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.integrate import DEFAULT_STEP
+from epv_env.plant.values import Value
 from epv_env.plant.valves import Valves
 
 
@@ -24,7 +25,7 @@ class Trajectory:
     state: State
 
 
-def energised(p: Mapping[str, ArrayLike], *, p1: ArrayLike, p2: ArrayLike, U: ArrayLike) -> State:
+def energised(p: Mapping[str, Value], *, p1: Value, p2: Value, U: Value) -> State:
     """Steady state with the coil on: armature pulled in, p3 = p1, PV shut (SI units).
 
     Arguments are numbers, or arrays (n,) for n valves.

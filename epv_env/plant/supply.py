@@ -81,9 +81,7 @@ class Supply:
         """Imposed dp1/dt over the period that starts at `time` [Pa/s], shape of time."""
         if self.recording is None:
             return np.zeros_like(time)
-        return (
-            np.interp(time + period, *self.recording) - np.interp(time, *self.recording)
-        ) / period
+        return (np.interp(time + period, *self.recording) - np.interp(time, *self.recording)) / period
 
     def compressor_runs(self, p1: NDArray, ran: NDArray) -> NDArray:
         """Whether the compressor runs now (two-point control with memory), boolean array."""

@@ -78,7 +78,7 @@ class Valves:
         self._highest[:] = -np.inf
 
     def set_parameters(
-        self, where: ArrayLike, p: Mapping[str, ArrayLike], reservoir_volume: ArrayLike = np.inf
+        self, where: NDArray, p: Mapping[str, ArrayLike], reservoir_volume: ArrayLike = np.inf
     ) -> None:
         """Give the valves at the indices `where` (m,) the values p (scalars or arrays (m,))."""
         self._coefficients[:, where] = coefficients(p, reservoir_volume)

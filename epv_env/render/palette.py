@@ -20,6 +20,8 @@ IRON: Colour = (136, 146, 160)
 RUBBER: Colour = (38, 42, 50)
 COIL_COLD: Colour = (173, 128, 98)
 COIL_HOT: Colour = (255, 176, 32)
+WIRE_COLD: Colour = (206, 166, 138)
+WIRE_HOT: Colour = (255, 230, 150)
 
 P1: Colour = (84, 96, 118)
 P2: Colour = (20, 108, 214)

@@ -5,10 +5,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.render.canvas import Canvas, load_pygame
+from epv_env.render.canvas import Box, Canvas, load_pygame
 from epv_env.render.palette import BAD, CARD, EDGE, GOOD, INK, MUTED, PAGE
 from epv_env.render.section import draw_section, draw_section_background
-from epv_env.render.section import AREA as SECTION_AREA
 from epv_env.render.snapshot import Snapshot
 from epv_env.render.strip import Strip
 
@@ -17,9 +16,15 @@ if TYPE_CHECKING:
 
 WIDTH, HEIGHT = 1280, 720
 """Size of the frame [px]."""
-HEADER_AREA = (0, 0, WIDTH, 64)
 SECTION_CARD = (20, 68, 664, 704)
 STRIP_CARD = (680, 68, 1260, 704)
+MOVING_BOXES: tuple[Box, ...] = (
+    (16, 16, 700, 52),
+    (896, 16, 1264, 52),
+    (24, 104, 662, 630),
+    (690, 102, 1258, 676),
+)
+"""The parts of the frame that change [px]."""
 MOVING = 0.01
 """Stroke fraction from which the piston counts as off its seat [-]."""
 
@@ -27,10 +32,15 @@ MOVING = 0.01
 def phase(snapshot: Snapshot) -> tuple[str, str]:
     """Name of what the valve is doing, and a sentence on it."""
     is_open = snapshot.xPV_fraction > MOVING
+    is_pulled_in = snapshot.xMV_fraction > 0.5
+    if snapshot.coil_on and not is_pulled_in:
+        return "Pulling in", "coil on: the current builds up until it moves the armature"
+    if snapshot.coil_on and is_open:
+        return "Closing", "coil on: p_3 rises until it shuts the PV"
     if snapshot.coil_on:
-        if is_open:
-            return "Closing", "coil on: p_3 rises until it shuts the PV"
-        return "Holding", "coil on: p_3 keeps the PV shut, p_2 only falls by consumption"
+        return "Holding", "coil on: p_3 keeps the PV shut, p_2 falls only by consumption"
+    if is_pulled_in:
+        return "Releasing", "coil off: the current dies away until the spring moves the armature"
     if is_open:
         return "Filling", "coil off: PV open, p_2 rises towards p_1"
     return "Venting", "coil off: p_3 falls until p_1 and p_2 lift the piston"
@@ -52,7 +62,8 @@ class Renderer:
     ):
         """fps: frames per second of the window. tolerance_bar: half width of the shaded band [bar].
 
-        window_s: time that the strip chart shows [s]. Raises DependencyNotInstalled on first drawing.
+        window_s: time that the strip chart shows [s]. Without pygame, `draw` raises
+        DependencyNotInstalled.
         """
         if mode not in ("rgb_array", "human"):
             raise ValueError(f"render mode {mode!r} is unknown: use 'rgb_array' or 'human'")
@@ -73,33 +84,29 @@ class Renderer:
         if not self.is_open:
             return None
         self._strip.append(snapshot)
-        canvas = self._compose(snapshot)
+        image = self._compose(snapshot)
         if self.mode == "rgb_array":
-            return canvas.image()
-        self._show(canvas)
+            return image
+        self._show(image)
         return None
 
     def close(self) -> None:
-        """Shut the window and free the memory. May be called twice."""
+        """Shut the window and free the memory. May be called twice; drawing again starts anew."""
         if self._window is not None:
             load_pygame().display.quit()
         self._canvas = self._window = self._clock = None
-        self.is_open = False
 
-    def _compose(self, snapshot: Snapshot) -> Canvas:
+    def _compose(self, snapshot: Snapshot) -> NDArray[np.uint8]:
         if self._canvas is None:
             self._canvas = Canvas(WIDTH, HEIGHT)
             self._draw_background(self._canvas)
         canvas = self._canvas
-        areas = (HEADER_AREA, SECTION_AREA, self._strip.area)
-        for area in areas:
-            canvas.clear(area)
+        for box in MOVING_BOXES:
+            canvas.clear(box)
         self._draw_header(canvas, snapshot)
         draw_section(canvas, snapshot)
         self._strip.draw(canvas)
-        for area in areas:
-            canvas.sharpen(area)
-        return canvas
+        return canvas.image()
 
     def _draw_background(self, canvas: Canvas) -> None:
         canvas.rectangle((0, 0, WIDTH, HEIGHT), PAGE)
@@ -118,13 +125,13 @@ class Renderer:
         deviation = snapshot.p2_bar - snapshot.target_bar
         inside = abs(deviation) <= self._strip.tolerance_bar
         canvas.rectangle((900, 18, 1122, 50), GOOD if inside else BAD, radius=8)
-        # The font's hyphen stands for a minus: it is as wide as the plus is not.
+        # The font has no minus sign; its dash is as wide as the plus, the hyphen is not.
         words = f"p_2 – target  {deviation:+.2f} bar".replace("-", "–")
         canvas.text(words, (1011, 34), 20, CARD, align=0.5)
         width = canvas.text(f"{snapshot.time_s:.3f} s", (1258, 34), 22, INK, align=1.0)
         canvas.text("time", (1250 - width, 34), 18, MUTED, align=1.0)
 
-    def _show(self, canvas: Canvas) -> None:
+    def _show(self, image: NDArray[np.uint8]) -> None:
         pygame = load_pygame()
         if self._window is None:
             pygame.display.init()
@@ -133,8 +140,10 @@ class Renderer:
             self._clock = pygame.time.Clock()
         if any(event.type == pygame.QUIT for event in pygame.event.get()):
             self.close()
+            self.is_open = False
             return
-        assert self._window is not None and self._clock is not None
-        self._window.blit(canvas.frame, (0, 0))
+        assert self._window is not None
+        assert self._clock is not None
+        self._window.blit(pygame.image.frombuffer(image, (WIDTH, HEIGHT), "RGB"), (0, 0))
         pygame.display.flip()
         self._clock.tick(self.fps)

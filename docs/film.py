@@ -1,0 +1,58 @@
+"""Film the valve at work: one episode under the tuned hysteresis controller, as a GIF.
+
+python docs/film.py --out docs/images/valve.gif
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from controllers.tuned import tuned_controllers
+from epv_env.env import EPValveEnv
+from training.cli import fail_clearly, writable_file
+
+SIZE = (800, 450)
+
+
+def film(scenario: str, seconds: float, seed: int, every: int) -> list[Image.Image]:
+    """Frames of an episode, one per `every` control periods, on one palette of colours."""
+    env = EPValveEnv(scenario=scenario, render_mode="rgb_array")
+    controller = tuned_controllers()[1]
+    observation, _ = env.reset(seed=seed)
+    controller.reset(1)
+    frames = []
+    for step in range(round(seconds / env.settings.control_period)):
+        observation, *_ = env.step(int(controller.act(observation[None])[0]))
+        picture = env.render()
+        if step % every == 0:
+            frames.append(Image.fromarray(np.asarray(picture)).resize(SIZE, Image.Resampling.LANCZOS))
+    env.close()
+    palette = frames[-1].quantize(128)
+    return [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+
+
+def main() -> int:
+    """Command line; returns the exit status."""
+    parser = argparse.ArgumentParser(description="Film the valve at work.")
+    parser.add_argument("--out", type=writable_file, default=Path("docs/images/valve.gif"))
+    parser.add_argument("--scenario", default="steps", help="consumption scenario")
+    parser.add_argument("--seconds", type=float, default=2.4, help="simulated time")
+    parser.add_argument("--seed", type=int, default=4)
+    parser.add_argument("--slow", type=float, default=4.0, help="how much slower than real time")
+    chosen = parser.parse_args()
+    every, period = 2, 5e-3
+    frames = film(chosen.scenario, chosen.seconds, chosen.seed, every)
+    chosen.out.parent.mkdir(parents=True, exist_ok=True)
+    frames[0].save(
+        chosen.out, save_all=True, append_images=frames[1:], loop=0, optimize=True,
+        duration=round(1000 * every * period * chosen.slow),
+    )  # fmt: skip
+    print(f"{chosen.out}: {len(frames)} frames, {chosen.out.stat().st_size / 1e6:.1f} MB")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(fail_clearly(main))

@@ -1,0 +1,74 @@
+"""Where the parts of the section are [px of the frame]. Not to scale: both strokes are enlarged."""
+
+from typing import NamedTuple
+
+from epv_env.render.canvas import Box
+from epv_env.render.snapshot import Snapshot
+
+BLOCK: Box = (96, 162, 590, 622)
+"""The valve's body."""
+
+# Magnet valve, upper left: from above the exhaust bore, the core, the armature, the inlet nozzle.
+MV = 190.0
+"""Axis of the magnet valve."""
+TUBE = 27.0
+"""Half width of the tube in which the armature moves."""
+ARMATURE = 22.0
+NOSE = 11.0
+"""Half width of the armature's nose, which shuts the exhaust."""
+NOSE_LENGTH = 26.0
+ARMATURE_LENGTH = 94.0
+BORE = 5.5
+"""Half width of the exhaust bore and of the riser to the inlet."""
+CORE_TIP = 236.0
+"""Height of the exhaust seat."""
+INLET_TIP = 354.0
+"""Height of the inlet seat."""
+MV_CHAMBER: Box = (130, 320, 250, 386)
+COIL_TOP, COIL_BOTTOM = 182.0, 308.0
+STROKE_MV = INLET_TIP - CORE_TIP - ARMATURE_LENGTH
+
+# Protection valve, right: from above the control chamber, the piston, the seat, the output chamber.
+PV = 438.0
+"""Axis of the protection valve."""
+PISTON = 90.0
+"""Half width of the piston."""
+PISTON_LENGTH = 60.0
+BOSS_LENGTH = 18.0
+"""Boss on the piston's back, which meets the stop."""
+CEILING = 184.0
+"""Top of the control chamber."""
+SEAT = 396.0
+"""Height of the seat."""
+SEAT_INNER, LIP, SEAT_OUTER = 50.0, 56.0, 64.0
+"""Half widths of the seat's bore, of its lip and of its foot."""
+FLOOR = 470.0
+"""Bottom of the ring chamber around the seat."""
+STROKE_PV = 48.0
+
+INPUT: Box = (96, 424, 314, 600)
+NECK: Box = (313, 424, PV - PISTON, FLOOR)
+OUTPUT: Box = (PV - 74, 508, 590, 602)
+DUCT: tuple[Box, ...] = ((249, 360, 306, 374), (292, 196, 306, 374), (292, 196, 349, 210))
+"""From the magnet valve's chamber to the control chamber."""
+
+
+class Movers(NamedTuple):
+    """Heights of the moving parts."""
+
+    armature_top: float
+    armature_bottom: float
+    piston_top: float
+    piston_bottom: float
+
+
+def movers(snapshot: Snapshot) -> Movers:
+    """Where the armature and the piston are."""
+    lift_MV = STROKE_MV * min(max(snapshot.xMV_fraction, 0.0), 1.0)
+    lift_PV = STROKE_PV * min(max(snapshot.xPV_fraction, 0.0), 1.0)
+    return Movers(
+        armature_top=INLET_TIP - lift_MV - ARMATURE_LENGTH,
+        armature_bottom=INLET_TIP - lift_MV,
+        piston_top=SEAT - lift_PV - PISTON_LENGTH,
+        piston_bottom=SEAT - lift_PV,
+    )

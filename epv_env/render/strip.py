@@ -1,0 +1,177 @@
+"""The strip chart: pressures with the target's band, coil command and consumption over time."""
+
+from collections import deque
+from typing import NamedTuple
+
+import numpy as np
+
+from epv_env.render.axes import (
+    MOST_TICKS,
+    Array,
+    Axis,
+    Label,
+    draw_levels,
+    draw_steps,
+    round_up,
+    run_ends,
+    spread,
+    time_step,
+)
+from epv_env.render.canvas import Box, Canvas
+from epv_env.render.palette import (
+    BAND,
+    COIL,
+    CONSUMPTION,
+    EDGE,
+    GRID,
+    INK,
+    MUTED,
+    P1,
+    P2,
+    P3,
+    SCALE_TOP_BAR,
+    TARGET,
+)
+from epv_env.render.snapshot import Snapshot
+
+LEFT, RIGHT = 730.0, 1150.0
+"""Ends of the time axis [px]."""
+PRESSURES: Box = (LEFT, 112, RIGHT, 428)
+COMMAND: Box = (LEFT, 474, RIGHT, 512)
+CONSUMED: Box = (LEFT, 558, RIGHT, 650)
+
+
+class Samples(NamedTuple):
+    """What the chart keeps of a snapshot; or of all of them, then every field is an array."""
+
+    time: Array
+    """[s]; once drawn: its place [px]."""
+    p1: Array
+    p2: Array
+    p3: Array
+    target: Array
+    coil: Array
+    consumption: Array
+    """[g/s]."""
+
+
+class Strip:
+    """The last `window_s` of snapshots, and their drawing."""
+
+    def __init__(self, *, tolerance_bar: float, window_s: float):
+        """tolerance_bar: half width of the band [bar]. window_s: time shown [s]."""
+        self.tolerance_bar = tolerance_bar
+        self.window_s = window_s
+        self._history: deque[tuple[float, ...]] = deque()
+
+    def reset(self) -> None:
+        """Forget the history."""
+        self._history.clear()
+
+    def append(self, s: Snapshot) -> None:
+        """Add a snapshot. One of the same time replaces the last, an earlier one begins anew."""
+        history = self._history
+        if history and s.time_s < history[-1][0]:
+            history.clear()
+        elif history and s.time_s == history[-1][0]:
+            history.pop()
+        history.append(
+            (s.time_s, s.p1_bar, s.p2_bar, s.p3_bar, s.target_bar, s.coil_on, s.sigma_S_g_per_s)
+        )
+        # One sample before the window stays, so that the lines begin at the panel's edge.
+        while len(history) > 1 and history[1][0] < s.time_s - self.window_s:
+            history.popleft()
+
+    def draw_background(self, canvas: Canvas) -> None:
+        """What never moves: the titles."""
+        canvas.text("Pressure [bar absolute]", (LEFT, 90), 18, INK)
+        canvas.text("Coil command", (LEFT, COMMAND[1] - 16), 18, INK)
+        canvas.text("on", (LEFT - 8, COMMAND[1] + 7), 16, MUTED, align=1.0)
+        canvas.text("off", (LEFT - 8, COMMAND[3] - 5), 16, MUTED, align=1.0)
+        canvas.text("Consumption [g/s]", (LEFT, CONSUMED[1] - 16), 18, INK)
+        canvas.text("time [s]", ((LEFT + RIGHT) / 2, 691), 18, INK, align=0.5)
+        words = f"target ±{1000 * self.tolerance_bar:.0f} mbar"
+        width = canvas.text(words, (RIGHT, 90), 18, TARGET, align=1.0)
+        canvas.rectangle((RIGHT - width - 32, 83, RIGHT - width - 8, 97), BAND)
+        canvas.rectangle((RIGHT - width - 32, 89, RIGHT - width - 8, 91), TARGET)
+
+    def draw(self, canvas: Canvas) -> None:
+        """Draw the history."""
+        samples = Samples(*np.array(self._history, dtype=float).T)
+        begin = max(0.0, float(samples.time[-1]) - self.window_s)
+        self._draw_time_axis(canvas, begin)
+        place = LEFT + self._per_second * (samples.time - begin)
+        samples = samples._replace(time=place)
+        for draw in (self._draw_pressures, _draw_command, _draw_consumption):
+            draw(canvas, samples)
+        for panel in (PRESSURES, COMMAND, CONSUMED):
+            canvas.rectangle(panel, EDGE, outline=1)
+
+    @property
+    def _per_second(self) -> float:
+        """Length of a second on the time axis [px]."""
+        return (RIGHT - LEFT) / self.window_s
+
+    def _draw_time_axis(self, canvas: Canvas, begin: float) -> None:
+        """Grid lines through all panels, and their times."""
+        step = time_step(self.window_s)
+        first = int(np.ceil(begin / step - 1e-9))
+        for k in range(first, first + MOST_TICKS + 1):
+            x = LEFT + self._per_second * (k * step - begin)
+            if x > RIGHT + 0.5:
+                break
+            for _, top, _, bottom in (PRESSURES, COMMAND, CONSUMED):
+                canvas.rectangle((x - 0.5, top, x + 0.5, bottom), GRID)
+            canvas.text(f"{k * step:.10g}", (x, CONSUMED[3] + 14), 16, MUTED, align=0.5)
+
+    def _draw_pressures(self, canvas: Canvas, s: Samples) -> None:
+        highest = max(s.p1.max(), s.p2.max(), s.p3.max())
+        axis = Axis(PRESSURES, max(SCALE_TOP_BAR, 2.0 * float(np.ceil(highest / 2.0))))
+        canvas.clip(PRESSURES)
+        self._draw_band(canvas, s, axis)
+        canvas.clip(None)
+        draw_levels(canvas, axis, 2.0)
+        canvas.clip(PRESSURES)
+        rows = (
+            ("target", s.target, TARGET, 1.5),
+            ("p_1", s.p1, P1, 4.0),
+            ("p_3", s.p3, P3, 2.0),
+            ("p_2", s.p2, P2, 3.0),
+        )
+        for _, values, colour, width in rows:
+            canvas.polyline(axis.points(s.time, values), colour, width)
+        canvas.clip(None)
+        labels = [
+            Label(axis.y(float(values[-1])), f"{name} {values[-1]:.2f}", colour)
+            for name, values, colour, _ in rows
+        ]
+        for label in spread(labels, PRESSURES[1] + 4, PRESSURES[3] - 4):
+            canvas.text(label.words, (RIGHT + 10, label.y), 18, label.colour)
+
+    def _draw_band(self, canvas: Canvas, s: Samples, axis: Axis) -> None:
+        """The band lies under the whole window: beside the samples their first and last target."""
+        ends = run_ends(s.target)
+        time = np.concatenate([[LEFT], s.time[ends], [RIGHT]])
+        target = np.concatenate([s.target[:1], s.target[ends], s.target[-1:]])
+        upper = axis.points(time, target + self.tolerance_bar)
+        lower = axis.points(time, target - self.tolerance_bar)
+        canvas.polygon(np.concatenate([upper, lower[::-1]]).tolist(), BAND)
+
+
+def _draw_command(canvas: Canvas, s: Samples) -> None:
+    """Filled while the coil is commanded on."""
+    _, top, _, bottom = COMMAND
+    axis = Axis((LEFT, top + 5, RIGHT, bottom - 4), 1.0)
+    draw_steps(canvas, s.time, axis, s.coil, COIL)
+    state, colour = ("coil on", COIL) if s.coil[-1] else ("coil off", MUTED)
+    canvas.text(state, (RIGHT + 10, (top + bottom) / 2), 18, colour)
+
+
+def _draw_consumption(canvas: Canvas, s: Samples) -> None:
+    top = round_up(1.1 * float(s.consumption.max()))
+    axis = Axis(CONSUMED, top)
+    draw_levels(canvas, axis, top / 2.0)
+    draw_steps(canvas, s.time, axis, s.consumption, CONSUMPTION)
+    now = float(s.consumption[-1])
+    y = min(max(axis.y(now), CONSUMED[1] + 8), CONSUMED[3] - 8)
+    canvas.text(f"{now:.2f} g/s", (RIGHT + 10, y), 18, CONSUMPTION)
