@@ -1,0 +1,54 @@
+"""Controllers as data: what is written is what is read, and what does not fit is refused."""
+
+import json
+
+import numpy as np
+import pytest
+
+from controllers.tuned import KINDS, ControllersFileError, Tuning, load_tunings, save_tunings
+
+pytestmark = pytest.mark.training
+
+
+def test_tunings_survive_a_round_trip(tmp_path):
+    tunings = {"hysteresis": Tuning(values={"open_below": -0.1}, trials=3, mean_return=-1.5)}
+    save_tunings(tunings, tmp_path / "t.json", {"seed": 0})
+    assert load_tunings(tmp_path / "t.json") == tunings
+
+
+def test_every_classic_controller_was_tuned_with_the_same_budget():
+    tunings = load_tunings()
+    assert tuple(tunings) == KINDS
+    assert len({tuning.trials for tuning in tunings.values()}) == 1
+
+
+def test_another_version_is_refused(tmp_path):
+    (tmp_path / "t.json").write_text(json.dumps({"format": "epv-controllers/0"}))
+    with pytest.raises(ControllersFileError, match="tune anew"):
+        load_tunings(tmp_path / "t.json")
+
+
+def test_a_written_policy_acts_as_the_model_it_came_from(tmp_path):
+    pytest.importorskip("stable_baselines3")
+    from controllers.learned import PolicyError, load_policy
+    from epv_env.plant.plantfile import Plant
+    from training.policy_files import save_policy
+    from training.ppo import Hyperparameters, make_model, make_training_env
+
+    h = Hyperparameters(num_envs=4, n_steps=8, batch_size=32)
+    env = make_training_env(h, plant=Plant.calibrated(), scenario="mixed", seed=0)
+    model = make_model(h, env, seed=3, device="cpu")
+    save_policy(model, tmp_path, control_period=5e-3, provenance={})
+    policy = load_policy(tmp_path)
+    observations = np.random.default_rng(0).normal(size=(500, policy.layers[0][0].shape[1])).astype("f4")
+    expected, _ = model.predict(observations, deterministic=True)
+    assert np.mean(policy.act(observations) == expected) > 0.995  # ties may fall either way
+
+    content = json.loads((tmp_path / "policy.json").read_text())
+    content["observation"]["entries"].reverse()
+    (tmp_path / "policy.json").write_text(json.dumps(content))
+    with pytest.raises(PolicyError, match="another observation layout"):
+        load_policy(tmp_path)
+    (tmp_path / "policy.safetensors").write_bytes(b"no weights")
+    with pytest.raises(PolicyError, match="cannot read a policy"):
+        load_policy(tmp_path)

@@ -1,0 +1,70 @@
+"""The PWM controller's design: the linearisation is the plant's, the margins are the loop's."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("control")
+
+from controllers.pwm_design import design, linearise, outer_loop
+from epv_env.plant.equations import Inputs
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.simulate import energised
+from epv_env.plant.valves import Valves
+
+pytestmark = pytest.mark.training
+
+P1, P2, PERIOD = 11.5e5, 8e5, 20e-3
+SHAPE = {
+    "p1": P1, "p2": P2, "inner_time": 0.02, "phase_margin": 40.0, "integral_time": 1.0, "period": PERIOD,
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def plant():
+    return Parameters.calibrated()
+
+
+def test_the_operating_duty_nearly_holds_p3_in_the_full_simulation(plant):
+    """Switched with the design's duty, the simulated valve's p3 settles near the operating point."""
+    point = linearise(plant, p1=P1, p2=P2)
+    duty = design(plant, **SHAPE).duty
+    valves = Valves(1, threads=1)
+    for field, value in zip(valves.state, energised(plant, p1=P1, p2=P2, U=24.0), strict=True):
+        field[:] = value
+    valves.state.p3[:] = point.p3
+    mean = []
+    for _ in range(60):
+        inside = []
+        for on, share in ((24.0, duty), (0.0, 1 - duty)):
+            for name, value in zip(Inputs._fields, (on, 0.0, 0.0, 0.0), strict=True):
+                getattr(valves.inputs, name)[:] = value
+            valves.advance(share * PERIOD)
+            inside.append(float(valves.state.p3[0]))
+        valves.state.p2[:] = P2  # the circuit is held: only the control chamber is looked at
+        mean.append(np.mean(inside))
+    assert np.mean(mean[-10:]) == pytest.approx(point.p3, rel=0.15)
+
+
+def test_an_open_valve_raises_p2_and_p3_drifts_back(plant):
+    point = linearise(plant, p1=P1, p2=P2)
+    assert point.a < 0 < point.b
+    assert point.g < 0
+    assert 0 < point.duty < 1
+
+
+def test_margins_are_those_of_the_loop_at_its_crossover(plant):
+    found = design(plant, **SHAPE)
+    point = linearise(plant, p1=P1, p2=P2)
+    z = np.exp(1j * np.array([found.crossover]) * PERIOD)
+    at_crossover = found.outer_gain * outer_loop(point, found.inner_gain, 1.0, PERIOD, z)[0]
+    assert abs(at_crossover) == pytest.approx(1.0, rel=0.01)
+    assert 180 + np.degrees(np.angle(at_crossover)) == pytest.approx(found.phase_margin, abs=0.5)
+    assert found.phase_margin >= 40.0
+    assert found.gain_margin > 1
+
+
+def test_an_impossible_margin_is_refused(plant):
+    with pytest.raises(ValueError, match="no gain keeps a phase margin"):
+        design(
+            plant, p1=P1, p2=P2, inner_time=0.02, phase_margin=85.0, integral_time=0.05, period=PERIOD
+        )

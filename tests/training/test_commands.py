@@ -1,0 +1,85 @@
+"""The command lines: the whole job in its short form, and one clear sentence for a wrong input."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("stable_baselines3")
+pytestmark = pytest.mark.training
+
+ROOT = Path(__file__).parents[2]
+WRITTEN = (
+    "checkpoint.zip", "config.json", "episode.png", "excursions.png", "learning_curve.csv",
+    "learning_curve.png", "model.zip", "policy.json", "policy.safetensors", "table.csv", "table.json",
+)  # fmt: skip
+
+
+def command(*arguments, script="training/train_ppo.py"):
+    """Run a script of the project as a user does."""
+    return subprocess.run(
+        [sys.executable, str(ROOT / script), *map(str, arguments)],
+        capture_output=True, text=True, timeout=600, check=False,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    out = tmp_path_factory.mktemp("run")
+    result = command("--quick", "--out", out)
+    assert result.returncode == 0, result.stderr
+    return out, result
+
+
+def test_the_short_run_writes_everything_and_prints_the_table(finished):
+    out, result = finished
+    assert sorted(path.name for path in out.iterdir()) == sorted(WRITTEN)
+    for heading in ("C1 stayed", "C2 largest breakdown [bar]", "ten_percent", "PPO", "PWM"):
+        assert heading in result.stdout
+    assert len(json.loads((out / "table.json").read_text())) == 3 * 4
+
+
+def test_a_run_resumes_from_its_checkpoint(finished):
+    out, _ = finished
+    before = (out / "learning_curve.csv").read_text().splitlines()
+    result = command("--quick", "--out", out, "--resume")
+    assert result.returncode == 0, result.stderr
+    assert (out / "learning_curve.csv").read_text().splitlines()[: len(before)] == before
+
+
+def test_resuming_with_another_seed_is_refused(finished):
+    out, _ = finished
+    result = command("--quick", "--out", out, "--resume", "--seed", "5")
+    assert result.returncode == 2
+    assert "resume with the same" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--scenario", "flood"], "unknown consumption scenario 'flood'"),
+        (["--plant", "nowhere.json"], "cannot read plant file nowhere.json"),
+        (["--timesteps", "0"], "--timesteps must be positive"),
+        (["--out", "/dev/null/x"], "is not a folder"),
+        (["--resume"], "nothing to resume"),
+    ],
+)
+def test_wrong_input_gets_one_sentence_and_leaves_nothing(arguments, words, tmp_path):
+    out = tmp_path / "out"
+    where = [] if "--out" in arguments else ["--out", out]
+    result = command("--quick", *arguments, *where)
+    assert result.returncode == 2
+    assert words in result.stderr
+    assert "Traceback" not in result.stderr
+    assert not out.exists()
+
+
+def test_tuning_in_its_shortest_form(tmp_path):
+    out = tmp_path / "tuned.json"
+    result = command(
+        "--trials", 2, "--episodes", 2, "--duration", 0.6, "--out", out, script="training/tune.py"
+    )
+    assert result.returncode == 0, result.stderr
+    assert json.loads(out.read_text())["search"]["trials"] == 2
