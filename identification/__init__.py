@@ -1,0 +1,1 @@
+"""Identification: how well a model fits recordings, and which parameters matter."""
