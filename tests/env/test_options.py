@@ -1,0 +1,236 @@
+"""Plant, supply, disturbance and pressures can be set: for good at construction, or for one episode."""
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+
+from epv_env.plant.consumption import SCENARIOS
+from epv_env.plant.parameters import Parameters, table
+from epv_env.plant.plantfile import Plant, save_plant
+from epv_env.plant.region import REGIONS, Region
+from epv_env.plant.supply import Supply
+from tests.env.rollouts import IDS, actions, assert_same, native, run
+
+RECORDED = Supply.recorded(np.array([0.0, 0.1, 0.3]), np.array([9.0, 9.5, 8.0]))
+CHOICES = [
+    {"parameters": {"alphaMV": 0.6}},
+    {"parameters": {"alphaMV": (0.6, 0.7), "R": 41.0}},
+    {"parameters": "ten_percent"},
+    {"parameters": Parameters.nominal()},
+    {"scenario": "leak"},
+    {"supply": 9.0},
+    {"supply": Supply.reservoirs((11.0, 11.5), 20.0)},
+    {"supply": RECORDED},
+    {"target_bar": 7.0},
+    {"target_bar": (6.0, 6.5)},
+    {"p2_bar": (5.0, 6.0)},
+    {"p3_bar": 3.0},
+]
+
+
+def valve(**options) -> Any:
+    """One bare EPValve."""
+    return gymnasium.make("EPValve-v0", **options).unwrapped
+
+
+def episodes(env, n=200, options=None):
+    """The valve's parameters in n episodes."""
+    env.reset(seed=0, options=options)
+    for _ in range(n):
+        env.reset(options=options)
+        yield env.task.parameters[0]
+
+
+@pytest.mark.parametrize("identifier", IDS)
+@pytest.mark.parametrize("options", CHOICES, ids=str)
+def test_an_option_means_the_same_at_construction_and_at_reset(identifier, options):
+    commands = actions(identifier, 2, 30)
+    built = run(native(identifier, 2, **options), commands)
+    assert_same(run(native(identifier, 2), commands, options=options), built)
+    with pytest.raises(AssertionError):  # and it means something
+        assert_same(run(native(identifier, 2), commands), built)
+
+
+@pytest.mark.parametrize("options", CHOICES, ids=str)
+def test_reset_options_last_one_episode(options):
+    env, plain = valve(), valve()
+    env.reset(seed=0, options=options)
+    plain.reset(seed=0)
+    np.testing.assert_array_equal(env.reset()[0], plain.reset()[0])
+    for action in (0, 0, 1):
+        np.testing.assert_array_equal(env.step(action)[0], plain.step(action)[0])
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_an_autoreset_forgets_the_options(mode):
+    limited = {"max_episode_steps": 3, "autoreset_mode": mode}
+    env, plain = native("EPValve-v0", 2, **limited), native("EPValve-v0", 2, **limited)
+    env.reset(seed=0, options={"target_bar": 15.0, "supply": 16.0})
+    plain.reset(seed=0)
+    off = np.zeros(2, dtype=int)
+    seen, usual = ([one.step(off)[0] for _ in range(4)] for one in (env, plain))
+    assert np.any(seen[0] != usual[0])
+    np.testing.assert_array_equal(seen[-1], usual[-1])
+
+
+def test_exact_parameters_arrive_at_the_plant():
+    env = valve(parameters={"alphaMV": 0.61, "RML": 2e7})
+    for p in episodes(env, 3):
+        assert (p["alphaMV"], p["RML"]) == (0.61, 2e7)
+        assert p["alphaPV"] == Parameters.calibrated()["alphaPV"]
+
+
+def test_a_range_is_drawn_from_for_each_episode():
+    drawn = [p["alphaMV"] for p in episodes(valve(parameters={"alphaMV": (0.6, 0.7)}))]
+    assert 0.6 <= min(drawn) < 0.61
+    assert 0.69 < max(drawn) <= 0.7
+    assert len(set(drawn)) == len(drawn)
+
+
+@pytest.mark.parametrize("name", REGIONS)
+def test_a_named_region_is_drawn_from(name):
+    env = valve(parameters=name)
+    region = env.settings.region
+    drawn = list(episodes(env, 50))
+    for symbol in table():
+        low, high = region.boxes.get(symbol, (env.plant.parameters[symbol],) * 2)
+        assert all(low <= p[symbol] <= high for p in drawn)
+    assert bool(region.boxes) == (name != "exact")
+
+
+def test_a_region_of_one_s_own_is_drawn_from():
+    region = Region(centre=Parameters.nominal(), boxes={"kPV": (1.0, 2.0)})
+    assert all(1.0 <= p["kPV"] <= 2.0 for p in episodes(valve(parameters=region), 20))
+
+
+def test_a_plant_file_is_the_centre_and_its_region_is_confidence(tmp_path):
+    centre = Parameters.calibrated().replace(alphaMV=0.8)
+    plant = Plant(parameters=centre, region=Region(centre=centre, boxes={"R": (40.0, 41.0)}))
+    save_plant(plant, tmp_path / "plant.json")
+    exact = next(episodes(valve(plant=tmp_path / "plant.json")))
+    assert exact["alphaMV"] == 0.8
+    drawn = list(episodes(valve(plant=str(tmp_path / "plant.json"), parameters="confidence"), 20))
+    assert all(40.0 <= p["R"] <= 41.0 and p["alphaMV"] == 0.8 for p in drawn)
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_a_scenario_draws_within_its_flows(name):
+    env = native("EPValve-v0", 8, scenario=name, control_period=50e-3)
+    found = run(env, np.zeros((100, 8), dtype=int))
+    flow = np.array([step.infos["consumption_g_per_s"] for step in found.steps])
+    scenario = SCENARIOS[name]
+    assert np.all(flow >= scenario.leak[0] - 1e-12)
+    assert np.all(flow <= scenario.leak[1] + scenario.flow[1] + 1e-12)
+    assert (np.max(flow) > 0) == (name != "none")
+
+
+def test_a_constant_supply_holds():
+    env = valve(supply=9.0)
+    env.reset(seed=0)
+    for _ in range(50):
+        env.step(0)
+    assert env.snapshot().p1_bar == 9.0
+
+
+def test_a_recorded_supply_is_followed():
+    env = valve(supply=RECORDED)
+    env.reset(seed=0)
+    for k in range(1, 101):
+        env.step(k % 3 // 2)
+        expected = np.interp(5e-3 * k, [0.0, 0.1, 0.3], [9.0, 9.5, 8.0])
+        assert env.snapshot().p1_bar == pytest.approx(expected, abs=1e-9)
+
+
+def test_reservoirs_sag_when_air_is_drawn():
+    env = valve(p2_bar=6.0, target_bar=9.0)
+    env.reset(seed=0)
+    first = env.snapshot().p1_bar
+    assert 10.5 <= first <= 12.5
+    for _ in range(50):
+        env.step(0)
+    assert env.snapshot().p1_bar < first - 0.01
+
+
+def test_pressures_start_where_they_are_told():
+    env = valve()
+    env.reset(seed=0, options={"target_bar": 7.5, "p2_bar": 5.5, "p3_bar": 4.5, "supply": 11.0})
+    start = env.snapshot()
+    found = (start.target_bar, start.p2_bar, start.p3_bar, start.p1_bar)
+    assert found == pytest.approx((7.5, 5.5, 4.5, 11.0), rel=1e-12)
+
+
+def test_an_episode_begins_energised_and_not_above_its_target():
+    env = valve()
+    for seed in range(100):
+        env.reset(seed=seed)
+        start = env.snapshot()
+        assert 6.0 <= start.target_bar <= 9.5
+        assert start.target_bar - 2.0 <= start.p2_bar <= start.target_bar
+        assert start.p3_bar == start.p1_bar
+        assert (start.xMV_fraction, start.xPV_fraction) == (1.0, 0.0)
+
+
+def test_lists_give_each_sub_environment_its_own():
+    env = native("EPValve-v0", 3)
+    env.reset(
+        seed=0,
+        options={
+            "parameters": ["exact", {"R": 40.0}, {"R": (36.0, 37.0)}],
+            "supply": [8.0, RECORDED, None],
+            "scenario": ["none", "leak", "mixed"],
+            "target_bar": [6.0, (7.0, 7.1), 8.0],
+            "p2_bar": 5.0,
+        },
+    )
+    parameters = [p["R"] for p in env.task.parameters]
+    assert parameters[:2] == [Parameters.calibrated()["R"], 40.0]
+    assert 36.0 <= parameters[2] <= 37.0
+    np.testing.assert_allclose(env.task.valves.state.p1[:2], [8e5, 9e5])
+    assert env.task.target[0] == 6.0
+    assert 7.0 <= env.task.target[1] <= 7.1
+    np.testing.assert_allclose(env.task.valves.state.p2, 5e5)
+    infos = env.step(np.array([1, 1, 1]))[-1]
+    assert infos["consumption_g_per_s"][0] == 0.0
+    assert infos["consumption_g_per_s"][1] >= 0.1
+
+
+def test_a_list_equals_single_environments_with_those_options():
+    targets = [6.0, 7.0, 8.0]
+    found, _ = native("EPValve-v0", 3).reset(seed=0, options={"target_bar": targets})
+    for i, target in enumerate(targets):
+        alone, _ = valve().reset(seed=i, options={"target_bar": target})
+        np.testing.assert_array_equal(found[i], alone)
+
+
+def test_options_of_a_masked_reset_reach_the_masked_alone():
+    env = native("EPValve-v0", 3, autoreset_mode="Disabled")
+    before, _ = env.reset(seed=0)
+    mask = np.array([False, True, False])
+    after, _ = env.reset(seed=0, options={"reset_mask": mask, "target_bar": 5.0})
+    assert env.task.target[1] == 5.0
+    np.testing.assert_array_equal(after[~mask], before[~mask])
+
+
+def test_the_caller_s_options_are_left_alone():
+    options = {"reset_mask": np.array([True, True]), "target_bar": 7.0}
+    native("EPValve-v0", 2).reset(options=options)
+    assert set(options) == {"reset_mask", "target_bar"}
+
+
+@pytest.mark.parametrize("identifier", IDS)
+def test_a_control_period_can_be_chosen(identifier):
+    env = native(identifier, 1, control_period=8e-3)
+    env.reset(seed=0)
+    for command in actions(identifier, 1, 5):
+        env.step(command)
+    assert env.task.time()[0] == pytest.approx(40e-3)
+
+
+def test_the_supply_voltage_can_be_chosen():
+    env = valve(supply_voltage=20.0, scenario="none")
+    env.reset(seed=0)
+    env.step(1)
+    current = env.snapshot().I_A
+    assert current == pytest.approx(20.0 / Parameters.calibrated()["R"])

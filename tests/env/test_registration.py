@@ -1,0 +1,90 @@
+"""The ids work after `import epv_env`, and as "epv_env:ID" without it, from anywhere."""
+
+import subprocess
+import sys
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+
+import epv_env
+from epv_env.env import EPValveEnv, EPValvePWMEnv
+from epv_env.vector_env import EPValvePWMVectorEnv, EPValveVectorEnv
+from tests.env.rollouts import IDS, native
+
+CLASSES = {
+    "EPValve-v0": (EPValveEnv, EPValveVectorEnv),
+    "EPValvePWM-v0": (EPValvePWMEnv, EPValvePWMVectorEnv),
+}
+
+
+def run_abroad(code: str, folder) -> str:
+    """What a fresh interpreter prints that starts in a folder of its own."""
+    done = subprocess.run(
+        [sys.executable, "-W", "error::UserWarning", "-c", code],
+        cwd=folder, capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.parametrize("identifier", IDS)
+def test_an_id_makes_its_classes(identifier):
+    single, vector = CLASSES[identifier]
+    assert type(gymnasium.make(identifier).unwrapped) is single
+    assert type(gymnasium.make_vec(identifier, num_envs=2)) is vector
+
+
+@pytest.mark.parametrize("identifier", IDS)
+def test_an_episode_lasts_ten_seconds(identifier):
+    env: Any = gymnasium.make(identifier)
+    assert env.spec.max_episode_steps * env.unwrapped.settings.control_period == 10.0
+    assert native(identifier, 1).max_episode_steps == env.spec.max_episode_steps
+
+
+def test_registering_again_is_harmless():
+    before = {identifier: gymnasium.spec(identifier) for identifier in IDS}
+    epv_env.register_envs()
+    assert {identifier: gymnasium.spec(identifier) for identifier in IDS} == before
+
+
+def test_ids_work_from_a_foreign_folder_without_an_import(tmp_path):
+    code = """
+import gymnasium
+for name in ("EPValve-v0", "EPValvePWM-v0"):
+    env = gymnasium.make("epv_env:" + name)
+    env.reset(seed=0)
+    env.step(env.action_space.sample())
+    envs = gymnasium.make_vec("epv_env:" + name, num_envs=2)
+    envs.reset(seed=0)
+    print(envs.step(envs.action_space.sample())[0].shape)
+"""
+    assert run_abroad(code, tmp_path) == "(2, 13)\n(2, 13)\n"
+
+
+def test_ids_work_from_a_foreign_folder_after_a_double_import(tmp_path):
+    code = """
+import importlib, gymnasium, epv_env
+importlib.reload(epv_env)
+print(gymnasium.make("EPValve-v0").reset(seed=0)[0].shape)
+"""
+    assert run_abroad(code, tmp_path) == "(13,)\n"
+
+
+def test_a_worker_process_makes_the_environment_from_its_id():
+    """AsyncVectorEnv is Gymnasium's own way to several processes."""
+    env = gymnasium.make_vec("epv_env:EPValve-v0", num_envs=2, vectorization_mode="async")
+    here = gymnasium.make_vec("EPValve-v0", num_envs=2)
+    try:
+        np.testing.assert_array_equal(env.reset(seed=3)[0], here.reset(seed=3)[0])
+        actions = np.array([0, 1])
+        np.testing.assert_array_equal(env.step(actions)[0], here.step(actions)[0])
+    finally:
+        env.close()
+
+
+def test_the_classes_need_no_gymnasium_wrapper():
+    bare, wrapped = EPValveEnv(), gymnasium.make("EPValve-v0")
+    np.testing.assert_array_equal(bare.reset(seed=4)[0], wrapped.reset(seed=4)[0])
+    np.testing.assert_array_equal(bare.step(0)[0], wrapped.step(0)[0])

@@ -1,0 +1,106 @@
+"""The reward is the sum of its terms, each a price that is zero at best."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from epv_env.reward import RewardTerms, RewardWeights, reward_terms
+from tests.env.rollouts import ENDING, IDS, actions, native, run
+
+WEIGHTS = [field.name for field in fields(RewardWeights)]
+NOTHING = {
+    "error_bar": 0.0,
+    "highest_error_bar": 0.0,
+    "lowest_error_bar": 0.0,
+    "switchings": 0,
+    "vented_kg": 0.0,
+    "failed": False,
+}
+
+
+def terms(weights=None, period=5e-3, **happened):
+    """Terms of one period in which only what is named happened, as numbers."""
+    values = {key: np.array([value]) for key, value in {**NOTHING, **happened}.items()}
+    found = reward_terms(weights or RewardWeights(), period=period, **values)
+    return {name: float(getattr(found, name)[0]) for name in RewardTerms._fields}
+
+
+@pytest.mark.parametrize(
+    ("happened", "expected"),
+    [
+        ({}, {}),
+        ({"error_bar": 0.3}, {"tracking": -0.25 * 0.6}),
+        ({"error_bar": -0.3}, {"tracking": -0.25 * 0.6}),
+        ({"highest_error_bar": 0.5}, {}),
+        ({"highest_error_bar": 0.51}, {"band": -1.0}),
+        ({"lowest_error_bar": -0.5}, {"breakdown": -0.25}),
+        ({"lowest_error_bar": -0.75}, {"band": -1.0, "breakdown": -0.375}),
+        ({"highest_error_bar": -0.6, "lowest_error_bar": -0.7}, {"band": -1.0, "breakdown": -0.35}),
+        ({"lowest_error_bar": 0.2, "highest_error_bar": 0.4}, {}),
+        ({"switchings": 2}, {"switching": -0.2}),
+        ({"vented_kg": 1.5e-3}, {"vented_air": -3.0}),
+        ({"failed": True}, {"failure": -100.0}),
+    ],
+)
+def test_each_event_has_its_price(happened, expected):
+    assert terms(**happened) == pytest.approx({**dict.fromkeys(RewardTerms._fields, 0.0), **expected})
+
+
+def test_running_terms_are_per_time_and_events_are_per_event():
+    happened = {
+        "error_bar": -0.6, "highest_error_bar": -0.5, "lowest_error_bar": -0.8,
+        "switchings": 1, "vented_kg": 1e-3, "failed": True,
+    }  # fmt: skip
+    short, long = terms(period=5e-3, **happened), terms(period=20e-3, **happened)
+    for name in RewardTerms._fields:
+        factor = 4 if name in ("band", "tracking", "breakdown") else 1
+        assert long[name] == pytest.approx(factor * short[name])
+        assert short[name] < 0
+
+
+@pytest.mark.parametrize("name", WEIGHTS)
+def test_a_weight_scales_its_term_alone(name):
+    happened = {"error_bar": -0.6, "lowest_error_bar": -0.8, "switchings": 1, "vented_kg": 1e-3}
+    usual, double = (
+        terms(RewardWeights(**{name: factor * getattr(RewardWeights(), name)}), failed=True, **happened)
+        for factor in (1, 2)
+    )
+    assert double == pytest.approx({**usual, name: 2 * usual[name]})
+
+
+@pytest.mark.parametrize("name", WEIGHTS)
+@pytest.mark.parametrize("value", [-0.1, np.nan, np.inf])
+def test_a_price_is_finite_and_not_negative(name, value):
+    with pytest.raises(ValueError, match=f"reward weight {name} = .* at least 0"):
+        RewardWeights(**{name: value})
+
+
+@pytest.mark.parametrize("identifier", IDS)
+def test_the_reward_is_the_sum_of_its_terms(identifier):
+    found = run(native(identifier, 8, **ENDING), actions(identifier, 8, 40))
+    seen = set()
+    for step in found.steps:
+        parts = {name: step.infos[f"reward_{name}"] for name in RewardTerms._fields}
+        np.testing.assert_array_equal(sum(parts.values()), step.reward)
+        assert all(np.all(part <= 0) for part in parts.values())
+        seen |= {name for name, part in parts.items() if np.any(part < 0)}
+    assert seen == set(RewardTerms._fields)
+
+
+@pytest.mark.parametrize("identifier", IDS)
+def test_terms_follow_from_the_figures_in_info(identifier):
+    found = run(native(identifier, 4, target_bar=7.0), actions(identifier, 4, 200))
+    scale = 1 if identifier == "EPValve-v0" else 4
+    for step in found.steps:
+        info = step.infos
+        outside = np.abs(info["deviation_bar"]) > 0.5
+        np.testing.assert_array_equal(info["reward_band"], -scale * outside)
+        np.testing.assert_allclose(info["reward_switching"], -0.1 * info["switchings"])
+        np.testing.assert_allclose(info["reward_vented_air"], -2.0 * info["vented_g"])
+
+
+def test_free_control_costs_nothing():
+    free = RewardWeights(**dict.fromkeys(WEIGHTS, 0.0))
+    found = run(native("EPValve-v0", 4, weights=free), actions("EPValve-v0", 4, 50))
+    assert all(np.all(step.reward == 0) for step in found.steps)

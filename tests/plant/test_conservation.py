@@ -1,0 +1,115 @@
+"""Air and energy are neither made nor lost, and no mover leaves its stroke."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.integrate import simpson
+
+from epv_env.plant.equations import Inputs, State
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.simulate import energised
+from epv_env.plant.valves import Valves
+
+CALIBRATED = Parameters.calibrated()
+N = 40
+PERIODS = 200
+PERIOD = 5e-3
+RESERVOIR = 0.02  # m^3, small so that it sags
+
+
+@cache
+def switched_at_random(restitution=0.0, reservoir=RESERVOIR):
+    """N valves for 1 s under random switching, consumption and refill.
+
+    Returns (parameters, states at the borders of the periods, inputs); fields of shape
+    (PERIODS + 1, N) and (PERIODS, N).
+    """
+    rng = np.random.default_rng(1)
+    p = CALIBRATED.replace(eMV=restitution, ePV=restitution)
+    valves = Valves(N)
+    valves.set_parameters(np.arange(N), p, reservoir)
+    for field, value in zip(valves.state, energised(p, p1=12e5, p2=6e5, U=24.0), strict=True):
+        field[:] = value
+    start = [field.copy() for field in valves.state]
+    switches = rng.random((PERIODS, N)) < 0.08
+    inputs = Inputs(
+        U=np.where(np.cumsum(switches, axis=0) % 2 == 0, 24.0, 0.0),
+        sigma_S=rng.uniform(0, 3e-3, (PERIODS, N)),
+        p1_slope=np.zeros((PERIODS, N)),
+        refill=rng.uniform(0, 4e-3, (PERIODS, N)),
+    )
+    later = valves.record(inputs, PERIOD)
+    states = State(*(np.vstack([a, b]) for a, b in zip(start, later, strict=True)))
+    return p, states, inputs
+
+
+def mass(pressure, volume, p):
+    """Air in a chamber relative to the start [kg]."""
+    return (pressure - pressure[0]) * volume / (p["R_gas"] * p["T_env"])
+
+
+def total(flow):
+    """Air moved by a flow that is constant over each period, at the borders of the periods [kg]."""
+    return np.vstack([np.zeros(N), np.cumsum(flow, axis=0)]) * PERIOD
+
+
+def test_the_run_is_one_in_which_things_happen():
+    _, q, _ = switched_at_random()
+    assert np.max(q.air_in_PV) > 1e-3
+    assert np.max(q.air_vented) > 1e-4
+    assert np.min(q.p1) < 11.9e5
+
+
+def test_output_chamber_holds_what_came_in_less_what_was_consumed():
+    p, q, u = switched_at_random()
+    np.testing.assert_allclose(
+        mass(q.p2, p["V2"], p), q.air_in_PV - total(u.sigma_S), rtol=0, atol=1e-14
+    )
+
+
+def test_control_chamber_holds_what_came_in_less_what_was_vented():
+    p, q, _ = switched_at_random()
+    np.testing.assert_allclose(mass(q.p3, p["V3"], p), q.air_in_MV - q.air_vented, rtol=0, atol=1e-16)
+
+
+def test_reservoir_lacks_what_went_into_both_chambers_and_was_not_refilled():
+    p, q, u = switched_at_random()
+    expected = total(u.refill) - q.air_in_PV - q.air_in_MV
+    np.testing.assert_allclose(mass(q.p1, RESERVOIR, p), expected, rtol=0, atol=1e-13)
+
+
+def test_an_infinite_reservoir_does_not_sag():
+    _, q, _ = switched_at_random(reservoir=np.inf)
+    np.testing.assert_array_equal(q.p1, 12e5)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.7])
+def test_movers_stay_between_their_stops(restitution):
+    p, q, _ = switched_at_random(restitution)
+    for x, limit in ((q.xPV, p["xPVmax"]), (q.xMV, p["xMVmax"])):
+        assert np.min(x) == 0.0
+        assert np.max(x) == limit
+
+
+def test_coil_energy_is_the_integral_of_electrical_power():
+    fine = 50e-6
+    valves = Valves(1)
+    valves.set_parameters([0], CALIBRATED)
+    start = energised(CALIBRATED, p1=12e5, p2=6e5, U=0.0)._replace(xMV=0.0, p3=1e5)
+    for field, value in zip(valves.state, start, strict=True):
+        field[:] = value
+    U = np.full((400, 1), 24.0)
+    q = valves.record(Inputs(U, *np.zeros((3, 1, 1))), fine)
+    power = 24.0 * np.append(start.I, q.I)
+    assert q.coil_energy[-1, 0] == pytest.approx(simpson(power, dx=fine), rel=1e-6)
+
+
+def test_nothing_moves_when_nothing_acts():
+    """Vented, shut and without a supply pressure: a valve with everything off stays as it is."""
+    valves = Valves(3)
+    for field in (valves.state.p1, valves.state.p2, valves.state.p3):
+        field[:] = CALIBRATED["p_env"]
+    before = np.array(valves.state)
+    valves.advance(1.0)
+    np.testing.assert_array_equal(np.array(valves.state), before)

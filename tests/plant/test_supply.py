@@ -1,0 +1,132 @@
+"""The supply: reservoirs keep their air balance, recordings are followed, the rest holds still."""
+
+import numpy as np
+import pytest
+
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.simulate import energised
+from epv_env.plant.supply import BAR, Supply
+from epv_env.plant.valves import Valves
+
+P = Parameters.calibrated()
+RT = P["R_gas"] * P["T_env"]
+VOLUME = 80e-3
+
+
+def opened(volume, refill=0.0, slope=0.0):
+    """A valve that fills its circuit from 9 bar for 0.3 s."""
+    valves = Valves(1)
+    valves.set_parameters(np.array([0]), P, volume)
+    for field, value in zip(valves.state, energised(P, p1=9e5, p2=5e5, U=24.0), strict=True):
+        field[:] = value
+    valves.inputs.refill[:], valves.inputs.p1_slope[:] = refill, slope
+    valves.advance(0.3)
+    return valves.state
+
+
+@pytest.mark.parametrize("delivery", [0.0, 5e-3])
+def test_reservoirs_lose_what_the_valve_draws_and_gain_what_the_compressor_delivers(delivery):
+    state = opened(VOLUME, delivery)
+    drawn = state.air_in_PV + state.air_in_MV
+    assert drawn > 1e-3
+    lost = (9e5 - state.p1) * VOLUME / RT
+    assert lost == pytest.approx(drawn - delivery * 0.3, abs=1e-12)
+
+
+def test_air_is_conserved_between_reservoirs_and_circuit():
+    state = opened(VOLUME)
+    assert (state.p2 - 5e5) * P["V2"] / RT == pytest.approx(state.air_in_PV, abs=1e-12)
+
+
+def test_a_supply_without_volume_limit_holds_still():
+    assert opened(Supply.constant(9.0).volume, refill=5e-3).p1 == 9e5
+
+
+def test_an_imposed_slope_is_followed_exactly():
+    assert opened(np.inf, slope=-1e5).p1 == pytest.approx(9e5 - 0.3e5, rel=1e-13)
+
+
+def test_the_compressor_remembers_between_its_thresholds():
+    supply = Supply.reservoirs()
+    p1 = np.array([10.4, 11.5, 12.4, 12.5, 11.5, 10.6, 10.5, 10.49]) * BAR
+    runs, seen = np.array([False]), []
+    for pressure in p1:
+        runs = supply.compressor_runs(np.array([pressure]), runs)
+        seen.append(bool(runs[0]))
+    assert seen == [True, True, True, False, False, False, False, True]
+
+
+def test_a_compressor_cycles_between_its_thresholds():
+    """Under a constant draw below its delivery, the pressure saws between cut-in and cut-out."""
+    supply = Supply.reservoirs()
+    p1, runs, seen = np.array([11e5]), np.array([False]), []
+    for _ in range(4000):
+        runs = supply.compressor_runs(p1, runs)
+        p1 = p1 + 0.1 * RT / supply.volume * (supply.delivery * runs - 2e-3)
+        seen.append(p1[0])
+    assert min(seen) == pytest.approx(10.5e5, abs=300)
+    assert max(seen) == pytest.approx(12.5e5, abs=400)
+    assert np.sum(np.diff(np.sign(np.diff(seen))) != 0) > 3
+
+
+def test_a_constant_supply_never_starts_a_compressor():
+    supply = Supply.constant(8.0)
+    assert not supply.compressor_runs(np.array([1e-3, 8e5]), np.array([False, False])).any()
+
+
+def test_first_pressures_are_drawn_from_the_range():
+    rng = np.random.default_rng(0)
+    drawn = [Supply.reservoirs((9.0, 10.0)).draw(rng) / BAR for _ in range(500)]
+    assert (min(drawn), max(drawn)) == pytest.approx((9.0, 10.0), abs=0.01)
+    assert Supply.constant(8.0).draw(rng) == 8 * BAR
+
+
+def test_slopes_of_a_recording_lead_along_it():
+    time, pressure = np.array([0.0, 0.1, 0.25, 0.4]), np.array([9.0, 9.6, 7.0, 8.0])
+    supply = Supply.recorded(time, pressure)
+    starts = np.arange(0, 0.6, 0.02)
+    p1 = supply.draw(np.random.default_rng(0)) + np.cumsum(0.02 * supply.slope(starts, 0.02))
+    expected = np.interp(starts + 0.02, time, pressure) * BAR
+    np.testing.assert_allclose(p1, expected, rtol=1e-13)
+
+
+def test_only_a_recording_imposes_a_slope():
+    time = np.arange(3.0)
+    np.testing.assert_array_equal(Supply.reservoirs().slope(time, 0.1), np.zeros(3))
+
+
+@pytest.mark.parametrize("ends", [(0.0, 1e6), (-1e5, 1e6), (9e5, 8e5), (np.nan, 1e6)])
+def test_an_impossible_pressure_range_is_refused(ends):
+    with pytest.raises(ValueError, match="is empty or not positive: give 0 < low <= high"):
+        Supply(pressure=ends)
+
+
+def test_a_compressor_that_stops_before_it_starts_is_refused():
+    with pytest.raises(ValueError, match=r"cut-in .* above its cut-out .*: give cut_in <= cut_out"):
+        Supply(pressure=(9e5, 9e5), cut_in=11e5, cut_out=10e5)
+
+
+@pytest.mark.parametrize(
+    ("time", "pressure"),
+    [([0.0, 0.0], [9.0, 9.0]), ([1.0, 0.0], [9.0, 9.0]), ([0.0, 1.0], [9.0]), (0.0, 9.0)],
+)
+def test_a_recording_without_increasing_times_is_refused(time, pressure):
+    with pytest.raises(ValueError, match="needs increasing times and one pressure for each"):
+        Supply.recorded(time, pressure)
+
+
+@pytest.mark.xfail(strict=True, reason="later samples of a recording are not looked at")
+@pytest.mark.parametrize(
+    ("time", "pressure"),
+    [([], []), ([0.0, 1.0], [9.0, -5.0]), ([0.0, 1.0], [9.0, np.nan]), ([0.0, np.nan], [9.0, 9.0])],
+)
+def test_a_recording_without_positive_pressures_is_refused(time, pressure):
+    with pytest.raises(ValueError, match="recorded supply"):
+        Supply.recorded(time, pressure)
+
+
+@pytest.mark.xfail(strict=True, reason="volume and delivery are not looked at")
+@pytest.mark.parametrize("wrong", [{"volume": 0.0}, {"volume": -1.0}, {"delivery": -1.0}], ids=str)
+def test_reservoirs_without_volume_and_negative_deliveries_are_refused(wrong):
+    with pytest.raises(ValueError, match=next(iter(wrong))):
+        Supply(pressure=(9e5, 9e5), **wrong)
