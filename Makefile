@@ -10,7 +10,7 @@ PACKAGES := epv_env identification controllers training
 
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help venv train test test-oldest bench lint check format wheel clean
+.PHONY: help venv train test test-oldest bench tune gif lint check format wheel clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z][a-z-]*\):.*## /\1	/p' Makefile | while IFS='	' read -r name text; do \
@@ -48,10 +48,16 @@ test: $(VENV)/.installed ## run the tests; options in ARGS="..."
 # Its own numba cache: the two numba versions would overwrite each other's files.
 test-oldest: $(OLDEST)/.installed ## run the plant and environment tests on the oldest core packages
 	NUMBA_CACHE_DIR=$(CURDIR)/$(OLDEST)/numba-cache \
-		$(OLDEST)/bin/python -m pytest tests/plant tests/env -m "not training"
+		$(OLDEST)/bin/python -m pytest tests/plant tests/env tests/identification -m "not training"
 
 bench: $(VENV)/.installed ## measure the speed of the plant simulation
-	$(PY) -m tests.benchmarks.plant
+	$(PY) -m tests.benchmarks.plant $(ARGS)
+
+tune: $(VENV)/.installed ## search the classic controllers' settings anew (minutes)
+	$(PY) training/tune.py --out controllers/tuned.json $(ARGS)
+
+gif: $(VENV)/.installed ## film the valve for the README
+	SDL_VIDEODRIVER=dummy $(PY) docs/film.py --out docs/images/valve.gif $(ARGS)
 
 lint: $(VENV)/.installed ## check format, style and types
 	$(PY) -m ruff format --check .

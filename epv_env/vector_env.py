@@ -65,6 +65,7 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.task = LimitingTask(num_envs, self.settings, threads=threads)
         self._rngs = [np_random(None)[0] for _ in range(num_envs)]
+        self._begun = np.zeros(num_envs, dtype=bool)
         self._done = np.zeros(num_envs, dtype=bool)
         self._every = np.ones(num_envs, dtype=bool)
 
@@ -85,6 +86,8 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         return self._begin(where, options), {}
 
     def step(self, actions: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray, dict[str, Any]]:
+        if not np.all(self._begun):
+            raise gymnasium.error.ResetNeeded("call reset() on all sub-environments before step()")
         stale = self._done
         if self.mode is AutoresetMode.DISABLED and np.any(stale):
             raise OptionError(
@@ -138,6 +141,7 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         ]
         self._done = self._done.copy()
         self._done[where] = False
+        self._begun[where] = True
         return self.task.begin(where, [self._rngs[i] for i in where], settings)
 
     def _own(self, options: dict[str, Any], i: int) -> dict[str, Any]:

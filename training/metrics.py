@@ -62,11 +62,12 @@ class Meter:
         self._switchings += info["switchings"]
         self._vented += info["vented_g"]
         self._return += reward
+        over = self._failed.copy()  # what comes after a failure means nothing
         self._failed |= failed
         if self._steps * self._period <= self._settling_time:
             return
         self._counted += 1
-        deviation = info["deviation_bar"]
+        deviation = np.where(over, 0.0, info["deviation_bar"])
         self._highest = np.maximum(self._highest, deviation)
         self._lowest = np.minimum(self._lowest, deviation)
         self._squares += deviation**2

@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
+from stable_baselines3.common.vec_env import VecMonitor
 from tqdm import tqdm
 
 from epv_env.plant.files import write_text
@@ -34,20 +34,20 @@ class Hyperparameters:
     """Control periods of a training episode (3 s)."""
     n_steps: int = 64
     batch_size: int = 8192
-    n_epochs: int = 5
+    n_epochs: int = 6
     learning_rate: float = 1e-3
     """At the start; it falls linearly to a tenth."""
     gamma: float = 0.995
     gae_lambda: float = 0.95
-    ent_coef: float = 0.002
+    ent_coef: float = 0.003
     width: int = 64
     """Of the two hidden layers."""
 
 
 def make_training_env(
-    h: Hyperparameters, *, plant: Plant, scenario: str, seed: int, parameters: Any = "confidence"
-) -> VecNormalize:
-    """Episodes on plants drawn from the confidence region, returns scaled to unit variance."""
+    h: Hyperparameters, *, plant: Plant, scenario: str, parameters: str, seed: int
+) -> VecMonitor:
+    """Episodes on plants drawn from a region, "confidence" or another (epv_env.settings)."""
     env = make_sb3_env(
         "EPValve-v0",
         h.num_envs,
@@ -57,10 +57,10 @@ def make_training_env(
         scenario=scenario,
     )
     env.seed(seed)
-    return VecNormalize(VecMonitor(env), norm_obs=False, gamma=h.gamma)
+    return VecMonitor(env)
 
 
-def make_model(h: Hyperparameters, env: VecNormalize, *, seed: int, device: str) -> PPO:
+def make_model(h: Hyperparameters, env: VecMonitor, *, seed: int, device: str) -> PPO:
     """A new PPO model."""
     return PPO(
         "MlpPolicy",
@@ -159,6 +159,7 @@ def train(
     folder: Path,
     plant: Plant,
     scenario: str,
+    parameters: str,
     timesteps: int,
     seed: int,
     device: str,
@@ -173,7 +174,7 @@ def train(
     torch.set_num_threads(available_cores())
     checkpoint = folder / CHECKPOINT_FILE
     done = 0
-    env = make_training_env(h, plant=plant, scenario=scenario, seed=seed)
+    env = make_training_env(h, plant=plant, scenario=scenario, parameters=parameters, seed=seed)
     model = make_model(h, env, seed=seed, device=device)
     if resume and checkpoint.exists():
         model.set_parameters(str(checkpoint), device=device)

@@ -90,7 +90,7 @@ MIXED = "mixed"
 
 def check_scenario(name: str) -> str:
     """The name, if it is one of SCENARIOS or "mixed"; else ValueError."""
-    if name != MIXED and name not in SCENARIOS:
+    if not isinstance(name, str) or (name != MIXED and name not in SCENARIOS):
         known = ", ".join([MIXED, *SCENARIOS])
         raise ValueError(f"unknown consumption scenario {name!r}: choose one of {known}")
     return name

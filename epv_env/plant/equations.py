@@ -133,8 +133,11 @@ def piston_force(q, c, effects, extended):
 
 @inlined
 def reluctance_inverse(q, c):
-    """1/Rm of the magnetic loop [V s/A]: the air gap closes as the armature is pulled in."""
-    return 1.0 / (c.RML + (c.xMVmax - q.xMV) * c.gap_reluctance)
+    """1/Rm of the magnetic loop [V s/A]: the air gap closes as the armature is pulled in.
+
+    A step on trial may run past the stop; the bound, never met within the strokes, keeps it from a pole.
+    """
+    return 1.0 / max(c.RML + (c.xMVmax - q.xMV) * c.gap_reluctance, 0.5 * c.RML)
 
 
 @inlined

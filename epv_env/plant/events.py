@@ -5,7 +5,7 @@ Scalar and rarely called: only for the few lanes whose trial step passed an even
 
 import numba
 
-from epv_env.plant.compiled import FLAGS
+from epv_env.plant.compiled import FLAGS, inlined
 
 BISECTIONS = 24
 """Halvings of the step: 250 us / 2^24 is far below the clock of anything here."""
@@ -13,7 +13,14 @@ BISECTIONS = 24
 compiled = numba.njit(**FLAGS)
 
 
-@compiled
+@inlined
+def turning_point(v0, v1):
+    """Fraction of the step at which a mover's speed changes sign, taken linear; 1 if it does not."""
+    turns = v0 * v1 < 0.0
+    return v0 / (v0 - v1) if turns else 1.0
+
+
+@inlined
 def hermite(x0, v0, x1, v1, h, s):
     """Cubic through both ends' positions and speeds at fraction s of a step of h."""
     rest = 1.0 - s
@@ -22,15 +29,16 @@ def hermite(x0, v0, x1, v1, h, s):
 
 
 @compiled
-def crossing(x0, v0, x1, v1, h, target):
-    """Fraction of the step at which x, ending beyond target, last passes it; 1 if it does not pass.
+def crossing(x0, v0, x1, v1, h, target, until):
+    """Fraction of the step at which x, beyond target at the fraction `until`, passes it before that.
 
-    A mover that starts on the target (a rebound) and comes back is caught at its return.
+    1 if x does not pass. A mover that starts on the target (a rebound) and comes back is caught at its
+    return.
     """
-    above = x1 > target
+    above = hermite(x0, v0, x1, v1, h, until) > target
     if above == (x0 > target) and x0 != target:
         return 1.0
-    before, after = 0.0, 1.0
+    before, after = 0.0, until
     for _ in range(BISECTIONS):
         middle = 0.5 * (before + after)
         if (hermite(x0, v0, x1, v1, h, middle) > target) == above:

@@ -27,7 +27,7 @@ LAMINAR_DROP = 5e-4
 At r = 1 the square root has infinite slope, which no real orifice shows (its flow turns laminar) and
 no integrator can follow. Below 0.9995 the flux is the isentropic one."""
 
-MAX_RELATIVE_ERROR = 2e-8
+MAX_RELATIVE_ERROR = 3e-9
 """Bound on the polynomial's relative error in flux over all r (tests/plant/test_flow.py proves it)."""
 
 _DEGREE = 7

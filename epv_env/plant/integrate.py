@@ -4,7 +4,8 @@ Sixteen valves ("lanes") go through one loop as SIMD registers, each with a cloc
 A step that would pass a stop, let a held mover go, or cross the stroke where the curtain of a magnet
 valve seat exceeds its bore (a kink of the flow area) is not accepted: the instant is located on the
 step's own interpolant and the step is taken again up to it. Between such instants the right-hand side
-is smooth, so the classical Runge-Kutta method keeps its fourth order (docs/model.md, Integration).
+is smooth but for the seam of the laminar region, where pressures have all but met; so the classical
+Runge-Kutta method keeps its fourth order (docs/model.md, Integration).
 
 Every valve, alone or in a batch of thousands, runs through the same instructions in a block of
 sixteen; so its trajectory does not depend, to the bit, on its companions or on the number of threads.
@@ -15,7 +16,7 @@ import numpy as np
 
 from epv_env.plant.compiled import FLAGS, inlined, source_digest
 from epv_env.plant.equations import State, derivative
-from epv_env.plant.events import crossing, release
+from epv_env.plant.events import crossing, hermite, release, turning_point
 from epv_env.plant.lanes import (
     COEFFICIENT,
     EFFECT,
@@ -59,7 +60,7 @@ RELEASE_MARGIN = 1e-7
 SHORTEST_STEP = 1e-10
 """Every step makes at least this much progress [s]."""
 
-MAX_STEPS = 20_000
+MAX_STEPS = 200_000
 """Steps per period after which a lane is given up (its state becomes NaN)."""
 
 _UNLOCATED = 1e9  # a step hint that never binds
@@ -77,6 +78,13 @@ def _landed(x, v, x_max, restitution):
 
 
 @inlined
+def _overruns(x0, v0, x1, v1, h, x_max):
+    """Whether a mover is beyond a stop at the end of the step, or where it turns within it."""
+    x = hermite(x0, v0, x1, v1, h, turning_point(v0, v1))
+    return (min(x, x1) < -LANDING) | (max(x, x1) > x_max + LANDING)
+
+
+@inlined
 def _passes(x0, x1, kink):
     """Whether a step runs through a kink that it did not start on."""
     return (abs(x0 - kink) > LANDING) & ((x0 - kink) * (x1 - kink) < 0.0)
@@ -90,11 +98,14 @@ def _lets_go(held, force, force_end):
 
 @inlined
 def _passing(x0, v0, x1, v1, h, x_max):
-    """Fraction of the step at which a mover runs into either stop."""
-    if x1 > x_max:
-        return crossing(x0, v0, x1, v1, h, x_max)
-    if x1 < 0.0:
-        return crossing(x0, v0, x1, v1, h, 0.0)
+    """Fraction of the step at which a mover runs into either stop, on its way or at its end."""
+    turn = turning_point(v0, v1)
+    for until in (turn, 1.0):
+        x = hermite(x0, v0, x1, v1, h, until)
+        if x > x_max:
+            return crossing(x0, v0, x1, v1, h, x_max, until)
+        if x < 0.0:
+            return crossing(x0, v0, x1, v1, h, 0.0, until)
     return 1.0
 
 
@@ -110,7 +121,7 @@ def _locate(start, trial, h, c, work, lane):
     )
     for kink in (c.kink_in, c.kink_exh):
         if abs(start.xMV - kink) > LANDING:
-            passed = crossing(start.xMV, start.vMV, trial.xMV, trial.vMV, h, kink)
+            passed = crossing(start.xMV, start.vMV, trial.xMV, trial.vMV, h, kink, 1.0)
             fraction = min(fraction, passed)
     released = 1.0
     if is_held(start.xPV, start.vPV, c.xPVmax, work[FORCE, lane]):
@@ -142,8 +153,8 @@ def _try_steps(work, step, extended):
         )
 
         unlocated = hint >= _UNLOCATED
-        beyond = (end.xPV < -LANDING) | (end.xPV > c.xPVmax + LANDING)
-        beyond |= (end.xMV < -LANDING) | (end.xMV > c.xMVmax + LANDING)
+        beyond = _overruns(q.xPV, q.vPV, end.xPV, end.vPV, h, c.xPVmax)
+        beyond |= _overruns(q.xMV, q.vMV, end.xMV, end.vMV, h, c.xMVmax)
         kinked = _passes(q.xMV, end.xMV, c.kink_in) | _passes(q.xMV, end.xMV, c.kink_exh)
         let_go = _lets_go(held_PV, force_PV, end_PV) | _lets_go(held_MV, force_MV, end_MV)
         event = beyond | (unlocated & (kinked | let_go))

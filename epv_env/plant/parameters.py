@@ -63,7 +63,7 @@ def checked_value(symbol: str, value: Any) -> float:
     row = table().get(symbol)
     if row is None:
         raise ParameterError(f"unknown parameter {symbol!r}: known symbols are {', '.join(table())}")
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise ParameterError(f"parameter {symbol} is {value!r}: give one number [{row.unit}]")
     low, high = row.domain if row.domain else (row.value, row.value)
     if not low <= value <= high:

@@ -54,7 +54,8 @@ class Region:
             covariance.shape == (k, k)
             and bool(np.all(np.isfinite(covariance)))
             and np.allclose(covariance, covariance.T, rtol=1e-9, atol=0.0)
-            and bool(np.all(np.linalg.eigvalsh(covariance) >= 0))
+            and bool(np.all(np.diag(covariance) >= 0))
+            and bool(np.all(np.linalg.eigvalsh(_correlation(covariance)) >= -1e-9))
         )
         if not proper:
             raise ParameterError(
@@ -80,14 +81,9 @@ class Region:
         if name == "exact":
             return cls(centre=centre)
         if name == "confidence":
-            reference = Parameters.calibrated()
-            boxes = {
-                symbol: (
-                    low + centre[symbol] - reference[symbol],
-                    high + centre[symbol] - reference[symbol],
-                )
-                for symbol, (low, high) in confidence_intervals().items()
-            }
+            shift = {s: centre[s] - Parameters.calibrated()[s] for s in CALIBRATED_SYMBOLS}
+            intervals = confidence_intervals().items()
+            boxes = {s: _cut(s, low + shift[s], high + shift[s]) for s, (low, high) in intervals}
         elif name == "ten_percent":
             boxes = _relative(centre, CALIBRATED_SYMBOLS, 0.1)
         elif name == "sensitive_ten_percent":
@@ -127,8 +123,9 @@ class Region:
         k = len(self.symbols)
         direction = rng.standard_normal(k)
         radius = np.sqrt(self.chi_square) * rng.uniform() ** (1 / k) / np.linalg.norm(direction)
-        values, vectors = np.linalg.eigh(covariance)
+        values, vectors = np.linalg.eigh(_correlation(covariance))
         offset = vectors @ (np.sqrt(np.maximum(values, 0)) * direction) * radius
+        offset *= np.sqrt(np.diag(covariance))
         domains = [table()[symbol].domain or (-np.inf, np.inf) for symbol in self.symbols]
         return [
             float(np.clip(self.centre[symbol] + change, low, high))
@@ -136,13 +133,21 @@ class Region:
         ]
 
 
+def _correlation(covariance: NDArray) -> NDArray:
+    """The correlation matrix: free of units, whose magnitudes differ by more than a float's digits."""
+    deviation = np.sqrt(np.diag(covariance))
+    deviation = np.where(deviation > 0, deviation, 1.0)
+    return covariance / np.outer(deviation, deviation)
+
+
 def _relative(
     centre: Parameters, symbols: tuple[str, ...], share: float
 ) -> dict[str, tuple[float, float]]:
     """Boxes of +-share around the centre, cut at the domains."""
-    boxes = {}
-    for symbol in symbols:
-        low, high = table()[symbol].domain or (-np.inf, np.inf)
-        value = centre[symbol]
-        boxes[symbol] = (max(value * (1 - share), low), min(value * (1 + share), high))
-    return boxes
+    return {s: _cut(s, centre[s] * (1 - share), centre[s] * (1 + share)) for s in symbols}
+
+
+def _cut(symbol: str, low: float, high: float) -> tuple[float, float]:
+    """The interval within the symbol's domain."""
+    least, greatest = table()[symbol].domain or (-np.inf, np.inf)
+    return float(np.clip(low, least, greatest)), float(np.clip(high, least, greatest))

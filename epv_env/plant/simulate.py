@@ -55,20 +55,18 @@ def simulate(
     [s]. Returns the states at the samples, the first being `initial`. Raises SimulationError.
     """
     U = np.asarray(U, dtype=float)
-    n = max(np.size(value) for value in (*p.values(), *initial, U[0]))
+    columns = [np.reshape(x, (-1, 1)) if np.ndim(x) < 2 else np.asarray(x) for x in (U, sigma_S)]
+    n = max(np.size(value) for value in (*p.values(), *initial, *(c[0] for c in columns)))
     valves = Valves(n, step=step)
     valves.set_parameters(np.arange(n), p, reservoir_volume)
     for field, value in zip(valves.state, initial, strict=True):
         field[:] = value
-    columns = [
-        value[:, None] if (value := np.asarray(x, float)).ndim == 1 else value for x in (U, sigma_S)
-    ]
     slope = np.zeros((len(U), 1))
     if p1 is not None:
         valves.state.p1[:] = np.asarray(p1)[0]
         slope[:-1, 0] = np.diff(p1) / period
     later = valves.record(Inputs(columns[0], columns[1], slope, np.zeros((1, 1))), period)
-    if not np.all(np.isfinite(later.p2)):
+    if not np.all(later.p2 > 0):  # false for NaN, too
         raise SimulationError(
             "the plant could not be integrated: check that pressures are positive (an empty circuit "
             "cannot be consumed from) and that parameters lie in their domains"

@@ -36,6 +36,11 @@ class Supply:
                 f"supply pressure range [{low:g}, {high:g}] Pa is empty or not positive: "
                 "give 0 < low <= high, absolute"
             )
+        if not (self.volume > 0 and self.delivery >= 0):
+            raise ValueError(
+                f"supply volume {self.volume:g} m^3 must be positive, and the compressor's delivery "
+                f"{self.delivery:g} kg/s at least 0"
+            )
         if self.cut_in > self.cut_out:
             raise ValueError(
                 f"compressor cut-in {self.cut_in:g} Pa is above its cut-out {self.cut_out:g} Pa: "
@@ -68,8 +73,11 @@ class Supply:
     def recorded(cls, time_s: NDArray, pressure_bar: NDArray) -> "Supply":
         """A measured p1 [bar absolute], linear between its samples."""
         time, pressure = np.asarray(time_s, float), np.asarray(pressure_bar, float) * BAR
-        if time.ndim != 1 or time.shape != pressure.shape or np.any(np.diff(time) <= 0):
+        shaped = time.ndim == 1 and time.size > 0 and time.shape == pressure.shape
+        if not shaped or not np.all(np.isfinite(time)) or np.any(np.diff(time) <= 0):
             raise ValueError("a recorded supply needs increasing times and one pressure for each")
+        if not np.all((pressure > 0) & np.isfinite(pressure)):
+            raise ValueError("a recorded supply needs positive, finite pressures [bar absolute]")
         first = float(np.interp(0.0, time, pressure))
         return cls(pressure=(first, first), recording=(time, pressure))
 

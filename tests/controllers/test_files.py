@@ -36,7 +36,7 @@ def test_a_written_policy_acts_as_the_model_it_came_from(tmp_path):
     from training.ppo import Hyperparameters, make_model, make_training_env
 
     h = Hyperparameters(num_envs=4, n_steps=8, batch_size=32)
-    env = make_training_env(h, plant=Plant.calibrated(), scenario="mixed", seed=0)
+    env = make_training_env(h, plant=Plant.calibrated(), scenario="mixed", parameters="exact", seed=0)
     model = make_model(h, env, seed=3, device="cpu")
     save_policy(model, tmp_path, control_period=5e-3, provenance={})
     policy = load_policy(tmp_path)

@@ -20,9 +20,10 @@ CHOICES = [
     {"parameters": "ten_percent"},
     {"parameters": Parameters.nominal()},
     {"scenario": "leak"},
-    {"supply": 9.0},
+    {"supply": 9.5},
+    {"supply": (9.5, 10.0)},
     {"supply": Supply.reservoirs((11.0, 11.5), 20.0)},
-    {"supply": RECORDED},
+    {"supply": RECORDED, "target_bar": 7.0},
     {"target_bar": 7.0},
     {"target_bar": (6.0, 6.5)},
     {"p2_bar": (5.0, 6.0)},
@@ -127,15 +128,15 @@ def test_a_scenario_draws_within_its_flows(name):
 
 
 def test_a_constant_supply_holds():
-    env = valve(supply=9.0)
+    env = valve(supply=9.5)
     env.reset(seed=0)
     for _ in range(50):
         env.step(0)
-    assert env.snapshot().p1_bar == 9.0
+    assert env.snapshot().p1_bar == 9.5
 
 
 def test_a_recorded_supply_is_followed():
-    env = valve(supply=RECORDED)
+    env = valve(supply=RECORDED, target_bar=7.0)
     env.reset(seed=0)
     for k in range(1, 101):
         env.step(k % 3 // 2)

@@ -10,11 +10,12 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.training
-@pytest.mark.parametrize("method", ["fork", "forkserver", "spawn"])
-def test_subproc_vec_env_works(method):
+def test_worker_processes_agree_with_their_parent():
     pytest.importorskip("stable_baselines3")
     done = subprocess.run(
-        [sys.executable, "-m", "tests.env.sb3_processes", method],
-        cwd=ROOT, capture_output=True, text=True, timeout=180, check=False,
+        [sys.executable, "-m", "tests.env.sb3_processes"],
+        cwd=ROOT, capture_output=True, text=True, timeout=300, check=False,
     )  # fmt: skip
-    assert done.stdout.strip() == "same", done.stderr
+    assert done.stdout.split("\n")[:4] == [
+        "fork True", "forkserver True", "spawn True", "threads True",
+    ], done.stderr  # fmt: skip

@@ -95,7 +95,7 @@ def test_movers_stay_between_their_stops(restitution):
 def test_coil_energy_is_the_integral_of_electrical_power():
     fine = 50e-6
     valves = Valves(1)
-    valves.set_parameters([0], CALIBRATED)
+    valves.set_parameters(np.arange(1), CALIBRATED)
     start = energised(CALIBRATED, p1=12e5, p2=6e5, U=0.0)._replace(xMV=0.0, p3=1e5)
     for field, value in zip(valves.state, start, strict=True):
         field[:] = value

@@ -107,7 +107,6 @@ def test_rebounds_end_and_agree_with_scipy():
     assert_agrees(REBOUNDING, run, within=0.5)
 
 
-@pytest.mark.xfail(strict=True, reason="an excursion beyond a stop and back within one step is missed")
 def test_a_bounce_within_one_step_is_not_missed():
     """Switched off on its way up, the armature touches the stop for less than a step and falls."""
     at_rest = REPORT["test1"].initial._replace(xMV=0.0, I=0.0, p2=8e5, p3=10e5)
