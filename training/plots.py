@@ -16,6 +16,10 @@ from training.rollout import Trace
 COLOURS = plt.rcParams["axes.prop_cycle"].by_key()["color"]
 
 
+WIDEST_BAR = 1.2
+"""Right end of the excursion axis; the table holds what lies beyond."""
+
+
 def save_figure(figure: Figure, path: Path) -> None:
     """Write a PNG and free the figure."""
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -43,8 +47,8 @@ def episode_overlay(traces: dict[str, Trace], path: Path) -> None:
     """The same episode under every controller: circuit pressure, coil and consumption."""
     rows = len(traces)
     figure, axes = plt.subplots(
-        rows + 2, 1, figsize=(9, 3.4 + 0.7 * rows), sharex=True,
-        height_ratios=[4, *([0.7] * rows), 1],
+        rows + 2, 1, figsize=(9, 4.2 + 0.65 * rows), sharex=True, layout="constrained",
+        height_ratios=[4, *([0.6] * rows), 1],
     )  # fmt: skip
     first = next(iter(traces.values()))
     target = first.target_bar
@@ -54,21 +58,25 @@ def episode_overlay(traces: dict[str, Trace], path: Path) -> None:
         axes[0].plot(trace.time, trace.p2_bar, color=colour, lw=1.1, label=name)
         coil.step(trace.time, trace.coil, where="pre", color=colour, lw=0.8)
         coil.set(ylim=(-0.15, 1.15), yticks=[0, 1])
-        coil.set_ylabel(name.replace(", ", "\n"), rotation=0, ha="right", va="center", fontsize=8)
+        coil.set_ylabel(
+            f"coil, {name}".replace(", ", "\n"), rotation=0, ha="right", va="center", fontsize=8
+        )
     axes[0].set_ylabel("circuit pressure p2\n[bar absolute]")
-    axes[0].legend(fontsize=8, ncols=3, loc="lower right")
-    axes[1].set_title("coil: 1 on (valve shuts), 0 off (valve opens); PWM: duty", fontsize=8)
+    figure.legend(
+        *axes[0].get_legend_handles_labels(), fontsize=8, ncols=rows + 1, loc="outside upper center"
+    )
     axes[-1].plot(first.time, first.consumption_g_per_s, color="0.3")
-    axes[-1].set_ylabel("consumption\n[g/s]")
-    axes[-1].set_xlabel("time [s]")
-    figure.align_ylabels([axes[0], axes[-1]])
+    axes[-1].set_ylabel("consumption\n[g/s]", rotation=0, ha="right", va="center", fontsize=8)
+    axes[-1].set_xlabel("time [s]     (coil: 1 on, valve shuts; 0 off, valve opens; PWM: duty)")
     save_figure(figure, path)
 
 
 def excursion_distribution(comparison: Comparison, path: Path) -> None:
     """Share of episodes whose worst excursion is larger than x, by plant set."""
     sets = list(dict.fromkeys(plants for plants, _ in comparison.metrics))
-    figure, axes = plt.subplots(1, len(sets), figsize=(4 * len(sets), 3.6), sharey=True)
+    figure, axes = plt.subplots(
+        1, len(sets), figsize=(4 * len(sets), 3.8), sharex=True, sharey=True, layout="constrained"
+    )
     for axis, plants in zip(np.atleast_1d(axes), sets, strict=True):
         for (where, name), metrics in comparison.metrics.items():
             if where == plants:
@@ -77,7 +85,9 @@ def excursion_distribution(comparison: Comparison, path: Path) -> None:
                 axis.step(worst, 100 * beyond, where="pre", label=name)
         axis.axvline(BAND_BAR, color="0.4", ls="--", lw=0.9)
         axis.set(yscale="log", title=plants, xlabel="worst |p2 - target| after settling [bar]")
+        axis.set_xlim(0.0, WIDEST_BAR)
         axis.grid(alpha=0.3, which="both")
     np.atleast_1d(axes)[0].set_ylabel("episodes with a larger excursion [%]")
-    np.atleast_1d(axes)[0].legend(fontsize=8)
+    handles = np.atleast_1d(axes)[0].get_legend_handles_labels()
+    figure.legend(*handles, fontsize=8, ncols=len(handles[0]), loc="outside upper center")
     save_figure(figure, path)

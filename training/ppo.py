@@ -18,6 +18,7 @@ from tqdm import tqdm
 from epv_env.plant.files import write_text
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.valves import available_cores
+from epv_env.reward import RewardWeights
 from epv_env.sb3 import make_sb3_env
 
 CHECKPOINT_FILE = "checkpoint.zip"
@@ -45,7 +46,13 @@ class Hyperparameters:
 
 
 def make_training_env(
-    h: Hyperparameters, *, plant: Plant, scenario: str, parameters: str, seed: int
+    h: Hyperparameters,
+    *,
+    plant: Plant,
+    scenario: str,
+    parameters: str,
+    seed: int,
+    weights: RewardWeights,
 ) -> VecMonitor:
     """Episodes on plants drawn from a region, "confidence" or another (epv_env.settings)."""
     env = make_sb3_env(
@@ -55,6 +62,7 @@ def make_training_env(
         plant=plant,
         parameters=parameters,
         scenario=scenario,
+        weights=weights,
     )
     env.seed(seed)
     return VecMonitor(env)
@@ -160,6 +168,7 @@ def train(
     plant: Plant,
     scenario: str,
     parameters: str,
+    weights: RewardWeights,
     timesteps: int,
     seed: int,
     device: str,
@@ -174,7 +183,9 @@ def train(
     torch.set_num_threads(available_cores())
     checkpoint = folder / CHECKPOINT_FILE
     done = 0
-    env = make_training_env(h, plant=plant, scenario=scenario, parameters=parameters, seed=seed)
+    env = make_training_env(
+        h, plant=plant, scenario=scenario, parameters=parameters, weights=weights, seed=seed
+    )
     model = make_model(h, env, seed=seed, device=device)
     if resume and checkpoint.exists():
         model.set_parameters(str(checkpoint), device=device)

@@ -22,6 +22,7 @@ from epv_env.plant.consumption import check_scenario
 from epv_env.plant.files import write_text
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.region import REGIONS
+from epv_env.reward import RewardWeights
 from training.cli import fail_clearly, writable_folder
 from training.evaluate import Comparison, as_text, compare
 
@@ -45,6 +46,12 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--plant", default=None, help="plant file; default: the report's calibration")
     parser.add_argument("--scenario", default="mixed", help="consumption scenario")
     parser.add_argument("--parameters", choices=REGIONS, default="confidence", help="plants to train on")
+    parser.add_argument(
+        "--switching-price",
+        type=float,
+        default=RewardWeights().switching,
+        help="reward's price of one switching of the coil: trades wear against excursions",
+    )
     parser.add_argument(
         "--device", default="cpu", help="torch device; cpu is fastest for so small a net"
     )
@@ -89,10 +96,10 @@ def check_resume(chosen: argparse.Namespace) -> None:
     if not chosen.resume:
         return
     earlier = json.loads(path.read_text(encoding="utf-8"))["options"]
-    for name in ("seed", "plant", "scenario", "parameters"):
+    for name in ("seed", "plant", "scenario", "parameters", "switching_price"):
         if earlier[name] != getattr(chosen, name):
             raise ValueError(
-                f"{chosen.out} was trained with --{name} {earlier[name]}, not "
+                f"{chosen.out} was trained with {name} {earlier[name]}, not "
                 f"{getattr(chosen, name)}: resume with the same, or choose another --out"
             )
 
@@ -132,8 +139,8 @@ def main(arguments: list[str] | None = None) -> int:
     write_text(chosen.out / CONFIG_FILE, json.dumps(config, indent=1) + "\n")
     model, log = train(
         hyperparameters, folder=chosen.out, plant=plant, scenario=chosen.scenario,
-        parameters=chosen.parameters, timesteps=chosen.timesteps, seed=chosen.seed,
-        device=chosen.device, resume=chosen.resume,
+        parameters=chosen.parameters, weights=RewardWeights(switching=chosen.switching_price),
+        timesteps=chosen.timesteps, seed=chosen.seed, device=chosen.device, resume=chosen.resume,
     )  # fmt: skip
     save_model(model, chosen.out / "model.zip")
     save_policy(model, chosen.out, control_period=5e-3, provenance=config)

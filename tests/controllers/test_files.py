@@ -32,11 +32,19 @@ def test_a_written_policy_acts_as_the_model_it_came_from(tmp_path):
     pytest.importorskip("stable_baselines3")
     from controllers.learned import PolicyError, load_policy
     from epv_env.plant.plantfile import Plant
+    from epv_env.reward import RewardWeights
     from training.policy_files import save_policy
     from training.ppo import Hyperparameters, make_model, make_training_env
 
     h = Hyperparameters(num_envs=4, n_steps=8, batch_size=32)
-    env = make_training_env(h, plant=Plant.calibrated(), scenario="mixed", parameters="exact", seed=0)
+    env = make_training_env(
+        h,
+        plant=Plant.calibrated(),
+        scenario="mixed",
+        parameters="exact",
+        weights=RewardWeights(),
+        seed=0,
+    )
     model = make_model(h, env, seed=3, device="cpu")
     save_policy(model, tmp_path, control_period=5e-3, provenance={})
     policy = load_policy(tmp_path)

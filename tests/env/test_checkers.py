@@ -40,7 +40,8 @@ def test_gymnasium_s_vector_wrappers_accept_the_batch(identifier):
     for command in actions(identifier, 3, 10):
         observation, reward, _, _, infos = env.step(command)
         returns += reward
-        assert env.observation_space.contains(observation.astype(np.float32))
+        assert observation.shape == env.observation_space.shape
+        assert np.all(np.isfinite(observation))
     np.testing.assert_allclose(infos["episode"]["r"], returns, rtol=1e-6)
     np.testing.assert_array_equal(infos["episode"]["l"], 10)
 

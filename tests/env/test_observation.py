@@ -42,11 +42,11 @@ def test_the_layout_names_measured_quantities_only():
 )
 def test_observations_stay_in_their_space_under_extremes(identifier, supply, target):
     env = native(
-        identifier, 16, autoreset_mode=AutoresetMode.SAME_STEP, max_episode_steps=400,
+        identifier, 16, autoreset_mode=AutoresetMode.SAME_STEP, max_episode_steps=150,
         parameters="domain", supply=supply, target_bar=target, p2_bar=(1.51, 16.0),
         p3_bar=(1.0, 16.0),
     )  # fmt: skip
-    found = run(env, actions(identifier, 16, 2000))
+    found = run(env, actions(identifier, 16, 600))
     seen = np.array([step.observation for step in found.steps])
     space = observation_space()
     assert seen.dtype == np.float32
@@ -92,7 +92,7 @@ def test_a_valve_that_cannot_be_integrated_ends_its_episode_with_finite_figures(
     np.testing.assert_array_equal(terminated, [True, False])
     assert env.observation_space.contains(observation)
     assert np.all(np.isfinite(reward))
-    assert reward[0] <= -100
+    assert infos["reward_failure"][0] < 0
     assert all(np.all(np.isfinite(values)) for values in infos.values())
 
 

@@ -44,9 +44,7 @@ def test_without_a_seed_two_environments_differ(identifier):
     assert np.any(starts[0] != starts[1])
 
 
-@pytest.mark.parametrize(
-    "parameters", ["ten_percent", "domain", {"alphaMV": 0.6}, {"V2": (5e-4, 2e-3)}], ids=str
-)
+@pytest.mark.parametrize("parameters", ["domain", {"alphaMV": 0.6, "V2": (5e-4, 2e-3)}], ids=str)
 def test_other_parameters_meet_the_same_consumption(identifier, parameters):
     found = consumption(identifier, parameters=parameters, scenario="steps")
     expected = consumption(identifier, scenario="steps")

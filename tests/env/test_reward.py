@@ -1,6 +1,6 @@
 """The reward is the sum of its terms, each a price that is zero at best."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -9,6 +9,10 @@ from epv_env.reward import RewardTerms, RewardWeights, reward_terms
 from tests.env.rollouts import ENDING, IDS, actions, native, run
 
 WEIGHTS = [field.name for field in fields(RewardWeights)]
+PRICES = RewardWeights(
+    band=1.0, tracking=0.25, breakdown=0.25, switching=0.1, vented_air=2.0, failure=100.0
+)
+"""Of these tests: the defaults may be tuned."""
 NOTHING = {
     "error_bar": 0.0,
     "highest_error_bar": 0.0,
@@ -19,10 +23,10 @@ NOTHING = {
 }
 
 
-def terms(weights=None, period=5e-3, **happened):
+def terms(weights=PRICES, period=5e-3, **happened):
     """Terms of one period in which only what is named happened, as numbers."""
     values = {key: np.array([value]) for key, value in {**NOTHING, **happened}.items()}
-    found = reward_terms(weights or RewardWeights(), period=period, **values)
+    found = reward_terms(weights, period=period, **values)
     return {name: float(getattr(found, name)[0]) for name in RewardTerms._fields}
 
 
@@ -63,7 +67,7 @@ def test_running_terms_are_per_time_and_events_are_per_event():
 def test_a_weight_scales_its_term_alone(name):
     happened = {"error_bar": -0.6, "lowest_error_bar": -0.8, "switchings": 1, "vented_kg": 1e-3}
     usual, double = (
-        terms(RewardWeights(**{name: factor * getattr(RewardWeights(), name)}), failed=True, **happened)
+        terms(replace(PRICES, **{name: factor * getattr(PRICES, name)}), failed=True, **happened)
         for factor in (1, 2)
     )
     assert double == pytest.approx({**usual, name: 2 * usual[name]})
@@ -90,7 +94,8 @@ def test_the_reward_is_the_sum_of_its_terms(identifier):
 
 @pytest.mark.parametrize("identifier", IDS)
 def test_terms_follow_from_the_figures_in_info(identifier):
-    found = run(native(identifier, 4, target_bar=7.0), actions(identifier, 4, 200))
+    env = native(identifier, 4, target_bar=7.0, weights=PRICES)
+    found = run(env, actions(identifier, 4, 200))
     scale = 1 if identifier == "EPValve-v0" else 4
     for step in found.steps:
         info = step.infos

@@ -76,7 +76,7 @@ def test_a_terminated_episode_is_not_truncated():
         _, _, done, infos = env.step(np.array([0]))
     assert infos[0]["TimeLimit.truncated"] is False
     assert not infos[0]["is_success"]
-    assert infos[0]["reward_failure"] == -100.0
+    assert infos[0]["reward_failure"] < 0
 
 
 def test_seeds_are_forwarded():
