@@ -158,12 +158,13 @@ def design(
     inner_gain = (drift - pole) / ((drift - 1) / point.a * point.b / BAR)
     frequency = np.geomspace(0.1, np.pi / period, 400)
     unit = outer_loop(point, inner_gain, integral_time, period, np.exp(1j * frequency * period))
-    for gain in np.geomspace(3.0, 1e-2, 80):
+    for gain in np.geomspace(3.0, 1e-2, 40):
         margin, phase, _, crossover = map(float, control.margin(control.frd(gain * unit, frequency)))
         if margin > 1 and phase >= phase_margin:
             return Design(
                 inner_gain=float(inner_gain), outer_gain=float(gain), integral_time=integral_time,
-                duty=point.duty + lag / period, gain_margin=margin, phase_margin=phase, crossover=crossover,
+                duty=point.duty + lag / period,
+                gain_margin=margin, phase_margin=phase, crossover=crossover,
             )  # fmt: skip
     raise ValueError(
         f"no gain keeps a phase margin of {phase_margin:g} degrees with an integral time of "

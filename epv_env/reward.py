@@ -17,13 +17,13 @@ REFERENCE_PERIOD = 5e-3
 class RewardWeights:
     """Price of each term; every term is zero at best. Running terms are per 5 ms."""
 
-    band: float = 1.0
+    band: float = 2.0
     """Outside target ±500 mbar at any instant of the period (C1)."""
     tracking: float = 0.25
     """|p2 - target| at the end of the period, in units of 500 mbar."""
     breakdown: float = 0.25
     """Largest shortfall of p2 below the target in the period, in units of 500 mbar (C2)."""
-    switching: float = 0.03
+    switching: float = 0.2
     """Each switching of the coil (wear)."""
     vented_air: float = 2.0
     """Each gram of air blown off by the magnet valve."""

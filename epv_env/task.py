@@ -68,12 +68,14 @@ class _Start:
         p1 = settings.supply.draw(disturbance)
         target = disturbance.uniform(*settings.target_bar)
         drop = disturbance.uniform(*settings.drop_bar)
+        consumption = draw_profile(settings.scenario, disturbance)
+        # Draws that only some settings need come last: they must not shift the others.
         p2 = target - drop if settings.p2_bar is None else disturbance.uniform(*settings.p2_bar)
         p3 = p1 if settings.p3_bar is None else disturbance.uniform(*settings.p3_bar) * BAR
         return cls(
             parameters=settings.region.draw(plant),
             p1=p1, p2=p2 * BAR, p3=p3, target=target,
-            consumption=draw_profile(settings.scenario, disturbance),
+            consumption=consumption,
             noise=noise,
             supply=settings.supply,
         )  # fmt: skip
@@ -194,7 +196,8 @@ class LimitingTask:
         switchings = (begins_on != self._coil).astype(np.int64) + (begins_on != ends_on)
         self._coil = ends_on
         self._action = action.astype(float)
-        self._waited = np.where(switchings > 0, 0.0, self._waited) + self.period
+        since = np.where(begins_on & ~ends_on, self.period - on_time, self.period)
+        self._waited = np.where(switchings > 0, since, self._waited + self.period)
         return switchings
 
     def _drive(self, on_time: NDArray, time: NDArray, consumption: NDArray) -> None:

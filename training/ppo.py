@@ -4,7 +4,7 @@ import csv
 import io
 import os
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +41,11 @@ class Hyperparameters:
     gamma: float = 0.995
     gae_lambda: float = 0.95
     ent_coef: float = 0.003
+    first_switching_price: float = 0.02
+    """The price of switching rises linearly from this to the reward's own over `rising_share`: priced in
+    full from the start, learning tends to end where the coil is never switched."""
+    rising_share: float = 0.6
+    """Share of the training over which it rises."""
     width: int = 64
     """Of the two hidden layers."""
 
@@ -84,6 +89,24 @@ def make_model(h: Hyperparameters, env: VecMonitor, *, seed: int, device: str) -
         seed=seed,
         device=device,
     )
+
+
+class RisingPrice(BaseCallback):
+    """Raises the price of switching as training goes on."""
+
+    def __init__(self, h: Hyperparameters, weights: RewardWeights, total: int):
+        super().__init__()
+        self._first = min(h.first_switching_price, weights.switching)
+        self._weights = weights
+        self._steps = h.rising_share * total
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_start(self) -> None:
+        share = min(self.num_timesteps / self._steps, 1.0)
+        price = self._first + share * (self._weights.switching - self._first)
+        self.training_env.env_method("set_weights", replace(self._weights, switching=price))
 
 
 class TrainingLog(BaseCallback):
@@ -195,7 +218,11 @@ def train(
     if done < timesteps:
         model.num_timesteps = done
         try:
-            model.learn(timesteps - done, callback=log, reset_num_timesteps=done == 0)
+            model.learn(
+                timesteps - done,
+                callback=[RisingPrice(h, weights, timesteps), log],
+                reset_num_timesteps=done == 0,
+            )
         except KeyboardInterrupt:
             log.save()
             raise

@@ -39,13 +39,13 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--out", type=writable_folder, default=Path("runs/ppo"), help="folder of results"
     )
-    parser.add_argument("--timesteps", type=int, default=4_000_000, help="environment steps to train")
+    parser.add_argument("--timesteps", type=int, default=5_000_000, help="environment steps to train")
     parser.add_argument("--episodes", type=int, default=256, help="evaluation episodes per plant set")
     parser.add_argument("--duration", type=float, default=10.0, help="length of one of them [s]")
     parser.add_argument("--seed", type=int, default=0, help="of the training")
     parser.add_argument("--plant", default=None, help="plant file; default: the report's calibration")
     parser.add_argument("--scenario", default="mixed", help="consumption scenario")
-    parser.add_argument("--parameters", choices=REGIONS, default="confidence", help="plants to train on")
+    parser.add_argument("--parameters", choices=REGIONS, default="ten_percent", help="plants to train on")
     parser.add_argument(
         "--switching-price",
         type=float,

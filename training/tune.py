@@ -1,6 +1,6 @@
 """Tune the classic controllers: the same budget, scenarios and objective for each.
 
-    python training/tune.py --trials 150 --out controllers/tuned.json
+    python training/tune.py --trials 100 --out controllers/tuned.json
 
 The objective is the mean return on the training scenarios, the very reward that PPO maximises.
 """
@@ -19,6 +19,9 @@ from epv_env.observation import P2_LAGS
 from epv_env.plant.parameters import Parameters
 from training.cli import fail_clearly, writable_file
 from training.rollout import run_episodes
+
+TUNING_REGION = "ten_percent"
+"""Plants tuned on: those that PPO trains on."""
 
 TUNING_SEED = 1_000_000
 """First seed of the tuning scenarios; evaluations use others."""
@@ -77,14 +80,14 @@ def tune(
 def main(arguments: list[str] | None = None) -> int:
     """Command line; returns the exit status."""
     parser = argparse.ArgumentParser(description="Tune the classic controllers.")
-    parser.add_argument("--trials", type=int, default=150, help="evaluations for each controller")
+    parser.add_argument("--trials", type=int, default=100, help="evaluations for each controller")
     parser.add_argument("--episodes", type=int, default=128, help="episodes of one evaluation")
     parser.add_argument("--duration", type=float, default=6.0, help="length of an episode [s]")
     parser.add_argument("--seed", type=int, default=0, help="of the search")
     parser.add_argument("--out", type=writable_file, required=True, help="JSON file to write")
     chosen = parser.parse_args(arguments)
     optuna.logging.set_verbosity(optuna.logging.WARNING)
-    options = {"parameters": "confidence"}
+    options = {"parameters": TUNING_REGION}
     settings = {"trials": chosen.trials, "episodes": chosen.episodes, "duration": chosen.duration}
     tunings = {kind: tune(kind, **settings, seed=chosen.seed, options=options) for kind in KINDS}
     search = {"method": "Optuna TPE on the mean return", **settings, "seed": chosen.seed, **options}

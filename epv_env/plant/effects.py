@@ -13,6 +13,14 @@ from epv_env.plant.compiled import inlined
 from epv_env.plant.flow import KAPPA
 from epv_env.plant.values import Value
 
+CATALOGUE: dict[str, tuple[str, ...]] = {
+    "armature_bounce": ("eMV",),
+    "local_gas_speed": ("a1", "a2"),
+}
+"""Effects by name, with the parameters that size them (epv_env.plant.parameters); all 0 is off.
+
+The bounce acts where a stop is met (integrate.py) and costs nothing there, so it is not in `Effects`."""
+
 
 class Effects(NamedTuple):
     """Sizes of the effects; 0 is off."""

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from epv_env.plant.effects import CATALOGUE
 from epv_env.plant.files import write_text
 from epv_env.plant.parameters import ParameterError, Parameters
 from epv_env.plant.region import Region
@@ -80,10 +81,16 @@ def load_plant(source: "Plant | str | PathLike[str] | None") -> Plant:
 
 def save_plant(plant: Plant, path: str | PathLike[str]) -> None:
     """Write a plant file, whole or not at all."""
+    effects = {
+        name: {symbol: plant.parameters[symbol] for symbol in symbols}
+        for name, symbols in CATALOGUE.items()
+    }
+    sizing = {symbol for symbols in CATALOGUE.values() for symbol in symbols}
     content: dict[str, Any] = {
         "format": FORMAT,
         "name": plant.name,
-        "parameters": dict(plant.parameters),
+        "parameters": {s: value for s, value in plant.parameters.items() if s not in sizing},
+        "effects": {name: sizes for name, sizes in effects.items() if any(sizes.values())},
         "region": {"boxes": {symbol: list(ends) for symbol, ends in plant.region.boxes.items()}},
         "provenance": plant.provenance,
     }
@@ -100,6 +107,12 @@ def _decode(content: dict[str, Any]) -> Plant:
     given = content["parameters"]
     if not isinstance(given, dict):
         raise ParameterError("parameters must be an object of values by symbol")
+    for name, sizes in content.get("effects", {}).items():
+        if name not in CATALOGUE:
+            raise ParameterError(f"unknown effect {name!r}: known are {', '.join(CATALOGUE)}")
+        if not set(sizes) <= set(CATALOGUE[name]):
+            raise ParameterError(f"effect {name} is sized by {', '.join(CATALOGUE[name])} only")
+        given = {**given, **sizes}
     parameters = Parameters.calibrated().replace(**given)
     region = content.get("region", {})
     boxes = {

@@ -162,3 +162,22 @@ def test_missing_parameters_are_refused(tmp_path):
 def test_a_region_of_the_wrong_form_is_refused(tmp_path, region, message):
     with pytest.raises(PlantFileError, match=rf"plant\.json.* {message}"):
         load_plant(written(tmp_path / "plant.json", region=region))
+
+
+def test_effects_travel_by_name(tmp_path):
+    """What is switched on stands under its effect's name, and comes back; what is off is left out."""
+    parameters = Parameters.calibrated().replace(a2=1e-4, eMV=0.5)
+    save_plant(Plant(parameters=parameters, region=Region(centre=parameters)), tmp_path / "p.json")
+    content = json.loads((tmp_path / "p.json").read_text())
+    assert content["effects"] == {
+        "armature_bounce": {"eMV": 0.5},
+        "local_gas_speed": {"a1": 0.0, "a2": 1e-4},
+    }
+    assert dict(load_plant(tmp_path / "p.json").parameters) == dict(parameters)
+
+
+def test_an_unknown_effect_is_refused(tmp_path):
+    content = {"format": "epv-plant/1", "parameters": {}, "effects": {"gremlins": {"eMV": 0.5}}}
+    (tmp_path / "p.json").write_text(json.dumps(content))
+    with pytest.raises(PlantFileError, match="unknown effect 'gremlins': known are armature_bounce"):
+        load_plant(tmp_path / "p.json")
