@@ -10,7 +10,7 @@ PACKAGES := epv_env identification controllers training
 
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help venv train test test-oldest bench tune gif lint check format wheel clean
+.PHONY: help venv train test test-oldest bench tune tradeoff gif lint check format wheel clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z][a-z-]*\):.*## /\1	/p' Makefile | while IFS='	' read -r name text; do \
@@ -55,6 +55,9 @@ bench: $(VENV)/.installed ## measure the speed of the plant simulation
 
 tune: $(VENV)/.installed ## search the classic controllers' settings anew (minutes)
 	$(PY) training/tune.py --out controllers/tuned.json $(ARGS)
+
+tradeoff: $(VENV)/.installed ## switching against excursion at several prices (half an hour)
+	$(PY) training/tradeoff.py $(ARGS)
 
 gif: $(VENV)/.installed ## film the valve for the README
 	SDL_VIDEODRIVER=dummy $(PY) docs/film.py --out docs/images/valve.gif $(ARGS)

@@ -45,7 +45,9 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=0, help="of the training")
     parser.add_argument("--plant", default=None, help="plant file; default: the report's calibration")
     parser.add_argument("--scenario", default="mixed", help="consumption scenario")
-    parser.add_argument("--parameters", choices=REGIONS, default="ten_percent", help="plants to train on")
+    parser.add_argument(
+        "--parameters", choices=REGIONS, default="ten_percent", help="plants to train on"
+    )
     parser.add_argument(
         "--switching-price",
         type=float,

@@ -83,3 +83,16 @@ def test_tuning_in_its_shortest_form(tmp_path):
     )
     assert result.returncode == 0, result.stderr
     assert json.loads(out.read_text())["search"]["trials"] == 2
+
+
+def test_the_tradeoff_in_its_shortest_form_keeps_what_is_done(tmp_path):
+    short = ("--prices", 0.2, "--timesteps", 32768, "--trials", 1, "--episodes", 2, "--duration", 0.8)
+    script = "training/tradeoff.py"
+    first = command(*short, "--out", tmp_path, script=script)
+    assert first.returncode == 0, first.stderr
+    assert (tmp_path / "tradeoff.png").stat().st_size > 0
+    rows = json.loads((tmp_path / "table.json").read_text())
+    assert [row["controller"] for row in rows] == ["PPO", "hysteresis, extrapolating", "PWM"]
+    weights = (tmp_path / "price-0.2" / "policy.safetensors").read_bytes()
+    assert command(*short, "--out", tmp_path, script=script).returncode == 0
+    assert (tmp_path / "price-0.2" / "policy.safetensors").read_bytes() == weights
