@@ -30,7 +30,7 @@ def film(scenario: str, seconds: float, seed: int, every: int) -> list[Image.Ima
         if step % every == 0:
             frames.append(Image.fromarray(np.asarray(picture)).resize(SIZE, Image.Resampling.LANCZOS))
     env.close()
-    palette = frames[-1].quantize(128)
+    palette = frames[-1].quantize(256)
     return [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
 
 

@@ -23,7 +23,7 @@ class RewardWeights:
     """|p2 - target| at the end of the period, in units of 500 mbar."""
     breakdown: float = 0.25
     """Largest shortfall of p2 below the target in the period, in units of 500 mbar (C2)."""
-    switching: float = 0.2
+    switching: float = 0.3
     """Each switching of the coil (wear)."""
     vented_air: float = 2.0
     """Each gram of air blown off by the magnet valve."""

@@ -1,6 +1,6 @@
 """Switching against excursion: PPO and the extrapolating hysteresis, each optimised at several prices.
 
-    python training/tradeoff.py --prices 0.1 0.2 0.3 0.5
+    python training/tradeoff.py --prices 0.2 0.3 0.5
 
 What is finished in --out is kept and not done again.
 """
@@ -72,7 +72,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Command line; returns the exit status."""
     parser = argparse.ArgumentParser(description="Switching against excursion at several prices.")
     parser.add_argument("--out", type=writable_folder, default=Path("runs/tradeoff"))
-    parser.add_argument("--prices", type=float, nargs="+", default=[0.1, 0.2, 0.3, 0.5])
+    parser.add_argument("--prices", type=float, nargs="+", default=[0.2, 0.3, 0.5])
     parser.add_argument("--timesteps", type=int, default=5_000_000, help="training steps at each price")
     parser.add_argument("--trials", type=int, default=60, help="tuning evaluations at each price")
     parser.add_argument("--episodes", type=int, default=256)
