@@ -17,7 +17,6 @@ from tqdm import tqdm
 
 from epv_env.plant.files import write_text
 from epv_env.plant.plantfile import Plant
-from epv_env.plant.valves import available_cores
 from epv_env.reward import RewardWeights
 from epv_env.sb3 import make_sb3_env
 
@@ -203,7 +202,7 @@ def train(
     An interruption (Ctrl-C) leaves the newest checkpoint behind. A resumed run draws new episodes, so it
     is a continuation, not a repetition, of an uninterrupted one.
     """
-    torch.set_num_threads(available_cores())
+    torch.set_num_threads(1)  # sums do not depend on the machine's cores; the plant uses them all
     checkpoint = folder / CHECKPOINT_FILE
     done = 0
     env = make_training_env(
