@@ -64,6 +64,12 @@ class Design:
     crossover: float
     """Gain crossover [rad/s]."""
 
+    def __str__(self) -> str:
+        return (
+            f"gain margin {self.gain_margin:.2f}, phase margin {self.phase_margin:.0f} degrees, "
+            f"crossover {self.crossover:.1f} rad/s"
+        )
+
 
 def _static_stroke(p3: float, p1: float, p2: float, c: Coefficients) -> float:
     """Stroke at which the spring balances the pressures, within the stops [m] (eq. 22 at rest)."""

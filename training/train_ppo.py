@@ -17,6 +17,7 @@ from typing import Any
 from tqdm import tqdm
 
 from controllers.learned import load_policy
+from controllers.pwm import PWM
 from controllers.tuned import tuned_controllers
 from epv_env.plant.consumption import check_scenario
 from epv_env.plant.files import write_text
@@ -120,10 +121,14 @@ def evaluate(chosen: argparse.Namespace, plant: Plant) -> Comparison:
             bar.set_postfix_str(what)
             bar.update(100 * share - bar.n)
 
-        return compare(
+        comparison = compare(
             contenders, plant=plant, scenario=chosen.scenario, episodes=chosen.episodes,
             duration=chosen.duration, progress=show,
         )  # fmt: skip
+    for contender in contenders:
+        if isinstance(contender, PWM):
+            print(f"design of the PWM loop: {contender.design}\n")
+    return comparison
 
 
 def main(arguments: list[str] | None = None) -> int:
