@@ -98,7 +98,7 @@ def excursion_distribution(comparison: Comparison, path: Path) -> None:
 
 
 def tradeoff(table: pd.DataFrame, path: Path) -> None:
-    """Worst excursion, breakdown and rms error over switchings, a line per controller."""
+    """Worst excursion, breakdown and rms error over switchings; the small numbers are prices."""
     figures = {
         "C1_worst_excursion_bar": "worst |p2 - target| [bar]",
         "C2_largest_breakdown_bar": "largest breakdown [bar]",
@@ -108,7 +108,7 @@ def tradeoff(table: pd.DataFrame, path: Path) -> None:
     for axis, (column, label) in zip(axes, figures.items(), strict=True):
         for name, rows in table.groupby("controller", sort=False):
             rows = rows.sort_values("switchings_per_s")
-            axis.plot(rows["switchings_per_s"], rows[column], "o-", label=name)
+            axis.plot(rows["switchings_per_s"], rows[column], "o", label=name)
             for _, row in rows.iterrows():
                 axis.annotate(
                     f"{row['switching_price']:g}", (row["switchings_per_s"], row[column]),
