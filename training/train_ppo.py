@@ -29,7 +29,7 @@ from training.evaluate import Comparison, as_text, compare
 
 CONFIG_FILE = "config.json"
 QUICK = {"timesteps": 65_536, "episodes": 16, "duration": 2.0}
-"""What --quick does: everything, too short to learn anything."""
+"""The defaults under --quick: everything is done, too short to learn anything."""
 
 
 def parse(arguments: list[str] | None) -> argparse.Namespace:
@@ -62,9 +62,9 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--quick", action="store_true", help="a run of seconds that shows that all works"
     )
+    if parser.parse_known_args(arguments)[0].quick:
+        parser.set_defaults(**QUICK)  # what is given beside --quick still holds
     chosen = parser.parse_args(arguments)
-    if chosen.quick:
-        vars(chosen).update(QUICK)
     for name in ("timesteps", "episodes", "duration"):
         if getattr(chosen, name) <= 0:
             parser.error(f"--{name} must be positive")
