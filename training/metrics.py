@@ -1,6 +1,6 @@
 """The control aims as figures, per episode: C1 excursion, C2 breakdown, and what control costs."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,10 +31,6 @@ class EpisodeMetrics:
     """Air blown off per second, whole episode."""
     episode_return: NDArray
     """Sum of rewards."""
-
-    def select(self, chosen: NDArray) -> "EpisodeMetrics":
-        """Some episodes only."""
-        return EpisodeMetrics(**{f.name: getattr(self, f.name)[chosen] for f in fields(self)})
 
 
 class Meter:

@@ -4,7 +4,7 @@ import csv
 import io
 import os
 import time
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -226,8 +226,3 @@ def train(
             log.save()
             raise
     return model, log
-
-
-def settings_as_data(h: Hyperparameters) -> dict[str, Any]:
-    """For config.json."""
-    return asdict(h)

@@ -17,6 +17,7 @@ import pandas as pd
 from controllers.base import Controller
 from controllers.learned import CONTRACT_FILE, load_policy
 from controllers.tuned import build, load_tunings, save_tunings, tuned_controllers
+from epv_env.actions import OnOff
 from epv_env.plant.files import write_text
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
@@ -43,7 +44,10 @@ def learned(folder: Path, price: float, timesteps: int, seed: int) -> Controller
             seed=seed, device="cpu", resume=True,
         )  # fmt: skip
         save_policy(
-            model, folder, control_period=5e-3, provenance={"switching_price": price, "seed": seed}
+            model,
+            folder,
+            control_period=OnOff.default_period,
+            provenance={"switching_price": price, "seed": seed},
         )
     return load_policy(folder)
 

@@ -9,6 +9,7 @@ import argparse
 import json
 import platform
 import sys
+from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -19,6 +20,7 @@ from tqdm import tqdm
 from controllers.learned import load_policy
 from controllers.pwm import PWM
 from controllers.tuned import tuned_controllers
+from epv_env.actions import OnOff
 from epv_env.plant.consumption import check_scenario
 from epv_env.plant.files import write_text
 from epv_env.plant.plantfile import Plant, load_plant
@@ -73,12 +75,10 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
 
 def configuration(chosen: argparse.Namespace, plant: Plant, hyperparameters: Any) -> dict[str, Any]:
     """What a stranger needs to repeat the run."""
-    from training.ppo import settings_as_data
-
     packages = ("gymnasium", "numba", "numpy", "stable-baselines3", "torch")
     return {
         "options": {name: str(v) if isinstance(v, Path) else v for name, v in vars(chosen).items()},
-        "hyperparameters": settings_as_data(hyperparameters),
+        "hyperparameters": asdict(hyperparameters),
         "plant": {
             "name": plant.name,
             "parameters": dict(plant.parameters),
@@ -150,7 +150,7 @@ def main(arguments: list[str] | None = None) -> int:
         timesteps=chosen.timesteps, seed=chosen.seed, device=chosen.device, resume=chosen.resume,
     )  # fmt: skip
     save_model(model, chosen.out / "model.zip")
-    save_policy(model, chosen.out, control_period=5e-3, provenance=config)
+    save_policy(model, chosen.out, control_period=OnOff.default_period, provenance=config)
 
     comparison = evaluate(chosen, plant)
     report(comparison, log.rows, chosen.out)
