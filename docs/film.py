@@ -12,7 +12,7 @@ from PIL import Image
 
 from controllers.tuned import tuned_controllers
 from epv_env.env import EPValveEnv
-from training.cli import fail_clearly, writable_file
+from epv_env.plant.commandline import fail_clearly, writable_file
 
 SIZE = (800, 450)
 

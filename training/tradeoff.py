@@ -23,7 +23,7 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
 from epv_env.reward import RewardWeights
-from training.cli import fail_clearly, writable_folder
+from epv_env.plant.commandline import fail_clearly, writable_folder
 from training.evaluate import EVALUATION_SEED, HEADINGS, summary
 from training.rollout import run_episodes
 from training.tune import TUNING_REGION, tune

@@ -26,7 +26,7 @@ from epv_env.plant.files import write_text
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.region import REGIONS
 from epv_env.reward import RewardWeights
-from training.cli import fail_clearly, writable_folder
+from epv_env.plant.commandline import fail_clearly, writable_folder
 from training.evaluate import Comparison, as_text, compare
 
 CONFIG_FILE = "config.json"

@@ -5,7 +5,7 @@ from functools import cache
 import pytest
 
 from epv_env.plant.parameters import Parameters, table
-from identification.sensitivity import THRESHOLD, sensitivities, studied_symbols
+from identification.sensitivity.one_at_a_time import THRESHOLD, sensitivities, studied_symbols
 
 REPORTED = {  # total error for -10 % and for +10 % [%]
     "dMVexh": (15.539, 11.462),

@@ -1,0 +1,1 @@
+"""A virtual bench: campaigns of recordings from a plant whose truth is known."""

@@ -1,0 +1,1 @@
+"""Is the data good enough to identify from (section 4)?"""

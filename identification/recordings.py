@@ -1,0 +1,83 @@
+"""Recordings of a bench in SI units: what every stage of the identification works on."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+ROLES = ("calibration", "validation", "quality")
+"""What a recording may be used for: fitting, testing only, statistics of the noise (section 4)."""
+
+OUTPUTS = ("p2", "p3", "I")
+"""Measured outputs y of the model (eq. 4)."""
+
+CHANNELS = ("I", "U", "p1", "p2", "p3")
+"""Measured signals, in the order of the report's Table 1."""
+
+UNITS = {"I": ("A", 1.0), "U": ("V", 1.0), "p1": ("bar", 1e5), "p2": ("bar", 1e5), "p3": ("bar", 1e5)}
+"""Unit in which people read each channel, and its size in SI units."""
+
+
+class CampaignError(ValueError):
+    """A campaign breaks a rule of docs/data.md: the message says what, where, the rule, the remedy."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recording:
+    """One recording of the bench; arrays have shape (samples,) and SI units."""
+
+    name: str
+    """The file's name without its suffix."""
+    role: str
+    """One of ROLES."""
+    period: float
+    """Time between samples [s]; the first sample is at time 0."""
+    I: NDArray  # noqa: E741 - the report's symbol
+    """Solenoid current [A]."""
+    U: NDArray
+    """Solenoid voltage, fed back [V]."""
+    p1: NDArray
+    """Input chamber pressure [Pa absolute]."""
+    p2: NDArray
+    """Output chamber (circuit) pressure [Pa absolute]."""
+    p3: NDArray
+    """Control chamber pressure [Pa absolute]."""
+    sigma_S: NDArray
+    """Air consumed from the circuit [kg/s]; zero where it was not measured."""
+    sha256: str = ""
+    """Of the file's bytes; empty for a recording that was not read from a file."""
+
+    def __len__(self) -> int:
+        return len(self.U)
+
+    @property
+    def time(self) -> NDArray:
+        """Times of the samples [s]."""
+        return np.arange(len(self)) * self.period
+
+    @property
+    def energised(self) -> NDArray:
+        """Whether the coil is on: U above half its greatest value, boolean (samples,)."""
+        return self.U > 0.5 * np.max(self.U)
+
+    def channel(self, name: str) -> NDArray:
+        """One of CHANNELS [SI units]."""
+        return {"I": self.I, "U": self.U, "p1": self.p1, "p2": self.p2, "p3": self.p3}[name]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Campaign:
+    """The recordings of one bench, and the ambient conditions they share."""
+
+    name: str
+    temperature: float
+    """T_env [K]."""
+    pressure: float
+    """p_env [Pa absolute]."""
+    recordings: tuple[Recording, ...]
+    folder: Path | None = None
+
+    def of(self, role: str) -> tuple[Recording, ...]:
+        """The recordings with one of ROLES."""
+        return tuple(recording for recording in self.recordings if recording.role == role)
