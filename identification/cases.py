@@ -11,9 +11,8 @@ class Case:
     """Deactivations of the coil. Times in s; those that the report does not print are fitted to it."""
 
     name: str
-    opening: float
-    """Length of one deactivation."""
-    count: int
+    openings: tuple[float, ...]
+    """Lengths of the deactivations."""
     duration: float
     first: float = 0.05
     pause: float = 0.209
@@ -21,20 +20,22 @@ class Case:
 
     def voltage(self, U_on: float, rate: float) -> NDArray:
         """Voltage at `rate` samples per second [V], (samples,); exact in whole sample counts."""
-        samples = np.arange(round(self.duration * rate) + 1)
-        since = samples - round(self.first * rate)
-        cycle, opening = round((self.opening + self.pause) * rate), round(self.opening * rate)
-        off = (since >= 0) & (since % cycle < opening) & (since < self.count * cycle)
-        return np.where(off, 0.0, U_on)
+        U = np.full(round(self.duration * rate) + 1, U_on)
+        start = self.first
+        for opening in self.openings:
+            first = round(start * rate)
+            U[first : first + round(opening * rate)] = 0.0
+            start += opening + self.pause
+        return U
 
 
 CALIBRATION_CASES = (
-    Case(name="Test1", opening=0.09, count=2, duration=0.65),
-    Case(name="Test2", opening=0.10, count=2, duration=0.65),
-    Case(name="Test3", opening=0.11, count=2, duration=0.65),
-    Case(name="Test4", opening=0.09, count=1, duration=1.05),
+    Case(name="Test1", openings=(0.09, 0.09), duration=0.65),
+    Case(name="Test2", openings=(0.10, 0.10), duration=0.65),
+    Case(name="Test3", openings=(0.11, 0.11), duration=0.65),
+    Case(name="Test4", openings=(0.09,), duration=1.05),
 )
 # Three such pulses fit into 0.75 s with a shorter pause only; its length is a choice of this project.
-VALIDATION_CASE = Case(name="Validation", opening=0.11, count=3, duration=0.75, pause=0.1)
+VALIDATION_CASE = Case(name="Validation", openings=(0.11, 0.11, 0.11), duration=0.75, pause=0.1)
 RATE = 2000.0
 """Samples per second of the report's bench (section 3)."""

@@ -59,7 +59,7 @@ class Recording:
     @property
     def energised(self) -> NDArray:
         """Whether the coil is on: U above half its greatest value, boolean (samples,)."""
-        return self.U > 0.5 * np.max(self.U)
+        return 0.5 * np.max(self.U) < self.U
 
     def channel(self, name: str) -> NDArray:
         """One of CHANNELS [SI units]."""

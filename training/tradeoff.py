@@ -18,12 +18,12 @@ from controllers.base import Controller
 from controllers.learned import CONTRACT_FILE, load_policy
 from controllers.tuned import build, load_tunings, save_tunings, tuned_controllers
 from epv_env.actions import OnOff
+from epv_env.plant.commandline import fail_clearly, writable_folder
 from epv_env.plant.files import write_text
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
 from epv_env.reward import RewardWeights
-from epv_env.plant.commandline import fail_clearly, writable_folder
 from training.evaluate import EVALUATION_SEED, HEADINGS, summary
 from training.rollout import run_episodes
 from training.tune import TUNING_REGION, tune

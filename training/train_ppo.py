@@ -21,12 +21,12 @@ from controllers.learned import load_policy
 from controllers.pwm import PWM
 from controllers.tuned import tuned_controllers
 from epv_env.actions import OnOff
+from epv_env.plant.commandline import fail_clearly, writable_folder
 from epv_env.plant.consumption import check_scenario
 from epv_env.plant.files import write_text
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.region import REGIONS
 from epv_env.reward import RewardWeights
-from epv_env.plant.commandline import fail_clearly, writable_folder
 from training.evaluate import Comparison, as_text, compare
 
 CONFIG_FILE = "config.json"

@@ -16,8 +16,8 @@ from tqdm import tqdm
 
 from controllers.tuned import KINDS, Tuning, build, save_tunings
 from epv_env.observation import P2_LAGS
-from epv_env.plant.parameters import Parameters
 from epv_env.plant.commandline import fail_clearly, writable_file
+from epv_env.plant.parameters import Parameters
 from training.rollout import run_episodes
 
 TUNING_REGION = "ten_percent"

@@ -15,7 +15,7 @@ from epv_env.plant.lanes import LANES, N_INPUT, N_STATE
 from epv_env.plant.parameters import Parameters
 
 LANES_PER_TASK = 4 * LANES
-"""Fewest lanes worth a thread of their own."""
+"""Fewest lanes, times periods, worth a thread of their own."""
 
 
 @cache
@@ -90,10 +90,11 @@ class Valves:
         self._duration[: self.n] = duration
         self._run(self._inputs[None], self._duration[None], np.empty((0, *self._state.shape)))
 
-    def record(self, inputs: Inputs, period: float) -> State:
+    def record(self, inputs: Inputs, period: ArrayLike) -> State:
         """Apply a series of inputs, each for `period` [s], and keep every state.
 
-        inputs: fields that broadcast to (samples, n). Returns fields of shape (samples, n): the state
+        inputs: fields that broadcast to (samples, n). period: a number, or one per sample and valve
+        (samples, n); a valve stands still where it is 0. Returns fields of shape (samples, n): the state
         after each period. A valve that cannot be integrated becomes NaN.
         """
         fields = np.broadcast_arrays(*inputs, np.empty((1, self.n)))[:-1]
@@ -133,7 +134,7 @@ class Valves:
                 self._highest, out, self.step, first, last)  # fmt: skip
 
         lanes = self._state.shape[1]
-        tasks = min(self.threads, lanes // LANES_PER_TASK)
+        tasks = min(self.threads, lanes // LANES, lanes * len(duration) // LANES_PER_TASK)
         if tasks <= 1:
             work(0, lanes)
             return

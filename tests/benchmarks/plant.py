@@ -17,6 +17,7 @@ import numpy as np
 
 from epv_env.plant.integrate import DEFAULT_STEP
 from epv_env.plant.valves import available_cores
+from identification.bench.automaton import simulate_reference
 from tests.benchmarks import startup, workloads
 from tests.benchmarks.measure import WALL, Row, Table, durations, rates
 from tests.benchmarks.naive import run_naive
@@ -24,7 +25,6 @@ from tests.benchmarks.operations import count_operations
 from tests.benchmarks.roofline import floating_point_rates, operation_rates
 from tests.benchmarks.unaware import CLIPS, final_p2
 from tests.benchmarks.workloads import PERIOD
-from tests.reference.hybrid import simulate_reference
 from tests.reference.numpy_rhs import numpy_right_hand_side
 from tests.reference.schedule import plant_states, report_tests
 

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from epv_env.plant.coefficients import coefficients, effect_sizes
-from tests.reference.hybrid import COMPILED, X
-from tests.reference.schedule import Schedule
+from identification.bench.automaton import COMPILED, X
+from identification.bench.schedule import Schedule
 
 RTOL, ATOL = 1e-6, 1e-9
 MOST_EVALUATIONS = 300_000

@@ -6,7 +6,7 @@ from epv_env.plant.equations import Inputs
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
-from tests.reference.schedule import Schedule, scheduled
+from identification.bench.schedule import Schedule, scheduled
 
 PERIOD = 5e-3
 SWITCHING = 0.15

@@ -18,7 +18,7 @@ from epv_env.plant.equations import (
 from epv_env.plant.flow import MAX_RELATIVE_ERROR
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised, simulate
-from tests.reference.hybrid import COMPILED
+from identification.bench.automaton import COMPILED
 from tests.reference.numpy_rhs import numpy_rates
 
 CALIBRATED = Parameters.calibrated()

@@ -7,8 +7,8 @@ import pytest
 
 from epv_env.plant.integrate import DEFAULT_STEP
 from epv_env.plant.parameters import Parameters
+from identification.bench.automaton import Run, simulate_reference
 from tests.reference.closed_loop import random_schedules
-from tests.reference.hybrid import Run, simulate_reference
 from tests.reference.schedule import (
     Schedule,
     largest_difference,

@@ -9,7 +9,7 @@ from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters, table
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
-from tests.reference.schedule import Schedule, scheduled
+from identification.bench.schedule import Schedule, scheduled
 
 PERIOD = 5e-3
 """Time between decisions [s]."""

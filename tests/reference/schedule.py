@@ -1,65 +1,21 @@
-"""What is done to a valve over time, in a form that both the plant and the reference can run."""
+"""Schedules of the tests, and the plant run on a schedule."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from epv_env.plant.equations import Inputs, State
+from epv_env.plant.equations import State
 from epv_env.plant.integrate import DEFAULT_STEP
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
+from identification.bench.schedule import Schedule, scheduled
 
 MOST_STEPS = 5000
 """Steps that one `advance` is asked for; well below integrate.MAX_STEPS."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Schedule:
-    """A valve, its state at time 0, and inputs that hold from one border to the next. SI units."""
-
-    parameters: Parameters
-    initial: State
-    borders: NDArray
-    """Times at which inputs change [s], from 0 to the end of the run, shape (segments + 1,)."""
-    inputs: Inputs
-    """One value per segment, shape (segments,)."""
-    reservoir_volume: float = np.inf
-
-    @property
-    def duration(self) -> float:
-        """Length of the run [s]."""
-        return float(self.borders[-1])
-
-
-def scheduled(
-    parameters: Parameters,
-    initial: State,
-    borders: ArrayLike,
-    *,
-    U: ArrayLike,
-    sigma_S: ArrayLike = 0.0,
-    p1_slope: ArrayLike = 0.0,
-    refill: ArrayLike = 0.0,
-    reservoir_volume: float = np.inf,
-) -> Schedule:
-    """A Schedule; scalars hold throughout, and borders between equal inputs are dropped."""
-    times = np.asarray(borders, dtype=float)
-    rows = np.stack(
-        np.broadcast_arrays(*np.atleast_1d(U, sigma_S, p1_slope, refill), times[:-1])[:4]
-    ).astype(float)
-    changes = np.concatenate([[True], np.any(np.diff(rows, axis=1) != 0, axis=0)])
-    return Schedule(
-        parameters=parameters,
-        initial=initial,
-        borders=np.append(times[:-1][changes], times[-1]),
-        inputs=Inputs(*rows[:, changes]),
-        reservoir_volume=reservoir_volume,
-    )
 
 
 def pulses(

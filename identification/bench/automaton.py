@@ -1,4 +1,4 @@
-"""Reference simulator: SciPy's integrators around the plant's right-hand side, in an automaton.
+"""The bench's simulator, and the plant's reference: SciPy's integrators in an automaton.
 
 What it shares with epv_env.plant.integrate is the right-hand side and the definition of a rebound
 (STICK_SPEED), nothing else: its own modes (each mover free, held low or held high), its own
@@ -18,7 +18,7 @@ from epv_env.plant.compiled import FLAGS
 from epv_env.plant.equations import Coefficients, State, derivative
 from epv_env.plant.integrate import STICK_SPEED
 from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at, store_state
-from tests.reference.schedule import Schedule
+from identification.bench.schedule import Schedule
 
 RTOL = 1e-9
 SCALE = State(

@@ -1,0 +1,92 @@
+"""The bench at work: a plant's true trajectories, and what the sensors make of them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epv_env.plant.equations import State
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.sensors import SENSORS
+from epv_env.plant.simulate import energised
+from identification.bench.automaton import simulate_reference
+from identification.bench.programmes import Programme
+from identification.bench.schedule import scheduled
+from identification.cases import RATE
+from identification.recordings import CHANNELS, UNITS, Campaign, Recording
+
+RESERVOIR = 0.08
+"""The bench's two reservoirs of 40 litres (section 3) [m^3]; air drawn from them lowers p1."""
+
+RTOL = 1e-8
+"""Relative tolerance of the bench's solver: errors below 0.1 mbar, a thirtieth of an ADC step."""
+
+OFFSETS = {"p1": 0.000909, "p2": -0.00728, "p3": -0.003112, "I": -0.000235, "U": 0.001837}
+"""Reading less truth at the start of a recording (Table 2; pressures less 1 bar) [bar, A, V]."""
+
+TRENDS = {"p1": 7.9e-5, "p2": -1.16e-4, "p3": -8.2e-5, "I": -6e-6, "U": 5.8e-5}
+"""Drift of the readings (Table 2) [bar/s, A/s, V/s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Truth:
+    """What really happened in one recording; arrays (samples,) by channel, SI units."""
+
+    programme: Programme
+    period: float
+    channels: Mapping[str, NDArray]
+
+
+def run_programme(
+    parameters: Parameters, programme: Programme, *, rate: float = RATE, reservoir: float = RESERVOIR
+) -> Truth:
+    """The true course of one recording at `rate` samples per second."""
+    U = programme.case.voltage(programme.U_on, rate)
+    time = np.arange(len(U)) / rate
+    if programme.U_on == 0:
+        start = _exhausted(parameters)
+    else:
+        start = energised(parameters, p1=programme.p1, p2=programme.p2, U=programme.U_on)
+    # Switching takes effect at the sample at which the voltage is first read.
+    schedule = scheduled(parameters, start, time, U=U[:-1], reservoir_volume=reservoir)
+    state = simulate_reference(schedule, time, rtol=RTOL).state
+    channels = {"I": state.I, "U": U, "p1": state.p1, "p2": state.p2, "p3": state.p3}
+    return Truth(programme=programme, period=1.0 / rate, channels=channels)
+
+
+def measured(truth: Truth, rng: np.random.Generator) -> Recording:
+    """A recording of the truth by the sensors of Tables 1 to 3: offset, trend, noise, 12 bit."""
+    readings = {}
+    for channel in CHANNELS:
+        value = truth.channels[channel] / UNITS[channel][1]
+        time = np.arange(len(value)) * truth.period
+        drifted = value + OFFSETS[channel] + TRENDS[channel] * time
+        reading = SENSORS[channel].measure(drifted, rng.standard_normal(len(value)))
+        readings[channel] = reading * UNITS[channel][1]
+    return Recording(
+        name=truth.programme.name,
+        role=truth.programme.role,
+        period=truth.period,
+        sigma_S=np.zeros_like(truth.channels["U"]),
+        **readings,
+    )
+
+
+def measured_campaign(
+    truths: Sequence[Truth], parameters: Parameters, *, seed: int, name: str = "virtual bench"
+) -> Campaign:
+    """A campaign of the truths; each recording's noise has a generator of its own, from the seed."""
+    generators = [np.random.default_rng([seed, index]) for index in range(len(truths))]
+    return Campaign(
+        name=name,
+        temperature=parameters["T_env"],
+        pressure=parameters["p_env"],
+        recordings=tuple(measured(t, rng) for t, rng in zip(truths, generators, strict=True)),
+    )
+
+
+def _exhausted(parameters: Parameters) -> State:
+    """Steady state with the coil off and every chamber at ambient pressure."""
+    start = energised(parameters, p1=parameters["p_env"], p2=parameters["p_env"], U=0.0)
+    return start._replace(xMV=0.0)

@@ -1,0 +1,123 @@
+"""What a recording imposes on the model: voltage, supply pressure, consumption and the start.
+
+The model takes these as known, so their noise would enter its outputs. Where a simple course (a constant
+voltage, a supply that loses what the circuit gains) explains a signal but for white noise, it stands in
+for the signal.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import make_smoothing_spline
+from scipy.signal import savgol_filter
+from scipy.stats import chi2
+
+from identification.recordings import Recording
+
+HOLD = 0.04
+"""Recordings start with at least this long in steady state, energised [s] (docs/data.md)."""
+
+SMOOTHING = 0.01
+"""Window in which p2 is smoothed before the air drawn from the supply is read off it [s]."""
+
+BLOCK = 0.02
+"""Length of the blocks over which what is left of p1 must average out [s]."""
+
+DOUBT = 1e-4
+"""Probability of what is left of a signal, as white noise, below which a simple course is given up."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drive:
+    """Inputs of the model for one recording; arrays (samples,), SI units."""
+
+    period: float
+    U: NDArray
+    p1: NDArray
+    sigma_S: NDArray
+    U_start: float
+    """Voltage in the steady start, of which I(0) follows [V]."""
+    p2_start: float
+    """Circuit pressure in the steady start [Pa]."""
+
+    @property
+    def p1_start(self) -> float:
+        """Supply pressure at the first sample [Pa]."""
+        return float(self.p1[0])
+
+
+def drive_of(recording: Recording) -> Drive:
+    """The inputs that the model is given for a recording."""
+    start = slice(0, max(2, round(HOLD / recording.period)))
+    return Drive(
+        period=recording.period,
+        U=smooth_voltage(recording),
+        p1=smooth_supply(recording),
+        sigma_S=recording.sigma_S,
+        U_start=float(np.mean(recording.U[start])),
+        p2_start=float(np.mean(recording.p2[start])),
+    )
+
+
+def smooth_voltage(recording: Recording) -> NDArray:
+    """U with each stretch between two switchings at its mean, if noise alone hides that [V], (samples,)."""
+    U = recording.U.copy()
+    borders = np.flatnonzero(np.diff(recording.energised)) + 1
+    for stretch in np.split(U, borders):  # views: assigning to one changes U
+        residual = stretch - np.mean(stretch)
+        if len(stretch) > 2 and _is_white(residual, recording.period):
+            stretch[:] = np.mean(stretch)
+    return U
+
+
+def smooth_supply(recording: Recording) -> NDArray:
+    """p1 without its noise [Pa], (samples,).
+
+    Reservoirs lose what the circuit gains: a line in time, the rise of p2 and the air consumed explain
+    p1 (eq. 6 divided by V1), by least squares. Where what they leave is no white noise, because the
+    supply has a life of its own, a smoothing spline (generalised cross-validation) takes its place.
+    """
+    fitted = _air_balance(recording)
+    if _is_white(recording.p1 - fitted, recording.period):
+        return fitted
+    return _spline(recording)
+
+
+def without_offsets(recording: Recording, offsets: dict[str, float]) -> Recording:
+    """The recording less its sensors' offsets by channel [SI units]."""
+    corrected = {name: recording.channel(name) - offset for name, offset in offsets.items()}
+    return replace(recording, **corrected)
+
+
+def _air_balance(recording: Recording) -> NDArray:
+    window = min(2 * round(0.5 * SMOOTHING / recording.period) + 1, len(recording) // 2 * 2 - 1)
+    p2 = savgol_filter(recording.p2, window, 1)
+    consumed = np.cumsum(recording.sigma_S)
+    basis = np.stack([np.ones_like(p2), recording.time, p2, consumed], axis=1)
+    basis /= np.maximum(np.max(np.abs(basis), axis=0), np.finfo(float).tiny)
+    return basis @ np.linalg.lstsq(basis, recording.p1, rcond=None)[0]
+
+
+def _is_white(residual: NDArray, period: float) -> bool:
+    """Whether block means scatter no more than independent samples of the same spread allow.
+
+    The spread is read off differences between neighbours, which slow courses hardly enter.
+    """
+    length = min(max(2, round(BLOCK / period)), len(residual))
+    blocks = residual[: len(residual) // length * length].reshape(-1, length)
+    variance = 0.5 * np.mean(np.diff(residual) ** 2)
+    statistic = length * np.sum(np.mean(blocks, axis=1) ** 2)
+    return bool(statistic <= variance * chi2.isf(DOUBT, len(blocks)))
+
+
+def _spline(recording: Recording) -> NDArray:
+    """Smoothing spline through means of a few samples each, which keep it cheap.
+
+    Its search for the least cross-validation error needs knots about 1 apart.
+    """
+    every = max(1, round(0.1 * BLOCK / recording.period))
+    count = len(recording) // every
+    means = recording.p1[: count * every].reshape(count, every).mean(axis=1)
+    spline = make_smoothing_spline(np.arange(count), means - means[0])
+    return spline((np.arange(len(recording)) - 0.5 * (every - 1)) / every) + means[0]
