@@ -13,10 +13,7 @@ from scipy.interpolate import make_smoothing_spline
 from scipy.signal import savgol_filter
 from scipy.stats import chi2
 
-from identification.recordings import Recording
-
-HOLD = 0.04
-"""Recordings start with at least this long in steady state, energised [s] (docs/data.md)."""
+from identification.recordings import HOLD, Recording
 
 SMOOTHING = 0.01
 """Window in which p2 is smoothed before the air drawn from the supply is read off it [s]."""
@@ -92,7 +89,7 @@ def without_offsets(recording: Recording, offsets: dict[str, float]) -> Recordin
 
 def _air_balance(recording: Recording) -> NDArray:
     window = min(2 * round(0.5 * SMOOTHING / recording.period) + 1, len(recording) // 2 * 2 - 1)
-    p2 = savgol_filter(recording.p2, window, 1)
+    p2 = np.asarray(savgol_filter(recording.p2, window, 1))
     consumed = np.cumsum(recording.sigma_S)
     basis = np.stack([np.ones_like(p2), recording.time, p2, consumed], axis=1)
     basis /= np.maximum(np.max(np.abs(basis), axis=0), np.finfo(float).tiny)

@@ -15,6 +15,9 @@ OUTPUTS = ("p2", "p3", "I")
 CHANNELS = ("I", "U", "p1", "p2", "p3")
 """Measured signals, in the order of the report's Table 1."""
 
+HOLD = 0.04
+"""Recordings start in steady state, energised, for at least this long [s]."""
+
 UNITS = {"I": ("A", 1.0), "U": ("V", 1.0), "p1": ("bar", 1e5), "p2": ("bar", 1e5), "p3": ("bar", 1e5)}
 """Unit in which people read each channel, and its size in SI units."""
 

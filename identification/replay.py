@@ -65,20 +65,20 @@ def _simulate(drives: list[Drive], p: Mapping[str, ArrayLike], shift: NDArray) -
         field[:] = value
     first = np.stack([valves.state.p2, valves.state.p3, valves.state.I])
     inputs, duration = _inputs(drives)
-    every = [np.repeat(field, n, axis=1) for field in inputs]
-    later = valves.record(Inputs(*every, np.zeros((1, 1))), np.repeat(duration, n, axis=1))
+    every = Inputs(*(np.repeat(field, n, axis=1) for field in inputs))
+    later = valves.record(every, np.repeat(duration, n, axis=1))
     outputs = np.concatenate([first[:, None], np.stack([later.p2, later.p3, later.I])], axis=1)
     return [outputs[:, : len(drive.U), r * n : (r + 1) * n] for r, drive in enumerate(drives)]
 
 
-def _inputs(drives: list[Drive]) -> tuple[list[NDArray], NDArray]:
-    """U, sigma_S, slope of p1, and length of each period; (longest - 1, recordings), 0 past the end."""
+def _inputs(drives: list[Drive]) -> tuple[Inputs, NDArray]:
+    """Inputs, and length of each period; (longest - 1, recordings), 0 past a recording's end."""
     steps = max(len(drive.U) for drive in drives) - 1
-    table = np.zeros((4, steps, len(drives)))
+    table = np.zeros((5, steps, len(drives)))
     for r, drive in enumerate(drives):
         own = slice(0, len(drive.U) - 1)
         table[0, own, r] = drive.U[:-1]
         table[1, own, r] = drive.sigma_S[:-1]
         table[2, own, r] = np.diff(drive.p1) / drive.period
-        table[3, own, r] = drive.period
-    return [table[0], table[1], table[2]], table[3]
+        table[4, own, r] = drive.period
+    return Inputs(*table[:4]), table[4]

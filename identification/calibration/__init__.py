@@ -1,0 +1,1 @@
+"""Fitting parameters to recordings (section 6.2)."""

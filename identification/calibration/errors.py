@@ -1,0 +1,50 @@
+"""The report's error terms of a model on recordings, as in Tables 11, 13 and 15."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epv_env.plant.parameters import Parameters
+from identification.drive import drive_of
+from identification.error import partial_error, relative_error, total_error
+from identification.misfit import measured_outputs
+from identification.recordings import OUTPUTS, Recording
+from identification.replay import Replay
+
+
+@dataclass(frozen=True, kw_only=True)
+class Response:
+    """One recording and the model's answer to its inputs; arrays (3, samples) of OUTPUTS, SI units."""
+
+    recording: Recording
+    measured: NDArray
+    model: NDArray
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """Eq. 19 by output, as fractions."""
+        time = self.recording.time
+        pairs = zip(OUTPUTS, self.measured, self.model, strict=True)
+        return {output: float(relative_error(y, model, time)) for output, y, model in pairs}
+
+    @property
+    def partial(self) -> float:
+        """Eq. 20, as a fraction."""
+        return float(partial_error([np.array(error) for error in self.errors.values()]))
+
+
+def responses(recordings: Sequence[Recording], parameters: Parameters) -> list[Response]:
+    """The model's answers, started where each recording's hold says; nothing is fitted."""
+    replay = Replay([drive_of(recording) for recording in recordings], parameters)
+    one = {"R": np.array([parameters["R"]])}
+    return [
+        Response(recording=recording, measured=measured_outputs(recording), model=model[:, :, 0])
+        for recording, model in zip(recordings, replay.outputs(one), strict=True)
+    ]
+
+
+def total(answers: Sequence[Response]) -> float:
+    """Eq. 21, as a fraction."""
+    return float(total_error([np.array(answer.partial) for answer in answers]))

@@ -1,0 +1,85 @@
+"""One fit from one start: the report's Nelder-Mead search, or weighted least squares."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import OptimizeResult, least_squares, minimize
+
+from identification.misfit import Misfit
+
+MOST_EVALUATIONS = 2000
+"""Of the total error; a search that needs more is reported as not converged."""
+
+PRECISION = 1e-6
+"""Relative change of the parameters at which a search has converged."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fit:
+    """Where a search ended."""
+
+    method: str
+    """'Nelder-Mead' or 'least squares'."""
+    start: NDArray
+    """Scaled vector at the start, (k,)."""
+    z: NDArray
+    """Scaled vector at the end, (k,)."""
+    error: float
+    """Nelder-Mead: total error (eq. 21, a fraction). Least squares: rms in noise deviations."""
+    evaluations: int
+    seconds: float
+    converged: bool
+    message: str
+
+    def as_json(self) -> dict[str, Any]:
+        """JSON-ready; `from_json` gives it back."""
+        return {**self.__dict__, "start": self.start.tolist(), "z": self.z.tolist()}
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any]) -> "Fit":
+        """A fit as `as_json` wrote it."""
+        arrays = {name: np.array(content[name]) for name in ("start", "z")}
+        return cls(**{**content, **arrays})
+
+
+def nelder_mead(misfit: Misfit, start: NDArray) -> Fit:
+    """Minimise the total error by the simplex search that the report used (section 6.2)."""
+    options = {"xatol": PRECISION, "fatol": 1e-3 * PRECISION, "maxfev": MOST_EVALUATIONS}
+    began = perf_counter()
+    result = minimize(
+        misfit.error, start, method="Nelder-Mead", bounds=misfit.vector.bounds, options=options
+    )
+    return _fit("Nelder-Mead", start, result, float(result.fun), began)
+
+
+def weighted_least_squares(misfit: Misfit, start: NDArray) -> Fit:
+    """Minimise the sum of squares in units of the noise by a trust-region Gauss-Newton method."""
+    began = perf_counter()
+    result = least_squares(
+        lambda z: np.concatenate(misfit.residuals(z)),
+        start,
+        jac=lambda z: np.vstack(misfit.linearised(z)[1]),  # type: ignore[arg-type]
+        bounds=misfit.vector.bounds.T,
+        xtol=PRECISION,
+        ftol=PRECISION,
+        max_nfev=200,
+    )
+    rms = float(np.sqrt(np.mean(np.square(result.fun))))
+    return _fit("least squares", start, result, rms, began)
+
+
+def _fit(method: str, start: NDArray, result: OptimizeResult, error: float, began: float) -> Fit:
+    return Fit(
+        method=method,
+        start=np.asarray(start, dtype=float),
+        z=np.asarray(result.x, dtype=float),
+        error=error,
+        evaluations=int(result.nfev),
+        seconds=perf_counter() - began,
+        converged=bool(result.success),
+        message=str(result.message),
+    )

@@ -1,0 +1,189 @@
+"""The rules that the signals of a recording keep, each a function that raises CampaignError.
+
+They look at columns in the units of the file (A, V, bar absolute), as identification.columns reads
+them. What is wrong with a file as a whole comes before what is wrong with single samples, so that the
+first refusal is the most helpful one.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epv_env.plant.sensors import SENSORS, Sensor
+from identification.columns import CHANNEL_OF, TIME, line
+from identification.gauge import check_above_ambient, check_against_supply, check_discharge
+from identification.recordings import HOLD, CampaignError
+from identification.timing import sampling_period
+
+LEAST_REST = 0.5
+"""Least duration of a quality recording [s]; statistics of less mean little."""
+
+LEAST_VOLTAGE = 1.0
+"""Least greatest voltage of a coil that is on at all [V]; noise has 0.012 V."""
+
+PASCAL, KILOPASCAL = 1e4, 50.0
+"""Medians of a pressure column above which it is in Pa, and else in kPa; the range ends at 16 bar."""
+
+STUCK_TIME, STUCK_SAMPLES = 0.02, 20
+"""A reading that stays at the end of a range for both [s and samples] is stuck; noise moves it."""
+
+
+def check_recording(
+    file: str, columns: Mapping[str, NDArray], *, role: str, ambient_bar: float
+) -> float:
+    """Apply every rule to a recording's columns, each (samples,); returns the sampling period [s].
+
+    file: what messages call it. role: one of identification.recordings.ROLES. ambient_bar: p_env [bar
+    absolute]. Raises CampaignError at the first rule that is broken.
+    """
+    period = sampling_period(file, columns[TIME])
+    check_length(file, columns, role, period)
+    for name, channel in CHANNEL_OF.items():
+        if name in columns:
+            _check_channel(file, name, columns[name], SENSORS[channel], period, ambient_bar)
+    if role != "quality":
+        check_switching(file, columns["U_V"])
+        check_energised_start(file, columns["U_V"], period)
+        check_steady_start(file, columns, period)
+        check_pressures(file, columns, period, ambient_bar)
+    return period
+
+
+def _check_channel(
+    file: str, name: str, values: NDArray, sensor: Sensor, period: float, ambient_bar: float
+) -> None:
+    if name != "U_V":  # a voltage may be fed back without noise
+        check_alive(file, name, values)
+    if name.startswith("p"):
+        check_unit(file, name, values)
+        check_above_ambient(file, name, values, ambient_bar)
+    check_range(file, name, values, sensor)
+    check_rail(file, name, values, sensor, period)
+
+
+def check_length(file: str, columns: Mapping[str, NDArray], role: str, period: float) -> None:
+    """A recording holds its steady start and more; one for statistics LEAST_REST."""
+    found = len(columns[TIME])
+    needed = _samples(LEAST_REST, period) if role == "quality" else _samples(HOLD, period) + 1
+    if found < needed:
+        raise CampaignError(
+            f"{file}, line {line(found)}: the file ends after {found} samples, and a {role} recording "
+            f"at {1 / period:g} Hz needs at least {needed}: record for longer"
+        )
+
+
+def check_alive(file: str, name: str, values: NDArray) -> None:
+    """Noise and the ADC's steps move every channel that is connected."""
+    if np.min(values) == np.max(values):
+        raise CampaignError(
+            f"{file}, {_lines(0, len(values))}: {name} is {values[0]:g} throughout, and noise moves "
+            "every live channel: check its sensor, or give simulated data the sensors' noise"
+        )
+
+
+def check_unit(file: str, name: str, values: NDArray) -> None:
+    """Pressures are in bar."""
+    typical = float(np.median(values))
+    if typical > KILOPASCAL:
+        unit, factor = ("Pa", 100000) if typical > PASCAL else ("kPa", 100)
+        raise CampaignError(
+            f"{file}, line {line(0)}: {name} is {values[0]:g}, which looks like {unit}: give bar "
+            f"absolute (divide {unit} by {factor})"
+        )
+
+
+def check_range(file: str, name: str, values: NDArray, sensor: Sensor) -> None:
+    """Table 1's range holds, but for the sensor's accuracy."""
+    margin = _margin(sensor) + 1e-9
+    outside = (values < sensor.low - margin) | (values > sensor.high + margin)
+    if np.any(outside):
+        sample = int(np.argmax(outside))
+        raise CampaignError(
+            f"{file}, line {line(sample)}: {name} is {values[sample]:g}, outside the sensor's range "
+            f"[{sensor.low:g}, {sensor.high:g}] by more than its accuracy of {_margin(sensor):g}: "
+            "check unit and scaling, or cut the recording there"
+        )
+
+
+def check_rail(file: str, name: str, values: NDArray, sensor: Sensor, period: float) -> None:
+    """No reading stays at an end of the range, or where the ADC saturates beyond it."""
+    at_end = (values <= sensor.low) | (values >= sensor.high - sensor.resolution)
+    first, length = _longest_run(at_end[1:] & (values[1:] == values[:-1]))
+    if length >= max(_samples(STUCK_TIME, period), STUCK_SAMPLES):
+        raise CampaignError(
+            f"{file}, {_lines(first, length + 1)}: {name} is stuck at {values[first]:g}, an end of the "
+            f"sensor's range [{sensor.low:g}, {sensor.high:g}]: check the sensor, or record again with "
+            "signals inside the range"
+        )
+
+
+def check_switching(file: str, U: NDArray) -> None:
+    """The coil is on and off: below and above half its greatest voltage."""
+    if np.max(U) < LEAST_VOLTAGE or np.min(U) > 0.5 * np.max(U):
+        raise CampaignError(
+            f"{file}, {_lines(0, len(U))}: U_V never switches, it stays between {np.min(U):g} and "
+            f"{np.max(U):g} V: record a switching of the coil, or give the recording the role quality"
+        )
+
+
+def check_energised_start(file: str, U: NDArray, period: float) -> None:
+    """The coil is on for HOLD before it first switches."""
+    off = np.flatnonzero(0.5 * np.max(U) >= U[: _samples(HOLD, period)])
+    if off.size:
+        raise CampaignError(
+            f"{file}, line {line(off[0])}: U_V is {U[off[0]]:g} V at {1e3 * off[0] * period:g} ms, and "
+            f"recordings start energised for at least {1e3 * HOLD:g} ms: record from before the first "
+            "switching"
+        )
+
+
+def check_steady_start(file: str, columns: Mapping[str, NDArray], period: float) -> None:
+    """Current and pressures rest during HOLD: first and last quarter agree within the accuracy."""
+    count = _samples(HOLD, period)
+    quarter = count // 4
+    for name, channel in CHANNEL_OF.items():
+        if name in columns and name != "U_V":
+            start = columns[name][:count]
+            change = float(np.mean(start[-quarter:]) - np.mean(start[:quarter]))
+            if abs(change) > _margin(SENSORS[channel]):
+                raise CampaignError(
+                    f"{file}, {_lines(0, count)}: {name} changes by {change:g} in the first "
+                    f"{1e3 * HOLD:g} ms, which must be steady: let the bench settle, energised, "
+                    "before recording"
+                )
+
+
+def check_pressures(
+    file: str, columns: Mapping[str, NDArray], period: float, ambient_bar: float
+) -> None:
+    """Pressures are absolute, as far as a recording that starts energised and switches can tell."""
+    start = slice(_samples(HOLD, period))
+    for name, channel in CHANNEL_OF.items():
+        if name in columns and channel == "p1":
+            check_against_supply(file, name, columns[name][start], columns["p3_bar"][start])
+    check_discharge(file, columns["U_V"], columns["p3_bar"], period, ambient_bar)
+
+
+def _margin(sensor: Sensor) -> float:
+    """Accuracy in the sensor's unit."""
+    return sensor.accuracy * sensor.high
+
+
+def _samples(duration: float, period: float) -> int:
+    """Samples that a duration [s] holds."""
+    return int(np.ceil(duration / period - 1e-6))
+
+
+def _lines(first: int, count: int) -> str:
+    return f"lines {line(first)} to {line(first + count - 1)}"
+
+
+def _longest_run(mask: NDArray) -> tuple[int, int]:
+    """First index and length of the longest run of true in a boolean array (samples,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
+    lengths = edges[1::2] - edges[::2]
+    if not lengths.size:
+        return 0, 0
+    longest = int(np.argmax(lengths))
+    return int(edges[2 * longest]), int(lengths[longest])

@@ -1,0 +1,138 @@
+"""The columns of a recording's CSV file: which there are, and the number in every cell."""
+
+import csv
+import io
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.recordings import CampaignError
+
+TIME, CONSUMPTION = "time_s", "sigmaS_kg_per_s"
+
+CHANNEL_OF: Mapping[str, str] = {
+    "I_A": "I",
+    "U_V": "U",
+    "p1_bar": "p1",
+    "p1a_bar": "p1",
+    "p1b_bar": "p1",
+    "p2_bar": "p2",
+    "p3_bar": "p3",
+}
+"""Measured channel (identification.recordings.CHANNELS) in each column, in the unit of its name."""
+
+REQUIRED = (TIME, "I_A", "U_V", "p2_bar", "p3_bar")
+SUPPLY = (("p1_bar",), ("p1a_bar", "p1b_bar"))
+"""The two ways to give p1: one column, or the two reservoirs' sensors."""
+
+KNOWN = (TIME, *CHANNEL_OF, CONSUMPTION)
+
+
+def line(sample: int) -> int:
+    """Number of a sample's line in its file; the header is line 1."""
+    return sample + 2
+
+
+def read_columns(file: str, content: bytes) -> dict[str, NDArray]:
+    """The known columns of a CSV file (RFC 4180, UTF-8), each (samples,), in the order of the file.
+
+    file: what messages call it. Columns that are not KNOWN are ignored. Raises CampaignError.
+    """
+    text = _decoded(file, content)
+    names = _column_names(file, text)
+    wanted = [index for index, name in enumerate(names) if name in KNOWN]
+    values = _parsed_at_once(text, len(names), wanted)
+    if values is None:
+        values = _parsed_by_line(file, text, names, wanted)
+    return {names[index]: values[:, place].copy() for place, index in enumerate(wanted)}
+
+
+def _decoded(file: str, content: bytes) -> str:
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        place = content.count(b"\n", 0, error.start) + 1
+        raise CampaignError(
+            f"{file}, line {place}: a byte is not UTF-8: save the file as CSV in UTF-8"
+        ) from None
+    return text.replace("\r\n", "\n").rstrip("\n")
+
+
+def _column_names(file: str, text: str) -> list[str]:
+    try:
+        header = next(csv.reader(io.StringIO(text), strict=True), [])
+    except csv.Error as error:
+        raise CampaignError(f"{file}, line 1: not CSV ({error}): write the header anew") from None
+    names = [name.strip() for name in header]
+    _check_names(f"{file}, line 1", names)
+    return names
+
+
+def _check_names(place: str, names: Sequence[str]) -> None:
+    for name in names:
+        if names.count(name) > 1:
+            raise CampaignError(f"{place}: column {name!r} stands twice: keep one of them")
+    missing = [name for name in REQUIRED if name not in names]
+    if missing:
+        raise CampaignError(
+            f"{place}: missing {', '.join(missing)} in the header {','.join(names)[:120]!r}: "
+            "name these columns as docs/data.md does, separated by commas"
+        )
+    given = tuple(name for way in SUPPLY for name in way if name in names)
+    if given not in SUPPLY:
+        raise CampaignError(
+            f"{place}: p1 is given by {' and '.join(given) or 'no column'}: "
+            "give p1_bar, or both p1a_bar and p1b_bar, not a mixture"
+        )
+
+
+def _parsed_at_once(text: str, width: int, wanted: Sequence[int]) -> NDArray | None:
+    """All numbers, (samples, wanted), or None where only a closer look can tell."""
+    rows = text.split("\n")[1:]
+    if '"' in text or not rows or any(row.count(",") != width - 1 for row in rows):
+        return None
+    try:
+        values = np.loadtxt(rows, delimiter=",", comments=None, usecols=wanted, ndmin=2)
+    except ValueError:
+        return None
+    return values if np.all(np.isfinite(values)) else None
+
+
+def _parsed_by_line(file: str, text: str, names: Sequence[str], wanted: Sequence[int]) -> NDArray:
+    """The same, slowly; the first line that breaks a rule is named."""
+    reader = csv.reader(io.StringIO(text), strict=True)
+    values: list[list[float]] = []
+    try:
+        next(reader, None)
+        for row in reader:
+            values.append(_row(f"{file}, line {reader.line_num}", row, names, wanted))
+    except csv.Error as error:
+        raise CampaignError(
+            f"{file}, line {reader.line_num}: not CSV ({error}): write this line anew"
+        ) from None
+    return np.reshape(np.array(values, dtype=float), (-1, len(wanted)))
+
+
+def _row(place: str, row: Sequence[str], names: Sequence[str], wanted: Sequence[int]) -> list[float]:
+    if len(row) != len(names):
+        raise CampaignError(
+            f"{place}: {len(row)} cells stand under {len(names)} column names: "
+            "give every column one cell, with '.' as decimal sign"
+        )
+    return [_number(f"{place}: {names[index]}", row[index]) for index in wanted]
+
+
+def _number(place: str, cell: str) -> float:
+    try:
+        value = math.nan if "_" in cell else float(cell)  # Python's own 1_000 is no CSV number
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        found = repr(cell[:40]) if cell.strip() else "empty"
+        raise CampaignError(
+            f"{place} is {found}, not a finite number: give one with '.' as decimal sign, or cut the "
+            "recording before this line"
+        )
+    return value

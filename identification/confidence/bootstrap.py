@@ -1,0 +1,33 @@
+"""Block bootstrap of an estimate, to check the sandwich covariance without its normality.
+
+Blocks of consecutive instants are drawn with replacement and the estimate is moved by one Gauss-Newton
+step on each draw (the one-step bootstrap of Davidson & MacKinnon 1999), which needs no simulation.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.confidence.covariance import score_series
+
+DRAWS = 2000
+
+
+def block_bootstrap(
+    residuals: Sequence[NDArray], jacobians: Sequence[NDArray], *, block: int, seed: int = 0
+) -> NDArray:
+    """Movements of the estimate (DRAWS, k) under blocks of `block` samples, within each recording."""
+    H = np.linalg.inv(sum(J.T @ J for J in jacobians))
+    sums = [_block_sums(s, block) for s in score_series(residuals, jacobians)]
+    rng = np.random.default_rng(seed)
+    moved = np.zeros((DRAWS, H.shape[0]))
+    for blocks in sums:
+        counts = rng.multinomial(len(blocks), np.full(len(blocks), 1.0 / len(blocks)), DRAWS)
+        moved += (counts - 1.0) @ blocks @ H
+    return moved
+
+
+def _block_sums(scores: NDArray, block: int) -> NDArray:
+    """Sums over consecutive blocks (blocks, k); the last one may be shorter."""
+    return np.add.reduceat(scores, np.arange(0, len(scores), block), axis=0)

@@ -1,0 +1,97 @@
+"""The confidence stage: intervals and joint region of a calibration, and checks of its minimum."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+from statsmodels.tools.numdiff import approx_fprime, approx_hess
+
+from epv_env.plant.region import Region
+from identification.calibration.calibrate import Calibration
+from identification.calibration.problem import Problem
+from identification.confidence.bootstrap import block_bootstrap
+from identification.confidence.covariance import Covariance, covariance
+from identification.confidence.eq23 import PROBABILITY, ReportInterval, report_interval
+
+DIFFERENCE = 1e-3
+"""Relative step of the gradient and the Hessian of the total error."""
+
+PROFILE = 0.01
+"""How far to either side a parameter is moved for its profile, relative."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Minimum:
+    """The total error (eq. 21) around the Nelder-Mead estimate."""
+
+    gradient: NDArray
+    """By the scaled parameters (k,); a fraction per fraction."""
+    eigenvalues: NDArray
+    """Of the Hessian (k,); all positive at a minimum."""
+    offsets: NDArray
+    """Relative changes of one parameter at a time (points,)."""
+    profiles: NDArray
+    """Total error with one parameter changed and the others held (k, points)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Confidence:
+    """How sure a calibration is."""
+
+    problem: Problem
+    estimate: NDArray
+    """Least-squares estimate, scaled (k,)."""
+    covariance: Covariance
+    bootstrap: NDArray
+    """Movements of the estimate under the block bootstrap (draws, k)."""
+    nelder_mead: NDArray
+    """The report's estimate, scaled (k,)."""
+    report: ReportInterval
+    minimum: Minimum
+
+    @property
+    def chi_square(self) -> float:
+        """Squared Mahalanobis radius of the joint region."""
+        return float(chi2.ppf(PROBABILITY, len(self.estimate)))
+
+    @property
+    def half_widths(self) -> NDArray:
+        """Of the intervals of each parameter on its own, scaled (k,)."""
+        return np.sqrt(chi2.ppf(PROBABILITY, 1) * np.diag(self.covariance.total))
+
+    @cached_property
+    def disagreement(self) -> float:
+        """Squared Mahalanobis distance of the two methods' estimates in the region's covariance."""
+        apart = self.nelder_mead - self.estimate
+        return float(apart @ np.linalg.solve(self.covariance.total, apart))
+
+    @property
+    def region(self) -> Region:
+        """The joint region in SI units, for the plant file."""
+        scale = self.problem.vector.scale
+        return Region(
+            centre=self.problem.vector.parameters(self.estimate),
+            symbols=self.problem.vector.symbols,
+            covariance=self.covariance.total * np.outer(scale, scale),
+            chi_square=self.chi_square,
+        )
+
+    def intervals(self) -> Mapping[str, tuple[float, float]]:
+        """95 % interval of each parameter on its own [SI]."""
+        return self._around(self.estimate, self.half_widths)
+
+    def _minimum(problem: Problem, z: NDArray) -> Minimum:
+    error = problem.total_error().error
+    offsets = np.linspace(-PROFILE, PROFILE, 41)
+    unit = np.eye(len(z))
+    step = np.full(len(z), DIFFERENCE)
+    hessian = approx_hess(z, error, epsilon=step)
+    return Minimum(
+        gradient=np.atleast_1d(approx_fprime(z, error, epsilon=1e-5, centered=True)),
+        eigenvalues=np.linalg.eigvalsh(0.5 * (hessian + hessian.T)),
+        offsets=offsets,
+        profiles=np.array([[error(z * (1 + d * axis)) for d in offsets] for axis in unit]),
+    )

@@ -1,0 +1,164 @@
+"""Covariance of an estimate that holds for sampled, autocorrelated residuals.
+
+An estimate that minimises a weighted sum of squares moves with the noise e of the outputs by H J'We,
+H = (J'W'WJ)^-1. The usual covariance s^2 H assumes independent e of the weights' size; here the middle
+of the sandwich H M H sums what neighbouring samples have in common (Newey & West 1987). The inputs
+that the model takes as known (U, p1) carry noise too, of which the residuals show nothing: its share is
+found by drawing that noise anew.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from statsmodels.stats.sandwich_covariance import S_hac_simple
+from statsmodels.tsa.stattools import acf
+
+from identification.calibration.problem import Problem
+from identification.drive import Drive, drive_of
+from identification.misfit import Misfit
+from identification.recordings import OUTPUTS, Recording
+from identification.replay import Replay
+
+DRAWS = 8
+"""Of the inputs' noise, for each recording."""
+
+INPUTS = ("U", "p1")
+"""Channels that the model takes as known."""
+
+ZEROED = ("U", "p1", "p2")
+"""Channels whose offset at rest matters; those of p3 and I are nuisances of each recording."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Covariance:
+    """Covariances (k, k) of a scaled vector."""
+
+    independent: NDArray
+    """As if the residuals were independent: s^2 H."""
+    residual: NDArray
+    """Sandwich: from the residuals as they are."""
+    inputs: NDArray
+    """From the noise of the inputs, and from what is left of the sensors' offsets."""
+    lags: int
+    """Samples over which the sandwich sums."""
+
+    @property
+    def total(self) -> NDArray:
+        """What the estimate's region is made of."""
+        return self.residual + self.inputs
+
+
+def covariance(problem: Problem, misfit: Misfit, z: NDArray, *, seed: int = 0) -> Covariance:
+    """Covariance of the estimate z (k,) that minimises one of the problem's misfits."""
+    residuals, jacobians = misfit.linearised(z)
+    H = np.linalg.inv(sum(J.T @ J for J in jacobians))
+    samples = sum(len(residual) for residual in residuals)
+    variance = sum(float(r @ r) for r in residuals) / (samples - len(z))
+    lags = max(correlation_lags(residual) for residual in residuals)
+    middle = sum(S_hac_simple(s, nlags=lags) for s in score_series(residuals, jacobians))
+    influence = [H @ J.T for J in jacobians]
+    inputs = _input_share(problem, misfit, z, influence, seed)
+    return Covariance(
+        independent=variance * H,
+        residual=H @ middle @ H,
+        inputs=inputs + _offset_share(problem, misfit, z, influence),
+        lags=lags,
+    )
+
+
+def score_series(residuals: Sequence[NDArray], jacobians: Sequence[NDArray]) -> list[NDArray]:
+    """J'e of each instant, summed over the outputs; per recording (samples, k)."""
+    return [
+        (J * r[:, None]).reshape(len(OUTPUTS), -1, J.shape[1]).sum(axis=0)
+        for r, J in zip(residuals, jacobians, strict=True)
+    ]
+
+
+def correlation_lags(residual: NDArray) -> int:
+    """Lags over which neighbours may be correlated, for one recording's residual (3 samples,).
+
+    Twice the first lag at which every output's autocorrelation is within its 95 % band, and at least
+    Newey and West's rule of thumb 4 (n/100)^(2/9).
+    """
+    outputs = residual.reshape(len(OUTPUTS), -1)
+    n = outputs.shape[1]
+    longest = n // 10
+    band = 1.96 / np.sqrt(n)
+    correlations = np.array([acf(output, nlags=longest, fft=True) for output in outputs])
+    within = np.all(np.abs(correlations) < band, axis=0)
+    first = int(np.argmax(within)) if np.any(within) else longest
+    return min(max(2 * first, int(4 * (n / 100) ** (2 / 9))), longest)
+
+
+def _input_share(
+    problem: Problem, misfit: Misfit, z: NDArray, influence: Sequence[NDArray], seed: int
+) -> NDArray:
+    """Mean square of how far redrawn input noise moves the estimate, summed over the recordings.
+
+    influence: H J' per recording (k, 3 samples).
+    """
+    redrawn = _redrawn(problem, misfit.replay.drives, np.random.default_rng(seed))
+    values = misfit.vector.values(z)
+    known = misfit.replay.outputs(values)
+    noisy = Replay(redrawn, misfit.vector.reference).outputs(values)
+    share = np.zeros((len(z), len(z)))
+    for r, (influenced, weights) in enumerate(zip(influence, misfit.weights, strict=True)):
+        for model in noisy[r * DRAWS : (r + 1) * DRAWS]:
+            moved = influenced @ (weights * (model - known[r])[:, :, 0]).ravel()
+            share += np.outer(moved, moved) / DRAWS
+    return share
+
+
+def _offset_share(problem: Problem, misfit: Misfit, z: NDArray, influence: Sequence[NDArray]) -> NDArray:
+    """How far the standard errors of the offsets, common to all recordings, move the estimate."""
+    values = misfit.vector.values(z)
+    known = misfit.replay.outputs(values)
+    share = np.zeros((len(z), len(z)))
+    for channel in (name for name in ZEROED if name in problem.offset_errors):
+        error = problem.offset_errors[channel]
+        drives = [_shifted(drive, channel, error) for drive in misfit.replay.drives]
+        models = Replay(drives, misfit.vector.reference).outputs(values)
+        moved = np.zeros(len(z))
+        for influenced, weights, model, before in zip(
+            influence, misfit.weights, models, known, strict=True
+        ):
+            change = (before - model)[:, :, 0]
+            if channel in OUTPUTS:  # the reading is shifted with it
+                change[OUTPUTS.index(channel)] += error
+            moved += influenced @ (weights * change).ravel()
+        share += np.outer(moved, moved)
+    return share
+
+
+def _shifted(drive: Drive, channel: str, error: float) -> Drive:
+    """The drive that would follow if a channel read higher by `error` [SI units]."""
+    if channel == "U":
+        return replace(drive, U=drive.U + error, U_start=drive.U_start + error)
+    if channel == "p1":
+        return replace(drive, p1=drive.p1 + error)
+    return replace(drive, p2_start=drive.p2_start + error)
+
+
+def _redrawn(problem: Problem, drives: Sequence[Drive], rng: np.random.Generator) -> list[Drive]:
+    """DRAWS drives per recording, as they would follow from other noise on the same inputs."""
+    return [
+        _with_start_of(drive, drive_of(_noisy(recording, drive, problem.noise, rng)))
+        for recording, drive in zip(problem.calibration, drives, strict=True)
+        for _ in range(DRAWS)
+    ]
+
+
+def _noisy(
+    recording: Recording, drive: Drive, noise: Mapping[str, float], rng: np.random.Generator
+) -> Recording:
+    drawn = {
+        name: getattr(drive, name) + noise[name] * rng.standard_normal(len(recording)) for name in INPUTS
+    }
+    return replace(recording, **drawn)
+
+
+def _with_start_of(drive: Drive, redrawn: Drive) -> Drive:
+    """The redrawn inputs with the circuit pressure of the original start, which is a nuisance."""
+    return replace(redrawn, p2_start=drive.p2_start)

@@ -1,0 +1,67 @@
+"""The noise of each channel, read off a steady record or off the hold before a test."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epv_env.plant.sensors import SENSORS
+from identification.recordings import CHANNELS, HOLD, UNITS, Campaign, CampaignError, Recording
+
+BLOCK = 0.05
+"""Time over which a drift passes for straight [s]."""
+
+
+def noise_of(campaign: Campaign) -> dict[str, float]:
+    """Standard deviation of each channel's readings about the true value [A, V, Pa], pooled.
+
+    From the quality recordings if there are any, otherwise from the holds that the other recordings
+    start with. Raises CampaignError if a hold is too short.
+    """
+    steady = campaign.of("quality")
+    stretches = [(r, len(r)) for r in steady] or [(r, hold(r)) for r in campaign.recordings]
+    return {name: _pooled(name, stretches) for name in CHANNELS}
+
+
+def noise_from_hold(recording: Recording) -> dict[str, float]:
+    """As `noise_of`, from the energised steady start of one recording [A, V, Pa]."""
+    return {name: _pooled(name, [(recording, hold(recording))]) for name in CHANNELS}
+
+
+def hold(recording: Recording) -> int:
+    """Length of the energised start [samples]. Raises CampaignError if it lasts less than HOLD."""
+    energised = recording.energised
+    samples = len(recording) if np.all(energised) else int(np.argmin(energised))
+    if samples * recording.period < HOLD * (1 - 1e-9):
+        raise CampaignError(
+            f"{recording.name}: energised for the first {1e3 * samples * recording.period:.3g} ms only; "
+            f"the noise is read off {1e3 * HOLD:.0f} ms or more: start recordings in steady state"
+        )
+    return samples
+
+
+def _pooled(name: str, stretches: Sequence[tuple[Recording, int]]) -> float:
+    """Root of the summed squares over the summed degrees of freedom, at least the rounding error."""
+    parts = [
+        _about_lines(recording.channel(name)[:samples], recording.period)
+        for recording, samples in stretches
+    ]
+    variance = sum(squares for squares, _ in parts) / sum(degrees for _, degrees in parts)
+    return max(float(np.sqrt(variance)), _rounding_error(name))
+
+
+def _about_lines(signal: NDArray, period: float) -> tuple[float, int]:
+    """Sum of squares and degrees of freedom about one straight line per block, (samples,)."""
+    blocks = np.array_split(signal, max(1, int(len(signal) * period / BLOCK)))
+    return sum(_squares(block) for block in blocks), len(signal) - 2 * len(blocks)
+
+
+def _squares(block: NDArray) -> float:
+    time = np.arange(len(block)) - (len(block) - 1) / 2
+    slope = time @ block / (time @ time)
+    return float(np.sum((block - np.mean(block) - slope * time) ** 2))
+
+
+def _rounding_error(name: str) -> float:
+    """Standard deviation of the rounding to Table 1's twelve bits [A, V, Pa]."""
+    return SENSORS[name].resolution / np.sqrt(12) * UNITS[name][1]

@@ -1,0 +1,112 @@
+"""The sampling of a recording: uniform up to the digits in which its times are printed."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.columns import TIME, line
+from identification.recordings import CampaignError
+
+LEAST_RATE = 500.0
+"""Least samples per second: a slower bench misses the armature's movement."""
+
+HARMLESS = 1e-3
+"""Part of a period by which a sample may be off; it displaces the steepest signal by less than noise."""
+
+MOST_DIGITS = 9
+"""Decimals of a second beyond which nobody prints times."""
+
+
+def sampling_period(file: str, time: NDArray) -> float:
+    """Time between samples [s] of a `time_s` column, (samples,).
+
+    Of all periods that explain the printed times the one with the roundest rate in Hz; their middle
+    where no whole rate does. Raises CampaignError for times that are not uniform, do not start at 0 or
+    are slower than LEAST_RATE.
+    """
+    if len(time) < 2:
+        raise CampaignError(
+            f"{file}, line {line(len(time))}: the file ends after {len(time)} samples, too few to tell "
+            "the sampling rate: record for longer"
+        )
+    _check_order(file, time)
+    _check_gaps(file, time)
+    least, greatest = _explaining_periods(time)
+    if least > greatest:
+        _refuse_jitter(file, time)
+    period = _roundest(least, greatest)
+    if period * LEAST_RATE > 1 + 1e-9:
+        raise CampaignError(
+            f"{file}, line {line(1)}: sampled at {1 / period:g} Hz: record at {LEAST_RATE:g} Hz or "
+            "faster"
+        )
+    return period
+
+
+def _check_order(file: str, time: NDArray) -> None:
+    if abs(time[0]) > 1e-9:
+        raise CampaignError(
+            f"{file}, line {line(0)}: {TIME} starts at {time[0]:g} and must start at 0: subtract the "
+            "first time from all"
+        )
+    backward = np.flatnonzero(np.diff(time) <= 0)
+    if backward.size:
+        rule = "must increase: sort the samples, give each once, or print more digits"
+        _refuse_step(file, time, backward[0], rule)
+
+
+def _check_gaps(file: str, time: NDArray) -> None:
+    steps = np.diff(time)
+    usual = float(np.median(steps))
+    odd = np.flatnonzero(np.abs(steps - usual) > 0.5 * usual + 1e-9)
+    if odd.size:
+        rule = f"must be uniform, in steps of {usual:g}: cut the recording there, or print more digits"
+        _refuse_step(file, time, odd[0], rule)
+
+
+def _refuse_step(file: str, time: NDArray, sample: int, rule: str) -> None:
+    raise CampaignError(
+        f"{file}, line {line(sample + 1)}: {TIME} goes from {time[sample]:.9g} to "
+        f"{time[sample + 1]:.9g} and {rule}"
+    )
+
+
+def _refuse_jitter(file: str, time: NDArray) -> None:
+    uniform = np.linspace(0.0, time[-1], len(time))
+    worst = int(np.argmax(np.abs(time - uniform)))
+    raise CampaignError(
+        f"{file}, line {line(worst)}: {TIME} is {time[worst]:.9g} where uniform sampling has "
+        f"{uniform[worst]:.9g}, which rounding to the printed digits does not explain: resample to a "
+        "uniform rate"
+    )
+
+
+def _explaining_periods(time: NDArray) -> tuple[float, float]:
+    """Ends of the range of periods with which every time is right up to its rounding [s].
+
+    Time k, rounded by at most h, allows (t_k - h) / k to (t_k + h) / k; the first end lies above the
+    second where nothing explains all.
+    """
+    rounding = 0.5 * _last_digit(time) + HARMLESS * float(np.median(np.diff(time)))
+    count = np.arange(1, len(time))
+    return (
+        float(np.max((time[1:] - rounding) / count)),
+        float(np.min((time[1:] + rounding) / count)),
+    )
+
+
+def _last_digit(time: NDArray) -> float:
+    """Value of the last decimal in which times are printed [s]."""
+    for digits in range(MOST_DIGITS):
+        if np.max(np.abs(time - np.round(time, digits))) < 1e-12:
+            return 10.0**-digits
+    return 10.0**-MOST_DIGITS
+
+
+def _roundest(least: float, greatest: float) -> float:
+    """Of a range of periods the one with the roundest rate, or the middle [s]."""
+    middle = 0.5 * (least + greatest)
+    for unit in (1000, 100, 10, 1):
+        rate = unit * round(1 / (middle * unit))
+        if rate > 0 and least <= 1 / rate <= greatest:
+            return 1 / rate
+    return middle

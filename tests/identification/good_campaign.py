@@ -1,0 +1,53 @@
+"""A campaign that keeps every rule: short recordings of the calibrated plant with the bench's noise."""
+
+from functools import cache
+
+import numpy as np
+
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.sensors import SENSORS
+from epv_env.plant.simulate import energised, simulate
+from identification.cases import CALIBRATION_CASES, RATE
+from identification.recordings import CHANNELS, UNITS, Campaign, Recording
+
+
+@cache
+def switching(role: str = "calibration", rate: float = RATE, name: str = "test1") -> Recording:
+    """The report's Test1 (0.65 s), measured."""
+    p = Parameters.calibrated()
+    U = CALIBRATION_CASES[0].voltage(24.0, rate)
+    start = energised(p, p1=12e5, p2=6.8e5, U=24.0)
+    state = simulate(p, initial=start, U=U, period=1 / rate).state
+    return _measured(name, role, rate, {"I": state.I, "U": U, **state._asdict()})
+
+
+@cache
+def resting(name: str = "rest") -> Recording:
+    """Half a second with the coil off and every chamber vented, measured."""
+    count = round(0.5 * RATE)
+    vented, off = np.full(count, 1e5), np.zeros(count)
+    truth = {"I": off, "U": off, "p1": vented, "p2": vented, "p3": vented}
+    return _measured(name, "quality", RATE, truth)
+
+
+@cache
+def good_campaign() -> Campaign:
+    """One recording of every role."""
+    recordings = (switching(), switching("validation", name="validation"), resting())
+    return campaign_of(*recordings)
+
+
+def campaign_of(*recordings: Recording) -> Campaign:
+    """A campaign of these recordings at 20 degrees Celsius and 1 bar."""
+    return Campaign(name="bench run", temperature=293.0, pressure=1e5, recordings=recordings)
+
+
+def _measured(name: str, role: str, rate: float, truth: dict) -> Recording:
+    rng = np.random.default_rng(1)
+    readings = {}
+    for channel in CHANNELS:
+        unit = UNITS[channel][1]
+        value = truth[channel] / unit
+        readings[channel] = SENSORS[channel].measure(value, rng.standard_normal(len(value))) * unit
+    zero = np.zeros(len(truth["U"]))
+    return Recording(name=name, role=role, period=1 / rate, sigma_S=zero, **readings)

@@ -1,0 +1,374 @@
+"""Bad recordings are refused in one sentence: file, place, rule and remedy; nothing is written."""
+
+import json
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from identification.campaign_files import read_campaign, write_campaign
+from identification.recordings import CampaignError
+from tests.identification.good_campaign import campaign_of, good_campaign, resting, switching
+
+Change = Callable[[Path], None]
+"""Damages a good campaign: test1.csv (calibration), validation.csv, rest.csv (quality)."""
+
+
+@cache
+def good_files() -> dict[str, bytes]:
+    """Content of the files of a good campaign, by name."""
+    with TemporaryDirectory() as folder:
+        write_campaign(good_campaign(), folder)
+        return {path.name: path.read_bytes() for path in Path(folder).iterdir()}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for name, content in good_files().items():
+        (tmp_path / name).write_bytes(content)
+    return tmp_path
+
+
+def text(change: Callable[[str], str], file: str = "test1.csv") -> Change:
+    """Changes a file's text."""
+
+    def apply(folder: Path) -> None:
+        path = folder / file
+        path.write_text(change(path.read_text(encoding="utf-8")), encoding="utf-8")
+
+    return apply
+
+
+def rows(change: Callable[[list[list[str]]], object], file: str = "test1.csv") -> Change:
+    """Changes the cells of a file's lines, in place; the header is row 0."""
+
+    def apply(content: str) -> str:
+        cells = [row.split(",") for row in content.splitlines()]
+        change(cells)
+        return "\n".join(",".join(row) for row in cells)
+
+    return text(apply, file)
+
+
+def cell(column: str, line: int, value: str) -> Change:
+    """Puts a text into one cell of test1.csv; the header is line 1."""
+    return rows(lambda cells: cells[line - 1].__setitem__(cells[0].index(column), value))
+
+
+def column(name: str, change: Callable[[NDArray], NDArray], file: str = "test1.csv") -> Change:
+    """Changes a column's numbers."""
+
+    def apply(cells: list[list[str]]) -> None:
+        place = cells[0].index(name)
+        values = change(np.array([row[place] for row in cells[1:]], dtype=float))
+        for row, value in zip(cells[1:], values, strict=True):
+            row[place] = f"{value:.6f}"
+
+    return rows(apply, file)
+
+
+def held(name: str, samples: slice, value: float, file: str = "test1.csv") -> Change:
+    """Puts one value into some samples of a column."""
+
+    def apply(values: NDArray) -> NDArray:
+        values[samples] = value
+        return values
+
+    return column(name, apply, file)
+
+
+def manifest(change: Callable[[dict], object]) -> Change:
+    """Changes what campaign.json says, in place."""
+
+    def apply(content: str) -> str:
+        decoded = json.loads(content)
+        change(decoded)
+        return json.dumps(decoded)
+
+    return text(apply, "campaign.json")
+
+
+def entry(**fields: object) -> Change:
+    """Changes the campaign's second recording."""
+    return manifest(lambda content: content["recordings"][1].update(fields))
+
+
+def environment(**fields: object) -> Change:
+    """Changes the campaign's ambient conditions."""
+    return manifest(lambda content: content["environment"].update(fields))
+
+
+def without_column(cells: list[list[str]], name: str) -> None:
+    place = cells[0].index(name)
+    for row in cells:
+        del row[place]
+
+
+def with_column(cells: list[list[str]], name: str) -> None:
+    for number, row in enumerate(cells):
+        row.append("12.0" if number else name)
+
+
+def gauge(folder: Path) -> None:
+    """Every pressure of test1.csv less that of the environment."""
+    for name in ("p1_bar", "p2_bar", "p3_bar"):
+        column(name, lambda values: values - 1.0)(folder)
+
+
+def linked(folder: Path) -> None:
+    """test1.csv lies elsewhere."""
+    target = folder.parent / f"{folder.name}-outside.csv"
+    (folder / "test1.csv").rename(target)
+    (folder / "test1.csv").symlink_to(target)
+
+
+def jittered(time: NDArray) -> NDArray:
+    return time + np.where(np.arange(len(time)) % 7 == 3, 1e-4, 0.0)
+
+
+CSV_FILES = [  # damage, place, rule, remedy
+    (rows(lambda c: without_column(c, "p2_bar")), "line 1", "missing p2_bar", "name these columns"),
+    (text(lambda t: t.replace(",", ";")), "line 1", "missing time_s, I_A", "separated by commas"),
+    (text(lambda t: ""), "line 1", "missing time_s", "name these columns"),
+    (text(lambda t: t.split("\n", 1)[1]), "line 1", "stands twice", "keep one"),
+    (rows(lambda c: with_column(c, "I_A")), "line 1", "'I_A' stands twice", "keep one"),
+    (rows(lambda c: with_column(c, "p1a_bar")), "line 1", "p1_bar and p1a_bar", "both p1a_bar and"),
+    (
+        text(lambda t: t.replace("p1_bar", "p1a_bar", 1)),
+        "line 1",
+        "p1 is given by p1a_bar",
+        "give p1_bar, or",
+    ),
+    (
+        text(lambda t: t.replace("p1_bar", "p", 1)),
+        "line 1",
+        "p1 is given by no column",
+        "give p1_bar, or",
+    ),
+    (cell("I_A", 7, "much"), "line 7", "I_A is 'much', not a finite number", "'.' as decimal sign"),
+    (cell("I_A", 7, '"0,55"'), "line 7", "I_A is '0,55', not a finite number", "'.' as decimal sign"),
+    (cell("I_A", 7, "0_5"), "line 7", "I_A is '0_5', not a finite number", "give one"),
+    (cell("I_A", 7, "0,55"), "line 7", "7 cells stand under 6 column names", "'.' as decimal sign"),
+    (cell("p3_bar", 8, "nan"), "line 8", "p3_bar is 'nan', not a finite number", "cut the recording"),
+    (cell("p3_bar", 8, "-inf"), "line 8", "p3_bar is '-inf', not a finite number", "cut the recording"),
+    (cell("U_V", 1301, ""), "line 1301", "U_V is empty, not a finite number", "cut the recording"),
+    (cell("U_V", 9, '"24.0'), "line 1302", "not CSV", "write this line anew"),
+    (text(lambda t: t.replace("\n", "\n\n", 3)), "line 2", "0 cells stand under 6", "give every column"),
+    (text(lambda t: t[: t.rindex(",")]), "line 1302", "5 cells stand under 6", "give every column"),
+    (column("time_s", lambda t: t + 0.1), "line 2", "starts at 0.1 and must start at 0", "subtract"),
+    (column("time_s", lambda t: t[::-1] - t[-1]), "line 3", "0 to -0.0005 and must increase", "sort"),
+    (cell("time_s", 12, "0.0045"), "line 12", "0.0045 to 0.0045 and must increase", "give each once"),
+    (column("time_s", lambda t: np.round(t, 3)), "line 3", "0 to 0 and must increase", "more digits"),
+    (rows(lambda c: c.pop(600)), "line 601", "0.299 to 0.3 and must be uniform", "cut the recording"),
+    (column("time_s", lambda t: t + 0.0002 * (t > 0.3)), "line 603", "uniform sampling has", "resample"),
+    (column("time_s", jittered), "line ", "rounding to the printed digits does not", "resample"),
+    (column("time_s", lambda t: 5 * t), "line 3", "sampled at 400 Hz", "500 Hz or faster"),
+    (rows(lambda c: c.__delitem__(slice(1, None))), "line 2", "ends after 0 samples", "for longer"),
+    (rows(lambda c: c.__delitem__(slice(2, None))), "line 3", "ends after 1 samples", "for longer"),
+    (rows(lambda c: c.__delitem__(slice(81, None))), "line 82", "needs at least 81", "for longer"),
+    (held("I_A", slice(None), 0.5), "lines 2 to 1302", "I_A is 0.5 throughout", "check its sensor"),
+    (
+        held("p1_bar", slice(None), 12),
+        "lines 2 to 1302",
+        "p1_bar is 12 throughout",
+        "the sensors' noise",
+    ),
+    (held("p2_bar", slice(None), 1), "lines 2 to 1302", "p2_bar is 1 throughout", "check its sensor"),
+    (held("p3_bar", slice(None), 16), "lines 2 to 1302", "p3_bar is 16 throughout", "check its sensor"),
+    (
+        column("p1_bar", lambda p: 1e5 * p),
+        "line 2",
+        "looks like Pa",
+        "give bar absolute .divide Pa by 100000",
+    ),
+    (
+        column("p2_bar", lambda p: 1e2 * p),
+        "line 2",
+        "looks like kPa",
+        "give bar absolute .divide kPa by 100",
+    ),
+    (gauge, "line 1[0-9][0-9]", "p3_bar vents towards -[01]", "give bar absolute .add the environment"),
+    (
+        column("p3_bar", lambda p: p - 1),
+        "line 1[0-9][0-9]",
+        "p3_bar vents towards -[01]",
+        "bar absolute",
+    ),
+    (column("p3_bar", lambda p: p - p.min()), "line ", "p3_bar is .* looks like gauge", "bar absolute"),
+    (
+        column("p1_bar", lambda p: p - 1),
+        "lines 2 to 81",
+        "p1_bar is 1.00 bar less than p3_bar",
+        "give bar",
+    ),
+    (cell("p2_bar", 40, "16.3"), "line 40", r"p2_bar is 16.3, outside .*\[1, 16\]", "check unit and"),
+    (cell("p3_bar", 40, "0.5"), "line 40", r"p3_bar is 0.5, outside .*\[1, 16\]", "cut the recording"),
+    (cell("I_A", 40, "1.02"), "line 40", r"I_A is 1.02, outside .*\[-1, 1\]", "check unit and scaling"),
+    (column("I_A", lambda i: 1e3 * i), "line 2", r"outside .*\[-1, 1\]", "check unit and scaling"),
+    (cell("U_V", 40, "-33"), "line 40", r"U_V is -33, outside .*\[-32, 32\]", "check unit and scaling"),
+    (held("p2_bar", slice(300, 400), 16.256), "lines 302 to 401", "p2_bar is stuck at 16.256", "record"),
+    (
+        held("p2_bar", slice(300, 400), 15.9964),
+        "lines 302 to 401",
+        "p2_bar is stuck at 15.9964",
+        "record",
+    ),
+    (
+        held("p3_bar", slice(300, 341), 1.0),
+        "lines 302 to 342",
+        "p3_bar is stuck at 1,",
+        "check the sensor",
+    ),
+    (
+        held("I_A", slice(900, None), -1.01),
+        "lines 902 to 1302",
+        "I_A is stuck at -1.01",
+        "check the sen",
+    ),
+    (held("U_V", slice(None), 24), "lines 2 to 1302", "U_V never switches", "record a switching"),
+    (held("U_V", slice(None), 0), "lines 2 to 1302", "U_V never switches", "the role quality"),
+    (column("U_V", lambda U: 24 + U / 2400), "lines 2 to 1302", "U_V never switches", "record a switch"),
+    (column("U_V", lambda U: U / 2400), "lines 2 to 1302", "U_V never switches", "record a switching"),
+    (held("U_V", slice(70, 90), 0), "line 72", "U_V is 0 V at 35 ms, .* at least 40 ms", "record from"),
+    (
+        column("U_V", lambda U: 24 - U),
+        "line 2",
+        "U_V is .* V at 0 ms, .* start energised",
+        "record from",
+    ),
+    (
+        held("p2_bar", slice(50), 6),
+        "lines 2 to 81",
+        "p2_bar changes by 0.[0-9]*",
+        "let the bench settle",
+    ),
+    (held("I_A", slice(30), 0.2), "lines 2 to 81", "I_A changes by 0.[0-9]* .* steady", "let the bench"),
+]  # fmt: skip
+
+OTHER_ROLES = [
+    ("validation.csv", held("U_V", slice(None), 24, "validation.csv"), "lines 2 to 1302", "U_V never"),
+    ("validation.csv", held("U_V", slice(5, 9), 0, "validation.csv"), "line 7", "start energised"),
+    ("rest.csv", held("p1_bar", slice(None), 1, "rest.csv"), "lines 2 to 1001", "p1_bar is 1 through"),
+    ("rest.csv", column("p2_bar", lambda p: p - 1, "rest.csv"), "line 2", "looks like gauge"),
+    ("rest.csv", column("p3_bar", lambda p: 100 * p, "rest.csv"), "line 2", "looks like kPa"),
+    ("rest.csv", rows(lambda c: c.__delitem__(slice(1000, None)), "rest.csv"), "line 1001", "at least"),
+]  # fmt: skip
+
+MANIFESTS = [  # damage, message
+    (lambda folder: (folder / "campaign.json").unlink(), "cannot be read .No such.*: give the folder"),
+    (text(lambda t: t[:-9], "campaign.json"), "is not JSON in UTF-8 .*line 2.*: write it anew"),
+    (text(lambda t: "[]", "campaign.json"), "has format None, this version reads 'epv-campaign/1'"),
+    (manifest(lambda c: c.update(format="epv-campaign/2")), "has format 'epv-campaign/2', this version"),
+    (manifest(lambda c: c.pop("name")), "name is missing or not text: give it"),
+    (manifest(lambda c: c.update(name=3)), "name is missing or not text: give it"),
+    (manifest(lambda c: c.pop("environment")), "environment is missing or not an object: give it"),
+    (manifest(lambda c: c.pop("recordings")), "recordings is missing or not a list: give it"),
+    (manifest(lambda c: c.update(recordings=[])), "recordings is empty: name at least one file"),
+    (manifest(lambda c: c["environment"].pop("pressure_bar")), "environment: pressure_bar is missing"),
+    (environment(temperature_K="warm"), "temperature_K is missing or not a number: give it"),
+    (environment(temperature_K=True), "temperature_K is missing or not a number: give it"),
+    (environment(temperature_K=20), r"T_env = 20 K is outside its domain \[233, 353\].*: give a value"),
+    (environment(pressure_bar=101325), r"p_env = .* Pa is outside its domain .*: give a value inside"),
+    (environment(pressure_bar=float("nan")), "p_env = nan Pa is outside its domain .*: give a value"),
+    (environment(pressure_bar=10**400), "environment: pressure_bar is "),
+    (manifest(lambda c: c["recordings"].append("x.csv")), "recording 4: file is missing or not text: "),
+    (manifest(lambda c: c["recordings"][0].pop("role")), "recording 1: role is missing or not text: "),
+    (entry(role="test"), "recording 2: unknown role 'test': choose one of calibration, valid"),
+    (entry(file="test1.csv"), "recording 2: test1.csv is named twice, .*: name each file once"),
+    (entry(file="./test1.csv"), "recording 2: test1.csv is named twice, .*: name each file once"),
+    (entry(file="sub/test1.csv"), "recording 2: test1.csv is named twice, .*once, and rename"),
+    (entry(file="../test1.csv"), "recording 2: file '../test1.csv' leaves the campaign's folder: "),
+    (entry(file="/etc/hostname"), "recording 2: file '/etc/hostname' leaves the campaign's folder: "),
+    (entry(file="a\0.csv"), "recording 2: file .* leaves the campaign's folder: copy it there"),
+    (linked, "recording 1: file 'test1.csv' leaves the campaign's folder: copy it there"),
+]  # fmt: skip
+
+
+def refusal(folder: Path) -> str:
+    """The sentence with which a campaign is refused; reading leaves the folder as it was."""
+    before = {path: path.read_bytes() for path in folder.iterdir()}
+    with pytest.raises(CampaignError) as caught:
+        read_campaign(folder)
+    assert {path: path.read_bytes() for path in folder.iterdir()} == before
+    message = str(caught.value)
+    assert "\n" not in message
+    return message
+
+
+def test_the_campaign_that_is_damaged_here_is_good(folder):
+    assert len(read_campaign(folder).recordings) == 3
+
+
+@pytest.mark.parametrize(
+    ("damage", "place", "rule", "remedy"), CSV_FILES, ids=[f"{case[1]}: {case[2]}" for case in CSV_FILES]
+)
+def test_a_bad_recording_is_refused(folder, damage, place, rule, remedy):
+    damage(folder)
+    sentence = f"^{re.escape(str(folder / 'test1.csv'))}, {place}.*{rule}.*: .*{remedy}"
+    assert re.search(sentence, refusal(folder)), refusal(folder)
+
+
+@pytest.mark.parametrize(
+    ("file", "damage", "place", "rule"),
+    OTHER_ROLES,
+    ids=[f"{case[0]}: {case[3]}" for case in OTHER_ROLES],
+)
+def test_rules_hold_in_the_other_roles(folder, file, damage, place, rule):
+    damage(folder)
+    sentence = f"^{re.escape(str(folder / file))}, {place}.*{rule}.*: "
+    assert re.search(sentence, refusal(folder)), refusal(folder)
+
+
+@pytest.mark.parametrize(("damage", "message"), MANIFESTS, ids=[case[1] for case in MANIFESTS])
+def test_a_bad_campaign_json_is_refused(folder, damage, message):
+    damage(folder)
+    sentence = f"^{re.escape(str(folder / 'campaign.json'))}.*{message}"
+    assert re.search(sentence, refusal(folder)), refusal(folder)
+
+
+def test_a_missing_recording_is_refused(folder):
+    (folder / "rest.csv").unlink()
+    assert re.search(r"rest.csv cannot be read \(No such file.*: add the file, or", refusal(folder))
+
+
+def test_a_recording_in_another_encoding_is_refused(folder):
+    content = (folder / "test1.csv").read_bytes().replace(b"\n", b",\xb0C\n")
+    (folder / "test1.csv").write_bytes(content)
+    assert re.search("test1.csv, line 1: a byte is not UTF-8: save the file", refusal(folder))
+
+
+def renamed(name: str):
+    return replace(switching(), name=name)
+
+
+@pytest.mark.parametrize(
+    ("campaign", "message"),
+    [
+        (campaign_of(), "recordings is empty"),
+        (campaign_of(switching(), switching()), "recording 2: test1.csv is named twice"),
+        (campaign_of(renamed("../test1")), "leaves the campaign's folder"),
+        (campaign_of(renamed("sub/test1")), "'sub/test1' does not name a file: give it a name without"),
+        (campaign_of(renamed("")), "'' does not name a file"),
+        (campaign_of(replace(switching(), role="test")), "unknown role 'test'"),
+        (campaign_of(replace(resting(), role="calibration")), "rest.csv, .* U_V never switches"),
+        (campaign_of(resting(), replace(switching(), p1=switching().p1[1:])), "p1_bar has shape"),
+        (campaign_of(replace(switching(), I=switching().I * np.nan)), "I_A has .* not finite"),
+        (replace(good_campaign(), temperature=20.0), "T_env = 20 K is outside its domain"),
+    ],
+)
+def test_nothing_is_written_of_a_bad_campaign(tmp_path, campaign, message):
+    with pytest.raises(CampaignError, match=message):
+        write_campaign(campaign, tmp_path / "new")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_campaign_is_not_written_over_another(folder):
+    with pytest.raises(CampaignError, match="exists already: write to another folder"):
+        write_campaign(campaign_of(switching(name="another")), folder)
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == good_files()
