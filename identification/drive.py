@@ -58,7 +58,7 @@ def drive_of(recording: Recording) -> Drive:
 
 
 def smooth_voltage(recording: Recording) -> NDArray:
-    """U with each stretch between two switchings at its mean, if noise alone hides that [V], (samples,)."""
+    """U with each stretch between switchings at its mean, if only noise hides that [V], (samples,)."""
     U = recording.U.copy()
     borders = np.flatnonzero(np.diff(recording.energised)) + 1
     for stretch in np.split(U, borders):  # views: assigning to one changes U

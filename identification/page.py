@@ -104,8 +104,8 @@ def _section(section: Section) -> str:
 
 def _verdicts(verdicts: Sequence[Verdict]) -> str:
     items = "".join(
-        f'<li class="{verdict.status}"><b>{_LABELS[verdict.status]}</b>: {html.escape(verdict.text)}</li>'
-        for verdict in verdicts
+        f'<li class="{v.status}"><b>{_LABELS[v.status]}</b>: {html.escape(v.text)}</li>'
+        for v in verdicts
     )
     return f'<ul class="verdicts">{items}</ul>'
 

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from epv_env.plant.parameters import Parameters
-from identification.calibration.errors import Response, responses
 from identification.calibration.fits import Fit
 from identification.calibration.problem import Problem
 from identification.calibration.starts import best, fit_from_all, starting_points
 from identification.calibration.warnings import warnings_of
 from identification.journal import Journal
+from identification.responses import Response, responses
 
 STARTS = 6
 """Table 10, and five spread over the domains."""

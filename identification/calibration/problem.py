@@ -8,8 +8,8 @@ from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.drive import without_offsets
 from identification.misfit import Misfit, noise_weights, report_weights
 from identification.noise import noise_of
-from identification.quality.assess import assess, sensor_offsets
-from identification.recordings import Campaign, CampaignError, Recording
+from identification.quality.assess import assess
+from identification.recordings import UNITS, Campaign, CampaignError, Recording
 from identification.vector import Vector
 
 
@@ -72,12 +72,13 @@ def calibration_problem(
 
 
 def _offsets(campaign: Campaign) -> tuple[dict[str, float], dict[str, float]]:
-    """The sensors' offsets, and their standard errors, from the first quality record at rest."""
+    """The sensors' offsets at the start of the first quality recording at rest, and standard errors."""
     for recording in campaign.of("quality"):
-        offsets = sensor_offsets(assess(recording, campaign.pressure))
-        if offsets:
+        quality = assess(recording, campaign.pressure)
+        if quality.at_rest:
+            found = {name: (c.trend, c.rest, UNITS[name][1]) for name, c in quality.channels.items()}
             return (
-                {name: offset.value for name, offset in offsets.items()},
-                {name: offset.error for name, offset in offsets.items()},
+                {name: (trend.offset - rest) * unit for name, (trend, rest, unit) in found.items()},
+                {name: trend.offset_error * unit for name, (trend, _, unit) in found.items()},
             )
     return {}, {}

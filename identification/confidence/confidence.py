@@ -83,15 +83,42 @@ class Confidence:
         """95 % interval of each parameter on its own [SI]."""
         return self._around(self.estimate, self.half_widths)
 
-    def _minimum(problem: Problem, z: NDArray) -> Minimum:
+    def report_intervals(self) -> Mapping[str, tuple[float, float]]:
+        """Eq. 23's interval of each parameter [SI]."""
+        return self._around(self.nelder_mead, self.report.half_widths)
+
+    def _around(self, centre: NDArray, half: NDArray) -> dict[str, tuple[float, float]]:
+        vector = self.problem.vector
+        low, high = (centre - half) * vector.scale, (centre + half) * vector.scale
+        return {symbol: (float(low[i]), float(high[i])) for i, symbol in enumerate(vector.symbols)}
+
+
+def confidence(calibration: Calibration, *, seed: int = 0) -> Confidence:
+    """Intervals of both estimates, the joint region, and the check of gradient and Hessian."""
+    problem = calibration.problem
+    misfit = problem.least_squares()
+    z = calibration.best("least squares").z
+    found = covariance(problem, misfit, z, seed=seed)
+    residuals, jacobians = misfit.linearised(z)
+    simplex = calibration.best("Nelder-Mead")
+    return Confidence(
+        problem=problem,
+        estimate=z,
+        covariance=found,
+        bootstrap=block_bootstrap(residuals, jacobians, block=2 * found.lags, seed=seed),
+        nelder_mead=simplex.z,
+        report=report_interval(problem, simplex.z, simplex.error),
+        minimum=_minimum(problem, simplex.z),
+    )
+
+
+def _minimum(problem: Problem, z: NDArray) -> Minimum:
     error = problem.total_error().error
     offsets = np.linspace(-PROFILE, PROFILE, 41)
-    unit = np.eye(len(z))
-    step = np.full(len(z), DIFFERENCE)
-    hessian = approx_hess(z, error, epsilon=step)
+    hessian = approx_hess(z, error, epsilon=np.full(len(z), DIFFERENCE))
     return Minimum(
         gradient=np.atleast_1d(approx_fprime(z, error, epsilon=1e-5, centered=True)),
         eigenvalues=np.linalg.eigvalsh(0.5 * (hessian + hessian.T)),
         offsets=offsets,
-        profiles=np.array([[error(z * (1 + d * axis)) for d in offsets] for axis in unit]),
+        profiles=np.array([[error(z * (1 + d * axis)) for d in offsets] for axis in np.eye(len(z))]),
     )

@@ -1,8 +1,8 @@
 """The report's confidence interval (eq. 23), as printed.
 
 eps_p = eps_opt (1 + v/(k - v) F), with k measured values and v parameters. The printed F(k, v - k, p)
-has negative degrees of freedom; F(v, k - v) quantiles are meant. A parameter's interval is where the total
-error, the other parameters held, stays below eps_p (Figures 16 and 17, Table 14).
+has negative degrees of freedom; F(v, k - v) quantiles are meant. A parameter's interval is where the
+total error, the other parameters held, stays below eps_p (Figures 16 and 17, Table 14).
 """
 
 from dataclasses import dataclass
@@ -48,39 +48,9 @@ def limit_ratio(values: int, parameters: int, probability: float = PROBABILITY) 
     return 1.0 + parameters / degrees * float(f.ppf(probability, parameters, degrees))
 
 
-def report_intervals(self) -> Mapping[str, tuple[float, float]]:
-        """Eq. 23's interval of each parameter [SI]."""
-        return self._around(self.nelder_mead, self.report.half_widths)
-
-    def _around(self, centre: NDArray, half: NDArray) -> dict[str, tuple[float, float]]:
-        vector = self.problem.vector
-        ends = zip(vector.symbols, (centre - half) * vector.scale, (centre + half) * vector.scale)
-        return {symbol: (float(low), float(high)) for symbol, low, high in ends}
-
-
-def confidence(calibration: Calibration, *, seed: int = 0) -> Confidence:
-    """Intervals of both estimates, the joint region, and the check of gradient and Hessian."""
-    problem = calibration.problem
-    misfit = problem.least_squares()
-    z = calibration.best("least squares").z
-    found = covariance(problem, misfit, z, seed=seed)
-    residuals, jacobians = misfit.linearised(z)
-    simplex = calibration.best("Nelder-Mead")
-    return Confidence(
-        problem=problem,
-        estimate=z,
-        covariance=found,
-        bootstrap=block_bootstrap(residuals, jacobians, block=2 * found.lags, seed=seed),
-        nelder_mead=simplex.z,
-        report=report_interval(problem, simplex.z, simplex.error),
-        minimum=_minimum(problem, simplex.z),
-    )
-
-
 def report_interval(problem: Problem, z: NDArray, error: float) -> ReportInterval:
-    """Eq. 23 at the minimum z (k,) of the total error, whose square is quadratic about it."""
+    """Eq. 23 at the minimum z (k,) of the total error."""
     residuals, jacobians = problem.total_error().linearised(z)
     ratio = limit_ratio(sum(len(r) for r in residuals), len(z))
-    return ReportInterval(
-        error=error, ratio=ratio, curvature=np.sum([J.T @ J for J in jacobians], axis=0)
-    )
+    curvature = np.sum([J.T @ J for J in jacobians], axis=0)
+    return ReportInterval(error=error, ratio=ratio, curvature=curvature)

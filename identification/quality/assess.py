@@ -1,0 +1,118 @@
+"""Section 4 for one recording: `assess`, and the offsets that a calibration may subtract."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import combinations
+
+from identification.quality.channel import Channel, assess_channel
+from identification.quality.dependence import Pair, assess_pair
+from identification.recordings import CHANNELS, UNITS, CampaignError, Recording
+
+LEAST_SAMPLES = 250
+"""Half a second at 500 Hz; fewer do not show the distribution of a noise."""
+
+LONGEST_LAG = 0.1
+"""Up to where correlations are computed [s], at most a twentieth of the record.
+
+With more lags for the samples, the Ljung-Box test alarms too often on white noise.
+"""
+
+PRESSURES = ("p1", "p2", "p3")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quality:
+    """What one steady recording says about its channels, in A, V and bar."""
+
+    name: str
+    """Of the recording."""
+    period: float
+    """[s]."""
+    samples: int
+    channels: Mapping[str, Channel]
+    """By name, in the order of Table 1."""
+    pairs: Mapping[tuple[str, str], Pair]
+    """Of all channels that change."""
+
+    @property
+    def adjusted(self) -> dict[tuple[str, str], float]:
+        """p-values of the correlations at lag 0, family-wise over all pairs (Bonferroni)."""
+        return {
+            names: min(1.0, len(self.pairs) * pair.probability) for names, pair in self.pairs.items()
+        }
+
+    @property
+    def coil_off(self) -> bool:
+        """Whether no current flows: at least one of I and U is zero within its accuracy."""
+        return any(self.channels[name].within_accuracy for name in ("I", "U"))
+
+    @property
+    def vented(self) -> bool:
+        """Whether at least two of three pressures are ambient within their accuracy."""
+        return sum(self.channels[name].within_accuracy for name in PRESSURES) >= 2
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether every channel is steady, and within the accuracy of its rest value."""
+        return all(channel.at_rest for channel in self.channels.values())
+
+    @property
+    def lags(self) -> int:
+        """Greatest lag of the correlations [samples]."""
+        return longest_lag(self.samples, self.period)
+
+
+def assess(recording: Recording, environment_pressure: float) -> Quality:
+    """Statistics of a steady recording.
+
+    environment_pressure: p_env [Pa absolute]. Raises CampaignError for a record of fewer than
+    LEAST_SAMPLES.
+    """
+    if len(recording) < LEAST_SAMPLES:
+        raise CampaignError(
+            f"{recording.name}: {len(recording)} samples; the statistics of section 4 need "
+            f"{LEAST_SAMPLES} or more: record 5 s of steady state"
+        )
+    channels = {name: _channel(recording, name, environment_pressure) for name in CHANNELS}
+    pairs = _pairs(channels, longest_lag(len(recording), recording.period))
+    return Quality(
+        name=recording.name,
+        period=recording.period,
+        samples=len(recording),
+        channels=channels,
+        pairs=pairs,
+    )
+
+
+def sensor_offsets(quality: Quality) -> dict[str, float]:
+    """Mean reading minus rest value by channel [A, V, Pa]: what a calibration may subtract.
+
+    Empty unless the record is at rest: elsewhere an offset cannot be told from the signal.
+    """
+    if not quality.at_rest:
+        return {}
+    return {name: channel.offset * UNITS[name][1] for name, channel in quality.channels.items()}
+
+
+def longest_lag(samples: int, period: float) -> int:
+    """Greatest lag at which correlations are computed [samples]."""
+    return max(1, min(round(LONGEST_LAG / period), samples // 20))
+
+
+def _channel(recording: Recording, name: str, environment_pressure: float) -> Channel:
+    size = UNITS[name][1]
+    return assess_channel(
+        name,
+        recording.channel(name) / size,
+        period=recording.period,
+        rest=environment_pressure / size if name in PRESSURES else 0.0,
+        lags=longest_lag(len(recording), recording.period),
+    )
+
+
+def _pairs(channels: Mapping[str, Channel], lags: int) -> dict[tuple[str, str], Pair]:
+    moving = [name for name, channel in channels.items() if channel.whiteness is not None]
+    return {
+        (first, second): assess_pair(channels[first].residual, channels[second].residual, lags)
+        for first, second in combinations(moving, 2)
+    }

@@ -1,0 +1,127 @@
+"""Everything that section 4 says about one channel of a steady recording, in A, V or bar."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epv_env.plant.sensors import SENSORS, Sensor
+from identification.quality.dependence import Whiteness, assess_whiteness
+from identification.quality.normality import UNTESTED, Normality, assess_normality
+from identification.quality.resolution import longest_run, quantum, run_limit
+from identification.quality.statistics import (
+    Description,
+    Trend,
+    describe,
+    fit_trend,
+    outlier_limit,
+)
+from identification.recordings import UNITS
+
+MARGINAL_DRIFT = 0.1
+"""Drift over the record, relative to Table 1's accuracy, up to which a signal counts as steady."""
+
+SIGNIFICANCE = 1e-4
+"""Probability of a false alarm of one test; the 40 of a record stay below 1 % together."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Channel:
+    """One channel's readings and what they show."""
+
+    name: str
+    readings: NDArray
+    """(samples,) [A, V or bar]."""
+    residual: NDArray
+    """Readings minus the line of the trend."""
+    duration: float
+    """Of the record [s]."""
+    rest: float
+    """What a perfect sensor reads with the coil off and the chambers vented [A, V or bar]."""
+    trend: Trend
+    description: Description
+    quantum: float
+    """Step of the converter as the readings show it; 0.0 without a grid."""
+    rounding: float
+    """The step over the standard deviation; 0.0 for a signal that never changes."""
+    longest_run: int
+    """Longest run of one and the same reading [samples]."""
+    run_limit: int
+    """What independent readings do not reach."""
+    normality: Normality
+    whiteness: Whiteness | None
+    """None for a signal that never changes."""
+
+    @property
+    def unit(self) -> str:
+        """A, V or bar."""
+        return UNITS[self.name][0]
+
+    @property
+    def sensor(self) -> Sensor:
+        """Table 1's range and accuracy, Table 3's noise."""
+        return SENSORS[self.name]
+
+    @property
+    def accuracy(self) -> float:
+        """What the supplier allows a reading to be off (Table 1) [unit]."""
+        return self.sensor.accuracy * self.sensor.high
+
+    @property
+    def offset(self) -> float:
+        """Mean reading minus rest value [unit]; an offset error only if the record is at rest."""
+        return float(np.mean(self.readings)) - self.rest
+
+    @property
+    def drift(self) -> float:
+        """Change of the line over the record [unit]."""
+        return self.trend.factor * self.duration
+
+    @property
+    def trend_deviations(self) -> float:
+        """Slope over its standard error, the error enlarged for correlated noise; 0.0 if constant."""
+        if self.whiteness is None:
+            return 0.0
+        enlarged = self.trend.factor_error * np.sqrt(max(1.0, self.whiteness.inflation))
+        return float(abs(self.trend.factor) / enlarged)
+
+    @property
+    def within_accuracy(self) -> bool:
+        """Whether the line stays within the accuracy of the rest value from start to end."""
+        return abs(self.offset) + abs(self.drift) / 2 <= self.accuracy
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the channel is steady, and within the accuracy of its rest value."""
+        return self.within_accuracy and abs(self.drift) < MARGINAL_DRIFT * self.accuracy
+
+    @property
+    def outlier_limit(self) -> float:
+        """Outlier factor that normal noise stays below in 99.9 % of such records."""
+        return outlier_limit(len(self.readings), rounding=self.rounding)
+
+
+def assess_channel(name: str, readings: NDArray, *, period: float, rest: float, lags: int) -> Channel:
+    """Statistics of one channel; readings (samples,) and rest in A, V or bar, period [s]."""
+    time = np.arange(len(readings)) * period
+    trend = fit_trend(time, readings)
+    moves = bool(np.ptp(readings) > 0)
+    residual = readings - trend.at(time) if moves else np.zeros_like(readings)
+    description = describe(residual, greatest=SENSORS[name].high)
+    step = quantum(readings)
+    rounding = step / description.standard_deviation if moves else 0.0
+    return Channel(
+        name=name,
+        readings=readings,
+        residual=residual,
+        duration=len(readings) * period,
+        rest=rest,
+        trend=trend,
+        description=description,
+        quantum=step,
+        rounding=rounding,
+        longest_run=longest_run(readings),
+        run_limit=run_limit(readings, rounding=rounding, significance=SIGNIFICANCE),
+        normality=assess_normality(readings, trend.at(time), step) if moves else UNTESTED,
+        whiteness=assess_whiteness(residual, lags) if moves else None,
+    )

@@ -1,0 +1,76 @@
+"""An assessment as JSON-ready data and as text for a terminal."""
+
+import math
+from dataclasses import asdict
+from typing import Any
+
+from identification.quality.assess import Quality, sensor_offsets
+from identification.quality.channel import Channel
+from identification.quality.verdicts import CHECKS, findings, worst
+from identification.recordings import CHANNELS
+
+
+def as_json(quality: Quality) -> dict[str, Any]:
+    """Figures in A, V and bar (sensor_offsets in SI units) and findings; None for what is undefined."""
+    return {
+        "recording": quality.name,
+        "samples": quality.samples,
+        "period_s": quality.period,
+        "at_rest": quality.at_rest,
+        "sensor_offsets_SI": sensor_offsets(quality),
+        "channels": {name: _channel(quality, name) for name in CHANNELS},
+        "correlations": [
+            {
+                "channels": list(names),
+                "correlation": pair.correlation,
+                "adjusted_p": quality.adjusted[names],
+                "peak": pair.peak,
+                "peak_lag_s": pair.peak_lag * quality.period,
+            }
+            for names, pair in quality.pairs.items()
+        ],
+    }
+
+
+def as_text(quality: Quality) -> str:
+    """A line per channel: its worst status, then the status of each check."""
+    widths = {check: max(len(check), 5) for check in CHECKS}
+    lines = ["channel  verdict  " + "  ".join(check.ljust(widths[check]) for check in CHECKS)]
+    for name in CHANNELS:
+        found = {finding.check: finding.status for finding in findings(quality, name)}
+        cells = "  ".join(found.get(check, "-").ljust(width) for check, width in widths.items())
+        lines.append(f"{name:7}  {worst(findings(quality, name)):7}  {cells}")
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def _channel(quality: Quality, name: str) -> dict[str, Any]:
+    channel = quality.channels[name]
+    found = findings(quality, name)
+    return {
+        "unit": channel.unit,
+        "status": worst(found),
+        "findings": [
+            {"check": finding.check, "status": finding.status, "text": finding.text} for finding in found
+        ],
+        "trend": _finite(asdict(channel.trend)),
+        "statistics": _finite(asdict(channel.description)),
+        "normality": _finite(asdict(channel.normality)),
+        "offset": channel.offset,
+        "quantum": channel.quantum,
+        "whiteness": _whiteness(channel),
+    }
+
+
+def _whiteness(channel: Channel) -> dict[str, float] | None:
+    found = channel.whiteness
+    if found is None:
+        return None
+    return {
+        "ljung_box_p": found.probability,
+        "greatest_autocorrelation": found.peak,
+        "variance_inflation": found.inflation,
+    }
+
+
+def _finite(figures: dict[str, float]) -> dict[str, float | None]:
+    return {name: value if math.isfinite(value) else None for name, value in figures.items()}

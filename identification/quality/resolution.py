@@ -1,0 +1,44 @@
+"""The converter's step, as the readings show it, and readings that stop moving."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+CONTINUOUS = 0.2
+"""Distinct readings per sample above which the readings lie on no grid."""
+
+
+def quantum(readings: NDArray) -> float:
+    """Step of the converter [unit]: the least step between distinct readings.
+
+    The few digits of a file make equal steps unequal, so the step is the slope of the line through
+    the distinct readings over their codes. 0.0: fewer than two distinct readings, or no grid.
+    """
+    distinct = np.unique(readings)
+    if len(distinct) < 2 or len(distinct) > CONTINUOUS * len(readings):
+        return 0.0
+    steps = np.diff(distinct)
+    steps = steps[steps > 1e-3 * np.median(steps)]  # the same reading but for rounding in sums
+    least = float(np.median(steps[steps < 1.5 * np.min(steps)]))
+    return float(np.polyfit(np.rint((distinct - distinct[0]) / least), distinct, 1)[0])
+
+
+def longest_run(readings: NDArray) -> int:
+    """Length of the longest run of one and the same reading [samples]."""
+    changes = np.flatnonzero(np.diff(readings) != 0)
+    return int(np.max(np.diff(np.concatenate(([-1], changes, [len(readings) - 1])))))
+
+
+def run_limit(readings: NDArray, *, rounding: float, significance: float) -> int:
+    """Length that runs of independent readings reach with this probability at most [samples].
+
+    A run of L readings starts at one of n samples with probability p^L, so the limit solves
+    n p^L = significance. p is the share of the commonest reading, or what normal noise about that
+    reading gives it if that is more, as under a drift; `rounding` is the step over sigma. The limit
+    is n for readings that never change.
+    """
+    share = np.max(np.unique(readings, return_counts=True)[1]) / len(readings)
+    if share == 1.0:
+        return len(readings)
+    share = max(share, 1 - 2 * stats.norm.sf(rounding / 2))
+    return int(np.ceil(np.log(significance / len(readings)) / np.log(share)))

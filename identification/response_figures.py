@@ -1,0 +1,52 @@
+"""Measured and modelled responses over time (the report's Figures 10 to 15)."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from identification.recordings import OUTPUTS, UNITS
+from identification.responses import Response
+
+MEASURED = {"color": "tab:gray", "linewidth": 0.8, "label": "measured"}
+MODEL = {"color": "tab:red", "linewidth": 1.0, "label": "model"}
+
+
+def overlay(answer: Response) -> Figure:
+    """Voltage, and the measured outputs with the model's over them (Figures 10 to 14)."""
+    figure = Figure(figsize=(9, 6.5), layout="constrained")
+    rows = figure.subplots(len(OUTPUTS) + 1, 1, sharex=True, height_ratios=[0.6, 1, 1, 1])
+    time = answer.recording.time
+    rows[0].plot(time, answer.recording.U, color="tab:blue", linewidth=0.8)
+    rows[0].set_ylabel("U [V]")
+    for axes, output, measured, model in zip(
+        rows[1:], OUTPUTS, answer.measured, answer.model, strict=True
+    ):
+        unit, size = UNITS[output]
+        axes.plot(time, measured / size, **MEASURED)
+        axes.plot(time, model / size, **MODEL)
+        axes.set_ylabel(f"{output} [{unit}]")
+        axes.grid(alpha=0.3)
+    rows[1].legend(loc="best", fontsize="small")
+    rows[-1].set_xlabel("time [s]")
+    figure.suptitle(answer.recording.name)
+    figure.align_ylabels()
+    return figure
+
+
+def errors_over_time(answers: Sequence[Response]) -> Figure:
+    """Model error relative to each output's mean, as eq. 19 weighs it (Figure 15)."""
+    figure = Figure(figsize=(9, 1.9 * len(OUTPUTS) + 0.6), layout="constrained")
+    rows = figure.subplots(len(OUTPUTS), 1, sharex=True)
+    for index, (axes, output) in enumerate(zip(rows, OUTPUTS, strict=True)):
+        for answer in answers:
+            error = answer.model[index] - answer.measured[index]
+            relative = 100.0 * error / np.mean(answer.measured[index])
+            axes.plot(answer.recording.time, relative, linewidth=0.6, label=answer.recording.name)
+        axes.axhline(0.0, color="black", linewidth=0.6)
+        axes.set_ylabel(f"{output}: model - measured\n[% of the mean]")
+        axes.grid(alpha=0.3)
+    rows[0].legend(loc="upper right", fontsize="small", ncols=3)
+    rows[-1].set_xlabel("time [s]")
+    figure.align_ylabels()
+    return figure

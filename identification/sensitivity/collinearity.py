@@ -1,0 +1,105 @@
+"""Which parameters the outputs cannot tell apart: scaled sensitivities and their collinearity.
+
+Brun, Reichert and Künsch, Practical identifiability analysis of large environmental simulation models,
+Water Resources Research 37 (2001): the collinearity index of a set of parameters is 1/sqrt of the
+least eigenvalue of the matrix of cosines between their sensitivities. It is 1 if they are orthogonal;
+at an index of 10, a change of one that the others make up for leaves a tenth of its effect.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epv_env.plant.parameters import table
+from epv_env.plant.sensors import SENSORS
+from identification.recordings import OUTPUTS, UNITS
+from identification.sensitivity.study import STUDY, Conditions, outputs, run_cases
+
+STEP = 2e-3
+"""Of the central differences: in the logarithm of a value, or in half widths of the domain of a zero."""
+
+CHANGE = 0.1
+"""Change for which effects are stated, in the same measure: that of Table 8."""
+
+CRITICAL = 10.0
+"""Brun et al.: sets of parameters become poorly identifiable at an index of 10 to 15."""
+
+ROUNDING = 1e-12
+"""A least eigenvalue below this is zero within the accuracy of the differences."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensitivities:
+    """How all outputs of all test cases respond to each parameter, in standard deviations of noise."""
+
+    symbols: tuple[str, ...]
+    columns: NDArray
+    """Change of each output sample for a change by CHANGE, (samples, parameters)."""
+
+    def of(self, symbols: Sequence[str]) -> NDArray:
+        """The columns of some parameters."""
+        return self.columns[:, [self.symbols.index(symbol) for symbol in symbols]]
+
+    @property
+    def effect(self) -> NDArray:
+        """Root mean square of each column [standard deviations of the noise], (parameters,)."""
+        return np.sqrt(np.mean(np.square(self.columns), axis=0))
+
+    @property
+    def correlation(self) -> NDArray:
+        """Cosines between the columns, (parameters, parameters)."""
+        return cosines(self.columns)
+
+    def index(self, symbols: Sequence[str]) -> float:
+        """Collinearity index of a set of parameters; infinite if one can replace another exactly."""
+        return collinearity_index(self.of(symbols))
+
+    def inseparable_pairs(self, limit: float = CRITICAL) -> list[tuple[str, str, float]]:
+        """(symbol, symbol, index) of every pair above the limit, the worst first."""
+        pairs = [(a, b, self.index((a, b))) for a, b in combinations(self.symbols, 2)]
+        return sorted((pair for pair in pairs if pair[2] > limit), key=lambda pair: -pair[2])
+
+
+def cosines(columns: NDArray) -> NDArray:
+    """Cosines between columns (samples, n), as (n, n)."""
+    unit = columns / np.linalg.norm(columns, axis=0)
+    return np.clip(unit.T @ unit, -1.0, 1.0)
+
+
+def collinearity_index(columns: NDArray) -> float:
+    """Brun et al.'s index of columns (samples, n): between 1 and infinity."""
+    least = np.linalg.eigvalsh(cosines(columns))[0]
+    return float(1 / np.sqrt(least)) if least > ROUNDING else np.inf
+
+
+def stepped(symbol: str, value: float) -> NDArray:
+    """A value one STEP down and up, (2,).
+
+    Steps in the logarithm: two parameters that act by their ratio then have opposite columns exactly.
+    """
+    domain = table()[symbol].domain
+    if value == 0.0 and domain is not None:
+        return value + STEP * (domain[1] - domain[0]) / 2 * np.array([-1.0, 1.0])
+    return value * np.exp(STEP * np.array([-1.0, 1.0]))
+
+
+def sensitivities_of_outputs(
+    nominal: Mapping[str, float], symbols: Sequence[str], conditions: Conditions = STUDY
+) -> Sensitivities:
+    """Central differences of p2, p3 and I in all test cases, all variants in one batch.
+
+    Each output is divided by its sensor's noise (Table 3). Raises SimulationError.
+    """
+    p = {symbol: np.full(2 * len(symbols), value) for symbol, value in nominal.items()}
+    for row, symbol in enumerate(symbols):
+        p[symbol][2 * row : 2 * row + 2] = stepped(symbol, nominal[symbol])
+    noise = [SENSORS[name].noise * UNITS[name][1] for name in OUTPUTS]
+    rows = [
+        (y[:, 1::2] - y[:, ::2]) * CHANGE / (2 * STEP * deviation)
+        for run in run_cases(p, conditions)
+        for y, deviation in zip(outputs(run), noise, strict=True)
+    ]
+    return Sensitivities(symbols=tuple(symbols), columns=np.concatenate(rows))

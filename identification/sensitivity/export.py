@@ -1,0 +1,72 @@
+"""The sensitivity study as JSON-ready data."""
+
+import math
+from typing import Any
+
+from epv_env.plant.parameters import confidence_intervals, sensitive_symbols
+from identification.sensitivity.collinearity import CRITICAL, Sensitivities
+from identification.sensitivity.global_indices import Indices, Screening
+from identification.sensitivity.one_at_a_time import Sensitivity
+from identification.sensitivity.results import FIXED_STEP_STUDY, SensitivityStudy
+from identification.sensitivity.study import STUDY
+
+
+def as_json(study: SensitivityStudy) -> dict[str, Any]:
+    """All figures; total errors in percent, infinite indices as None."""
+    rows = study.one_at_a_time
+    return {
+        "conditions": {
+            "p1_bar": STUDY.p1 / 1e5,
+            "p2_bar": STUDY.p2 / 1e5,
+            "U_on_V": STUDY.U_on,
+            "U_on_fixed_step_V": FIXED_STEP_STUDY.U_on,
+        },
+        "fixed_step": {symbol: _row(row) for symbol, row in rows.fixed_step.items()},
+        "exact": {symbol: _row(row) for symbol, row in rows.exact.items()},
+        "collinearity": _collinearity(study.outputs),
+        "morris": _screening(study.screening),
+        "sobol": _indices(study.indices),
+    }
+
+
+def _row(row: Sensitivity) -> dict[str, Any]:
+    return {"minus10": 100 * row.minus, "plus10": 100 * row.plus, "sensitive": row.sensitive}
+
+
+def _collinearity(found: Sensitivities) -> dict[str, Any]:
+    return {
+        "effect_noise_sd": dict(zip(found.symbols, found.effect.tolist(), strict=True)),
+        "critical_index": CRITICAL,
+        "inseparable_pairs": [[a, b, _finite(index)] for a, b, index in found.inseparable_pairs()],
+        "calibrated_four": _finite(found.index(tuple(confidence_intervals()))),
+        "all_sensitive": _finite(found.index(sensitive_symbols())),
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _screening(found: Screening) -> dict[str, Any]:
+    columns = zip(
+        found.mean_absolute.tolist(), found.half_width.tolist(), found.spread.tolist(), strict=True
+    )
+    return {
+        symbol: {"mu_star": effect, "half_width95": width, "sigma": spread}
+        for symbol, (effect, width, spread) in zip(found.symbols, columns, strict=True)
+    }
+
+
+def _indices(found: Indices) -> dict[str, Any]:
+    table = zip(
+        found.symbols,
+        found.first.tolist(),
+        found.first_half_width.tolist(),
+        found.total.tolist(),
+        found.total_half_width.tolist(),
+        strict=True,
+    )
+    return {
+        symbol: {"first": first, "first_half_width95": a, "total": total, "total_half_width95": b}
+        for symbol, first, a, total, b in table
+    }

@@ -1,0 +1,130 @@
+"""Pictures of the sensitivity study."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from identification.sensitivity.collinearity import CRITICAL, Sensitivities, collinearity_index
+from identification.sensitivity.global_indices import Indices, Screening
+from identification.sensitivity.one_at_a_time import THRESHOLD, Sensitivity
+from identification.sensitivity.results import OneAtATime
+
+BAR: Mapping[str, Any] = {"color": "tab:blue", "alpha": 0.55, "height": 0.7}
+INTERVAL = {"color": "0.25", "linewidth": 1.2}
+GREATEST_SHOWN = 100.0
+"""Collinearity indices above this share a colour."""
+
+
+def tornado(study: OneAtATime, printed: Mapping[str, tuple[float, float]]) -> Figure:
+    """Tables 8 and 9: bars as computed, the report's figures [%] as markers, and the limit of 2 %."""
+    order = sorted(printed, key=lambda symbol: max(printed[symbol]))
+    figure = Figure(figsize=(9, 8), layout="constrained")
+    panels = figure.subplots(1, 2, sharey=True)
+    for side, (axes, change) in enumerate(zip(panels, ("−10 %", "+10 %"), strict=True)):
+        _tornado_side(axes, study, printed, order, side)
+        axes.set_title(f"{change} (a1: {('lower', 'upper')[side]} end of its domain)")
+    panels[0].set_yticks(range(len(order)), order)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    return figure
+
+
+def _tornado_side(
+    axes: Axes,
+    study: OneAtATime,
+    printed: Mapping[str, tuple[float, float]],
+    order: Sequence[str],
+    side: int,
+) -> None:
+    rows = np.arange(len(order))
+    low = [100 * study.scatter[symbol][:, side].min() for symbol in order]
+    high = [100 * study.scatter[symbol][:, side].max() for symbol in order]
+    report = [printed[symbol][side] for symbol in order]
+    axes.barh(rows, _side(study.fixed_step, order, side), label="fixed step of 0.5 ms", **BAR)
+    axes.hlines(rows, low, high, label="its scatter over 18.5 to 19.3 V", **INTERVAL)
+    axes.plot(report, rows, "D", color="tab:red", markersize=5, label="the report")
+    axes.plot(
+        _side(study.exact, order, side), rows, "|", color="black", markersize=11, label="exact stops"
+    )
+    axes.axvline(100 * THRESHOLD, color="tab:red", linestyle="--", linewidth=1, label="limit of 2 %")
+    axes.set_xscale("log")
+    axes.set_xlabel("total error [%]")
+    axes.set_xlim(0.01, 40)
+    axes.set_ylim(-0.6, len(order) - 0.4)
+    axes.grid(axis="x", alpha=0.3)
+
+
+def _side(found: Mapping[str, Sensitivity], order: Sequence[str], side: int) -> list[float]:
+    """Errors of one direction in an order [%]."""
+    return [100 * (found[symbol].minus, found[symbol].plus)[side] for symbol in order]
+
+
+def collinearity_map(found: Sensitivities) -> Figure:
+    """Collinearity index of every pair; those from 10 up are written out."""
+    figure = Figure(figsize=(9, 8), layout="constrained")
+    axes = figure.subplots()
+    index = pairwise_indices(found)
+    norm = LogNorm(1, GREATEST_SHOWN)
+    shown = axes.imshow(np.minimum(index, GREATEST_SHOWN), norm=norm, cmap="Blues")
+    figure.colorbar(
+        shown, ax=axes, label=f"collinearity index (above {GREATEST_SHOWN:g}: as {GREATEST_SHOWN:g})"
+    )
+    for row, column in np.argwhere(index >= CRITICAL):
+        text = "∞" if np.isinf(index[row, column]) else f"{index[row, column]:.0f}"
+        colour = "white" if index[row, column] > 30 else "black"
+        axes.text(column, row, text, ha="center", va="center", fontsize=7, color=colour)
+    axes.set_xticks(range(len(found.symbols)), found.symbols, rotation=90)
+    axes.set_yticks(range(len(found.symbols)), found.symbols)
+    return figure
+
+
+def pairwise_indices(found: Sensitivities) -> NDArray:
+    """Collinearity index of each pair below the diagonal, NaN elsewhere, (parameters, parameters)."""
+    n = len(found.symbols)
+    index = np.full((n, n), np.nan)
+    for row in range(n):
+        for column in range(row):
+            index[row, column] = collinearity_index(found.columns[:, [row, column]])
+    return index
+
+
+def global_bars(indices: Indices, screening: Screening) -> Figure:
+    """Sobol's indices and Morris's mean absolute effects with 95 % intervals, in one order."""
+    order = np.argsort(indices.total)
+    figure = Figure(figsize=(9, 7.5), layout="constrained")
+    left, right = figure.subplots(1, 2, sharey=True)
+    _sobol_bars(left, indices, order)
+    effects, width = screening.mean_absolute[order], screening.half_width[order]
+    right.barh(range(len(order)), effects, xerr=width, error_kw={"elinewidth": 1}, **BAR)
+    right.set_xlabel("Morris μ*: mean change of total error [% points]")
+    for axes in (left, right):
+        axes.set_ylim(-0.6, len(order) - 0.4)
+        axes.grid(axis="x", alpha=0.3)
+    return figure
+
+
+def _sobol_bars(axes: Axes, indices: Indices, order: NDArray) -> None:
+    rows = np.arange(len(order))
+    bars = (
+        ("total", indices.total, indices.total_half_width, 0.2, "tab:blue"),
+        ("first order", indices.first, indices.first_half_width, -0.2, "tab:orange"),
+    )
+    for label, values, width, shift, colour in bars:
+        axes.barh(
+            rows + shift,
+            values[order],
+            xerr=width[order],
+            error_kw={"elinewidth": 1},
+            height=0.38,
+            color=colour,
+            alpha=0.6,
+            label=label,
+        )
+    axes.set_yticks(rows, [indices.symbols[at] for at in order])
+    axes.set_xlabel("Sobol index: share of the variance")
+    axes.legend(loc="lower right")

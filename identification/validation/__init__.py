@@ -1,0 +1,1 @@
+"""Does the calibrated model hold on recordings it has not seen (section 7)?"""

@@ -1,0 +1,77 @@
+"""What people and programs get to see of an assessment."""
+
+import json
+from functools import cache
+
+import numpy as np
+import pytest
+
+from identification.page import Picture, Table, write_page
+from identification.quality import figures
+from identification.quality.assess import assess
+from identification.quality.export import as_json, as_text
+from identification.quality.reported import CORRELATIONS, DESCRIPTIONS, FACTORS
+from identification.quality.section import quality_section
+from identification.recordings import CHANNELS
+from tests.identification.quality.records import AMBIENT, rest_record, with_channel
+
+
+@cache
+def qualities():
+    """A perfect record, and one with a channel that never changes."""
+    stuck = with_channel(rest_record(1, 2000), "U", np.zeros(2000))
+    return assess(rest_record(0, 2000), AMBIENT), assess(stuck, AMBIENT)
+
+
+def test_a_page_can_be_written(tmp_path):
+    path = tmp_path / "quality.html"
+    write_page(path, title="quality", sections=[quality_section(qualities()[0])])
+    assert path.read_text(encoding="utf-8").count("<img") == 6
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_a_section_is_complete(which):
+    section = quality_section(qualities()[which])
+    assert [verdict.status for verdict in section.verdicts].count("good") == 5 - which
+    assert sum(isinstance(block, Picture) for block in section.blocks) == 6
+    for table in (block for block in section.blocks if isinstance(block, Table)):
+        assert {len(row) for row in table.rows} == {len(table.columns)}
+
+
+def test_tables_show_the_report_s_figures_beside_their_own():
+    cells = {
+        cell
+        for block in quality_section(qualities()[0]).blocks
+        if isinstance(block, Table)
+        for row in block.rows
+        for cell in row
+    }
+    for name in CHANNELS:
+        assert f"{FACTORS[name]:.6f}" in cells
+        assert f"{DESCRIPTIONS[name].kurtosis:.4f}" in cells
+    for value in CORRELATIONS.values():
+        assert f"{value:.4f}" in cells
+
+
+@pytest.mark.parametrize("draw", figures.CAPTIONS)
+def test_every_axis_has_a_unit_or_a_name(draw):
+    figure = draw(qualities()[0])
+    own = [axes.get_xlabel() + axes.get_ylabel() for axes in figure.axes]
+    assert all(own) or figure.get_supxlabel()
+    assert figure.get_supylabel() or all(axes.get_ylabel() for axes in figure.axes)
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_json_is_strict_and_complete(which):
+    found = json.loads(json.dumps(as_json(qualities()[which]), allow_nan=False))
+    assert found["at_rest"] is True
+    assert list(found["channels"]) == list(CHANNELS)
+    assert len(found["correlations"]) == (10, 6)[which]
+    assert found["channels"]["I"]["status"] == "good"
+    assert (found["channels"]["U"]["statistics"]["kurtosis"] is None) == bool(which)
+
+
+def test_text_has_a_line_per_channel():
+    lines = as_text(qualities()[1]).splitlines()
+    assert [line.split()[0] for line in lines] == ["channel", *CHANNELS]
+    assert lines[2].split()[1] == "bad"

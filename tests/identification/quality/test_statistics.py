@@ -1,0 +1,106 @@
+"""Tables 2 and 3 on signals whose statistics are known."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from identification.quality.resolution import longest_run, quantum, run_limit
+from identification.quality.statistics import describe, fit_trend, outlier_limit
+
+TIME = np.arange(10_000) / 2000
+
+
+def test_a_ramp_s_factor_and_offset_come_back_without_error():
+    trend = fit_trend(TIME, 3.0 - 0.2 * TIME)
+    assert (trend.factor, trend.offset) == (pytest.approx(-0.2), pytest.approx(3.0))
+    assert trend.factor_error == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_allclose(trend.at(TIME), 3.0 - 0.2 * TIME)
+
+
+def test_the_standard_error_of_the_slope_is_that_of_white_noise():
+    """sigma sqrt(12/n)/T for n samples over the time T."""
+    noise = np.random.default_rng(0).standard_normal(len(TIME))
+    trend = fit_trend(TIME, noise)
+    assert trend.factor_error == pytest.approx(np.sqrt(12 / len(TIME)) / 5, rel=0.02)
+    assert trend.offset_error == pytest.approx(2 / np.sqrt(len(TIME)), rel=0.02)
+
+
+def test_a_sine_has_its_closed_forms():
+    found = describe(2 * np.sin(2 * np.pi * 10 * TIME), greatest=20.0)
+    assert found.arithmetic_mean == pytest.approx(0.0, abs=1e-12)
+    assert found.trimmed_mean == pytest.approx(0.0, abs=1e-12)
+    assert found.median == pytest.approx(0.0, abs=1e-12)
+    assert found.standard_deviation == pytest.approx(np.sqrt(2), rel=1e-4)
+    assert found.interquartile_range == pytest.approx(2 * np.sqrt(2), rel=1e-2)
+    assert found.absolute_deviation == pytest.approx(4 / np.pi, rel=1e-3)
+    assert found.range == pytest.approx(4.0)
+    assert found.signal_to_noise == pytest.approx(20 * np.log10(20 / np.sqrt(2)), abs=1e-3)
+    assert found.outlier_factor == pytest.approx(np.sqrt(2), rel=1e-4)
+    assert found.kurtosis == pytest.approx(1.5)
+    assert found.skewness == pytest.approx(0.0, abs=1e-9)
+
+
+def test_skewness_is_that_of_the_exponential_distribution():
+    quantiles = stats.expon.ppf((np.arange(100_000) + 0.5) / 100_000)
+    assert describe(quantiles, greatest=1.0).skewness == pytest.approx(2.0, rel=0.01)
+
+
+def test_the_trimmed_mean_leaves_the_extreme_five_percent_out():
+    """2.5 % at either end, so two wild values of a hundred do not count."""
+    wild = np.zeros(100)
+    wild[:2] = 1e6
+    assert describe(wild, greatest=1.0).trimmed_mean == 0.0
+
+
+def test_a_signal_that_never_changes_has_no_shape():
+    found = describe(np.zeros(1000), greatest=1.0)
+    assert found.standard_deviation == 0.0
+    assert np.isinf(found.signal_to_noise)
+    assert np.isnan([found.outlier_factor, found.kurtosis, found.skewness]).all()
+
+
+@pytest.mark.parametrize("rounding", [0.0, 0.6, 1.2])
+def test_999_of_1000_normal_records_stay_below_the_outlier_limit(rounding):
+    """The greatest of n |z| is drawn through its distribution; rounding adds half a step at most."""
+    uniform = np.random.default_rng(1).random(100_000)
+    greatest = stats.norm.isf(-np.expm1(np.log(uniform) / 10_000) / 2) + rounding / 2
+    above = np.mean(greatest > outlier_limit(10_000, rounding=rounding))
+    assert above == pytest.approx(0.001, abs=0.0004)
+
+
+def test_the_report_s_limit_of_four_would_fail_every_second_normal_record():
+    assert outlier_limit(10_000, rounding=0.0, confidence=0.53) == pytest.approx(4.0, abs=0.01)
+
+
+@pytest.mark.parametrize("digits", [None, 5])
+def test_the_step_is_found_though_codes_are_missing_and_digits_are_few(digits):
+    step = 15 / 4096
+    codes = np.array([0, 1, 2, 5, 6, 40] * 100)
+    readings = 1.0 + step * codes
+    readings = readings if digits is None else np.round(readings, digits)
+    assert quantum(readings) == pytest.approx(step, rel=1e-4)
+
+
+def test_rounding_in_sums_is_no_step():
+    readings = np.array([0.1 + 0.2, 0.3, 0.4, 0.5] * 100)
+    assert quantum(readings) == pytest.approx(0.1, rel=1e-6)
+
+
+def test_continuous_readings_have_no_step():
+    assert quantum(np.random.default_rng(0).standard_normal(1000)) == 0.0
+    assert quantum(np.ones(1000)) == 0.0
+
+
+def test_runs():
+    coin = np.random.default_rng(0).integers(2, size=10_000)
+    assert longest_run(np.array([1, 1, 2, 2, 2, 3])) == 3
+    assert longest_run(np.ones(7)) == 7
+    assert run_limit(coin, rounding=0.0, significance=1e-4) == pytest.approx(np.log2(1e8), abs=2)
+    assert longest_run(coin) < run_limit(coin, rounding=0.0, significance=1e-4)
+
+
+def test_a_drift_does_not_shorten_the_run_that_is_allowed():
+    """The commonest reading of a drifting signal is rare, but not while the signal is there."""
+    drifting = np.rint(np.linspace(0, 1000, 10_000))
+    limit = run_limit(drifting, rounding=1.0, significance=1e-4)
+    assert limit == pytest.approx(np.log(1e-8) / np.log(0.383), abs=2)

@@ -1,0 +1,71 @@
+"""Known columns have known collinearity; parameters that act by their ratio cannot be told apart."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from epv_env.plant.parameters import Parameters, confidence_intervals, sensitive_symbols
+from identification.sensitivity.collinearity import (
+    CRITICAL,
+    Sensitivities,
+    collinearity_index,
+    cosines,
+    sensitivities_of_outputs,
+)
+from identification.sensitivity.one_at_a_time import studied_symbols
+
+
+@cache
+def found() -> Sensitivities:
+    return sensitivities_of_outputs(Parameters.nominal(), studied_symbols())
+
+
+def test_orthogonal_columns_have_index_one():
+    assert collinearity_index(np.diag([3.0, 0.1, 7.0])) == pytest.approx(1.0)
+
+
+def test_proportional_columns_have_an_infinite_index():
+    column = np.array([1.0, -2.0, 0.5])
+    assert collinearity_index(np.stack([column, -3 * column], axis=1)) == np.inf
+
+
+@pytest.mark.parametrize("angle", [0.05, 0.3, 1.2])
+def test_two_columns_at_an_angle(angle):
+    """The least eigenvalue of [[1, c], [c, 1]] is 1 - |c|."""
+    columns = np.array([[1.0, np.cos(angle)], [0.0, np.sin(angle)]])
+    assert collinearity_index(columns) == pytest.approx(1 / np.sqrt(1 - np.cos(angle)))
+    assert cosines(columns)[0, 1] == pytest.approx(np.cos(angle))
+
+
+def test_an_index_never_falls_when_a_parameter_joins():
+    four = tuple(confidence_intervals())
+    assert found().index(four[:3]) <= found().index(four)
+
+
+@pytest.mark.parametrize("pair", [("V2", "alphaPV"), ("V3", "alphaMV")])
+def test_volumes_and_contractions_act_by_their_ratio(pair):
+    """alphaPV/V2 and alphaMV/V3 are all that the state equations of p2 and p3 contain."""
+    assert found().index(pair) == np.inf
+    assert found().correlation[[found().symbols.index(s) for s in pair], :][:, 0].sum() == pytest.approx(
+        0.0, abs=1e-6
+    )
+
+
+def test_the_calibrated_four_can_be_told_apart_but_not_all_sensitive_ones():
+    assert found().index(tuple(confidence_intervals())) < 4.0 < CRITICAL
+    assert found().index(sensitive_symbols()) == np.inf
+
+
+def test_pairs_are_listed_the_worst_first():
+    pairs = found().inseparable_pairs()
+    assert [index for _, _, index in pairs] == sorted((index for *_, index in pairs), reverse=True)
+    assert ("cPV", "xPV0") in [(a, b) for a, b, _ in pairs]
+    assert all(index > CRITICAL for *_, index in pairs)
+
+
+def test_effects_do_not_depend_on_the_size_of_the_differences(monkeypatch):
+    """The model is differentiable here: event times move smoothly with every parameter."""
+    monkeypatch.setattr("identification.sensitivity.collinearity.STEP", 1e-3)
+    finer = sensitivities_of_outputs(Parameters.nominal(), studied_symbols())
+    assert finer.effect == pytest.approx(found().effect, rel=0.01)

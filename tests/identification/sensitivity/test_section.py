@@ -1,0 +1,39 @@
+"""The study's section can be written, and its data is JSON."""
+
+import json
+
+from epv_env.plant.parameters import Parameters
+from identification.page import Picture, write_page
+from identification.sensitivity.export import as_json
+from identification.sensitivity.global_indices import (
+    ranges,
+    screen,
+    sobol_indices,
+    total_error_model,
+)
+from identification.sensitivity.results import SensitivityStudy
+from identification.sensitivity.section import sensitivity_section
+from tests.identification.sensitivity.study import one_at_a_time
+from tests.identification.sensitivity.test_collinearity import found
+
+
+def short_study() -> SensitivityStudy:
+    p, symbols = Parameters.nominal(), ["d1", "R"]
+    model, bounds = total_error_model(p, symbols), ranges(p, symbols)
+    return SensitivityStudy(
+        one_at_a_time=one_at_a_time(),
+        outputs=found(),
+        screening=screen(model, symbols, bounds, trajectories=4, seed=1),
+        indices=sobol_indices(model, symbols, bounds, samples=8, seed=1),
+    )
+
+
+def test_section_and_data(tmp_path):
+    study = short_study()
+    section = sensitivity_section(study)
+    assert [verdict.status for verdict in section.verdicts] == ["good", "doubt", "good", "bad", "note"]
+    assert sum(isinstance(block, Picture) for block in section.blocks) == 3
+    write_page(tmp_path / "page.html", title="Sensitivity", sections=[section])
+    data = json.loads(json.dumps(as_json(study), allow_nan=False))
+    assert data["collinearity"]["all_sensitive"] is None
+    assert set(data["sobol"]) == {"d1", "R"}
