@@ -14,7 +14,7 @@ from identification.bench.automaton import simulate_reference
 from identification.bench.programmes import Programme
 from identification.bench.schedule import scheduled
 from identification.cases import RATE
-from identification.recordings import CHANNELS, UNITS, Campaign, Recording
+from identification.recordings.recording import CHANNELS, UNITS, Campaign, Recording
 
 RESERVOIR = 0.08
 """The bench's two reservoirs of 40 litres (section 3) [m^3]; air drawn from them lowers p1."""

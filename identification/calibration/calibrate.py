@@ -10,7 +10,7 @@ from identification.calibration.problem import Problem
 from identification.calibration.starts import best, fit_from_all, starting_points
 from identification.calibration.warnings import warnings_of
 from identification.journal import Journal
-from identification.responses import Response, responses
+from identification.replay.responses import Response, responses
 
 STARTS = 6
 """Table 10, and five spread over the domains."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares, minimize
 
-from identification.misfit import Misfit
+from identification.replay.misfit import Misfit
 
 MOST_EVALUATIONS = 2000
 """Of the total error; a search that needs more is reported as not converged."""

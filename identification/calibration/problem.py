@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 from epv_env.plant.parameters import ParameterError, Parameters
 from epv_env.plant.region import CALIBRATED_SYMBOLS
-from identification.drive import without_offsets
-from identification.misfit import Misfit, noise_weights, report_weights
-from identification.noise import noise_of
-from identification.quality.assess import assess
-from identification.recordings import UNITS, Campaign, CampaignError, Recording
-from identification.vector import Vector
+from identification.quality.assess import Offset, assess, sensor_offsets
+from identification.recordings.noise import noise_of
+from identification.recordings.recording import Campaign, CampaignError, Recording
+from identification.replay.drive import without_offsets
+from identification.replay.misfit import Misfit, noise_weights, report_weights
+from identification.replay.vector import Vector
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,10 +21,8 @@ class Problem:
     validation: tuple[Recording, ...]
     noise: Mapping[str, float]
     """Standard deviation of each channel's noise [SI units]."""
-    offsets: Mapping[str, float]
-    """What was subtracted from each channel [SI units]; empty without a record at rest."""
-    offset_errors: Mapping[str, float]
-    """Their standard errors."""
+    offsets: Mapping[str, Offset]
+    """What was subtracted from each channel; empty without a record at rest."""
     vector: Vector
     """Its reference is where the calibration starts."""
 
@@ -60,25 +58,21 @@ def calibration_problem(
         raise ParameterError(
             f"{', '.join(zero)} start at 0, from which a relative change leads nowhere: start elsewhere"
         )
-    offsets, errors = _offsets(campaign)
+    offsets = _offsets(campaign)
+    values = {name: offset.value for name, offset in offsets.items()}
     return Problem(
-        calibration=tuple(without_offsets(r, offsets) for r in campaign.of("calibration")),
-        validation=tuple(without_offsets(r, offsets) for r in campaign.of("validation")),
+        calibration=tuple(without_offsets(r, values) for r in campaign.of("calibration")),
+        validation=tuple(without_offsets(r, values) for r in campaign.of("validation")),
         noise=noise_of(campaign),
         offsets=offsets,
-        offset_errors=errors,
         vector=Vector(symbols=tuple(symbols), reference=start),
     )
 
 
-def _offsets(campaign: Campaign) -> tuple[dict[str, float], dict[str, float]]:
-    """The sensors' offsets at the start of the first quality recording at rest, and standard errors."""
+def _offsets(campaign: Campaign) -> dict[str, Offset]:
+    """The sensors' offsets from the first quality recording that shows them."""
     for recording in campaign.of("quality"):
-        quality = assess(recording, campaign.pressure)
-        if quality.at_rest:
-            found = {name: (c.trend, c.rest, UNITS[name][1]) for name, c in quality.channels.items()}
-            return (
-                {name: (trend.offset - rest) * unit for name, (trend, rest, unit) in found.items()},
-                {name: trend.offset_error * unit for name, (trend, _, unit) in found.items()},
-            )
-    return {}, {}
+        offsets = sensor_offsets(assess(recording, campaign.pressure))
+        if offsets:
+            return offsets
+    return {}

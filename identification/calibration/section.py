@@ -5,10 +5,10 @@ from typing import Any
 from epv_env.plant.parameters import table
 from identification.calibration.calibrate import Calibration
 from identification.calibration.starts import METHODS, reached_the_best
-from identification.error_tables import error_table, errors_as_json, percent
-from identification.page import Picture, Section, Table, Text, Verdict
-from identification.response_figures import overlay
-from identification.responses import total
+from identification.replay.responses import total
+from identification.report.error_tables import error_table, errors_as_json, percent
+from identification.report.page import Picture, Section, Table, Text, Verdict
+from identification.report.response_figures import overlay
 
 TOLERANCE = 0.1
 """Total error that the report accepts (sections 6.1 and 7)."""
@@ -48,7 +48,7 @@ def calibration_json(calibration: Calibration) -> dict[str, Any]:
         },
         "errors_before": errors_as_json(calibration.before),
         "errors_after": {m: errors_as_json(calibration.after[m]) for m in METHODS},
-        "offsets_subtracted": dict(calibration.problem.offsets),
+        "offsets_subtracted": {name: o.value for name, o in calibration.problem.offsets.items()},
         "noise": dict(calibration.problem.noise),
         "searches": {m: [fit.as_json() for fit in calibration.fits[m]] for m in METHODS},
         "warnings": calibration.warnings,
@@ -96,7 +96,7 @@ def _offsets(calibration: Calibration) -> str:
             "No record at rest shows the sensors' offsets: readings were taken as they are, so an error "
             "of the supply's, the circuit's or the voltage's sensor goes into the estimates."
         )
-    listed = ", ".join(f"{name} {value:.4g}" for name, value in offsets.items())
+    listed = ", ".join(f"{name} {offset.value:.4g}" for name, offset in offsets.items())
     return f"Offsets at rest that were subtracted from the readings [A, V, Pa]: {listed}."
 
 

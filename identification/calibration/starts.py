@@ -8,7 +8,7 @@ from identification.calibration.fits import Fit, nelder_mead, weighted_least_squ
 from identification.calibration.problem import Problem
 from identification.journal import Journal
 from identification.progress import progress
-from identification.vector import Vector
+from identification.replay.vector import Vector
 
 METHODS = ("Nelder-Mead", "least squares")
 

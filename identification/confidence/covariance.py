@@ -16,10 +16,10 @@ from statsmodels.stats.sandwich_covariance import S_hac_simple
 from statsmodels.tsa.stattools import acf
 
 from identification.calibration.problem import Problem
-from identification.drive import Drive, drive_of
-from identification.misfit import Misfit
-from identification.recordings import OUTPUTS, Recording
-from identification.replay import Replay
+from identification.recordings.recording import OUTPUTS, Recording
+from identification.replay.drive import Drive, drive_of
+from identification.replay.misfit import Misfit
+from identification.replay.model import Replay
 
 DRAWS = 8
 """Of the inputs' noise, for each recording."""
@@ -116,8 +116,8 @@ def _offset_share(problem: Problem, misfit: Misfit, z: NDArray, influence: Seque
     values = misfit.vector.values(z)
     known = misfit.replay.outputs(values)
     share = np.zeros((len(z), len(z)))
-    for channel in (name for name in ZEROED if name in problem.offset_errors):
-        error = problem.offset_errors[channel]
+    for channel in (name for name in ZEROED if name in problem.offsets):
+        error = problem.offsets[channel].error
         drives = [_shifted(drive, channel, error) for drive in misfit.replay.drives]
         models = Replay(drives, misfit.vector.reference).outputs(values)
         moved = np.zeros(len(z))
@@ -144,7 +144,9 @@ def _shifted(drive: Drive, channel: str, error: float) -> Drive:
 def _redrawn(problem: Problem, drives: Sequence[Drive], rng: np.random.Generator) -> list[Drive]:
     """DRAWS drives per recording, as they would follow from other noise on the same inputs."""
     return [
-        _with_start_of(drive, drive_of(_noisy(recording, drive, problem.noise, rng)))
+        _with_start_of(
+            drive, drive_of(_noisy(recording, drive, problem.noise, rng), problem.vector.reference)
+        )
         for recording, drive in zip(problem.calibration, drives, strict=True)
         for _ in range(DRAWS)
     ]

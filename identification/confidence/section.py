@@ -8,7 +8,7 @@ from epv_env.plant.parameters import table
 from identification.confidence import figures
 from identification.confidence.confidence import Confidence
 from identification.confidence.coverage import Coverage, share
-from identification.page import Picture, Section, Table, Text, Verdict
+from identification.report.page import Picture, Section, Table, Text, Verdict
 
 FLAT = 1e-3
 """Largest possible decrease of the total error, relative to it, at which a gradient counts as zero."""

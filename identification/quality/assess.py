@@ -6,7 +6,7 @@ from itertools import combinations
 
 from identification.quality.channel import Channel, assess_channel
 from identification.quality.dependence import Pair, assess_pair
-from identification.recordings import CHANNELS, UNITS, CampaignError, Recording
+from identification.recordings.recording import CHANNELS, UNITS, CampaignError, Recording
 
 LEAST_SAMPLES = 250
 """Half a second at 500 Hz; fewer do not show the distribution of a noise."""
@@ -18,6 +18,15 @@ With more lags for the samples, the Ljung-Box test alarms too often on white noi
 """
 
 PRESSURES = ("p1", "p2", "p3")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Offset:
+    """Reading of a sensor at the start of a record at rest, less what a perfect sensor reads [SI]."""
+
+    value: float
+    error: float
+    """Standard error."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,14 +93,21 @@ def assess(recording: Recording, environment_pressure: float) -> Quality:
     )
 
 
-def sensor_offsets(quality: Quality) -> dict[str, float]:
-    """Mean reading minus rest value by channel [A, V, Pa]: what a calibration may subtract.
+def sensor_offsets(quality: Quality) -> dict[str, Offset]:
+    """Offset of each channel, which a calibration may subtract.
 
     Empty unless the record is at rest: elsewhere an offset cannot be told from the signal.
     """
     if not quality.at_rest:
         return {}
-    return {name: channel.offset * UNITS[name][1] for name, channel in quality.channels.items()}
+    return {name: _offset(channel) for name, channel in quality.channels.items()}
+
+
+def _offset(channel: Channel) -> Offset:
+    """Of the trend's line at time 0, since a drift starts with the recording."""
+    size = UNITS[channel.name][1]
+    value = channel.trend.offset - channel.rest
+    return Offset(value=value * size, error=channel.trend.offset_error * size)
 
 
 def longest_lag(samples: int, period: float) -> int:

@@ -16,7 +16,7 @@ from identification.quality.statistics import (
     fit_trend,
     outlier_limit,
 )
-from identification.recordings import UNITS
+from identification.recordings.recording import UNITS
 
 MARGINAL_DRIFT = 0.1
 """Drift over the record, relative to Table 1's accuracy, up to which a signal counts as steady."""

@@ -7,7 +7,7 @@ from typing import Any
 from identification.quality.assess import Quality, sensor_offsets
 from identification.quality.channel import Channel
 from identification.quality.verdicts import CHECKS, findings, worst
-from identification.recordings import CHANNELS
+from identification.recordings.recording import CHANNELS
 
 
 def as_json(quality: Quality) -> dict[str, Any]:
@@ -17,7 +17,7 @@ def as_json(quality: Quality) -> dict[str, Any]:
         "samples": quality.samples,
         "period_s": quality.period,
         "at_rest": quality.at_rest,
-        "sensor_offsets_SI": sensor_offsets(quality),
+        "sensor_offsets_SI": {name: asdict(o) for name, o in sensor_offsets(quality).items()},
         "channels": {name: _channel(quality, name) for name in CHANNELS},
         "correlations": [
             {

@@ -3,13 +3,13 @@
 import math
 from dataclasses import fields
 
-from identification.page import Picture, Section, Table, Text
 from identification.quality import figures, reported
 from identification.quality.assess import Quality, sensor_offsets
 from identification.quality.dependence import white_band
 from identification.quality.statistics import Description
 from identification.quality.verdicts import CHECKS, findings, verdict, worst
-from identification.recordings import CHANNELS, UNITS
+from identification.recordings.recording import CHANNELS, UNITS
+from identification.report.page import Picture, Section, Table, Text
 
 UNIT_COLUMNS = [f"{name} [{UNITS[name][0]}]" for name in CHANNELS]
 
@@ -32,7 +32,9 @@ def quality_section(quality: Quality) -> Section:
 
 def _state(quality: Quality) -> str:
     if quality.at_rest:
-        values = ", ".join(f"{name} {value:.3g}" for name, value in sensor_offsets(quality).items())
+        values = ", ".join(
+            f"{name} {offset.value:.3g}" for name, offset in sensor_offsets(quality).items()
+        )
         return f"The record is at rest. A calibration may subtract these offsets [A, V, Pa]: {values}."
     off = [name for name, channel in quality.channels.items() if not channel.at_rest]
     return (

@@ -3,12 +3,12 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from identification.page import Verdict
 from identification.quality.assess import Quality
 from identification.quality.channel import Channel
 from identification.quality.levels import SEVERITY, Judgement
 from identification.quality.noise_checks import correlation, normality, whiteness
 from identification.quality.reading_checks import noise, offset, outliers, resolution, trend
+from identification.report.page import Verdict
 
 CHECKS: Mapping[str, Callable[[Quality, Channel], Judgement]] = {
     "offset": offset,

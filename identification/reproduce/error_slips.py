@@ -6,7 +6,7 @@ import numpy as np
 
 from epv_env.plant.parameters import table
 from identification.error import partial_error, total_error
-from identification.recordings import OUTPUTS
+from identification.recordings.recording import OUTPUTS
 from identification.reproduce.finding import DOUBT, HOLDS, SLIP, Finding, compared
 from identification.reproduce.report_values import (
     printed_errors,

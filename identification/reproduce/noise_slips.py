@@ -5,7 +5,7 @@ from scipy import stats
 
 from epv_env.plant.sensors import SENSORS
 from identification.quality.reported import DESCRIPTIONS, OFFSETS, SAMPLES
-from identification.recordings import CHANNELS, UNITS
+from identification.recordings.recording import CHANNELS, UNITS
 from identification.reproduce.finding import DOUBT, HOLDS, SLIP, Finding
 from identification.reproduce.report_values import correlation_matrix
 

@@ -6,7 +6,7 @@ from scipy import stats
 
 from epv_env.plant.parameters import Parameters, confidence_intervals, table
 from identification.cases import CALIBRATION_CASES, RATE
-from identification.recordings import OUTPUTS
+from identification.recordings.recording import OUTPUTS
 from identification.reproduce.finding import DOUBT, HOLDS, SLIP, Finding
 
 PRINTED_MU0 = 4 * math.pi * 1e7

@@ -3,7 +3,7 @@
 from dataclasses import asdict
 from typing import Any
 
-from identification.page import Table
+from identification.report.page import Table
 from identification.reproduce.error_slips import error_findings
 from identification.reproduce.finding import SLIP, Finding
 from identification.reproduce.noise_slips import noise_findings

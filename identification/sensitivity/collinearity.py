@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from epv_env.plant.parameters import table
 from epv_env.plant.sensors import SENSORS
-from identification.recordings import OUTPUTS, UNITS
+from identification.recordings.recording import OUTPUTS, UNITS
 from identification.sensitivity.study import STUDY, Conditions, outputs, run_cases
 
 STEP = 2e-3

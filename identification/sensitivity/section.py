@@ -3,7 +3,7 @@
 import math
 
 from epv_env.plant.parameters import confidence_intervals, sensitive_symbols, table
-from identification.page import Picture, Section, Table, Text, Verdict
+from identification.report.page import Picture, Section, Table, Text, Verdict
 from identification.reproduce.tables import Agreement, agreement, percentages, printed_rows
 from identification.sensitivity import figures
 from identification.sensitivity.collinearity import CRITICAL, Sensitivities

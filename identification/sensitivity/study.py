@@ -11,7 +11,7 @@ from epv_env.plant.equations import State
 from epv_env.plant.simulate import Trajectory, energised, simulate
 from identification.cases import CALIBRATION_CASES, RATE, Case
 from identification.error import partial_error, relative_error, total_error
-from identification.recordings import OUTPUTS
+from identification.recordings.recording import OUTPUTS
 
 
 class Simulator(Protocol):

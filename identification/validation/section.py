@@ -6,11 +6,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from identification.calibration.section import TOLERANCE
-from identification.error_tables import error_table, errors_as_json, percent
-from identification.page import Picture, Section, Table, Verdict
 from identification.quality.dependence import white_band
-from identification.recordings import OUTPUTS
-from identification.response_figures import errors_over_time, overlay
+from identification.recordings.recording import OUTPUTS
+from identification.report.error_tables import error_table, errors_as_json, percent
+from identification.report.page import Picture, Section, Table, Verdict
+from identification.report.response_figures import errors_over_time, overlay
 from identification.validation.validate import Residual, Validation
 
 WHITE = 1e-4

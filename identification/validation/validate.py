@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from epv_env.plant.parameters import Parameters
 from identification.calibration.problem import Problem
 from identification.quality.dependence import Whiteness, assess_whiteness
-from identification.recordings import OUTPUTS, CampaignError
-from identification.responses import Response, responses
+from identification.recordings.recording import OUTPUTS, CampaignError
+from identification.replay.responses import Response, responses
 
 LONGEST_LAG = 0.05
 """Up to where residuals are correlated with themselves [s]."""

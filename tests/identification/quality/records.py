@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from epv_env.plant.sensors import SENSORS
 from identification.quality.reported import OFFSETS
-from identification.recordings import CHANNELS, UNITS, Recording
+from identification.recordings.recording import CHANNELS, UNITS, Recording
 
 PERIOD = 1 / 2000
 AMBIENT = 1e5

@@ -7,7 +7,7 @@ from scipy import stats
 from epv_env.plant.sensors import SENSORS
 from identification.quality.dependence import white_band
 from identification.quality.reported import CORRELATIONS, DESCRIPTIONS, FACTORS, OFFSETS, SAMPLES
-from identification.recordings import CHANNELS
+from identification.recordings.recording import CHANNELS
 
 
 def chance_of_staying_below(factor):

@@ -11,7 +11,7 @@ from epv_env.plant.sensors import SENSORS
 from identification.quality.assess import assess, sensor_offsets
 from identification.quality.reported import DESCRIPTIONS, OFFSETS
 from identification.quality.verdicts import CHECKS, findings, verdict, worst
-from identification.recordings import CHANNELS, UNITS, CampaignError
+from identification.recordings.recording import CHANNELS, UNITS, CampaignError
 from tests.identification.quality.records import (
     AMBIENT,
     PERIOD,
@@ -65,8 +65,9 @@ def test_offsets_of_a_record_at_rest_come_in_si_units():
     for name in CHANNELS:
         rest = 1.0 if name.startswith("p") else 0.0
         size = UNITS[name][1]
-        allowed = 0.05 * SENSORS[name].noise * size
-        assert offsets[name] == pytest.approx((OFFSETS[name] - rest) * size, abs=allowed)
+        error = offsets[name].error
+        assert error == pytest.approx(2 * SENSORS[name].noise * size / np.sqrt(SAMPLES), rel=0.1)
+        assert offsets[name].value == pytest.approx((OFFSETS[name] - rest) * size, abs=4 * error)
 
 
 def test_no_offset_is_read_off_an_energised_record():

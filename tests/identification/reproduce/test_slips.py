@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from identification.recordings import CHANNELS
+from identification.recordings.recording import CHANNELS
 from identification.reproduce.error_slips import recomputed_partial, recomputed_total
 from identification.reproduce.finding import DOUBT, HOLDS, SLIP, compared
 from identification.reproduce.noise_slips import signal_to_noise

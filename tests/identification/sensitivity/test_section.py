@@ -3,7 +3,7 @@
 import json
 
 from epv_env.plant.parameters import Parameters
-from identification.page import Picture, write_page
+from identification.report.page import Picture, write_page
 from identification.sensitivity.export import as_json
 from identification.sensitivity.global_indices import (
     ranges,

@@ -3,9 +3,9 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from identification.page import Table
-from identification.recordings import OUTPUTS
-from identification.responses import Response, total
+from identification.recordings.recording import OUTPUTS
+from identification.replay.responses import Response, total
+from identification.report.page import Table
 
 COLUMNS = ["Case", *(f"eps_{output} [%]" for output in OUTPUTS), "eps_partial [%]"]
 

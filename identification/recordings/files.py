@@ -11,10 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.files import write_text
-from identification.checks import check_recording
-from identification.columns import CONSUMPTION, TIME, read_columns
-from identification.manifest import BAR, FILE_NAME, check_manifest, manifest_content, read_manifest
-from identification.recordings import Campaign, CampaignError, Recording
+from identification.recordings.checks import check_recording
+from identification.recordings.columns import CONSUMPTION, TIME, read_columns
+from identification.recordings.manifest import (
+    BAR,
+    FILE_NAME,
+    check_manifest,
+    manifest_content,
+    read_manifest,
+)
+from identification.recordings.recording import Campaign, CampaignError, Recording
 
 DECIMALS = {
     TIME: 9, "I_A": 6, "U_V": 5, "p1_bar": 5, "p2_bar": 5, "p3_bar": 5, CONSUMPTION: 9

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.columns import TIME, line
-from identification.recordings import CampaignError
+from identification.recordings.columns import TIME, line
+from identification.recordings.recording import CampaignError
 
 LEAST_RATE = 500.0
 """Least samples per second: a slower bench misses the armature's movement."""

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from identification.recordings import OUTPUTS, UNITS
-from identification.responses import Response
+from identification.recordings.recording import OUTPUTS, UNITS
+from identification.replay.responses import Response
 
 MEASURED = {"color": "tab:gray", "linewidth": 0.8, "label": "measured"}
 MODEL = {"color": "tab:red", "linewidth": 1.0, "label": "model"}

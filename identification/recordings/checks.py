@@ -1,8 +1,8 @@
 """The rules that the signals of a recording keep, each a function that raises CampaignError.
 
-They look at columns in the units of the file (A, V, bar absolute), as identification.columns reads
-them. What is wrong with a file as a whole comes before what is wrong with single samples, so that the
-first refusal is the most helpful one.
+They look at columns in the units of the file (A, V, bar absolute), as `columns` reads them. What is
+wrong with a file as a whole comes before what is wrong with single samples, so that the first refusal is
+the most helpful one.
 """
 
 from collections.abc import Mapping
@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.sensors import SENSORS, Sensor
-from identification.columns import CHANNEL_OF, TIME, line
-from identification.gauge import check_above_ambient, check_against_supply, check_discharge
-from identification.recordings import HOLD, CampaignError
-from identification.timing import sampling_period
+from identification.recordings.columns import CHANNEL_OF, TIME, line
+from identification.recordings.gauge import check_above_ambient, check_against_supply, check_discharge
+from identification.recordings.recording import HOLD, CampaignError
+from identification.recordings.timing import sampling_period
 
 LEAST_REST = 0.5
 """Least duration of a quality recording [s]; statistics of less mean little."""
@@ -34,7 +34,7 @@ def check_recording(
 ) -> float:
     """Apply every rule to a recording's columns, each (samples,); returns the sampling period [s].
 
-    file: what messages call it. role: one of identification.recordings.ROLES. ambient_bar: p_env [bar
+    file: what messages call it. role: one of recording.ROLES. ambient_bar: p_env [bar
     absolute]. Raises CampaignError at the first rule that is broken.
     """
     period = sampling_period(file, columns[TIME])

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.recordings import CampaignError
+from identification.recordings.recording import CampaignError
 
 TIME, CONSUMPTION = "time_s", "sigmaS_kg_per_s"
 
@@ -21,7 +21,7 @@ CHANNEL_OF: Mapping[str, str] = {
     "p2_bar": "p2",
     "p3_bar": "p3",
 }
-"""Measured channel (identification.recordings.CHANNELS) in each column, in the unit of its name."""
+"""Measured channel (recording.CHANNELS) in each column, in the unit of its name."""
 
 REQUIRED = (TIME, "I_A", "U_V", "p2_bar", "p3_bar")
 SUPPLY = (("p1_bar",), ("p1a_bar", "p1b_bar"))

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from epv_env.plant.parameters import ParameterError, checked_value
-from identification.recordings import ROLES, UNITS, Campaign, CampaignError
+from identification.recordings.recording import ROLES, UNITS, Campaign, CampaignError
 
 FORMAT = "epv-campaign/1"
 FILE_NAME = "campaign.json"

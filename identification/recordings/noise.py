@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.sensors import SENSORS
-from identification.recordings import CHANNELS, HOLD, UNITS, Campaign, CampaignError, Recording
+from identification.recordings.recording import CHANNELS, HOLD, UNITS, Campaign, CampaignError, Recording
 
 BLOCK = 0.05
 """Time over which a drift passes for straight [s]."""

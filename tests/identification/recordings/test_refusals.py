@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from identification.campaign_files import read_campaign, write_campaign
-from identification.recordings import CampaignError
-from tests.identification.good_campaign import campaign_of, good_campaign, resting, switching
+from identification.recordings.files import read_campaign, write_campaign
+from identification.recordings.recording import CampaignError
+from tests.identification.recordings.good_campaign import campaign_of, good_campaign, resting, switching
 
 Change = Callable[[Path], None]
 """Damages a good campaign: test1.csv (calibration), validation.csv, rest.csv (quality)."""

@@ -12,10 +12,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.drive import drive_of
-from identification.recordings import OUTPUTS, Recording
-from identification.replay import Replay
-from identification.vector import Vector
+from identification.recordings.recording import OUTPUTS, Recording
+from identification.replay.drive import drive_of
+from identification.replay.model import Replay
+from identification.replay.vector import Vector
 
 P2_STEP = 1e3
 """Change of the start's circuit pressure by which its influence is measured [Pa]."""
@@ -50,7 +50,9 @@ class Misfit:
         self.vector = vector
         self.weights = list(weights)
         self.measured = [measured_outputs(recording) for recording in recordings]
-        self.replay = Replay([drive_of(recording) for recording in recordings], vector.reference)
+        self.replay = Replay(
+            [drive_of(recording, vector.reference) for recording in recordings], vector.reference
+        )
 
     def error(self, z: NDArray) -> float:
         """Root of the sum of squares for one vector (k,): eq. 21 under `report_weights`."""

@@ -5,6 +5,7 @@ voltage, a supply that loses what the circuit gains) explains a signal but for w
 for the signal.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from scipy.interpolate import make_smoothing_spline
 from scipy.signal import savgol_filter
 from scipy.stats import chi2
 
-from identification.recordings import HOLD, Recording
+from identification.recordings.recording import HOLD, Recording
 
 SMOOTHING = 0.01
 """Window in which p2 is smoothed before the air drawn from the supply is read off it [s]."""
@@ -44,13 +45,13 @@ class Drive:
         return float(self.p1[0])
 
 
-def drive_of(recording: Recording) -> Drive:
-    """The inputs that the model is given for a recording."""
+def drive_of(recording: Recording, p: Mapping[str, float]) -> Drive:
+    """The inputs that the model is given for a recording; p: volumes and temperature by symbol."""
     start = slice(0, max(2, round(HOLD / recording.period)))
     return Drive(
         period=recording.period,
         U=smooth_voltage(recording),
-        p1=smooth_supply(recording),
+        p1=smooth_supply(recording, p),
         sigma_S=recording.sigma_S,
         U_start=float(np.mean(recording.U[start])),
         p2_start=float(np.mean(recording.p2[start])),
@@ -68,32 +69,40 @@ def smooth_voltage(recording: Recording) -> NDArray:
     return U
 
 
-def smooth_supply(recording: Recording) -> NDArray:
+def smooth_supply(recording: Recording, p: Mapping[str, float]) -> NDArray:
     """p1 without its noise [Pa], (samples,).
 
-    Reservoirs lose what the circuit gains: a line in time, the rise of p2 and the air consumed explain
-    p1 (eq. 6 divided by V1), by least squares. Where what they leave is no white noise, because the
-    supply has a life of its own, a smoothing spline (generalised cross-validation) takes its place.
+    Reservoirs lose the air that is drawn from them, by which p1 falls in proportion (R T / V1). Where
+    this leaves more than white noise, because the supply has a life of its own, a smoothing spline
+    (generalised cross-validation) takes its place.
     """
-    fitted = _air_balance(recording)
+    fitted = _air_balance(recording, p)
     if _is_white(recording.p1 - fitted, recording.period):
         return fitted
     return _spline(recording)
 
 
-def without_offsets(recording: Recording, offsets: dict[str, float]) -> Recording:
+def without_offsets(recording: Recording, offsets: Mapping[str, float]) -> Recording:
     """The recording less its sensors' offsets by channel [SI units]."""
     corrected = {name: recording.channel(name) - offset for name, offset in offsets.items()}
     return replace(recording, **corrected)
 
 
-def _air_balance(recording: Recording) -> NDArray:
-    window = min(2 * round(0.5 * SMOOTHING / recording.period) + 1, len(recording) // 2 * 2 - 1)
-    p2 = np.asarray(savgol_filter(recording.p2, window, 1))
-    consumed = np.cumsum(recording.sigma_S)
-    basis = np.stack([np.ones_like(p2), recording.time, p2, consumed], axis=1)
+def _air_balance(recording: Recording, p: Mapping[str, float]) -> NDArray:
+    """Least squares of p1 on a constant, a line in time, and the air drawn so far."""
+    drawn = _air_drawn(recording, p)
+    basis = np.stack([np.ones_like(drawn), recording.time, drawn], axis=1)
     basis /= np.maximum(np.max(np.abs(basis), axis=0), np.finfo(float).tiny)
     return basis @ np.linalg.lstsq(basis, recording.p1, rcond=None)[0]
+
+
+def _air_drawn(recording: Recording, p: Mapping[str, float]) -> NDArray:
+    """What the circuit holds and has consumed, and what has filled the control chamber [kg]."""
+    window = min(2 * round(0.5 * SMOOTHING / recording.period) + 1, len(recording) // 2 * 2 - 1)
+    p2, p3 = np.asarray(savgol_filter([recording.p2, recording.p3], window, 1))
+    filling = np.cumsum(np.diff(p3, prepend=p3[0]) * recording.energised)
+    stored = (p["V2"] * p2 + p["V3"] * filling) / (p["R_gas"] * p["T_env"])
+    return stored + np.cumsum(recording.sigma_S) * recording.period
 
 
 def _is_white(residual: NDArray, period: float) -> bool:

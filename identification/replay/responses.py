@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.parameters import Parameters
-from identification.drive import drive_of
 from identification.error import partial_error, relative_error, total_error
-from identification.misfit import measured_outputs
-from identification.recordings import OUTPUTS, Recording
-from identification.replay import Replay
+from identification.recordings.recording import OUTPUTS, Recording
+from identification.replay.drive import drive_of
+from identification.replay.misfit import measured_outputs
+from identification.replay.model import Replay
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +37,7 @@ class Response:
 
 def responses(recordings: Sequence[Recording], parameters: Parameters) -> list[Response]:
     """The model's answers, started where each recording's hold says; nothing is fitted."""
-    replay = Replay([drive_of(recording) for recording in recordings], parameters)
+    replay = Replay([drive_of(recording, parameters) for recording in recordings], parameters)
     one = {"R": np.array([parameters["R"]])}
     return [
         Response(recording=recording, measured=measured_outputs(recording), model=model[:, :, 0])

@@ -9,7 +9,7 @@ from epv_env.plant.equations import Inputs
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
-from identification.drive import Drive
+from identification.replay.drive import Drive
 
 LARGEST_BATCH = 1_500_000
 """Samples times valves that are simulated at once: about 200 MB."""

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.sensors import SENSORS
-from identification.columns import line
-from identification.recordings import CampaignError
+from identification.recordings.columns import line
+from identification.recordings.recording import CampaignError
 
 CHOKED = 2.2
 """Pressure over ambient above which outflow is choked (from 1.9 on), with room for noise."""

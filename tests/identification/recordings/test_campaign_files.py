@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-import identification.campaign_files as campaign_files
-from identification.campaign_files import read_campaign, write_campaign
-from identification.recordings import CampaignError
-from identification.timing import sampling_period
-from tests.identification.good_campaign import campaign_of, good_campaign, resting, switching
+import identification.recordings.files as campaign_files
+from identification.recordings.files import read_campaign, write_campaign
+from identification.recordings.recording import CampaignError
+from identification.recordings.timing import sampling_period
+from tests.identification.recordings.good_campaign import campaign_of, good_campaign, resting, switching
 
-BLIND = Path(__file__).parents[3] / "shared" / "blind" / "round-1"
+BLIND = Path(__file__).parents[4] / "shared" / "blind" / "round-1"
 ROUNDING = {"I": 0.51e-6, "U": 0.51e-5, "p1": 0.51, "p2": 0.51, "p3": 0.51, "sigma_S": 0.51e-9}
 """Half the last decimal in the file [SI units]."""
 

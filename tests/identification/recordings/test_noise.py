@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from epv_env.plant.sensors import SENSORS
-from identification.noise import hold, noise_from_hold, noise_of
-from identification.recordings import CHANNELS, UNITS, Campaign, CampaignError, Recording
+from identification.recordings.noise import hold, noise_from_hold, noise_of
+from identification.recordings.recording import CHANNELS, UNITS, Campaign, CampaignError, Recording
 
 HELD = {"I": 0.57, "U": 24.0, "p1": 12.0, "p2": 7.5, "p3": 12.0}
 PERIOD = 1 / 2000
