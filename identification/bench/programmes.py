@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from identification.cases import CALIBRATION_CASES, VALIDATION_CASE, Case
+from identification.cases import CALIBRATION_CASES, CIRCUIT, SUPPLY, VALIDATION_CASE, VOLTAGE, Case
 
 BAR = 1e5
 
@@ -14,12 +14,12 @@ class Programme:
     name: str
     role: str
     case: Case
-    p1: float = 12.54 * BAR
-    """Supply pressure at the start [Pa absolute]; the value behind Tables 8 and 9."""
-    p2: float = 6.81 * BAR
-    """Circuit pressure at the start [Pa absolute]; the value behind Tables 8 and 9."""
-    U_on: float = 18.9
-    """Voltage of the energised coil [V]; the value behind Tables 8 and 9."""
+    p1: float = SUPPLY
+    """Supply pressure at the start [Pa absolute]."""
+    p2: float = CIRCUIT
+    """Circuit pressure at the start [Pa absolute]."""
+    U_on: float = VOLTAGE
+    """Voltage of the energised coil [V]."""
 
 
 REST = Case(name="Rest", openings=(), duration=5.0)

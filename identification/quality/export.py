@@ -17,7 +17,7 @@ def as_json(quality: Quality) -> dict[str, Any]:
         "samples": quality.samples,
         "period_s": quality.period,
         "at_rest": quality.at_rest,
-        "sensor_offsets_SI": {name: asdict(o) for name, o in sensor_offsets(quality).items()},
+        "sensor_offsets_SI": {n: _finite(asdict(o)) for n, o in sensor_offsets(quality).items()},
         "channels": {name: _channel(quality, name) for name in CHANNELS},
         "correlations": [
             {

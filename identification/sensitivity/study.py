@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from epv_env.plant.equations import State
 from epv_env.plant.simulate import Trajectory, energised, simulate
-from identification.cases import CALIBRATION_CASES, RATE, Case
+from identification.cases import CALIBRATION_CASES, CIRCUIT, RATE, SUPPLY, VOLTAGE, Case
 from identification.error import partial_error, relative_error, total_error
 from identification.recordings.recording import OUTPUTS
 
@@ -28,11 +28,11 @@ class Simulator(Protocol):
 class Conditions:
     """What the report does not print about its study; the values are fitted to Tables 8 and 9."""
 
-    p1: float = 12.54e5
+    p1: float = SUPPLY
     """Input chamber pressure, constant [Pa absolute]."""
-    p2: float = 6.81e5
+    p2: float = CIRCUIT
     """Output chamber pressure at the start [Pa absolute]."""
-    U_on: float = 18.9
+    U_on: float = VOLTAGE
     """Voltage that holds the armature [V]."""
     cases: tuple[Case, ...] = CALIBRATION_CASES
 

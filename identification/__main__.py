@@ -1,0 +1,183 @@
+"""Identification from the command line: `python -m identification COMMAND --help`."""
+
+import argparse
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from threadpoolctl import threadpool_limits
+
+from epv_env.plant.commandline import fail_clearly, writable_folder
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.plantfile import load_plant, save_plant
+from identification.bench.programmes import SUITES
+from identification.bench.session import run_bench
+from identification.calibration.calibrate import STARTS
+from identification.cases import RATE
+from identification.confidence.coverage import CAMPAIGNS, coverage_study
+from identification.confidence.section import coverage_json, coverage_section
+from identification.recordings.files import read_campaign, write_campaign
+from identification.report.results import as_text, write_results
+from identification.reproduce.reproduce import reproduce
+from identification.run import PLANT_FILE, run
+from identification.stages import STAGES, Identification
+
+JOURNAL = "searches.jsonl"
+
+HELP = {
+    "quality": "is the data good enough (section 4)",
+    "sensitivity": "which parameters matter (section 5)",
+    "calibrate": "fit the parameters (section 6.2)",
+    "confidence": "how sure the estimates are (section 6.3)",
+    "validate": "does the model hold on held-out recordings (section 7)",
+}
+
+
+def parse(arguments: list[str] | None) -> argparse.Namespace:
+    """The command line's options, checked."""
+    parser = argparse.ArgumentParser(
+        prog="python -m identification",
+        description="Identify the valve from a campaign of recordings (docs/identification.md).",
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    _add_bench(commands)
+    for stage in STAGES:
+        _add_stage(commands, stage, HELP[stage])
+    _add_stage(commands, "run", "all of these: plant.json and report.html")
+    _add_coverage(commands)
+    _add_reproduce(commands)
+    chosen = parser.parse_args(arguments)
+    for name in ("starts", "campaigns", "workers"):
+        if (getattr(chosen, name, None) or 1) < 1:
+            parser.error(f"--{name} must be at least 1")
+    if getattr(chosen, "seed", 0) < 0:
+        parser.error("--seed must not be negative")
+    return chosen
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run one command; returns the exit status."""
+    chosen = parse(arguments)
+    # The matrices are small: threads of the linear algebra would only wait for each other.
+    with threadpool_limits(1):
+        COMMANDS.get(chosen.command, _stage)(chosen)
+    return 0
+
+
+def _add_stage(commands: "argparse._SubParsersAction", name: str, text: str) -> None:
+    parser = commands.add_parser(name, help=text, description=text)
+    parser.add_argument("campaign", help="folder with campaign.json and the recordings (docs/data.md)")
+    parser.add_argument("--out", type=writable_folder, required=True, help="folder of results")
+    parser.add_argument("--seed", type=int, default=0, help="of starts, draws and resampling")
+    parser.add_argument("--starts", type=int, default=STARTS, help="searches of each method")
+
+
+def _add_bench(commands: "argparse._SubParsersAction") -> None:
+    text = "write a campaign of a virtual bench whose truth is known"
+    parser = commands.add_parser("bench", help=text, description=text)
+    parser.add_argument("--out", type=writable_folder, required=True, help="folder of the campaign")
+    parser.add_argument("--seed", type=int, default=0, help="of the sensors' noise")
+    parser.add_argument("--suite", choices=SUITES, default="report", help="which recordings")
+    parser.add_argument("--rate", type=float, default=RATE, help="samples per second")
+    parser.add_argument("--plant", default=None, help="plant file of the truth; default: Table 12")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="SYMBOL=VALUE", help="another true value [SI]"
+    )
+    parser.add_argument("--truth", type=Path, default=None, help="plant file to write the truth to")
+
+
+def _add_coverage(commands: "argparse._SubParsersAction") -> None:
+    text = "how often the intervals hold the truth, over twin campaigns"
+    parser = commands.add_parser("coverage", help=text, description=text)
+    parser.add_argument("--out", type=writable_folder, required=True, help="folder of results")
+    parser.add_argument("--campaigns", type=int, default=CAMPAIGNS, help="number of twin campaigns")
+    parser.add_argument("--seed", type=int, default=0, help="of the campaigns' noise")
+    parser.add_argument("--workers", type=int, default=None, help="processes; default: all cores")
+
+
+def _add_reproduce(commands: "argparse._SubParsersAction") -> None:
+    text = "the report's tables beside ours"
+    parser = commands.add_parser("reproduce", help=text, description=text)
+    parser.add_argument("--out", type=writable_folder, required=True, help="folder of results")
+    parser.add_argument("--seed", type=int, default=0, help="of the virtual bench's noise")
+
+
+def _bench(chosen: argparse.Namespace) -> None:
+    truth = _with_values(load_plant(chosen.plant).parameters, chosen.set)
+    campaign = run_bench(SUITES[chosen.suite], truth, seed=chosen.seed, rate=chosen.rate)
+    write_campaign(campaign, chosen.out)
+    if chosen.truth is not None:
+        plant = load_plant(chosen.plant)
+        save_plant(
+            type(plant)(parameters=truth, region=type(plant.region)(centre=truth), name="truth"),
+            chosen.truth,
+        )
+    print(f"{len(campaign.recordings)} recordings in {chosen.out}")
+
+
+def _with_values(parameters: Parameters, settings: list[str]) -> Parameters:
+    """Parameters with SYMBOL=VALUE settings applied. Raises ValueError for what is not of that form."""
+    changes = {}
+    for setting in settings:
+        symbol, _, text = setting.partition("=")
+        try:
+            changes[symbol] = float(text)
+        except ValueError:
+            raise ValueError(
+                f"--set {setting}: give SYMBOL=VALUE with a number in SI units, as in --set R=43.5"
+            ) from None
+    return parameters.replace(**changes)
+
+
+def _stage(chosen: argparse.Namespace) -> None:
+    result = STAGES[chosen.command](_identification(chosen))
+    title = f"{chosen.command}: {chosen.campaign}"
+    write_results(
+        chosen.out, chosen.command, title=title, sections=result.sections, content=result.content
+    )
+    print(as_text(result.sections))
+    print(f"\nwritten: {chosen.out / chosen.command}.html and .json")
+
+
+def _identification(chosen: argparse.Namespace) -> Identification:
+    campaign = read_campaign(chosen.campaign)
+    return Identification(campaign, chosen.out / JOURNAL, seed=chosen.seed, starts=chosen.starts)
+
+
+def _run(chosen: argparse.Namespace) -> None:
+    plant = run(_identification(chosen), chosen.out)
+    for symbol in plant.region.symbols:
+        print(f"{symbol:8} {plant.parameters[symbol]:.7g}")
+    print(f"written: {chosen.out / PLANT_FILE}, {chosen.out}/report.html and report.json")
+
+
+def _coverage(chosen: argparse.Namespace) -> None:
+    found = coverage_study(
+        journal=chosen.out / "coverage.jsonl",
+        campaigns=chosen.campaigns,
+        seed=chosen.seed,
+        workers=chosen.workers,
+    )
+    section = coverage_section(found)
+    write_results(
+        chosen.out, "coverage", title=section.title, sections=[section], content=coverage_json(found)
+    )
+    print(as_text([section]))
+
+
+def _reproduce(chosen: argparse.Namespace) -> None:
+    sections = reproduce(chosen.out, seed=chosen.seed)
+    print(as_text(sections))
+    print(f"\nwritten: {chosen.out}/reproduce.json and reproduce.html")
+
+
+COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {
+    "bench": _bench,
+    "run": _run,
+    "coverage": _coverage,
+    "reproduce": _reproduce,
+}
+"""Commands that are not one stage."""
+
+if __name__ == "__main__":
+    sys.exit(fail_clearly(main))
