@@ -41,7 +41,8 @@ def region(confidence: Confidence) -> Figure:
     figure = Figure(figsize=(9, 6), layout="constrained")
     for axes, pair in zip(_panels(figure, len(pairs)), pairs, strict=False):
         _pair(axes, confidence, pair)
-    figure.axes[0].legend(fontsize="x-small", loc="best")
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize="small")
     return figure
 
 

@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 from identification.recordings.recording import OUTPUTS, UNITS
 from identification.replay.responses import Response
 
-MEASURED = {"color": "tab:gray", "linewidth": 0.8, "label": "measured"}
-MODEL = {"color": "tab:red", "linewidth": 1.0, "label": "model"}
+MEASURED = {"color": "tab:blue", "alpha": 0.35, "linewidth": 3.0, "label": "measured"}
+MODEL = {"color": "tab:red", "linewidth": 0.8, "label": "model"}
 
 
 def overlay(answer: Response) -> Figure:

@@ -16,10 +16,10 @@ from identification.stages import Identification
 
 LIMITS = (
     "The measured data behind Tables 11, 13 and 15 was never published. The virtual bench obeys the "
-    "model, so calibration takes its errors down to the sensors' noise; the report's 6.6 % (mostly of the "
-    "current) cannot come back: it is what the real valve did and the model does not. Table 14's "
-    "intervals are of that bench too. Tables 2 to 4 are reproduced in kind: the bench's sensors have the "
-    "printed offsets, trends and standard deviations, and normal, white, independent noise."
+    "model, so calibration takes its errors down to the sensors' noise; the report's 6.6 % (mostly of "
+    "the current) cannot come back: it is what the real valve did and the model does not. Table 14's "
+    "intervals are of that bench too. Tables 2 to 4 are reproduced in kind: the bench's sensors have "
+    "the printed offsets, trends and standard deviations, and normal, white, independent noise."
 )
 
 
@@ -73,8 +73,8 @@ def _recovered(identification: Identification) -> Verdict:
     inside = distance <= confidence.chi_square
     return Verdict(
         status="good" if inside else "doubt",
-        text=f"Table 12, the truth, lies {'inside' if inside else 'outside'} the joint 95 % region of the "
-        f"estimate (squared distance {distance:.3g}, limit {confidence.chi_square:.3g}); the region "
+        text=f"Table 12, the truth, lies {'inside' if inside else 'outside'} the joint 95 % region of "
+        f"the estimate (squared distance {distance:.3g}, limit {confidence.chi_square:.3g}); the region "
         "misses the truth once in twenty campaigns.",
     )
 

@@ -75,7 +75,7 @@ def _separability(found: Sensitivities) -> list[Verdict]:
             f"below {CRITICAL:g} data can tell them apart.",
         ),
         Verdict(
-            status="good" if sensitive < CRITICAL else "bad",
+            status="good" if sensitive < CRITICAL else "note",
             text=f"All {len(sensitive_symbols())} sensitive ones together: {_index(sensitive)}. "
             f"{len(pairs)} pairs cannot be told apart, first "
             f"{' and '.join(f'{a}, {b}' for a, b, _ in pairs[:2])}, which act by their ratio alone.",
