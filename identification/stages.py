@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -60,7 +61,10 @@ class Identification:
         return calibrate(
             self.problem,
             journal=self.journal,
-            subject={"recordings": self.hashes},
+            subject={
+                "software": version("epv-valve"),
+                "recordings": {r.name: r.digest() for r in self.campaign.recordings},
+            },
             starts=self.starts,
             seed=self.seed,
         )

@@ -1,5 +1,6 @@
 """Recordings of a bench in SI units: what every stage of the identification works on."""
 
+import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -63,6 +64,13 @@ class Recording:
     def energised(self) -> NDArray:
         """Whether the coil is on: U above half its greatest value, boolean (samples,)."""
         return 0.5 * np.max(self.U) < self.U
+
+    def digest(self) -> str:
+        """SHA-256 of what was measured, the same whether it was read from a file or not."""
+        found = hashlib.sha256(repr((self.role, self.period)).encode())
+        for name in (*CHANNELS, "sigma_S"):
+            found.update(np.ascontiguousarray(getattr(self, name), dtype=float).tobytes())
+        return found.hexdigest()
 
     def channel(self, name: str) -> NDArray:
         """One of CHANNELS [SI units]."""

@@ -121,7 +121,7 @@ def _rows(number: str, answers: Sequence[Response]) -> list[list[str]]:
     rows = []
     for answer, (case, errors) in zip(answers, printed.items(), strict=True):
         cells = [percent(error) for error in answer.errors.values()]
-        rows.append([number, case, *cells, percent(answer.partial), f"{errors['eps_partial']:.4f}"])
+        rows.append([number, case, *cells, percent(answer.partial), f"{errors['partial']:.4f}"])
     if len(answers) > 1:
         total_printed = f"{printed_total(int(number)):.4f}"
         rows.append([number, "eps_total", "", "", "", percent(total(answers)), total_printed])
