@@ -16,7 +16,7 @@ from identification.calibration.calibrate import STARTS
 from identification.cases import RATE
 from identification.confidence.coverage import CAMPAIGNS, coverage_study
 from identification.confidence.section import coverage_json, coverage_section
-from identification.recordings.files import read_campaign, write_campaign
+from identification.recordings.files import check_vacant, read_campaign, write_campaign
 from identification.report.results import as_text, write_results
 from identification.reproduce.reproduce import reproduce
 from identification.run import PLANT_FILE, run
@@ -48,7 +48,8 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     _add_reproduce(commands)
     chosen = parser.parse_args(arguments)
     for name in ("starts", "campaigns", "workers"):
-        if (getattr(chosen, name, None) or 1) < 1:
+        value = getattr(chosen, name, None)
+        if value is not None and value < 1:
             parser.error(f"--{name} must be at least 1")
     if getattr(chosen, "seed", 0) < 0:
         parser.error("--seed must not be negative")
@@ -103,6 +104,7 @@ def _add_reproduce(commands: "argparse._SubParsersAction") -> None:
 
 
 def _bench(chosen: argparse.Namespace) -> None:
+    check_vacant(chosen.out)
     truth = _with_values(load_plant(chosen.plant).parameters, chosen.set)
     campaign = run_bench(SUITES[chosen.suite], truth, seed=chosen.seed, rate=chosen.rate)
     write_campaign(campaign, chosen.out)

@@ -59,8 +59,8 @@ def _other_minima(method: str, fits: list[Fit]) -> list[str]:
     others = [fit.error for fit, reached in zip(fits, same, strict=True) if not reached]
     first = "" if same[0] else "; the usual start (Table 10) is among those that do not"
     return [
-        f"{method}: {np.sum(same)} of {len(fits)} starts reach the least error {best(fits).error:.4g}, "
-        f"the others end at {min(others):.4g} or more{first}: there are other local minima"
+        f"{method}: {np.sum(same)} of {len(fits)} starts reach the least error {best(fits).error:.6g}, "
+        f"the others end at {min(others):.6g} or more{first}: there are other local minima"
     ]
 
 

@@ -43,6 +43,13 @@ def read_campaign(folder: str | PathLike[str]) -> Campaign:
     )
 
 
+def check_vacant(folder: Path) -> None:
+    """Raise CampaignError if the folder holds a campaign already."""
+    path = folder / FILE_NAME
+    if os.path.lexists(path):
+        raise CampaignError(f"{path} exists already: write to another folder, or remove that campaign")
+
+
 def write_campaign(campaign: Campaign, folder: str | PathLike[str]) -> None:
     """Write a campaign that `read_campaign` takes; its JSON last, so that a part of one is none.
 
@@ -50,16 +57,14 @@ def write_campaign(campaign: Campaign, folder: str | PathLike[str]) -> None:
     before anything is written, if the folder holds a campaign already or a recording breaks a rule.
     """
     folder = Path(folder)
-    path = folder / FILE_NAME
-    if os.path.lexists(path):
-        raise CampaignError(f"{path} exists already: write to another folder, or remove that campaign")
+    check_vacant(folder)
     content = manifest_content(campaign)
     check_manifest(folder, content)
     for recording in campaign.recordings:
         _check_writable(folder / f"{recording.name}.csv", recording, campaign.pressure)
     for recording in campaign.recordings:
         write_text(folder / f"{recording.name}.csv", _csv(_columns(recording)))
-    write_text(path, json.dumps(content, indent=1) + "\n")
+    write_text(folder / FILE_NAME, json.dumps(content, indent=1) + "\n")
 
 
 def _read_recording(path: Path, role: str, ambient: float) -> Recording:

@@ -1,0 +1,54 @@
+"""Draw the figures of docs/identification.md from a virtual bench.
+
+python docs/pictures.py --out docs/images --coverage runs/coverage
+"""
+
+import argparse
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from matplotlib.figure import Figure
+
+from epv_env.plant.commandline import fail_clearly, writable_folder
+from epv_env.plant.parameters import Parameters
+from identification.bench.programmes import REPORT_SUITE
+from identification.bench.session import run_bench
+from identification.calibration.starts import METHODS
+from identification.confidence import figures
+from identification.confidence.coverage import coverage_study
+from identification.report.response_figures import overlay
+from identification.stages import Identification
+
+
+def drawn(coverage: Path, campaigns: int) -> dict[str, Figure]:
+    """Figures by file name; the coverage study's journal lies in the folder `coverage`."""
+    campaign = run_bench(REPORT_SUITE, Parameters.calibrated(), seed=0)
+    with TemporaryDirectory() as folder:
+        identification = Identification(campaign, Path(folder) / "searches.jsonl", starts=1)
+        study = coverage_study(journal=coverage / "coverage.jsonl", campaigns=campaigns)
+        return {
+            "calibration.png": overlay(identification.calibration.after[METHODS[0]][0]),
+            "region.png": figures.region(identification.confidence),
+            "coverage.png": figures.distances(study),
+        }
+
+
+def main() -> int:
+    """Draw and write; returns the exit status."""
+    parser = argparse.ArgumentParser(description="Draw the figures of docs/identification.md.")
+    parser.add_argument("--out", type=writable_folder, required=True, help="folder of the pictures")
+    parser.add_argument(
+        "--coverage", type=writable_folder, required=True, help="folder of a coverage study, resumed"
+    )
+    parser.add_argument("--campaigns", type=int, default=200, help="of the coverage study")
+    chosen = parser.parse_args()
+    found = drawn(chosen.coverage, chosen.campaigns)
+    chosen.out.mkdir(parents=True, exist_ok=True)
+    for name, figure in found.items():
+        figure.savefig(chosen.out / name, dpi=100, bbox_inches="tight")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(fail_clearly(main))

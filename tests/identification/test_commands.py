@@ -1,0 +1,156 @@
+"""The command line as a user meets it: files written, refusals, the same again, on to the env."""
+
+import json
+import re
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+
+import epv_env  # noqa: F401 - registers the environments
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.plantfile import load_plant
+from identification.__main__ import main
+from identification.calibration import starts
+from identification.recordings.files import read_campaign
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    """The report's recordings from a virtual bench, with another resistance than Table 12's."""
+    folder = tmp_path_factory.mktemp("bench") / "campaign"
+    truth = folder.parent / "truth.json"
+    arguments = ["--out", str(folder), "--seed", "3", "--set", "R=43", "--truth", str(truth)]
+    assert main(["bench", *arguments]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def finished(campaign, tmp_path_factory):
+    """A folder in which `run` has worked on it."""
+    out = tmp_path_factory.mktemp("run")
+    assert main(["run", str(campaign), "--out", str(out), "--starts", "2"]) == 0
+    return out
+
+
+def test_the_bench_writes_a_campaign_and_keeps_its_truth_elsewhere(campaign):
+    recordings = read_campaign(campaign).recordings
+    roles = [recording.role for recording in recordings]
+    assert roles == ["calibration"] * 4 + ["validation", "quality"]
+    assert load_plant(campaign.parent / "truth.json").parameters == Parameters.calibrated().replace(R=43)
+    assert "43" not in (campaign / "campaign.json").read_text()
+
+
+def test_run_finds_the_truth_and_says_so(finished):
+    plant = load_plant(finished / "plant.json")
+    assert plant.parameters["R"] == pytest.approx(43, rel=1e-3)
+    content = json.loads((finished / "report.json").read_text())
+    assert content["validation"]["errors_percent"]["validation"]["eps_partial"] < 1
+    assert set(content) >= {"quality", "sensitivity", "calibration", "confidence", "validation"}
+    assert len(plant.provenance["recordings_sha256"]["test1"]) == 64
+
+
+def test_the_report_needs_no_other_file(finished):
+    page = (finished / "report.html").read_text()
+    sources = re.findall(r'(?:src|href)="([^"]{0,20})', page)
+    assert len(sources) > 10
+    assert all(source.startswith("data:image/png") for source in sources)
+    assert page.index("Verdicts") < page.index("<figure>")
+
+
+def test_the_environment_draws_its_plants_from_the_joint_region(finished):
+    region = load_plant(finished / "plant.json").region
+    made = gymnasium.make("EPValve-v0", plant=finished / "plant.json", parameters="confidence")
+    env: Any = made.unwrapped
+    drawn = []
+    for seed in range(40):
+        env.reset(seed=seed)
+        drawn.append([env.task.parameters[0][symbol] for symbol in region.symbols])
+    apart = np.array(drawn) - [region.centre[symbol] for symbol in region.symbols]
+    assert region.covariance is not None
+    scale = np.sqrt(np.diag(region.covariance))
+    correlation = region.covariance / np.outer(scale, scale)
+    scaled = apart / scale
+    distances = np.einsum("ni,ij,nj->n", scaled, np.linalg.inv(correlation), scaled)
+    assert len(np.unique(distances)) == 40
+    assert np.max(distances) <= region.chi_square * (1 + 1e-9)
+    assert np.max(distances) > 0.5 * region.chi_square
+
+
+def test_a_second_run_gives_the_same_plant_and_searches_nothing(finished, campaign, monkeypatch):
+    before = (finished / "plant.json").read_bytes()
+
+    def search(*_):
+        raise AssertionError("a finished search was done again")
+
+    monkeypatch.setattr(starts, "nelder_mead", search)
+    monkeypatch.setattr(starts, "weighted_least_squares", search)
+    arguments = [str(campaign), "--out", str(finished), "--starts", "2"]
+    assert main(["confidence", *arguments]) == 0
+    assert (finished / "plant.json").read_bytes() == before
+    with pytest.raises(AssertionError, match="done again"):  # another seed has other starts
+        main(["calibrate", *arguments, "--seed", "1"])
+
+
+def test_a_campaign_that_lacks_recordings_is_still_identified(campaign, tmp_path):
+    folder = tmp_path / "four"
+    folder.mkdir()
+    content = json.loads((campaign / "campaign.json").read_text())
+    content["recordings"] = [r for r in content["recordings"] if r["role"] == "calibration"]
+    (folder / "campaign.json").write_text(json.dumps(content))
+    for recording in content["recordings"]:
+        (folder / recording["file"]).write_bytes((campaign / recording["file"]).read_bytes())
+    with pytest.raises(ValueError, match="no recording with role 'quality'"):
+        main(["quality", str(folder), "--out", str(tmp_path / "out")])
+    with pytest.raises(ValueError, match="no recording with role 'validation'"):
+        main(["validate", str(folder), "--out", str(tmp_path / "out"), "--starts", "1"])
+    assert main(["calibrate", str(folder), "--out", str(tmp_path / "out"), "--starts", "1"]) == 0
+    page = (tmp_path / "out" / "calibrate.html").read_text()
+    assert "No record at rest shows the sensors" in page
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["bench", "--set", "R=abc"], "give SYMBOL=VALUE with a number"),
+        (["bench", "--set", "R"], "give SYMBOL=VALUE with a number"),
+        (["bench", "--set", "Q=3"], "unknown parameter 'Q'"),
+        (["bench", "--set", "R=1"], "outside its domain"),
+        (["bench", "--rate", "100"], "sampling rate 100"),
+        (["bench", "--plant", "/no/plant.json"], "cannot read plant file"),
+        (["quality", "/no/campaign"], "cannot be read"),
+        (["run", "/no/campaign"], "cannot be read"),
+    ],
+)
+def test_a_wrong_value_is_refused_in_one_sentence(arguments, message, tmp_path):
+    with pytest.raises(ValueError, match=message):
+        main([*arguments, "--out", str(tmp_path / "out")])
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["calibrate", "campaign", "--starts", "0"],
+        ["coverage", "--campaigns", "0"],
+        ["coverage", "--workers", "0"],
+        ["bench", "--seed", "-1"],
+        ["bench", "--suite", "none"],
+        ["nothing"],
+        [],
+    ],
+)
+def test_a_wrong_option_is_refused_with_the_usage(arguments, tmp_path, capsys):
+    with pytest.raises(SystemExit) as refusal:
+        main([*arguments, "--out", str(tmp_path / "out")])
+    assert refusal.value.code == 2
+    assert "error:" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_bench_does_not_write_over_a_campaign(campaign):
+    before = (campaign / "test1.csv").read_bytes()
+    with pytest.raises(ValueError, match="exists already"):
+        main(["bench", "--out", str(campaign), "--seed", "4"])
+    assert (campaign / "test1.csv").read_bytes() == before
