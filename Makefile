@@ -10,7 +10,7 @@ PACKAGES := epv_env identification controllers training
 
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help venv train test test-oldest bench tune tradeoff gif lint check format wheel clean
+.PHONY: help venv train test test-oldest identify pictures bench tune tradeoff gif lint check format wheel clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z][a-z-]*\):.*## /\1	/p' Makefile | while IFS='	' read -r name text; do \
@@ -58,6 +58,14 @@ tune: $(VENV)/.installed ## search the classic controllers' settings anew (minut
 
 tradeoff: $(VENV)/.installed ## switching against excursion at several prices (half an hour)
 	$(PY) training/tradeoff.py $(ARGS)
+
+identify: $(VENV)/.installed ## calibrate a plant on a virtual bench's recordings, with a report
+	rm -rf runs/bench
+	$(PY) -m identification bench --out runs/bench
+	$(PY) -m identification run runs/bench --out runs/identification $(ARGS)
+
+pictures: $(VENV)/.installed ## draw the figures of docs/identification.md
+	$(PY) docs/pictures.py --out docs/images --coverage runs/coverage $(ARGS)
 
 gif: $(VENV)/.installed ## film the valve for the README
 	SDL_VIDEODRIVER=dummy $(PY) docs/film.py --out docs/images/valve.gif $(ARGS)

@@ -19,6 +19,8 @@ from identification.quality.section import quality_section
 from identification.recordings.recording import Campaign, CampaignError
 from identification.report.page import Section, Verdict
 from identification.sensitivity import export as sensitivity_export
+from identification.sensitivity.collinearity import sensitivities_on_recordings
+from identification.sensitivity.one_at_a_time import studied_symbols
 from identification.sensitivity.results import run_study
 from identification.sensitivity.section import sensitivity_section
 from identification.validation.section import validation_json, validation_section
@@ -96,8 +98,11 @@ def quality(identification: Identification) -> Result:
 
 
 def sensitivity(identification: Identification) -> Result:
-    """Section 5, at the report's conditions; it needs no recordings."""
-    study = run_study(seed=identification.seed)
+    """Section 5 at the report's conditions, and what the campaign's own recordings can separate."""
+    problem = identification.problem
+    replay = problem.least_squares().replay
+    outputs = sensitivities_on_recordings(replay, studied_symbols(), problem.noise)
+    study = run_study(outputs=outputs, seed=identification.seed)
     return Result(
         sections=[sensitivity_section(study)],
         content={"sensitivity": sensitivity_export.as_json(study)},

@@ -12,7 +12,9 @@ pytest.importorskip("stable_baselines3")
 pytestmark = pytest.mark.training
 
 ROOT = Path(__file__).parents[1]
-PAGES = ("README.md", "docs/env.md", "docs/data.md")
+PAGES = ("README.md", "docs/env.md", "docs/data.md", "docs/identification.md")
+OTHERS = ("docs/model.md", "docs/controllers.md", "docs/quality.md", "docs/sensitivity.md")
+"""Pages without examples."""
 HEADLESS = {**os.environ, "SDL_VIDEODRIVER": "dummy"}
 
 
@@ -37,7 +39,7 @@ def test_the_examples_of_a_page_run(page, tmp_path):
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("page", [*PAGES, "docs/model.md", "docs/controllers.md"])
+@pytest.mark.parametrize("page", [*PAGES, *OTHERS])
 def test_links_lead_somewhere(page):
     text = (ROOT / page).read_text(encoding="utf-8")
     for link in re.findall(r"\]\(([^)#]+)[^)]*\)", text):
@@ -50,3 +52,12 @@ def test_the_film_in_its_shortest_form(tmp_path):
     done = run(sys.executable, ROOT / "docs/film.py", "--seconds", "0.05", "--out", out, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert out.read_bytes()[:3] == b"GIF"
+
+
+def test_the_pictures_of_the_identification_in_their_shortest_form(tmp_path):
+    options = ("--coverage", tmp_path / "coverage", "--campaigns", "2")
+    done = run(sys.executable, ROOT / "docs/pictures.py", "--out", tmp_path, *options, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    names = {path.name for path in tmp_path.glob("*.png")}
+    assert names == {"calibration.png", "region.png", "coverage.png"}
+    assert names <= {path.name for path in (ROOT / "docs/images").iterdir()}

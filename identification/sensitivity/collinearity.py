@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from epv_env.plant.parameters import table
 from epv_env.plant.sensors import SENSORS
 from identification.recordings.recording import OUTPUTS, UNITS
+from identification.replay.model import Replay
 from identification.sensitivity.study import STUDY, Conditions, outputs, run_cases
 
 STEP = 2e-3
@@ -38,6 +39,8 @@ class Sensitivities:
     symbols: tuple[str, ...]
     columns: NDArray
     """Change of each output sample for a change by CHANGE, (samples, parameters)."""
+    where: str = "the outputs"
+    """What the samples are of."""
 
     def of(self, symbols: Sequence[str]) -> NDArray:
         """The columns of some parameters."""
@@ -89,17 +92,39 @@ def stepped(symbol: str, value: float) -> NDArray:
 def sensitivities_of_outputs(
     nominal: Mapping[str, float], symbols: Sequence[str], conditions: Conditions = STUDY
 ) -> Sensitivities:
-    """Central differences of p2, p3 and I in all test cases, all variants in one batch.
+    """How p2, p3 and I respond in the report's test cases, in units of Table 3's noise.
 
-    Each output is divided by its sensor's noise (Table 3). Raises SimulationError.
+    Raises SimulationError.
     """
+    runs = run_cases(_both_ways(nominal, symbols), conditions)
+    noise = {name: SENSORS[name].noise * UNITS[name][1] for name in OUTPUTS}
+    found = [np.stack(outputs(run)) for run in runs]
+    return _central_differences(symbols, found, noise, "the report's test cases")
+
+
+def sensitivities_on_recordings(
+    replay: Replay, symbols: Sequence[str], noise: Mapping[str, float]
+) -> Sensitivities:
+    """How the outputs respond on recorded inputs, in units of the measured noise by output [SI]."""
+    found = replay.outputs(_both_ways(replay.base, symbols))
+    return _central_differences(symbols, found, noise, "the calibration recordings")
+
+
+def _both_ways(nominal: Mapping[str, float], symbols: Sequence[str]) -> dict[str, NDArray]:
+    """Parameters by symbol (2 symbols,): each symbol one STEP down and up, the others nominal."""
     p = {symbol: np.full(2 * len(symbols), value) for symbol, value in nominal.items()}
     for row, symbol in enumerate(symbols):
         p[symbol][2 * row : 2 * row + 2] = stepped(symbol, nominal[symbol])
-    noise = [SENSORS[name].noise * UNITS[name][1] for name in OUTPUTS]
-    rows = [
-        (y[:, 1::2] - y[:, ::2]) * CHANGE / (2 * STEP * deviation)
-        for run in run_cases(p, conditions)
-        for y, deviation in zip(outputs(run), noise, strict=True)
+    return p
+
+
+def _central_differences(
+    symbols: Sequence[str], found: Sequence[NDArray], noise: Mapping[str, float], where: str
+) -> Sensitivities:
+    """found: per test case the outputs (3, samples, 2 symbols) of `_both_ways`."""
+    deviation = np.array([noise[name] for name in OUTPUTS])[:, None, None]
+    columns = [
+        ((y[..., 1::2] - y[..., ::2]) * CHANGE / (2 * STEP * deviation)).reshape(-1, len(symbols))
+        for y in found
     ]
-    return Sensitivities(symbols=tuple(symbols), columns=np.concatenate(rows))
+    return Sensitivities(symbols=tuple(symbols), columns=np.concatenate(columns), where=where)

@@ -35,6 +35,7 @@ def _row(row: Sensitivity) -> dict[str, Any]:
 
 def _collinearity(found: Sensitivities) -> dict[str, Any]:
     return {
+        "of": found.where,
         "effect_noise_sd": dict(zip(found.symbols, found.effect.tolist(), strict=True)),
         "critical_index": CRITICAL,
         "inseparable_pairs": [[a, b, _finite(index)] for a, b, index in found.inseparable_pairs()],

@@ -67,17 +67,22 @@ def run_one_at_a_time(nominal: Mapping[str, float] | None = None) -> OneAtATime:
 def run_study(
     nominal: Mapping[str, float] | None = None,
     *,
+    outputs: Sensitivities | None = None,
     trajectories: int = TRAJECTORIES,
     samples: int = SAMPLES,
     seed: int = SEED,
 ) -> SensitivityStudy:
-    """All studies; trajectories, samples: size of Morris's and Sobol's designs."""
+    """All studies.
+
+    outputs: how the outputs respond on recordings; None: in the report's test cases. trajectories,
+    samples: size of Morris's and Sobol's designs.
+    """
     p = nominal or Parameters.nominal()
     symbols = studied_symbols()
     model, bounds = total_error_model(p, symbols), ranges(p, symbols)
     return SensitivityStudy(
         one_at_a_time=run_one_at_a_time(p),
-        outputs=sensitivities_of_outputs(p, symbols),
+        outputs=outputs or sensitivities_of_outputs(p, symbols),
         screening=screen(model, symbols, bounds, trajectories=trajectories, seed=seed),
         indices=sobol_indices(model, symbols, bounds, samples=samples, seed=seed),
     )

@@ -39,7 +39,7 @@ def sensitivity_section(study: SensitivityStudy) -> Section:
             _pairs(study.outputs),
             Picture(
                 figure=figures.collinearity_map(study.outputs),
-                caption="Collinearity of pairs of parameters in p2, p3 and I of the four test cases, "
+                caption=f"Collinearity of pairs of parameters in p2, p3 and I of {study.outputs.where}, "
                 "weighted by the sensors' noise (Brun et al. 2001).",
             ),
             Picture(

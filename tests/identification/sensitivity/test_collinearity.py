@@ -6,12 +6,18 @@ import numpy as np
 import pytest
 
 from epv_env.plant.parameters import Parameters, confidence_intervals, sensitive_symbols
+from epv_env.plant.sensors import SENSORS
+from identification.cases import CALIBRATION_CASES, CIRCUIT, RATE, SUPPLY, VOLTAGE
+from identification.recordings.recording import OUTPUTS, UNITS
+from identification.replay.drive import Drive
+from identification.replay.model import Replay
 from identification.sensitivity.collinearity import (
     CRITICAL,
     Sensitivities,
     collinearity_index,
     cosines,
     sensitivities_of_outputs,
+    sensitivities_on_recordings,
 )
 from identification.sensitivity.one_at_a_time import studied_symbols
 
@@ -69,3 +75,26 @@ def test_effects_do_not_depend_on_the_size_of_the_differences(monkeypatch):
     monkeypatch.setattr("identification.sensitivity.collinearity.STEP", 1e-3)
     finer = sensitivities_of_outputs(Parameters.nominal(), studied_symbols())
     assert finer.effect == pytest.approx(found().effect, rel=0.01)
+
+
+def test_recordings_of_the_report_s_cases_separate_what_the_cases_do():
+    """The same inputs as recordings impose them, and a noise of half the size: twice the effects."""
+    drives = [
+        Drive(
+            period=1 / RATE,
+            U=(U := case.voltage(VOLTAGE, RATE)),
+            p1=np.full(len(U), SUPPLY),
+            sigma_S=np.zeros(len(U)),
+            U_start=VOLTAGE,
+            p2_start=CIRCUIT,
+        )
+        for case in CALIBRATION_CASES
+    ]
+    symbols = ("alphaMV", "V3", "R")
+    noise = {name: 0.5 * SENSORS[name].noise * UNITS[name][1] for name in OUTPUTS}
+    replay = Replay(drives, Parameters.nominal())
+    on_recordings = sensitivities_on_recordings(replay, symbols, noise)
+    in_cases = sensitivities_of_outputs(Parameters.nominal(), symbols)
+    assert on_recordings.effect == pytest.approx(2 * in_cases.effect, rel=1e-6)
+    assert on_recordings.correlation == pytest.approx(in_cases.correlation, abs=1e-6)
+    assert on_recordings.index(("alphaMV", "V3")) > 1e3

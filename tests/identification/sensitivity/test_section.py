@@ -31,7 +31,7 @@ def short_study() -> SensitivityStudy:
 def test_section_and_data(tmp_path):
     study = short_study()
     section = sensitivity_section(study)
-    assert [verdict.status for verdict in section.verdicts] == ["good", "doubt", "good", "bad", "note"]
+    assert [verdict.status for verdict in section.verdicts] == ["good", "doubt", "good", "note", "note"]
     assert sum(isinstance(block, Picture) for block in section.blocks) == 3
     write_page(tmp_path / "page.html", title="Sensitivity", sections=[section])
     data = json.loads(json.dumps(as_json(study), allow_nan=False))
