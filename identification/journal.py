@@ -1,9 +1,10 @@
 """Finished pieces of long work, kept line by line, so that an interrupted run goes on where it was."""
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+
+from epv_env.plant.files import write_text
 
 
 class Journal:
@@ -13,15 +14,15 @@ class Journal:
         """subject: everything that the results depend on. A journal of another subject starts anew."""
         self.path = path
         self._found: dict[str, Any] = {}
-        header = json.dumps({"subject": subject}, sort_keys=True)
-        lines = _complete_lines(path)
-        if next(lines, None) == header:
-            for line in lines:
-                entry = json.loads(line)
-                self._found[entry["name"]] = entry["result"]
-            return
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(header + "\n", encoding="utf-8")
+        header = json.dumps({"subject": subject}, sort_keys=True) + "\n"
+        text = path.read_text(encoding="utf-8") if path.exists() else ""
+        complete = text[: text.rfind("\n") + 1]  # the last line of a killed run may be torn
+        kept = complete if complete.startswith(header) else header
+        for line in kept.splitlines()[1:]:
+            entry = json.loads(line)
+            self._found[entry["name"]] = entry["result"]
+        if kept != text:
+            write_text(path, kept)
 
     def __contains__(self, name: str) -> bool:
         return name in self._found
@@ -37,12 +38,3 @@ class Journal:
         with self.path.open("a", encoding="utf-8") as stream:
             stream.write(json.dumps({"name": name, "result": result}) + "\n")
         self._found[name] = result
-
-
-def _complete_lines(path: Path) -> Iterator[str]:
-    """Lines of the file that end; the last one of a killed run may not."""
-    if not path.exists():
-        return
-    for line in path.read_text(encoding="utf-8").splitlines(keepends=True):
-        if line.endswith("\n"):
-            yield line[:-1]

@@ -53,7 +53,7 @@ def calibrate(
     points = starting_points(problem.vector, starts, seed)
     symbols = list(problem.vector.symbols)
     reference = dict(problem.vector.reference)
-    about = {**subject, "symbols": symbols, "reference": reference, "seed": seed}
+    about = {**subject, "symbols": symbols, "reference": reference, "seed": seed, "starts": starts}
     fits = fit_from_all(problem, points, Journal(journal, about))
     after = {
         method: responses(problem.calibration, problem.vector.parameters(best(found).z))

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from epv_env.plant.parameters import ParameterError, Parameters
+from epv_env.plant.parameters import ParameterError, Parameters, table
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.quality.assess import Offset, assess, sensor_offsets
 from identification.recordings.noise import noise_of
@@ -53,11 +53,7 @@ def calibration_problem(
     start = (start or Parameters.initial_guess()).replace(
         T_env=campaign.temperature, p_env=campaign.pressure
     )
-    zero = [symbol for symbol in symbols if start[symbol] == 0]
-    if zero:
-        raise ParameterError(
-            f"{', '.join(zero)} start at 0, from which a relative change leads nowhere: start elsewhere"
-        )
+    _check_fitted(symbols, start)
     offsets = _offsets(campaign)
     values = {name: offset.value for name, offset in offsets.items()}
     return Problem(
@@ -67,6 +63,19 @@ def calibration_problem(
         offsets=offsets,
         vector=Vector(symbols=tuple(symbols), reference=start),
     )
+
+
+def _check_fitted(symbols: Sequence[str], start: Parameters) -> None:
+    """Symbols that can be fitted exist, have a domain, and do not start at zero."""
+    free = [symbol for symbol, row in table().items() if row.domain]
+    fixed = [symbol for symbol in symbols if symbol not in free]
+    if fixed:
+        raise ParameterError(f"{', '.join(fixed)} cannot be fitted: choose from {', '.join(free)}")
+    zero = [symbol for symbol in symbols if start[symbol] == 0]
+    if zero:
+        raise ParameterError(
+            f"{', '.join(zero)} start at 0, from which a relative change leads nowhere: start elsewhere"
+        )
 
 
 def _offsets(campaign: Campaign) -> dict[str, Offset]:

@@ -16,11 +16,14 @@ METHODS = ("Nelder-Mead", "least squares")
 def starting_points(vector: Vector, count: int, seed: int) -> NDArray:
     """Scaled vectors (count, k): the reference, then a Latin hypercube over the domains.
 
-    Each symbol is spread evenly over the logarithm of its domain: RML's spans a decade.
+    Each symbol is spread evenly over the logarithm of its domain, of which RML's spans a decade; over
+    the domain itself where that holds zero.
     """
     low, high = vector.bounds.T
     draws = qmc.LatinHypercube(len(vector.symbols), rng=np.random.default_rng(seed)).random(count - 1)
-    spread = low * (high / low) ** draws
+    positive = low > 0
+    ratio = np.where(positive, high, 1.0) / np.where(positive, low, 1.0)
+    spread = np.where(positive, low * ratio**draws, low + (high - low) * draws)
     return np.vstack([vector.of(vector.reference), spread])
 
 
@@ -45,5 +48,5 @@ def best(fits: list[Fit]) -> Fit:
 
 def reached_the_best(fits: list[Fit], tolerance: float = 1e-3) -> NDArray:
     """Which searches ended within a relative `tolerance` of the best, boolean (starts,)."""
-    ends = np.array([fit.z for fit in fits])
-    return np.all(np.abs(ends / best(fits).z - 1.0) < tolerance, axis=1)
+    ends, goal = np.array([fit.z for fit in fits]), best(fits).z
+    return np.all(np.abs(ends - goal) <= tolerance * np.maximum(np.abs(goal), tolerance), axis=1)

@@ -26,7 +26,7 @@ class Vector:
     def bounds(self) -> NDArray:
         """Scaled ends of the domains (Tables 6, 7), (k, 2)."""
         domains = [table()[s].domain or (self.reference[s],) * 2 for s in self.symbols]
-        return np.array(domains) / self.scale[:, None]
+        return np.sort(np.array(domains) / self.scale[:, None], axis=1)
 
     def values(self, z: NDArray) -> dict[str, NDArray]:
         """Values by symbol [SI], each of shape (n,), for scaled vectors z (n, k)."""

@@ -7,11 +7,11 @@ import numpy as np
 
 from epv_env.plant.parameters import Parameters, confidence_intervals, table
 from identification.calibration.starts import METHODS
+from identification.printed import printed_errors, printed_total
 from identification.recordings.recording import OUTPUTS
 from identification.replay.responses import Response, responses, total
 from identification.report.error_tables import errors_as_json, percent
 from identification.report.page import Section, Table, Text, Verdict
-from identification.reproduce.report_values import printed_errors, printed_total
 from identification.stages import Identification
 
 LIMITS = (

@@ -6,13 +6,13 @@ import numpy as np
 
 from epv_env.plant.parameters import table
 from identification.error import partial_error, total_error
-from identification.recordings.recording import OUTPUTS
-from identification.reproduce.finding import DOUBT, HOLDS, SLIP, Finding, compared
-from identification.reproduce.report_values import (
+from identification.printed import (
     printed_errors,
     printed_sensitivities,
     printed_total,
 )
+from identification.recordings.recording import OUTPUTS
+from identification.reproduce.finding import DOUBT, HOLDS, SLIP, Finding, compared
 from identification.sensitivity.one_at_a_time import FACTORS, THRESHOLD
 
 ROUNDING = 1.5e-4

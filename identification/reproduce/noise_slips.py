@@ -4,10 +4,10 @@ import numpy as np
 from scipy import stats
 
 from epv_env.plant.sensors import SENSORS
+from identification.printed import correlation_matrix
 from identification.quality.reported import DESCRIPTIONS, OFFSETS, SAMPLES
 from identification.recordings.recording import CHANNELS, UNITS
 from identification.reproduce.finding import DOUBT, HOLDS, SLIP, Finding
-from identification.reproduce.report_values import correlation_matrix
 
 HALF_DIGIT = 5e-5
 """Table 3 prints standard deviations and ranges to four decimals."""

@@ -13,7 +13,7 @@ from identification.report.page import Section, Verdict
 from identification.report.results import write_results
 from identification.reproduce import slips
 from identification.reproduce.bench_tables import bench_json, bench_section
-from identification.reproduce.tables import sensitivity_tables
+from identification.sensitivity.agreement import sensitivity_tables
 from identification.sensitivity.results import run_study
 from identification.sensitivity.section import sensitivity_section
 from identification.stages import Identification

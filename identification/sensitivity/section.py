@@ -4,8 +4,8 @@ import math
 
 from epv_env.plant.parameters import confidence_intervals, sensitive_symbols, table
 from identification.report.page import Picture, Section, Table, Text, Verdict
-from identification.reproduce.tables import Agreement, agreement, percentages, printed_rows
 from identification.sensitivity import figures
+from identification.sensitivity.agreement import Agreement, agreement, percentages, printed_rows
 from identification.sensitivity.collinearity import CRITICAL, Sensitivities
 from identification.sensitivity.global_indices import Indices
 from identification.sensitivity.results import FIXED_STEP_STUDY, OneAtATime, SensitivityStudy

@@ -4,12 +4,12 @@ import json
 
 import pytest
 
+from identification.printed import printed_errors
 from identification.recordings.recording import CHANNELS
 from identification.reproduce.error_slips import recomputed_partial, recomputed_total
 from identification.reproduce.finding import DOUBT, HOLDS, SLIP, compared
 from identification.reproduce.noise_slips import signal_to_noise
 from identification.reproduce.parameter_slips import interval_position, measurement_points
-from identification.reproduce.report_values import printed_errors
 from identification.reproduce.slips import as_json, findings, findings_table, slips
 
 STATUS = {finding.where: finding.status for finding in findings()}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from epv_env.plant.parameters import Parameters, table
-from identification.reproduce.tables import percentages, printed_rows
+from identification.sensitivity.agreement import percentages, printed_rows
 from identification.sensitivity.one_at_a_time import (
     Sensitivity,
     changed_values,

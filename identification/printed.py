@@ -1,4 +1,4 @@
-"""Printed values of the report that no other file of this project holds (report_tables.json)."""
+"""Printed values of the report that no other file of this project holds (printed.json)."""
 
 import json
 from functools import cache
@@ -8,7 +8,7 @@ from typing import Any
 
 @cache
 def _data() -> dict[str, Any]:
-    path = resources.files("identification.reproduce").joinpath("report_tables.json")
+    path = resources.files("identification").joinpath("printed.json")
     return json.loads(path.read_text(encoding="utf-8"))
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from epv_env.plant.parameters import table
-from identification.reproduce.tables import (
+from identification.sensitivity.agreement import (
     agreement,
     is_reproduced,
     printed_rows,

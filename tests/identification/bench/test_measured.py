@@ -1,0 +1,111 @@
+"""The bench's sensors: Tables 1 to 3 are recovered from its records, and seeds mean what they say."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from epv_env.plant.sensors import SENSORS
+from identification.bench.campaign import OFFSETS, TRENDS, measured, measured_campaign
+from identification.bench.programmes import DIAGNOSIS_SUITE, SUITES
+from identification.recordings.files import read_campaign, write_campaign
+from identification.recordings.recording import CHANNELS, UNITS
+from tests.identification.twins import REPORT, TRUE, truth, twin
+
+
+def rest(seed=5):
+    return measured(truth("rest"), np.random.default_rng(seed))
+
+
+def line(channel, seed=5):
+    """Offset and slope at time 0, and the deviation about the line [A, V, bar] of the rest record."""
+    recording, (_, unit) = rest(seed), UNITS[channel]
+    reading = (recording.channel(channel) - truth("rest").channels[channel]) / unit
+    slope, offset = np.polyfit(recording.time, reading, 1)
+    return offset, slope, np.std(reading - offset - slope * recording.time), len(recording)
+
+
+def deviation(channel):
+    """Table 3's noise and the rounding to Table 1's steps."""
+    sensor = SENSORS[channel]
+    return np.hypot(sensor.noise, sensor.resolution / np.sqrt(12))
+
+
+@pytest.mark.parametrize("channel", CHANNELS)
+def test_offset_and_trend_of_table_2_are_in_the_rest_record(channel):
+    offset, slope, _, samples = line(channel)
+    error = deviation(channel) / np.sqrt(samples)
+    assert offset == pytest.approx(OFFSETS[channel], abs=4 * 2 * error)
+    assert slope == pytest.approx(TRENDS[channel], abs=4 * np.sqrt(12) * error / 5.0)
+
+
+@pytest.mark.parametrize("channel", ["p2", "p3", "U"])
+def test_the_offsets_are_far_enough_from_zero_to_be_noticed(channel):
+    offset, _, _, samples = line(channel)
+    assert abs(offset) > 4 * 2 * deviation(channel) / np.sqrt(samples)
+
+
+@pytest.mark.parametrize("channel", CHANNELS)
+def test_the_noise_is_table_3_s(channel):
+    assert line(channel)[2] == pytest.approx(deviation(channel), rel=0.03)
+
+
+@pytest.mark.parametrize("channel", CHANNELS)
+def test_readings_are_whole_steps_of_twelve_bits(channel):
+    sensor, unit = SENSORS[channel], UNITS[channel][1]
+    steps = (rest().channel(channel) / unit - sensor.low) / sensor.resolution
+    np.testing.assert_allclose(steps, np.rint(steps), atol=1e-6)
+    assert np.ptp(steps) >= 3
+
+
+def test_one_seed_gives_one_campaign_and_another_seed_another():
+    truths = [truth(name) for name in REPORT]
+    one, same, other = (measured_campaign(truths, TRUE, seed=seed) for seed in (1, 1, 2))
+    for a, b, c in zip(one.recordings, same.recordings, other.recordings, strict=True):
+        for channel in CHANNELS:
+            np.testing.assert_array_equal(a.channel(channel), b.channel(channel))
+            assert np.any(a.channel(channel) != c.channel(channel))
+
+
+def test_a_recording_s_noise_does_not_depend_on_how_many_others_there_are():
+    two = measured_campaign([truth(name) for name in REPORT[:2]], TRUE, seed=1)
+    for alone, among in zip(two.recordings, twin(1).recordings, strict=False):
+        np.testing.assert_array_equal(alone.p2, among.p2)
+
+
+def test_recordings_of_a_campaign_have_noise_of_their_own():
+    """The same truth twice."""
+    one, other = measured_campaign([truth("rest")] * 2, TRUE, seed=1).recordings
+    assert abs(np.corrcoef(one.p3, other.p3)[0, 1]) < 0.04
+
+
+@pytest.mark.parametrize("suite", SUITES)
+def test_a_written_campaign_keeps_every_rule_and_comes_back(tmp_path, suite):
+    names = [programme.name for programme in SUITES[suite]]
+    campaign = measured_campaign([truth(name) for name in names], TRUE, seed=3)
+    write_campaign(campaign, tmp_path)
+    found = read_campaign(tmp_path)
+    assert [(r.name, r.role) for r in found.recordings] == [
+        (r.name, r.role) for r in campaign.recordings
+    ]
+    assert (found.temperature, found.pressure) == (TRUE["T_env"], TRUE["p_env"])
+    for read, written in zip(found.recordings, campaign.recordings, strict=True):
+        np.testing.assert_allclose(read.p2, written.p2, atol=0.51)
+        np.testing.assert_allclose(read.I, written.I, atol=0.51e-6)
+
+
+def test_the_bench_measures_at_the_truth_s_ambient():
+    campaign = measured_campaign([], TRUE.replace(T_env=280.0, p_env=0.95e5), seed=0)
+    assert (campaign.temperature, campaign.pressure) == (280.0, 0.95e5)
+
+
+def test_roles_are_the_programmes():
+    recordings = measured_campaign([truth(p.name) for p in DIAGNOSIS_SUITE], TRUE, seed=0).recordings
+    assert [r.role for r in recordings] == [p.role for p in DIAGNOSIS_SUITE]
+
+
+def test_a_recording_of_another_truth_differs_by_more_than_noise():
+    true = truth("test1")
+    hotter = replace(true, channels={**true.channels, "I": 0.98 * true.channels["I"]})
+    one, other = (measured(t, np.random.default_rng(0)) for t in (true, hotter))
+    assert np.sqrt(np.mean((one.I - other.I) ** 2)) > 5 * SENSORS["I"].noise

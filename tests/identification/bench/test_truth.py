@@ -1,0 +1,133 @@
+"""The bench's truth: the programmes' voltages, the plant's own trajectories, and air that is conserved."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from epv_env.plant.simulate import energised, simulate
+from identification.bench.campaign import RESERVOIR, run_programme
+from identification.bench.programmes import DIAGNOSIS_SUITE, REPORT_SUITE
+from identification.recordings.recording import HOLD
+from tests.identification.twins import PROGRAMMES, SWITCHING, TRUE, truth
+
+SETTLED = 0.03
+"""After a switching the armature rests within this [s]."""
+
+
+def volumes(true, reservoir=RESERVOIR):
+    """Air in the reservoirs, the circuit and the control chamber [kg], (samples,)."""
+    RT = TRUE["R_gas"] * TRUE["T_env"]
+    held = reservoir * true.channels["p1"] + TRUE["V2"] * true.channels["p2"]
+    return (held + TRUE["V3"] * true.channels["p3"]) / RT
+
+
+def since_switching(true):
+    """Time since the coil was last switched [s], (samples,)."""
+    switched = np.flatnonzero(np.diff(true.channels["U"])) + 1
+    index = np.arange(len(true.channels["U"]))
+    last = np.array([max((s for s in switched if s <= i), default=0) for i in index])
+    return (index - last) * true.period
+
+
+def plant_s_own(true, reservoir=RESERVOIR):
+    programme = true.programme
+    start = energised(TRUE, p1=programme.p1, p2=programme.p2, U=programme.U_on)
+    voltage = true.channels["U"]
+    return simulate(TRUE, initial=start, U=voltage, period=true.period, reservoir_volume=reservoir).state
+
+
+def assert_agrees(true, state):
+    for pressure in ("p1", "p2", "p3"):
+        assert np.max(np.abs(getattr(state, pressure) - true.channels[pressure])) < 20.0
+    assert np.max(np.abs(state.I - true.channels["I"])) < 2e-5
+
+
+@pytest.mark.parametrize("name", [p.name for p in DIAGNOSIS_SUITE if p.U_on])
+def test_the_voltage_is_on_or_off_as_the_programme_says(name):
+    U, programme = truth(name).channels["U"], PROGRAMMES[name]
+    assert set(U) == {0.0, programme.U_on}
+    assert np.all(U[: round(HOLD * 2000)] == programme.U_on)
+    assert np.sum(U == 0) / 2000 == pytest.approx(sum(programme.case.openings))
+    assert (len(U) - 1) / 2000 == pytest.approx(programme.case.duration)
+
+
+def test_every_suite_has_recordings_to_fit_to_to_hold_out_and_to_rest():
+    for suite in (REPORT_SUITE, DIAGNOSIS_SUITE):
+        assert {programme.role for programme in suite} == {"calibration", "validation", "quality"}
+        assert len({programme.name for programme in suite}) == len(suite)
+
+
+@pytest.mark.parametrize("name", [p.name for p in DIAGNOSIS_SUITE if p.U_on])
+def test_the_plant_s_own_integrator_finds_the_same(name):
+    """They share the right-hand side alone; 20 Pa are a twentieth of an ADC step."""
+    assert_agrees(truth(name), plant_s_own(truth(name)))
+
+
+def test_another_supply_is_noticed():
+    with pytest.raises(AssertionError):
+        assert_agrees(truth("test1"), plant_s_own(truth("test1"), reservoir=1.05 * RESERVOIR))
+
+
+def test_at_rest_nothing_moves():
+    true = truth("rest").channels
+    for pressure in ("p1", "p2", "p3"):
+        np.testing.assert_array_equal(true[pressure], TRUE["p_env"])
+    np.testing.assert_array_equal(true["I"], 0.0)
+
+
+@pytest.mark.parametrize("name", ["test1", "test4", "long_open", "hold"])
+def test_with_the_coil_on_the_air_of_the_three_volumes_stays(name):
+    """The exhaust is shut: what the reservoirs lose, the circuit and the control chamber gain."""
+    true = truth(name)
+    shut = (true.channels["U"] > 0) & (since_switching(true) > SETTLED)
+    last = shut & (np.cumsum(true.channels["U"] == 0) == np.sum(true.channels["U"] == 0))
+    air = volumes(true)[last]
+    drawn = volumes(true)[0] - RESERVOIR * true.channels["p1"][-1] / (TRUE["R_gas"] * TRUE["T_env"])
+    assert np.sum(last) > 50
+    assert np.ptp(air) < 1e-6 * drawn
+
+
+@pytest.mark.parametrize("name", SWITCHING)
+def test_over_a_recording_the_air_falls_by_what_the_control_chamber_vents(name):
+    """Each opening vents a filling, and what slips past the armature while it moves."""
+    true = truth(name)
+    lost = volumes(true)[0] - volumes(true)[-1]
+    filling = TRUE["V3"] * true.channels["p3"][0] / (TRUE["R_gas"] * TRUE["T_env"])
+    vented = plant_s_own(true).air_vented[-1]
+    assert lost == pytest.approx(vented, rel=1e-3)
+    assert 0.7 < lost / (filling * len(true.programme.case.openings)) < 1.5
+
+
+def test_a_reservoir_of_another_size_would_break_the_balance():
+    true = truth("test1")
+    lost = volumes(true, 1.05 * RESERVOIR)[0] - volumes(true, 1.05 * RESERVOIR)[-1]
+    assert lost != pytest.approx(plant_s_own(true).air_vented[-1], rel=0.5)
+
+
+def test_without_a_reservoir_the_supply_holds():
+    still = run_programme(TRUE, PROGRAMMES["test1"], reservoir=np.inf).channels["p1"]
+    np.testing.assert_allclose(still, PROGRAMMES["test1"].p1, rtol=1e-12)
+    assert np.ptp(truth("test1").channels["p1"]) > 1000.0
+
+
+def test_another_truth_gives_other_data():
+    """With 2 % more resistance the current rests 2 % lower."""
+    other = run_programme(TRUE.replace(R=1.02 * TRUE["R"]), PROGRAMMES["test1"]).channels
+    true = truth("test1").channels
+    assert true["I"][0] / other["I"][0] == pytest.approx(1.02)
+    assert np.max(np.abs(other["p2"] - true["p2"])) > 100.0
+
+
+def test_another_rate_samples_the_same_course():
+    coarse, fine = truth("test2", 500.0), truth("test2")
+    for channel in ("I", "p1", "p2", "p3"):
+        np.testing.assert_allclose(
+            coarse.channels[channel], fine.channels[channel][::4], rtol=1e-5, atol=1e-6
+        )
+
+
+def test_a_case_starts_where_its_programme_says():
+    moved = replace(PROGRAMMES["test1"], p1=11e5, p2=7e5, U_on=24.0)
+    start = {name: signal[0] for name, signal in run_programme(TRUE, moved).channels.items()}
+    assert start == pytest.approx({"I": 24.0 / TRUE["R"], "U": 24.0, "p1": 11e5, "p2": 7e5, "p3": 11e5})
