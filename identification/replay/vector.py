@@ -23,10 +23,14 @@ class Vector:
         return np.array([self.reference[symbol] for symbol in self.symbols])
 
     @property
+    def domains(self) -> NDArray:
+        """Ends of the domains (Tables 6, 7) [SI], (k, 2)."""
+        return np.array([table()[s].domain or (self.reference[s],) * 2 for s in self.symbols])
+
+    @property
     def bounds(self) -> NDArray:
-        """Scaled ends of the domains (Tables 6, 7), (k, 2)."""
-        domains = [table()[s].domain or (self.reference[s],) * 2 for s in self.symbols]
-        return np.sort(np.array(domains) / self.scale[:, None], axis=1)
+        """Scaled ends of the domains, the lesser first, (k, 2)."""
+        return np.sort(self.domains / self.scale[:, None], axis=1)
 
     def values(self, z: NDArray) -> dict[str, NDArray]:
         """Values by symbol [SI], each of shape (n,), for scaled vectors z (n, k)."""
@@ -34,10 +38,8 @@ class Vector:
 
     def parameters(self, z: NDArray) -> Parameters:
         """The complete set for one scaled vector (k,), within the domains."""
-        low, high = self.bounds.T
-        return self.reference.replace(
-            **{s: float(v[0]) for s, v in self.values(np.clip(z, low, high)).items()}
-        )
+        inside = np.clip(z * self.scale, *self.domains.T)
+        return self.reference.replace(**dict(zip(self.symbols, inside.tolist(), strict=True)))
 
     def of(self, parameters: Mapping[str, float]) -> NDArray:
         """The scaled vector of a set of parameters, (k,)."""

@@ -17,6 +17,8 @@ class Row:
     """One per repetition."""
     ratio: float | None = None
     """Against the row that the section compares with."""
+    bar: float | None = None
+    """The most that the median may be."""
     note: str = ""
 
     @property
@@ -24,9 +26,16 @@ class Row:
         """Median of the repetitions."""
         return statistics.median(self.values)
 
+    @property
+    def verdict(self) -> str:
+        """What the bar says of it; empty without a bar."""
+        if self.bar is None:
+            return ""
+        return "met" if self.median <= self.bar else "MISSED"
+
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
-        return {**asdict(self), "median": self.median}
+        return {**asdict(self), "median": self.median, "verdict": self.verdict}
 
 
 @dataclass
@@ -41,12 +50,14 @@ class Table:
         print(f"\n{title}", flush=True)
 
     def add(self, name: str, unit: str, values: list[float] | float, **more: Any) -> Row:
-        """Record and print one row. more: ratio, note."""
+        """Record and print one row. more: ratio, bar, note."""
         row = Row(name=name, unit=unit, values=values if isinstance(values, list) else [values], **more)
         list(self.sections.values())[-1].append(row)
         spread = f"{min(row.values):.4g}..{max(row.values):.4g}" if len(row.values) > 1 else ""
         ratio = "" if row.ratio is None else f"x {row.ratio:.4g}"
-        line = f"  {name:<58} {row.median:>11.5g} {unit:<10} {spread:<22} {ratio:<11} {row.note}"
+        bar = "" if row.bar is None else f"bar {row.bar:g} {unit} {row.verdict}"
+        words = "; ".join(filter(None, (bar, row.note)))
+        line = f"  {name:<58} {row.median:>11.5g} {unit:<10} {spread:<22} {ratio:<11} {words}"
         print(line.rstrip(), flush=True)
         return row
 

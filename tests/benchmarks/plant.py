@@ -6,19 +6,13 @@ Every figure is the median of several repetitions, with the least and the greate
 noisy: compare ratios within one run, not figures between runs.
 """
 
-import argparse
-import json
-import os
-import platform
-from pathlib import Path
-
-import numba
 import numpy as np
 
 from epv_env.plant.integrate import DEFAULT_STEP
 from epv_env.plant.valves import available_cores
 from identification.bench.automaton import simulate_reference
 from tests.benchmarks import startup, workloads
+from tests.benchmarks.commandline import run
 from tests.benchmarks.measure import WALL, Row, Table, durations, rates
 from tests.benchmarks.naive import run_naive
 from tests.benchmarks.operations import count_operations
@@ -132,49 +126,15 @@ def starting(table: Table, repetitions: int) -> None:
         table.add(name, "s", startup.seconds_in_fresh_processes(code, repetitions))
 
 
-def processor() -> str:
-    """Name of the processor, where the system tells."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        lines = []
-    names = [line.split(":")[1].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.machine()
-
-
-def main() -> None:
-    """Measure and print everything."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--quick", action="store_true", help="few repetitions, short runs")
-    parser.add_argument("--json", type=Path, metavar="PATH", help="also write the figures there")
-    arguments = parser.parse_args()
-    repetitions, periods, duration = (3, 20, 0.5) if arguments.quick else (9, 200, 2.0)
-    machine = {
-        "processor": processor(),
-        "cores": available_cores(),
-        "load": f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown",
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "numba": numba.__version__,
-    }
-    print(", ".join(f"{key} {value}" for key, value in machine.items()))
-    print(
-        "Median, least..greatest of the repetitions. Single-threaded times are CPU times, which other\n"
-        "processes on the machine hardly touch; machines are noisy all the same: trust the ratios."
-    )
-    table = Table()
+def benchmark(table: Table, quick: bool) -> None:
+    """All sections."""
+    repetitions, periods, duration = (3, 20, 0.5) if quick else (9, 200, 2.0)
     batch = batched(table, repetitions, periods)
     kernel(table, repetitions, periods, batch)
     one_valve(table, repetitions, duration, batch)
     without_events(table)
     starting(table, repetitions)
-    if arguments.json:
-        arguments.json.write_text(
-            json.dumps(
-                {"machine": machine, "quick": arguments.quick, "results": table.as_dict()}, indent=1
-            )
-        )
 
 
 if __name__ == "__main__":
-    main()
+    run(__doc__, benchmark)

@@ -3,6 +3,7 @@
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
@@ -49,7 +50,7 @@ def exact_recording(name: str, rate: float = 2000.0, share: float = 1e-6, seed: 
     """A truth seen by sensors without offset, trend and steps, and with a share of their noise."""
     rng = np.random.default_rng(seed)
     true = truth(name, rate)
-    readings = {
+    readings: dict[str, Any] = {
         channel: true.channels[channel]
         + share
         * SENSORS[channel].noise

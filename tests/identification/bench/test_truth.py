@@ -1,4 +1,4 @@
-"""The bench's truth: the programmes' voltages, the plant's own trajectories, and air that is conserved."""
+"""The bench's truth: voltages as programmed, the plant's own trajectories, air that is conserved."""
 
 from dataclasses import replace
 
@@ -90,13 +90,13 @@ def test_with_the_coil_on_the_air_of_the_three_volumes_stays(name):
 
 @pytest.mark.parametrize("name", SWITCHING)
 def test_over_a_recording_the_air_falls_by_what_the_control_chamber_vents(name):
-    """Each opening vents a filling, and what slips past the armature while it moves."""
+    """Each opening vents a good part of the chamber's filling."""
     true = truth(name)
     lost = volumes(true)[0] - volumes(true)[-1]
     filling = TRUE["V3"] * true.channels["p3"][0] / (TRUE["R_gas"] * TRUE["T_env"])
     vented = plant_s_own(true).air_vented[-1]
     assert lost == pytest.approx(vented, rel=1e-3)
-    assert 0.7 < lost / (filling * len(true.programme.case.openings)) < 1.5
+    assert 0.3 < lost / (filling * len(true.programme.case.openings)) < 1.0
 
 
 def test_a_reservoir_of_another_size_would_break_the_balance():
@@ -120,7 +120,7 @@ def test_another_truth_gives_other_data():
 
 
 def test_another_rate_samples_the_same_course():
-    coarse, fine = truth("test2", 500.0), truth("test2")
+    coarse, fine = truth("test4", 500.0), truth("test4")
     for channel in ("I", "p1", "p2", "p3"):
         np.testing.assert_allclose(
             coarse.channels[channel], fine.channels[channel][::4], rtol=1e-5, atol=1e-6

@@ -1,0 +1,10 @@
+"""All benchmarks in one table, on this machine and in one run.
+
+python -m tests.benchmarks [--quick] [--json PATH]
+"""
+
+from tests.benchmarks import identification, plant
+from tests.benchmarks.commandline import run
+
+if __name__ == "__main__":
+    run(__doc__, plant.benchmark, identification.benchmark)

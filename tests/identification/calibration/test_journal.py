@@ -1,0 +1,65 @@
+"""A journal gives back what was added, only to the subject it belongs to, and survives a killed run."""
+
+import pytest
+
+from identification.journal import Journal
+
+SUBJECT = {"recordings": ["a", "b"], "seed": 0}
+
+
+@pytest.fixture
+def path(tmp_path):
+    """A journal of two results."""
+    journal = Journal(tmp_path / "folder" / "journal.jsonl", SUBJECT)
+    journal.add("one", {"z": [0.1, 1e-300], "converged": True})
+    journal.add("two", None)
+    return journal.path
+
+
+def test_results_come_back(path):
+    found = Journal(path, SUBJECT)
+    assert len(found) == 2
+    assert found["one"] == {"z": [0.1, 1e-300], "converged": True}
+    assert "two" in found
+    assert found["two"] is None
+    assert "three" not in found
+
+
+def test_the_order_of_the_subject_s_fields_does_not_matter(path):
+    assert len(Journal(path, dict(reversed(SUBJECT.items())))) == 2
+
+
+def test_another_subject_starts_anew(path):
+    assert len(Journal(path, {**SUBJECT, "seed": 1})) == 0
+    assert len(Journal(path, SUBJECT)) == 0
+
+
+@pytest.mark.parametrize("torn", ['{"name": "three", "res', "{", '{"name": "three", "result": 1}'])
+def test_a_torn_last_line_is_dropped_and_written_anew(path, torn):
+    """A line without its end may lack digits, so even one that reads well is none."""
+    with path.open("a") as stream:
+        stream.write(torn)
+    found = Journal(path, SUBJECT)
+    assert len(found) == 2
+    found.add("three", 3)
+    again = Journal(path, SUBJECT)
+    assert len(again) == 3
+    assert again["three"] == 3
+
+
+def test_a_torn_subject_starts_anew(path):
+    path.write_text(path.read_text()[:10])
+    assert len(Journal(path, SUBJECT)) == 0
+    Journal(path, SUBJECT).add("one", 1)
+    assert Journal(path, SUBJECT)["one"] == 1
+
+
+def test_a_later_result_replaces_an_earlier_one(path):
+    Journal(path, SUBJECT).add("one", 1)
+    assert Journal(path, SUBJECT)["one"] == 1
+
+
+def test_a_journal_that_is_only_read_is_not_touched(path):
+    before = path.stat().st_mtime_ns
+    Journal(path, SUBJECT)
+    assert path.stat().st_mtime_ns == before

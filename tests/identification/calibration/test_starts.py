@@ -1,0 +1,142 @@
+"""Searches from several starts: spread over the domains, kept in the journal, compared at the end."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.region import CALIBRATED_SYMBOLS
+from identification.calibration import starts
+from identification.calibration.calibrate import calibrate
+from identification.calibration.starts import METHODS, fit_from_all, reached_the_best, starting_points
+from identification.calibration.warnings import warnings_of
+from identification.journal import Journal
+from identification.replay.vector import Vector
+from tests.identification.twins import calibration, problem
+
+START = Parameters.initial_guess()
+FOUR = Vector(CALIBRATED_SYMBOLS, START)
+BAD_BASIN = (1.06, 0.92, 4.2, 0.95)
+"""Of the reference: with so much reluctance the armature hardly moves."""
+
+
+@pytest.fixture
+def calls(monkeypatch):
+    """Searches that end where they start, and what was asked of them."""
+    asked = []
+
+    def searching(method):
+        def search(misfit, start):
+            asked.append((method, tuple(start)))
+            error = float(np.sum((start - 1.0) ** 2))
+            return replace(calibration().best(method), start=start, z=start, error=error)
+
+        return search
+
+    monkeypatch.setattr(starts, "nelder_mead", searching("Nelder-Mead"))
+    monkeypatch.setattr(starts, "weighted_least_squares", searching("least squares"))
+    return asked
+
+
+def test_the_first_start_is_the_reference_and_the_others_lie_in_the_domains():
+    points = starting_points(FOUR, 50, 0)
+    low, high = FOUR.bounds.T
+    assert points.shape == (50, 4)
+    np.testing.assert_array_equal(points[0], np.ones(4))
+    assert np.all((low <= points) & (points <= high))
+
+
+def test_each_symbol_is_spread_evenly_over_its_logarithm():
+    """A Latin hypercube puts one point into each of as many equal strips."""
+    low, high = FOUR.bounds.T
+    share = np.log(starting_points(FOUR, 41, 0)[1:] / low) / np.log(high / low)
+    np.testing.assert_array_equal(
+        np.sort(np.floor(40 * share), axis=0), np.arange(40)[:, None] + np.zeros(4)
+    )
+
+
+def test_domains_that_hold_zero_are_spread_over_evenly():
+    """kPV's begins at zero and a1's is symmetric about it."""
+    vector = Vector(("kPV", "a1"), START.replace(a1=-0.05))
+    points = starting_points(vector, 41, 0)[1:]
+    low, high = vector.bounds.T
+    assert np.all((low <= points) & (points <= high))
+    np.testing.assert_allclose(
+        np.mean(points, axis=0), 0.5 * (low + high), atol=0.02 * np.max(high - low)
+    )
+
+
+def test_one_seed_gives_one_set_of_starts():
+    np.testing.assert_array_equal(starting_points(FOUR, 6, 3), starting_points(FOUR, 6, 3))
+    assert np.all(starting_points(FOUR, 6, 3)[1:] != starting_points(FOUR, 6, 4)[1:])
+
+
+def test_one_start_is_the_reference_alone():
+    np.testing.assert_array_equal(starting_points(FOUR, 1, 0), np.ones((1, 4)))
+
+
+def test_a_start_in_another_basin_is_reported(tmp_path, monkeypatch):
+    monkeypatch.setattr("identification.calibration.fits.MOST_EVALUATIONS", 200)
+    points = np.array([np.ones(4), BAD_BASIN])
+    fits = fit_from_all(problem(), points, Journal(tmp_path / "journal", {}))
+    for method in METHODS:
+        assert reached_the_best(fits[method]).tolist() == [True, False]
+        assert fits[method][1].error > 5 * fits[method][0].error
+    found = warnings_of(problem(), fits)
+    assert [warning.split(":")[0] for warning in found] == list(METHODS)
+    assert all("1 of 2 starts reach the least error" in warning for warning in found)
+    assert not any("Table 10" in warning for warning in found)
+    turned = {method: found_fits[::-1] for method, found_fits in fits.items()}
+    assert all(
+        "the usual start (Table 10) is among" in warning for warning in warnings_of(problem(), turned)
+    )
+
+
+def test_ends_agree_relative_to_the_best_and_at_zero():
+    fit = calibration().best("least squares")
+    ends = ([1.0, 0.0], [1.0009, 1e-7], [1.002, 0.0], [1.0, 0.01])
+    fits = [replace(fit, z=np.array(z), error=1.0 + i) for i, z in enumerate(ends)]
+    assert reached_the_best(fits).tolist() == [True, True, False, False]
+
+
+def test_finished_searches_are_not_done_again(tmp_path, calls):
+    first = calibrate(problem(), journal=tmp_path / "journal", subject={"of": "a"}, starts=3)
+    assert len(calls) == len(set(calls)) == 6
+    again = calibrate(problem(), journal=tmp_path / "journal", subject={"of": "a"}, starts=3)
+    assert len(calls) == 6
+    for method in METHODS:
+        pairs = zip(first.fits[method], again.fits[method], strict=True)
+        assert all(one.as_json() == other.as_json() for one, other in pairs)
+
+
+def test_an_interrupted_run_goes_on_where_it_was(tmp_path, calls):
+    path = tmp_path / "journal"
+    calibrate(problem(), journal=path, subject={}, starts=3)
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(lines[:4]) + lines[4][:20])
+    calls.clear()
+    calibrate(problem(), journal=path, subject={}, starts=3)
+    assert [method for method, _ in calls] == ["least squares", "Nelder-Mead", "least squares"]
+    assert path.read_text().splitlines() == [line.rstrip("\n") for line in lines]
+
+
+@pytest.mark.parametrize("change", [{"subject": {"of": "b"}}, {"seed": 1}, {"starts": 4}])
+def test_searches_of_another_subject_are_not_used(tmp_path, calls, change):
+    """Another number of starts moves all of them but the first."""
+    usual = {"subject": {"of": "a"}, "starts": 3, "seed": 0}
+    calibrate(problem(), journal=tmp_path / "journal", **usual)
+    calls.clear()
+    found = calibrate(problem(), journal=tmp_path / "journal", **{**usual, **change})
+    assert len(calls) == 2 * {**usual, **change}["starts"]
+    ends = np.array([fit.start for fit in found.fits["Nelder-Mead"]])
+    expected = starting_points(problem().vector, len(ends), {**usual, **change}["seed"])
+    np.testing.assert_array_equal(ends, expected)
+
+
+def test_searches_of_another_reference_are_not_used(tmp_path, calls):
+    calibrate(problem(), journal=tmp_path / "journal", subject={}, starts=2)
+    moved = replace(problem().vector, reference=problem().vector.reference.replace(d1=0.0181))
+    calls.clear()
+    calibrate(replace(problem(), vector=moved), journal=tmp_path / "journal", subject={}, starts=2)
+    assert len(calls) == 4

@@ -1,0 +1,102 @@
+"""Every warning fires on a calibration made for it, and on no other."""
+
+from dataclasses import replace
+
+import pytest
+
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.region import CALIBRATED_SYMBOLS
+from identification.calibration import fits as searches
+from identification.calibration.calibrate import calibrate
+from identification.calibration.problem import calibration_problem
+from identification.calibration.section import calibration_json, calibration_section
+from identification.calibration.warnings import warnings_of
+from tests.identification.twins import TRUE, calibration, problem, twin
+
+START = Parameters.initial_guess()
+
+
+@pytest.fixture
+def warnings(tmp_path):
+    """The warnings of a problem, calibrated from its reference."""
+
+    def found(problem):
+        return calibrate(problem, journal=tmp_path / "journal", subject={}, starts=1).warnings
+
+    return found
+
+
+def fits(**changes):
+    """The good calibration's fits, with another outcome of every method."""
+    return {m: [replace(fit, **changes) for fit in found] for m, found in calibration().fits.items()}
+
+
+def test_a_good_calibration_has_none():
+    assert warnings_of(problem(), calibration().fits) == []
+
+
+def test_an_estimate_on_the_end_of_a_domain_is_named(warnings):
+    """With too small a chamber the flow into it must be smaller than alphaMV may become."""
+    found = warnings(calibration_problem(twin(), start=START.replace(V3=2e-6)))
+    assert any("least squares ends at the end of alphaMV's domain" in warning for warning in found)
+    assert any("Nelder-Mead ends at the end of alphaMV's domain" in warning for warning in found)
+    assert not any("end of R's domain" in warning for warning in found)
+
+
+@pytest.mark.parametrize("end", [0, 1])
+@pytest.mark.parametrize("symbol", CALIBRATED_SYMBOLS)
+def test_either_end_of_any_domain_counts(symbol, end):
+    vector = problem().vector
+    z = calibration().best("least squares").z.copy()
+    at = vector.symbols.index(symbol)
+    z[at] = vector.bounds[at, end]
+    on_end = [warning for warning in warnings_of(problem(), fits(z=z)) if "ends at the end" in warning]
+    assert len(on_end) == 2
+    assert all(f"of {symbol}'s domain" in warning for warning in on_end)
+    assert vector.parameters(z)[symbol] == pytest.approx(vector.domains[at, end])
+
+
+def test_a_search_that_is_cut_short_is_not_trusted(warnings, monkeypatch):
+    monkeypatch.setattr(searches, "MOST_EVALUATIONS", 20)
+    found = warnings(problem())
+    assert any("Nelder-Mead has not converged after" in warning for warning in found)
+    assert not any("least squares has not converged" in warning for warning in found)
+
+
+def test_parameters_that_act_by_their_ratio_cannot_be_separated(warnings):
+    found = warnings(calibration_problem(twin(), symbols=("alphaMV", "V3")))
+    assert any("the recordings cannot separate alphaMV, V3" in warning for warning in found)
+
+
+def test_only_those_are_named_that_cannot_be_separated():
+    four = calibration_problem(twin(), symbols=("alphaMV", "R", "V3", "alphaPV"))
+    found = warnings_of(four, fits(z=four.vector.of(TRUE)))
+    (separate,) = (warning for warning in found if "cannot separate" in warning)
+    assert "cannot separate alphaMV, V3 (" in separate
+
+
+def test_recordings_that_the_model_cannot_explain_are_noticed(warnings):
+    found = warnings(calibration_problem(twin(), symbols=("alphaMV",)))
+    assert any("misses the recordings by" in warning for warning in found)
+    assert not any("cannot separate" in warning for warning in found)
+
+
+def test_the_section_shows_every_warning_as_a_doubt():
+    doubted = replace(calibration(), warnings=["the one", "the other"])
+    section = calibration_section(doubted)
+    assert [verdict.text for verdict in section.verdicts if verdict.status == "doubt"] == [
+        "the one",
+        "the other",
+    ]
+    good = calibration_section(calibration())
+    assert [verdict.status for verdict in good.verdicts] == ["good"]
+
+
+def test_the_json_holds_estimates_searches_and_warnings():
+    content = calibration_json(replace(calibration(), warnings=["the one"]))
+    assert content["warnings"] == ["the one"]
+    estimate = content["estimates"]["least squares"]
+    assert estimate == {
+        s: calibration().parameters("least squares")[s] for s in problem().vector.symbols
+    }
+    assert len(content["searches"]["Nelder-Mead"]) == 1

@@ -1,0 +1,11 @@
+"""One run of the confidence stage for all tests."""
+
+from functools import cache
+
+from identification.confidence.confidence import Confidence, confidence
+from tests.identification.twins import calibration
+
+
+@cache
+def found() -> Confidence:
+    return confidence(calibration())

@@ -1,0 +1,144 @@
+"""The covariance on scores whose inflation is known, and on other campaigns of the same truth."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+from scipy.stats import chi2
+
+from identification.calibration.fits import weighted_least_squares
+from identification.confidence import covariance as stage
+from identification.confidence.bootstrap import block_bootstrap
+from identification.confidence.covariance import correlation_lags, covariance
+from tests.identification.confidence.results import found
+from tests.identification.twins import TRUE, problem
+
+SAMPLES, RECORDINGS = 4000, 3
+SLOPES = (1.0, 0.5, 2.0)
+"""Derivatives of p2, p3 and I by the first parameter, constant in time; the second moves p3 alone."""
+
+
+class Synthetic:
+    """A misfit with residuals (RECORDINGS, 3, SAMPLES) and derivatives that do not change in time."""
+
+    def __init__(self, residuals):
+        ones, still = np.ones(SAMPLES), np.zeros(SAMPLES)
+        first = np.concatenate([slope * ones for slope in SLOPES])
+        second = np.concatenate([still, ones, still])
+        self.jacobian = np.stack([first, second], axis=1)
+        self.residuals = residuals.reshape(RECORDINGS, -1)
+
+    def linearised(self, z):
+        return list(self.residuals), [self.jacobian] * RECORDINGS
+
+
+def coloured(phi, seed=0):
+    """Residuals e(k) = phi e(k - 1) + white of variance 1, each output and recording of its own."""
+    white = np.random.default_rng(seed).standard_normal((RECORDINGS, len(SLOPES), SAMPLES + 500))
+    return Synthetic(np.sqrt(1 - phi**2) * np.asarray(lfilter([1.0], [1.0, -phi], white))[..., 500:])
+
+
+@pytest.fixture
+def covariance_of(monkeypatch):
+    """The covariance of a synthetic misfit, whose inputs are exact."""
+    for share in ("_input_share", "_offset_share"):
+        monkeypatch.setattr(stage, share, lambda *arguments: np.zeros((2, 2)))
+    return lambda misfit: covariance(problem(), misfit, np.ones(2))
+
+
+def known(misfit, phi):
+    """H M H with the variance (1 + phi) / (1 - phi) of every output's sum over time."""
+    J = misfit.jacobian
+    return np.linalg.inv(RECORDINGS * J.T @ J) * (1 + phi) / (1 - phi)
+
+
+def test_white_residuals_are_independent(covariance_of):
+    both = covariance_of(coloured(0.0))
+    np.testing.assert_allclose(both.independent, known(coloured(0.0), 0.0), rtol=0.05)
+    np.testing.assert_allclose(np.diag(both.residual), np.diag(both.independent), rtol=0.15)
+
+
+@pytest.mark.parametrize("phi", [0.5, 0.8, -0.4])
+def test_the_sandwich_knows_what_neighbours_have_in_common(covariance_of, phi):
+    misfit = coloured(phi)
+    ratio = np.diag(covariance_of(misfit).residual) / np.diag(known(misfit, phi))
+    np.testing.assert_allclose(ratio, 1.0, atol=0.25)
+
+
+@pytest.mark.parametrize("phi", [0.5, 0.8])
+def test_so_does_the_block_bootstrap(covariance_of, phi):
+    misfit = coloured(phi)
+    lags = covariance_of(misfit).lags
+    moved = block_bootstrap(*misfit.linearised(None), block=2 * lags, seed=1)
+    assert np.all(np.abs(np.mean(moved, axis=0)) < 0.1 * np.std(moved, axis=0))
+    np.testing.assert_allclose(np.var(moved, axis=0) / np.diag(known(misfit, phi)), 1.0, atol=0.25)
+
+
+@pytest.mark.parametrize("phi", [0.5, 0.8])
+def test_independence_would_promise_too_much(covariance_of, phi):
+    """By the inflation (1 + phi) / (1 - phi)."""
+    misfit = coloured(phi)
+    ratio = np.diag(covariance_of(misfit).independent) / np.diag(known(misfit, phi))
+    np.testing.assert_allclose(ratio, (1 - phi) / (1 + phi), rtol=0.1)
+
+
+def test_blocks_of_two_samples_would_promise_too_much():
+    misfit = coloured(0.8)
+    moved = block_bootstrap(*misfit.linearised(None), block=2, seed=1)
+    assert np.all(np.var(moved, axis=0) < 0.3 * np.diag(known(misfit, 0.8)))
+
+
+def test_more_correlated_residuals_are_summed_over_more_lags():
+    lags = [correlation_lags(coloured(phi).residuals[0]) for phi in (0.0, 0.8, 0.95)]
+    assert lags[0] < lags[1] < lags[2]
+    assert lags[0] >= int(4 * (SAMPLES / 100) ** (2 / 9))
+
+
+def test_one_seed_gives_one_bootstrap():
+    misfit = coloured(0.5)
+    one, same, other = (block_bootstrap(*misfit.linearised(None), block=20, seed=s) for s in (1, 1, 2))
+    np.testing.assert_array_equal(one, same)
+    assert np.all(one[0] != other[0])
+
+
+def test_on_the_bench_all_three_agree():
+    """Its noise is white."""
+    parts = found().covariance
+    sandwich = np.diag(parts.residual)
+    np.testing.assert_allclose(np.diag(parts.independent), sandwich, rtol=0.3)
+    np.testing.assert_allclose(np.var(found().bootstrap, axis=0), sandwich, rtol=0.3)
+
+
+def test_the_noise_of_the_inputs_adds_with_its_square(monkeypatch):
+    """U's and p1's, without the record at rest; none, none."""
+    monkeypatch.setattr(stage, "DRAWS", 2)
+    shares = {}
+    for size in (0.0, 1.0, 2.0):
+        noise = {n: v * (size if n in ("U", "p1") else 1.0) for n, v in problem().noise.items()}
+        quiet = replace(problem(), noise=noise, offsets={})
+        shares[size] = covariance(quiet, problem().least_squares(), found().estimate).inputs
+    assert np.all(np.diag(shares[0.0]) < 1e-3 * np.diag(shares[1.0]))
+    np.testing.assert_allclose(np.diag(shares[2.0]), 4 * np.diag(shares[1.0]), rtol=0.02)
+
+
+def test_offsets_that_are_known_badly_widen_the_covariance():
+    offsets = {n: replace(o, error=100 * o.error) for n, o in problem().offsets.items()}
+    unsure = replace(problem(), offsets=offsets)
+    wide = covariance(unsure, problem().least_squares(), found().estimate)
+    assert np.all(np.diag(wide.inputs) > 3 * np.diag(found().covariance.inputs))
+    np.testing.assert_allclose(wide.residual, found().covariance.residual)
+
+
+def test_estimates_of_other_campaigns_scatter_as_it_says():
+    """Squared distances of eight campaigns follow chi-square, and no covariance of another size."""
+    distances = []
+    for seed in range(2, 10):
+        twin = problem(seed)
+        fit = weighted_least_squares(twin.least_squares(), twin.vector.of(TRUE))
+        apart = fit.z - twin.vector.of(TRUE)
+        distances.append(apart @ np.linalg.solve(found().covariance.total, apart))
+    low, high = chi2.ppf([0.001, 0.999], 4 * len(distances))
+    assert low < np.sum(distances) < high
+    assert not low < 4 * np.sum(distances) < high
+    assert not low < np.sum(distances) / 4 < high

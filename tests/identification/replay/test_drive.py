@@ -1,0 +1,135 @@
+"""Inputs lose their noise and nothing else, whatever the coil's voltage and the supply do."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.replay import drive
+from identification.replay.drive import drive_of, smooth_supply, smooth_voltage, without_offsets
+from tests.identification.twins import SWITCHING, TRUE, exact_recording, truth
+
+NOISE = 680.0
+"""Standard deviation of p1's noise [Pa]."""
+
+LIVES = {
+    "sine": lambda time: 1e4 * np.sin(2 * np.pi * time / 0.5),
+    "compressor that starts": lambda time: 1e4 * np.clip((time - 0.3) / 0.1, 0.0, 1.0),
+    "compressor that fades in": lambda time: 1e4 * (1 - np.exp(-time / 0.1)),
+}
+"""What a supply may do on its own [Pa over s]."""
+
+
+def supply_error(name, seed=0, life=lambda time: 0.0 * time):
+    """smooth_supply less the truth [Pa], (samples,)."""
+    recording = exact_recording(name, share=1.0, seed=seed)
+    moved = life(recording.time)
+    found = smooth_supply(replace(recording, p1=recording.p1 + moved), TRUE)
+    return found - truth(name).channels["p1"] - moved
+
+
+def rms(values):
+    return float(np.sqrt(np.mean(values**2)))
+
+
+@pytest.mark.parametrize("name", SWITCHING)
+def test_a_constant_voltage_loses_its_noise(name):
+    found = smooth_voltage(exact_recording(name, share=1.0))
+    assert np.max(np.abs(found - truth(name).channels["U"])) < 0.005
+
+
+def test_a_voltage_that_sags_is_kept_as_it_was_read():
+    """0.6 V/s, as when a battery is loaded; the coil off shows noise alone."""
+    recording = exact_recording("test1", share=1.0)
+    on = recording.energised
+    sagging = replace(recording, U=recording.U - 0.6 * recording.time * on)
+    found = smooth_voltage(sagging)
+    later = on & (recording.time > 0.1)
+    np.testing.assert_array_equal(found[later], sagging.U[later])
+    assert set(np.diff(found[~on][:100])) == {0.0}
+
+
+def test_a_dip_in_one_stretch_is_kept():
+    recording = exact_recording("test4", share=1.0)
+    dipped = recording.U.copy()
+    dipped[1000:1200] -= 0.1
+    found = smooth_voltage(replace(recording, U=dipped))
+    assert np.mean(found[1000:1200]) == pytest.approx(np.mean(found[1300:1500]) - 0.1, abs=0.01)
+
+
+def test_switching_times_stay():
+    recording = exact_recording("test3", share=1.0)
+    np.testing.assert_array_equal(smooth_voltage(recording) > 9.0, recording.energised)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("name", ["test1", "test4", "hold", "long_open", "steps"])
+def test_a_reservoir_s_pressure_is_found_within_a_millibar(name, seed):
+    assert rms(supply_error(name, seed)) < 100.0
+    assert np.max(np.abs(supply_error(name, seed))) < 200.0
+
+
+def test_a_line_would_not_find_it():
+    """What the air balance adds: with 80 litres the sag follows the valve's openings."""
+    p1 = truth("long_open").channels["p1"]
+    time = np.arange(len(p1))
+    assert rms(p1 - np.polyval(np.polyfit(time, p1, 1), time)) > 400.0
+
+
+@pytest.mark.parametrize("life", LIVES)
+@pytest.mark.parametrize("name", ["test1", "test4", "hold"])
+def test_a_supply_with_a_life_of_its_own_is_followed_within_millibars(name, life):
+    error = supply_error(name, life=LIVES[life])
+    assert rms(error) < 0.25 * NOISE
+    assert np.max(np.abs(error)) < 1000.0
+
+
+@pytest.mark.parametrize("life", LIVES)
+def test_the_air_balance_alone_would_miss_it(monkeypatch, life):
+    monkeypatch.setattr(drive, "_is_white", lambda residual, period: True)
+    assert rms(supply_error("test4", life=LIVES[life])) > 0.5 * NOISE
+
+
+def test_a_reservoir_that_is_refilled_evenly_needs_no_spline():
+    """A line in time is part of the balance."""
+    error = supply_error("test1", life=lambda time: 2e4 * time)
+    np.testing.assert_allclose(error, supply_error("test1"), atol=1.0)
+
+
+@pytest.mark.parametrize("rate", [500.0, 2000.0, 10000.0])
+def test_any_rate_is_smoothed(rate):
+    recording = exact_recording("test4", rate, share=1.0)
+    true = truth("test4", rate).channels["p1"]
+    assert rms(smooth_supply(recording, TRUE) - true) < 150.0
+    swinging = replace(recording, p1=recording.p1 + LIVES["sine"](recording.time))
+    found = smooth_supply(swinging, TRUE)
+    assert rms(found - true - LIVES["sine"](recording.time)) < 0.4 * NOISE
+
+
+def test_consumed_air_is_drawn_from_the_supply():
+    """What the circuit consumed went through the valve too."""
+    recording = exact_recording("test1", share=1e-3)
+    drawn = np.where((recording.time > 0.2) & (recording.time < 0.3), 0.02, 0.0)
+    fallen = np.cumsum(drawn) * recording.period * TRUE["R_gas"] * TRUE["T_env"] / 0.08
+    consuming = replace(recording, sigma_S=drawn, p1=recording.p1 - fallen)
+    balance = drive._air_balance(consuming, TRUE)
+    assert rms(balance - consuming.p1) < 100.0
+    unaware = drive._air_balance(replace(consuming, sigma_S=0 * drawn), TRUE)
+    assert rms(unaware - consuming.p1) > 300.0
+
+
+def test_the_start_is_the_mean_of_the_hold():
+    recording = exact_recording("test1", share=1.0)
+    found = drive_of(recording, TRUE)
+    assert found.p2_start == pytest.approx(np.mean(recording.p2[:80]))
+    assert found.p2_start == pytest.approx(truth("test1").channels["p2"][0], abs=4 * 980 / np.sqrt(80))
+    assert found.U_start == pytest.approx(18.9, abs=0.006)
+    assert found.p1_start == found.p1[0]
+
+
+def test_offsets_are_subtracted_from_their_channels_alone():
+    recording = exact_recording("test1")
+    found = without_offsets(recording, {"p2": 700.0, "U": -0.01})
+    np.testing.assert_allclose(recording.p2 - found.p2, 700.0)
+    np.testing.assert_allclose(recording.U - found.U, -0.01)
+    assert found.p1 is recording.p1

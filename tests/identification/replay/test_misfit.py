@@ -1,0 +1,160 @@
+"""The misfit is eq. 21 less its nuisances, blind to what they explain, and has the right derivatives."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.error import partial_error, relative_error, total_error
+from identification.replay.misfit import (
+    Misfit,
+    measured_outputs,
+    noise_weights,
+    report_weights,
+)
+from tests.identification.twins import TRUE, problem
+
+
+def true_vector():
+    return problem().vector.of(TRUE)
+
+
+def eq21(misfit, z):
+    """The total error without any nuisance."""
+    models = misfit.replay.outputs(misfit.vector.values(z))
+    partial = []
+    for recording, measured, model in zip(problem().calibration, misfit.measured, models, strict=True):
+        pairs = zip(measured, model[:, :, 0], strict=True)
+        partial.append(partial_error([relative_error(y, m, recording.time) for y, m in pairs]))
+    return float(total_error(partial))
+
+
+def changed(**changes):
+    """Least squares on recordings with channels changed by functions of (time, values)."""
+    recordings = [
+        replace(r, **{name: change(r.time, r.channel(name)) for name, change in changes.items()})
+        for r in problem().calibration
+    ]
+    return Misfit(recordings, problem().vector, noise_weights(recordings, problem().noise))
+
+
+def moved(**changes):
+    """How far `changed` moves the residuals, as a share of how far the measurements move."""
+    before, after = problem().least_squares(), changed(**changes)
+    apart = [
+        w * (b - a) for w, b, a in zip(before.weights, before.measured, after.measured, strict=True)
+    ]
+    residuals = [np.concatenate(m.residuals(true_vector())) for m in (before, after)]
+    return np.linalg.norm(residuals[1] - residuals[0]) / np.sqrt(sum(np.sum(a**2) for a in apart))
+
+
+@pytest.mark.parametrize("z", [(1.0, 1.0, 1.0, 1.0), (0.95, 1.1, 1.08, 1.004), (1.0, 1.1, 1.0, 0.97)])
+def test_the_weighted_error_is_eq_21_less_what_nuisances_explain(z):
+    misfit = problem().total_error()
+    whole = eq21(misfit, np.array(z))
+    assert 0.3 * whole < misfit.error(np.array(z)) <= whole * (1 + 1e-9)
+
+
+def test_it_is_eq_21_where_nuisances_explain_nothing():
+    """Measured is the model and a deviation of p2 that is orthogonal to a changed start."""
+    misfit, z = problem().total_error(), true_vector()
+    values = misfit.vector.values(np.stack([z, z]))
+    models = misfit.replay.outputs(values, np.array([0.0, 100.0]))
+    rng = np.random.default_rng(0)
+    misfit.measured, misfit.weights = [], []
+    for recording, model in zip(problem().calibration, models, strict=True):
+        outputs = dict(zip(("p2", "p3", "I"), model[:, :, 0], strict=True))
+        share = report_weights([replace(recording, **outputs)])[0][0] ** 2
+        start = model[0, :, 1] - model[0, :, 0]
+        both = np.stack([start, np.ones_like(start)], axis=1)  # the mean of p2 is part of eq. 19
+        noise = 2e4 * rng.standard_normal(len(recording))
+        deviation = noise - both @ np.linalg.solve(
+            both.T @ (share[:, None] * both), both.T @ (share * noise)
+        )
+        outputs["p2"] = outputs["p2"] + deviation
+        misfit.measured.append(measured_outputs(replace(recording, **outputs)))
+        weights = report_weights([replace(recording, **outputs)])[0]
+        misfit.weights.append(weights / np.sqrt(len(models)))
+    assert misfit.error(z) == pytest.approx(eq21(misfit, z), rel=1e-6)
+    assert misfit.error(z) > 0.01
+
+
+def test_noise_weights_make_the_right_model_s_residuals_one():
+    residuals = np.concatenate(problem().least_squares().residuals(true_vector()))
+    assert np.sqrt(np.mean(residuals**2)) == pytest.approx(1.0, abs=0.03)
+
+
+@pytest.mark.parametrize(("channel", "size"), [("p3", 5e3), ("I", 0.01)])
+def test_a_constant_error_of_the_p3_and_i_sensors_is_not_seen(channel, size):
+    assert moved(**{channel: lambda time, values: values + size}) < 1e-9
+
+
+@pytest.mark.parametrize(("channel", "size"), [("p3", 5e3), ("I", 0.01)])
+def test_a_drift_of_them_is_seen(channel, size):
+    assert moved(**{channel: lambda time, values: values + size * time}) > 0.3
+
+
+def test_a_p2_that_reads_high_is_hardly_seen():
+    """The start follows it, and the flow through the valve does so but for its pressure ratio."""
+    assert moved(p2=lambda time, values: values + 1e3) < 0.2
+
+
+def test_a_wrong_start_of_p2_is_hardly_seen():
+    """200 Pa in the first 40 ms go into the start, out of which the nuisance takes them again."""
+    before = np.concatenate(problem().least_squares().residuals(true_vector()))
+    misfit = problem().least_squares()
+    misfit.replay.drives = [replace(d, p2_start=d.p2_start + 200.0) for d in misfit.replay.drives]
+    after = np.concatenate(misfit.residuals(true_vector()))
+    assert np.linalg.norm(after - before) < 1e-3 * np.linalg.norm(before)
+
+
+def test_a_wrong_start_would_be_seen_without_the_nuisance():
+    misfit, z = problem().least_squares(), true_vector()
+    values = misfit.vector.values(np.stack([z, z]))
+    models = misfit.replay.outputs(values, np.array([0.0, 200.0]))
+    apart = [w * (m[:, :, 1] - m[:, :, 0]) for w, m in zip(misfit.weights, models, strict=True)]
+    before = np.concatenate(misfit.residuals(z))
+    assert np.sqrt(sum(np.sum(a**2) for a in apart)) > 0.05 * np.linalg.norm(before)
+
+
+@pytest.mark.parametrize("away", [1.0, 1.0005, 1.005])
+def test_derivatives_are_central_differences(away):
+    """Up to the share that the nuisances' own change has, which grows with the residual."""
+    misfit, z = problem().least_squares(), away * true_vector()
+    derivative = np.vstack(misfit.linearised(z)[1])
+    for column, axis in zip(derivative.T, 1e-5 * np.eye(4), strict=True):
+        ends = [np.concatenate(misfit.residuals(z + way * axis)) for way in (-1, 1)]
+        difference = (ends[1] - ends[0]) / 2e-5
+        assert np.linalg.norm(column - difference) < 0.02 * np.linalg.norm(difference)
+
+
+def test_residuals_are_the_same_with_and_without_derivatives():
+    misfit, z = problem().least_squares(), true_vector()
+    for alone, among in zip(misfit.residuals(z), misfit.linearised(z)[0], strict=True):
+        np.testing.assert_allclose(alone, among, rtol=1e-9, atol=1e-9)
+
+
+def test_derivatives_on_a_bound_are_taken_inwards(monkeypatch):
+    misfit = problem().least_squares()
+    asked = []
+    outputs = misfit.replay.outputs
+
+    def spy(candidates, p2_shift=0.0):
+        asked.append(candidates)
+        return outputs(candidates, p2_shift)
+
+    monkeypatch.setattr(misfit.replay, "outputs", spy)
+    low, high = misfit.vector.bounds.T
+    for end in (low, high):
+        misfit.linearised(end)
+    for candidates in asked:
+        for symbol, first, last in zip(misfit.vector.symbols, low, high, strict=True):
+            scaled = candidates[symbol] / misfit.vector.reference[symbol]
+            assert np.all((first - 1e-12 <= scaled) & (scaled <= last + 1e-12))
+
+
+def test_the_least_error_lies_at_the_truth():
+    misfit, z = problem().total_error(), true_vector()
+    at = misfit.error(z)
+    for axis in np.eye(4):
+        assert misfit.error(z + 0.005 * axis) > at < misfit.error(z - 0.005 * axis)

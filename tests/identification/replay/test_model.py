@@ -1,0 +1,106 @@
+"""The model on recorded inputs: batches change nothing, and the bench's truth comes back."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from identification.recordings.recording import OUTPUTS
+from identification.replay.drive import drive_of
+from identification.replay.misfit import Misfit, report_weights
+from identification.replay.model import Replay
+from identification.replay.responses import responses, total
+from identification.replay.vector import Vector
+from tests.identification.twins import SWITCHING, TRUE, exact_recording, problem, truth
+
+CANDIDATES = {
+    "alphaMV": TRUE["alphaMV"] * np.array([1.0, 1.05, 0.9]),
+    "R": TRUE["R"] * np.array([1.0, 0.98, 1.03]),
+}
+
+
+@cache
+def mixed():
+    """Drives of different lengths and rates."""
+    recordings = [exact_recording("test1"), exact_recording("test4", 500.0), exact_recording("hold")]
+    return [drive_of(recording, TRUE) for recording in recordings]
+
+
+def test_many_candidates_are_each_alone_to_the_bit():
+    together = Replay(mixed()[:1], TRUE).outputs(CANDIDATES, np.array([0.0, 500.0, -500.0]))[0]
+    for i, shift in enumerate([0.0, 500.0, -500.0]):
+        one = {symbol: values[i : i + 1] for symbol, values in CANDIDATES.items()}
+        alone = Replay(mixed()[:1], TRUE).outputs(one, shift)[0]
+        np.testing.assert_array_equal(alone[:, :, 0], together[:, :, i])
+
+
+def test_recordings_of_other_lengths_and_rates_are_each_alone_to_the_bit():
+    drives = mixed()
+    together = Replay(drives, TRUE).outputs(CANDIDATES)
+    for drive, found in zip(drives, together, strict=True):
+        assert found.shape == (len(OUTPUTS), len(drive.U), 3)
+        np.testing.assert_array_equal(Replay([drive], TRUE).outputs(CANDIDATES)[0], found)
+
+
+@pytest.mark.parametrize(("largest", "batches"), [(1, 3), (9000, 2)])
+def test_smaller_batches_change_nothing(monkeypatch, largest, batches):
+    whole = Replay(mixed(), TRUE).outputs(CANDIDATES)
+    monkeypatch.setattr("identification.replay.model.LARGEST_BATCH", largest)
+    assert len(Replay(mixed(), TRUE)._groups(3)) == batches
+    for one, other in zip(whole, Replay(mixed(), TRUE).outputs(CANDIDATES), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("name", SWITCHING)
+def test_the_truth_s_parameters_give_the_truth_back(name):
+    """Through the smoothed inputs: p2 within 0.1 mbar, p3 within 0.1 mbar, I within 0.02 mA."""
+    found = Replay([drive_of(exact_recording(name), TRUE)], TRUE).outputs({"R": np.array([TRUE["R"]])})
+    for output, model, limit in zip(OUTPUTS, found[0][:, :, 0], (10.0, 10.0, 2e-5), strict=True):
+        assert np.max(np.abs(model - truth(name).channels[output])) < limit
+
+
+def test_other_parameters_do_not():
+    values = {"alphaMV": np.array([1.01 * TRUE["alphaMV"]])}
+    found = Replay([drive_of(exact_recording("test1"), TRUE)], TRUE).outputs(values)[0]
+    assert np.max(np.abs(found[0, :, 0] - truth("test1").channels["p2"])) > 100.0
+
+
+def test_consumed_air_is_missing_from_the_circuit():
+    """A constant flow m over the time t lowers p2 by R T m t / V2 while the valve is shut."""
+    drive = mixed()[0]
+    leaking = replace(drive, sigma_S=np.full(len(drive.U), 1e-3))
+    tight, leaky = (
+        found[0, :, 0] for found in Replay([drive, leaking], TRUE).outputs({"R": np.ones(1) * 42})
+    )
+    lost = TRUE["R_gas"] * TRUE["T_env"] * 1e-3 * 0.05 / TRUE["V2"]
+    assert (tight - leaky)[100] == pytest.approx(lost, rel=1e-6)
+
+
+def test_a_candidate_that_cannot_be_integrated_is_nan_and_harms_no_other():
+    drive = drive_of(cut(), TRUE)
+    found = Replay([drive], TRUE).outputs({"alphaMV": np.array([TRUE["alphaMV"], np.nan])})[0]
+    alone = Replay([drive], TRUE).outputs({"alphaMV": np.array([TRUE["alphaMV"]])})[0]
+    np.testing.assert_array_equal(found[:, :, :1], alone)
+    assert np.all(np.isnan(found[:2, 1:, 1]))
+
+
+def test_the_misfit_of_such_a_candidate_is_a_large_number():
+    vector = Vector(("alphaMV", "R"), TRUE)
+    misfit = Misfit([cut()], vector, report_weights([cut()]))
+    assert misfit.error(np.array([np.nan, 1.0])) > 1e3 * misfit.error(np.ones(2))
+
+
+def test_responses_have_the_errors_of_eqs_19_to_21():
+    answers = responses(problem().calibration, TRUE)
+    for answer in answers:
+        assert answer.partial == pytest.approx(np.linalg.norm(list(answer.errors.values())))
+    assert total(answers) == pytest.approx(np.sqrt(np.mean([a.partial**2 for a in answers])))
+    assert total(answers) < 0.004 < total(responses(problem().calibration, problem().vector.reference))
+
+
+def cut():
+    """The first 20 ms at 500 Hz: what cannot be integrated takes a long time to fail."""
+    whole = exact_recording("test4", 500.0, share=1.0)
+    short = {name: getattr(whole, name)[:10] for name in ("I", "U", "p1", "p2", "p3", "sigma_S")}
+    return replace(whole, **short)
