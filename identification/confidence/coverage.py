@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binomtest, chi2
+from threadpoolctl import threadpool_limits
 
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.valves import available_cores
@@ -101,6 +102,7 @@ _twin: dict[str, Any] = {}
 
 
 def _prepare(truths: list[Truth], truth: Parameters, seed: int) -> None:
+    threadpool_limits(1)  # threads of the linear algebra would take the other workers' cores
     _twin.update(truths=truths, truth=truth, seed=seed)
 
 
