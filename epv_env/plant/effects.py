@@ -66,7 +66,7 @@ class Effects(NamedTuple):
     U_clamp: Value
     """Voltage against which the current decays [V]."""
     saturation: Value
-    """Turns over the saturation flux: with the current and 1/Rm, how far the iron saturates [1/(V s)]."""
+    """Turns over the saturation flux: with I/Rm, how far the iron saturates [1/(V s)]."""
     I_rem: Value
     """Current that would make the residual flux [A]."""
     friction_MV: Value
