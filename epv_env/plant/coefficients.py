@@ -11,6 +11,9 @@ from epv_env.plant.flow import CRITICAL_RATIO
 
 QUARTER_PI = np.pi / 4
 
+GREATEST_CURRENT = 1.0
+"""Up to which saturation is followed [A] (Table 1's range)."""
+
 STABLE = 1.0
 """Longest step times fastest rate at which the integrator follows an effect well [-]."""
 
@@ -67,8 +70,10 @@ def effect_sizes(p: Mapping[str, ArrayLike]) -> NDArray:
     friction_rate = np.maximum(
         p["F_MV"] / (p["mMV"] * SLIDING_SPEED_MV), p["F_PV"] / (p["mPV"] * SLIDING_SPEED_PV)
     )
-    gap_reluctance = p["xMVmax"] / (p["mu0"] * QUARTER_PI * p["dMB"] ** 2)
-    clamp_rate = p["U_clamp"] * (p["RML"] + gap_reluctance) / (p["N"] ** 2 * CLAMP_WIDTH)
+    reluctance = p["RML"] + p["xMVmax"] / (p["mu0"] * QUARTER_PI * p["dMB"] ** 2)
+    flattened = (1 + p["sMV"] * p["N"] * GREATEST_CURRENT / p["RML"]) ** 2
+    per_inductance = reluctance / p["N"] ** 2 * flattened
+    clamp_rate = p["U_clamp"] / CLAMP_WIDTH * per_inductance
     rows = Effects(
         a1=p["a1"],
         a2=p["a2"],
@@ -89,7 +94,7 @@ def effect_sizes(p: Mapping[str, ArrayLike]) -> NDArray:
         friction_PV=p["F_PV"],
         leak_PV=p["A_PV"],
         leak_circuit=p["A_circuit"],
-        friction_step=STABLE / np.maximum(friction_rate, STABLE / UNLIMITED),
+        steady_step=STABLE / np.maximum(friction_rate, p["R"] * per_inductance),
         clamp_step=STABLE / np.maximum(clamp_rate, STABLE / UNLIMITED),
     )
     return np.ascontiguousarray(np.broadcast_arrays(*np.atleast_1d(*rows)), dtype=float)
@@ -98,5 +103,5 @@ def effect_sizes(p: Mapping[str, ArrayLike]) -> NDArray:
 def has_effects(effects: NDArray) -> NDArray:
     """Which valves have an effect switched on, boolean (valve,); RT and the steps are not sizes."""
     sizes = Effects(*effects)
-    properties = ("RT", "friction_step", "clamp_step")
+    properties = ("RT", "steady_step", "clamp_step")
     return np.any([getattr(sizes, f) != 0 for f in Effects._fields if f not in properties], axis=0)

@@ -42,8 +42,8 @@ OFF_VOLTAGE = 1.0
 CLAMP_WIDTH = 0.01
 """Current over which a clamp's voltage rises to its value [A]: no integrator follows a jump at zero."""
 
-NO_CURRENT = 1e-9
-"""Below this the decay against a clamp is over [A]."""
+NO_CURRENT = 1e-6
+"""Below this the decay against a clamp is over, and the clamp conducts no more [A]."""
 
 SLIDING_SPEED_MV = 0.02
 """Speed over which the armature's friction rises to its value [m/s]; it flies at 0.3 m/s."""
@@ -93,8 +93,8 @@ class Effects(NamedTuple):
     """Effective area of the shut PV seat [m^2]."""
     leak_circuit: Value
     """Effective area of the circuit's leak [m^2]."""
-    friction_step: Value
-    """Longest step at which the integrator follows friction [s]."""
+    steady_step: Value
+    """Longest step at which the integrator follows friction and the saturated coil [s]."""
     clamp_step: Value
     """Longest step at which it follows the current's decay against a clamp [s]."""
 
@@ -119,7 +119,8 @@ def coil_voltage(U, I, effects):  # noqa: E741 - the report's symbol
     """
     on = U - min(effects.U_drop, max(U, 0.0))
     clamp = effects.U_clamp * I / math.sqrt(I * I + CLAMP_WIDTH * CLAMP_WIDTH)
-    return on if U > OFF_VOLTAGE else U - clamp
+    off = U - clamp if abs(I) > NO_CURRENT else U
+    return on if U > OFF_VOLTAGE else off
 
 
 @inlined
@@ -165,4 +166,4 @@ def discharge(p1, p2, effects):
 def longest_step(U, I, effects):  # noqa: E741 - the report's symbol
     """Longest step that the effects allow at present [s]."""
     clamped = (U <= OFF_VOLTAGE) & (abs(I) > NO_CURRENT)
-    return min(effects.friction_step, effects.clamp_step if clamped else effects.friction_step)
+    return min(effects.steady_step, effects.clamp_step if clamped else effects.steady_step)

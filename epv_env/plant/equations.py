@@ -224,9 +224,12 @@ def flow_circuit_leak(q, c, effects, extended):
 
 @inlined
 def control_pressure_rate(q, c, mass_rate, effects, extended):
-    """dp3/dt for air coming in at mass_rate [Pa/s] (eq. 7); the piston may sweep the chamber."""
+    """dp3/dt for air coming in at mass_rate [Pa/s] (eq. 7); the piston may sweep the chamber.
+
+    A tenth of the chamber is left, whatever the parameters say, so that its pressure stays finite.
+    """
     if extended:
-        left = 1.0 - effects.swept * q.xPV
+        left = max(1.0 - effects.swept * q.xPV, 0.1)
         return (c.RT_V3 * mass_rate + effects.swept * q.vPV * q.p3) / left
     return c.RT_V3 * mass_rate
 
