@@ -8,6 +8,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from epv_env.plant.commandline import fail_clearly, writable_folder
+from epv_env.plant.effects import CATALOGUE
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import load_plant, save_plant
 from identification.bench.programmes import SUITES
@@ -84,6 +85,9 @@ def _add_bench(commands: "argparse._SubParsersAction") -> None:
     parser.add_argument(
         "--set", action="append", default=[], metavar="SYMBOL=VALUE", help="another true value [SI]"
     )
+    parser.add_argument(
+        "--effect", action="append", default=[], metavar="NAME=SIZE", help="an effect (docs/effects.md)"
+    )
     parser.add_argument("--truth", type=Path, default=None, help="plant file to write the truth to")
 
 
@@ -106,6 +110,7 @@ def _add_reproduce(commands: "argparse._SubParsersAction") -> None:
 def _bench(chosen: argparse.Namespace) -> None:
     check_vacant(chosen.out)
     truth = _with_values(load_plant(chosen.plant).parameters, chosen.set)
+    truth = _with_effects(truth, chosen.effect)
     campaign = run_bench(SUITES[chosen.suite], truth, seed=chosen.seed, rate=chosen.rate)
     write_campaign(campaign, chosen.out)
     if chosen.truth is not None:
@@ -129,6 +134,24 @@ def _with_values(parameters: Parameters, settings: list[str]) -> Parameters:
                 f"--set {setting}: give SYMBOL=VALUE with a number in SI units, as in --set R=43.5"
             ) from None
     return parameters.replace(**changes)
+
+
+def _with_effects(parameters: Parameters, settings: list[str]) -> Parameters:
+    """Parameters with NAME=SIZE effects switched on; several sizes of one effect part at commas."""
+    for setting in settings:
+        name, _, text = setting.partition("=")
+        symbols = CATALOGUE.get(name)
+        if symbols is None:
+            raise ValueError(f"--effect {setting}: unknown effect; known are {', '.join(CATALOGUE)}")
+        values = text.split(",")
+        if len(values) != len(symbols):
+            raise ValueError(
+                f"--effect {setting}: {name} is sized by {', '.join(symbols)}: give a number for each"
+            )
+        parameters = _with_values(
+            parameters, [f"{symbol}={value}" for symbol, value in zip(symbols, values, strict=True)]
+        )
+    return parameters
 
 
 def _stage(chosen: argparse.Namespace) -> None:

@@ -8,7 +8,17 @@ are inlined into the kernels of integrate.py.
 from typing import NamedTuple
 
 from epv_env.plant.compiled import inlined
-from epv_env.plant.effects import effective_seat_diameter
+from epv_env.plant.effects import (
+    SLIDING_SPEED_MV,
+    SLIDING_SPEED_PV,
+    coil_voltage,
+    discharge,
+    effective_seat_diameter,
+    friction,
+    opened,
+    saturated_force,
+    saturation_level,
+)
 from epv_env.plant.flow import mass_flux
 from epv_env.plant.values import Value
 
@@ -44,7 +54,7 @@ class State(NamedTuple):
     air_in_MV: Value
     """Air passed from the input to the control chamber [kg]."""
     air_vented: Value
-    """Air passed from the control chamber to ambient [kg]."""
+    """Air passed from the control chamber, and through a leak of the circuit, to ambient [kg]."""
     coil_energy: Value
     """Electrical energy taken by the coil [J]."""
 
@@ -128,7 +138,11 @@ def piston_force(q, c, effects, extended):
         seat = effective_seat_diameter(q.xPV, q.p1, q.p2, seat, effects)
     seat_area = QUARTER_PI * seat * seat
     pressure = (q.p1 - q.p3) * c.piston_area - (q.p1 - q.p2) * seat_area
-    return pressure - c.cPV * (q.xPV + c.xPV0) - c.kPV * q.vPV
+    force = pressure - c.cPV * (q.xPV + c.xPV0) - c.kPV * q.vPV
+    if extended:
+        force -= effects.flow_force * c.curtain_PV * q.xPV * (q.p1 - q.p2)
+        force = friction(force, q.xPV, q.vPV, c.xPVmax, effects.friction_PV, SLIDING_SPEED_PV)
+    return force
 
 
 @inlined
@@ -141,38 +155,83 @@ def reluctance_inverse(q, c):
 
 
 @inlined
-def armature_force(q, c, inverse_Rm):
+def armature_force(q, c, inverse_Rm, effects, extended):
     """Net force on the MV armature, pull-in positive [N] (eq. 11)."""
-    flux_linkage = q.I * inverse_Rm
-    magnetic = 0.5 * c.N_squared * flux_linkage * flux_linkage * c.gap_reluctance
-    return magnetic - c.cMV * (q.xMV + c.xMV0) - c.kMV * q.vMV
+    current, half = q.I, 0.5
+    if extended:
+        current = q.I + effects.I_rem
+        half = saturated_force(saturation_level(current, inverse_Rm, effects))
+    flux_linkage = current * inverse_Rm
+    magnetic = half * c.N_squared * flux_linkage * flux_linkage * c.gap_reluctance
+    force = magnetic - c.cMV * (q.xMV + c.xMV0) - c.kMV * q.vMV
+    if extended:
+        force += effects.inlet_area * (q.p1 - q.p3) - effects.exhaust_area * (q.p3 - c.p_env)
+        force = friction(force, q.xMV, q.vMV, c.xMVmax, effects.friction_MV, SLIDING_SPEED_MV)
+    return force
 
 
 @inlined
-def current_rate(q, u, c, inverse_Rm):
+def current_rate(q, u, c, inverse_Rm, effects, extended):
     """dI/dt [A/s] (eq. 12 with the sign of docs/model.md, correction 6)."""
-    motion = q.I * q.vMV * c.gap_reluctance * inverse_Rm
-    return (u.U - c.R * q.I) * c.N_squared_inverse / inverse_Rm - motion
+    U, current, per_inductance = u.U, q.I, c.N_squared_inverse / inverse_Rm
+    if extended:
+        U = coil_voltage(u.U, q.I, effects)
+        current = q.I + effects.I_rem
+        flattened = 1.0 + saturation_level(current, inverse_Rm, effects)
+        per_inductance *= flattened * flattened
+    motion = current * q.vMV * c.gap_reluctance * inverse_Rm
+    return (U - c.R * q.I) * per_inductance - motion
 
 
 @inlined
-def flow_PV(q, c):
+def flow_PV(q, c, effects, extended):
     """Mass flow from the input to the output chamber through the PV seat [kg/s] (eq. 6)."""
-    return c.curtain_PV * q.xPV * mass_flux(q.p1, q.p2, c.inverse_sqrt_RT)
+    area, share = c.curtain_PV * q.xPV, 1.0
+    if extended:
+        area = area * discharge(q.p1, q.p2, effects) + effects.leak_PV
+        share = 1.0 - effects.drop_deficit
+    return area * mass_flux(q.p1, q.p2, c.inverse_sqrt_RT, share)
 
 
 @inlined
-def flow_inlet(q, c):
+def flow_inlet(q, c, effects, extended):
     """Mass flow from the input to the control chamber [kg/s] (eq. 7): smaller of curtain, orifice."""
-    area = min(c.curtain_in * q.xMV, c.orifice_in)
-    return area * mass_flux(q.p1, q.p3, c.inverse_sqrt_RT)
+    area, share = min(c.curtain_in * q.xMV, c.orifice_in), 1.0
+    if extended:
+        area = opened(area, c.orifice_in, effects.leak_inlet)
+        share = 1.0 - effects.drop_deficit
+    return area * mass_flux(q.p1, q.p3, c.inverse_sqrt_RT, share)
 
 
 @inlined
-def flow_exhaust(q, c):
+def flow_exhaust(q, c, effects, extended):
     """Mass flow from the control chamber to ambient [kg/s] (the exhaust that eq. 7 leaves out)."""
-    area = min(c.curtain_exh * (c.xMVmax - q.xMV), c.orifice_exh)
-    return area * mass_flux(q.p3, c.p_env, c.inverse_sqrt_RT)
+    area, share = min(c.curtain_exh * (c.xMVmax - q.xMV), c.orifice_exh), 1.0
+    if extended:
+        area = opened(area, c.orifice_exh, effects.leak_exhaust)
+        share = 1.0 - effects.drop_deficit
+    return area * mass_flux(q.p3, c.p_env, c.inverse_sqrt_RT, share)
+
+
+@inlined
+def flow_circuit_leak(q, c, effects, extended):
+    """Mass flow from the circuit to ambient through its leak [kg/s]."""
+    if extended:
+        share = 1.0 - effects.drop_deficit
+        return effects.leak_circuit * mass_flux(q.p2, c.p_env, c.inverse_sqrt_RT, share)
+    return 0.0
+
+
+@inlined
+def control_pressure_rate(q, c, mass_rate, effects, extended):
+    """dp3/dt for air coming in at mass_rate [Pa/s] (eq. 7); the piston may sweep the chamber.
+
+    A tenth of the chamber is left, whatever the parameters say, so that its pressure stays finite.
+    """
+    if extended:
+        left = max(1.0 - effects.swept * q.xPV, 0.1)
+        return (c.RT_V3 * mass_rate + effects.swept * q.vPV * q.p3) / left
+    return c.RT_V3 * mass_rate
 
 
 @inlined
@@ -184,22 +243,23 @@ def derivative(q, u, c, effects, free_PV, free_MV, extended):
     """
     force_PV = piston_force(q, c, effects, extended)
     inverse_Rm = reluctance_inverse(q, c)
-    force_MV = armature_force(q, c, inverse_Rm)
-    through_PV = flow_PV(q, c)
-    inlet = flow_inlet(q, c)
-    exhaust = flow_exhaust(q, c)
+    force_MV = armature_force(q, c, inverse_Rm, effects, extended)
+    through_PV = flow_PV(q, c, effects, extended)
+    inlet = flow_inlet(q, c, effects, extended)
+    exhaust = flow_exhaust(q, c, effects, extended)
+    leak = flow_circuit_leak(q, c, effects, extended)
     rates = State(
-        p2=c.RT_V2 * (through_PV - u.sigma_S),
-        p3=c.RT_V3 * (inlet - exhaust),
+        p2=c.RT_V2 * (through_PV - leak - u.sigma_S),
+        p3=control_pressure_rate(q, c, inlet - exhaust, effects, extended),
         xPV=q.vPV * free_PV,
         vPV=force_PV * c.mPV_inverse * free_PV,
         xMV=q.vMV * free_MV,
         vMV=force_MV * c.mMV_inverse * free_MV,
-        I=current_rate(q, u, c, inverse_Rm),
+        I=current_rate(q, u, c, inverse_Rm, effects, extended),
         p1=u.p1_slope + c.RT_V1 * (u.refill - through_PV - inlet),
         air_in_PV=through_PV,
         air_in_MV=inlet,
-        air_vented=exhaust,
+        air_vented=exhaust + leak,
         coil_energy=u.U * q.I,
     )
     return rates, force_PV, force_MV

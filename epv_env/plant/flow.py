@@ -51,14 +51,15 @@ _C0, _C1, _C2, _C3, _C4, _C5, _C6, _C7 = _fit()
 
 
 @inlined
-def mass_flux(p_a, p_b, inverse_sqrt_RT):
+def mass_flux(p_a, p_b, inverse_sqrt_RT, drop_share=1.0):
     """Mass flux from side a to side b [kg/(s m^2)]; negative when p_b is the higher pressure.
 
     p_a, p_b: absolute pressures [Pa], positive. inverse_sqrt_RT: 1/sqrt(R T) upstream [s/m].
+    drop_share: what of the drop 1 - r counts; below 1 the orifice chokes at a lower ratio than 0.528.
     """
     upstream = max(p_a, p_b)
     downstream = min(p_a, p_b)
-    drop = min(1.0 - downstream / upstream, _LARGEST_DROP)
+    drop = min(drop_share * (1.0 - downstream / upstream), _LARGEST_DROP)
     bracket = _C0 + drop * (
         _C1 + drop * (_C2 + drop * (_C3 + drop * (_C4 + drop * (_C5 + drop * (_C6 + drop * _C7)))))
     )

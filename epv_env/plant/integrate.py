@@ -15,6 +15,7 @@ import numba
 import numpy as np
 
 from epv_env.plant.compiled import FLAGS, inlined, source_digest
+from epv_env.plant.effects import longest_step
 from epv_env.plant.equations import State, derivative
 from epv_env.plant.events import crossing, hermite, release, turning_point
 from epv_env.plant.lanes import (
@@ -148,6 +149,8 @@ def _try_steps(work, step, extended):
         free_PV = 0.0 if held_PV else 1.0
         free_MV = 0.0 if held_MV else 1.0
         h = min(min(2.0 * step if held_PV & held_MV else step, hint), remaining)
+        if extended:
+            h = min(h, longest_step(u.U, q.I, effects))
         end, mid_PV, mid_MV, end_PV, end_MV = remaining_stages(
             q, held_still(rates, free_PV, free_MV), u, c, effects, free_PV, free_MV, h, extended
         )

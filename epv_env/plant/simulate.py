@@ -28,10 +28,11 @@ class Trajectory:
 def energised(p: Mapping[str, Value], *, p1: Value, p2: Value, U: Value) -> State:
     """Steady state with the coil on: armature pulled in, p3 = p1, PV shut (SI units).
 
-    Arguments are numbers, or arrays (n,) for n valves.
+    Arguments are numbers, or arrays (n,) for n valves. Leaks, which know no steady state, are left out.
     """
+    coil = U - np.minimum(p["U_drop"], np.maximum(U, 0.0))
     return State(
-        p2=p2, p3=p1, xPV=0.0, vPV=0.0, xMV=p["xMVmax"], vMV=0.0, I=U / p["R"], p1=p1,
+        p2=p2, p3=p1, xPV=0.0, vPV=0.0, xMV=p["xMVmax"], vMV=0.0, I=coil / p["R"], p1=p1,
         air_in_PV=0.0, air_in_MV=0.0, air_vented=0.0, coil_energy=0.0,
     )  # fmt: skip
 

@@ -91,9 +91,12 @@ def test_coil_current_rises_exponentially_while_the_armature_is_held():
 
 
 @numba.njit
-def _magnet(q, u, c):
+def _magnet(q, u, c, e):
     inverse_Rm = reluctance_inverse(q, c)
-    return current_rate(q, u, c, inverse_Rm), armature_force(q, c, inverse_Rm)
+    return (
+        current_rate(q, u, c, inverse_Rm, e, False),
+        armature_force(q, c, inverse_Rm, e, False),
+    )
 
 
 def _magnet_powers(p, q, u, printed):
@@ -112,7 +115,8 @@ def _magnet_powers(p, q, u, printed):
     else:
         reluctance = p["RML"] + (p["xMVmax"] - q.xMV) * gap_reluctance
         reluctance_rate = -q.vMV * gap_reluctance
-        current, net_force = _magnet(q, u, Coefficients(*coefficients(p)[:, 0]))
+        c, e = Coefficients(*coefficients(p)[:, 0]), Effects(*effect_sizes(p)[:, 0])
+        current, net_force = _magnet(q, u, c, e)
         force = net_force + p["cMV"] * (q.xMV + p["xMV0"]) + p["kMV"] * q.vMV
     stored = p["N"] ** 2 * (  # of N^2 I^2 / (2 Rm)
         q.I * current / reluctance - q.I**2 * reluctance_rate / (2 * reluctance**2)
