@@ -23,6 +23,7 @@ from epv_env.plant.lanes import (
     EFFECT,
     EVENT,
     FORCE,
+    GIVEN_UP,
     HIGHEST,
     HINT,
     INPUT,
@@ -209,6 +210,7 @@ def _run_block(work, step, extended):
     for lane in range(LANES):
         if not work[REMAINING, lane] <= 0.0:
             work[:N_STATE, lane] = np.nan
+            work[GIVEN_UP, lane] = 1.0
 
 
 @inlined
@@ -221,12 +223,14 @@ def _run(state, coefficients, effects, inputs, duration, lowest, highest, record
         copy_rows(coefficients, 0, at, work, COEFFICIENT, 0, N_COEFFICIENT)
         copy_rows(effects, 0, at, work, EFFECT, 0, N_EFFECT)
         for lane in range(LANES):
+            work[GIVEN_UP, lane] = 0.0
             work[LOWEST, lane] = lowest[at + lane]
             work[HIGHEST, lane] = highest[at + lane]
         for period in range(inputs.shape[0]):
             copy_rows(inputs[period], 0, at, work, INPUT, 0, N_INPUT)
             for lane in range(LANES):
-                work[REMAINING, lane] = duration[period, at + lane]
+                lasts = duration[period, at + lane]
+                work[REMAINING, lane] = 0.0 if work[GIVEN_UP, lane] != 0.0 else lasts
                 work[HINT, lane] = _UNLOCATED
             _run_block(work, step, extended)
             if record.shape[0] > 0:

@@ -34,7 +34,9 @@ HINT = REMAINING + 1
 """Largest next step [s]."""
 EVENT = HINT + 1
 """1 where the step on trial met an event, else 0."""
-LOWEST = EVENT + 1
+GIVEN_UP = EVENT + 1
+"""1 where the lane could not be integrated, else 0."""
+LOWEST = GIVEN_UP + 1
 """Least p2 so far [Pa]."""
 HIGHEST = LOWEST + 1
 """Greatest p2 so far [Pa]."""

@@ -151,3 +151,16 @@ def test_trajectory_is_the_same_beside_valves_with_other_effects():
     for a2 in (0.0, 2e-4):
         same = run(({**p, "a2": a2}, start), u, np.arange(N))
         np.testing.assert_array_equal(mixed[:, :, effects == a2], same[:, :, effects == a2])
+
+
+def test_a_valve_that_was_given_up_is_not_tried_again():
+    """Trying the 499 later periods of a valve whose mass is NaN as well would take minutes."""
+    p = {**Parameters.calibrated(), "mMV": np.array([2e-3, np.nan])}
+    start = energised(p, p1=12e5, p2=6e5, U=24.0)
+    valves = Valves(2)
+    valves.set_parameters(np.arange(2), p)
+    for field, value in zip(valves.state, start, strict=True):
+        field[:] = value
+    later = valves.record(Inputs(*np.zeros((4, 500, 1))), 5e-4)
+    assert np.all(np.isfinite(later.p2[:, 0]))
+    assert np.all(np.isnan(later.p2[:, 1]))
