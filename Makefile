@@ -42,8 +42,9 @@ $(OLDEST)/.installed: $(OLDEST)/.locked pyproject.toml
 train: $(VENV)/.installed ## train the PPO controller; options in ARGS="..."
 	$(PY) training/train_ppo.py $(ARGS)
 
+# The matrices are small: threads of the linear algebra would only wait for each other.
 test: $(VENV)/.installed ## run the tests; options in ARGS="..."
-	$(PY) -m pytest $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(PY) -m pytest $(ARGS)
 
 # Its own numba cache: the two numba versions would overwrite each other's files.
 test-oldest: $(OLDEST)/.installed ## run the plant and environment tests on the oldest core packages

@@ -80,7 +80,7 @@ def _into_stop(x, v, x_max, direction):
 def _rates(q, u, c, effects):
     """Rates of a state with limited strokes; a mover pressed against a stop stands still."""
     force_PV = piston_force(q, c, effects, True)
-    force_MV = armature_force(q, c, reluctance_inverse(q, c))
+    force_MV = armature_force(q, c, reluctance_inverse(q, c), effects, True)
     free_PV = 0.0 if _into_stop(q.xPV, q.vPV, c.xPVmax, force_PV) else 1.0
     free_MV = 0.0 if _into_stop(q.xMV, q.vMV, c.xMVmax, force_MV) else 1.0
     q = _with_speeds(q, q.vPV * free_PV, q.vMV * free_MV)

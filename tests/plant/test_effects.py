@@ -6,7 +6,7 @@ import pytest
 from scipy.integrate import quad
 
 from epv_env.plant.coefficients import coefficients, effect_sizes, has_effects
-from epv_env.plant.effects import CATALOGUE, Effects
+from epv_env.plant.effects import CATALOGUE, Effects, saturated_force
 from epv_env.plant.equations import (
     Coefficients,
     Inputs,
@@ -193,3 +193,9 @@ def test_the_swept_volume_raises_the_pressure_of_a_sealed_chamber():
     gained = run.state.air_in_MV - run.state.air_vented
     np.testing.assert_allclose(held - held[0], gained, rtol=0, atol=1e-11)
     assert np.max(run.state.xPV) > 1e-3
+
+
+@pytest.mark.parametrize("u", [0.0, 1e-6, 0.01, 0.3, 1.0, 3.0])
+def test_the_saturated_force_is_the_coenergy_s(u):
+    exact = (np.log1p(u) - u / (1 + u)) / u**2 if u > 1e-3 else 0.5 - 2 / 3 * u
+    assert saturated_force.py_func(u) == pytest.approx(exact, abs=1e-5)

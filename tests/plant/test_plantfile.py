@@ -179,5 +179,5 @@ def test_effects_travel_by_name(tmp_path):
 def test_an_unknown_effect_is_refused(tmp_path):
     content = {"format": "epv-plant/1", "parameters": {}, "effects": {"gremlins": {"eMV": 0.5}}}
     (tmp_path / "p.json").write_text(json.dumps(content))
-    with pytest.raises(PlantFileError, match="unknown effect 'gremlins': known are .*armature_bounce"):
+    with pytest.raises(PlantFileError, match=r"unknown effect 'gremlins': known are .*armature_bounce"):
         load_plant(tmp_path / "p.json")
