@@ -42,6 +42,15 @@ def test_the_bench_writes_a_campaign_and_keeps_its_truth_elsewhere(campaign):
     assert "43" not in (campaign / "campaign.json").read_text()
 
 
+def test_an_effect_of_the_bench_goes_into_its_truth(tmp_path):
+    truth = tmp_path / "truth.json"
+    arguments = ["--out", str(tmp_path / "campaign"), "--truth", str(truth)]
+    assert main(["bench", *arguments, "--effect", "circuit_leak=2e-7"]) == 0
+    assert load_plant(truth).parameters["A_circuit"] == 2e-7
+    test4 = next(r for r in read_campaign(tmp_path / "campaign").recordings if r.name == "test4")
+    assert np.mean(test4.p2[600:700]) - np.mean(test4.p2[-100:]) > 5e3  # shut all the while
+
+
 def test_run_finds_the_truth_and_says_so(finished):
     plant = load_plant(finished / "plant.json")
     assert plant.parameters["R"] == pytest.approx(43, rel=1e-3)
@@ -117,6 +126,9 @@ def test_a_campaign_that_lacks_recordings_is_still_identified(campaign, tmp_path
         (["bench", "--set", "R"], "give SYMBOL=VALUE with a number"),
         (["bench", "--set", "Q=3"], "unknown parameter 'Q'"),
         (["bench", "--set", "R=1"], "outside its domain"),
+        (["bench", "--effect", "gremlins=1"], "unknown effect; known are"),
+        (["bench", "--effect", "local_gas_speed=0.1"], "sized by a1, a2"),
+        (["bench", "--effect", "circuit_leak=1"], "outside its domain"),
         (["bench", "--rate", "100"], "sampling rate 100"),
         (["bench", "--plant", "/no/plant.json"], "cannot read plant file"),
         (["quality", "/no/campaign"], "cannot be read"),
