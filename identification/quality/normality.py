@@ -20,6 +20,9 @@ LEAST_EXPECTED = 5.0
 ESTIMATED = 2
 """Parameters estimated from the counts: mean and standard deviation."""
 
+MOST_CELLS = 10_000
+"""Cells into which the readings of one channel are sorted."""
+
 MOST_POSITIONS = 500
 """Points of the line, a quarter of sigma apart, over which the probability of a code is averaged."""
 
@@ -97,7 +100,8 @@ def _cells(readings: NDArray, step: float, sigma: float) -> tuple[NDArray, NDArr
     least = float(np.min(readings))
     step = step or 1e-3 * sigma
     codes = np.rint((readings - least) / step).astype(int)
-    width = max(1, round(sigma / CELLS_PER_SIGMA / step))
+    # Readings that drift by thousands of deviations need no more cells than this to show it.
+    width = max(1, round(sigma / CELLS_PER_SIGMA / step), int(np.max(codes)) // MOST_CELLS + 1)
     counts = np.bincount(codes // width)
     return least + (width * np.arange(1, len(counts)) - 0.5) * step, counts
 

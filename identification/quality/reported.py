@@ -1,6 +1,10 @@
 """What the report found on its own bench (Tables 2, 3, 4), in A, V and bar."""
 
+from itertools import combinations
+
+from identification.printed import correlation_matrix
 from identification.quality.statistics import Description
+from identification.recordings.recording import CHANNELS
 
 NAMES = {
     "arithmetic_mean": "arithmetic mean",
@@ -37,16 +41,8 @@ DESCRIPTIONS = {
 """Table 3 by channel."""
 
 CORRELATIONS = {
-    ("I", "U"): -0.0135,
-    ("I", "p1"): 0.0297,
-    ("I", "p2"): -0.0203,
-    ("I", "p3"): 0.071,
-    ("U", "p1"): 0.0233,
-    ("U", "p2"): -0.0366,
-    ("U", "p3"): -0.012,
-    ("p1", "p2"): 0.0344,
-    ("p1", "p3"): 0.0127,
-    ("p2", "p3"): 0.0643,
+    (CHANNELS[row], CHANNELS[column]): correlation_matrix()[row][column]
+    for row, column in combinations(range(len(CHANNELS)), 2)
 }
 """Table 4, above the diagonal."""
 

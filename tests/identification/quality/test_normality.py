@@ -88,3 +88,11 @@ def test_the_probability_plot_of_normal_noise_has_its_deviation_as_slope():
     assert (slope, offset) == (pytest.approx(2.0, rel=0.02), pytest.approx(1.0, abs=0.1))
     assert quantiles.shape == ordered.shape == (SAMPLES,)
     assert np.all(np.diff(ordered) >= 0)
+
+
+def test_a_drift_of_millions_of_steps_needs_little_memory():
+    """A converter so fine that its steps vanish in the drift: cells of equal width, not of one code."""
+    time = np.linspace(0.0, 1.0, SAMPLES)
+    readings = 1e9 * time + np.random.default_rng(3).standard_normal(SAMPLES)
+    found = assess_normality(readings, 1e9 * time, 1e-3)
+    assert np.isfinite(found.standard_deviation)
