@@ -127,12 +127,7 @@ def _with_values(parameters: Parameters, settings: list[str]) -> Parameters:
     changes = {}
     for setting in settings:
         symbol, _, text = setting.partition("=")
-        try:
-            changes[symbol] = float(text)
-        except ValueError:
-            raise ValueError(
-                f"--set {setting}: give SYMBOL=VALUE with a number in SI units, as in --set R=43.5"
-            ) from None
+        changes[symbol] = _number(text, f"--set {setting}: give SYMBOL=VALUE", "--set R=43.5")
     return parameters.replace(**changes)
 
 
@@ -143,15 +138,23 @@ def _with_effects(parameters: Parameters, settings: list[str]) -> Parameters:
         symbols = CATALOGUE.get(name)
         if symbols is None:
             raise ValueError(f"--effect {setting}: unknown effect; known are {', '.join(CATALOGUE)}")
-        values = text.split(",")
-        if len(values) != len(symbols):
+        sizes = text.split(",")
+        if len(sizes) != len(symbols):
             raise ValueError(
                 f"--effect {setting}: {name} is sized by {', '.join(symbols)}: give a number for each"
             )
-        parameters = _with_values(
-            parameters, [f"{symbol}={value}" for symbol, value in zip(symbols, values, strict=True)]
-        )
+        rule = f"--effect {setting}: give NAME=SIZE"
+        values = [_number(size, rule, "--effect piston_friction=8") for size in sizes]
+        parameters = parameters.replace(**dict(zip(symbols, values, strict=True)))
     return parameters
+
+
+def _number(text: str, rule: str, example: str) -> float:
+    """The text as a number; ValueError says the rule and gives an example."""
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError(f"{rule} with a number in SI units, as in {example}") from None
 
 
 def _stage(chosen: argparse.Namespace) -> None:

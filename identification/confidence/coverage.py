@@ -77,8 +77,10 @@ def coverage_study(
     """Calibrate `campaigns` twin campaigns of the report's tests, each with its own sensor noise.
 
     truth: None is Table 12. Campaign i has the same noise whatever the number of campaigns or of
-    workers. Finished campaigns are kept in the journal.
+    workers. Finished campaigns are kept in the journal. Raises ValueError for less than one campaign.
     """
+    if campaigns < 1:
+        raise ValueError(f"a coverage study of {campaigns} campaigns shows nothing: give 1 or more")
     truth = truth or Parameters.calibrated()
     book = Journal(journal, {"study": "coverage", "truth": dict(truth), "seed": seed})
     missing = [i for i in range(campaigns) if str(i) not in book]

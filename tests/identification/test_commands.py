@@ -128,6 +128,7 @@ def test_a_campaign_that_lacks_recordings_is_still_identified(campaign, tmp_path
         (["bench", "--set", "R=1"], "outside its domain"),
         (["bench", "--effect", "gremlins=1"], "unknown effect; known are"),
         (["bench", "--effect", "local_gas_speed=0.1"], "sized by a1, a2"),
+        (["bench", "--effect", "circuit_leak=x"], "--effect circuit_leak=x: give NAME=SIZE with a"),
         (["bench", "--effect", "circuit_leak=1"], "outside its domain"),
         (["bench", "--rate", "100"], "sampling rate 100"),
         (["bench", "--plant", "/no/plant.json"], "cannot read plant file"),
