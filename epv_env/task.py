@@ -15,6 +15,7 @@ from epv_env.observation import HISTORY, LONGEST_WAIT, P2_LAGS, P3_LAGS, encode
 from epv_env.plant.consumption import Profile, Profiles, draw_profile
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
+from epv_env.plant.readings import MEASURED
 from epv_env.plant.sensors import SENSORS
 from epv_env.plant.simulate import energised
 from epv_env.plant.supply import BAR, Supply
@@ -23,7 +24,6 @@ from epv_env.reward import BAND_BAR, RewardTerms, reward_terms
 from epv_env.settings import EMPTY_CIRCUIT_BAR, Settings
 
 PRESSURES = ("p1", "p2", "p3")
-MEASURED = (*PRESSURES, "I")
 NOISE_BLOCK = 256
 """Samples of noise drawn at a time for each episode."""
 
@@ -274,7 +274,9 @@ class LimitingTask:
             if rng is not None and self.settings.sensor_noise:
                 self._noise_block[i] = rng.standard_normal((NOISE_BLOCK, len(MEASURED)))
         normal = self._noise_block[where, place]
-        state = self.valves.state
-        true = {name: getattr(state, name)[where] / BAR for name in PRESSURES}
-        true["I"] = state.I[where]
-        return {name: SENSORS[name].measure(true[name], normal[:, k]) for k, name in enumerate(MEASURED)}
+        true = {name: value[where] for name, value in self.valves.readings().items()}
+        units = {name: BAR if name in PRESSURES else 1.0 for name in MEASURED}
+        return {
+            name: SENSORS[name].measure(true[name] / units[name], normal[:, k])
+            for k, name in enumerate(MEASURED)
+        }

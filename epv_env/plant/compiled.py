@@ -15,6 +15,25 @@ inlined = numba.njit(forceinline=True, **FLAGS)
 """Decorator for the small functions that the kernels absorb."""
 
 
+def generated(name: str, arguments: str, body: str, **names):
+    """An inlined function from source text: one expression per field, so that no field is typed twice.
+
+    LLVM vectorises plain indexing; a loop over the fields of a tuple would go through memory.
+    """
+    namespace = dict(names)
+    exec(f"def {name}({arguments}):\n    {body}\n", namespace)
+    return inlined(namespace[name])
+
+
+def replacing(kind, *fields: str):
+    """Function (q, value of each of `fields` in turn) -> q with these fields replaced.
+
+    What `q._replace` does outside of compiled code.
+    """
+    items = ", ".join(field if field in fields else f"q.{field}" for field in kind._fields)
+    return generated("replace", f"q, {', '.join(fields)}", f"return kind({items})", kind=kind)
+
+
 def source_digest() -> str:
     """Digest of the plant's sources.
 

@@ -14,6 +14,8 @@ from epv_env.plant.flow import KAPPA
 from epv_env.plant.values import Value
 
 CATALOGUE: dict[str, tuple[str, ...]] = {
+    "coil_heating": ("h_coil", "theta_coil"),
+    "eddy_current": ("G_eddy",),
     "flyback_voltage": ("U_clamp",),
     "driver_voltage_drop": ("U_drop",),
     "magnetic_saturation": ("sMV",),
@@ -23,18 +25,27 @@ CATALOGUE: dict[str, tuple[str, ...]] = {
     "armature_pressure_force": ("sFMV",),
     "inlet_seat_leak": ("A_in",),
     "exhaust_seat_leak": ("A_exh",),
+    "control_chamber_heat": ("tau_3",),
     "moving_control_volume": ("sV3",),
     "pressure_dependent_discharge": ("kalpha",),
     "critical_pressure_ratio": ("dbcrit",),
-    "piston_friction": ("F_PV",),
+    "piston_friction": ("F_PV", "S_PV"),
     "flow_force": ("cflow",),
     "local_gas_speed": ("a1", "a2"),
     "seat_leak": ("A_PV",),
     "circuit_leak": ("A_circuit",),
+    "output_chamber_heat": ("tau_2",),
+    "output_pipe": ("s_pipe", "A_pipe"),
+    "supply_restriction": ("z_supply",),
+    "pressure_sensor_lag": ("tau_p2", "tau_p3"),
+    "pressure_sensor_bias": ("b_p2", "b_p3"),
+    "current_sensor_gain": ("g_I",),
+    "command_delay": ("t_delay",),
 }
 """Effects by name, with the parameters that size them (epv_env.plant.parameters); all 0 is off.
 
-The bounce acts where a stop is met (integrate.py) and costs nothing there, so it is not in `Effects`."""
+Not in `Effects`: the bounce, which acts where a stop is met (integrate.py), the delay (valves.py), and
+bias and gain of sensors (readings.py)."""
 
 OFF_VOLTAGE = 1.0
 """Below this voltage the power stage counts as off [V]."""
@@ -50,6 +61,18 @@ SLIDING_SPEED_MV = 0.02
 
 SLIDING_SPEED_PV = 0.02
 """The same for the piston [m/s], which moves at 0.1 m/s and more."""
+
+STRIBECK_SPEED = 0.05
+"""Speed at which half of the break-away excess of the piston's friction is left [m/s]."""
+
+COPPER = 0.00393
+"""Relative rise of copper's resistance per kelvin [1/K]."""
+
+COOLING_TIME = 60.0
+"""Time constant with which the winding cools [s]."""
+
+FILLING_TIME = 2e-3
+"""Time constant with which the pressure before the valve follows the flow through its pipe [s]."""
 
 
 class Effects(NamedTuple):
@@ -89,12 +112,46 @@ class Effects(NamedTuple):
     """Force of the PV jet per opened area and pressure drop [-]."""
     friction_PV: Value
     """Coulomb friction of the piston [N]."""
+    breakaway_PV: Value
+    """Relative excess of that friction at rest [-]."""
     leak_PV: Value
     """Effective area of the shut PV seat [m^2]."""
     leak_circuit: Value
     """Effective area of the circuit's leak [m^2]."""
+    eddy: Value
+    """Conductance of the shorted turn in the iron, seen from the coil [S]."""
+    heating: Value
+    """Temperature rise of the winding per energy turned into heat [K/J]."""
+    coil_start: Value
+    """How warm the winding is at the start [K]: it sets the state, not its rates."""
+    warm_3: Value
+    """1 where the control chamber's gas temperature is free, 0 where it is T_env [-]."""
+    exchange_3: Value
+    """Rate at which that temperature relaxes to the wall's [1/s]."""
+    warm_2: Value
+    """`warm_3` for the output chamber [-]."""
+    exchange_2: Value
+    """`exchange_3` for the output chamber [1/s]."""
+    pipe_on: Value
+    """1 where part of the circuit lies behind a pipe, else 0 [-]."""
+    pipe_area: Value
+    """Effective area of that pipe [m^2]."""
+    near_share: Value
+    """V2 over its part before the pipe [-]."""
+    far_share: Value
+    """V2 over its part behind the pipe [-]; 0 without one."""
+    supply_loss: Value
+    """Pressure lost before the valve, times p1 over the flow squared [Pa^2 s^2/kg^2]."""
+    lag_2_on: Value
+    """1 where the sensor of p2 lags, else 0 [-]."""
+    lag_2_rate: Value
+    """Reciprocal of its time constant [1/s]."""
+    lag_3_on: Value
+    """1 where the sensor of p3 lags, else 0 [-]."""
+    lag_3_rate: Value
+    """Reciprocal of its time constant [1/s]."""
     steady_step: Value
-    """Longest step at which the integrator follows friction and the saturated coil [s]."""
+    """Longest step at which the integrator follows every effect but a clamp [s]."""
     clamp_step: Value
     """Longest step at which it follows the current's decay against a clamp [s]."""
 
@@ -121,6 +178,83 @@ def coil_voltage(U, I, effects):  # noqa: E741 - the report's symbol
     clamp = effects.U_clamp * I / math.sqrt(I * I + CLAMP_WIDTH * CLAMP_WIDTH)
     off = U - clamp if abs(I) > NO_CURRENT else U
     return on if U > OFF_VOLTAGE else off
+
+
+@inlined
+def heated(R, coil_heat):
+    """Resistance of the warm winding [Ohm] (copper)."""
+    return R * (1.0 + COPPER * coil_heat)
+
+
+@inlined
+def coil_current(U, I, R, coil_heat, effects):  # noqa: E741
+    """Current at the coil's terminals [A]: I, which makes the flux, and the shorted turn's share.
+
+    The turn carries (dflux/dt)/R_eddy, and dflux/dt is what the resistance leaves of U. A clamp
+    conducts one way only: behind it the terminals' current ends at zero, and the turn carries I alone.
+    """
+    U = coil_voltage(U, I, effects)
+    current = (I + effects.eddy * U) / (1.0 + effects.eddy * heated(R, coil_heat))
+    blocked = (effects.U_clamp > 0.0) & (current * I < 0.0)
+    return 0.0 if blocked else current
+
+
+@inlined
+def flux_rate(U, I, R, effects):  # noqa: E741
+    """Rate of the coil's flux linkage [V]; R: resistance of the winding, warm as it is."""
+    U = coil_voltage(U, I, effects)
+    rate = (U - R * I) / (1.0 + effects.eddy * R)
+    blocked = (effects.U_clamp > 0.0) & ((I + effects.eddy * U) * I < 0.0)
+    return -I / effects.eddy if blocked else rate
+
+
+@inlined
+def heating_rate(current, R, coil_heat, effects):
+    """Rate of the winding's temperature [K/s]."""
+    power = heated(R, coil_heat) * current * current
+    return effects.heating * power - coil_heat * (1.0 / COOLING_TIME)
+
+
+@inlined
+def chamber_rates(p, heat, RT_V, inflow, outflow, expansion, warm, exchange):
+    """Rates of a chamber's pressure [Pa/s] and of its gas's relative temperature rise [1/s].
+
+    First law for air that enters at T_env and leaves as it is, with heat passing to the wall (Newton):
+    dp/dt = kappa (R T_env/V (in - (1 + heat) out) - p expansion) - exchange p heat/(1 + heat). RT_V:
+    R T_env/V [Pa/kg]. expansion: dV/dt over V [1/s]. warm = 0 holds the gas at T_env.
+    """
+    isothermal = RT_V * (inflow - outflow) - p * expansion
+    lost = exchange * p * heat / (1.0 + heat)
+    free = KAPPA * (RT_V * (inflow - (1.0 + heat) * outflow) - p * expansion) - lost
+    rate = isothermal + warm * (free - isothermal)
+    air_rate = (1.0 + heat) * RT_V * (inflow - outflow) / p
+    return rate, warm * (1.0 + heat) * (rate / p + expansion - air_rate)
+
+
+@inlined
+def pipe_rate(inflow, p2_rate, RT_V2, effects):
+    """Rate of the far pressure less p2 [Pa/s]; inflow: net, into the part behind the pipe [kg/s]."""
+    return effects.pipe_on * (RT_V2 * effects.far_share * inflow - p2_rate)
+
+
+@inlined
+def supply_drop_rate(flow, p1, drop, effects):
+    """Rate of the pressure lost before the valve [Pa/s]; it follows zeta flow^2/(2 rho A^2)."""
+    steady = min(effects.supply_loss * flow * flow / p1, 0.5 * p1)
+    return (steady - drop) * (1.0 / FILLING_TIME)
+
+
+@inlined
+def lag_rate(lag, rate, on, per_time):
+    """Rate of a first-order sensor's reading less the pressure, which changes at `rate` [Pa/s]."""
+    return -per_time * lag - on * rate
+
+
+@inlined
+def stribeck(v, excess):
+    """Friction at a speed relative to Coulomb's [-]: 1 + excess at rest, 1 if fast (Hess, Soom 1990)."""
+    relative = v * (1.0 / STRIBECK_SPEED)
+    return 1.0 + excess / (1.0 + relative * relative)
 
 
 @inlined

@@ -5,19 +5,28 @@ SI units; symbols are those of docs/model.md. Functions take named tuples of num
 are inlined into the kernels of integrate.py.
 """
 
+import math
 from typing import NamedTuple
 
-from epv_env.plant.compiled import inlined
+from epv_env.plant.compiled import inlined, replacing
 from epv_env.plant.effects import (
     SLIDING_SPEED_MV,
     SLIDING_SPEED_PV,
-    coil_voltage,
+    chamber_rates,
+    coil_current,
     discharge,
     effective_seat_diameter,
+    flux_rate,
     friction,
+    heated,
+    heating_rate,
+    lag_rate,
     opened,
+    pipe_rate,
     saturated_force,
     saturation_level,
+    stribeck,
+    supply_drop_rate,
 )
 from epv_env.plant.flow import mass_flux
 from epv_env.plant.values import Value
@@ -26,11 +35,12 @@ QUARTER_PI = 0.7853981633974483
 
 
 class State(NamedTuple):
-    """State q (eq. 1), the supply pressure, and what has passed through so far.
+    """State q (eq. 1), the supply pressure, what has passed through so far, and what effects add.
 
     The report's seven states are p2 .. I. p1 is the input chamber's pressure, a disturbance in the
-    report and here a state because a reservoir sags. The last four are running integrals, carried so
-    that mass and energy balances can be read off exactly.
+    report and here a state because a reservoir sags. The next four are running integrals, carried so
+    that mass and energy balances can be read off exactly. The last belong to effects (effects.py); but
+    for I_coil they are departures from the nominal valve, and rest at zero without their effect.
     """
 
     p2: Value
@@ -46,7 +56,7 @@ class State(NamedTuple):
     vMV: Value
     """Speed of the armature [m/s]."""
     I: Value  # noqa: E741 - the report's symbol
-    """Solenoid current [A]."""
+    """Solenoid current, as far as it makes flux [A]."""
     p1: Value
     """Input chamber pressure [Pa absolute]."""
     air_in_PV: Value
@@ -57,6 +67,22 @@ class State(NamedTuple):
     """Air passed from the control chamber, and through a leak of the circuit, to ambient [kg]."""
     coil_energy: Value
     """Electrical energy taken by the coil [J]."""
+    I_coil: Value = 0.0
+    """Current at the coil's terminals at the end of the last step [A]; I but for eddy currents."""
+    coil_heat: Value = 0.0
+    """How far the winding is warmer than where its resistance is R [K]."""
+    heat_3: Value = 0.0
+    """Relative rise of the control chamber's gas temperature above T_env [-]."""
+    heat_2: Value = 0.0
+    """The same for the output chamber [-]."""
+    far_pressure: Value = 0.0
+    """Pressure of the circuit behind its pipe, less p2 [Pa]."""
+    supply_drop: Value = 0.0
+    """Pressure lost between the sensor of p1 and the valve [Pa]."""
+    lag_2: Value = 0.0
+    """What the sensor of p2 reads, less p2 [Pa]."""
+    lag_3: Value = 0.0
+    """What the sensor of p3 reads, less p3 [Pa]."""
 
 
 class Inputs(NamedTuple):
@@ -70,6 +96,13 @@ class Inputs(NamedTuple):
     """Imposed rate of the supply pressure, for a recorded p1 [Pa/s]."""
     refill: Value
     """Air that the compressor delivers to the reservoirs [kg/s]."""
+    air_3: Value = 0.0
+    """Air forced into the control chamber [kg/s]; this and the next are for diagnosis, and act in the
+    extended kernel only."""
+    force_PV: Value = 0.0
+    """Force on the piston, opening positive [N]."""
+    force_MV: Value = 0.0
+    """Force on the armature, pull-in positive [N]."""
 
 
 class Coefficients(NamedTuple):
@@ -127,6 +160,9 @@ class Coefficients(NamedTuple):
     p_env: Value
 
 
+_with_supply = replacing(State, "p1")
+
+
 @inlined
 def piston_force(q, c, effects, extended):
     """Net force on the PV piston, opening positive [N] (eq. 22; eq. 9 with the cone effect).
@@ -141,7 +177,8 @@ def piston_force(q, c, effects, extended):
     force = pressure - c.cPV * (q.xPV + c.xPV0) - c.kPV * q.vPV
     if extended:
         force -= effects.flow_force * c.curtain_PV * q.xPV * (q.p1 - q.p2)
-        force = friction(force, q.xPV, q.vPV, c.xPVmax, effects.friction_PV, SLIDING_SPEED_PV)
+        size = effects.friction_PV * stribeck(q.vPV, effects.breakaway_PV)
+        force = friction(force, q.xPV, q.vPV, c.xPVmax, size, SLIDING_SPEED_PV)
     return force
 
 
@@ -173,14 +210,16 @@ def armature_force(q, c, inverse_Rm, effects, extended):
 @inlined
 def current_rate(q, u, c, inverse_Rm, effects, extended):
     """dI/dt [A/s] (eq. 12 with the sign of docs/model.md, correction 6)."""
-    U, current, per_inductance = u.U, q.I, c.N_squared_inverse / inverse_Rm
+    current, per_inductance = q.I, c.N_squared_inverse / inverse_Rm
     if extended:
-        U = coil_voltage(u.U, q.I, effects)
         current = q.I + effects.I_rem
         flattened = 1.0 + saturation_level(current, inverse_Rm, effects)
         per_inductance *= flattened * flattened
+        linkage_rate = flux_rate(u.U, q.I, heated(c.R, q.coil_heat), effects)
+    else:
+        linkage_rate = u.U - c.R * q.I
     motion = current * q.vMV * c.gap_reluctance * inverse_Rm
-    return (U - c.R * q.I) * per_inductance - motion
+    return linkage_rate * per_inductance - motion
 
 
 @inlined
@@ -207,10 +246,12 @@ def flow_inlet(q, c, effects, extended):
 def flow_exhaust(q, c, effects, extended):
     """Mass flow from the control chamber to ambient [kg/s] (the exhaust that eq. 7 leaves out)."""
     area, share = min(c.curtain_exh * (c.xMVmax - q.xMV), c.orifice_exh), 1.0
+    inverse_sqrt_RT = c.inverse_sqrt_RT
     if extended:
         area = opened(area, c.orifice_exh, effects.leak_exhaust)
         share = 1.0 - effects.drop_deficit
-    return area * mass_flux(q.p3, c.p_env, c.inverse_sqrt_RT, share)
+        inverse_sqrt_RT /= math.sqrt(1.0 + q.heat_3)
+    return area * mass_flux(q.p3, c.p_env, inverse_sqrt_RT, share)
 
 
 @inlined
@@ -223,15 +264,47 @@ def flow_circuit_leak(q, c, effects, extended):
 
 
 @inlined
-def control_pressure_rate(q, c, mass_rate, effects, extended):
-    """dp3/dt for air coming in at mass_rate [Pa/s] (eq. 7); the piston may sweep the chamber.
+def flow_pipe(q, c, effects):
+    """Mass flow from the output chamber through the pipe to the rest of the circuit [kg/s]."""
+    return effects.pipe_area * mass_flux(q.p2, q.p2 + q.far_pressure, c.inverse_sqrt_RT)
+
+
+@inlined
+def control_chamber_rates(q, c, inflow, outflow, effects):
+    """dp3/dt [Pa/s] and the rate of heat_3 [1/s]: the piston may sweep the chamber, its gas warm up.
 
     A tenth of the chamber is left, whatever the parameters say, so that its pressure stays finite.
     """
-    if extended:
-        left = max(1.0 - effects.swept * q.xPV, 0.1)
-        return (c.RT_V3 * mass_rate + effects.swept * q.vPV * q.p3) / left
-    return c.RT_V3 * mass_rate
+    left = max(1.0 - effects.swept * q.xPV, 0.1)
+    expansion = -effects.swept * q.vPV / left
+    return chamber_rates(
+        q.p3, q.heat_3, c.RT_V3 / left, inflow, outflow, expansion, effects.warm_3, effects.exchange_3
+    )
+
+
+@inlined
+def effect_rates(q, u, c, effects, through_PV, inlet, exhaust, leak):
+    """dp2/dt and dp3/dt with effects [Pa/s], and the rates of the effects' own states."""
+    pipe = flow_pipe(q, c, effects)
+    consumed = leak + u.sigma_S * (1.0 - effects.pipe_on)
+    p2_rate, heat_2_rate = chamber_rates(
+        q.p2, q.heat_2, c.RT_V2 * effects.near_share, through_PV, pipe + consumed, 0.0,
+        effects.warm_2, effects.exchange_2,
+    )  # fmt: skip
+    p3_rate, heat_3_rate = control_chamber_rates(q, c, inlet + u.air_3, exhaust, effects)
+    current = coil_current(u.U, q.I, c.R, q.coil_heat, effects)
+    return (
+        p2_rate,
+        p3_rate,
+        heating_rate(current, c.R, q.coil_heat, effects),
+        heat_3_rate,
+        heat_2_rate,
+        pipe_rate(pipe - u.sigma_S, p2_rate, c.RT_V2, effects),
+        supply_drop_rate(through_PV + inlet, q.p1, q.supply_drop, effects),
+        lag_rate(q.lag_2, p2_rate, effects.lag_2_on, effects.lag_2_rate),
+        lag_rate(q.lag_3, p3_rate, effects.lag_3_on, effects.lag_3_rate),
+        current,
+    )
 
 
 @inlined
@@ -241,6 +314,8 @@ def derivative(q, u, c, effects, free_PV, free_MV, extended):
     free_PV, free_MV: 1.0 where the mover may move, 0.0 where a stop holds it. extended: a literal
     bool; False compiles the effects away. Returns (State of rates, piston force, armature force).
     """
+    if extended:
+        q = _with_supply(q, q.p1 - q.supply_drop)
     force_PV = piston_force(q, c, effects, extended)
     inverse_Rm = reluctance_inverse(q, c)
     force_MV = armature_force(q, c, inverse_Rm, effects, extended)
@@ -248,9 +323,22 @@ def derivative(q, u, c, effects, free_PV, free_MV, extended):
     inlet = flow_inlet(q, c, effects, extended)
     exhaust = flow_exhaust(q, c, effects, extended)
     leak = flow_circuit_leak(q, c, effects, extended)
+    if extended:
+        force_PV += u.force_PV
+        force_MV += u.force_MV
+        (
+            p2_rate, p3_rate, coil_heat_rate, heat_3_rate, heat_2_rate, far_rate, drop_rate, lag_2_rate,
+            lag_3_rate, current,
+        ) = effect_rates(q, u, c, effects, through_PV, inlet, exhaust, leak)  # fmt: skip
+    else:
+        p2_rate = c.RT_V2 * (through_PV - u.sigma_S)
+        p3_rate = c.RT_V3 * (inlet - exhaust)
+        coil_heat_rate = heat_3_rate = heat_2_rate = far_rate = drop_rate = 0.0
+        lag_2_rate = lag_3_rate = 0.0
+        current = q.I
     rates = State(
-        p2=c.RT_V2 * (through_PV - leak - u.sigma_S),
-        p3=control_pressure_rate(q, c, inlet - exhaust, effects, extended),
+        p2=p2_rate,
+        p3=p3_rate,
         xPV=q.vPV * free_PV,
         vPV=force_PV * c.mPV_inverse * free_PV,
         xMV=q.vMV * free_MV,
@@ -260,6 +348,14 @@ def derivative(q, u, c, effects, free_PV, free_MV, extended):
         air_in_PV=through_PV,
         air_in_MV=inlet,
         air_vented=exhaust + leak,
-        coil_energy=u.U * q.I,
+        coil_energy=u.U * current,
+        I_coil=0.0,
+        coil_heat=coil_heat_rate,
+        heat_3=heat_3_rate,
+        heat_2=heat_2_rate,
+        far_pressure=far_rate,
+        supply_drop=drop_rate,
+        lag_2=lag_2_rate,
+        lag_3=lag_3_rate,
     )
     return rates, force_PV, force_MV

@@ -14,8 +14,8 @@ sixteen; so its trajectory does not depend, to the bit, on its companions or on 
 import numba
 import numpy as np
 
-from epv_env.plant.compiled import FLAGS, inlined, source_digest
-from epv_env.plant.effects import longest_step
+from epv_env.plant.compiled import FLAGS, inlined, replacing, source_digest
+from epv_env.plant.effects import coil_current, longest_step
 from epv_env.plant.equations import State, derivative
 from epv_env.plant.events import crossing, hermite, release, turning_point
 from epv_env.plant.lanes import (
@@ -43,6 +43,7 @@ from epv_env.plant.lanes import (
     inputs_at,
     new_workspace,
     state_at,
+    store_nominal,
     store_state,
 )
 from epv_env.plant.runge_kutta import held_still, is_held, remaining_stages
@@ -64,6 +65,8 @@ SHORTEST_STEP = 1e-10
 
 MAX_STEPS = 200_000
 """Steps per period after which a lane is given up (its state becomes NaN)."""
+
+_with_landing = replacing(State, "xPV", "vPV", "xMV", "vMV", "I_coil")
 
 _UNLOCATED = 1e9  # a step hint that never binds
 
@@ -165,13 +168,15 @@ def _try_steps(work, step, extended):
 
         xPV, vPV = _landed(end.xPV, end.vPV, c.xPVmax, c.ePV)
         xMV, vMV = _landed(end.xMV, end.vMV, c.xMVmax, c.eMV)
-        landed = State(
-            end.p2, end.p3, xPV, vPV, xMV, vMV, end.I, end.p1,
-            end.air_in_PV, end.air_in_MV, end.air_vented, end.coil_energy,
-        )  # fmt: skip
+        current = coil_current(u.U, end.I, c.R, end.coil_heat, effects) if extended else end.I
+        landed = _with_landing(end, xPV, vPV, xMV, vMV, current)
         reached = chosen_state(event, q, landed)
-        store_state(work, TRIAL, lane, end)
-        store_state(work, STATE, lane, reached)
+        if extended:
+            store_state(work, TRIAL, lane, end)
+            store_state(work, STATE, lane, reached)
+        else:
+            store_nominal(work, TRIAL, lane, end)
+            store_nominal(work, STATE, lane, reached)
         work[REMAINING, lane] = remaining if event else remaining - h
         work[HINT, lane] = h if event else _UNLOCATED
         work[EVENT, lane] = 1.0 if event else 0.0

@@ -6,7 +6,7 @@ whole SIMD registers. The kernels work on one such table per block, the workspac
 
 import numpy as np
 
-from epv_env.plant.compiled import inlined
+from epv_env.plant.compiled import generated, inlined
 from epv_env.plant.effects import Effects
 from epv_env.plant.equations import Coefficients, Inputs, State
 
@@ -49,20 +49,10 @@ def new_workspace():
     return np.empty((N_ROW, LANES))
 
 
-def _generated(name: str, arguments: str, body: str, **names):
-    """An inlined function from source text: one expression per field, so that no field is typed twice.
-
-    LLVM vectorises plain indexing; a loop over the fields of a tuple would go through memory.
-    """
-    namespace = dict(names)
-    exec(f"def {name}({arguments}):\n    {body}\n", namespace)
-    return inlined(namespace[name])
-
-
 def _reader(kind):
     """Function (table, first, lane) -> the `kind` that starts at row `first` of column `lane`."""
     items = ", ".join(f"table[first + {row}, lane]" for row in range(len(kind._fields)))
-    return _generated("read", "table, first, lane", f"return kind({items})", kind=kind)
+    return generated("read", "table, first, lane", f"return kind({items})", kind=kind)
 
 
 def _per_field(expression: str) -> str:
@@ -75,14 +65,21 @@ coefficients_at = _reader(Coefficients)
 effects_at = _reader(Effects)
 inputs_at = _reader(Inputs)
 
-store_state = _generated(
-    "store_state",
-    "table, first, lane, q",
-    "; ".join(f"table[first + {row}, lane] = q.{name}" for row, name in enumerate(State._fields)),
-)
+
+def _writer(fields):
+    """Function (table, first, lane, q) that writes these fields of a State from row `first` on."""
+    rows = ((State._fields.index(name), name) for name in fields)
+    body = "; ".join(f"table[first + {row}, lane] = q.{name}" for row, name in rows)
+    return generated("store", "table, first, lane, q", body)
+
+
+store_state = _writer(State._fields)
 """Write a State from row `first` of column `lane` on."""
 
-chosen_state = _generated(
+store_nominal = _writer(State._fields[: State._fields.index("I_coil") + 1])
+"""The same without the states of effects, which rest in a nominal valve."""
+
+chosen_state = generated(
     "chosen_state",
     "condition, q, other",
     f"return State({_per_field('q.@ if condition else other.@')})",
@@ -90,7 +87,7 @@ chosen_state = _generated(
 )
 """q where the condition holds, else other, without a branch."""
 
-moved = _generated(
+moved = generated(
     "moved", "q, rates, h", f"return State({_per_field('q.@ + h * rates.@')})", State=State
 )
 """q + h * rates, field by field."""

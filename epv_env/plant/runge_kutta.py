@@ -1,8 +1,10 @@
 """One classical Runge-Kutta step of the whole state, with the movers that a stop holds kept still."""
 
-from epv_env.plant.compiled import inlined
+from epv_env.plant.compiled import inlined, replacing
 from epv_env.plant.equations import State, derivative
 from epv_env.plant.lanes import moved
+
+_with_motion = replacing(State, "xPV", "vPV", "xMV", "vMV")
 
 
 @inlined
@@ -16,12 +18,10 @@ def is_held(x, v, x_max, force):
 @inlined
 def held_still(rates, free_PV, free_MV):
     """The rates with those of held movers set to zero."""
-    return State(
-        rates.p2, rates.p3,
+    return _with_motion(
+        rates,
         rates.xPV * free_PV, rates.vPV * free_PV,
         rates.xMV * free_MV, rates.vMV * free_MV,
-        rates.I, rates.p1,
-        rates.air_in_PV, rates.air_in_MV, rates.air_vented, rates.coil_energy,
     )  # fmt: skip
 
 

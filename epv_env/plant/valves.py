@@ -10,9 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from epv_env.plant import integrate
 from epv_env.plant.coefficients import coefficients, effect_sizes, has_effects
+from epv_env.plant.delay import delayed_inputs
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.lanes import LANES, N_INPUT, N_STATE
 from epv_env.plant.parameters import Parameters
+from epv_env.plant.readings import SENSOR_SYMBOLS, readings
 
 LANES_PER_TASK = 4 * LANES
 """Fewest lanes, times periods, worth a thread of their own."""
@@ -51,6 +53,10 @@ class Valves:
         self._lowest = np.full(lanes, np.inf)
         self._highest = np.full(lanes, -np.inf)
         self._with_effects = np.zeros(lanes, dtype=bool)
+        self._delay = np.zeros(lanes)
+        self._acting_U = np.full(lanes, np.nan)
+        self._delay_left = np.zeros(lanes)
+        self._sensors = {symbol: np.zeros(lanes) for symbol in SENSOR_SYMBOLS}
 
     @property
     def state(self) -> State:
@@ -84,11 +90,44 @@ class Valves:
         self._coefficients[:, where] = coefficients(p, reservoir_volume)
         self._effects[:, where] = effect_sizes(p)
         self._with_effects = has_effects(self._effects)
+        self._delay[where] = p["t_delay"]
+        self._acting_U[where] = np.nan
+        for symbol, values in self._sensors.items():
+            values[where] = p[symbol]
+
+    def readings(self) -> dict[str, NDArray]:
+        """What the sensors of p1, p2, p3 and I have before them [Pa, A], shape (n,)."""
+        return readings(self.state, {symbol: v[: self.n] for symbol, v in self._sensors.items()})
 
     def advance(self, duration: ArrayLike) -> None:
-        """Apply `inputs` for `duration` [s], one for all or one per valve (n,)."""
+        """Apply `inputs` for `duration` [s], one for all or one per valve (n,).
+
+        A coil with a delay keeps its former voltage for that long after a change of U; a change within
+        the delay starts it anew.
+        """
         self._duration[: self.n] = duration
+        if np.any(self._delay):
+            self._advance_delayed()
+        else:
+            self._advance_all()
+
+    def _advance_all(self) -> None:
         self._run(self._inputs[None], self._duration[None], np.empty((0, *self._state.shape)))
+
+    def _advance_delayed(self) -> None:
+        """Advance under the former voltage as long as it still acts, then under the new one."""
+        commanded, total = Inputs(*self._inputs).U.copy(), self._duration.copy()
+        acting = np.where(np.isnan(self._acting_U), commanded, self._acting_U)
+        changed = (commanded != acting) & (self._delay_left <= 0)
+        self._delay_left[:] = np.where(changed, self._delay, self._delay_left)
+        self._delay_left[commanded == acting] = 0.0
+        before = np.minimum(self._delay_left, total)
+        self._delay_left -= before
+        for U, lasts in ((acting, before), (commanded, total - before)):
+            Inputs(*self._inputs).U[:] = U
+            self._duration[:] = lasts
+            self._advance_all()
+        self._acting_U = np.where(self._delay_left > 0, acting, commanded)
 
     def record(self, inputs: Inputs, period: ArrayLike) -> State:
         """Apply a series of inputs, each for `period` [s], and keep every state.
@@ -102,27 +141,32 @@ class Valves:
         table[:, :, : self.n] = np.stack(fields, axis=1)
         duration = np.zeros((table.shape[0], table.shape[2]))
         duration[:, : self.n] = period
+        delayed = bool(np.any(self._delay))
+        if delayed:
+            table, duration = delayed_inputs(table, duration, self._delay)
         out = np.empty((table.shape[0], *self._state.shape))
         self._run(table, duration, out)
-        return State(*out[:, :, : self.n].transpose(1, 0, 2))
+        return State(*out[delayed :: 1 + delayed, :, : self.n].transpose(1, 0, 2))
 
     def _run(self, inputs: NDArray, duration: NDArray, out: NDArray) -> None:
         """Run both kernels if valves with and without effects are mixed, each on its own valves.
 
         So a valve's trajectory does not depend, to the bit, on its companions' effects.
         """
-        if not np.any(self._with_effects):
+        forced = Inputs(*np.any(inputs, axis=0))
+        with_effects = self._with_effects | forced.air_3 | forced.force_PV | forced.force_MV
+        if not np.any(with_effects):
             self._run_with(integrate.run_nominal, inputs, duration, out)
             return
-        if np.all(self._with_effects[: self.n]):
+        if np.all(with_effects[: self.n]):
             self._run_with(integrate.run_extended, inputs, duration, out)
             return
-        nominal = np.where(self._with_effects, 0.0, duration)
-        extended = np.where(self._with_effects, duration, 0.0)
+        nominal = np.where(with_effects, 0.0, duration)
+        extended = np.where(with_effects, duration, 0.0)
         self._run_with(integrate.run_nominal, inputs, nominal, out)
         others = np.empty_like(out)
         self._run_with(integrate.run_extended, inputs, extended, others)
-        out[:, :, self._with_effects] = others[:, :, self._with_effects]
+        out[:, :, with_effects] = others[:, :, with_effects]
 
     def _run_with(
         self, run: Callable[..., None], inputs: NDArray, duration: NDArray, out: NDArray

@@ -15,7 +15,8 @@ from scipy.integrate import solve_ivp
 
 from epv_env.plant.coefficients import coefficients, effect_sizes, has_effects
 from epv_env.plant.compiled import FLAGS
-from epv_env.plant.equations import Coefficients, State, derivative
+from epv_env.plant.effects import coil_current
+from epv_env.plant.equations import Coefficients, Inputs, State, derivative
 from epv_env.plant.integrate import STICK_SPEED
 from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at, store_state
 from identification.bench.schedule import Schedule
@@ -23,7 +24,8 @@ from identification.bench.schedule import Schedule
 RTOL = 1e-9
 SCALE = State(
     p2=1e6, p3=1e6, xPV=1e-3, vPV=1.0, xMV=1e-3, vMV=1.0, I=1.0, p1=1e6,
-    air_in_PV=1e-2, air_in_MV=1e-3, air_vented=1e-3, coil_energy=10.0,
+    air_in_PV=1e-2, air_in_MV=1e-3, air_vented=1e-3, coil_energy=10.0, I_coil=1.0, coil_heat=10.0,
+    heat_3=1.0, heat_2=1.0, far_pressure=1e6, supply_drop=1e6, lag_2=1e6, lag_3=1e6,
 )  # fmt: skip
 """Usual size of each state; the absolute tolerance is rtol times this."""
 
@@ -34,9 +36,20 @@ FREE, LOW, HIGH = 0, 1, 2
 X = (State._fields.index("xPV"), State._fields.index("xMV"))
 V = (State._fields.index("vPV"), State._fields.index("vMV"))
 NAMES = ("piston", "armature")
+I_COIL = State._fields.index("I_coil")
 
 RightHandSide = Callable[[NDArray, NDArray, NDArray, NDArray, float, float], NDArray]
 """(state, inputs, coefficients, effects, free_PV, free_MV) -> rates and both forces."""
+
+
+@numba.njit(**FLAGS)
+def _coil_currents(U, current, coil_heat, coefficients, effects):
+    """Currents at the coil's terminals [A] for states (samples,)."""
+    c, e = coefficients_at(coefficients, 0, 0), effects_at(effects, 0, 0)
+    out = np.empty_like(current)
+    for k in range(current.size):
+        out[k] = coil_current(U, current[k], c.R, coil_heat[k], e)
+    return out
 
 
 def compiled_right_hand_side(extended: bool) -> RightHandSide:
@@ -94,7 +107,7 @@ class Automaton:
         e = effect_sizes(schedule.parameters)
         self.c, self.e = c, e
         self.right_hand_side = right_hand_side or COMPILED[bool(np.any(has_effects(e)))]
-        self.u = np.zeros(4)
+        self.u = np.zeros(len(Inputs._fields))
         named = Coefficients(*c[:, 0])
         self.stroke = (named.xPVmax, named.xMVmax)
         self.restitution = (named.ePV, named.eMV)
@@ -129,6 +142,11 @@ class Automaton:
         rebound = -self.restitution[mover] * y[V[mover]]
         y[X[mover]] = stop
         y[V[mover]] = rebound if abs(rebound) > STICK_SPEED else 0.0
+
+    def read_current(self, out: NDArray, at: NDArray) -> None:
+        """Fill in the current at the coil's terminals, which no equation of state holds."""
+        q = State(*out[at].T)
+        out[at, I_COIL] = _coil_currents(self.u[0], q.I, q.coil_heat, self.c, self.e)
 
     def events(self, y: NDArray) -> list[tuple[str, Callable, int]]:
         """(name, function of time and state whose zero ends the piece, direction) of each."""
@@ -177,6 +195,7 @@ def simulate_reference(
     automaton = Automaton(schedule, right_hand_side)
     y = np.array(schedule.initial, dtype=float)
     out = np.full((len(times), len(y)), np.nan)
+    out[times <= 0] = y
     log: list[Event] = []
     steps = 0
     for segment, border in enumerate(schedule.borders[1:]):
@@ -186,9 +205,10 @@ def simulate_reference(
         while t < border:
             piece = _piece(automaton, t, float(border), y, method, rtol)
             steps += len(piece.t) - 1
-            inside = (times >= t) & (times <= piece.t[-1])
+            inside = (times > t) & (times <= piece.t[-1])
             if np.any(inside):
                 out[inside] = piece.sol(times[inside]).T
+                automaton.read_current(out, np.flatnonzero(inside))
             if piece.t[-1] <= t and piece.status != 1:
                 raise RuntimeError(f"reference is stuck at {t} s: {piece.message}")
             t, y = float(piece.t[-1]), piece.y[:, -1].copy()

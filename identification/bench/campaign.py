@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
+from epv_env.plant.readings import readings
 from epv_env.plant.sensors import SENSORS
 from epv_env.plant.simulate import energised
 from identification.bench.automaton import simulate_reference
 from identification.bench.programmes import Programme
-from identification.bench.schedule import scheduled
+from identification.bench.schedule import delayed_schedule, scheduled
 from identification.cases import RATE
 from identification.recordings.recording import CHANNELS, UNITS, Campaign, Recording
 
@@ -48,10 +49,11 @@ def run_programme(
         start = _exhausted(parameters)
     else:
         start = energised(parameters, p1=programme.p1, p2=programme.p2, U=programme.U_on)
-    # Switching takes effect at the sample at which the voltage is first read.
+    # Switching takes effect at the sample at which the voltage is first read, or later.
     schedule = scheduled(parameters, start, time, U=U[:-1], reservoir_volume=reservoir)
-    state = simulate_reference(schedule, time, rtol=RTOL).state
-    channels = {"I": state.I, "U": U, "p1": state.p1, "p2": state.p2, "p3": state.p3}
+    delayed = delayed_schedule(schedule, parameters["t_delay"])
+    state = simulate_reference(delayed, time, rtol=RTOL).state
+    channels = {"U": U, **readings(state, parameters)}
     return Truth(programme=programme, period=1.0 / rate, channels=channels)
 
 

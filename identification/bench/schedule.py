@@ -1,6 +1,6 @@
 """What is done to a valve over time, as pieces between which the inputs are constant."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -48,6 +48,18 @@ def scheduled(
         parameters=parameters,
         initial=initial,
         borders=np.append(times[:-1][changes], times[-1]),
-        inputs=Inputs(*rows[:, changes]),
+        inputs=Inputs(*rows[:, changes], *np.zeros((len(Inputs._fields) - 4, np.sum(changes)))),
         reservoir_volume=reservoir_volume,
     )
+
+
+def delayed_schedule(schedule: Schedule, delay: float) -> Schedule:
+    """The schedule with every change of its inputs but the first later by `delay` [s].
+
+    Only the voltage may change: inputs that act at once have no place in a delayed schedule.
+    """
+    if delay == 0 or len(schedule.borders) == 2:
+        return schedule
+    end = schedule.duration
+    borders = np.concatenate([[0.0], np.minimum(schedule.borders[1:-1] + delay, end), [end]])
+    return replace(schedule, borders=borders)

@@ -5,10 +5,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from epv_env.plant.equations import Inputs
+from epv_env.plant.equations import Inputs, State
 from epv_env.plant.parameters import Parameters
+from epv_env.plant.readings import readings
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
+from identification.recordings.recording import OUTPUTS
 from identification.replay.drive import Drive
 
 LARGEST_BATCH = 1_500_000
@@ -23,62 +25,87 @@ class Replay:
         self.drives = list(drives)
         self.base = base
 
-    def outputs(self, candidates: Mapping[str, NDArray], p2_shift: ArrayLike = 0.0) -> list[NDArray]:
+    def outputs(
+        self,
+        candidates: Mapping[str, NDArray],
+        p2_shift: ArrayLike = 0.0,
+        which: Sequence[int] | None = None,
+    ) -> list[NDArray]:
         """Model outputs of n candidates for each recording.
 
-        candidates: values by symbol, shape (n,). p2_shift: added to the recordings' p2 at the start
-        [Pa], () or (n,). Returns per recording an array (3, samples, n) of OUTPUTS [Pa, Pa, A]; NaN
-        where a candidate cannot be integrated.
+        candidates: values by symbol, (n,), or (n, recordings) where recordings differ. p2_shift: added
+        to the recordings' p2 at the start [Pa], (), (n,) or (n, recordings). which: indices of the
+        recordings, None for all. Returns per recording an array (3, samples, n) of OUTPUTS [Pa, Pa, A];
+        NaN where a candidate cannot be integrated.
         """
-        n = max(np.size(value) for value in candidates.values())
-        shift = np.broadcast_to(np.asarray(p2_shift, dtype=float), (n,))
+        chosen = range(len(self.drives)) if which is None else which
+        n = max(np.shape(value)[0] for value in candidates.values())
+        shift = np.asarray(p2_shift, dtype=float)
+        each = {"": np.broadcast_to(shift[:, None] if shift.ndim == 1 else shift, (n, len(self.drives)))}
+        each |= {s: np.asarray(value) for s, value in candidates.items()}
         found: list[NDArray] = []
-        for group in self._groups(n):
-            found += _simulate(group, {**self.base, **candidates}, shift)
+        for group in self._groups(n, chosen):
+            lanes = {s: _lanes(value, group) for s, value in each.items()}
+            shifts = lanes.pop("")
+            found += _simulate([self.drives[r] for r in group], {**self.base, **lanes}, shifts, n)
         return found
 
-    def _groups(self, n: int) -> list[list[Drive]]:
+    def _groups(self, n: int, chosen: Sequence[int]) -> list[list[int]]:
         """Consecutive recordings that fit into one batch together."""
-        groups: list[list[Drive]] = [[]]
+        groups: list[list[int]] = [[]]
         longest = 0
-        for drive in self.drives:
-            longest = max(longest, len(drive.U))
+        for index in chosen:
+            longest = max(longest, len(self.drives[index].U))
             if groups[-1] and longest * n * (len(groups[-1]) + 1) > LARGEST_BATCH:
                 groups.append([])
-                longest = len(drive.U)
-            groups[-1].append(drive)
+                longest = len(self.drives[index].U)
+            groups[-1].append(index)
         return groups
 
 
-def _simulate(drives: list[Drive], p: Mapping[str, ArrayLike], shift: NDArray) -> list[NDArray]:
-    """One batch: lane r n + j is candidate j on recording r."""
-    n = len(shift)
-    tiled = {s: np.tile(value, len(drives)) if np.ndim(value) else value for s, value in p.items()}
+def _lanes(value: NDArray, recordings: Sequence[int]) -> NDArray:
+    """Values (n,) or (n, all recordings) in the order of the lanes of one batch."""
+    if value.ndim == 1:
+        return np.tile(value, len(recordings))
+    return value[:, list(recordings)].T.ravel()
+
+
+def _simulate(
+    drives: list[Drive], tiled: Mapping[str, ArrayLike], shift: NDArray, n: int
+) -> list[NDArray]:
+    """One batch: lane r n + j is candidate j on recording r. tiled, shift: by lane."""
     valves = Valves(n * len(drives))
     valves.set_parameters(np.arange(valves.n), tiled)
     p1, U, p2 = (
         np.repeat([getattr(drive, name) for drive in drives], n, axis=0)
         for name in ("p1_start", "U_start", "p2_start")
     )
-    initial = energised(tiled, p1=p1, p2=p2 + np.tile(shift, len(drives)), U=U)
+    initial = energised(tiled, p1=p1, p2=p2 + shift, U=U)
     for field, value in zip(valves.state, initial, strict=True):
         field[:] = value
-    first = np.stack([valves.state.p2, valves.state.p3, valves.state.I])
+    first = _read(State(*(field.copy()[None] for field in valves.state)), tiled)
     inputs, duration = _inputs(drives)
-    every = Inputs(*(np.repeat(field, n, axis=1) for field in inputs))
+    every = Inputs(**{name: np.repeat(field, n, axis=1) for name, field in inputs.items()})
     later = valves.record(every, np.repeat(duration, n, axis=1))
-    outputs = np.concatenate([first[:, None], np.stack([later.p2, later.p3, later.I])], axis=1)
+    outputs = np.concatenate([first, _read(later, tiled)], axis=1)
     return [outputs[:, : len(drive.U), r * n : (r + 1) * n] for r, drive in enumerate(drives)]
 
 
-def _inputs(drives: list[Drive]) -> tuple[Inputs, NDArray]:
-    """Inputs, and length of each period; (longest - 1, recordings), 0 past a recording's end."""
+def _read(state: State, p: Mapping[str, ArrayLike]) -> NDArray:
+    """OUTPUTS as the sensors see them, (3, samples, lanes)."""
+    read = readings(state, p)
+    return np.stack([read[output] for output in OUTPUTS])
+
+
+def _inputs(drives: list[Drive]) -> tuple[dict[str, NDArray], NDArray]:
+    """Inputs by name, and length of each period; (longest - 1, recordings), 0 past a recording's end."""
     steps = max(len(drive.U) for drive in drives) - 1
-    table = np.zeros((5, steps, len(drives)))
+    table = np.zeros((4, steps, len(drives)))
     for r, drive in enumerate(drives):
         own = slice(0, len(drive.U) - 1)
         table[0, own, r] = drive.U[:-1]
         table[1, own, r] = drive.sigma_S[:-1]
         table[2, own, r] = np.diff(drive.p1) / drive.period
-        table[4, own, r] = drive.period
-    return Inputs(*table[:4]), table[4]
+        table[3, own, r] = drive.period
+    U, sigma_S, p1_slope, period = table
+    return {"U": U, "sigma_S": sigma_S, "p1_slope": p1_slope, "refill": 0.0 * U}, period

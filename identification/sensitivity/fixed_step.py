@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from epv_env.plant.coefficients import coefficients, effect_sizes
-from epv_env.plant.compiled import FLAGS, inlined, source_digest
+from epv_env.plant.compiled import FLAGS, inlined, replacing, source_digest
 from epv_env.plant.equations import (
     Inputs,
     State,
@@ -49,24 +49,16 @@ WEIGHTS = np.array([35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84])
 """Weights of all stages' rates in the step."""
 
 
+_with_strokes = replacing(State, "xPV", "xMV")
+_with_speeds = replacing(State, "vPV", "vMV")
+
+
 @inlined
 def _limited(q, c):
     """The state with both strokes limited; the speeds are left as they are."""
     xPV = min(max(q.xPV, 0.0), c.xPVmax)
     xMV = min(max(q.xMV, 0.0), c.xMVmax)
-    return State(
-        q.p2, q.p3, xPV, q.vPV, xMV, q.vMV, q.I, q.p1,
-        q.air_in_PV, q.air_in_MV, q.air_vented, q.coil_energy,
-    )  # fmt: skip
-
-
-@inlined
-def _with_speeds(q, vPV, vMV):
-    """The state with other speeds."""
-    return State(
-        q.p2, q.p3, q.xPV, vPV, q.xMV, vMV, q.I, q.p1,
-        q.air_in_PV, q.air_in_MV, q.air_vented, q.coil_energy,
-    )  # fmt: skip
+    return _with_strokes(q, xPV, xMV)
 
 
 @inlined
@@ -121,7 +113,7 @@ def _compile(digest: str):
             store_state(y, 0, 0, state_at(state, 0, lane))
             for sample in range(U.size):
                 record[sample, :, lane] = y[:, 0]
-                u = Inputs(U[sample], 0.0, 0.0, 0.0)
+                u = Inputs(U[sample], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
                 for stage in range(WEIGHTS.size):
                     _moved(y, rates, STAGES[stage], h, trial)
                     q = _limited(state_at(trial, 0, 0), c)

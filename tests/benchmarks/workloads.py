@@ -34,13 +34,16 @@ def random_switching(n: int, periods: int, seed: int = 0) -> Inputs:
         sigma_S=rng.uniform(0, 4e-3, (1, n)) * np.ones((periods, 1)),
         p1_slope=zeros,
         refill=zeros,
+        air_3=zeros,
+        force_PV=zeros,
+        force_MV=zeros,
     )
 
 
 def held(n: int, periods: int) -> Inputs:
     """The coil stays on: both movers are held, and every step is twice the default one."""
     zeros = np.zeros((periods, n))
-    return Inputs(zeros + U_ON, zeros, zeros, zeros)
+    return Inputs(zeros + U_ON, *[zeros] * 6)
 
 
 def one_valve(duration: float, seed: int = 0) -> Schedule:

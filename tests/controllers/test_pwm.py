@@ -36,8 +36,8 @@ def test_the_operating_duty_nearly_holds_p3_in_the_full_simulation(plant):
     for _ in range(60):
         inside = []
         for on, share in ((24.0, duty), (0.0, 1 - duty)):
-            for name, value in zip(Inputs._fields, (on, 0.0, 0.0, 0.0), strict=True):
-                getattr(valves.inputs, name)[:] = value
+            for value, field in zip(Inputs(on, 0.0, 0.0, 0.0), valves.inputs, strict=True):
+                field[:] = value
             valves.advance(share * PERIOD)
             inside.append(float(valves.state.p3[0]))
         valves.state.p2[:] = P2  # the circuit is held: only the control chamber is looked at

@@ -30,7 +30,8 @@ def inputs(periods=60):
     rng = np.random.default_rng(3)
     off = np.cumsum(rng.random((periods, N)) < 0.15, axis=0) % 2 == 1
     zeros = np.zeros((periods, N))
-    return Inputs(np.where(off, 0.0, 24.0), rng.uniform(0, 2e-3, (periods, N)), zeros, zeros)
+    consumed = rng.uniform(0, 2e-3, (periods, N))
+    return Inputs(np.where(off, 0.0, 24.0), consumed, *[zeros] * 5)
 
 
 def run(fleet, u, members, threads=1):
@@ -161,6 +162,6 @@ def test_a_valve_that_was_given_up_is_not_tried_again():
     valves.set_parameters(np.arange(2), p)
     for field, value in zip(valves.state, start, strict=True):
         field[:] = value
-    later = valves.record(Inputs(*np.zeros((4, 500, 1))), 5e-4)
+    later = valves.record(Inputs(*np.zeros((7, 500, 1))), 5e-4)
     assert np.all(np.isfinite(later.p2[:, 0]))
     assert np.all(np.isnan(later.p2[:, 1]))

@@ -42,7 +42,8 @@ def random_states(n, seed=0):
         p1_slope=rng.normal(0, 1e5, n),
         refill=rng.uniform(0, 1e-2, n),
     )
-    return state, inputs
+    state = State(*np.broadcast_arrays(*state))
+    return state, Inputs(*np.broadcast_arrays(*inputs))
 
 
 @pytest.mark.parametrize("p", [CALIBRATED, WITH_CONE], ids=["nominal kernel", "extended kernel"])
@@ -59,7 +60,7 @@ def test_compiled_derivative_agrees_with_equations_typed_independently(p):
         ],
         axis=1,
     )
-    scale = np.max(np.abs(expected), axis=1, keepdims=True)
+    scale = np.maximum(np.max(np.abs(expected), axis=1, keepdims=True), 1e-9)
     assert np.max(np.abs(found - expected) / scale) < 2 * MAX_RELATIVE_ERROR
 
 

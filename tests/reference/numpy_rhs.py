@@ -62,6 +62,7 @@ def numpy_rates(
         air_vented=exhaust,
         coil_energy=u.U * q.I,
     )
+    rates = State(*np.broadcast_arrays(*rates)) if np.ndim(q.p2) else rates
     return rates, force_PV, force_MV
 
 

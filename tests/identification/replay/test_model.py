@@ -47,7 +47,7 @@ def test_recordings_of_other_lengths_and_rates_are_each_alone_to_the_bit():
 def test_smaller_batches_change_nothing(monkeypatch, largest, batches):
     whole = Replay(mixed(), TRUE).outputs(CANDIDATES)
     monkeypatch.setattr("identification.replay.model.LARGEST_BATCH", largest)
-    assert len(Replay(mixed(), TRUE)._groups(3)) == batches
+    assert len(Replay(mixed(), TRUE)._groups(3, range(len(mixed())))) == batches
     for one, other in zip(whole, Replay(mixed(), TRUE).outputs(CANDIDATES), strict=True):
         np.testing.assert_array_equal(one, other)
 
