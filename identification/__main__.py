@@ -17,6 +17,7 @@ from identification.calibration.calibrate import STARTS
 from identification.cases import RATE
 from identification.confidence.coverage import CAMPAIGNS, coverage_study
 from identification.confidence.section import coverage_json, coverage_section
+from identification.real_bench.real_bench import real_bench
 from identification.recordings.files import check_vacant, read_campaign, write_campaign
 from identification.report.results import as_text, write_results
 from identification.reproduce.reproduce import reproduce
@@ -47,6 +48,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     _add_stage(commands, "run", "all of these: plant.json and report.html")
     _add_coverage(commands)
     _add_reproduce(commands)
+    _add_gap(commands)
     chosen = parser.parse_args(arguments)
     for name in ("starts", "campaigns", "workers"):
         value = getattr(chosen, name, None)
@@ -105,6 +107,15 @@ def _add_reproduce(commands: "argparse._SubParsersAction") -> None:
     parser = commands.add_parser("reproduce", help=text, description=text)
     parser.add_argument("--out", type=writable_folder, required=True, help="folder of results")
     parser.add_argument("--seed", type=int, default=0, help="of the virtual bench's noise")
+
+
+def _add_gap(commands: "argparse._SubParsersAction") -> None:
+    text = "which unmodelled effects give the report's printed errors (docs/real-bench.md)"
+    parser = commands.add_parser("gap", help=text, description=text)
+    parser.add_argument("--tables", action="store_true", required=True, help="diagnose Tables 11 to 15")
+    parser.add_argument("--out", type=writable_folder, required=True, help="folder of results")
+    parser.add_argument("--images", type=writable_folder, default=None, help="folder of its figure")
+    parser.add_argument("--seed", type=int, default=0, help="of the uncertain test conditions")
 
 
 def _bench(chosen: argparse.Namespace) -> None:
@@ -199,11 +210,18 @@ def _reproduce(chosen: argparse.Namespace) -> None:
     print(f"\nwritten: {chosen.out}/reproduce.json and reproduce.html")
 
 
+def _gap(chosen: argparse.Namespace) -> None:
+    sections = real_bench(chosen.out, seed=chosen.seed, images=chosen.images)
+    print(as_text(sections))
+    print(f"\nwritten: {chosen.out}/tables.json and tables.html")
+
+
 COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {
     "bench": _bench,
     "run": _run,
     "coverage": _coverage,
     "reproduce": _reproduce,
+    "gap": _gap,
 }
 """Commands that are not one stage."""
 

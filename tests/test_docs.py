@@ -13,7 +13,14 @@ pytestmark = pytest.mark.training
 
 ROOT = Path(__file__).parents[1]
 PAGES = ("README.md", "docs/env.md", "docs/data.md", "docs/identification.md", "docs/effects.md")
-OTHERS = ("docs/model.md", "docs/controllers.md", "docs/quality.md", "docs/sensitivity.md")
+OTHERS = (
+    "docs/model.md",
+    "docs/controllers.md",
+    "docs/quality.md",
+    "docs/sensitivity.md",
+    "docs/real-bench.md",
+    "docs/component-data.md",
+)
 """Pages without examples."""
 HEADLESS = {**os.environ, "SDL_VIDEODRIVER": "dummy"}
 

@@ -6,7 +6,7 @@ supply is the bench's reservoir, not the recorded p1: a slope for every sample w
 every half millisecond.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,8 +27,14 @@ RTOL = 1e-6
 class ScipyReplay(Replay):
     """Simulates recordings under candidate parameters, none of them in a batch."""
 
-    def outputs(self, candidates: Mapping[str, NDArray], p2_shift: ArrayLike = 0.0) -> list[NDArray]:
-        """As Replay.outputs."""
+    def outputs(
+        self,
+        candidates: Mapping[str, NDArray],
+        p2_shift: ArrayLike = 0.0,
+        which: Sequence[int] | None = None,
+    ) -> list[NDArray]:
+        """As Replay.outputs, for candidates that are the same for all recordings."""
+        chosen = range(len(self.drives)) if which is None else which
         n = max(np.size(value) for value in candidates.values())
         shift = np.broadcast_to(np.asarray(p2_shift, dtype=float), (n,))
         parameters = [
@@ -37,7 +43,7 @@ class ScipyReplay(Replay):
         ]
         return [
             np.stack([_answer(drive, p, dp) for p, dp in zip(parameters, shift, strict=True)], axis=2)
-            for drive in self.drives
+            for drive in (self.drives[r] for r in chosen)
         ]
 
 

@@ -207,7 +207,7 @@ def test_the_energy_of_the_coil_goes_into_heat_of_winding_and_iron_and_the_field
 def test_a_warm_winding_starts_with_less_current_and_cools():
     p = CALIBRATED.replace(theta_coil=60.0)
     rest = energised(p, p1=12e5, p2=6e5, U=24.0)
-    assert rest.I == pytest.approx(24.0 / (p["R"] * (1 + 0.00393 * 60.0)), rel=1e-12)
+    np.testing.assert_allclose(rest.I, 24.0 / (p["R"] * (1 + 0.00393 * 60.0)), rtol=1e-12)
     run = simulate(p, initial=rest, U=np.full(21, 24.0), period=0.05)
     np.testing.assert_allclose(run.state.coil_heat, 60.0 * np.exp(-run.time / 60.0), rtol=1e-6)
     resistance = p["R"] * (1 + 0.00393 * run.state.coil_heat)

@@ -1,5 +1,7 @@
 """What sensors are given to read: lag, bias and gain against their closed forms."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -47,9 +49,9 @@ def test_every_valve_of_a_batch_has_sensors_of_its_own():
     valves.set_parameters(np.arange(2), {**CALIBRATED, **{s: np.array(v) for s, v in sizes.items()}})
     for field, value in zip(valves.state, energised(CALIBRATED, p1=12e5, p2=6e5, U=24.0), strict=True):
         field[:] = value
-    values, current = valves.readings(), 24.0 / CALIBRATED["R"]
-    expected = {"p1": [12e5] * 2, "p2": [6e5, 6.2e5], "p3": [11.7e5, 12e5], "I": [1.05 * current, current]}
-    for name, found in values.items():
+    current = np.array([1.05, 1.0]) * 24.0 / CALIBRATED["R"]
+    expected = {"p1": [12e5] * 2, "p2": [6e5, 6.2e5], "p3": [11.7e5, 12e5], "I": current}
+    for name, found in valves.readings().items():
         np.testing.assert_allclose(found, expected[name], rtol=1e-12, err_msg=name)
 
 
@@ -93,7 +95,7 @@ def _filtered(values: np.ndarray, tau: float, period: float) -> np.ndarray:
     left = np.exp(-period / tau)
     out = np.empty_like(values)
     out[0] = values[0]
-    for k, (before, after) in enumerate(zip(values[:-1], values[1:], strict=True)):
+    for k, (before, after) in enumerate(pairwise(values)):
         slope = (after - before) / period
         out[k + 1] = after - tau * slope + (out[k] - before + tau * slope) * left
     return out

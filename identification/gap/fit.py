@@ -1,0 +1,261 @@
+"""Joint refits of the calibrated parameters with causes: many hypotheses side by side in one batch."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.gap.model import Cause, GreyBox, Nuisance, Size, weighted
+from identification.gap.normal import Linear, Normal, freed, normal
+
+STEP = 1e-3
+"""Change of a scaled number for a finite difference."""
+
+LOST = 1e3
+"""Residual of a reading whose candidate could not be simulated, in noise deviations."""
+
+ITERATIONS = 12
+"""Of the damped Gauss-Newton method; a fit that needs more is reported as not converged."""
+
+ENOUGH = 0.3
+RELATIVE = 3e-5
+"""Decrease of chi-square, predicted, and its share of chi-square, at which a fit has converged."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hypothesis:
+    """Causes that are taken to act together; none: the nominal model, recalibrated."""
+
+    causes: tuple[Cause, ...]
+
+    @property
+    def sizes(self) -> tuple[Size, ...]:
+        """What is fitted beside the calibrated parameters."""
+        return tuple(size for cause in self.causes for size in cause.sizes)
+
+    @property
+    def local(self) -> tuple[Nuisance, ...]:
+        """The causes' own numbers of every run."""
+        return tuple(nuisance for cause in self.causes for nuisance in cause.local)
+
+    @property
+    def name(self) -> tuple[str, ...]:
+        """The causes' labels."""
+        return tuple(cause.label for cause in self.causes)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Point:
+    """Where the fit of a hypothesis is."""
+
+    hypothesis: Hypothesis
+    vector: NDArray
+    """Calibrated parameters and sizes, scaled, (k,)."""
+    local: NDArray
+    """(runs, l) [SI]."""
+    chi_square: float = np.inf
+    damping: float = 1e-3
+    converged: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Frame:
+    """What all hypotheses share: derivatives by starts and tolerances, at the recalibrated model."""
+
+    starts: list[NDArray]
+    """Per run (values, starts)."""
+    shared: list[NDArray]
+    """Per run (values, tolerances), per standard deviation."""
+
+
+class Fitter:
+    """Fits hypotheses to the runs that may be fitted to."""
+
+    def __init__(self, plant: GreyBox, frame: Frame | None = None):
+        self.plant = plant
+        self.fitted = [r for r, run in enumerate(plant.runs) if not run.held_out]
+        self.everything = list(range(len(plant.runs)))
+        self.target = [weighted(plant, r, run.measured).reshape(-1) for r, run in enumerate(plant.runs)]
+        empty = [np.zeros((len(target), 0)) for target in self.target]
+        self.frame = frame or Frame(starts=empty, shared=empty)
+
+    def start(self, hypothesis: Hypothesis, values: Mapping[str, float]) -> Point:
+        """A point at values by symbol; what is left out begins where it is off."""
+        symbols = (*self.plant.parameters, *hypothesis.sizes)
+        vector = np.array([values.get(size.symbol, size.off) / size.scale for size in symbols])
+        local = np.zeros((len(self.plant.runs), len(hypothesis.local)))
+        return Point(hypothesis=hypothesis, vector=vector, local=local)
+
+    def fit(self, points: Sequence[Point], iterations: int = ITERATIONS) -> list[Point]:
+        """Damped Gauss-Newton on all points at once, until each has converged."""
+        points = list(points)
+        trials = [replace(point) for point in points]
+        active = list(range(len(points)))
+        equations: dict[int, Normal] = {}
+        for _ in range(iterations + 1):
+            for index, runs in zip(
+                active, self.linearise([trials[i] for i in active], self.fitted), strict=True
+            ):
+                found = normal(runs)
+                trial, point = trials[index], points[index]
+                if found.chi_square < point.chi_square:
+                    local = self._local(trial, runs, found)
+                    damping = max(0.2 * point.damping, 1e-9)
+                    points[index] = replace(
+                        trial, chi_square=found.chi_square, damping=damping, local=local
+                    )
+                    equations[index] = found
+                else:
+                    points[index] = replace(point, damping=min(10.0 * point.damping + 1e-6, 1e6))
+                trials[index], gain = self._step(points[index], equations[index])
+                done = (
+                    gain < max(ENOUGH, RELATIVE * points[index].chi_square)
+                    or points[index].damping >= 1e5
+                )
+                points[index] = replace(points[index], converged=done)
+            active = [index for index in active if not points[index].converged]
+            if not active:
+                break
+        return points
+
+    def _local(self, point: Point, runs: Sequence[Linear], found: Normal) -> NDArray:
+        """The runs' own numbers of the causes after one Gauss-Newton step; starts stay linear."""
+        local = point.local.copy()
+        l = local.shape[1]  # noqa: E741
+        if l:
+            for r, run in zip(self.fitted, runs, strict=True):
+                local[r] += freed(run, found.shared)[1][:l]
+        return local
+
+    def _step(self, point: Point, equations: Normal) -> tuple[Point, float]:
+        """The next trial, within the ranges, and the decrease of chi-square it promises."""
+        sizes = (*self.plant.parameters, *point.hypothesis.sizes)
+        low = np.array([min(s.low / s.scale, s.high / s.scale) for s in sizes])
+        high = np.array([max(s.low / s.scale, s.high / s.scale) for s in sizes])
+        hessian, gradient = equations.hessian, equations.gradient
+        free = np.ones(len(sizes), dtype=bool)
+        step = np.zeros(len(sizes))
+        for _ in range(len(sizes)):
+            damped = hessian[np.ix_(free, free)].copy()
+            damped[np.diag_indices_from(damped)] *= 1.0 + point.damping
+            damped[np.diag_indices_from(damped)] += 1e-9
+            rest = gradient[free] - hessian[np.ix_(free, ~free)] @ step[~free]
+            step[free] = np.linalg.solve(damped, rest)
+            outside = free & ((point.vector + step < low) | (point.vector + step > high))
+            if not np.any(outside):
+                break
+            step[outside] = (np.clip(point.vector + step, low, high) - point.vector)[outside]
+            free &= ~outside
+            if not np.any(free):
+                break
+        gain = float(2 * gradient @ step - step @ hessian @ step)
+        return replace(point, vector=point.vector + step), gain
+
+    def linearise(self, points: Sequence[Point], runs: Sequence[int]) -> list[list[Linear]]:
+        """Residuals and derivatives of each point in each of the runs, all simulated side by side."""
+        values, places = self._candidates(points)
+        outputs = self.plant.outputs(values, runs)
+        flat = [
+            weighted(self.plant, r, output).reshape(len(self.target[r]), -1)
+            for r, output in zip(runs, outputs, strict=True)
+        ]
+        return [
+            [self._linear(point, r, block[:, place]) for r, block in zip(runs, flat, strict=True)]
+            for point, place in zip(points, places, strict=True)
+        ]
+
+    def residuals(self, points: Sequence[Point], runs: Sequence[int]) -> list[NDArray]:
+        """Weighted measured - model of each point, per run (values, points)."""
+        n = len(points)
+        values: dict[str, NDArray] = {}
+        for i, point in enumerate(points):
+            sizes = (*self.plant.parameters, *point.hypothesis.sizes)
+            for size, scaled in zip(sizes, point.vector, strict=True):
+                values.setdefault(size.symbol, np.full(n, size.off))[i] = scaled * size.scale
+            for j, nuisance in enumerate(point.hypothesis.local):
+                shape = (n, len(self.plant.runs))
+                values.setdefault(nuisance.symbol, np.full(shape, nuisance.centre))[i] = point.local[
+                    :, j
+                ]
+        outputs = self.plant.outputs(values, runs)
+        flat = [weighted(self.plant, r, y).reshape(-1, n) for r, y in zip(runs, outputs, strict=True)]
+        return [
+            np.nan_to_num(self.target[r][:, None] - y, nan=LOST) for r, y in zip(runs, flat, strict=True)
+        ]
+
+    def _linear(self, point: Point, run: int, block: NDArray) -> Linear:
+        k, starts = len(point.vector), self.plant.starts
+        own = np.array([n.step for n in point.hypothesis.local])
+        residual = np.nan_to_num(self.target[run] - block[:, 0], nan=LOST)
+        changes = np.nan_to_num(block[:, 1:] - block[:, :1])
+        local = np.column_stack([changes[:, k:] / own, self.frame.starts[run]])
+        linear_starts = self.frame.starts[run].shape[1]
+        sd = [n.sd for n in point.hypothesis.local] + [n.sd for n in starts][:linear_starts]
+        return Linear(
+            residual=residual,
+            slopes=changes[:, :k] / self._steps(point),
+            local=local,
+            local_value=np.concatenate([point.local[run], np.zeros(linear_starts)]),
+            local_sd=np.array(sd),
+            shared=self.frame.shared[run],
+        )
+
+    def _steps(self, point: Point) -> NDArray:
+        """Finite differences of the scaled vector, away from the nearer end of each range."""
+        sizes = (*self.plant.parameters, *point.hypothesis.sizes)
+        middle = np.array([0.5 * (s.low + s.high) / s.scale for s in sizes])
+        return np.where(point.vector > middle, -STEP, STEP) * np.maximum(np.abs(point.vector), 0.1)
+
+    def _candidates(self, points: Sequence[Point]) -> tuple[dict[str, NDArray], list[slice]]:
+        """Values by symbol of every point and its changes, and which candidates belong to which."""
+        places, rows = [], []
+        first = 0
+        for point in points:
+            k, l = len(point.vector), point.local.shape[1]  # noqa: E741
+            vectors = np.tile(point.vector, (1 + k + l, 1))
+            vectors[1 : 1 + k] += np.diag(self._steps(point))
+            local = np.tile(point.local, (1 + k + l, 1, 1))
+            for j, nuisance in enumerate(point.hypothesis.local):
+                local[1 + k + j, :, j] += nuisance.step
+            rows.append((vectors, local))
+            places.append(slice(first, first + len(vectors)))
+            first += len(vectors)
+        values: dict[str, NDArray] = {}
+        for point, place, (vectors, local) in zip(points, places, rows, strict=True):
+            sizes = (*self.plant.parameters, *point.hypothesis.sizes)
+            for j, size in enumerate(sizes):
+                values.setdefault(size.symbol, np.full(first, size.off))[place] = (
+                    vectors[:, j] * size.scale
+                )
+            for j, nuisance in enumerate(point.hypothesis.local):
+                shape = (first, len(self.plant.runs))
+                values.setdefault(nuisance.symbol, np.full(shape, nuisance.centre))[place] = local[
+                    ..., j
+                ]
+        return values, places
+
+    def values(self, point: Point) -> dict[str, float]:
+        """Parameters and sizes by symbol [SI]."""
+        sizes = (*self.plant.parameters, *point.hypothesis.sizes)
+        return {s.symbol: float(v * s.scale) for s, v in zip(sizes, point.vector, strict=True)}
+
+
+def shared_frame(plant: GreyBox, point: Point) -> Frame:
+    """Derivatives by starts and tolerances at a point, by differences over all runs at once."""
+    fitter = Fitter(plant)
+    nuisances = (*plant.starts, *plant.tolerances)
+    n = 1 + len(nuisances)
+    values = {symbol: np.full(n, value) for symbol, value in fitter.values(point).items()}
+    for j, nuisance in enumerate(nuisances):
+        values[nuisance.symbol] = np.full(n, nuisance.centre)
+        values[nuisance.symbol][1 + j] += nuisance.step
+    steps = np.array([nuisance.step for nuisance in nuisances])
+    sd = np.array([nuisance.sd for nuisance in nuisances])
+    starts, shared = [], []
+    for r, output in enumerate(plant.outputs(values, fitter.everything)):
+        flat = weighted(plant, r, output).reshape(len(fitter.target[r]), -1)
+        slopes = np.nan_to_num(flat[:, 1:] - flat[:, :1]) / steps
+        starts.append(slopes[:, : len(plant.starts)])
+        shared.append(slopes[:, len(plant.starts) :] * sd[len(plant.starts) :])
+    return Frame(starts=starts, shared=shared)

@@ -1,0 +1,136 @@
+"""The protocol by which the diagnosis knows a plant: channels, parameters, causes, a simulator."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Channel:
+    """One measured output."""
+
+    name: str
+    unit: str
+    """In which people read it."""
+    scale: float
+    """Size of that unit in SI."""
+    noise: float
+    """Standard deviation of the readings about the true value [SI], from the recordings themselves."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """One recording as the diagnosis sees it."""
+
+    name: str
+    held_out: bool
+    """Never fitted to: the gap and its shrinking are judged on these runs."""
+    time: NDArray
+    """(samples,) [s]."""
+    measured: NDArray
+    """(channels, samples) [SI]."""
+    trusted: NDArray
+    """Which readings count, boolean (channels, samples): not those of the instant of a switching."""
+    inputs: Mapping[str, NDArray]
+    """What acts on the plant, (samples,) by name [SI], for figures and the black box."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Size:
+    """A number that may be fitted: a parameter of the model, or what sizes a cause."""
+
+    symbol: str
+    unit: str
+    low: float
+    high: float
+    """Ends of the physical range [SI]."""
+    off: float = 0.0
+    """Value in the nominal model."""
+    trials: tuple[float, ...] = ()
+    """Values from which a search for a cause's size begins; () for a parameter: from `off`."""
+    scale: float = 1.0
+    """Usual size, by which an optimiser sees it divided."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Nuisance:
+    """What no recording tells exactly and is no gap either: known up to a standard deviation."""
+
+    symbol: str
+    sd: float
+    """Standard deviation about `centre` [SI]."""
+    centre: float = 0.0
+    step: float
+    """Change for a finite difference [SI]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cause:
+    """One way in which the nominal model may be wrong."""
+
+    name: str
+    """As in the catalogue; several variants of a cause share it."""
+    component: str
+    sizes: tuple[Size, ...]
+    local: tuple[Nuisance, ...] = ()
+    """Numbers of the cause that every run has its own of."""
+    prior: float = 1.0
+    """Probability before any data, relative to the other causes."""
+    variant: str = ""
+
+    @property
+    def label(self) -> str:
+        """Name and variant."""
+        return f"{self.name} ({self.variant})" if self.variant else self.name
+
+
+class GreyBox(Protocol):
+    """A plant with recordings. Values are SI; n candidates are simulated side by side."""
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        """Measured outputs, in the order of every array of outputs."""
+        ...
+
+    @property
+    def runs(self) -> Sequence[Run]:
+        """Recordings."""
+        ...
+
+    @property
+    def parameters(self) -> Sequence[Size]:
+        """What calibration fits; `off` is where it starts."""
+        ...
+
+    @property
+    def causes(self) -> Sequence[Cause]:
+        """What may be wrong with the model."""
+        ...
+
+    @property
+    def tolerances(self) -> Sequence[Nuisance]:
+        """Other parameters, with the scatter of a unit that is as drawn; the same in every run."""
+        ...
+
+    @property
+    def starts(self) -> Sequence[Nuisance]:
+        """What every run has its own of: state at the start, zero of a sensor on that day."""
+        ...
+
+    def outputs(self, values: Mapping[str, NDArray], runs: Sequence[int]) -> list[NDArray]:
+        """Model outputs for each of the runs (indices), (channels, samples, n); NaN where it fails.
+
+        values: by symbol, (n,), or (n, runs) for what every run has its own of; a symbol that is left
+        out has its nominal value.
+        """
+        ...
+
+
+def weighted(plant: GreyBox, run: int, values: NDArray) -> NDArray:
+    """Values (channels, samples, ...) in noise deviations, 0 where readings are not trusted."""
+    noise = np.array([channel.noise for channel in plant.channels])
+    mask = plant.runs[run].trusted / noise[:, None]
+    return values * mask.reshape(*mask.shape, *[1] * (values.ndim - 2))

@@ -1,0 +1,89 @@
+"""Which causes are worth a refit: each one's signature against the residual, linearised once."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.gap.fit import Fitter, Hypothesis, Point
+from identification.gap.model import Cause
+from identification.gap.normal import Linear, normal
+
+
+@dataclass(frozen=True, kw_only=True)
+class Screened:
+    """A cause at one trial size, and what it promises beside other causes."""
+
+    cause: Cause
+    sizes: tuple[float, ...]
+    """Predicted sizes, within their ranges [SI]."""
+    chi_square: float
+    """Predicted."""
+
+
+def trial_points(fitter: Fitter, base: Point, causes: Sequence[Cause]) -> list[tuple[Cause, Point]]:
+    """The base point with each cause added at each of its trial sizes."""
+    found = []
+    values = fitter.values(base)
+    for cause in causes:
+        joint = Hypothesis(causes=(*base.hypothesis.causes, cause))
+        for trial in range(max(len(size.trials) for size in cause.sizes)):
+            at = {s.symbol: s.trials[min(trial, len(s.trials) - 1)] for s in cause.sizes}
+            found.append((cause, fitter.start(joint, {**values, **at})))
+    return found
+
+
+def screen(fitter: Fitter, base: Point, causes: Sequence[Cause]) -> list[Screened]:
+    """Every cause's best trial beside the base's own causes, the most promising first.
+
+    The change that a cause makes at a trial size is taken to grow in proportion to its size; with the
+    calibrated parameters and all nuisances it is fitted to the base's residual.
+    """
+    own = fitter.linearise([base], fitter.fitted)[0]
+    trials = trial_points(fitter, base, causes)
+    signatures = _signatures(fitter, base, [point for _, point in trials])
+    best: dict[str, Screened] = {}
+    for (cause, point), signature in zip(trials, signatures, strict=True):
+        found = _promise(own, cause, point, signature)
+        if cause.label not in best or found.chi_square < best[cause.label].chi_square:
+            best[cause.label] = found
+    return sorted(best.values(), key=lambda screened: screened.chi_square)
+
+
+def _signatures(fitter: Fitter, base: Point, points: Sequence[Point]) -> list[list[NDArray]]:
+    """Changes of the weighted outputs by each point relative to the base, per fitted run."""
+    outputs = fitter.residuals([base, *points], fitter.fitted)
+    return [[block[:, 0] - block[:, 1 + k] for block in outputs] for k in range(len(points))]
+
+
+def _promise(
+    own: Sequence[Linear], cause: Cause, point: Point, signature: Sequence[NDArray]
+) -> Screened:
+    with_cause = [
+        replace(run, slopes=np.column_stack([run.slopes, change]))
+        for run, change in zip(own, signature, strict=True)
+    ]
+    found = normal(with_cause)
+    sizes = cause.sizes
+    trial = point.vector[len(point.vector) - len(sizes) :] * [size.scale for size in sizes]
+    off = np.array([size.off for size in sizes])
+    ends = np.array([(size.low - o, size.high - o) for size, o in zip(sizes, off, strict=True)])
+    shares = ends / (trial - off)[:, None]
+    low, high = np.max(np.min(shares, axis=1)), np.min(np.max(shares, axis=1))
+    a, chi_square = _bounded(found.hessian, found.gradient, found.chi_square, max(low, 0.0), high)
+    return Screened(cause=cause, sizes=tuple((off + a * (trial - off)).tolist()), chi_square=chi_square)
+
+
+def _bounded(
+    hessian: NDArray, gradient: NDArray, chi_square: float, low: float, high: float
+) -> tuple[float, float]:
+    """The last number of the least-squares step, held in a range, and the chi-square it leaves."""
+    k = len(gradient) - 1
+    others = hessian[:k, :k] + 1e-9 * np.eye(k)
+    inverse = np.linalg.solve(others, np.column_stack([gradient[:k], hessian[:k, k]]))
+    curvature = hessian[k, k] - hessian[k, :k] @ inverse[:, 1]
+    pull = gradient[k] - hessian[k, :k] @ inverse[:, 0]
+    a = float(np.clip(pull / max(curvature, 1e-12), low, high))
+    left = chi_square - gradient[:k] @ inverse[:, 0] - 2 * a * pull + a * a * curvature
+    return a, float(left)

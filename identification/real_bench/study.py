@@ -1,0 +1,55 @@
+"""Everything that the printed error tables say of the causes, computed: no text, no pictures."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from identification.real_bench.candidates import candidates
+from identification.real_bench.currents import Residual, Winding, residual, winding
+from identification.real_bench.library import Library, drawn, refined, simulated
+from identification.real_bench.pairs import Pairs, checked, nearest, paired, usable
+from identification.real_bench.patterns import printed_after, printed_before
+from identification.real_bench.ranking import Match, matches
+from identification.real_bench.trust import Trust, trust
+
+DRAWS = 8
+"""Sets of test conditions."""
+
+KNOWN_TABLES = 150
+"""Made-up tables by which the ranking of pairs is judged."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """What was found."""
+
+    library: Library
+    residual: Residual
+    winding: Winding
+    singles: list[Match]
+    """Each cause alone, the nearest first."""
+    checked: list[Match]
+    """The nearest pairs as simulated, the nearest first."""
+    pairs: Pairs
+    trust: Trust
+    seed: int
+
+
+def study(*, seed: int = 0, draws: int = DRAWS, causes: Sequence[str] | None = None) -> Study:
+    """Simulate the causes under drawn conditions and rank them. causes: None for all."""
+    conditions = drawn(draws, seed)
+    coarse = simulated(candidates(causes), conditions, "causes under drawn test conditions")
+    library = refined(coarse)
+    after, before = printed_after(), printed_before()
+    halves = usable(library)
+    misfit = nearest(halves, after)
+    known = trust(usable(coarse), float(misfit.min()), n=KNOWN_TABLES, seed=seed)
+    return Study(
+        library=library,
+        residual=residual(conditions[0]),
+        winding=winding(conditions, before, after),
+        singles=matches(library, after, before),
+        checked=checked(halves, misfit, after, before),
+        pairs=paired(halves, after, known.width),
+        trust=known,
+        seed=seed,
+    )
