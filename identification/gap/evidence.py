@@ -54,7 +54,7 @@ def assess(fitter: Fitter, points: Sequence[Point]) -> list[Assessed]:
         shared = normal(runs).shared
         freed_runs = [freed(run, shared)[0] for run in runs]
         log_evidence = -0.5 * sum(
-            _misfit(fitter, r, residual, _effect(point, run))
+            _misfit(fitter, r, residual, _effects(point, run))
             for r, (residual, run) in enumerate(zip(freed_runs, runs, strict=True))
         )
         sd = _size_sd(point, equations)
@@ -113,26 +113,37 @@ def stretches(series: NDArray, period: float) -> NDArray:
     return padded.reshape(count, length)
 
 
-def _effect(point: Point, run: Linear) -> NDArray:
-    """What the causes themselves change, linear in their sizes, (values,)."""
-    sizes = point.hypothesis.sizes
-    first = len(point.vector) - len(sizes)
-    acting = point.vector[first:] - np.array([size.off / size.scale for size in sizes])
-    own = len(point.hypothesis.local)
-    local = run.local[:, :own] @ run.local_value[:own]
-    return run.slopes[:, first:] @ acting + local
+def _effects(point: Point, run: Linear) -> NDArray:
+    """What each cause of uncertain form changes, linear in its sizes, (values, causes)."""
+    causes = point.hypothesis.causes
+    column = len(point.vector) - len(point.hypothesis.sizes)
+    own, found = 0, []
+    for cause in causes:
+        at, mine = slice(column, column + len(cause.sizes)), slice(own, own + len(cause.local))
+        column, own = at.stop, mine.stop
+        acting = point.vector[at] - np.array([size.off / size.scale for size in cause.sizes])
+        change = run.slopes[:, at] @ acting + run.local[:, mine] @ run.local_value[mine]
+        if not cause.exact:
+            found.append(change)
+    return np.stack(found, axis=1) if found else np.zeros((len(run.residual), 0))
 
 
-def _misfit(fitter: Fitter, r: int, residual: NDArray, effect: NDArray) -> float:
-    """-2 log likelihood of one run, but for a constant."""
+def _misfit(fitter: Fitter, r: int, residual: NDArray, effects: NDArray) -> float:
+    """-2 log likelihood of one run, but for a constant; every cause errs on its own."""
     run = fitter.plant.runs[r]
     shape = run.measured.shape
     total = float(residual @ residual)
-    for channel, change in zip(residual.reshape(shape), effect.reshape(shape), strict=True):
-        r_b, u_b = (stretches(series, run.time[1]) for series in (channel, change))
-        norm = FORM_ERROR**2 * np.sum(u_b**2, axis=1)
-        along = FORM_ERROR**2 * np.sum(u_b * r_b, axis=1) ** 2
-        total += float(np.sum(np.log1p(norm) - along / (1 + norm)))
+    for channel, changes in zip(
+        residual.reshape(shape), effects.reshape(*shape, effects.shape[1]), strict=True
+    ):
+        r_b = stretches(channel, run.time[1])
+        u_b = FORM_ERROR * np.stack(
+            [stretches(change, run.time[1]) for change in changes.T] or [0.0 * r_b], axis=2
+        )
+        gram = np.eye(u_b.shape[2]) + np.einsum("bsi,bsj->bij", u_b, u_b)
+        along = np.einsum("bsi,bs->bi", u_b, r_b)
+        explained = np.einsum("bi,bi->b", along, np.linalg.solve(gram, along[..., None])[..., 0])
+        total += float(np.sum(np.linalg.slogdet(gram)[1] - explained))
     return total
 
 

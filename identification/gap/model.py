@@ -80,6 +80,8 @@ class Cause:
     prior: float = 1.0
     """Probability before any data, relative to the other causes."""
     variant: str = ""
+    exact: bool = False
+    """Its form is not in doubt: a number of the model that is off."""
 
     @property
     def label(self) -> str:

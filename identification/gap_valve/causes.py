@@ -126,6 +126,7 @@ def parameters() -> list[Cause]:
             component=component,
             sizes=(parameter_size(symbol, OFF_BY),),
             prior=PARAMETER_PRIOR,
+            exact=True,
         )
         for symbol, component in PARAMETER_COMPONENTS.items()
     ]
