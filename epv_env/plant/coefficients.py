@@ -23,6 +23,9 @@ GREATEST_CURRENT = 1.0
 STABLE = 1.0
 """Longest step times fastest rate at which the integrator follows an effect well [-]."""
 
+FRICTION_STABLE = 0.7
+"""The same for friction near rest, where its rate falls steeply with speed [-]."""
+
 SHORTEST_TIME = 1e-4
 """Time constant below which nothing is felt of a lag or of heat in a chamber, and neither acts [s]."""
 
@@ -80,10 +83,8 @@ def effect_sizes(p: Mapping[str, ArrayLike]) -> NDArray:
     """Table [row of Effects, valve] in the same shape."""
     p = {symbol: np.asarray(value, dtype=float) for symbol, value in p.items()}
     RT = p["R_gas"] * p["T_env"]
-    friction_rate = np.maximum(
-        p["F_MV"] / (p["mMV"] * SLIDING_SPEED_MV),
-        p["F_PV"] * (1 + p["S_PV"]) / (p["mPV"] * SLIDING_SPEED_PV),
-    )
+    friction_rate_PV = p["F_PV"] * (1 + p["S_PV"]) / (p["mPV"] * SLIDING_SPEED_PV)
+    friction_rate_MV = p["F_MV"] / (p["mMV"] * SLIDING_SPEED_MV)
     reluctance = p["RML"] + p["xMVmax"] / (p["mu0"] * QUARTER_PI * p["dMB"] ** 2)
     flattened = (1 + p["sMV"] * p["N"] * GREATEST_CURRENT / p["RML"]) ** 2
     per_inductance = reluctance / p["N"] ** 2 * flattened
@@ -96,7 +97,7 @@ def effect_sizes(p: Mapping[str, ArrayLike]) -> NDArray:
     steepest = np.sqrt(2 * RT / LAMINAR_DROP)
     pipe_rate = piped * p["A_pipe"] * steepest / p["V2"] * (per_far_share + near_share)
     rates = {name: _rate(p[name]) for name in ("tau_3", "tau_2", "tau_p2", "tau_p3")}
-    fastest = np.maximum(friction_rate, 1 / FILLING_TIME)
+    fastest = np.full_like(pipe_rate, 1 / FILLING_TIME)
     for rate in (p["R"] * per_inductance, pipe_rate, *rates.values()):
         fastest = np.maximum(fastest, rate)
     rows = Effects(
@@ -138,6 +139,8 @@ def effect_sizes(p: Mapping[str, ArrayLike]) -> NDArray:
         lag_3_rate=rates["tau_p3"],
         steady_step=STABLE / fastest,
         clamp_step=STABLE / np.maximum(clamp_rate, STABLE / UNLIMITED),
+        slow_step_PV=FRICTION_STABLE / np.maximum(friction_rate_PV, STABLE / UNLIMITED),
+        slow_step_MV=FRICTION_STABLE / np.maximum(friction_rate_MV, STABLE / UNLIMITED),
     )
     return np.ascontiguousarray(np.broadcast_arrays(*np.atleast_1d(*rows)), dtype=float)
 
@@ -150,5 +153,5 @@ def _rate(time: NDArray) -> NDArray:
 def has_effects(effects: NDArray) -> NDArray:
     """Which valves have an effect switched on, boolean (valve,); RT, steps and V2's part are none."""
     sizes = Effects(*effects)
-    properties = ("RT", "near_share", "steady_step", "clamp_step")
+    properties = ("RT", "near_share", "steady_step", "clamp_step", "slow_step_PV", "slow_step_MV")
     return np.any([getattr(sizes, f) != 0 for f in Effects._fields if f not in properties], axis=0)

@@ -151,9 +151,13 @@ class Effects(NamedTuple):
     lag_3_rate: Value
     """Reciprocal of its time constant [1/s]."""
     steady_step: Value
-    """Longest step at which the integrator follows every effect but a clamp [s]."""
+    """Longest step at which the integrator follows every effect but a clamp and friction [s]."""
     clamp_step: Value
     """Longest step at which it follows the current's decay against a clamp [s]."""
+    slow_step_PV: Value
+    """Longest step at which it follows the friction of a piston about to stop [s]."""
+    slow_step_MV: Value
+    """The same of the armature [s]."""
 
 
 @inlined
@@ -300,7 +304,22 @@ def discharge(p1, p2, effects):
 
 
 @inlined
-def longest_step(U, I, effects):  # noqa: E741 - the report's symbol
-    """Longest step that the effects allow at present [s]."""
-    clamped = (U <= OFF_VOLTAGE) & (abs(I) > NO_CURRENT)
-    return min(effects.steady_step, effects.clamp_step if clamped else effects.steady_step)
+def friction_step(slow_step, v, sliding_speed):
+    """Longest step for friction at a speed [s]: the slope of the curve of `friction` falls with it.
+
+    Half the speed stands for what a step may take from it.
+    """
+    relative = 0.5 * v / sliding_speed
+    steeper = 1.0 + relative * relative
+    return slow_step * steeper * math.sqrt(steeper)
+
+
+@inlined
+def longest_step(U, q, effects, free_PV, free_MV):
+    """Longest step that the effects allow at present [s]; a mover that a stop holds needs none."""
+    clamped = (U <= OFF_VOLTAGE) & (abs(q.I) > NO_CURRENT)
+    step = min(effects.steady_step, effects.clamp_step if clamped else effects.steady_step)
+    step_PV = friction_step(effects.slow_step_PV, q.vPV, SLIDING_SPEED_PV)
+    step_MV = friction_step(effects.slow_step_MV, q.vMV, SLIDING_SPEED_MV)
+    step = min(step, step_PV if free_PV > 0.0 else step)
+    return min(step, step_MV if free_MV > 0.0 else step)

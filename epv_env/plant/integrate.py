@@ -154,7 +154,7 @@ def _try_steps(work, step, extended):
         free_MV = 0.0 if held_MV else 1.0
         h = min(min(2.0 * step if held_PV & held_MV else step, hint), remaining)
         if extended:
-            h = min(h, longest_step(u.U, q.I, effects))
+            h = min(h, longest_step(u.U, q, effects, free_PV, free_MV))
         end, mid_PV, mid_MV, end_PV, end_MV = remaining_stages(
             q, held_still(rates, free_PV, free_MV), u, c, effects, free_PV, free_MV, h, extended
         )

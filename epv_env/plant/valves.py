@@ -136,9 +136,10 @@ class Valves:
         (samples, n); a valve stands still where it is 0. Returns fields of shape (samples, n): the state
         after each period. A valve that cannot be integrated becomes NaN.
         """
-        fields = np.broadcast_arrays(*inputs, np.empty((1, self.n)))[:-1]
-        table = np.zeros((fields[0].shape[0], N_INPUT, self._state.shape[1]))
-        table[:, :, : self.n] = np.stack(fields, axis=1)
+        samples = np.broadcast_shapes(*map(np.shape, inputs), (1, self.n))[0]
+        table = np.zeros((samples, N_INPUT, self._state.shape[1]))
+        for row, field in enumerate(inputs):
+            table[:, row, : self.n] = field
         duration = np.zeros((table.shape[0], table.shape[2]))
         duration[:, : self.n] = period
         delayed = bool(np.any(self._delay))
