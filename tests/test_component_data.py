@@ -1,33 +1,16 @@
-"""The fits of docs/component_data.py recover what is known, and its page gives what they find."""
+"""The fits of docs/component_data recover what is known, and its page gives what they find."""
 
-import importlib.util
 import subprocess
 import sys
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
 
-pytest.importorskip("matplotlib")
+from docs.component_data import chambers, findings, friction, solenoids
 
 ROOT = Path(__file__).parents[1]
-SCRIPT = ROOT / "docs/component_data.py"
 MEASURED = ROOT.parent / "shared/measured"
-
-
-def loaded() -> ModuleType:
-    """The script as a module: docs is no package."""
-    specification = importlib.util.spec_from_file_location("component_data", SCRIPT)
-    assert specification is not None
-    assert specification.loader is not None
-    module = importlib.util.module_from_spec(specification)
-    sys.modules["component_data"] = module  # where its dataclasses look for their annotations
-    specification.loader.exec_module(module)
-    return module
-
-
-data = loaded()
 
 
 def synthetic_run(sliding: float, excess: float, droop: float) -> tuple[np.ndarray, ...]:
@@ -43,7 +26,7 @@ def synthetic_run(sliding: float, excess: float, droop: float) -> tuple[np.ndarr
 
 
 def test_a_known_friction_is_found_under_a_drooping_regulator():
-    loop = data.friction_loop(*synthetic_run(7.0, 0.8, 0.15e5), 0.0257)
+    loop = friction.friction_loop(*synthetic_run(7.0, 0.8, 0.15e5), bore=0.0257)
     assert loop.mean == pytest.approx(7.0, rel=1e-6)
     assert loop.raw == pytest.approx(7.0 + 0.15e5 / 2 * np.pi / 4 * 0.0257**2, rel=1e-6)
     assert loop.first_excess == pytest.approx(0.8, rel=0.01)
@@ -55,12 +38,12 @@ def test_a_known_friction_is_found_under_a_drooping_regulator():
 def test_a_run_without_a_whole_loop_is_refused():
     time, *others = synthetic_run(7.0, 0.0, 0.0)
     with pytest.raises(ValueError, match="two strokes"):
-        data.friction_loop(time[:300], *(other[:300] for other in others), 0.0257)
+        friction.friction_loop(time[:300], *(other[:300] for other in others), bore=0.0257)
 
 
 def test_a_line_over_pressure_covers_its_truth():
     bars = np.array([1.0, 3.0, 5.0, 7.0])
-    found = data.line(bars, 4 + 0.6 * bars + np.array([0.1, -0.1, -0.1, 0.1]))
+    found = friction.line(bars, 4 + 0.6 * bars + np.array([0.1, -0.1, -0.1, 0.1]))
     assert found.slope == pytest.approx(0.6, abs=found.slope_half)
     assert found.constant == pytest.approx(4.0, abs=found.constant_half)
     assert 0 < found.slope_half < 0.2
@@ -71,10 +54,10 @@ def test_a_line_over_pressure_covers_its_truth():
 )
 def test_the_laws_of_a_leak_are_told_apart(law, sizes):
     time = np.arange(0, 60, 0.3)
-    rate = data.LAWS[law][0]
-    clean = data.decay_over(time, 8.5e5, lambda p: rate(p, *sizes))
+    rate = chambers.LAWS[law][0]
+    clean = chambers.decay_over(time, 8.5e5, lambda p: rate(p, *sizes))
     noisy = clean + np.random.default_rng(0).normal(0, 300, len(time))
-    fits = {name: data.fitted_decay(time, noisy, name) for name in data.LAWS}
+    fits = {name: chambers.fitted_decay(time, noisy, name) for name in chambers.LAWS}
     assert fits[law].sizes == pytest.approx(sizes, rel=0.03)
     assert fits[law].rms < 400
     others = {name for name in ("orifice", "laminar") if name != law}
@@ -82,46 +65,82 @@ def test_the_laws_of_a_leak_are_told_apart(law, sizes):
 
 
 def test_choked_decay_is_exponential_in_the_absolute_pressure():
-    pressure = data.decay_over(np.array([0.0, 1, 2]), 8e5, lambda p: data.orifice_rate(p, 2e-4))
+    pressure = chambers.decay_over(np.array([0.0, 1, 2]), 8e5, lambda p: chambers.orifice_rate(p, 2e-4))
     assert pressure[1] / pressure[0] == pytest.approx(pressure[2] / pressure[1], rel=1e-4)
 
 
 def test_a_settling_is_found_beside_a_leak():
     time = np.arange(0, 140, 0.1)
-    size, lag = data.settling(time, 8e5 - 30 * time + 2e3 * np.exp(-time / 5))
+    size, lag = chambers.settling(time, 8e5 - 30 * time + 2e3 * np.exp(-time / 5))
     assert (size, lag) == pytest.approx((2e3, 5.0), rel=0.05)
 
 
 def test_a_shorted_turn_is_recovered_and_diffusion_is_not_taken_for_one():
-    turn = data.shorted_turn(data.FREQUENCIES, 0.13, 250.0, 4e-3)
-    found = data.fitted_inductor(data.FREQUENCIES, turn, data.shorted_turn, 400.0)
+    turn = solenoids.shorted_turn(solenoids.FREQUENCIES, 0.13, 250.0, 4e-3)
+    found = solenoids.fitted_inductor(solenoids.FREQUENCIES, turn, solenoids.shorted_turn, 400.0)
     assert (found.inductance, found.eddy, found.leakage) == pytest.approx((0.13, 250.0, 4e-3), rel=1e-3)
-    other = data.diffusion(data.FREQUENCIES, 0.13, 3e-3, 1e-4)
-    assert data.fitted_inductor(data.FREQUENCIES, other, data.shorted_turn, 400.0).worst > 0.3
+    other = solenoids.diffusion(solenoids.FREQUENCIES, 0.13, 3e-3, 1e-4)
+    taken = solenoids.fitted_inductor(solenoids.FREQUENCIES, other, solenoids.shorted_turn, 400.0)
+    assert taken.worst > 0.3
 
 
 def test_a_folder_without_data_is_one_sentence(tmp_path):
-    command = (sys.executable, SCRIPT, "--data", tmp_path / "none", "--out", tmp_path)
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    pytest.importorskip("matplotlib")
+    folders = ("--data", tmp_path / "none", "--out", tmp_path / "out")
+    command = (sys.executable, "-m", "docs.component_data", *folders)
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert "--data" in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+FRICTION = ("friction/Circle_1bar.csv", lambda data: friction.read_loop(data, "Circle", 1))
+CHAMBER = ("chambers/Prusa.csv", lambda data: chambers.read_chamber(data, "Prusa"))
+SOLENOID = (
+    "solenoids/SolPosMeas240805_SSBH-0830.csv",
+    lambda data: solenoids.temperature_slopes(data, "SSBH-0830"),
+)
+
+
+@pytest.mark.parametrize(
+    ("record", "content"),
+    [
+        (FRICTION, "a\tb\n"),
+        (FRICTION, ""),
+        (CHAMBER, "hello\n"),
+        (CHAMBER, "0.000;3.826;7.652\n"),
+        (SOLENOID, "heading\n26,0,x,64.1,206.2\n"),
+        (SOLENOID, "heading\n" + 100 * "26,0,9,542.3,600.8\n"),
+    ],
+)
+def test_a_file_that_is_no_record_is_named(tmp_path, record, content):
+    name, read = record
+    path = tmp_path / name
+    path.parent.mkdir()
+    path.write_text(content)
+    with pytest.raises(ValueError, match="take the file as published") as refused:
+        read(tmp_path)
+    assert str(path) in str(refused.value)
 
 
 def test_inductances_follow_one_shorted_turn():
     """These eight figures stand in the script: no folder is needed."""
-    for name, measured in data.INDUCTANCES.items():
-        turn = data.fitted_inductor(data.FREQUENCIES, measured, data.shorted_turn, 250.0)
+    for name, measured in solenoids.INDUCTANCES.items():
+        turn = solenoids.fitted_inductor(solenoids.FREQUENCIES, measured, solenoids.shorted_turn, 250.0)
         assert turn.worst < 0.04, name
         assert 220 < turn.eddy < 280
-        assert data.fitted_inductor(data.FREQUENCIES, measured, data.diffusion, 1e-3).worst > 0.5
+        assert (
+            solenoids.fitted_inductor(solenoids.FREQUENCIES, measured, solenoids.diffusion, 1e-3).worst
+            > 0.5
+        )
 
 
 @pytest.fixture(scope="module")
 def found():
     if not MEASURED.is_dir():
         pytest.skip("no measured component data beside this repository (../shared/measured)")
-    return data.found_in(MEASURED)
+    return findings.found_in(MEASURED)
 
 
 def test_friction_rises_with_pressure(found):
@@ -145,8 +164,8 @@ def test_break_away_follows_a_rest_and_no_reversal(found):
 
 
 def test_leaks_of_prints_lie_between_laminar_and_orifice(found):
-    for chamber in data.LEAKY:
-        rms = {law: found.decays[chamber, law].rms for law in data.LAWS}
+    for chamber in chambers.LEAKY:
+        rms = {law: found.decays[chamber, law].rms for law in chambers.LAWS}
         assert rms["porous"] < 0.02e5
         assert min(rms["orifice"], rms["laminar"]) > 5 * rms["porous"]
 
@@ -157,5 +176,8 @@ def test_currents_fall_faster_than_copper_at_the_case_temperature(found):
 
 
 def test_the_picture_is_drawn(found):
-    assert len(data.drawn(found).axes) == 3
+    pytest.importorskip("matplotlib")
+    from docs.component_data.figure import drawn
+
+    assert len(drawn(found).axes) == 3
     assert (ROOT / "docs/images/component-data.png").exists()

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.progress import progress
-from identification.real_bench.candidates import NONE, Candidate
+from identification.real_bench.candidates import Candidate
 from identification.real_bench.conditions import Conditions, drawn_conditions, fitted_conditions
 from identification.real_bench.patterns import predicted
 
@@ -37,12 +37,6 @@ class Library:
         """Where each cause's candidates begin, (C,)."""
         names = [candidate.cause for candidate in self.candidates]
         return np.array([names.index(cause) for cause in self.causes])
-
-    @property
-    def noise(self) -> NDArray:
-        """What the sensors' noise alone gives [%], (D, 1, tests, outputs)."""
-        index = self.causes.index(NONE)
-        return self.after[:, self.starts[index]][:, None]
 
 
 def drawn(n_draws: int, seed: int) -> list[Conditions]:

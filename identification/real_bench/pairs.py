@@ -6,7 +6,6 @@ conditions alike. How near is near is settled with tables whose causes are known
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,27 +21,6 @@ LARGE = 30.0
 """A cause that alone gives an error above this is no half of a pair [%]."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Pairs:
-    """All pairs of causes against a table, their errors added in squares."""
-
-    causes: list[str]
-    misfit: NDArray
-    """Median over conditions of the best sizes' misfit, (C, C); infinite on the diagonal."""
-    probability: NDArray
-    """Of each cause to be one of the two, (C,)."""
-
-    @property
-    def least(self) -> float:
-        """Misfit of the nearest pair: what no two causes of the catalogue explain."""
-        return float(self.misfit.min())
-
-    def partner(self, cause: str) -> tuple[str, float]:
-        """The other cause that suits best, and the pair's typical factor."""
-        row = self.misfit[self.causes.index(cause)]
-        return self.causes[int(row.argmin())], float(np.exp(row.min()))
-
-
 def usable(library: Library) -> Library:
     """The candidates that can be half of a pair."""
     small = np.max(library.after, axis=(0, 2, 3)) <= LARGE
@@ -50,19 +28,12 @@ def usable(library: Library) -> Library:
     return only(library, np.flatnonzero(small & named))
 
 
-def nearest(library: Library, table: NDArray) -> NDArray:
-    """Misfit of each pair of causes, median over conditions of the best sizes, (C, C)."""
-    misfit = np.median(_per_cause(all_misfits(library, table), library.starts, np.minimum), axis=0)
-    np.fill_diagonal(misfit, np.inf)
-    return misfit
-
-
-def paired(library: Library, table: NDArray, width: float) -> Pairs:
-    """All pairs of the causes of a usable library; width: of the kernel."""
-    misfit = all_misfits(library, table)
+def nearest(library: Library, misfit: NDArray) -> NDArray:
+    """Misfit of each pair of causes, median over conditions of the best sizes, (C, C), from misfits
+    (D, n, n)."""
     best = np.median(_per_cause(misfit, library.starts, np.minimum), axis=0)
     np.fill_diagonal(best, np.inf)
-    return Pairs(causes=library.causes, misfit=best, probability=probabilities(library, misfit, width))
+    return best
 
 
 def probabilities(library: Library, misfit: NDArray, width: float) -> NDArray:
@@ -81,9 +52,12 @@ def all_misfits(library: Library, table: NDArray) -> NDArray:
 
 
 def checked(library: Library, misfit: NDArray, after: NDArray, before: NDArray) -> list[Match]:
-    """The nearest pairs, at the sizes that serve most conditions best, as simulated together."""
-    sizes = np.median(all_misfits(library, after), axis=0)
-    upper = np.where(np.triu(np.ones_like(misfit), 1) > 0, misfit, np.inf)
+    """The nearest pairs, at the sizes that serve most conditions best, as simulated together.
+
+    misfit: (D, n, n), against Tables 13 and 15, `after`.
+    """
+    sizes, best = np.median(misfit, axis=0), nearest(library, misfit)
+    upper = np.where(np.triu(np.ones_like(best), 1) > 0, best, np.inf)
     order = np.column_stack(np.unravel_index(np.argsort(upper, axis=None), upper.shape))
     joined = [_joined(library, sizes, a, b) for a, b in order[:CHECKED]]
     return matches(simulated(joined, library.conditions, "pairs of causes"), after, before)

@@ -79,7 +79,7 @@ def initial_ratio() -> NDArray:
 
 def _predicted(conditions: Conditions, valves: Sequence[Valve]) -> Prediction:
     drives = conditions.drives
-    truths = [_truth(drive, valves, test) for test, drive in enumerate(drives)]
+    truths = _truths(drives, valves)
     z = recalibrated(drives[:N_FITTED], truths[:N_FITTED])
     candidates = vector().values(np.concatenate([z, z * initial_ratio()]))
     shift = np.tile(start_shift(drives, truths), 2)
@@ -89,21 +89,18 @@ def _predicted(conditions: Conditions, valves: Sequence[Valve]) -> Prediction:
     return Prediction(after=errors[0], before=errors[1, :, :N_FITTED], z=z)
 
 
-def _truth(drive: Drive, valves: Sequence[Valve], test: int) -> NDArray:
-    """Outputs of the valves in one test, (3, samples, n)."""
+def _truths(drives: Sequence[Drive], valves: Sequence[Valve]) -> list[NDArray]:
+    """Outputs of the valves in each test, (3, samples, n)."""
     base = Parameters.calibrated()
     symbols = {symbol for valve in valves for symbol in valve.values} | {SYMBOLS[0]}
-    candidates = {
-        symbol: np.array(
-            [valve.values.get(symbol, [base[symbol]] * (test + 1))[test] for valve in valves]
-        )
-        for symbol in symbols
-    }
-    outputs = Replay([drive], base).outputs(candidates)[0]
-    current = outputs[OUTPUTS.index("I")]
-    for lane, valve in enumerate(valves):
-        if valve.current_lag:
-            current[:, lane] = lagged(current[:, lane], valve.current_lag, drive.period)
+    nominal = {symbol: [base[symbol]] * len(drives) for symbol in symbols}
+    every = [{**nominal, **valve.values} for valve in valves]
+    outputs = Replay(drives, base).outputs({s: np.array([one[s] for one in every]) for s in symbols})
+    for drive, truth in zip(drives, outputs, strict=True):
+        current = truth[OUTPUTS.index("I")]
+        for lane, valve in enumerate(valves):
+            if valve.current_lag:
+                current[:, lane] = lagged(current[:, lane], valve.current_lag, drive.period)
     return outputs
 
 

@@ -108,11 +108,6 @@ def inseparable(found: Sequence[Match]) -> list[str]:
     ]
 
 
-def scatter(library: Library, candidate: int) -> float:
-    """Typical factor between the tables of one candidate under different conditions."""
-    return float(np.exp(np.sqrt(2.0 * np.mean(np.var(np.log(library.after[:, candidate]), axis=0)))))
-
-
 def _match(
     library: Library,
     tables: tuple[NDArray, NDArray | None],

@@ -40,7 +40,6 @@ def real_bench(
 
 def as_json(found: Study) -> dict[str, Any]:
     """JSON-ready; errors in percent, sizes in SI units."""
-    pairs = found.pairs
     return {
         "seed": found.seed,
         "draws": len(found.library.conditions),
@@ -57,7 +56,7 @@ def as_json(found: Study) -> dict[str, Any]:
             "alone": inseparable(found.singles),
             "pairs": inseparable(found.checked),
         },
-        "probability": dict(zip(pairs.causes, pairs.probability.tolist(), strict=True)),
+        "probability": found.probability,
         "trust": vars(found.trust),
     }
 

@@ -84,8 +84,6 @@ class Fits:
         steps = STEP * np.vstack([np.zeros(k), np.eye(k)])
         lanes = vector().values((z[:, None, :] + steps).reshape(-1, k))
         total = np.zeros((m, k + 1, k + 1))
-        if not m:
-            return total[:, 0, 0], total[:, 1:, 0], total[:, 1:, 1:]
         outputs = self.replay.outputs(lanes, np.repeat(self.p2_shift[which], k + 1))
         for model, truth, weight in zip(outputs, self.truths, self.weights, strict=True):
             total += _products(model, truth[..., which], weight[..., which])

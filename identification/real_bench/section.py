@@ -3,6 +3,7 @@
 import numpy as np
 
 from identification.real_bench import figures
+from identification.real_bench.candidates import NONE
 from identification.real_bench.conditions import CASES, N_FITTED
 from identification.real_bench.patterns import printed_after
 from identification.real_bench.ranking import (
@@ -115,7 +116,7 @@ def _part(verdict: str, found: list[Match]) -> Verdict:
 
 
 def _none(study: Study) -> str:
-    (none,) = [match for match in study.singles if match.cause == "none"]
+    (none,) = [match for match in study.singles if match.cause == NONE]
     least = ", ".join(
         f"{output} {value:.2f} %"
         for output, value in zip(OUTPUTS, none.predicted[:N_FITTED].mean(axis=0), strict=True)
@@ -143,11 +144,9 @@ def _ranking(found: list[Match]) -> Table:
 
 
 def _together(study: Study) -> Section:
-    pairs, trust = study.pairs, study.trust
-    order = np.argsort(-pairs.probability)
-    likely = ", ".join(
-        f"{pairs.causes[i]} {pairs.probability[i]:.2f}" for i in order if pairs.probability[i] >= 0.02
-    )
+    trust = study.trust
+    order = sorted(study.probability.items(), key=lambda item: -item[1])
+    likely = ", ".join(f"{cause} {share:.2f}" for cause, share in order if share >= 0.02)
     group = inseparable(study.checked)
     return Section(
         title="Two causes at once",

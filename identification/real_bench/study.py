@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from identification.real_bench.candidates import candidates
 from identification.real_bench.currents import Residual, Winding, residual, winding
 from identification.real_bench.library import Library, drawn, refined, simulated
-from identification.real_bench.pairs import Pairs, checked, nearest, paired, usable
+from identification.real_bench.pairs import all_misfits, checked, nearest, probabilities, usable
 from identification.real_bench.patterns import printed_after, printed_before
 from identification.real_bench.ranking import Match, matches
 from identification.real_bench.trust import Trust, trust
@@ -29,7 +29,8 @@ class Study:
     """Each cause alone, the nearest first."""
     checked: list[Match]
     """The nearest pairs as simulated, the nearest first."""
-    pairs: Pairs
+    probability: dict[str, float]
+    """Of each cause to be one of the two of a pair."""
     trust: Trust
     seed: int
 
@@ -41,15 +42,17 @@ def study(*, seed: int = 0, draws: int = DRAWS, causes: Sequence[str] | None = N
     library = refined(coarse)
     after, before = printed_after(), printed_before()
     halves = usable(library)
-    misfit = nearest(halves, after)
-    known = trust(usable(coarse), float(misfit.min()), n=KNOWN_TABLES, seed=seed)
+    misfit = all_misfits(halves, after)
+    scatter = float(nearest(halves, misfit).min())  # what no two causes of the catalogue explain
+    known = trust(usable(coarse), scatter, n=KNOWN_TABLES, seed=seed)
+    probability = probabilities(halves, misfit, known.width)
     return Study(
         library=library,
         residual=residual(conditions[0]),
         winding=winding(conditions, before, after),
         singles=matches(library, after, before),
         checked=checked(halves, misfit, after, before),
-        pairs=paired(halves, after, known.width),
+        probability=dict(zip(halves.causes, probability.tolist(), strict=True)),
         trust=known,
         seed=seed,
     )

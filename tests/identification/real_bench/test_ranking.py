@@ -5,7 +5,7 @@ import pytest
 
 from identification.real_bench.candidates import NONE, Candidate
 from identification.real_bench.library import simulated
-from identification.real_bench.pairs import paired, summed, usable
+from identification.real_bench.pairs import all_misfits, nearest, probabilities, summed, usable
 from identification.real_bench.patterns import printed_after
 from identification.real_bench.ranking import CANNOT, CURRENT, GIVES, inseparable, matches, misfits
 from identification.real_bench.real_bench import real_bench
@@ -58,11 +58,16 @@ def test_errors_of_two_causes_add_in_squares():
 
 
 def test_a_known_pair_is_the_most_probable():
-    found = paired(usable(coarse()), table(U_clamp=30.0, A_circuit=5e-7), width=0.1)
-    order = np.argsort(-found.probability)
-    assert {found.causes[i] for i in order[:2]} == {"flyback_voltage", "circuit_leak"}
-    assert found.probability.sum() == pytest.approx(2.0)
-    assert found.partner("flyback_voltage")[0] == "circuit_leak"
+    halves = usable(coarse())
+    misfit = all_misfits(halves, table(U_clamp=30.0, A_circuit=5e-7))
+    probability = probabilities(halves, misfit, width=0.1)
+    assert {halves.causes[i] for i in np.argsort(-probability)[:2]} == {
+        "flyback_voltage",
+        "circuit_leak",
+    }
+    assert probability.sum() == pytest.approx(2.0)
+    partner = nearest(halves, misfit)[halves.causes.index("flyback_voltage")].argmin()
+    assert halves.causes[partner] == "circuit_leak"
 
 
 def test_clear_tables_are_traced_more_often_than_scattered_ones():
