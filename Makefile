@@ -10,7 +10,7 @@ PACKAGES := epv_env identification controllers training
 
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help venv train test test-oldest identify real-bench pictures bench tune tradeoff gif lint check format wheel clean
+.PHONY: help venv train test test-oldest identify gap real-bench circle pictures bench tune tradeoff gif lint check format wheel clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z][a-z-]*\):.*## /\1	/p' Makefile | while IFS='	' read -r name text; do \
@@ -65,8 +65,16 @@ identify: $(VENV)/.installed ## calibrate a plant on a virtual bench's recording
 	$(PY) -m identification bench --out runs/bench
 	$(PY) -m identification run runs/bench --out runs/identification $(ARGS)
 
+gap: $(VENV)/.installed ## say which effect a virtual bench has that the model lacks (a minute)
+	rm -rf runs/gap-bench
+	$(PY) -m identification bench --suite diagnosis --effect eddy_current=0.004 --out runs/gap-bench
+	$(PY) -m identification gap runs/gap-bench --out runs/gap $(ARGS)
+
 real-bench: $(VENV)/.installed ## ask which effects give the report's printed errors (3 minutes)
 	$(PY) -m identification gap --tables --out runs/real-bench --images docs/images $(ARGS)
+
+circle: $(VENV)/.installed ## train, deploy on a bench, diagnose, retrain, deploy again (3 minutes)
+	$(PY) training/circle.py --out runs/circle --images docs/images $(ARGS)
 
 pictures: $(VENV)/.installed ## draw the figures of docs/identification.md
 	$(PY) docs/pictures.py --out docs/images --coverage runs/coverage $(ARGS)

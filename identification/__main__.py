@@ -11,13 +11,15 @@ from epv_env.plant.commandline import fail_clearly, writable_folder
 from epv_env.plant.effects import CATALOGUE
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import load_plant, save_plant
+from identification.bench.programme_file import load_programmes
 from identification.bench.programmes import SUITES
 from identification.bench.session import run_bench
+from identification.blind.command import add_blind, blind
 from identification.calibration.calibrate import STARTS
 from identification.cases import RATE
 from identification.confidence.coverage import CAMPAIGNS, coverage_study
 from identification.confidence.section import coverage_json, coverage_section
-from identification.real_bench.real_bench import real_bench
+from identification.gap_valve.command import add_gap, gap
 from identification.recordings.files import check_vacant, read_campaign, write_campaign
 from identification.report.results import as_text, write_results
 from identification.reproduce.reproduce import reproduce
@@ -48,7 +50,8 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     _add_stage(commands, "run", "all of these: plant.json and report.html")
     _add_coverage(commands)
     _add_reproduce(commands)
-    _add_gap(commands)
+    add_gap(commands)
+    add_blind(commands)
     chosen = parser.parse_args(arguments)
     for name in ("starts", "campaigns", "workers"):
         value = getattr(chosen, name, None)
@@ -81,7 +84,9 @@ def _add_bench(commands: "argparse._SubParsersAction") -> None:
     parser = commands.add_parser("bench", help=text, description=text)
     parser.add_argument("--out", type=writable_folder, required=True, help="folder of the campaign")
     parser.add_argument("--seed", type=int, default=0, help="of the sensors' noise")
-    parser.add_argument("--suite", choices=SUITES, default="report", help="which recordings")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--suite", choices=SUITES, default="report", help="which recordings")
+    which.add_argument("--programme", type=Path, default=None, help="JSON file of other recordings")
     parser.add_argument("--rate", type=float, default=RATE, help="samples per second")
     parser.add_argument("--plant", default=None, help="plant file of the truth; default: Table 12")
     parser.add_argument(
@@ -109,20 +114,12 @@ def _add_reproduce(commands: "argparse._SubParsersAction") -> None:
     parser.add_argument("--seed", type=int, default=0, help="of the virtual bench's noise")
 
 
-def _add_gap(commands: "argparse._SubParsersAction") -> None:
-    text = "which unmodelled effects give the report's printed errors (docs/real-bench.md)"
-    parser = commands.add_parser("gap", help=text, description=text)
-    parser.add_argument("--tables", action="store_true", required=True, help="diagnose Tables 11 to 15")
-    parser.add_argument("--out", type=writable_folder, required=True, help="folder of results")
-    parser.add_argument("--images", type=writable_folder, default=None, help="folder of its figure")
-    parser.add_argument("--seed", type=int, default=0, help="of the uncertain test conditions")
-
-
 def _bench(chosen: argparse.Namespace) -> None:
     check_vacant(chosen.out)
     truth = _with_values(load_plant(chosen.plant).parameters, chosen.set)
     truth = _with_effects(truth, chosen.effect)
-    campaign = run_bench(SUITES[chosen.suite], truth, seed=chosen.seed, rate=chosen.rate)
+    suite = load_programmes(chosen.programme) if chosen.programme else SUITES[chosen.suite]
+    campaign = run_bench(suite, truth, seed=chosen.seed, rate=chosen.rate)
     write_campaign(campaign, chosen.out)
     if chosen.truth is not None:
         plant = load_plant(chosen.plant)
@@ -152,10 +149,11 @@ def _with_effects(parameters: Parameters, settings: list[str]) -> Parameters:
         sizes = text.split(",")
         if len(sizes) != len(symbols):
             raise ValueError(
-                f"--effect {setting}: {name} is sized by {', '.join(symbols)}: give a number for each"
+                f"--effect {setting}: {name} is sized by {', '.join(symbols)}: give a number for each, "
+                "parted by commas"
             )
         rule = f"--effect {setting}: give NAME=SIZE"
-        values = [_number(size, rule, "--effect piston_friction=8") for size in sizes]
+        values = [_number(size, rule, "--effect piston_friction=8,0") for size in sizes]
         parameters = parameters.replace(**dict(zip(symbols, values, strict=True)))
     return parameters
 
@@ -210,18 +208,13 @@ def _reproduce(chosen: argparse.Namespace) -> None:
     print(f"\nwritten: {chosen.out}/reproduce.json and reproduce.html")
 
 
-def _gap(chosen: argparse.Namespace) -> None:
-    sections = real_bench(chosen.out, seed=chosen.seed, images=chosen.images)
-    print(as_text(sections))
-    print(f"\nwritten: {chosen.out}/tables.json and tables.html")
-
-
 COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {
     "bench": _bench,
     "run": _run,
     "coverage": _coverage,
     "reproduce": _reproduce,
-    "gap": _gap,
+    "gap": gap,
+    "blind": blind,
 }
 """Commands that are not one stage."""
 

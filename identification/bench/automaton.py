@@ -102,7 +102,7 @@ class Run:
 class Automaton:
     """One valve on a schedule: the modes of both movers and the events that change them."""
 
-    def __init__(self, schedule: Schedule, right_hand_side: RightHandSide | None):
+    def __init__(self, schedule: Schedule, right_hand_side: RightHandSide | None, most: float):
         c = coefficients(schedule.parameters, schedule.reservoir_volume)
         e = effect_sizes(schedule.parameters)
         self.c, self.e = c, e
@@ -113,11 +113,13 @@ class Automaton:
         self.restitution = (named.ePV, named.eMV)
         self.kinks = {"inlet kink": named.kink_in, "exhaust kink": named.kink_exh}
         self.mode = [FREE, FREE]
-        self.evaluations = 0
+        self.evaluations, self.most = 0, most
 
     def rates_and_forces(self, y: NDArray) -> NDArray:
         """Rates of the states in the present modes, then the forces on piston and armature [N]."""
         self.evaluations += 1
+        if self.evaluations > self.most:
+            raise RuntimeError(f"reference needs more than {self.most:g} evaluations")
         free = [1.0 if mode == FREE else 0.0 for mode in self.mode]
         y = np.ascontiguousarray(y)
         return self.right_hand_side(y, self.u, self.c, self.e, free[0], free[1])
@@ -186,13 +188,15 @@ def simulate_reference(
     method: str = "LSODA",
     rtol: float = RTOL,
     right_hand_side: RightHandSide | None = None,
+    most_evaluations: float = np.inf,
 ) -> Run:
     """Run a schedule through scipy.integrate.solve_ivp, piece by piece between events.
 
     times: sample times [s], rising. right_hand_side: another one than the plant's compiled one.
+    Raises RuntimeError where the solver fails, or needs more than `most_evaluations` of it.
     """
     times = np.asarray(times, dtype=float)
-    automaton = Automaton(schedule, right_hand_side)
+    automaton = Automaton(schedule, right_hand_side, most_evaluations)
     y = np.array(schedule.initial, dtype=float)
     out = np.full((len(times), len(y)), np.nan)
     out[times <= 0] = y

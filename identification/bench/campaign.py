@@ -45,10 +45,7 @@ def run_programme(
     """The true course of one recording at `rate` samples per second."""
     U = programme.case.voltage(programme.U_on, rate)
     time = np.arange(len(U)) / rate
-    if programme.U_on == 0:
-        start = _exhausted(parameters)
-    else:
-        start = energised(parameters, p1=programme.p1, p2=programme.p2, U=programme.U_on)
+    start = initial_state(parameters, programme)
     # Switching takes effect at the sample at which the voltage is first read, or later.
     schedule = scheduled(parameters, start, time, U=U[:-1], reservoir_volume=reservoir)
     delayed = delayed_schedule(schedule, parameters["t_delay"])
@@ -57,13 +54,18 @@ def run_programme(
     return Truth(programme=programme, period=1.0 / rate, channels=channels)
 
 
-def measured(truth: Truth, rng: np.random.Generator) -> Recording:
-    """A recording of the truth by the sensors of Tables 1 to 3: offset, trend, noise, 12 bit."""
+def measured(
+    truth: Truth, rng: np.random.Generator, offsets: Mapping[str, float] = OFFSETS
+) -> Recording:
+    """A recording of the truth by the sensors of Tables 1 to 3: offset, trend, noise, 12 bit.
+
+    offsets: by channel, as OFFSETS; a channel that is left out has none.
+    """
     readings = {}
     for channel in CHANNELS:
         value = truth.channels[channel] / UNITS[channel][1]
         time = np.arange(len(value)) * truth.period
-        drifted = value + OFFSETS[channel] + TRENDS[channel] * time
+        drifted = value + offsets.get(channel, 0.0) + TRENDS[channel] * time
         reading = SENSORS[channel].measure(drifted, rng.standard_normal(len(value)))
         readings[channel] = reading * UNITS[channel][1]
     return Recording(
@@ -76,7 +78,12 @@ def measured(truth: Truth, rng: np.random.Generator) -> Recording:
 
 
 def measured_campaign(
-    truths: Sequence[Truth], parameters: Parameters, *, seed: int, name: str = "virtual bench"
+    truths: Sequence[Truth],
+    parameters: Parameters,
+    *,
+    seed: int,
+    name: str = "virtual bench",
+    offsets: Mapping[str, float] = OFFSETS,
 ) -> Campaign:
     """A campaign of the truths; each recording's noise has a generator of its own, from the seed."""
     generators = [np.random.default_rng([seed, index]) for index in range(len(truths))]
@@ -84,11 +91,15 @@ def measured_campaign(
         name=name,
         temperature=parameters["T_env"],
         pressure=parameters["p_env"],
-        recordings=tuple(measured(t, rng) for t, rng in zip(truths, generators, strict=True)),
+        recordings=tuple(
+            measured(t, rng, offsets) for t, rng in zip(truths, generators, strict=True)
+        ),
     )
 
 
-def _exhausted(parameters: Parameters) -> State:
-    """Steady state with the coil off and every chamber at ambient pressure."""
-    start = energised(parameters, p1=parameters["p_env"], p2=parameters["p_env"], U=0.0)
-    return start._replace(xMV=0.0)
+def initial_state(parameters: Parameters, programme: Programme) -> State:
+    """Steady state in which a recording begins; without voltage every chamber is at ambient pressure."""
+    if programme.U_on == 0:
+        rest = energised(parameters, p1=parameters["p_env"], p2=parameters["p_env"], U=0.0)
+        return rest._replace(xMV=0.0)
+    return energised(parameters, p1=programme.p1, p2=programme.p2, U=programme.U_on)

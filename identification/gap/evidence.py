@@ -1,8 +1,8 @@
 """How well a refitted hypothesis explains the recordings: evidence that expects imperfect forms.
 
 A cause's true form is never quite ours. So a hypothesis may miss the recordings, in every short stretch
-on its own, by a share `FORM_ERROR` of what the cause itself does there: a Gaussian allowance, integrated
-out in closed form. What is left of one stretch's misfit beyond that counts in full.
+on its own, by a share of what the cause does there: a Gaussian allowance, integrated out in closed form.
+How large that share is the recordings say, up to a tenth; what is left beyond it counts in full.
 """
 
 from collections.abc import Sequence
@@ -10,15 +10,20 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import logsumexp, softmax
 
 from identification.gap.fit import Fitter, Point
 from identification.gap.normal import Linear, Normal, freed, normal
 
-FORM_ERROR = 0.1
-"""Relative standard deviation of a cause's effect, in a stretch, from what our form gives."""
+FORM_ERRORS = (0.0, 0.003, 0.01, 0.02, 0.05, 0.1)
+"""Relative standard deviations of a cause's effect, in a stretch, from what our form gives; beforehand
+each is as likely as the next."""
 
 STRETCH = 5e-3
 """Time over which a form's error is taken to be constant [s]."""
+
+GENERIC_STRETCHES = (1.5e-3, STRETCH, 20e-3)
+"""Times over which a misfit without a name may be constant [s]."""
 
 GENERIC = np.logspace(-4, 3, 29)
 """Variances, in noise variances, that a misfit without a name may have in a stretch."""
@@ -32,9 +37,20 @@ class Assessed:
     residuals: list[NDArray]
     """Per run (channels, samples), freed of nuisances; 0 where readings are not trusted."""
     log_evidence: float
+    form_error: float
+    """Root mean square of FORM_ERRORS, as probable as the recordings have each."""
+    with_leftover: float
+    """Log evidence of the hypothesis beside a misfit without a name."""
+    tolerances: NDArray
+    """What the fitted runs say of them, in standard deviations from their centres, (m,)."""
     size_sd: NDArray
     """Standard deviations of the sizes [SI]."""
     converged: bool
+
+    @property
+    def excess(self) -> float:
+        """Sum of squares beyond that of noise."""
+        return sum(float(np.sum(r**2) - np.count_nonzero(r)) for r in self.residuals)
 
     @property
     def name(self) -> tuple[str, ...]:
@@ -47,49 +63,72 @@ def assess(fitter: Fitter, points: Sequence[Point]) -> list[Assessed]:
 
     Tolerances and starts, which are nuisances with priors, adapt to the held-out runs as well.
     """
-    found = []
-    for point in points:
-        runs = fitter.linearise([point], fitter.everything)[0]
-        equations = normal([runs[r] for r in fitter.fitted])
-        shared = normal(runs).shared
-        freed_runs = [freed(run, shared)[0] for run in runs]
-        log_evidence = -0.5 * sum(
-            _misfit(fitter, r, residual, _effects(point, run))
-            for r, (residual, run) in enumerate(zip(freed_runs, runs, strict=True))
-        )
-        sd = _size_sd(point, equations)
-        found.append(
-            Assessed(
-                point=point,
-                residuals=[
-                    residual.reshape(fitter.plant.runs[r].measured.shape)
-                    for r, residual in enumerate(freed_runs)
-                ],
-                log_evidence=log_evidence - _occam(point, sd),
-                size_sd=sd * [size.scale for size in point.hypothesis.sizes],
-                converged=point.converged,
-            )
-        )
-    return found
+    if not points:
+        return []
+    linear = fitter.linearise(points, fitter.everything)
+    return [_assessed(fitter, point, runs) for point, runs in zip(points, linear, strict=True)]
+
+
+def _assessed(fitter: Fitter, point: Point, runs: Sequence[Linear]) -> Assessed:
+    shared = normal(runs).shared
+    residuals, steps = zip(*(freed(run, shared) for run in runs), strict=True)
+    strain = float(shared @ shared) + sum(
+        float(np.sum(((run.local_value + step) / run.local_sd) ** 2))
+        for run, step in zip(runs, steps, strict=True)
+    )
+    misfits = np.sum(
+        [
+            _misfits(fitter, r, residual, _effects(point, run))
+            for r, (residual, run) in enumerate(zip(residuals, runs, strict=True))
+        ],
+        axis=0,
+    )
+    fitted = normal([runs[r] for r in fitter.fitted])
+    sd = _size_sd(point, fitted)
+    shaped = [
+        residual.reshape(run.measured.shape)
+        for residual, run in zip(residuals, fitter.plant.runs, strict=True)
+    ]
+    price = _occam(point, sd) + 0.5 * strain
+    shares = softmax(-0.5 * misfits)
+    uncertain = any(not cause.exact for cause in point.hypothesis.causes)
+    return Assessed(
+        point=point,
+        residuals=shaped,
+        log_evidence=float(logsumexp(-0.5 * misfits) - np.log(len(misfits))) - price,
+        form_error=float(np.sqrt(np.sum(shares * np.square(FORM_ERRORS)))) if uncertain else 0.0,
+        with_leftover=generic_log_evidence(fitter, shaped) - price,
+        tolerances=fitted.shared,
+        size_sd=sd * [size.scale for size in point.hypothesis.sizes],
+        converged=point.converged,
+    )
 
 
 def generic_log_evidence(fitter: Fitter, residuals: Sequence[NDArray]) -> float:
     """Evidence of a misfit without a name: in every stretch of a channel an offset of its own.
 
-    Its variance is fitted for each channel (type-II likelihood, at the price of one fitted number).
+    Its variance and the stretch are fitted for each channel (type-II likelihood, at the price of the
+    fitted numbers).
     """
     total = 0.0
     for channel in range(len(residuals[0])):
-        sums = [
-            stretches(residual[channel], run.time[1])
-            for residual, run in zip(residuals, fitter.plant.runs, strict=True)
-        ]
-        s = np.concatenate([np.sum(part, axis=1) for part in sums])
-        n = np.concatenate([np.sum(part != 0, axis=1) for part in sums])
-        squares = sum(np.sum(np.square(residual[channel])) for residual in residuals)
-        gain = [np.sum(v * s**2 / (1 + v * n) - np.log1p(v * n)) for v in GENERIC]
-        total += -0.5 * (squares - max(gain) + np.log(len(s)))
-    return float(total)
+        series = [residual[channel] for residual in residuals]
+        squares = sum(float(np.sum(np.square(part))) for part in series)
+        gains = [_generic_gain(fitter, series, stretch) for stretch in GENERIC_STRETCHES]
+        total += -0.5 * (squares - max(gains)) - np.log(len(GENERIC_STRETCHES))
+    return total
+
+
+def _generic_gain(fitter: Fitter, series: Sequence[NDArray], stretch: float) -> float:
+    """By how much offsets of the best variance lower -2 log likelihood, less the price of a number."""
+    parts = [
+        stretches(part, run.time[1], stretch)
+        for part, run in zip(series, fitter.plant.runs, strict=True)
+    ]
+    s = np.concatenate([np.sum(part, axis=1) for part in parts])
+    n = np.concatenate([np.sum(part != 0, axis=1) for part in parts])
+    gains = [np.sum(v * s**2 / (1 + v * n) - np.log1p(v * n)) for v in GENERIC]
+    return float(max(gains)) - np.log(len(s))
 
 
 def inflation(fitter: Fitter, residuals: Sequence[NDArray]) -> float:
@@ -104,9 +143,9 @@ def inflation(fitter: Fitter, residuals: Sequence[NDArray]) -> float:
     return max(1.0, together / apart)
 
 
-def stretches(series: NDArray, period: float) -> NDArray:
+def stretches(series: NDArray, period: float, stretch: float = STRETCH) -> NDArray:
     """A series cut into stretches (stretches, samples), the last one filled with zeros."""
-    length = max(1, round(STRETCH / period))
+    length = max(1, round(stretch / period))
     count = -(-len(series) // length)
     padded = np.zeros(count * length)
     padded[: len(series)] = series
@@ -128,22 +167,24 @@ def _effects(point: Point, run: Linear) -> NDArray:
     return np.stack(found, axis=1) if found else np.zeros((len(run.residual), 0))
 
 
-def _misfit(fitter: Fitter, r: int, residual: NDArray, effects: NDArray) -> float:
-    """-2 log likelihood of one run, but for a constant; every cause errs on its own."""
+def _misfits(fitter: Fitter, r: int, residual: NDArray, effects: NDArray) -> NDArray:
+    """-2 log likelihood of one run but for a constant, for each of FORM_ERRORS; causes err apart."""
     run = fitter.plant.runs[r]
     shape = run.measured.shape
-    total = float(residual @ residual)
+    total = np.full(len(FORM_ERRORS), float(residual @ residual))
+    if not effects.shape[1]:
+        return total
     for channel, changes in zip(
         residual.reshape(shape), effects.reshape(*shape, effects.shape[1]), strict=True
     ):
         r_b = stretches(channel, run.time[1])
-        u_b = FORM_ERROR * np.stack(
-            [stretches(change, run.time[1]) for change in changes.T] or [0.0 * r_b], axis=2
-        )
-        gram = np.eye(u_b.shape[2]) + np.einsum("bsi,bsj->bij", u_b, u_b)
+        u_b = np.stack([stretches(change, run.time[1]) for change in changes.T], axis=2)
+        squares = np.einsum("bsi,bsj->bij", u_b, u_b)
         along = np.einsum("bsi,bs->bi", u_b, r_b)
-        explained = np.einsum("bi,bi->b", along, np.linalg.solve(gram, along[..., None])[..., 0])
-        total += float(np.sum(np.linalg.slogdet(gram)[1] - explained))
+        for k, error in enumerate(FORM_ERRORS):
+            gram = np.eye(u_b.shape[2]) + error**2 * squares
+            allowed = error**2 * np.linalg.solve(gram, along[..., None])[..., 0]
+            total[k] += np.sum(np.linalg.slogdet(gram)[1]) - np.sum(along * allowed)
     return total
 
 

@@ -19,8 +19,20 @@ ITERATIONS = 12
 """Of the damped Gauss-Newton method; a fit that needs more is reported as not converged."""
 
 ENOUGH = 0.3
-RELATIVE = 3e-5
-"""Decrease of chi-square, predicted, and its share of chi-square, at which a fit has converged."""
+RELATIVE = 3e-3
+"""Decrease of chi-square, predicted, and its share of the excess, at which a fit has converged.
+
+Excess: chi-square beyond one per reading. A cause that leaves much need not leave it to the digit.
+"""
+
+
+HOPE = 3.0
+"""Times the decrease that a step promises, which is all that a fit is trusted to gain yet."""
+
+HOPELESS = 4.0
+SLACK = 0.05
+"""A fit is given up if its excess stays above this many times the least of its rivals, and this per
+reading: noise is not known to the percent."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +69,7 @@ class Point:
     chi_square: float = np.inf
     damping: float = 1e-3
     converged: bool = False
+    given_up: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,6 +89,7 @@ class Fitter:
         self.plant = plant
         self.fitted = [r for r, run in enumerate(plant.runs) if not run.held_out]
         self.everything = list(range(len(plant.runs)))
+        self.readings = sum(np.count_nonzero(plant.runs[r].trusted) for r in self.fitted)
         self.target = [weighted(plant, r, run.measured).reshape(-1) for r, run in enumerate(plant.runs)]
         empty = [np.zeros((len(target), 0)) for target in self.target]
         self.frame = frame or Frame(starts=empty, shared=empty)
@@ -87,13 +101,17 @@ class Fitter:
         local = np.zeros((len(self.plant.runs), len(hypothesis.local)))
         return Point(hypothesis=hypothesis, vector=vector, local=local)
 
-    def fit(self, points: Sequence[Point], iterations: int = ITERATIONS) -> list[Point]:
-        """Damped Gauss-Newton on all points at once, until each has converged."""
+    def fit(self, points: Sequence[Point], rival: float = np.inf) -> list[Point]:
+        """Damped Gauss-Newton on all points at once, until each has converged or is given up.
+
+        rival: the least chi-square of earlier fits, beside which the points compete.
+        """
         points = list(points)
         trials = [replace(point) for point in points]
         active = list(range(len(points)))
         equations: dict[int, Normal] = {}
-        for _ in range(iterations + 1):
+        for _ in range(ITERATIONS + 1):
+            best = rival
             for index, runs in zip(
                 active, self.linearise([trials[i] for i in active], self.fitted), strict=True
             ):
@@ -109,15 +127,21 @@ class Fitter:
                 else:
                     points[index] = replace(point, damping=min(10.0 * point.damping + 1e-6, 1e6))
                 trials[index], gain = self._step(points[index], equations[index])
-                done = (
-                    gain < max(ENOUGH, RELATIVE * points[index].chi_square)
-                    or points[index].damping >= 1e5
+                excess = points[index].chi_square - self.readings
+                done = gain < max(ENOUGH, RELATIVE * excess) or points[index].damping >= 1e5
+                hopeless = excess - HOPE * gain > self._hopeless(best)
+                points[index] = replace(
+                    points[index], converged=bool(done), given_up=bool(hopeless)
                 )
-                points[index] = replace(points[index], converged=done)
-            active = [index for index in active if not points[index].converged]
+            rival = min(rival, *(point.chi_square for point in points))
+            active = [i for i in active if not (points[i].converged or points[i].given_up)]
             if not active:
                 break
         return points
+
+    def _hopeless(self, rival: float) -> float:
+        """Excess with which a fit has lost against a rival's chi-square."""
+        return HOPELESS * max(rival - self.readings, 0.0) + SLACK * self.readings
 
     def _local(self, point: Point, runs: Sequence[Linear], found: Normal) -> NDArray:
         """The runs' own numbers of the causes after one Gauss-Newton step; starts stay linear."""

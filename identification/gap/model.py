@@ -89,6 +89,34 @@ class Cause:
         return f"{self.name} ({self.variant})" if self.variant else self.name
 
 
+@dataclass(frozen=True, kw_only=True)
+class Equation:
+    """One state equation, to which a forcing may be added where physics is missing."""
+
+    name: str
+    state: str
+    """Whose rate it gives, as in `GreyBox.states`."""
+    component: str
+    unit: str
+    """Of the forcing, as people read it."""
+    scale: float = 1.0
+    """Size of that unit in SI."""
+    step: float
+    """Forcing for a finite difference [SI]; 0 for an identity such as x' = v, which lacks nothing."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trace:
+    """A state of the model, or what follows from its states and inputs, over a run."""
+
+    unit: str
+    """In which people read it."""
+    scale: float
+    """Size of that unit in SI."""
+    values: NDArray
+    """(samples,) [SI]."""
+
+
 class GreyBox(Protocol):
     """A plant with recordings. Values are SI; n candidates are simulated side by side."""
 
@@ -127,6 +155,28 @@ class GreyBox(Protocol):
 
         values: by symbol, (n,), or (n, runs) for what every run has its own of; a symbol that is left
         out has its nominal value.
+        """
+        ...
+
+    @property
+    def equations(self) -> Sequence[Equation]:
+        """The model's state equations."""
+        ...
+
+    def states(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, Trace]:
+        """What a missing term may depend on, from the model at one candidate's values, by name."""
+        ...
+
+    def regimes(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, NDArray]:
+        """In which regime the model is, boolean (samples,) by name; regimes may overlap."""
+        ...
+
+    def forced(
+        self, values: Mapping[str, NDArray], equation: Equation, run: int, edges: NDArray
+    ) -> NDArray:
+        """Change of the outputs by the equation's step as a forcing, (channels, samples, windows).
+
+        edges: first samples of the windows in which each acts alone, and the end, (windows + 1,).
         """
         ...
 

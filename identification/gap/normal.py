@@ -6,6 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+FARTHEST = 3.0
+"""Standard deviations by which a tolerance, or a run's own number, may differ from its centre."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Linear:
@@ -50,7 +53,7 @@ def normal(runs: Sequence[Linear]) -> Normal:
         hessian=reduced[1:, 1:],
         gradient=reduced[1:, 0],
         chi_square=float(reduced[0, 0]),
-        shared=solved[:, 0],
+        shared=_bounded(total[shared, shared], total[shared, 0], np.full(m, FARTHEST)),
     )
 
 
@@ -73,11 +76,28 @@ def _reduced(run: Linear) -> NDArray:
 
 
 def freed(run: Linear, shared: NDArray) -> tuple[NDArray, NDArray]:
-    """Residual (values,) at given tolerances, less what the run's own explain; their step."""
+    """Residual (values,) at given tolerances, less what the run's own explain; their step.
+
+    What would need a number beyond FARTHEST is no nuisance and stays in the residual.
+    """
     residual = run.residual - run.shared @ shared
     if not run.local.size:
         return residual, np.zeros(0)
     precision = 1.0 / run.local_sd**2
     own = run.local.T @ run.local + np.diag(precision)
-    step = np.linalg.solve(own, run.local.T @ residual - precision * run.local_value)
+    pull = run.local.T @ residual + (own - np.diag(precision)) @ run.local_value
+    value = _bounded(own, pull, FARTHEST * run.local_sd)
+    step = value - run.local_value
     return residual - run.local @ step, step
+
+
+def _bounded(matrix: NDArray, right: NDArray, farthest: NDArray) -> NDArray:
+    """Solution of matrix x = right whose numbers stay within +-farthest (active set)."""
+    x = np.linalg.solve(matrix, right)
+    bound = np.zeros(len(x), dtype=bool)
+    while np.any(beyond := ~bound & (np.abs(x) > farthest)):
+        bound |= beyond
+        x = np.clip(x, -farthest, farthest)
+        rest = right[~bound] - matrix[np.ix_(~bound, bound)] @ x[bound]
+        x[~bound] = np.linalg.solve(matrix[np.ix_(~bound, ~bound)], rest)
+    return x

@@ -22,6 +22,17 @@ class Screened:
     """Predicted."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Signature:
+    """What a cause at one trial size changes beside a base point."""
+
+    cause: Cause
+    point: Point
+    """The base point with the cause."""
+    changes: list[NDArray]
+    """Of the weighted outputs, per fitted run."""
+
+
 def trial_points(fitter: Fitter, base: Point, causes: Sequence[Cause]) -> list[tuple[Cause, Point]]:
     """The base point with each cause added at each of its trial sizes."""
     found = []
@@ -34,27 +45,30 @@ def trial_points(fitter: Fitter, base: Point, causes: Sequence[Cause]) -> list[t
     return found
 
 
-def screen(fitter: Fitter, base: Point, causes: Sequence[Cause]) -> list[Screened]:
+def signatures(fitter: Fitter, base: Point, causes: Sequence[Cause]) -> list[Signature]:
+    """What every cause changes at each of its trial sizes, all simulated side by side."""
+    trials = trial_points(fitter, base, causes)
+    outputs = fitter.residuals([base, *(point for _, point in trials)], fitter.fitted)
+    return [
+        Signature(cause=cause, point=point, changes=[block[:, 0] - block[:, 1 + k] for block in outputs])
+        for k, (cause, point) in enumerate(trials)
+    ]
+
+
+def screen(fitter: Fitter, base: Point, found: Sequence[Signature]) -> list[Screened]:
     """Every cause's best trial beside the base's own causes, the most promising first.
 
     The change that a cause makes at a trial size is taken to grow in proportion to its size; with the
     calibrated parameters and all nuisances it is fitted to the base's residual.
     """
     own = fitter.linearise([base], fitter.fitted)[0]
-    trials = trial_points(fitter, base, causes)
-    signatures = _signatures(fitter, base, [point for _, point in trials])
     best: dict[str, Screened] = {}
-    for (cause, point), signature in zip(trials, signatures, strict=True):
-        found = _promise(own, cause, point, signature)
-        if cause.label not in best or found.chi_square < best[cause.label].chi_square:
-            best[cause.label] = found
+    for signature in found:
+        promise = _promise(own, signature.cause, signature.point, signature.changes)
+        label = signature.cause.label
+        if label not in best or promise.chi_square < best[label].chi_square:
+            best[label] = promise
     return sorted(best.values(), key=lambda screened: screened.chi_square)
-
-
-def _signatures(fitter: Fitter, base: Point, points: Sequence[Point]) -> list[list[NDArray]]:
-    """Changes of the weighted outputs by each point relative to the base, per fitted run."""
-    outputs = fitter.residuals([base, *points], fitter.fitted)
-    return [[block[:, 0] - block[:, 1 + k] for block in outputs] for k in range(len(points))]
 
 
 def _promise(

@@ -5,18 +5,30 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.gap.evidence import Assessed, assess, generic_log_evidence, inflation
+from identification.gap.evidence import Assessed, assess, inflation
 from identification.gap.fit import Fitter, Hypothesis, Point, shared_frame
+from identification.gap.fits import Fits
 from identification.gap.model import GreyBox
-from identification.gap.screen import Screened, screen
+from identification.gap.screen import Screened, screen, signatures
+from identification.gap.separability import Separability, separability
 
-SINGLES = 12
+SINGLES = 10
 """Causes that are refitted, the most promising ones."""
 
 PARTNERS = 4
 """Causes that are tried beside each of the best two, where one cause leaves too much."""
 
-PRIOR = {"none": 0.25, "single": 0.5, "pair": 0.15, "unknown": 0.1}
+CLOSED = 0.5
+"""Share of what a cause leaves above which a pair must not leave, to be more than that cause alone."""
+
+RIVAL = 3.0
+"""Times what the best cause leaves, up to which a pair is also sought beside the second best."""
+
+LEFTOVER = 0.02
+"""Share of the recalibrated model's squared misfit that a cause may leave and still be called the cause:
+an error of its form of some 14 % in amplitude."""
+
+PRIOR = {"none": 0.4, "single": 0.4, "pair": 0.1, "unknown": 0.1}
 """Probabilities before any data."""
 
 
@@ -32,32 +44,67 @@ class Verdicts:
     """Of `candidates`."""
     no_cause: float
     unknown: float
+    separability: Separability
+    """What could be told apart, whatever the residual."""
 
 
-def which(plant: GreyBox) -> Verdicts:
-    """Refit what is worth it and weigh it. Raises nothing: a fit that fails is weighed as it is."""
-    fitter, base = recalibrated(plant)
+def which(plant: GreyBox, fits: Fits | None = None) -> Verdicts:
+    """Refit what is worth it and weigh it; a fit that does not converge is weighed as it is.
+
+    fits: runs the steps, and may remember them from an interrupted run.
+    """
+    fits = fits or Fits(plant)
+    fitter, base = recalibrated(plant, fits)
     none = assess(fitter, [base])[0]
-    singles = assess(fitter, _refit(fitter, base, screen(fitter, base, plant.causes)[:SINGLES]))
+    found = signatures(fitter, base, plant.causes)
+    promising = screen(fitter, base, found)[:SINGLES]
+    singles = assess(fitter, fits("single causes", lambda: _refit(fitter, base, promising)))
     singles.sort(key=lambda found: -found.log_evidence)
-    pairs: list[Assessed] = []
-    generic = generic_log_evidence(fitter, singles[0].residuals)
-    if generic > singles[0].log_evidence:
-        for best in singles[:2]:
-            others = [c for c in plant.causes if c.name != best.point.hypothesis.causes[0].name]
-            promising = screen(fitter, best.point, others)[:PARTNERS]
-            pairs += assess(fitter, _refit(fitter, best.point, promising))
-        pairs = _without_twins(pairs)
-    return _weighed(fitter, none, singles, pairs)
+    pairs = _without_twins(_pairs(fitter, none, singles, fits))
+    return _weighed(fitter, none, singles, pairs, separability(fitter, base, found))
 
 
-def recalibrated(plant: GreyBox) -> tuple[Fitter, Point]:
+def recalibrated(plant: GreyBox, fits: Fits | None = None) -> tuple[Fitter, Point]:
     """The nominal model with its calibrated parameters refitted, and a fitter that knows nuisances."""
+    fits = fits or Fits(plant)
     rough = Fitter(plant)
-    point = rough.fit([rough.start(Hypothesis(causes=()), {})])[0]
+    start = rough.start(Hypothesis(causes=()), {})
+    point = fits("calibration", lambda: rough.fit([start]))[0]
     fitter = Fitter(plant, shared_frame(plant, point))
     again = replace(point, chi_square=np.inf, damping=1e-3, converged=False)
-    return fitter, fitter.fit([again])[0]
+    return fitter, fits("recalibration", lambda: fitter.fit([again]))[0]
+
+
+def _pairs(fitter: Fitter, none: Assessed, singles: list[Assessed], fits: Fits) -> list[Assessed]:
+    """Pairs that explain what the best causes leave, where that is predictable and more than LEFTOVER.
+
+    A pair must close a good part of what its better half leaves: where forms err, any further number
+    lowers the misfit a little.
+    """
+    if not singles or singles[0].with_leftover <= singles[0].log_evidence:
+        return []
+    floor = min(0.0, *(found.excess for found in (none, *singles)))
+    if singles[0].excess - floor <= LEFTOVER * (none.excess - floor):
+        return []
+    found = []
+    for single in singles[:2]:
+        left = single.excess - floor
+        if single is singles[0] or left <= RIVAL * (singles[0].excess - floor):
+            both = assess(fitter, _partners(fitter, single.point, fits))
+            found += [pair for pair in both if pair.excess - floor <= CLOSED * left]
+    return found
+
+
+def _partners(fitter: Fitter, base: Point, fits: Fits) -> list[Point]:
+    """Fits of pairs: what may act beside the causes of the base."""
+    own = base.hypothesis.causes[0].name
+    others = [cause for cause in fitter.plant.causes if cause.name != own]
+
+    def refit() -> list[Point]:
+        promising = screen(fitter, base, signatures(fitter, base, others))[:PARTNERS]
+        return _refit(fitter, base, promising)
+
+    return fits(f"pairs with {' and '.join(base.hypothesis.name)}", refit)
 
 
 def _refit(fitter: Fitter, base: Point, promising: Sequence[Screened]) -> list[Point]:
@@ -70,7 +117,7 @@ def _refit(fitter: Fitter, base: Point, promising: Sequence[Screened]) -> list[P
         own = len(base.hypothesis.local)
         point.local[:, :own] = base.local
         starts.append(point)
-    return fitter.fit(starts)
+    return [point for point in fitter.fit(starts, base.chi_square) if not point.given_up]
 
 
 def _without_twins(pairs: Sequence[Assessed]) -> list[Assessed]:
@@ -81,14 +128,27 @@ def _without_twins(pairs: Sequence[Assessed]) -> list[Assessed]:
     return list(best.values())
 
 
-def _weighed(fitter: Fitter, none: Assessed, singles: list[Assessed], pairs: list[Assessed]) -> Verdicts:
+def _weighed(
+    fitter: Fitter,
+    none: Assessed,
+    singles: list[Assessed],
+    pairs: list[Assessed],
+    separable: Separability,
+) -> Verdicts:
+    """Probabilities of all hypotheses."""
     causes = sum(cause.prior for cause in fitter.plant.causes)
     candidates = [*singles, *pairs]
     best = max([none, *candidates], key=lambda found: found.log_evidence)
     temper = 1.0 / inflation(fitter, best.residuals)
-    scores = [temper * found.log_evidence + _log_prior(found, causes) for found in candidates]
+    small = [found.excess <= LEFTOVER * none.excess for found in candidates]
+    scores = [
+        temper * (max(found.log_evidence, found.with_leftover) if s else found.log_evidence)
+        + _log_prior(found, causes)
+        for found, s in zip(candidates, small, strict=True)
+    ]
     no_cause = temper * none.log_evidence + np.log(PRIOR["none"])
-    unknown = temper * generic_log_evidence(fitter, none.residuals) + np.log(PRIOR["unknown"])
+    large = [none, *(found for found, s in zip(candidates, small, strict=True) if not s)]
+    unknown = temper * max(found.with_leftover for found in large) + np.log(PRIOR["unknown"])
     scores = np.array([*scores, no_cause, unknown])
     weights = np.exp(scores - np.max(scores))
     weights /= np.sum(weights)
@@ -100,6 +160,7 @@ def _weighed(fitter: Fitter, none: Assessed, singles: list[Assessed], pairs: lis
         probability=weights[order].tolist(),
         no_cause=float(weights[-2]),
         unknown=float(weights[-1]),
+        separability=separable,
     )
 
 

@@ -1,5 +1,7 @@
 """The catalogue of causes of a gap, with physical ranges and sizes to begin a search from."""
 
+from collections.abc import Sequence
+
 from epv_env.plant.effects import CATALOGUE
 from epv_env.plant.parameters import table
 from epv_env.plant.region import CALIBRATED_SYMBOLS
@@ -95,11 +97,24 @@ VARIANTS = {
 OFF_BY = (1.03, 0.97)
 """Factors on a parameter's value to begin a search from."""
 
+FARTHEST_OFF = 0.1
+"""Share by which a parameter that is not calibrated may be off: Tables 8 and 9 vary them so far."""
+
 PARAMETER_PRIOR = 0.5
 """Prior probability of a parameter off its table value, relative to that of an effect."""
 
 WARM = Nuisance(symbol="theta_coil", sd=25.0, step=0.1)
 """How warm the winding is when a recording begins [K]."""
+
+
+def catalogue(without: Sequence[str] = ()) -> tuple[Cause, ...]:
+    """All causes but those named. Raises ValueError for a name that none has."""
+    every = effects() + parameters()
+    unknown = set(without) - {cause.name for cause in every}
+    if unknown:
+        known = ", ".join(dict.fromkeys(cause.name for cause in every))
+        raise ValueError(f"no cause is named {', '.join(sorted(unknown))}; known are {known}")
+    return tuple(cause for cause in every if cause.name not in without)
 
 
 def effects() -> list[Cause]:
@@ -124,7 +139,7 @@ def parameters() -> list[Cause]:
         Cause(
             name=f"parameter:{symbol}",
             component=component,
-            sizes=(parameter_size(symbol, OFF_BY),),
+            sizes=(parameter_size(symbol),),
             prior=PARAMETER_PRIOR,
             exact=True,
         )
@@ -147,13 +162,18 @@ def effect_size(symbol: str) -> Size:
     )
 
 
-def parameter_size(symbol: str, factors: tuple[float, ...] = ()) -> Size:
+def parameter_size(symbol: str) -> Size:
     """A parameter that is not off by itself; its scale is its table value."""
     row = table()[symbol]
     low, high = row.domain or (row.value, row.value)
-    trials = tuple(row.value * factor for factor in factors)
     return Size(
-        symbol=symbol, unit=row.unit, low=low, high=high, off=row.value, trials=trials, scale=row.value
+        symbol=symbol,
+        unit=row.unit,
+        low=max(low, row.value * (1 - FARTHEST_OFF)),
+        high=min(high, row.value * (1 + FARTHEST_OFF)),
+        off=row.value,
+        trials=tuple(row.value * factor for factor in OFF_BY),
+        scale=row.value,
     )
 
 

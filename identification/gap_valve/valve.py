@@ -7,8 +7,11 @@ from numpy.typing import NDArray
 
 from epv_env.plant.parameters import Parameters
 from identification.calibration.problem import calibration_problem
-from identification.gap.model import Channel, Nuisance, Run
+from identification.gap.model import Channel, Equation, Nuisance, Run, Trace
 from identification.gap_valve import causes
+from identification.gap_valve.equations import EQUATIONS, forced_changes, modelled
+from identification.gap_valve.noise import noise_of
+from identification.gap_valve.regimes import regimes, traces
 from identification.recordings.recording import OUTPUTS, UNITS, Campaign, Recording
 from identification.replay.drive import drive_of
 from identification.replay.misfit import measured_outputs
@@ -24,21 +27,33 @@ I_ZERO = Nuisance(symbol="I_zero", sd=4e-4, step=1e-3)
 
 
 class Valve:
-    """`GreyBox` for a campaign; nominal: the parameters as given (None: Table 10)."""
+    """`GreyBox` for a campaign."""
 
-    def __init__(self, campaign: Campaign, nominal: Parameters | None = None):
+    def __init__(
+        self, campaign: Campaign, nominal: Parameters | None = None, without: Sequence[str] = ()
+    ):
+        """nominal: the parameters as given (None: Table 10). without: names of causes to leave out.
+
+        Raises ValueError for a cause that the catalogue does not have.
+        """
         problem = calibration_problem(campaign, start=nominal)
         self.base = problem.vector.reference
         self.recordings = (*problem.calibration, *problem.validation)
         self.channels = tuple(
-            Channel(name=name, unit=UNITS[name][0], scale=UNITS[name][1], noise=problem.noise[name])
+            Channel(
+                name=name,
+                unit=UNITS[name][0],
+                scale=UNITS[name][1],
+                noise=noise_of(self.recordings, name),
+            )
             for name in OUTPUTS
         )
-        self.runs = tuple(_run(recording) for recording in self.recordings)
+        self.runs = tuple(as_run(recording) for recording in self.recordings)
         self.parameters = tuple(causes.calibrated(dict(self.base)))
-        self.causes = tuple(causes.effects() + causes.parameters())
+        self.causes = causes.catalogue(without)
         self.tolerances = tuple(_tolerance(symbol, self.base) for symbol in causes.PARAMETER_COMPONENTS)
         self.starts = (P2_START, P3_ZERO, I_ZERO)
+        self.equations = EQUATIONS
         self.replay = Replay([drive_of(r, self.base) for r in self.recordings], self.base)
 
     def outputs(self, values: Mapping[str, NDArray], runs: Sequence[int]) -> list[NDArray]:
@@ -50,14 +65,37 @@ class Valve:
             if symbol in values:
                 given = np.asarray(values[symbol])
                 start[symbol] = start[symbol] + (given[:, None] if given.ndim == 1 else given)
+        if "b_p2" in plant:
+            # The recorded start is what the biased sensor read.
+            start["p2_start"] = start["p2_start"] - np.asarray(plant["b_p2"])[:, None]
         found = self.replay.outputs(plant, start["p2_start"], runs)
         for run, output in zip(runs, found, strict=True):
             for channel, symbol in (("p3", "p3_zero"), ("I", "I_zero")):
                 output[OUTPUTS.index(channel)] += start[symbol][:, run]
         return found
 
+    def states(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, Trace]:
+        """`GreyBox.states`."""
+        return traces(modelled(self.replay.drives[run], self._one(values, run)))
 
-def _run(recording: Recording) -> Run:
+    def regimes(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, NDArray]:
+        """`GreyBox.regimes`."""
+        p = self._one(values, run)
+        return regimes(modelled(self.replay.drives[run], p), p, self.recordings[run].energised)
+
+    def forced(
+        self, values: Mapping[str, NDArray], equation: Equation, run: int, edges: NDArray
+    ) -> NDArray:
+        """`GreyBox.forced`."""
+        return forced_changes(self.replay.drives[run], self._one(values, run), equation, edges)
+
+    def _one(self, values: Mapping[str, NDArray], run: int) -> dict[str, float]:
+        """Plant parameters of the first candidate in a run."""
+        first = {s: v[0] for s, v in values.items() if s in self.base}
+        return {**self.base, **{s: float(v[run] if np.ndim(v) else v) for s, v in first.items()}}
+
+
+def as_run(recording: Recording) -> Run:
     measured = measured_outputs(recording)
     trusted = np.ones(measured.shape, dtype=bool)
     switched = np.flatnonzero(np.diff(recording.energised)) + 1

@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from epv_env.plant.parameters import Parameters
 from identification.bench.campaign import Truth, measured_campaign, run_programme
-from identification.bench.programmes import REPORT_SUITE
+from identification.bench.programmes import DIAGNOSIS_SUITE, REPORT_SUITE
 from identification.calibration.fits import Fit, nelder_mead, weighted_least_squares
 from identification.calibration.problem import Problem, calibration_problem
 from identification.confidence.coverage import CAMPAIGNS
@@ -29,8 +29,13 @@ from tests.benchmarks.scipy_replay import RTOL, scipy_misfit
 TRUE = Parameters.calibrated()
 MANY = 100
 """Calibration recordings of the large campaign."""
-BARS = {"evaluation": 10.0, "search": 5.0, "run": 60.0, "coverage": 300.0, "memory": 2048.0}
-"""ms, s, s, s, MiB."""
+AILING = TRUE.replace(A_PV=1e-7, G_eddy=2e-3)
+"""A valve with two effects, so that a diagnosis has to seek pairs."""
+BARS = {
+    "evaluation": 10.0, "search": 5.0, "run": 60.0, "coverage": 300.0, "diagnosis": 60.0,
+    "memory": 2048.0,
+}  # fmt: skip
+"""ms, s, s, s, s, MiB."""
 
 
 def benchmark(table: Table, quick: bool) -> None:
@@ -43,6 +48,7 @@ def benchmark(table: Table, quick: bool) -> None:
         whole_run(table, Path(folder), 1 if quick else 3, warm=not quick)
         coverage(table, Path(folder), quick)
         many_recordings(table, Path(folder), truths, quick)
+        diagnoses(table, Path(folder), quick)
 
 
 def fits(table: Table, problem: Problem, quick: bool) -> None:
@@ -152,6 +158,27 @@ def large_campaign(truths: list[Truth]) -> Campaign:
     others = [truth for truth in truths if truth.programme.role != "calibration"]
     copies = [renamed(tests[i % len(tests)], f"{i + 1:03d}") for i in range(MANY)]
     return measured_campaign([*copies, *others], TRUE, seed=0, name=f"{MANY} recordings")
+
+
+def diagnoses(table: Table, folder: Path, quick: bool) -> None:
+    """`gap` with two effects at work, and how its time grows with the recordings."""
+    table.section("diagnosis of the gap: two effects, whole catalogue; ratio: to the nine recordings")
+    suite = [p for p in DIAGNOSIS_SUITE if p.name not in ("rest", "high_voltage")]
+    truths = [run_programme(AILING, programme) for programme in suite]
+    fitted = [truth for truth in truths if truth.programme.role == "calibration"]
+    nine = 0.0
+    for copies in (0, 1) if quick else (0, 1, 3):
+        more = [renamed(t, f"{t.programme.name}_{c}") for c in range(copies) for t in fitted]
+        campaign = folder / f"ailing{copies}"
+        write_campaign(measured_campaign([*truths, *more], AILING, seed=0, offsets={}), campaign)
+        found = identification_process("gap", campaign, "--out", folder / f"gap{copies}")
+        count = len(truths) + len(more)
+        nine = nine or found.seconds
+        table.add(
+            f"gap: {count} recordings", "s", found.seconds, ratio=found.seconds / nine,
+            bar=None if copies else BARS["diagnosis"], note=found.note,
+        )  # fmt: skip
+        table.add("  its memory at most", "MiB", found.peak, bar=BARS["memory"])
 
 
 def renamed(truth: Truth, name: str) -> Truth:

@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
+from docs.examples.tank.plant import Tank
+from docs.examples.tank.recordings import recorded
 from identification.gap.evidence import stretches
 from identification.gap.which import recalibrated, which
-from tests.identification.gap.tank import Tank
 
 
 @pytest.mark.parametrize(("name", "size"), [("leak", 4e-3), ("lag", 4.0), ("evaporation", 8e-4)])
 def test_the_cause_that_made_the_recordings_is_found_with_its_size(name, size):
-    found = which(Tank({"c": 0.021, name: size}))
+    found = which(Tank(recorded({"c": 0.021, name: size})))
     best = found.candidates[0]
     assert best.name == (name,)
     assert found.probability[0] > 0.7
@@ -23,14 +24,14 @@ def test_the_cause_that_made_the_recordings_is_found_with_its_size(name, size):
 
 @pytest.mark.parametrize("seed", range(5))
 def test_without_a_cause_recalibration_is_enough(seed):
-    found = which(Tank({"c": 0.021}, seed=seed))
+    found = which(Tank(recorded({"c": 0.021}, seed=seed)))
     assert found.no_cause > 0.5
     assert found.no_cause + found.unknown + sum(found.probability) == pytest.approx(1.0)
 
 
 def test_what_the_catalogue_lacks_is_unknown():
     """An inflow that is not what was measured: no cause of the list makes steps of its own."""
-    tank = Tank({"c": 0.021})
+    tank = Tank(recorded({"c": 0.021}))
     for run in tank.runs:
         run.measured[:] += 0.02 * np.sin(run.time / 3.0)
     found = which(tank)
@@ -38,18 +39,18 @@ def test_what_the_catalogue_lacks_is_unknown():
 
 
 def test_two_causes_are_found_together():
-    found = which(Tank({"leak": 4e-3, "lag": 5.0}))
+    found = which(Tank(recorded({"leak": 4e-3, "lag": 5.0})))
     assert set(found.candidates[0].name) == {"leak", "lag"}
     assert found.probability[0] > 0.9
 
 
 def test_the_same_recordings_give_the_same_verdict():
-    one, other = (which(Tank({"leak": 2e-3})) for _ in range(2))
+    one, other = (which(Tank(recorded({"leak": 2e-3}))) for _ in range(2))
     assert one.probability == other.probability
 
 
 def test_held_out_runs_are_not_fitted_to():
-    tank = Tank({"c": 0.021})
+    tank = Tank(recorded({"c": 0.021}))
     fitter, point = recalibrated(tank)
     tank.runs[2].measured[:] += 0.5
     _, again = recalibrated(tank)

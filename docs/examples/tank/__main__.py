@@ -1,0 +1,48 @@
+"""Diagnose a tank's recordings: your own, or those of a virtual tank with a leak."""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from docs.examples.tank.plant import Tank
+from docs.examples.tank.recordings import read_runs, recorded, write_runs
+from epv_env.plant.commandline import fail_clearly, writable_folder
+from epv_env.plant.files import write_text
+from identification.gap.diagnosis import diagnose
+from identification.gap.export import as_json
+from identification.gap.section import sections
+from identification.gap.sentences import verdict
+from identification.gap.where_figures import shape_figure
+from identification.report.page import write_page
+
+LEAKING = {"c": 0.021, "leak": 4e-3}
+"""The virtual tank; its recordings are written to --out, and read from there."""
+
+
+def main() -> int:
+    """Diagnose, write gap.json and report.html, print the verdict; returns the exit status."""
+    parser = argparse.ArgumentParser(description="Why a model of a tank misses its recordings.")
+    parser.add_argument("--out", type=writable_folder, required=True, help="folder of results")
+    parser.add_argument("--recordings", type=Path, default=None, help="folder of your own CSV files")
+    parser.add_argument("--seed", type=int, default=0, help="of resampling, and of the virtual noise")
+    parser.add_argument("--images", type=writable_folder, default=None, help="folder of gap-tank.png")
+    chosen = parser.parse_args()
+    folder = chosen.recordings
+    if folder is None:
+        folder = chosen.out / "recordings"
+        write_runs(recorded(LEAKING, chosen.seed), folder)
+    found = diagnose(Tank(read_runs(folder)), seed=chosen.seed)
+    content = json.dumps(as_json(found), indent=1, allow_nan=False) + "\n"
+    write_text(chosen.out / "gap.json", content)
+    title = f"Gap between model and recordings: {folder}"
+    write_page(chosen.out / "report.html", title=title, sections=sections(found))
+    if chosen.images and found.where.shape:
+        chosen.images.mkdir(parents=True, exist_ok=True)
+        shape_figure(found.where.shape).savefig(chosen.images / "gap-tank.png", dpi=100)
+    print(verdict(found, "")[1])
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(fail_clearly(main))

@@ -1,0 +1,163 @@
+"""Programmes of the bench as a file, so that an experiment can be planned here and run there."""
+
+import json
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from epv_env.plant.files import write_text
+from epv_env.plant.sensors import SENSORS
+from identification.bench.programmes import BAR, Programme
+from identification.cases import Case
+from identification.recordings.recording import HOLD, ROLES
+
+FORMAT = "epv-programme/1"
+
+MS = 1e3
+"""Milliseconds in a second."""
+
+LONGEST = 60.0
+"""Longest recording that the bench makes [s]."""
+
+SHORTEST = 1e-3
+"""Shortest opening [s]."""
+
+
+class ProgrammeError(ValueError):
+    """A programme file cannot be read or run: the message names file, programme, rule and remedy."""
+
+
+def save_programmes(programmes: Sequence[Programme], path: str | PathLike[str]) -> None:
+    """Write programmes that `load_programmes` takes, whole or not at all.
+
+    Raises ProgrammeError, before anything is written, for what could not be read back.
+    """
+    content = {"format": FORMAT, "programmes": [_content(programme) for programme in programmes]}
+    _decode(str(path), content)
+    write_text(Path(path), json.dumps(content, indent=1) + "\n")
+
+
+def load_programmes(path: str | PathLike[str]) -> tuple[Programme, ...]:
+    """The programmes of a file (docs/data.md), every rule checked. Raises ProgrammeError."""
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ProgrammeError(
+            f"cannot read programme file {path}: {error.strerror}; give the path of a JSON file"
+        ) from None
+    except (ValueError, RecursionError) as error:  # also a number of thousands of digits
+        raise ProgrammeError(
+            f"programme file {path} is not JSON in UTF-8 ({error}): write it anew"
+        ) from None
+    return _decode(str(path), content)
+
+
+def _content(programme: Programme) -> dict[str, Any]:
+    case = programme.case
+    return {
+        "name": programme.name,
+        "role": programme.role,
+        "supply_bar": round(programme.p1 / BAR, 9),
+        "circuit_bar": round(programme.p2 / BAR, 9),
+        "voltage_V": programme.U_on,
+        "first_ms": round(MS * case.first, 6),
+        "openings_ms": [round(MS * opening, 6) for opening in case.openings],
+        "pause_ms": round(MS * case.pause, 6),
+        "duration_ms": round(MS * case.duration, 6),
+    }
+
+
+def _decode(path: str, content: Any) -> tuple[Programme, ...]:
+    found = content.get("format") if isinstance(content, dict) else None
+    if found != FORMAT:
+        raise ProgrammeError(
+            f"programme file {path} has format {found!r}, this version reads {FORMAT!r}: write it anew"
+        )
+    entries = content.get("programmes")
+    if not isinstance(entries, list) or not entries:
+        raise ProgrammeError(f"programme file {path}: programmes is not a list of at least one: add one")
+    programmes = tuple(
+        _programme(f"{path}, programme {number}", entry) for number, entry in enumerate(entries, start=1)
+    )
+    names = [programme.name for programme in programmes]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise ProgrammeError(f"{path}: two programmes are named {twice!r}: rename one")
+    return programmes
+
+
+def _programme(place: str, entry: Any) -> Programme:
+    if not isinstance(entry, dict):
+        raise ProgrammeError(f"{place} is not an object: give its fields as in docs/data.md")
+    role = _text(place, entry, "role")
+    if role not in ROLES:
+        raise ProgrammeError(f"{place}: unknown role {role!r}: choose one of {', '.join(ROLES)}")
+    supply = _number(place, entry, "supply_bar", SENSORS["p1"].low, SENSORS["p1"].high)
+    return Programme(
+        name=_file_name(place, entry),
+        role=role,
+        case=_case(place, entry, switches=role != "quality"),
+        p1=round(supply * BAR, 6),
+        p2=round(_number(place, entry, "circuit_bar", SENSORS["p2"].low, supply) * BAR, 6),
+        U_on=_number(place, entry, "voltage_V", 1.0 if role != "quality" else 0.0, SENSORS["U"].high),
+    )
+
+
+def _case(place: str, entry: dict[str, Any], *, switches: bool) -> Case:
+    """When the coil is switched off; a recording that `switches` needs at least one opening."""
+    longest = MS * LONGEST
+    openings = entry.get("openings_ms")
+    if not isinstance(openings, list) or (switches and not openings):
+        raise ProgrammeError(
+            f"{place}: openings_ms is not a list of lengths: give at least one, or the role 'quality'"
+        )
+    lengths = [_checked(place, "openings_ms", value, MS * SHORTEST, longest) for value in openings]
+    first = _number(place, entry, "first_ms", MS * HOLD, longest)
+    pause = _number(place, entry, "pause_ms", MS * SHORTEST, longest)
+    duration = _number(place, entry, "duration_ms", MS * HOLD, longest)
+    end = first + sum(lengths) + pause * (len(lengths) - 1)
+    if lengths and end > duration:
+        raise ProgrammeError(
+            f"{place}: the last opening ends at {end:g} ms, beyond duration_ms = {duration:g}: "
+            "lengthen the recording or leave an opening out"
+        )
+    return Case(
+        name=str(entry["name"]),
+        openings=tuple(length / MS for length in lengths),
+        duration=duration / MS,
+        first=first / MS,
+        pause=pause / MS,
+    )
+
+
+def _file_name(place: str, entry: dict[str, Any]) -> str:
+    """The programme's name, which becomes that of its recording's file."""
+    name = _text(place, entry, "name")
+    if not name.replace("_", "").replace("-", "").isalnum():
+        raise ProgrammeError(
+            f"{place}: name {name!r} does not name a file: use letters, digits, - and _ only"
+        )
+    return name
+
+
+def _text(place: str, entry: dict[str, Any], field: str) -> str:
+    value = entry.get(field)
+    if not isinstance(value, str):
+        raise ProgrammeError(f"{place}: {field} is missing or not text: give it as in docs/data.md")
+    return value
+
+
+def _number(place: str, entry: dict[str, Any], field: str, low: float, high: float) -> float:
+    return _checked(place, field, entry.get(field), low, high)
+
+
+def _checked(place: str, field: str, value: Any, low: float, high: float) -> float:
+    """A number of a field inside its range; false for NaN, too."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ProgrammeError(f"{place}: {field} is missing or not a number ({value!r}): give one")
+    if not low <= value <= high:
+        raise ProgrammeError(
+            f"{place}: {field} = {value!r} is outside {low:g} to {high:g}: choose one inside"
+        )
+    return float(value)

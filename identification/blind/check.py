@@ -1,0 +1,49 @@
+"""The whole blind check: draw and seal, commit, diagnose, and only then open and score."""
+
+from pathlib import Path
+
+from identification.blind.score import Scored, scored, true_shrink
+from identification.blind.seal import opened
+from identification.blind.section import blind_json, blind_section
+from identification.blind.trials import (
+    Diagnosis,
+    answer_of,
+    check_study,
+    commit,
+    diagnose,
+    generate,
+    trial_folder,
+)
+from identification.progress import progress
+from identification.report.page import Section
+from identification.report.results import write_results
+
+RESULTS = "results"
+
+
+def blind_check(out: Path, *, trials: int, seed: int, workers: int, diagnosis: Diagnosis) -> Section:
+    """Run what is missing of a blind check, write results.json and results.html, return the section.
+
+    diagnosis: a function of a module, for it is sent to other processes by name. Raises ValueError if
+    the folder holds trials of another seed, or a sealed answer was changed.
+    """
+    check_study(out, seed)
+    generate(out, trials=trials, seed=seed, workers=workers)
+    committed = commit(out, trials)
+    diagnose(out, trials=trials, workers=workers, diagnosis=diagnosis)
+    found = [
+        _opened_and_scored(out, number, digest)
+        for number, digest in progress(committed.items(), what="blind: scores", total=trials)
+    ]
+    section = blind_section(found)
+    write_results(
+        out, RESULTS, title=section.title, sections=[section], content=blind_json(found, seed=seed)
+    )
+    return section
+
+
+def _opened_and_scored(out: Path, number: int, committed: str) -> Scored:
+    folder = trial_folder(out, number)
+    answer = answer_of(folder)
+    label, truth = opened(folder, committed)
+    return scored(label, answer, true_shrink(answer, truth))

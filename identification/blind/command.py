@@ -1,0 +1,38 @@
+"""`python -m identification blind`."""
+
+import argparse
+
+from epv_env.plant.commandline import writable_folder
+from epv_env.plant.valves import available_cores
+from identification.blind.check import blind_check
+from identification.gap_valve.diagnose import diagnose_campaign
+from identification.report.results import as_text
+
+TRIALS = 300
+
+
+def add_blind(commands: "argparse._SubParsersAction") -> None:
+    """The command's options."""
+    text = "how often the diagnosis is right on campaigns whose cause is sealed"
+    parser = commands.add_parser("blind", help=text, description=text)
+    parser.add_argument(
+        "--out", type=writable_folder, required=True, help="folder of trials and results"
+    )
+    parser.add_argument("--trials", type=int, default=TRIALS, help="number of campaigns")
+    parser.add_argument("--seed", type=int, default=0, help="of truths and noise")
+    parser.add_argument("--workers", type=int, default=None, help="processes; default: all cores")
+
+
+def blind(chosen: argparse.Namespace) -> None:
+    """Run the command. Raises ValueError for less than one trial, or a folder of another study."""
+    if chosen.trials < 1:
+        raise ValueError(f"--trials {chosen.trials}: a blind check needs at least one")
+    section = blind_check(
+        chosen.out,
+        trials=chosen.trials,
+        seed=chosen.seed,
+        workers=chosen.workers or available_cores(),
+        diagnosis=diagnose_campaign,
+    )
+    print(as_text([section]))
+    print(f"\nwritten: {chosen.out}/results.json and results.html")

@@ -1,0 +1,206 @@
+"""The bench's own forms of the effects: each deviates from the fitted form by a share `d` of itself.
+
+A diagnosis that fits the very forms by which the data were made would grade its own handwriting. Here
+each size depends on the state as it well may in a real valve; at d = 0 the plant's form is left.
+
+| Effect | Form here, relative to that of docs/effects.md | Why |
+|---|---|---|
+| coil_heating | part of the heat flows on into the iron, rate d/(1 s) | the winding is not alone |
+| eddy_current | G (1 + d o_MV) | a closed iron path links the shorted turn better |
+| flyback_voltage | U_clamp (1 + d (I/0.3 A - 1)) | a diode's or Zener's slope resistance |
+| driver_voltage_drop | U_drop (1 + d (I/I_steady - 1)) | part of the drop is resistive |
+| magnetic_saturation | sMV (1 + d (u - 0.3)/(u + 0.3)) | iron stays linear longer, then bends sharper |
+| magnetic_remanence | I_rem (1 + d o_MV) | an open gap demagnetises |
+| armature_friction | F (1 + d (v/0.3 m/s - 1)) | a viscous share |
+| armature_bounce | a squeeze film of 20 um takes 0.1 m/s d eMV each way | slow landings bounce less |
+| armature_pressure_force | inlet (1 - d o_MV), exhaust (1 + d o_MV) | an open seat's jet sucks |
+| inlet_seat_leak, exhaust_seat_leak | A (1 + d (drop/6 bar - 1)) | the seat lifts under pressure |
+| control_chamber_heat | 1/tau (1 + d (2 w/(w + 0.3 g/s) - 1)) | moving gas exchanges more heat |
+| output_chamber_heat | the same with 20 g/s | |
+| moving_control_volume | s (1 + d o_PV) | a piston with a shoulder |
+| pressure_dependent_discharge | k (1 + d (3 (1 - p2/p1) - 1)) | curvature |
+| critical_pressure_ratio | deficit (1 + d o_PV) | b falls as the seat opens |
+| piston_friction | F (1 + d ((p3 - p_env)/6 bar + v/0.2 m/s - 1.5)) | lip pressure, viscosity |
+| flow_force | c (1 - d o_PV) | the jet's angle grows with the stroke |
+| local_gas_speed | a1, a2 (1 + d o_PV) | the cone widens |
+| seat_leak | A (1 + d ((p1 - p2)/4 bar - 1)) | as the MV seats |
+| circuit_leak | A (1 + d ((p2 - p_env)/6 bar - 1)) | the same |
+| output_pipe | A (1 + d (1 - 2 D/(D + 0.2 bar))), D the pipe's drop | wall friction beside the orifice |
+| supply_restriction | loss times (w/20 g/s)^(-2 d) | exponent below 2 of smooth pipes (Blasius) |
+| pressure_sensor_lag | 1/tau (1 - d D/(D + 50 mbar)), D: reading less pressure | empties slower |
+| pressure_sensor_bias | b (1 + d (p/8 bar - 1)) | part of it is a scale error |
+| current_sensor_gain | g (1 + d (I/0.4 A - 1)) | curvature of the amplifier |
+| command_delay | each switching by its own delay, t (1 ± d) | a controller's cycle |
+
+o_MV, o_PV = 2 x/x_max - 1: -1 shut, 1 open. w: flow. v, I, drops: absolute values.
+"""
+
+import math
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from epv_env.plant.compiled import FLAGS, inlined, replacing, source_digest
+from epv_env.plant.effects import OFF_VOLTAGE, Effects, coil_current, heated
+from epv_env.plant.equations import (
+    State,
+    derivative,
+    flow_exhaust,
+    flow_inlet,
+    flow_PV,
+    reluctance_inverse,
+)
+from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at, store_state
+from identification.bench.automaton import RightHandSide
+
+BAR = 1e5
+
+FILM = 20e-6
+"""Thickness of the air film that an armature squeezes out as it lands [m]."""
+
+FILM_SPEED = 0.1
+"""Speed that the film takes from a bouncing armature on each way through it, at d eMV = 1 [m/s]."""
+
+IRON_TIME = 1.0
+"""Time constant with which the winding's heat flows into the iron, at d = 1 [s]."""
+
+_with_electric = replacing(
+    Effects, "eddy", "U_clamp", "U_drop", "saturation", "I_rem", "friction_MV", "inlet_area",
+    "exhaust_area",
+)  # fmt: skip
+_with_gas = replacing(
+    Effects, "leak_inlet", "leak_exhaust", "exchange_3", "swept", "drop_deficit", "leak_PV",
+    "leak_circuit", "exchange_2", "pipe_area", "supply_loss",
+)  # fmt: skip
+_with_piston = replacing(
+    Effects, "discharge_slope", "friction_PV", "flow_force", "a1", "a2", "lag_2_rate", "lag_3_rate"
+)
+_with_supply = replacing(State, "p1")
+_with_rates = replacing(State, "vMV", "coil_heat")
+
+
+@inlined
+def _electric(q, u, c, e, d):
+    """Sizes of the solenoid's and the armature's effects."""
+    closed = 2.0 * q.xMV / c.xMVmax - 1.0
+    level = e.saturation * abs(q.I) * reluctance_inverse(q, c)
+    steady = max(u.U - e.U_drop, OFF_VOLTAGE) / heated(c.R, q.coil_heat)
+    return _with_electric(
+        e,
+        e.eddy * (1.0 + d * closed),
+        e.U_clamp * (1.0 + d * (abs(q.I) / 0.3 - 1.0)),
+        e.U_drop * (1.0 + d * (abs(q.I) / steady - 1.0)),
+        e.saturation * (1.0 + d * (level - 0.3) / (level + 0.3)),
+        e.I_rem * (1.0 + d * closed),
+        e.friction_MV * (1.0 + d * (abs(q.vMV) / 0.3 - 1.0)),
+        e.inlet_area * (1.0 - d * closed),
+        e.exhaust_area * (1.0 + d * closed),
+    )
+
+
+@inlined
+def _gas(q, c, e, d):
+    """Sizes of the effects of flows and chambers."""
+    opened = 2.0 * q.xPV / c.xPVmax - 1.0
+    through = abs(flow_PV(q, c, e, True))
+    inlet = abs(flow_inlet(q, c, e, True))
+    control = inlet + abs(flow_exhaust(q, c, e, True))
+    pipe = abs(q.far_pressure)
+    supply = max((through + inlet) / 0.02, 1e-3)
+    return _with_gas(
+        e,
+        e.leak_inlet * (1.0 + d * (abs(q.p1 - q.p3) / (6.0 * BAR) - 1.0)),
+        e.leak_exhaust * (1.0 + d * (abs(q.p3 - c.p_env) / (6.0 * BAR) - 1.0)),
+        e.exchange_3 * (1.0 + d * (2.0 * control / (control + 3e-4) - 1.0)),
+        e.swept * (1.0 + d * opened),
+        e.drop_deficit * (1.0 + d * opened),
+        e.leak_PV * (1.0 + d * (abs(q.p1 - q.p2) / (4.0 * BAR) - 1.0)),
+        e.leak_circuit * (1.0 + d * (abs(q.p2 - c.p_env) / (6.0 * BAR) - 1.0)),
+        e.exchange_2 * (1.0 + d * (2.0 * through / (through + 0.02) - 1.0)),
+        e.pipe_area * (1.0 + d * (1.0 - 2.0 * pipe / (pipe + 0.2 * BAR))),
+        e.supply_loss * supply ** (-2.0 * d),
+    )
+
+
+@inlined
+def _piston(q, c, e, d):
+    """Sizes of the effects of the piston, its seat and the pressure sensors."""
+    opened = 2.0 * q.xPV / c.xPVmax - 1.0
+    lip = (q.p3 - c.p_env) / (6.0 * BAR) - 1.0
+    return _with_piston(
+        e,
+        e.discharge_slope * (1.0 + d * (3.0 * (1.0 - min(q.p2 / q.p1, 1.0)) - 1.0)),
+        e.friction_PV * (1.0 + d * (lip + abs(q.vPV) / 0.2 - 0.5)),
+        e.flow_force * (1.0 - d * opened),
+        e.a1 * (1.0 + d * opened),
+        e.a2 * (1.0 + d * opened),
+        e.lag_2_rate * (1.0 - d * q.lag_2 / (abs(q.lag_2) + 5e3)),
+        e.lag_3_rate * (1.0 - d * q.lag_3 / (abs(q.lag_3) + 5e3)),
+    )
+
+
+@inlined
+def deviating(q, u, c, e, d):
+    """Effects with sizes as this state has them; d: share of the deviation."""
+    at_valve = _with_supply(q, q.p1 - q.supply_drop)
+    return _piston(at_valve, c, _gas(at_valve, c, _electric(q, u, c, e, d), d), d)
+
+
+@inlined
+def _film(q, c):
+    """Rate at which the squeezed film slows a bouncing armature, relative to its speed [1/s]."""
+    low = math.exp(-max(q.xMV, 0.0) / FILM)
+    high = math.exp(-max(c.xMVmax - q.xMV, 0.0) / FILM)
+    return c.eMV * FILM_SPEED / FILM * (low + high)
+
+
+_DIGEST = source_digest()
+
+
+@numba.njit(cache=True, **FLAGS)
+def _rates_and_forces(y, u, c, e, free_PV, free_MV, d):
+    out = np.empty(y.size + 2)
+    if _DIGEST == "":  # a change of the plant's sources compiles this anew (compiled.source_digest)
+        return out
+    q, inputs = state_at(y.reshape(-1, 1), 0, 0), inputs_at(u.reshape(-1, 1), 0, 0)
+    valve = coefficients_at(c, 0, 0)
+    sizes = deviating(q, inputs, valve, effects_at(e, 0, 0), d)
+    rates, force_PV, force_MV = derivative(q, inputs, valve, sizes, free_PV, free_MV, True)
+    slowed = rates.vMV - d * _film(q, valve) * q.vMV * free_MV
+    cooled = rates.coil_heat - d * q.coil_heat / IRON_TIME
+    store_state(out.reshape(-1, 1), 0, 0, _with_rates(rates, slowed, cooled))
+    out[-2], out[-1] = force_PV, force_MV
+    return out
+
+
+@numba.njit(cache=True, **FLAGS)
+def _terminal_currents(states, u, c, e, d):
+    out = np.empty(states.shape[1])
+    if _DIGEST == "":
+        return out
+    valve, sizes = coefficients_at(c, 0, 0), effects_at(e, 0, 0)
+    for k in range(out.size):
+        q, inputs = state_at(states, 0, k), inputs_at(u, 0, k)
+        now = deviating(q, inputs, valve, sizes, d)
+        out[k] = coil_current(inputs.U, q.I, valve.R, q.coil_heat, now)
+    return out
+
+
+def right_hand_side(deviation: float) -> RightHandSide:
+    """The plant with effects whose forms deviate by this share, for `simulate_reference`."""
+
+    def rates_and_forces(y, u, c, e, free_PV, free_MV):
+        return _rates_and_forces(y, u, c, e, free_PV, free_MV, deviation)
+
+    return rates_and_forces
+
+
+def terminal_currents(
+    states: NDArray, inputs: NDArray, c: NDArray, e: NDArray, deviation: float
+) -> NDArray:
+    """Currents at the coil's terminals [A], (samples,), where eddy currents deviate as well.
+
+    states: [row of State, sample]. inputs: [row of Inputs, sample]. c, e: tables of one valve.
+    """
+    return _terminal_currents(states, inputs, c, e, deviation)

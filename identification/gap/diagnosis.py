@@ -1,0 +1,88 @@
+"""The whole diagnosis of a grey-box plant: which cause, where, and how far the gap shrinks."""
+
+from dataclasses import dataclass
+
+from identification.gap.evidence import Assessed
+from identification.gap.fit import Hypothesis, Point
+from identification.gap.fits import Fits
+from identification.gap.model import GreyBox
+from identification.gap.shrink import NOMINAL, RECALIBRATED, Shrinkage, shrinkage
+from identification.gap.verdict import AMBIGUOUS, KNOWN, UNKNOWN, Conclusion, Ranked, conclude
+from identification.gap.where import Where, locate
+from identification.gap.which import Verdicts, which
+
+RUNNERS_UP = 3
+"""Single causes beyond the ambiguity set whose shrinking is judged too."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Diagnosis:
+    """Everything that one diagnosis found."""
+
+    verdicts: Verdicts
+    conclusion: Conclusion
+    where: Where
+    """Of what recalibration leaves."""
+    left: Where | None
+    """Of what the best cause leaves, where that is to be explained; else None."""
+    shrinkage: Shrinkage
+    nominal: Point
+    judged: list[Ranked]
+    """Causes that `shrinkage` knows by their label."""
+    warnings: list[str]
+
+    @property
+    def best(self) -> Ranked | None:
+        """The cause that the verdict names, or the one that comes closest; None where none is needed."""
+        named = self.conclusion.verdict in (KNOWN, AMBIGUOUS, UNKNOWN)
+        return self.judged[0] if named and self.judged else None
+
+
+def label(found: Assessed) -> str:
+    """A hypothesis in one line."""
+    return " + ".join(found.name)
+
+
+def diagnose(plant: GreyBox, *, seed: int = 0, fits: Fits | None = None) -> Diagnosis:
+    """Diagnose the plant's recordings.
+
+    seed: of the bootstrap. fits: runs and remembers the fits. Raises ValueError where no run is held
+    out.
+    """
+    fits = fits or Fits(plant)
+    verdicts = which(plant, fits)
+    fitter, none = verdicts.fitter, verdicts.none
+    fits.say("where")
+    where = locate(fitter, none.point, none.residuals, seed)
+    conclusion = conclude(verdicts, where)
+    first = max(len(conclusion.ambiguity), 1)
+    others = [cause for cause in conclusion.causes[first:] if len(cause.effects) == 1]
+    judged = [*conclusion.causes[:first], *others[:RUNNERS_UP]]
+    left = None
+    if conclusion.verdict == UNKNOWN and judged:
+        best = judged[0].found
+        left = locate(fitter, best.point, best.residuals, seed)
+    fits.say("how far it shrinks")
+    nominal = fitter.start(Hypothesis(causes=()), {})
+    points = {NOMINAL: nominal, RECALIBRATED: none.point}
+    points |= {label(cause.found): cause.found.point for cause in judged}
+    return Diagnosis(
+        verdicts=verdicts,
+        conclusion=conclusion,
+        where=where,
+        left=left,
+        shrinkage=shrinkage(fitter, points, seed=seed),
+        nominal=nominal,
+        judged=judged,
+        warnings=_warnings(none, judged),
+    )
+
+
+def _warnings(none: Assessed, judged: list[Ranked]) -> list[str]:
+    """What did not go as it should."""
+    found = [] if none.converged else ["the recalibration did not converge: its gap may be too large"]
+    return found + [
+        f"the fit of {label(cause.found)} did not converge: its size and probability are in doubt"
+        for cause in judged
+        if not cause.found.converged and cause.probability > 0.01
+    ]

@@ -1,0 +1,57 @@
+"""Diagnoses of tanks, one of each verdict, for the tests of what is made of them."""
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+
+from docs.examples.tank.plant import Tank
+from docs.examples.tank.recordings import recorded
+from identification.gap.diagnosis import Diagnosis, diagnose
+from identification.gap.model import Cause, Size
+
+
+def leaking() -> Tank:
+    """A cause of the catalogue."""
+    return Tank(recorded({"c": 0.021, "leak": 4e-3}))
+
+
+def sound() -> Tank:
+    """Nothing that recalibration does not set right."""
+    return Tank(recorded({"c": 0.021}))
+
+
+def haunted() -> Tank:
+    """A disturbance that no cause of the catalogue makes."""
+    tank = sound()
+    for run in tank.runs:
+        run.measured[:] += 0.02 * np.sin(run.time / 3.0)
+    return tank
+
+
+class Twins(Tank):
+    """A leaking tank whose catalogue has the leak under two names."""
+
+    def __init__(self):
+        super().__init__(recorded({"c": 0.021, "leak": 4e-3}))
+        size = Size(symbol="seep", unit="1/s", low=0.0, high=0.05, trials=(1e-3,), scale=1e-3)
+        self.causes = (*self.causes, Cause(name="seep", component="tank", sizes=(size,)))
+
+    def outputs(self, values, runs):
+        """A seep is a leak."""
+        both = values.get("leak", 0.0) + values.get("seep", np.zeros(1))
+        return super().outputs({**values, "leak": both}, runs)
+
+
+TANKS: dict[str, Callable[[], Tank]] = {
+    "known": leaking,
+    "no_gap": sound,
+    "unknown": haunted,
+    "ambiguous": Twins,
+}
+
+
+@cache
+def diagnosed(verdict: str) -> Diagnosis:
+    """Of the tank that has this verdict."""
+    return diagnose(TANKS[verdict]())

@@ -1,0 +1,109 @@
+"""A diagnosis as JSON."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.gap.export import as_json, location, magnitudes, unit_name
+from tests.identification.gap.tanks import TANKS, diagnosed
+
+KEYS = {
+    "format", "verdict", "where", "causes", "ambiguity_set", "gap", "unexplained", "parameters",
+    "next_experiment",
+}  # fmt: skip
+GAPS = {"floor", "nominal", "recalibrated", "with_cause", "black_box_floor", "report_metric_percent"}
+MODELS = {"nominal", "recalibrated", "with_cause"}
+
+
+@pytest.mark.parametrize("verdict", TANKS)
+def test_every_verdict_has_all_fields_of_the_format(verdict):
+    content = json.loads(json.dumps(as_json(diagnosed(verdict), "Wait."), allow_nan=False))
+    assert set(content) >= KEYS
+    assert content["format"] == "epv-gap/1"
+    assert content["verdict"] == verdict
+    assert content["next_experiment"] == "Wait."
+    assert set(content["where"]) >= {"component", "equation", "channel", "regimes"}
+    assert set(content["where"]["regimes"][0]) >= {"channel", "regime", "gap", "low", "high"}
+    assert set(content["gap"]) >= GAPS
+    assert set(content["gap"]["report_metric_percent"]) == MODELS
+    assert set(content["parameters"]) == MODELS
+    assert set(content["unexplained"]) >= {"fraction", "still_predictable", "location"}
+    judged = content["causes"][0]
+    assert set(judged) >= {"effects", "probability", "magnitude", "shrink", "gap"}
+
+
+@pytest.mark.parametrize("verdict", TANKS)
+def test_probabilities_fall_and_sum_to_one(verdict):
+    content = as_json(diagnosed(verdict))
+    found = [cause["probability"] for cause in content["causes"]]
+    assert found == sorted(found, reverse=True)
+    assert sum(found) + sum(content["probability"].values()) == pytest.approx(1.0)
+
+
+def test_a_regime_too_rare_for_an_interval_is_written_all_the_same():
+    found = diagnosed("known")
+    rare = [replace(gap, low=0.0, high=np.inf) for gap in found.where.regimes]
+    content = as_json(replace(found, where=replace(found.where, regimes=rare)))
+    assert json.loads(json.dumps(content, allow_nan=False))["where"]["regimes"][0]["high"] is None
+
+
+def test_a_known_cause_is_the_whole_ambiguity_set_and_its_size_is_that_of_the_tank():
+    content = as_json(diagnosed("known"))
+    assert content["ambiguity_set"] == [["leak"]]
+    value, low, high = content["causes"][0]["magnitude"]["leak_1_per_s"]
+    assert low < value < high
+    assert value == pytest.approx(4e-3, rel=0.1)
+    assert content["parameters"]["with_cause"]["leak"] == value
+    assert content["gap"]["with_cause"] == content["causes"][0]["gap"]
+    assert content["causes"][0]["shrink"]["fraction"] > 0.9
+
+
+def test_twins_are_ambiguous_and_announced():
+    content = as_json(diagnosed("ambiguous"))
+    assert sorted(content["ambiguity_set"]) == [["leak"], ["seep"]]
+    assert content["twins"]["leak"] == ["seep"]
+
+
+@pytest.mark.parametrize("verdict", ["no_gap", "unknown"])
+def test_no_cause_is_named_where_none_is_or_none_is_known(verdict):
+    content = as_json(diagnosed(verdict))
+    assert content["ambiguity_set"] == []
+    assert content["probability"]["no_cause" if verdict == "no_gap" else "unknown"] > 0.5
+
+
+def test_without_a_gap_the_recalibrated_model_stays_in_force():
+    content = as_json(diagnosed("no_gap"))
+    assert content["gap"]["with_cause"] == content["gap"]["recalibrated"]
+    assert content["parameters"]["with_cause"] == content["parameters"]["recalibrated"]
+
+
+def test_what_is_left_is_located_only_where_something_is():
+    assert location(diagnosed("known")) is None
+    unknown = diagnosed("unknown")
+    place = location(unknown)
+    assert place is not None
+    component, equation = place.split(": ")
+    assert unknown.left is not None
+    assert component in {forcing.equation.component for forcing in unknown.left.forcings}
+    assert unknown.left.equation[equation] == max(unknown.left.equation.values())
+
+
+def test_an_interval_stays_within_the_physical_range():
+    found = diagnosed("known").conclusion.causes[0].found
+    wide = replace(found, size_sd=np.full(1, 1.0))
+    size = wide.point.hypothesis.sizes[0]
+    ((_, low, high),) = magnitudes(wide).values()
+    assert (low, high) == (size.low, size.high)
+
+
+@pytest.mark.parametrize(
+    ("unit", "name"),
+    [
+        ("K/J", "K_per_J"), ("m^2", "m2"), ("1/m^2", "1_per_m2"), ("rad s/m", "rad_s_per_m"),
+        ("A/(V s)", "A_per_V_s"), ("1", "1"), ("-", "1"), ("Ohm", "Ohm"),
+    ],
+)  # fmt: skip
+def test_a_unit_as_part_of_a_name(unit, name):
+    assert unit_name(unit) == name

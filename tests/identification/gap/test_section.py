@@ -1,0 +1,234 @@
+"""The report of a diagnosis: it says and shows what was found, of whatever plant."""
+
+import re
+from dataclasses import replace
+from typing import cast
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.patches import Rectangle
+
+from identification.gap import which_figures
+from identification.gap.diagnosis import Diagnosis
+from identification.gap.export import as_json
+from identification.gap.quantities import quantity
+from identification.gap.section import sections
+from identification.gap.sentences import alike, ends, hidden, verdict
+from identification.report.page import Picture, Section, Table, write_page
+from tests.identification.gap.tanks import TANKS, diagnosed
+
+NEXT = "Record a long draining"
+
+
+def pictures(section: Section) -> list[Picture]:
+    return [block for block in section.blocks if isinstance(block, Picture)]
+
+
+def table(section: Section, first: str) -> Table:
+    (found,) = [b for b in section.blocks if isinstance(b, Table) and b.columns[0] == first]
+    return found
+
+
+def widths(axes: Axes) -> list[float]:
+    """Of bars."""
+    return [cast(Rectangle, patch).get_width() for patch in axes.patches]
+
+
+def texts(found: list[Section]) -> str:
+    return " ".join(verdict.text for section in found for verdict in section.verdicts)
+
+
+@pytest.mark.parametrize("name", TANKS)
+def test_every_report_has_the_same_parts(name):
+    found = sections(diagnosed(name), NEXT)
+    assert [section.title for section in found] == [
+        "Verdict", "Where the gap lies", "Which cause it is", "How far the gap shrinks",
+        "Next experiment", "Warnings",
+    ]  # fmt: skip
+    assert all(section.verdicts for section in found)
+    assert not re.search(r"\b(nan|inf)\b", texts(found))
+    assert plt.get_fignums() == []
+
+
+def test_the_report_is_one_page(tmp_path):
+    found = sections(diagnosed("unknown"), NEXT)
+    write_page(tmp_path / "report.html", title="Tank", sections=found)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert page.count("<img") == sum(len(pictures(section)) for section in found)
+    assert not re.search(r"\b(nan|inf)\b", re.sub(r"<img[^>]*>", "", page))
+
+
+def test_without_a_next_experiment_there_is_no_such_part():
+    assert "Next experiment" not in [section.title for section in sections(diagnosed("known"))]
+
+
+def test_a_known_cause_is_named_with_its_size_and_what_it_closes():
+    status, text = verdict(diagnosed("known"), NEXT)
+    cause = as_json(diagnosed("known"))["causes"][0]
+    assert status == "good"
+    assert text.startswith("leak explains the gap (> 99 %): adding it with leak = 0.00")
+    assert f"closes {100 * cause['shrink']['fraction']:.0f} % (" in text
+    assert "nothing predictable is left" in text
+
+
+def test_no_gap_says_so_and_what_to_do():
+    status, text = verdict(diagnosed("no_gap"), NEXT)
+    assert status == "good"
+    assert text.startswith("There is no gap beyond noise after recalibration")
+    assert "add nothing" in text
+
+
+def test_an_unknown_cause_is_sent_to_the_place_and_the_shape():
+    found = diagnosed("unknown")
+    status, text = verdict(found, NEXT)
+    assert status == "bad"
+    assert text.startswith("Nothing in the catalogue explains the gap (> 99 %)")
+    component = max(found.conclusion.component, key=found.conclusion.component.__getitem__)
+    assert f"missing, most likely in {component}" in text
+    assert found.where.shape is None or "see its shape" in text
+
+
+def test_rivals_are_named_together_with_what_would_decide():
+    status, text = verdict(diagnosed("ambiguous"), NEXT)
+    assert status == "doubt"
+    assert re.match(r"leak \(50 %\) or seep \(50 %\) explains the gap", text)
+    assert "cannot tell which" in text
+    assert text.endswith(f"{NEXT}.")
+
+
+def test_what_rivals_share_is_said_once():
+    found = diagnosed("ambiguous")
+    leak, seep = found.conclusion.ambiguity
+    lag = next(c for c in found.verdicts.fitter.plant.causes if c.name == "lag")
+
+    def beside(ranked):
+        point = ranked.found.point
+        causes = (lag, *point.hypothesis.causes)
+        point = replace(point, hypothesis=replace(point.hypothesis, causes=causes))
+        return replace(ranked, found=replace(ranked.found, point=point))
+
+    pairs = [beside(leak), beside(seep)]
+    shrink = found.shrinkage.shrink
+    known = {f"lag + {name}": share for name, share in shrink.items()}
+    text = verdict(
+        replace(
+            found,
+            conclusion=replace(found.conclusion, ambiguity=pairs),
+            shrinkage=replace(found.shrinkage, shrink=known),
+        ),
+        "",
+    )[1]
+    assert text.startswith("lag together with leak (")
+
+
+def test_twins_are_announced_beside_their_correlation():
+    found = diagnosed("ambiguous")
+    named = {cause.effects[0]: alike(found, cause) for cause in found.judged}
+    assert named["leak"] == "seep (1.000)"
+    assert named["seep"] == "leak (1.000)"
+    assert named["lag"] == "-"
+    assert alike(diagnosed("known"), diagnosed("known").judged[0]) == "-"
+
+
+def test_causes_that_recalibration_hides_are_announced():
+    found = diagnosed("known")
+    separability = found.verdicts.separability
+
+    def with_felt(felt):
+        of = dict.fromkeys(separability.labels, 100.0) | felt
+        other = replace(separability, felt=np.array([of[name] for name in separability.labels]))
+        return replace(found, verdicts=replace(found.verdicts, separability=other))
+
+    assert "every cause of the catalogue would show" in hidden(with_felt({}))
+    assert "would not show lag: recalibration" in hidden(with_felt({"lag": 1.0}))
+
+
+@pytest.mark.parametrize(
+    ("none", "reason"),
+    [(0.3, "no cause acts (30 %) cannot be ruled out"), (0.0, "too little to matter")],
+)
+def test_a_likely_cause_that_is_not_named_is_told_with_the_reason(none, reason):
+    found = diagnosed("no_gap")
+    first, *others = found.conclusion.causes
+    causes = [replace(first, probability=1.0 - none), *others]
+    status, text = verdict(
+        replace(
+            found,
+            conclusion=replace(found.conclusion, causes=causes),
+            verdicts=replace(found.verdicts, no_cause=none),
+        ),
+        "",
+    )
+    assert status == "doubt"
+    assert f"In doubt: {first.effects[0]} may act" in text
+    assert reason in text
+
+
+def at_end(found: Diagnosis) -> Diagnosis:
+    """The diagnosis with the leak as large as can be."""
+    best, *others = found.judged
+    size = best.found.point.hypothesis.sizes[0]
+    vector = np.array([*best.found.point.vector[:-1], size.high / size.scale])
+    point = replace(best.found.point, vector=vector)
+    return replace(found, judged=[replace(best, found=replace(best.found, point=point)), *others])
+
+
+def test_a_size_at_an_end_of_its_range_is_a_warning():
+    found = diagnosed("known")
+    assert ends(found) == []
+    assert ends(at_end(found)) == ["leak: leak is at an end of its physical range (0.0500 1/s)"]
+    assert sections(at_end(found))[-1].verdicts[0].status == "doubt"
+    assert sections(found)[-1].verdicts[0].status == "good"
+
+
+def test_a_warning_puts_the_verdict_in_doubt():
+    found = replace(diagnosed("known"), warnings=["the recalibration did not converge"])
+    assert verdict(found, "")[0] == "doubt"
+    assert "the recalibration did not converge." in texts([sections(found)[-1]])
+
+
+def test_the_ranking_shows_every_hypothesis_and_marks_the_ambiguity_set():
+    found = diagnosed("ambiguous")
+    (axes,) = which_figures.ranking(found).axes
+    assert sum(widths(axes)) == pytest.approx(1.0, abs=1e-6)
+    named = [bar.get_facecolor() for bar in axes.patches[: len(found.conclusion.ambiguity)]]
+    assert len(set(named)) == 1
+    assert axes.patches[len(named)].get_facecolor() not in named
+
+
+def test_places_sum_to_one_with_nothing_missing():
+    left, right = which_figures.places(diagnosed("known")).axes
+    assert sum(widths(left)) == pytest.approx(1.0)
+    assert sum(widths(right)) == pytest.approx(1.0)
+
+
+def test_sizes_lie_within_their_range():
+    found = diagnosed("known")
+    (axes,) = which_figures.sizes(found.judged).axes
+    size = found.judged[0].found.point.hypothesis.sizes[0]
+    value = found.verdicts.fitter.values(found.judged[0].found.point)[size.symbol]
+    dots = [line for line in axes.lines if line.get_marker() == "o"]
+    assert len(dots) == 1, "faint causes are not drawn beside a probable one"
+    assert dots[0].get_xdata() == pytest.approx((value - size.low) / (size.high - size.low))
+
+
+def test_tables_hold_the_figures_of_the_file():
+    found = diagnosed("known")
+    content, shrink = as_json(found), sections(found)[3]
+    gaps = {row[0]: row for row in table(shrink, "Model").rows}
+    assert gaps["recalibrated"][1].startswith(f"{content['gap']['recalibrated']:.1f} (")
+    assert gaps["leak"][1].startswith(f"{content['gap']['with_cause']:.2f} (")
+    assert gaps["black box"][-1] == "-"
+    columns = table(shrink, "Model").columns
+    percent = content["gap"]["report_metric_percent"]["nominal"]
+    assert gaps["nominal"][columns.index("overall [%]")] == f"{percent:.2f}"
+    parameters = {row[0]: row[1:] for row in table(shrink, "Parameter").rows}
+    fitted = [quantity(content["parameters"][m]["c"], "m/s") for m in content["parameters"]]
+    assert parameters["c"] == fitted
+
+
+def test_without_a_gap_no_share_of_it_is_drawn():
+    known, none = (len(pictures(sections(diagnosed(name))[3])) for name in ("known", "no_gap"))
+    assert none == known - 2

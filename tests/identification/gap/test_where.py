@@ -1,0 +1,147 @@
+"""Where the gap of a tank lies: regimes, the equation that lacks something, and its shape."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from docs.examples.tank.plant import Tank
+from docs.examples.tank.recordings import recorded
+from identification.gap.evidence import assess
+from identification.gap.fit import Fitter, Point
+from identification.gap.forcing import candidate, needed, window_edges
+from identification.gap.model import Trace
+from identification.gap.processes import courses
+from identification.gap.regimes import regime_gaps
+from identification.gap.where import Where, locate
+from identification.gap.where_figures import forcing_figure, heat_map, residual_figure, shape_figure
+from identification.gap.which import recalibrated
+
+LEAK = 2e-3
+"""Of the tank [1/s]."""
+
+
+@cache
+def recalibrated_tank(**truth: float) -> tuple[Fitter, Point, list]:
+    fitter, point = recalibrated(Tank(recorded(truth)))
+    return fitter, point, assess(fitter, [point])[0].residuals
+
+
+@cache
+def located(**truth: float) -> Where:
+    return locate(*recalibrated_tank(**truth), seed=4)
+
+
+def test_a_lack_in_the_state_equation_is_found_there():
+    found = located(leak=LEAK)
+    assert found.equation["f1"] > 0.99
+    assert found.forcings[0].equation.name == "f1"
+    assert found.forcings[0].explained > 0.5
+
+
+def test_a_lag_of_the_sensor_is_no_lack_of_an_equation():
+    found = located(lag=5.0)
+    assert found.equation["reading h"] > 0.9
+    assert found.shape is None
+
+
+def test_without_a_gap_nothing_is_missing():
+    found = located()
+    assert found.none > 0.8
+    assert sum(found.equation.values()) == pytest.approx(1 - found.none)
+    assert found.shape is None
+
+
+def test_probabilities_sum_to_one_and_the_same_seed_tells_the_same():
+    found = located(leak=LEAK)
+    assert sum(found.equation.values()) + found.none == pytest.approx(1)
+    again = locate(*recalibrated_tank(leak=LEAK), seed=4)
+    assert again.regimes == found.regimes
+    assert again.equation == found.equation
+
+
+def test_the_shape_is_that_of_the_missing_term():
+    """What a leak does beyond what the outlet's coefficient absorbs, over the level."""
+    fitter, point, _ = recalibrated_tank(leak=LEAK)
+    shape = located(leak=LEAK).shape
+    assert shape is not None
+    assert shape.state == "h"
+    assert shape.explained > 0.8
+    c = fitter.values(point)["c"]
+    missing = -1e3 * (LEAK * shape.x - (c - 0.02) * np.sqrt(shape.x))
+    inner = slice(len(shape.x) // 10, -len(shape.x) // 10)
+    error = (shape.y - missing)[inner] / np.maximum(shape.sd[inner], 1e-3)
+    assert np.sqrt(np.mean(error**2)) < 3
+
+
+def test_a_forcing_is_recovered_but_for_noise_and_what_calibration_absorbs():
+    """Readings are changed by a known forcing: what its estimate misses lies within the noise."""
+    fitter, point, _ = recalibrated_tank()
+    plant, values = fitter.plant, candidate(fitter, point)
+    equation = plant.equations[0]
+    edges = window_edges(plant.runs[0].time, plant.states(values, 0))
+    truth = 20.0 * np.sin(np.linspace(0, 6, len(edges) - 1))
+    change = plant.forced(values, equation, 0, edges) @ truth
+    altered = Fitter(plant, fitter.frame)
+    altered.target = [fitter.target[0] + (change / plant.channels[0].noise).ravel(), *fitter.target[1:]]
+    material, forms = needed(altered, point, [0])
+    course = courses(forms, material)[0][0]
+    error = course.forcing - truth
+    assert error @ forms[0].precision @ error < len(truth)
+    assert truth @ forms[0].precision @ truth > 20 * len(truth)
+
+
+def test_windows_are_dense_where_states_move():
+    time = np.arange(1000) * 0.1
+    moving = Trace(unit="m", scale=1.0, values=np.clip((time - 50.0) / 5.0, 0.0, 1.0))
+    edges = window_edges(time, {"x": moving})
+    assert edges[0] == 0
+    assert edges[-1] == len(time) - 1
+    assert np.all(np.diff(edges) > 0)
+    inside = np.sum((time[edges] >= 50) & (time[edges] <= 55))
+    assert inside > 0.25 * len(edges)
+
+
+def test_regime_gaps_are_root_mean_squares_with_intervals_that_hold_them():
+    fitter, point, residuals = recalibrated_tank(leak=LEAK)
+    plant, values = fitter.plant, candidate(fitter, point)
+    masks = [plant.regimes(values, r) for r in fitter.everything]
+    found = {gap.regime: gap for gap in regime_gaps(plant, masks, residuals, seed=1)}
+    assert set(found) == {"filling", "draining"}
+    for regime, gap in found.items():
+        own = residuals[2][0][masks[2][regime]]
+        assert gap.gap == pytest.approx(np.sqrt(np.mean(own**2)))
+        assert 0 < gap.low < gap.gap < gap.high < np.inf
+
+
+def test_a_regime_that_is_met_too_seldom_has_no_sure_gap():
+    fitter, _, residuals = recalibrated_tank()
+    once = [{"once": np.arange(240) == (7 if r == 0 else -1)} for r in fitter.everything]
+    (gap,) = regime_gaps(fitter.plant, once, residuals, seed=1)
+    assert (gap.low, gap.high, gap.held_out) == (0.0, np.inf, False)
+
+
+def test_intervals_cover_the_truth_of_white_noise():
+    fitter, _, residuals = recalibrated_tank()
+    rng = np.random.default_rng(8)
+    masks = [{"all": np.ones(240, dtype=bool)} for _ in fitter.everything]
+    hits = 0
+    for trial in range(60):
+        white = [rng.standard_normal(residual.shape) for residual in residuals]
+        (gap,) = regime_gaps(fitter.plant, masks, white, seed=trial)
+        hits += gap.low <= 1.0 <= gap.high
+    assert 47 <= hits < 60  # 90 % of 60, and three standard deviations
+
+
+def test_every_picture_is_drawn():
+    fitter, point, residuals = recalibrated_tank(leak=LEAK)
+    found, plant = located(leak=LEAK), fitter.plant
+    masks = plant.regimes(candidate(fitter, point), 2)
+    assert found.shape is not None
+    for figure in (
+        heat_map(found.regimes),
+        residual_figure(plant, 2, residuals[2], masks),
+        shape_figure(found.shape),
+        forcing_figure(plant, found.forcings[0]),
+    ):
+        figure.canvas.draw()

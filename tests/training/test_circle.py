@@ -1,0 +1,143 @@
+"""Promised against delivered: no gap without an effect, a gap with one, and the circle closes it."""
+
+import json
+import math
+
+import pytest
+
+pytest.importorskip("stable_baselines3")
+
+import pandas as pd
+
+from controllers.hysteresis import Hysteresis
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.plantfile import Plant, save_plant
+from epv_env.plant.region import Region
+from training.circle import main
+from training.circle_aims import FIGURES, GAPS, as_markdown, figures, gaps
+from training.circle_deployment import AFTER, AROUND, BEFORE, DELIVERED, ITSELF, PROMISED, deployed
+from training.circle_figure import circle_figure
+
+pytestmark = pytest.mark.training
+
+CONTROLLER = Hysteresis(open_below=-0.1, shut_above=0.0, shut_lookahead=0.03, name="hysteresis")
+
+
+def plant(**effects):
+    parameters = Parameters.calibrated().replace(**effects)
+    return Plant(parameters=parameters, region=Region(centre=parameters))
+
+
+def episodes(stage, **effects):
+    """Promised by the nominal plant, delivered by one with the effects."""
+    plants = {PROMISED: plant(), DELIVERED: plant(**effects)}
+    found = deployed(
+        [CONTROLLER], plants, scenario="steps", count=12, duration=2.0, what="test"
+    )  # fmt: skip
+    return found.assign(stage=stage)
+
+
+@pytest.fixture(scope="module")
+def late():
+    return episodes(BEFORE, t_delay=0.008)
+
+
+def test_a_bench_without_an_effect_delivers_exactly_what_was_promised():
+    found = gaps(episodes(BEFORE))
+    assert len(found) == 1
+    assert all(found.loc[0, name] == 0.0 for name in GAPS)
+
+
+def test_a_late_coil_delivers_larger_excursions_than_promised(late):
+    found = gaps(late).loc[0]
+    for name in ("C1_excursion", "C3_excursion"):
+        assert found[f"{name}_low_bar"] > 0.05
+        assert found[f"{name}_low_bar"] < found[f"{name}_bar"] < found[f"{name}_high_bar"]
+
+
+def test_c1_and_c2_are_judged_on_the_valve_itself_and_c3_around_it(late):
+    found = figures(late).set_index("place")
+    for place in (PROMISED, DELIVERED):
+        of = {s: late[(late["place"] == place) & (late["plants"] == s)] for s in (ITSELF, AROUND)}
+        assert found.loc[place, "C1_stayed"] == of[ITSELF]["stayed"].mean()
+        assert found.loc[place, "C3_stayed"] == of[AROUND]["stayed"].mean()
+        assert found.loc[place, "C3_worst_excursion_bar"] == of[AROUND]["excursion_bar"].max()
+        assert found.loc[place, "C1_stayed_low"] <= found.loc[place, "C1_stayed"]
+
+
+def test_the_table_names_every_figure_and_the_picture_has_every_aim(late):
+    both = pd.concat([late, late.assign(stage=AFTER)])
+    aims = figures(both)
+    text = as_markdown(aims, gaps(both))
+    assert all(heading in text for _, _, heading in FIGURES.values())
+    labels = " ".join(axes.get_ylabel() for axes in circle_figure(aims).axes)
+    assert all(aim in labels for aim in ("C1", "C2", "C3"))
+
+
+def circle(out, *more):
+    return main(["--quick", "--episodes", "4", "--out", str(out), *more])
+
+
+FOUND = {
+    "verdict": "known",
+    "causes": [
+        {"effects": ["command_delay"], "probability": 1.0, "magnitude": {"t_delay_s": [8e-3] * 3}}
+    ],
+    "ambiguity_set": [["command_delay"]],
+    "gap": {},
+}
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A short circle whose diagnosis is there already, and right."""
+    out = tmp_path_factory.mktemp("circle")
+    (out / "diagnosis").mkdir()
+    (out / "diagnosis" / "gap.json").write_text(json.dumps(FOUND))
+    save_plant(plant(t_delay=0.008), out / "diagnosis" / "plant.json")
+    assert circle(out, "--effect", "command_delay=0.008") == 0
+    return out
+
+
+def test_retraining_on_the_true_plant_leaves_nothing_between_promised_and_delivered(finished):
+    rows = json.loads((finished / "circle.json").read_text())["gaps"]
+    promise = {(row["controller"], row["stage"]): row["C1_excursion_bar"] for row in rows}
+    assert promise["hysteresis, extrapolating", BEFORE] > 0.05
+    assert all(promise[name, stage] == 0.0 for name, stage in promise if stage == AFTER)
+
+
+def test_what_is_finished_is_kept(finished):
+    def times():
+        return {
+            path: path.stat().st_mtime_ns
+            for path in finished.rglob("*")
+            if path.name in ("policy.safetensors", "episodes.csv", "campaign.json", "gap.json")
+        }
+
+    before = times()
+    assert len(before) == 6
+    assert circle(finished, "--effect", "command_delay=0.008") == 0
+    assert times() == before
+
+
+def test_another_effect_in_the_same_folder_is_refused(finished):
+    with pytest.raises(ValueError, match=r"holds a circle with effect command_delay=.*, not seat_leak"):
+        circle(finished, "--effect", "seat_leak=1e-7")
+
+
+def test_an_unknown_effect_is_refused_before_anything_is_written(tmp_path):
+    with pytest.raises(ValueError, match="unknown effect"):
+        circle(tmp_path, "--effect", "gremlins=3")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_the_diagnosis_finds_what_was_withheld_and_mends_the_promise(tmp_path):
+    assert circle(tmp_path, "--effect", "command_delay=0.006") == 0
+    content = json.loads((tmp_path / "circle.json").read_text())
+    assert content["diagnosis"]["ambiguity_set"] == [["command_delay"]]
+    found = content["diagnosis"]["causes"][0]["magnitude"]["t_delay_s"][0]
+    assert math.isclose(found, 0.006, rel_tol=0.01)
+    promise = {(row["controller"], row["stage"]): row["C1_excursion_bar"] for row in content["gaps"]}
+    name = "hysteresis, extrapolating"
+    assert abs(promise[name, AFTER]) < 0.1 * abs(promise[name, BEFORE])
