@@ -40,12 +40,15 @@ def report(
 
 def said(found: dict[str, Any], withheld: str) -> str:
     """What was withheld and what the diagnosis found, in two sentences."""
-    cause = found["causes"][0]
+    names = " or ".join(" + ".join(effects) for effects in found["ambiguity_set"])
+    if not names:
+        return f"Withheld: {withheld}. Diagnosis: {found['verdict']}; the plant is recalibrated only."
+    first = found["causes"][0]
     sizes = ", ".join(
         f"{name} {value:.4g} (90 %: {low:.4g} to {high:.4g})"
-        for name, (value, low, high) in cause["magnitude"].items()
+        for name, (value, low, high) in first["magnitude"].items()
     )
     return (
-        f"Withheld: {withheld}. Diagnosis: {found['verdict']}, {' + '.join(cause['effects'])} "
-        f"(probability {cause['probability']:.3f}), {sizes}."
+        f"Withheld: {withheld}. Diagnosis: {found['verdict']}, {names}; the likeliest has "
+        f"probability {first['probability']:.3f} and {sizes}."
     )

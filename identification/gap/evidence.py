@@ -25,6 +25,9 @@ STRETCH = 5e-3
 GENERIC_STRETCHES = (1.5e-3, STRETCH, 20e-3)
 """Times over which a misfit without a name may be constant [s]."""
 
+AT_END = 1e-4
+"""Share of its range within which a size counts as lying at its end."""
+
 GENERIC = np.logspace(-4, 3, 29)
 """Variances, in noise variances, that a misfit without a name may have in a stretch."""
 
@@ -51,6 +54,19 @@ class Assessed:
     def excess(self) -> float:
         """Sum of squares beyond that of noise."""
         return sum(float(np.sum(r**2) - np.count_nonzero(r)) for r in self.residuals)
+
+    @property
+    def at_end(self) -> bool:
+        """Whether a size lies at an end of its physical range: the data ask for what cannot be."""
+        sizes = self.point.hypothesis.sizes
+        for size, scaled in zip(
+            sizes, self.point.vector[len(self.point.vector) - len(sizes) :], strict=True
+        ):
+            low, high = sorted((size.low, size.high))
+            value, margin = scaled * size.scale, AT_END * (high - low)
+            if min(value - low, high - value) < margin and abs(value - size.off) > margin:
+                return True
+        return False
 
     @property
     def name(self) -> tuple[str, ...]:

@@ -130,9 +130,7 @@ class Fitter:
                 excess = points[index].chi_square - self.readings
                 done = gain < max(ENOUGH, RELATIVE * excess) or points[index].damping >= 1e5
                 hopeless = excess - HOPE * gain > self._hopeless(best)
-                points[index] = replace(
-                    points[index], converged=bool(done), given_up=bool(hopeless)
-                )
+                points[index] = replace(points[index], converged=bool(done), given_up=bool(hopeless))
             rival = min(rival, *(point.chi_square for point in points))
             active = [i for i in active if not (points[i].converged or points[i].given_up)]
             if not active:

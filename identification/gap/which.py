@@ -18,8 +18,12 @@ SINGLES = 10
 PARTNERS = 4
 """Causes that are tried beside each of the best two, where one cause leaves too much."""
 
-CLOSED = 0.5
-"""Share of what a cause leaves above which a pair must not leave, to be more than that cause alone."""
+SMALL = 0.005
+"""Share of the recalibrated model's squared misfit up to which what a cause leaves is its form's error:
+some 7 % in amplitude. No second cause is sought for it."""
+
+CLOSED = 0.3
+"""Share of what a cause leaves that a pair may leave at most, to be more than that cause alone."""
 
 RIVAL = 3.0
 """Times what the best cause leaves, up to which a pair is also sought beside the second best."""
@@ -76,7 +80,7 @@ def recalibrated(plant: GreyBox, fits: Fits | None = None) -> tuple[Fitter, Poin
 
 
 def _pairs(fitter: Fitter, none: Assessed, singles: list[Assessed], fits: Fits) -> list[Assessed]:
-    """Pairs that explain what the best causes leave, where that is predictable and more than LEFTOVER.
+    """Pairs that explain what the best causes leave, where that is predictable and more than SMALL.
 
     A pair must close a good part of what its better half leaves: where forms err, any further number
     lowers the misfit a little.
@@ -84,7 +88,7 @@ def _pairs(fitter: Fitter, none: Assessed, singles: list[Assessed], fits: Fits) 
     if not singles or singles[0].with_leftover <= singles[0].log_evidence:
         return []
     floor = min(0.0, *(found.excess for found in (none, *singles)))
-    if singles[0].excess - floor <= LEFTOVER * (none.excess - floor):
+    if singles[0].excess - floor <= SMALL * (none.excess - floor):
         return []
     found = []
     for single in singles[:2]:
@@ -140,10 +144,10 @@ def _weighed(
     candidates = [*singles, *pairs]
     best = max([none, *candidates], key=lambda found: found.log_evidence)
     temper = 1.0 / inflation(fitter, best.residuals)
-    small = [found.excess <= LEFTOVER * none.excess for found in candidates]
+    small = [found.excess <= LEFTOVER * none.excess and not found.at_end for found in candidates]
     scores = [
         temper * (max(found.log_evidence, found.with_leftover) if s else found.log_evidence)
-        + _log_prior(found, causes)
+        + (-np.inf if found.at_end else _log_prior(found, causes))
         for found, s in zip(candidates, small, strict=True)
     ]
     no_cause = temper * none.log_evidence + np.log(PRIOR["none"])

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from epv_env.plant.coefficients import effect_sizes, has_effects
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.readings import readings
@@ -43,6 +44,23 @@ class Replay:
         shift = np.asarray(p2_shift, dtype=float)
         each = {"": np.broadcast_to(shift[:, None] if shift.ndim == 1 else shift, (n, len(self.drives)))}
         each |= {s: np.asarray(value) for s, value in candidates.items()}
+        ailing = self._with_effects(each, n)
+        if np.all(ailing) or not np.any(ailing):
+            return self._outputs(each, n, chosen)
+        found = [np.empty((len(OUTPUTS), len(self.drives[r].U), n)) for r in chosen]
+        for part in (ailing, ~ailing):  # each by its own kernel, which the other need not wait for
+            own = self._outputs({s: v[part] for s, v in each.items()}, int(np.sum(part)), chosen)
+            for whole, some in zip(found, own, strict=True):
+                whole[:, :, part] = some
+        return found
+
+    def _with_effects(self, each: Mapping[str, NDArray], n: int) -> NDArray:
+        """Which candidates have an effect in any recording, boolean (n,)."""
+        largest = {s: v if v.ndim == 1 else np.max(np.abs(v), axis=1) for s, v in each.items() if s}
+        return np.broadcast_to(has_effects(effect_sizes({**self.base, **largest})), n)
+
+    def _outputs(self, each: Mapping[str, NDArray], n: int, chosen: Sequence[int]) -> list[NDArray]:
+        """`outputs` of candidates that one kernel can simulate; '' holds the shifts of p2."""
         found: list[NDArray] = []
         for group in self._groups(n, chosen):
             lanes = {s: _lanes(value, group) for s, value in each.items()}

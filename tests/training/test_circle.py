@@ -17,6 +17,7 @@ from training.circle import main
 from training.circle_aims import FIGURES, GAPS, as_markdown, figures, gaps
 from training.circle_deployment import AFTER, AROUND, BEFORE, DELIVERED, ITSELF, PROMISED, deployed
 from training.circle_figure import circle_figure
+from training.circle_report import said
 
 pytestmark = pytest.mark.training
 
@@ -118,6 +119,11 @@ def test_what_is_finished_is_kept(finished):
     assert len(before) == 6
     assert circle(finished, "--effect", "command_delay=0.008") == 0
     assert times() == before
+
+
+def test_a_plant_without_a_named_cause_is_said_to_be_recalibrated_only():
+    assert "command_delay" in said(FOUND, "an effect")
+    assert said({**FOUND, "ambiguity_set": []}, "an effect").endswith("recalibrated only.")
 
 
 def test_another_effect_in_the_same_folder_is_refused(finished):
