@@ -36,43 +36,64 @@ class Normal:
     gradient: NDArray
     chi_square: float
     shared: NDArray
-    """Present estimate of the tolerances, in standard deviations, (m,)."""
+    """Estimate of the tolerances at no step, in standard deviations, (m,)."""
 
 
 def normal(runs: Sequence[Linear]) -> Normal:
-    """Sum over runs; numbers that are no parameters are minimised over, with their priors."""
+    """Sum over runs; numbers that are no parameters are minimised over, with their priors.
+
+    A tolerance that would go beyond FARTHEST is held there. The runs' own are not, as their bounds
+    (`freed`) would hold the parameters back from far away.
+    """
     k, m = runs[0].slopes.shape[1], runs[0].shared.shape[1]
     total = np.sum([_reduced(run) for run in runs], axis=0)
     # order: residual, slopes, shared
-    shared = slice(1 + k, 1 + k + m)
-    total[shared, shared] += np.eye(m)
-    rest = np.r_[0 : 1 + k]
-    solved = np.linalg.solve(total[shared, shared], total[shared, rest])
-    reduced = total[np.ix_(rest, rest)] - total[rest, shared] @ solved
+    shared = np.arange(1 + k, 1 + k + m)
+    total[shared, shared] += 1.0
+    farthest = np.full(m, FARTHEST)
+    now = _bounded(total[np.ix_(shared, shared)], total[shared, 0], farthest)
+    # Which are held is judged where the step leads: else parameters would creep along with them.
+    slopes = np.arange(1, 1 + k)
+    ahead = total.copy()
+    ahead[slopes, slopes] += 1e-9
+    ahead = _eliminated(ahead, slopes, np.append(0, shared))
+    then = _bounded(ahead[1:, 1:], ahead[1:, 0], farthest)
+    held = np.abs(then) >= FARTHEST
+    reduced = _eliminated(_moved(total, shared[held], then[held]), shared[~held], np.arange(1 + k))
     return Normal(
         hessian=reduced[1:, 1:],
         gradient=reduced[1:, 0],
-        chi_square=float(reduced[0, 0]),
-        shared=_bounded(total[shared, shared], total[shared, 0], np.full(m, FARTHEST)),
+        chi_square=float(_moved(total, shared, now)[0, 0]),
+        shared=now,
     )
 
 
-def _columns(run: Linear) -> NDArray:
-    return np.column_stack([run.residual, run.slopes, run.shared])
+def _moved(gram: NDArray, which: NDArray, by: NDArray) -> NDArray:
+    """Gram matrix whose residual, in row 0, has these columns times `by` taken away."""
+    moved = gram.copy()
+    moved[0] -= by @ gram[which]
+    moved[:, 0] -= moved[:, which] @ by
+    return moved
+
+
+def _eliminated(gram: NDArray, which: NDArray, kept: NDArray) -> NDArray:
+    """Gram matrix of the kept columns after minimising over the others (Schur complement)."""
+    cross = gram[np.ix_(which, kept)]
+    return gram[np.ix_(kept, kept)] - cross.T @ np.linalg.solve(gram[np.ix_(which, which)], cross)
 
 
 def _reduced(run: Linear) -> NDArray:
-    """Gram matrix of residual, slopes and shared after the run's own numbers are eliminated."""
-    columns = _columns(run)
+    """Gram matrix of residual, slopes and shared after the run's own numbers are minimised over."""
+    columns = np.column_stack([run.residual, run.slopes, run.shared, run.local])
     gram = columns.T @ columns
-    if not run.local.size:
+    count, own = len(gram) - len(run.local_sd), len(run.local_sd)
+    if not own:
         return gram
-    precision = 1.0 / run.local_sd**2
-    gram[0, 0] += float(np.sum(precision * run.local_value**2))
-    cross = run.local.T @ columns
-    cross[:, 0] -= precision * run.local_value
-    own = run.local.T @ run.local + np.diag(precision)
-    return gram - cross.T @ np.linalg.solve(own, cross)
+    local = np.arange(count, count + own)
+    # The numbers themselves, from their centres, stand in the place of steps from where they are.
+    gram = _moved(gram, local, -run.local_value)
+    gram[local, local] += 1.0 / run.local_sd**2
+    return _eliminated(gram, local, np.arange(count))
 
 
 def freed(run: Linear, shared: NDArray) -> tuple[NDArray, NDArray]:
