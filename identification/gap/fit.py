@@ -155,23 +155,8 @@ class Fitter:
         sizes = (*self.plant.parameters, *point.hypothesis.sizes)
         low = np.array([min(s.low / s.scale, s.high / s.scale) for s in sizes])
         high = np.array([max(s.low / s.scale, s.high / s.scale) for s in sizes])
-        hessian, gradient = equations.hessian, equations.gradient
-        free = np.ones(len(sizes), dtype=bool)
-        step = np.zeros(len(sizes))
-        for _ in range(len(sizes)):
-            damped = hessian[np.ix_(free, free)].copy()
-            damped[np.diag_indices_from(damped)] *= 1.0 + point.damping
-            damped[np.diag_indices_from(damped)] += 1e-9
-            rest = gradient[free] - hessian[np.ix_(free, ~free)] @ step[~free]
-            step[free] = np.linalg.solve(damped, rest)
-            outside = free & ((point.vector + step < low) | (point.vector + step > high))
-            if not np.any(outside):
-                break
-            step[outside] = (np.clip(point.vector + step, low, high) - point.vector)[outside]
-            free &= ~outside
-            if not np.any(free):
-                break
-        gain = float(2 * gradient @ step - step @ hessian @ step)
+        ends = np.minimum(low - point.vector, 0.0), np.maximum(high - point.vector, 0.0)
+        step, gain = equations.step(*ends, point.damping)
         return replace(point, vector=point.vector + step), gain
 
     def linearise(self, points: Sequence[Point], runs: Sequence[int]) -> list[list[Linear]]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
 
 FARTHEST = 3.0
 """Standard deviations by which a tolerance, or a run's own number, may differ from its centre."""
@@ -30,42 +31,79 @@ class Linear:
 
 @dataclass(frozen=True, kw_only=True)
 class Normal:
-    """0.5 d' hessian d - gradient d + 0.5 chi_square over steps d of the vector."""
+    """Least squares in steps d of the vector and tolerances x; the runs' own numbers are minimised over.
 
+    For Gaussian tolerances: 0.5 d' hessian d - gradient d + 0.5 least over d.
+    """
+
+    gram: NDArray
+    """Of the residual, slopes and shared, with the priors of the last, (1 + k + m, 1 + k + m)."""
     hessian: NDArray
     gradient: NDArray
+    least: float
+    """Sum of squares at no step, with tolerances of any size."""
     chi_square: float
+    """The same with tolerances within FARTHEST."""
     shared: NDArray
-    """Estimate of the tolerances at no step, in standard deviations, (m,)."""
+    """These tolerances, in standard deviations, (m,)."""
+
+    def step(self, low: NDArray, high: NDArray, damping: float) -> tuple[NDArray, float]:
+        """Best step between low and high (k,) with tolerances within FARTHEST, and what it gains.
+
+        damping: of Levenberg and Marquardt, relative to the diagonal.
+        """
+        k, m = len(low), len(self.shared)
+        matrix = self.gram[1:, 1:].copy()
+        damped = np.arange(k)
+        matrix[damped, damped] *= 1.0 + damping
+        matrix[damped, damped] += 1e-9
+        farthest = np.full(m, FARTHEST)
+        ends = np.concatenate([low, -farthest]), np.concatenate([high, farthest])
+        best = _within(matrix, self.gram[1:, 0], *ends)
+        left = _left(self.gram, best)
+        return best[:k], self.chi_square - left
 
 
 def normal(runs: Sequence[Linear]) -> Normal:
-    """Sum over runs; numbers that are no parameters are minimised over, with their priors.
-
-    A tolerance that would go beyond FARTHEST is held there. The runs' own are not, as their bounds
-    (`freed`) would hold the parameters back from far away.
-    """
+    """Sum over runs; numbers that are no parameters are minimised over, with their priors."""
     k, m = runs[0].slopes.shape[1], runs[0].shared.shape[1]
-    total = np.sum([_reduced(run) for run in runs], axis=0)
+    gram = np.sum([_reduced(run) for run in runs], axis=0)
     # order: residual, slopes, shared
     shared = np.arange(1 + k, 1 + k + m)
-    total[shared, shared] += 1.0
+    gram[shared, shared] += 1.0
+    free = _eliminated(gram, shared, np.arange(1 + k))
     farthest = np.full(m, FARTHEST)
-    now = _bounded(total[np.ix_(shared, shared)], total[shared, 0], farthest)
-    # Which are held is judged where the step leads: else parameters would creep along with them.
-    slopes = np.arange(1, 1 + k)
-    ahead = total.copy()
-    ahead[slopes, slopes] += 1e-9
-    ahead = _eliminated(ahead, slopes, np.append(0, shared))
-    then = _bounded(ahead[1:, 1:], ahead[1:, 0], farthest)
-    held = np.abs(then) >= FARTHEST
-    reduced = _eliminated(_moved(total, shared[held], then[held]), shared[~held], np.arange(1 + k))
+    own = gram[np.ix_(shared, shared)]
+    x = _within(own, gram[shared, 0], -farthest, farthest)
     return Normal(
-        hessian=reduced[1:, 1:],
-        gradient=reduced[1:, 0],
-        chi_square=float(_moved(total, shared, now)[0, 0]),
-        shared=now,
+        gram=gram,
+        hessian=free[1:, 1:],
+        gradient=free[1:, 0],
+        least=float(free[0, 0]),
+        chi_square=_left(gram, np.concatenate([np.zeros(k), x])),
+        shared=x,
     )
+
+
+def _left(gram: NDArray, numbers: NDArray) -> float:
+    """Sum of squares after the numbers have taken their share of the residual in row 0."""
+    return float(gram[0, 0] - 2 * numbers @ gram[1:, 0] + numbers @ gram[1:, 1:] @ numbers)
+
+
+def _within(matrix: NDArray, right: NDArray, low: NDArray, high: NDArray) -> NDArray:
+    """Minimiser of 0.5 x' matrix x - right x between low and high (bounded least squares)."""
+    if not len(right):
+        return np.zeros(0)
+    scale = 1.0 / np.sqrt(np.diag(matrix))
+    try:
+        root = np.linalg.cholesky(matrix * np.outer(scale, scale)).T
+    except np.linalg.LinAlgError:  # slopes that are the same but for rounding
+        eigenvalues, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
+        root = np.sqrt(np.maximum(eigenvalues, 1e-14))[:, None] * vectors.T
+    aim = np.linalg.solve(root.T, right * scale)
+    widest = np.maximum(high - low, np.finfo(float).tiny)
+    found = lsq_linear(root, aim, (low / scale, (low + widest) / scale), method="bvls")
+    return np.clip(found.x * scale, low, high)
 
 
 def _moved(gram: NDArray, which: NDArray, by: NDArray) -> NDArray:
@@ -104,21 +142,9 @@ def freed(run: Linear, shared: NDArray) -> tuple[NDArray, NDArray]:
     residual = run.residual - run.shared @ shared
     if not run.local.size:
         return residual, np.zeros(0)
-    precision = 1.0 / run.local_sd**2
-    own = run.local.T @ run.local + np.diag(precision)
-    pull = run.local.T @ residual + (own - np.diag(precision)) @ run.local_value
-    value = _bounded(own, pull, FARTHEST * run.local_sd)
+    own = run.local.T @ run.local
+    pull = run.local.T @ residual + own @ run.local_value
+    farthest = FARTHEST * run.local_sd
+    value = _within(own + np.diag(1.0 / run.local_sd**2), pull, -farthest, farthest)
     step = value - run.local_value
     return residual - run.local @ step, step
-
-
-def _bounded(matrix: NDArray, right: NDArray, farthest: NDArray) -> NDArray:
-    """Solution of matrix x = right whose numbers stay within +-farthest (active set)."""
-    x = np.linalg.solve(matrix, right)
-    bound = np.zeros(len(x), dtype=bool)
-    while np.any(beyond := ~bound & (np.abs(x) > farthest)):
-        bound |= beyond
-        x = np.clip(x, -farthest, farthest)
-        rest = right[~bound] - matrix[np.ix_(~bound, bound)] @ x[bound]
-        x[~bound] = np.linalg.solve(matrix[np.ix_(~bound, ~bound)], rest)
-    return x

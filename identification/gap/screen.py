@@ -85,7 +85,7 @@ def _promise(
     ends = np.array([(size.low - o, size.high - o) for size, o in zip(sizes, off, strict=True)])
     shares = ends / (trial - off)[:, None]
     low, high = np.max(np.min(shares, axis=1)), np.min(np.max(shares, axis=1))
-    a, chi_square = _bounded(found.hessian, found.gradient, found.chi_square, max(low, 0.0), high)
+    a, chi_square = _bounded(found.hessian, found.gradient, found.least, max(low, 0.0), high)
     return Screened(cause=cause, sizes=tuple((off + a * (trial - off)).tolist()), chi_square=chi_square)
 
 

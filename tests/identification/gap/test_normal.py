@@ -1,9 +1,12 @@
 """Eliminating nuisances: the same answer as one big least-squares problem with prior rows."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.optimize import lsq_linear
 
-from identification.gap.normal import Linear, freed, normal
+from identification.gap.normal import FARTHEST, Linear, freed, normal
 
 RNG = np.random.default_rng(2)
 SD = np.array([0.3, 2.0])
@@ -44,7 +47,7 @@ def test_the_reduced_equations_have_the_whole_problem_s_solution():
     solution, squares, *_ = np.linalg.lstsq(matrix, right, rcond=None)
     step = np.linalg.solve(found.hessian, found.gradient)
     np.testing.assert_allclose(step, solution[:2], rtol=1e-9)
-    left = found.chi_square - found.gradient @ step
+    left = found.least - found.gradient @ step
     assert left == pytest.approx(squares[0], rel=1e-9)
 
 
@@ -60,3 +63,23 @@ def test_freed_residuals_are_what_the_whole_problem_leaves():
         np.testing.assert_allclose(step, solution[3 + 2 * r : 5 + 2 * r], rtol=1e-9)
         expected = run.residual - run.shared @ solution[:3] - run.local @ step
         np.testing.assert_allclose(residual, expected, rtol=1e-9)
+
+
+def test_a_bounded_step_is_that_of_the_whole_bounded_problem():
+    given = [replace(run, residual=200.0 * run.residual) for run in runs()]
+    found = normal(given)
+    matrix, right = one_problem(given)
+    ends = np.full(matrix.shape[1], np.inf)
+    ends[:2], ends[2:5] = (0.05, 0.5), FARTHEST
+    expected = lsq_linear(matrix, right, (-ends, ends), method="bvls")
+    step, gain = found.step(-ends[:2], ends[:2], damping=0.0)
+    np.testing.assert_allclose(step, expected.x[:2], atol=1e-8)
+    assert np.any(np.abs(expected.x[2:5]) >= FARTHEST)
+    assert found.chi_square - gain == pytest.approx(2 * expected.cost, rel=1e-9)
+    assert found.chi_square > found.least
+
+
+def test_a_number_of_a_run_stays_within_its_bounds():
+    run = replace(runs(1)[0], local_value=np.zeros(2), local_sd=np.array([1e-3, 2.0]))
+    _, step = freed(run, np.zeros(3))
+    assert abs(step[0]) <= FARTHEST * 1e-3
