@@ -10,7 +10,7 @@ PACKAGES := epv_env identification controllers training
 
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help venv train test test-oldest identify gap real-bench circle pictures bench tune tradeoff gif lint check format wheel clean
+.PHONY: help venv train test test-oldest identify gap blind real-bench circle pictures bench tune tradeoff gif lint check format wheel clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z][a-z-]*\):.*## /\1	/p' Makefile | while IFS='	' read -r name text; do \
@@ -69,6 +69,9 @@ gap: $(VENV)/.installed ## say which effect a virtual bench has that the model l
 	rm -rf runs/gap-bench
 	$(PY) -m identification bench --suite diagnosis --effect eddy_current=0.004 --out runs/gap-bench
 	$(PY) -m identification gap runs/gap-bench --out runs/gap $(ARGS)
+
+blind: $(VENV)/.installed ## how often the diagnosis is right on 300 sealed campaigns (three quarters of an hour)
+	$(PY) -m identification blind --trials 300 --seed 2026 --out runs/blind --images docs/images $(ARGS)
 
 real-bench: $(VENV)/.installed ## ask which effects give the report's printed errors (3 minutes)
 	$(PY) -m identification gap --tables --out runs/real-bench --images docs/images $(ARGS)

@@ -53,7 +53,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     add_gap(commands)
     add_blind(commands)
     chosen = parser.parse_args(arguments)
-    for name in ("starts", "campaigns", "workers"):
+    for name in ("starts", "campaigns", "trials", "workers"):
         value = getattr(chosen, name, None)
         if value is not None and value < 1:
             parser.error(f"--{name} must be at least 1")

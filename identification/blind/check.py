@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from identification.blind import figures
 from identification.blind.score import Scored, scored, true_shrink
 from identification.blind.seal import opened
 from identification.blind.section import blind_json, blind_section
@@ -20,12 +21,28 @@ from identification.report.results import write_results
 
 RESULTS = "results"
 
+PICTURES = {
+    "blind-detection": figures.detection,
+    "blind-components": figures.components,
+    "blind-causes": figures.causes,
+}
+"""Drawn for `images`."""
 
-def blind_check(out: Path, *, trials: int, seed: int, workers: int, diagnosis: Diagnosis) -> Section:
+
+def blind_check(
+    out: Path,
+    *,
+    trials: int,
+    seed: int,
+    workers: int,
+    diagnosis: Diagnosis,
+    images: Path | None = None,
+) -> Section:
     """Run what is missing of a blind check, write results.json and results.html, return the section.
 
-    diagnosis: a function of a module, for it is sent to other processes by name. Raises ValueError if
-    the folder holds trials of another seed, or a sealed answer was changed.
+    images: folder for the pictures alone, for documents. diagnosis: a function of a module, for it is
+    sent to other processes by name. Raises ValueError if the folder holds trials of another seed, or a
+    sealed answer was changed.
     """
     check_study(out, seed)
     generate(out, trials=trials, seed=seed, workers=workers)
@@ -36,6 +53,9 @@ def blind_check(out: Path, *, trials: int, seed: int, workers: int, diagnosis: D
         for number, digest in progress(committed.items(), what="blind: scores", total=trials)
     ]
     section = blind_section(found)
+    if images:
+        for name, draw in PICTURES.items():
+            draw(found).savefig(images / f"{name}.png", dpi=100)
     write_results(
         out, RESULTS, title=section.title, sections=[section], content=blind_json(found, seed=seed)
     )

@@ -21,18 +21,18 @@ def add_blind(commands: "argparse._SubParsersAction") -> None:
     parser.add_argument("--trials", type=int, default=TRIALS, help="number of campaigns")
     parser.add_argument("--seed", type=int, default=0, help="of truths and noise")
     parser.add_argument("--workers", type=int, default=None, help="processes; default: all cores")
+    parser.add_argument("--images", type=writable_folder, default=None, help="folder of its figures")
 
 
 def blind(chosen: argparse.Namespace) -> None:
-    """Run the command. Raises ValueError for less than one trial, or a folder of another study."""
-    if chosen.trials < 1:
-        raise ValueError(f"--trials {chosen.trials}: a blind check needs at least one")
+    """Run the command. Raises ValueError for a folder of another study."""
     section = blind_check(
         chosen.out,
         trials=chosen.trials,
         seed=chosen.seed,
         workers=chosen.workers or available_cores(),
         diagnosis=diagnose_campaign,
+        images=chosen.images,
     )
     print(as_text([section]))
     print(f"\nwritten: {chosen.out}/results.json and results.html")

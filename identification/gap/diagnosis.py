@@ -49,6 +49,11 @@ def diagnose(plant: GreyBox, *, seed: int = 0, fits: Fits | None = None) -> Diag
     seed: of the bootstrap. fits: runs and remembers the fits. Raises ValueError where no run is held
     out.
     """
+    if not any(run.held_out for run in plant.runs):
+        raise ValueError(
+            "no recording is held out: a gap is judged on recordings never fitted to; give one the role "
+            "'validation'"
+        )
     fits = fits or Fits(plant)
     verdicts = which(plant, fits)
     fitter, none = verdicts.fitter, verdicts.none

@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
@@ -49,7 +49,7 @@ def diagnose_campaign(
     nominal = load_plant(plant).parameters if plant else None
     valve = Valve(recorded, nominal, without=without)
     journal = Journal(out / JOURNAL, _subject(valve, without))
-    steps = Steps(began)
+    steps = Steps(began) if report else _silent
     found = diagnose(valve, seed=seed, fits=Fits(valve, journal, steps))
     text = _report(found, valve, recorded.name, out, steps) if report else ""
     content = {**as_json(found, text), "seconds": perf_counter() - began}
@@ -57,7 +57,7 @@ def diagnose_campaign(
     return found
 
 
-def _report(found: Diagnosis, valve: Valve, name: str, out: Path, steps: "Steps") -> str:
+def _report(found: Diagnosis, valve: Valve, name: str, out: Path, steps: Callable[[str], None]) -> str:
     """Write what people use of it; returns what to record next."""
     steps("next experiment")
     experiment = next_experiment(found.verdicts, valve)
@@ -90,6 +90,10 @@ def refitted_plant(found: Diagnosis, valve: Valve, name: str) -> Plant:
             "warnings": found.warnings,
         },
     )
+
+
+def _silent(step: str) -> None:
+    """Says nothing: many diagnoses run side by side."""
 
 
 class Steps:

@@ -33,8 +33,8 @@ def noise_of(recordings: Sequence[Recording], channel: str) -> float:
 
 def _block_variances(recording: Recording, channel: str) -> tuple[NDArray, int]:
     """Variance of the noise in each quiet block, and the block's length [samples]."""
-    length = max(4, round(BLOCK / recording.period))
     changes = np.diff(recording.channel(channel))
+    length = min(max(4, round(BLOCK / recording.period)), len(changes))
     lively = np.zeros(len(changes), dtype=bool)
     for switching in np.flatnonzero(np.diff(recording.energised)):
         lively[switching : switching + round(TRANSIENT / recording.period)] = True

@@ -4,6 +4,7 @@ import argparse
 
 import pytest
 
+from identification.__main__ import main
 from identification.blind import command
 
 
@@ -26,9 +27,11 @@ def test_the_command_passes_what_is_chosen(monkeypatch, tmp_path):
         command.blind(parsed(*arguments))
     assert seen == {
         "out": tmp_path, "trials": 3, "seed": 5, "workers": 2, "diagnosis": command.diagnose_campaign,
+        "images": None,
     }  # fmt: skip
 
 
-def test_no_trial_is_refused(tmp_path):
-    with pytest.raises(ValueError, match="at least one"):
-        command.blind(parsed("--out", str(tmp_path), "--trials", "0"))
+def test_no_trial_is_refused(tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        main(["blind", "--out", str(tmp_path), "--trials", "0"])
+    assert "--trials must be at least 1" in capsys.readouterr().err
