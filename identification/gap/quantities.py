@@ -66,7 +66,7 @@ def share(found: Interval) -> str:
 
 def gap(value: float) -> str:
     """A gap in noise deviations: small ones to the hundredth."""
-    return f"{value:.2f}" if value < 10 else f"{value:.1f}"
+    return f"{value:.2f}" if value < 9.995 else f"{value:.1f}"
 
 
 def spread(found: Interval) -> str:
