@@ -91,9 +91,7 @@ def measured_campaign(
         name=name,
         temperature=parameters["T_env"],
         pressure=parameters["p_env"],
-        recordings=tuple(
-            measured(t, rng, offsets) for t, rng in zip(truths, generators, strict=True)
-        ),
+        recordings=tuple(measured(t, rng, offsets) for t, rng in zip(truths, generators, strict=True)),
     )
 
 

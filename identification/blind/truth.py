@@ -98,9 +98,7 @@ def plan(seed: int, trials: int) -> list[tuple[str, tuple[str, ...]]]:
     return found
 
 
-def draw_trial(
-    seed: int, number: int, kind: str, causes: Sequence[str], attempt: int = 0
-) -> Trial:
+def draw_trial(seed: int, number: int, kind: str, causes: Sequence[str], attempt: int = 0) -> Trial:
     """The truth of one trial of a plan; attempt: sizes and unit anew, where no solver followed."""
     rng = np.random.default_rng([seed, number, *([attempt] if attempt else [])])
     unit = draw_unit(rng)
