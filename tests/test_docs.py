@@ -20,7 +20,8 @@ OTHERS = (
     "docs/sensitivity.md",
     "docs/real-bench.md",
     "docs/component-data.md",
-    "docs/gap.md", "docs/circle.md",
+    "docs/gap.md",
+    "docs/circle.md",
 )
 """Pages without examples."""
 HEADLESS = {**os.environ, "SDL_VIDEODRIVER": "dummy"}
