@@ -62,6 +62,10 @@ SLIDING_SPEED_MV = 0.02
 SLIDING_SPEED_PV = 0.02
 """The same for the piston [m/s], which moves at 0.1 m/s and more."""
 
+STICKY_STEP = 3e-5
+"""Steps shorter than this are asked for by friction so great that a mover chatters as it is let go [s]:
+there they are kept while a stop holds it, too."""
+
 STRIBECK_SPEED = 0.05
 """Speed at which half of the break-away excess of the piston's friction is left [m/s]."""
 
@@ -307,19 +311,21 @@ def discharge(p1, p2, effects):
 def friction_step(slow_step, v, sliding_speed):
     """Longest step for friction at a speed [s]: the slope of the curve of `friction` falls with it.
 
-    Half the speed stands for what a step may take from it.
+    Half the speed stands for what a step may take from it; nor may friction turn a mover within one.
     """
-    relative = 0.5 * v / sliding_speed
-    steeper = 1.0 + relative * relative
-    return slow_step * steeper * math.sqrt(steeper)
+    relative = abs(v) / sliding_speed
+    steeper = 1.0 + 0.25 * relative * relative
+    return slow_step * min(steeper * math.sqrt(steeper), 1.0 + 0.5 * relative)
 
 
 @inlined
 def longest_step(U, q, effects, free_PV, free_MV):
-    """Longest step that the effects allow at present [s]; a mover that a stop holds needs none."""
+    """Longest step that the effects allow at present [s]; friction asks for none while a stop holds."""
     clamped = (U <= OFF_VOLTAGE) & (abs(q.I) > NO_CURRENT)
     step = min(effects.steady_step, effects.clamp_step if clamped else effects.steady_step)
     step_PV = friction_step(effects.slow_step_PV, q.vPV, SLIDING_SPEED_PV)
     step_MV = friction_step(effects.slow_step_MV, q.vMV, SLIDING_SPEED_MV)
-    step = min(step, step_PV if free_PV > 0.0 else step)
-    return min(step, step_MV if free_MV > 0.0 else step)
+    bound_PV = (free_PV > 0.0) | (effects.slow_step_PV < STICKY_STEP)
+    bound_MV = (free_MV > 0.0) | (effects.slow_step_MV < STICKY_STEP)
+    step = min(step, step_PV if bound_PV else step)
+    return min(step, step_MV if bound_MV else step)
