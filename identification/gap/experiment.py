@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.gap.evidence import FORM_ERRORS, stretches
-from identification.gap.fit import LOST, Fitter, Point, shared_frame
+from identification.gap.fit import LOST, Fitter, Point, frames
 from identification.gap.model import GreyBox
 from identification.gap.normal import Linear, normal
 from identification.gap.outlook import Outlook, outlook
@@ -75,7 +75,8 @@ def outlooks(fitter: Fitter, plan: GreyBox, rivals: Rivals) -> list[Outlook]:
     """
     known = posteriors(fitter, rivals.points)
     points = [_planned(point, plan) for point in rivals.points]
-    planned = Fitter(plan, shared_frame(plan, points[0]))
+    none = np.zeros(len(plan.tolerances))
+    planned = Fitter(plan, frames(Fitter(plan), points[:1], [none])[0])
     predictions = planned.linearise(points, planned.everything)
     effects = _effects(planned, points, predictions)
     found = []
@@ -154,7 +155,7 @@ def gaussians(
 def _planned(point: Point, plan: GreyBox) -> Point:
     """The point in the plan's runs, whose own numbers nobody knows yet."""
     centres = [nuisance.centre for nuisance in point.hypothesis.local]
-    return replace(point, local=np.tile(np.array(centres), (len(plan.runs), 1)))
+    return replace(point, local=np.tile(np.array(centres), (len(plan.runs), 1)), frame=None)
 
 
 def _effects(

@@ -25,7 +25,6 @@ RELATIVE = 3e-3
 Excess: chi-square beyond one per reading. A cause that leaves much need not leave it to the digit.
 """
 
-
 HOPE = 3.0
 """Times the decrease that a step promises, which is all that a fit is trusted to gain yet."""
 
@@ -58,6 +57,18 @@ class Hypothesis:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Frame:
+    """Derivatives by starts and tolerances, which enter linearly, taken at some point."""
+
+    at: NDArray
+    """Tolerances of the simulations, in standard deviations from their centres, (m,)."""
+    starts: list[NDArray]
+    """Per run (values, starts)."""
+    shared: list[NDArray]
+    """Per run (values, tolerances), per standard deviation."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Point:
     """Where the fit of a hypothesis is."""
 
@@ -66,20 +77,12 @@ class Point:
     """Calibrated parameters and sizes, scaled, (k,)."""
     local: NDArray
     """(runs, l) [SI]."""
+    frame: Frame | None = None
+    """Its own; None: the one that the fitter has for all."""
     chi_square: float = np.inf
     damping: float = 1e-3
     converged: bool = False
     given_up: bool = False
-
-
-@dataclass(frozen=True, kw_only=True)
-class Frame:
-    """What all hypotheses share: derivatives by starts and tolerances, at the recalibrated model."""
-
-    starts: list[NDArray]
-    """Per run (values, starts)."""
-    shared: list[NDArray]
-    """Per run (values, tolerances), per standard deviation."""
 
 
 class Fitter:
@@ -92,7 +95,7 @@ class Fitter:
         self.readings = sum(np.count_nonzero(plant.runs[r].trusted) for r in self.fitted)
         self.target = [weighted(plant, r, run.measured).reshape(-1) for r, run in enumerate(plant.runs)]
         empty = [np.zeros((len(target), 0)) for target in self.target]
-        self.frame = frame or Frame(starts=empty, shared=empty)
+        self.frame = frame or Frame(at=np.zeros(0), starts=empty, shared=empty)
 
     def start(self, hypothesis: Hypothesis, values: Mapping[str, float]) -> Point:
         """A point at values by symbol; what is left out begins where it is off."""
@@ -152,52 +155,80 @@ class Fitter:
 
     def _step(self, point: Point, equations: Normal) -> tuple[Point, float]:
         """The next trial, within the ranges, and the decrease of chi-square it promises."""
-        sizes = (*self.plant.parameters, *point.hypothesis.sizes)
+        sizes = self.sizes(point)
         low = np.array([min(s.low / s.scale, s.high / s.scale) for s in sizes])
         high = np.array([max(s.low / s.scale, s.high / s.scale) for s in sizes])
         ends = np.minimum(low - point.vector, 0.0), np.maximum(high - point.vector, 0.0)
         step, gain = equations.step(*ends, point.damping)
         return replace(point, vector=point.vector + step), gain
 
+    def frame_of(self, point: Point) -> Frame:
+        """The derivatives by starts and tolerances that hold for a point."""
+        return point.frame or self.frame
+
     def linearise(self, points: Sequence[Point], runs: Sequence[int]) -> list[list[Linear]]:
         """Residuals and derivatives of each point in each of the runs, all simulated side by side."""
-        values, places = self._candidates(points)
-        outputs = self.plant.outputs(values, runs)
-        flat = [
-            weighted(self.plant, r, output).reshape(len(self.target[r]), -1)
-            for r, output in zip(runs, outputs, strict=True)
-        ]
+        changed = [self._changed(point) for point in points]
+        ends = np.cumsum([0, *(len(each) for each in changed)])
+        flat = self._weighted([candidate for each in changed for candidate in each], runs)
         return [
-            [self._linear(point, r, block[:, place]) for r, block in zip(runs, flat, strict=True)]
-            for point, place in zip(points, places, strict=True)
+            [self._linear(point, r, block[:, first:last]) for r, block in zip(runs, flat, strict=True)]
+            for point, first, last in zip(points, ends[:-1], ends[1:], strict=True)
         ]
 
     def residuals(self, points: Sequence[Point], runs: Sequence[int]) -> list[NDArray]:
         """Weighted measured - model of each point, per run (values, points)."""
-        n = len(points)
-        values: dict[str, NDArray] = {}
-        for i, point in enumerate(points):
-            sizes = (*self.plant.parameters, *point.hypothesis.sizes)
-            for size, scaled in zip(sizes, point.vector, strict=True):
-                values.setdefault(size.symbol, np.full(n, size.off))[i] = scaled * size.scale
-            for j, nuisance in enumerate(point.hypothesis.local):
-                shape = (n, len(self.plant.runs))
-                values.setdefault(nuisance.symbol, np.full(shape, nuisance.centre))[i] = point.local[
-                    :, j
-                ]
-        outputs = self.plant.outputs(values, runs)
-        flat = [weighted(self.plant, r, y).reshape(-1, n) for r, y in zip(runs, outputs, strict=True)]
         return [
-            np.nan_to_num(self.target[r][:, None] - y, nan=LOST) for r, y in zip(runs, flat, strict=True)
+            np.nan_to_num(self.target[r][:, None] - y, nan=LOST)
+            for r, y in zip(runs, self._weighted(points, runs), strict=True)
         ]
 
+    def columns(self, points: Sequence[Point]) -> dict[str, NDArray]:
+        """Values by symbol of points side by side, as `GreyBox.outputs` takes them."""
+        n = len(points)
+        found: dict[str, NDArray] = {}
+        for i, point in enumerate(points):
+            for size, scaled in zip(self.sizes(point), point.vector, strict=True):
+                found.setdefault(size.symbol, np.full(n, size.off, dtype=float))[i] = scaled * size.scale
+            for nuisance, own in zip(point.hypothesis.local, point.local.T, strict=True):
+                every = np.full((n, len(self.plant.runs)), nuisance.centre)
+                found.setdefault(nuisance.symbol, every)[i] = own
+            # A cause may set the same parameter: the unit's scatter goes on top of that.
+            at = self.frame_of(point).at
+            for tolerance, share in zip(self.plant.tolerances[: len(at)], at, strict=True):
+                centre = np.full(n, tolerance.centre, dtype=float)
+                found.setdefault(tolerance.symbol, centre)[i] += share * tolerance.sd
+        return found
+
+    def _weighted(self, points: Sequence[Point], runs: Sequence[int]) -> list[NDArray]:
+        """Weighted outputs of the points, per run (values, points)."""
+        outputs = self.plant.outputs(self.columns(points), runs)
+        return [
+            weighted(self.plant, r, output).reshape(-1, len(points))
+            for r, output in zip(runs, outputs, strict=True)
+        ]
+
+    def _changed(self, point: Point) -> list[Point]:
+        """The point, then each of its numbers, and of its runs' own, changed by a step."""
+        found = [point]
+        for i, step in enumerate(self._steps(point)):
+            vector = point.vector.copy()
+            vector[i] += step
+            found.append(replace(point, vector=vector))
+        for j, nuisance in enumerate(point.hypothesis.local):
+            local = point.local.copy()
+            local[:, j] += nuisance.step
+            found.append(replace(point, local=local))
+        return found
+
     def _linear(self, point: Point, run: int, block: NDArray) -> Linear:
-        k, starts = len(point.vector), self.plant.starts
+        k, starts, frame = len(point.vector), self.plant.starts, self.frame_of(point)
         own = np.array([n.step for n in point.hypothesis.local])
-        residual = np.nan_to_num(self.target[run] - block[:, 0], nan=LOST)
+        # of no tolerance at all, as the derivatives have it: what is added is taken away again
+        residual = np.nan_to_num(self.target[run] - block[:, 0], nan=LOST) + frame.shared[run] @ frame.at
         changes = np.nan_to_num(block[:, 1:] - block[:, :1])
-        local = np.column_stack([changes[:, k:] / own, self.frame.starts[run]])
-        linear_starts = self.frame.starts[run].shape[1]
+        local = np.column_stack([changes[:, k:] / own, frame.starts[run]])
+        linear_starts = frame.starts[run].shape[1]
         sd = [n.sd for n in point.hypothesis.local] + [n.sd for n in starts][:linear_starts]
         return Linear(
             residual=residual,
@@ -205,64 +236,45 @@ class Fitter:
             local=local,
             local_value=np.concatenate([point.local[run], np.zeros(linear_starts)]),
             local_sd=np.array(sd),
-            shared=self.frame.shared[run],
+            shared=frame.shared[run],
         )
 
     def _steps(self, point: Point) -> NDArray:
         """Finite differences of the scaled vector, away from the nearer end of each range."""
-        sizes = (*self.plant.parameters, *point.hypothesis.sizes)
+        sizes = self.sizes(point)
         middle = np.array([0.5 * (s.low + s.high) / s.scale for s in sizes])
         return np.where(point.vector > middle, -STEP, STEP) * np.maximum(np.abs(point.vector), 0.1)
 
-    def _candidates(self, points: Sequence[Point]) -> tuple[dict[str, NDArray], list[slice]]:
-        """Values by symbol of every point and its changes, and which candidates belong to which."""
-        places, rows = [], []
-        first = 0
-        for point in points:
-            k, l = len(point.vector), point.local.shape[1]  # noqa: E741
-            vectors = np.tile(point.vector, (1 + k + l, 1))
-            vectors[1 : 1 + k] += np.diag(self._steps(point))
-            local = np.tile(point.local, (1 + k + l, 1, 1))
-            for j, nuisance in enumerate(point.hypothesis.local):
-                local[1 + k + j, :, j] += nuisance.step
-            rows.append((vectors, local))
-            places.append(slice(first, first + len(vectors)))
-            first += len(vectors)
-        values: dict[str, NDArray] = {}
-        for point, place, (vectors, local) in zip(points, places, rows, strict=True):
-            sizes = (*self.plant.parameters, *point.hypothesis.sizes)
-            for j, size in enumerate(sizes):
-                values.setdefault(size.symbol, np.full(first, size.off))[place] = (
-                    vectors[:, j] * size.scale
-                )
-            for j, nuisance in enumerate(point.hypothesis.local):
-                shape = (first, len(self.plant.runs))
-                values.setdefault(nuisance.symbol, np.full(shape, nuisance.centre))[place] = local[
-                    ..., j
-                ]
-        return values, places
+    def sizes(self, point: Point) -> tuple[Size, ...]:
+        """What the point's vector holds: the calibrated parameters, then its causes' sizes."""
+        return (*self.plant.parameters, *point.hypothesis.sizes)
 
     def values(self, point: Point) -> dict[str, float]:
         """Parameters and sizes by symbol [SI]."""
-        sizes = (*self.plant.parameters, *point.hypothesis.sizes)
-        return {s.symbol: float(v * s.scale) for s, v in zip(sizes, point.vector, strict=True)}
+        pairs = zip(self.sizes(point), point.vector, strict=True)
+        return {size.symbol: float(scaled * size.scale) for size, scaled in pairs}
 
 
-def shared_frame(plant: GreyBox, point: Point) -> Frame:
-    """Derivatives by starts and tolerances at a point, by differences over all runs at once."""
-    fitter = Fitter(plant)
+def frames(fitter: Fitter, points: Sequence[Point], at: Sequence[NDArray]) -> list[Frame]:
+    """Derivatives by starts and tolerances at each point, by differences over all runs at once.
+
+    at: tolerances (m,) of each point, in standard deviations.
+    """
+    plant = fitter.plant
     nuisances = (*plant.starts, *plant.tolerances)
     n = 1 + len(nuisances)
-    values = {symbol: np.full(n, value) for symbol, value in fitter.values(point).items()}
-    for j, nuisance in enumerate(nuisances):
-        values[nuisance.symbol] = np.full(n, nuisance.centre)
-        values[nuisance.symbol][1 + j] += nuisance.step
+    found = [Frame(at=own, starts=[], shared=[]) for own in at]
+    placed = [replace(point, frame=frame) for point, frame in zip(points, found, strict=True)]
+    values = fitter.columns([point for point in placed for _ in range(n)])
+    for j, nuisance in enumerate(nuisances, start=1):
+        centre = np.full(n * len(points), nuisance.centre, dtype=float)
+        values.setdefault(nuisance.symbol, centre)[j::n] += nuisance.step
     steps = np.array([nuisance.step for nuisance in nuisances])
-    sd = np.array([nuisance.sd for nuisance in nuisances])
-    starts, shared = [], []
+    sd = np.array([nuisance.sd for nuisance in plant.tolerances])
     for r, output in enumerate(plant.outputs(values, fitter.everything)):
-        flat = weighted(plant, r, output).reshape(len(fitter.target[r]), -1)
-        slopes = np.nan_to_num(flat[:, 1:] - flat[:, :1]) / steps
-        starts.append(slopes[:, : len(plant.starts)])
-        shared.append(slopes[:, len(plant.starts) :] * sd[len(plant.starts) :])
-    return Frame(starts=starts, shared=shared)
+        flat = weighted(plant, r, output).reshape(-1, len(points), n)
+        slopes = np.nan_to_num(flat[..., 1:] - flat[..., :1]) / steps
+        for frame, own in zip(found, slopes.transpose(1, 0, 2), strict=True):
+            frame.starts.append(own[:, : len(plant.starts)])
+            frame.shared.append(own[:, len(plant.starts) :] * sd)
+    return found

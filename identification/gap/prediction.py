@@ -75,9 +75,9 @@ def _centred(measured: NDArray, time: NDArray) -> bool:
 
 def _linear(fitter: Fitter, point: Point, local: NDArray) -> tuple[list[NDArray], list[Linear]]:
     """Outputs, and the runs linearised in their own numbers and the tolerances alone."""
-    nuisances = point.hypothesis.local
+    nuisances, frame = point.hypothesis.local, fitter.frame_of(point)
     n = 1 + len(nuisances)
-    values = {symbol: np.full(n, value) for symbol, value in fitter.values(point).items()}
+    values = fitter.columns([point] * n)
     for j, nuisance in enumerate(nuisances):
         values[nuisance.symbol] = np.tile(nuisance.centre + local[:, j], (n, 1))
         values[nuisance.symbol][1 + j] += nuisance.step
@@ -86,16 +86,17 @@ def _linear(fitter: Fitter, point: Point, local: NDArray) -> tuple[list[NDArray]
     runs = []
     for r, output in enumerate(outputs):
         flat = weighted(fitter.plant, r, output).reshape(-1, n)
-        starts = fitter.frame.starts[r]
+        starts = frame.starts[r]
         known = fitter.plant.starts[: starts.shape[1]]
         runs.append(
             Linear(
-                residual=np.nan_to_num(fitter.target[r] - flat[:, 0], nan=LOST),
+                residual=np.nan_to_num(fitter.target[r] - flat[:, 0], nan=LOST)
+                + frame.shared[r] @ frame.at,
                 slopes=np.zeros((len(flat), 0)),
                 local=np.column_stack([np.nan_to_num(flat[:, 1:] - flat[:, :1]) / steps, starts]),
                 local_value=np.concatenate([local[r], np.zeros(starts.shape[1])]),
                 local_sd=np.array([nuisance.sd for nuisance in (*nuisances, *known)]),
-                shared=fitter.frame.shared[r],
+                shared=frame.shared[r],
             )
         )
     return [output[..., 0] for output in outputs], runs

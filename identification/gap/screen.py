@@ -58,7 +58,8 @@ def signatures(fitter: Fitter, base: Point, causes: Sequence[Cause]) -> list[Sig
 def screen(fitter: Fitter, base: Point, found: Sequence[Signature]) -> list[Screened]:
     """Every cause's best trial beside the base's own causes, the most promising first.
 
-    The change that a cause makes at a trial size is taken to grow in proportion to its size; with the
+    The change that a cause makes at a trial size is taken to grow in proportion to its size, and to turn
+    round with its sign; with the
     calibrated parameters and all nuisances it is fitted to the base's residual.
     """
     own = fitter.linearise([base], fitter.fitted)[0]
@@ -85,7 +86,7 @@ def _promise(
     ends = np.array([(size.low - o, size.high - o) for size, o in zip(sizes, off, strict=True)])
     shares = ends / (trial - off)[:, None]
     low, high = np.max(np.min(shares, axis=1)), np.min(np.max(shares, axis=1))
-    a, chi_square = _bounded(found.hessian, found.gradient, found.least, max(low, 0.0), high)
+    a, chi_square = _bounded(found.hessian, found.gradient, found.least, low, high)
     return Screened(cause=cause, sizes=tuple((off + a * (trial - off)).tolist()), chi_square=chi_square)
 
 

@@ -34,6 +34,10 @@ class Separability:
 
     def twins(self, label: str) -> tuple[str, ...]:
         """Causes that the campaign hardly tells from one, the most alike first."""
+        return self.like(label, TWINS)
+
+    def like(self, label: str, least: float) -> tuple[str, ...]:
+        """Causes that are felt, and correlate with one by more than `least`; the most alike first."""
         if label not in self.labels:
             return ()
         row = np.abs(self.correlation[self.labels.index(label)])
@@ -41,7 +45,7 @@ class Separability:
         return tuple(
             self.labels[i]
             for i in order
-            if row[i] > TWINS and self.labels[i] != label and self.felt[i] >= FELT
+            if row[i] > least and self.labels[i] != label and self.felt[i] >= FELT
         )
 
 

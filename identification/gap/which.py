@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from identification.gap.evidence import Assessed, assess, inflation
-from identification.gap.fit import Fitter, Hypothesis, Point, shared_frame
+from identification.gap.fit import Fitter, Hypothesis, Point, frames
 from identification.gap.fits import Fits
 from identification.gap.model import GreyBox
 from identification.gap.screen import Screened, screen, signatures
@@ -14,6 +15,13 @@ from identification.gap.separability import Separability, separability
 
 SINGLES = 10
 """Causes that are refitted, the most promising ones."""
+
+FINALISTS = (8, 4)
+"""Causes that are fitted on with nuisances linearised where each of them stands: so many, then fewer.
+Half as many pairs."""
+
+ALIKE = 0.8
+"""Correlation with a finalist's signature above which a cause that was screened out is refitted."""
 
 PARTNERS = 4
 """Causes that are tried beside each of the best two, where one cause leaves too much."""
@@ -59,13 +67,20 @@ def which(plant: GreyBox, fits: Fits | None = None) -> Verdicts:
     """
     fits = fits or Fits(plant)
     fitter, base = recalibrated(plant, fits)
-    none = assess(fitter, [base])[0]
     found = signatures(fitter, base, plant.causes)
-    promising = screen(fitter, base, found)[:SINGLES]
-    singles = assess(fitter, fits("single causes", lambda: _refit(fitter, base, promising)))
-    singles.sort(key=lambda found: -found.log_evidence)
+    separable = separability(fitter, base, found)
+    promising = screen(fitter, base, found)
+    first = fits("single causes", lambda: _refit(fitter, base, promising[:SINGLES]))
+    singles = _ranked(assess(fitter, first))
+    like = _alike(singles[: FINALISTS[1]], promising[SINGLES:], separable)
+    if like:
+        more = fits("causes like the best", lambda: _refit(fitter, base, like))
+        singles = _ranked([*singles, *assess(fitter, more)])
+    none = _finals(fitter, assess(fitter, [base]), (1, 1), "recalibration", fits)[0]
+    singles = _finals(fitter, singles, FINALISTS, "causes", fits)
     pairs = _without_twins(_pairs(fitter, none, singles, fits))
-    return _weighed(fitter, none, singles, pairs, separability(fitter, base, found))
+    pairs = _finals(fitter, _ranked(pairs), [n // 2 for n in FINALISTS], "pairs", fits)
+    return _weighed(fitter, none, singles, pairs, separable)
 
 
 def recalibrated(plant: GreyBox, fits: Fits | None = None) -> tuple[Fitter, Point]:
@@ -74,9 +89,42 @@ def recalibrated(plant: GreyBox, fits: Fits | None = None) -> tuple[Fitter, Poin
     rough = Fitter(plant)
     start = rough.start(Hypothesis(causes=()), {})
     point = fits("calibration", lambda: rough.fit([start]))[0]
-    fitter = Fitter(plant, shared_frame(plant, point))
-    again = replace(point, chi_square=np.inf, damping=1e-3, converged=False)
-    return fitter, fits("recalibration", lambda: fitter.fit([again]))[0]
+    fitter = Fitter(plant, frames(rough, [point], [np.zeros(len(plant.tolerances))])[0])
+    return fitter, fits("recalibration", lambda: fitter.fit([_again(point)]))[0]
+
+
+def _again(point: Point) -> Point:
+    """The point as the beginning of another fit."""
+    return replace(point, chi_square=np.inf, damping=1e-3, converged=False, given_up=False)
+
+
+def _ranked(found: Sequence[Assessed]) -> list[Assessed]:
+    return sorted(found, key=lambda assessed: -assessed.log_evidence)
+
+
+def _alike(
+    best: Sequence[Assessed], others: Sequence[Screened], separable: Separability
+) -> list[Screened]:
+    """Causes that were screened out, though what they change looks like what one of the best does."""
+    labels = [label for found in best for label in separable.like(found.name[0], ALIKE)]
+    return [screened for screened in others if screened.cause.label in labels]
+
+
+def _finals(
+    fitter: Fitter, found: list[Assessed], counts: Sequence[int], what: str, fits: Fits
+) -> list[Assessed]:
+    """The best of them fitted on, with nuisances linearised where each of them stands.
+
+    found: the most probable first, as what is returned. counts: how many of them, round by round.
+    """
+    for number, count in enumerate(counts if found else (), start=1):
+        points = [assessed.point for assessed in found[:count]]
+        own = frames(fitter, points, [assessed.tolerances for assessed in found[:count]])
+        starts = [replace(_again(p), frame=frame) for p, frame in zip(points, own, strict=True)]
+        fitted = fits(f"{what}: own nuisances, round {number}", partial(fitter.fit, starts))
+        framed = [replace(p, frame=frame) for p, frame in zip(fitted, own, strict=True)]
+        found = _ranked([*assess(fitter, framed), *found[count:]])
+    return found
 
 
 def _pairs(fitter: Fitter, none: Assessed, singles: list[Assessed], fits: Fits) -> list[Assessed]:
@@ -120,7 +168,7 @@ def _refit(fitter: Fitter, base: Point, promising: Sequence[Screened]) -> list[P
         point = fitter.start(joint, {**fitter.values(base), **sizes})
         own = len(base.hypothesis.local)
         point.local[:, :own] = base.local
-        starts.append(point)
+        starts.append(replace(point, frame=base.frame))
     return [point for point in fitter.fit(starts, base.chi_square) if not point.given_up]
 
 

@@ -25,7 +25,7 @@ from identification.report.page import write_page
 
 GAP, REPORT, PLANT, JOURNAL = "gap.json", "report.html", "plant.json", "fits.jsonl"
 
-STEPS = 9
+STEPS = 18
 """Of a diagnosis with pairs; without, two of them are left out."""
 
 

@@ -13,7 +13,7 @@ from scipy.stats import norm
 
 from identification.gap.evidence import FORM_ERRORS
 from identification.gap.experiment import Posterior, Rivals, gaussians, outlooks, posteriors, rivals_of
-from identification.gap.fit import Fitter, shared_frame
+from identification.gap.fit import Fitter, frames
 from identification.gap.model import Cause, Channel, Nuisance, Run, Size
 from identification.gap.normal import Linear, normal
 from identification.gap.outlook import divergences, odds, outlook
@@ -121,7 +121,9 @@ def test_the_odds_come_true(supply):
 def judged(fitter: Fitter, plan: Gauge, rivals: Rivals, count: int) -> tuple[float, ...]:
     """Mean probability of each rival over recordings that it made."""
     rng = np.random.default_rng(9)
-    predicting = Fitter(plan, shared_frame(plan, rivals.points[0]))
+    predicting = Fitter(
+        plan, frames(Fitter(plan), rivals.points[:1], [np.zeros(len(plan.tolerances))])[0]
+    )
     predicted = [lines[0] for lines in predicting.linearise(rivals.points, [0])]
     campaign = fitter.linearise(rivals.points, fitter.fitted)
     found = []
