@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp, softmax
+from scipy.special import logsumexp
 
 from identification.gap.fit import Fitter, Point
 from identification.gap.normal import Linear, Normal, freed, normal
@@ -40,8 +40,6 @@ class Assessed:
     residuals: list[NDArray]
     """Per run (channels, samples), freed of nuisances; 0 where readings are not trusted."""
     log_evidence: float
-    form_error: float
-    """Root mean square of FORM_ERRORS, as probable as the recordings have each."""
     with_leftover: float
     """Log evidence of the hypothesis beside a misfit without a name."""
     tolerances: NDArray
@@ -106,13 +104,10 @@ def _assessed(fitter: Fitter, point: Point, runs: Sequence[Linear]) -> Assessed:
         for residual, run in zip(residuals, fitter.plant.runs, strict=True)
     ]
     price = _occam(point, sd) + 0.5 * strain
-    shares = softmax(-0.5 * misfits)
-    uncertain = any(not cause.exact for cause in point.hypothesis.causes)
     return Assessed(
         point=point,
         residuals=shaped,
         log_evidence=float(logsumexp(-0.5 * misfits) - np.log(len(misfits))) - price,
-        form_error=float(np.sqrt(np.sum(shares * np.square(FORM_ERRORS)))) if uncertain else 0.0,
         with_leftover=generic_log_evidence(fitter, shaped) - price,
         tolerances=fitted.shared,
         size_sd=sd * [size.scale for size in point.hypothesis.sizes],

@@ -16,6 +16,10 @@ from identification.gap.verdict import Ranked
 LISTED = 10
 """Causes in the file."""
 
+SYSTEMATIC = 0.07
+"""Relative standard deviation of a size by the form's error that the recordings cannot show: what errs
+everywhere alike looks like another size."""
+
 
 def as_json(diagnosis: Diagnosis, next_experiment: str = "") -> dict[str, Any]:
     """JSON-ready; figures as in docs/gap.md."""
@@ -66,12 +70,13 @@ def values(diagnosis: Diagnosis, found: Assessed) -> dict[str, float]:
 def magnitudes(found: Assessed) -> dict[str, tuple[float, float, float]]:
     """Value and ends of the 90 % interval of each size, by symbol_unit [SI]."""
     quantile = norm.ppf(0.5 + LEVEL / 2)
+    form = SYSTEMATIC if any(not cause.exact for cause in found.point.hypothesis.causes) else 0.0
     sizes = found.point.hypothesis.sizes
     vector = found.point.vector[len(found.point.vector) - len(sizes) :]
     result = {}
     for size, scaled, sd in zip(sizes, vector, found.size_sd, strict=True):
         value = float(scaled * size.scale)
-        margin = float(quantile * np.hypot(sd, found.form_error * (value - size.off)))
+        margin = float(quantile * np.hypot(sd, form * (value - size.off)))
         low, high = sorted((size.low, size.high))
         result[f"{size.symbol}_{unit_name(size.unit)}"] = (
             value,

@@ -65,13 +65,21 @@ class Draws:
             percent=percent,
         )
 
-    def share(self, base: str, label: str) -> Interval:
+    def share(self, base: str, label: str, *also: tuple[str, str]) -> Interval:
         """Share of the base's gap above the floor that a model closes, Fieller's interval in 0 to 1.
 
         A share f is kept unless nearly all draws have the part that is closed on one side of
         f (base - floor); so every share is kept where there may be nothing to close. Ends are rounded
-        outwards.
+        outwards. also: other pairs of base and model that judge the same; the interval holds theirs too.
         """
+        every = [self._share(*pair) for pair in ((base, label), *also)]
+        return Interval(
+            value=every[0].value,
+            low=min(found.low for found in every),
+            high=max(found.high for found in every),
+        )
+
+    def _share(self, base: str, label: str) -> Interval:
         whole, closed = self.overall(base) - FLOOR, self.overall(base) - self.overall(label)
         value = float(np.clip(closed[0] / whole[0], 0, 1)) if whole[0] > 0 else 0.0
         less = np.mean(closed[1:, None] < SHARES * whole[1:, None], axis=0)

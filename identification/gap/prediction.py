@@ -25,6 +25,8 @@ class Prediction:
     residuals: list[NDArray]
     """Per run (channels, samples): measured - model in noise deviations, 0 where readings do not count;
     tolerances as the fitted runs have them, each run with its own start."""
+    as_recorded: list[NDArray]
+    """The same, but every run begins as it was recorded: no start follows what the model lacks."""
 
 
 def predict(fitter: Fitter, point: Point) -> Prediction:
@@ -38,10 +40,17 @@ def predict(fitter: Fitter, point: Point) -> Prediction:
         local = local + np.array([freed(run, shared)[1][:own] for run in runs])
     outputs, runs = _linear(fitter, point, local)
     shared = normal([runs[r] for r in fitter.fitted]).shared
-    residuals = [
-        freed(run, shared)[0].reshape(plant.runs[r].measured.shape) for r, run in enumerate(runs)
-    ]
-    return Prediction(outputs=outputs, residuals=residuals)
+    shapes = [run.measured.shape for run in plant.runs]
+    return Prediction(
+        outputs=outputs,
+        residuals=[
+            freed(run, shared)[0].reshape(shape) for run, shape in zip(runs, shapes, strict=True)
+        ],
+        as_recorded=[
+            (run.residual - run.shared @ shared).reshape(shape)
+            for run, shape in zip(runs, shapes, strict=True)
+        ],
+    )
 
 
 def percent(plant: GreyBox, outputs: list[NDArray]) -> Mapping[str, float] | None:

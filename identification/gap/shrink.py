@@ -1,7 +1,8 @@
 """How far the gap shrinks on held-out runs: nominal, recalibrated, with each cause, black-box ceiling.
 
 Every model is treated alike: tolerances as the fitted runs tell them, each run with its own start, the
-same draws of the block bootstrap.
+same draws of the block bootstrap. A start may follow what a model lacks; so the interval of a share also
+holds what is found when every run begins as it was recorded.
 """
 
 from collections.abc import Mapping
@@ -74,14 +75,22 @@ def shrinkage(
         f"{label} + black box": [y - p for y, p in zip(residuals[label], box, strict=True)]
         for label, box in boxes.items()
     }
-    draws = Draws(plant, {**residuals, **boxed}, seed)
+    recorded = {_recorded(label): prediction.as_recorded for label, prediction in found.items()}
+    draws = Draws(plant, {**residuals, **boxed, **recorded}, seed)
     return Shrinkage(
         gaps={label: draws.gap(label, percent(plant, found[label].outputs)) for label in points},
-        shrink={label: draws.share(RECALIBRATED, label) for label in causes},
+        shrink={
+            label: draws.share(RECALIBRATED, label, (_recorded(RECALIBRATED), _recorded(label)))
+            for label in causes
+        },
         black_box_floor=draws.gap(f"{RECALIBRATED} + black box"),
         unexplained=_unexplained(draws, best, p_value(plant, residuals[best], boxes[best], seed)),
         noise={c.name: float(n) for c, n in zip(plant.channels, draws.noise[0], strict=True)},
     )
+
+
+def _recorded(label: str) -> str:
+    return f"{label}, starts as recorded"
 
 
 def _unexplained(draws: Draws, best: str, significance: float) -> Unexplained:

@@ -1,6 +1,6 @@
 """Which cause: screening, joint refits of singles and pairs, probabilities."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -23,12 +23,16 @@ Half as many pairs."""
 ALIKE = 0.8
 """Correlation with a finalist's signature above which a cause that was screened out is refitted."""
 
-PARTNERS = 4
+PARTNERS = 8
 """Causes that are tried beside each of the best two, where one cause leaves too much."""
 
 SMALL = 0.005
 """Share of the recalibrated model's squared misfit up to which what a cause leaves is its form's error:
-some 7 % in amplitude. No second cause is sought for it."""
+some 7 % in amplitude. No second cause is sought for it, unless it is CLEAR."""
+
+CLEAR = 500.0
+"""Log evidence by which a leftover without a name beats errors of the form, where a second cause is
+sought however small the leftover: a form errs along with its cause, another cause acts on its own."""
 
 CLOSED = 0.3
 """Share of what a cause leaves that a pair may leave at most, to be more than that cause alone."""
@@ -77,8 +81,9 @@ def which(plant: GreyBox, fits: Fits | None = None) -> Verdicts:
         more = fits("causes like the best", lambda: _refit(fitter, base, like))
         singles = _ranked([*singles, *assess(fitter, more)])
     none = _finals(fitter, assess(fitter, [base]), (1, 1), "recalibration", fits)[0]
+    begun = {single.name: single.point for single in singles}
     singles = _finals(fitter, singles, FINALISTS, "causes", fits)
-    pairs = _without_twins(_pairs(fitter, none, singles, fits))
+    pairs = _without_twins(_pairs(fitter, none, singles, begun, fits))
     pairs = _finals(fitter, _ranked(pairs), [n // 2 for n in FINALISTS], "pairs", fits)
     return _weighed(fitter, none, singles, pairs, separable)
 
@@ -127,22 +132,32 @@ def _finals(
     return found
 
 
-def _pairs(fitter: Fitter, none: Assessed, singles: list[Assessed], fits: Fits) -> list[Assessed]:
-    """Pairs that explain what the best causes leave, where that is predictable and more than SMALL.
+def _pairs(
+    fitter: Fitter,
+    none: Assessed,
+    singles: list[Assessed],
+    begun: Mapping[tuple[str, ...], Point],
+    fits: Fits,
+) -> list[Assessed]:
+    """Pairs that explain what the best causes leave, where that is predictable and not SMALL, or CLEAR.
 
     A pair must close a good part of what its better half leaves: where forms err, any further number
-    lowers the misfit a little.
+    lowers the misfit a little. begun: where each cause was before its nuisances followed what it lacks;
+    from there a partner is seen best.
     """
-    if not singles or singles[0].with_leftover <= singles[0].log_evidence:
+    if not singles:
         return []
+    best = singles[0]
+    predictable = best.with_leftover - best.log_evidence
     floor = min(0.0, *(found.excess for found in (none, *singles)))
-    if singles[0].excess - floor <= SMALL * (none.excess - floor):
+    small = best.excess - floor <= SMALL * (none.excess - floor)
+    if predictable <= (CLEAR if small else 0.0):
         return []
     found = []
     for single in singles[:2]:
         left = single.excess - floor
-        if single is singles[0] or left <= RIVAL * (singles[0].excess - floor):
-            both = assess(fitter, _partners(fitter, single.point, fits))
+        if single is best or left <= RIVAL * (best.excess - floor):
+            both = assess(fitter, _partners(fitter, begun[single.name], fits))
             found += [pair for pair in both if pair.excess - floor <= CLOSED * left]
     return found
 

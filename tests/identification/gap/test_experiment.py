@@ -124,7 +124,8 @@ def judged(fitter: Fitter, plan: Gauge, rivals: Rivals, count: int) -> tuple[flo
     predicting = Fitter(
         plan, frames(Fitter(plan), rivals.points[:1], [np.zeros(len(plan.tolerances))])[0]
     )
-    predicted = [lines[0] for lines in predicting.linearise(rivals.points, [0])]
+    planned = [replace(point, frame=None) for point in rivals.points]
+    predicted = [lines[0] for lines in predicting.linearise(planned, [0])]
     campaign = fitter.linearise(rivals.points, fitter.fitted)
     found = []
     for right, (point, known) in enumerate(
