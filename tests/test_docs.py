@@ -22,6 +22,7 @@ OTHERS = (
     "docs/component-data.md",
     "docs/gap.md",
     "docs/circle.md",
+    "docs/deploy.md",
 )
 """Pages without examples."""
 HEADLESS = {**os.environ, "SDL_VIDEODRIVER": "dummy"}

@@ -1,0 +1,62 @@
+/* $title
+ *
+ * The policy in single precision. Plain C99: no library, no heap, no global that changes.
+ * $source
+ *
+ * Once every control period, right after the sensors were read:
+ *
+ *     static epv_float_memory memory;                  // zeros: nothing remembered yet
+ *     epv_float_readings now = {p1, p2, p3, current, target, coil};
+ *     coil = epv_float_step(&memory, &now);            // 1: energise for the coming period
+ */
+#ifndef EPV_FLOAT_H
+#define EPV_FLOAT_H
+
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define EPV_FLOAT_INPUTS $inputs
+#define EPV_FLOAT_HISTORY $history
+#define EPV_FLOAT_PERIOD_US $period_us
+
+/* What the control unit knows at the end of a period. */
+typedef struct {
+    float p1;      /* reservoir pressure, bar absolute */
+    float p2;      /* circuit pressure, bar absolute */
+    float p3;      /* control pressure, bar absolute */
+    float current; /* of the solenoid, A */
+    float target;  /* wanted circuit pressure, bar absolute */
+    uint8_t coil;  /* 1: the coil was energised in the period that has just ended, 0: it was not */
+} epv_float_readings;
+
+/* What one valve's controller remembers. Keep one for each valve; set to zero, it begins anew and
+ * takes the first readings for its past. */
+typedef struct {
+    float p2[EPV_FLOAT_HISTORY]; /* rings of the latest readings, bar */
+    float p3[EPV_FLOAT_HISTORY];
+    uint16_t waited; /* periods since the coil was switched, saturating */
+    uint8_t newest;  /* place of the newest readings in the rings */
+    uint8_t coil;
+    uint8_t begun;
+} epv_float_memory;
+
+/* One period: remember the readings, return what the coil shall do next (0 off, 1 on). */
+int epv_float_step(epv_float_memory *memory, const epv_float_readings *now);
+
+/* Its two halves: readings to observation (contract.json has the order), observation to decision.
+ * A reading that is not a number gives 1: the valve shuts. */
+void epv_float_observe(epv_float_memory *memory, const epv_float_readings *now,
+                       float observation[EPV_FLOAT_INPUTS]);
+int epv_float_decide(const float observation[EPV_FLOAT_INPUTS]);
+
+/* What the decision compares: {off, on}. */
+void epv_float_logits(const float observation[EPV_FLOAT_INPUTS], float logits[2]);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

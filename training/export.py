@@ -1,0 +1,162 @@
+"""Export a trained policy for an electronic control unit.
+
+    python training/export.py runs/ppo --out runs/ecu
+
+writes the policy as ONNX, as C99 in single precision and in integers, the contract, and a parity test,
+but only after the C code was compiled here and agreed with the policy on every one of 10,000 states.
+docs/deploy.md says what each file is.
+"""
+
+import argparse
+import hashlib
+import json
+import os
+import sys
+import tempfile
+from ctypes import CDLL
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+from controllers.learned import CONTRACT_FILE, WEIGHTS_FILE, LearnedPolicy, load_policy
+from epv_env.plant.commandline import fail_clearly, writable_folder
+from training.ecu import measure
+from training.ecu.compiled import CompiledPolicy, find_compiler, library
+from training.ecu.contract import deployment_contract
+from training.ecu.folder import check_free, write_folder
+from training.ecu.onnx_model import onnx_model
+from training.ecu.quantise import ExportError, quantise
+from training.ecu.sources import Export, checks, sources
+from training.ecu.states import states_table, visit
+from training.ecu.summary import as_text
+
+CALIBRATION_SEED = 6_000_000
+"""First seed of the episodes on whose states the integers are calibrated."""
+STATES_SEED = 7_000_000
+"""First seed of the episodes on whose states the code is compared."""
+CLOSED_LOOP_SEED = 8_000_000
+"""First seed of the episodes that the compiled code controls."""
+EPISODES, PERIODS = 20, 500
+"""10,000 states: so many episodes of so many control periods (2.5 s)."""
+
+FILES = {
+    "policy.onnx", "epv_float.h", "epv_float.c", "epv_fixed.h", "epv_fixed.c", "contract.json",
+    "states.csv", "states.h", "parity.c", "bench.c", "report.json",
+}  # fmt: skip
+"""What an export consists of."""
+BUILT = {"parity", "bench"}
+"""What its reader builds there, and another export may sweep away."""
+
+
+def parse(arguments: list[str] | None) -> argparse.Namespace:
+    """The command line's options, checked."""
+    parser = argparse.ArgumentParser(
+        description="Export a trained policy for an electronic control unit."
+    )
+    parser.add_argument("policy", type=Path, help=f"folder with {WEIGHTS_FILE} and {CONTRACT_FILE}")
+    parser.add_argument("--out", type=writable_folder, required=True, help="folder to write")
+    parser.add_argument(
+        "--compiler", default=os.environ.get("CC", "cc"), help="C compiler (default: cc)"
+    )
+    parser.add_argument("--episodes", type=int, default=256, help="episodes under the compiled code")
+    parser.add_argument("--duration", type=float, default=10.0, help="length of one of them [s]")
+    chosen = parser.parse_args(arguments)
+    for name in ("episodes", "duration"):
+        if not getattr(chosen, name) > 0:
+            parser.error(f"--{name} must be positive")
+    return chosen
+
+
+def prepare(policy: LearnedPolicy, folder: Path) -> tuple[Export, dict[str, Any]]:
+    """The policy with its integers, and its contract. Raises ExportError for another kind of policy."""
+    check(policy, folder)
+    content = json.loads((folder / CONTRACT_FILE).read_text(encoding="utf-8"))
+    digest = hashlib.sha256((folder / WEIGHTS_FILE).read_bytes()).hexdigest()
+    calibration = visit(policy, first_seed=CALIBRATION_SEED, episodes=EPISODES, periods=PERIODS)
+    export = Export(
+        policy=policy,
+        fixed=quantise(policy, calibration.flat),
+        period=content["observation"]["control_period_s"],
+        weights_sha256=digest,
+    )
+    return export, deployment_contract(export, provenance=content.get("provenance", {}))
+
+
+def check(policy: LearnedPolicy, folder: Path) -> None:
+    """Raises ExportError if the policy does not decide between off and on, or is damaged."""
+    outputs = len(policy.layers[-1][1])
+    if policy.environment != "EPValve-v0" or outputs != 2:
+        raise ExportError(
+            f"the policy in {folder} decides {outputs} things in {policy.environment}: only decisions "
+            "between off and on (EPValve-v0) can be exported"
+        )
+    if not all(np.all(np.isfinite(array)) for layer in policy.layers for array in layer):
+        raise ExportError(f"the policy in {folder} has weights that are not finite: train it anew")
+
+
+def verify(
+    export: Export, compiler: list[str], chosen: argparse.Namespace
+) -> tuple[dict[str, str], dict[str, Any]]:
+    """The C files by name and the report, once compiled code has passed. Raises ExportError."""
+    policy = export.policy
+    states = visit(policy, first_seed=STATES_SEED, episodes=EPISODES, periods=PERIODS)
+    files = sources(export)
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        put(folder, files)
+        code = library(compiler, folder)
+        agreement = measure.agreement(policy, code, states)
+        fixed_actions = measure.follow(CompiledPolicy(code=code, variant="fixed"), states)
+        agreement["fixed_agrees"] = int(np.sum(fixed_actions == states.actions))
+        margins = measure.margins(policy, states.flat, np.float64)
+        tests = checks(states.actions.size, rounding=agreement["rounding_of_c"])
+        tests["states.csv"] = states_table(states, margins, fixed_actions)
+        put(folder, tests)
+        measure.run_parity(compiler, folder)
+        report = {
+            "agreement": agreement,
+            "closed_loop": closed_loop(policy, code, chosen),
+            "microseconds": measure.run_bench(compiler, folder),
+            "machine": measure.machine(compiler),
+        }
+    return files | tests, report
+
+
+def put(folder: Path, files: dict[str, str]) -> None:
+    """Write texts into a folder that nobody else sees."""
+    for name, text in files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+
+
+def closed_loop(policy: LearnedPolicy, code: CDLL, chosen: argparse.Namespace) -> dict[str, Any]:
+    """The figures of the compiled code in closed loop, with a progress bar."""
+    seeds = list(range(CLOSED_LOOP_SEED, CLOSED_LOOP_SEED + chosen.episodes))
+    with tqdm(total=100, desc="closed loop", bar_format="{l_bar}{bar}| {elapsed}<{remaining}") as bar:
+
+        def show(share: float) -> None:
+            bar.update(100 * share - bar.n)
+
+        figures = measure.closed_loop(policy, code, seeds=seeds, duration=chosen.duration, progress=show)
+    return {"episodes": chosen.episodes, "duration_s": chosen.duration, "controllers": figures}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Command line; returns the exit status."""
+    chosen = parse(arguments)
+    check_free(chosen.out, FILES | BUILT)
+    compiler = find_compiler(chosen.compiler)
+    export, contract = prepare(load_policy(chosen.policy), chosen.policy)
+    files, report = verify(export, compiler, chosen)
+    files["contract.json"] = json.dumps(contract, indent=1) + "\n"
+    files["report.json"] = json.dumps(report, indent=1) + "\n"
+    content = {name: text.encode("utf-8") for name, text in files.items()}
+    content["policy.onnx"] = onnx_model(export.policy, period=export.period).SerializeToString()
+    write_folder(chosen.out, content)
+    print(f"{as_text(report, contract)}\nwritten to {chosen.out}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(fail_clearly(main))
