@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError
 from safetensors.numpy import load_file
 
+from controllers.dense import dense
 from epv_env.observation import contract
 
 FORMAT = "epv-policy/1"
@@ -42,9 +43,8 @@ class LearnedPolicy:
         """The action with the largest logit for each valve."""
         signal = observations.astype(np.float32)
         for weight, bias in self.layers[:-1]:
-            signal = np.tanh(signal @ weight.T + bias)
-        weight, bias = self.layers[-1]
-        return np.argmax(signal @ weight.T + bias, axis=1)
+            signal = np.tanh(dense(signal, weight, bias))
+        return np.argmax(dense(signal, *self.layers[-1]), axis=1)
 
 
 def load_policy(folder: str | PathLike[str]) -> LearnedPolicy:
@@ -66,6 +66,11 @@ def load_policy(folder: str | PathLike[str]) -> LearnedPolicy:
         raise PolicyError(
             f"policy {folder} has format {content.get('format')!r}, this version reads {FORMAT!r}: "
             "train it anew"
+        )
+    missing = {"environment", "layers", "observation"} - content.keys()
+    if missing:
+        raise PolicyError(
+            f"policy {folder} lacks {', '.join(sorted(missing))} in {CONTRACT_FILE}: train it anew"
         )
     expected = contract(content["observation"]["control_period_s"])
     if content["observation"] != json.loads(json.dumps(expected)):
