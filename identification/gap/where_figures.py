@@ -34,7 +34,7 @@ def heat_map(gaps: Sequence[RegimeGap]) -> Figure:
     for gap in gaps:
         axes.text(
             regimes.index(gap.regime), channels.index(gap.channel),
-            f"{gap.gap:.2g}{'' if gap.held_out else '*'}\n{_interval(gap)}",
+            f"{_brief(gap.gap)}{'' if gap.held_out else '*'}\n{_interval(gap)}",
             ha="center", va="center", fontsize=8, color="white" if norm(gap.gap) > 0.7 else "black",
         )  # fmt: skip
     axes.set_xticks(range(len(regimes)), [name.replace("_", "\n") for name in regimes], fontsize=9)
@@ -46,7 +46,12 @@ def heat_map(gaps: Sequence[RegimeGap]) -> Figure:
 
 
 def _interval(gap: RegimeGap) -> str:
-    return f"{gap.low:.2g} - {gap.high:.2g}" if np.isfinite(gap.high) else "too rare"
+    return f"{_brief(gap.low)} - {_brief(gap.high)}" if np.isfinite(gap.high) else "too rare"
+
+
+def _brief(gap: float) -> str:
+    """Two digits, or what it takes."""
+    return f"{gap:.1f}" if gap < 9.95 else f"{gap:.0f}"
 
 
 def residual_figure(plant: GreyBox, run: int, residual: NDArray, masks: Mapping[str, NDArray]) -> Figure:
