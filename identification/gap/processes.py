@@ -119,8 +119,8 @@ def _course(told: _Told, material: Material, kind: str) -> Course:
     strength, axes = np.linalg.eigh(told.root.T @ full)
     strength = np.maximum(strength, 0.0)
     pull = axes.T @ told.pull
-    usual = float(np.sum(strength)) / max(len(strength), 1)  # no reading may tell of this forcing
-    amplitude = AMPLITUDES / max(usual, np.finfo(float).tiny)
+    # Where no reading tells of this forcing there is no strength, and any amplitude will do.
+    amplitude = AMPLITUDES / (np.mean(strength) if np.any(strength) else 1.0)
     shrunk = amplitude[:, None] / (1.0 + amplitude[:, None] * strength)
     explained = (shrunk * strength) @ pull**2
     n, chi_square = material.count, material.chi_square
