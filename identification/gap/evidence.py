@@ -44,8 +44,8 @@ class Assessed:
     """Log evidence of the hypothesis beside a misfit without a name."""
     tolerances: NDArray
     """What the fitted runs say of them, in standard deviations from their centres, (m,)."""
-    size_sd: NDArray
-    """Standard deviations of the sizes [SI]."""
+    covariance: NDArray
+    """Of the calibrated parameters and the sizes, all else free, (k, k) [SI]."""
     converged: bool
 
     @property
@@ -65,6 +65,12 @@ class Assessed:
             if min(value - low, high - value) < margin and abs(value - size.off) > margin:
                 return True
         return False
+
+    @property
+    def size_sd(self) -> NDArray:
+        """Standard deviations of the sizes [SI]."""
+        deviations = np.sqrt(np.diag(self.covariance))
+        return deviations[len(deviations) - len(self.point.hypothesis.sizes) :]
 
     @property
     def name(self) -> tuple[str, ...]:
@@ -98,19 +104,20 @@ def _assessed(fitter: Fitter, point: Point, runs: Sequence[Linear]) -> Assessed:
         axis=0,
     )
     fitted = normal([runs[r] for r in fitter.fitted])
-    sd = _size_sd(point, fitted)
+    covariance = _covariance(fitted)
+    scales = [size.scale for size in fitter.sizes(point)]
     shaped = [
         residual.reshape(run.measured.shape)
         for residual, run in zip(residuals, fitter.plant.runs, strict=True)
     ]
-    price = _occam(point, sd) + 0.5 * strain
+    price = _occam(point, np.sqrt(np.diag(covariance))) + 0.5 * strain
     return Assessed(
         point=point,
         residuals=shaped,
         log_evidence=float(logsumexp(-0.5 * misfits) - np.log(len(misfits))) - price,
         with_leftover=generic_log_evidence(fitter, shaped) - price,
         tolerances=fitted.shared,
-        size_sd=sd * [size.scale for size in point.hypothesis.sizes],
+        covariance=covariance * np.outer(scales, scales),
         converged=point.converged,
     )
 
@@ -199,16 +206,14 @@ def _misfits(fitter: Fitter, r: int, residual: NDArray, effects: NDArray) -> NDA
     return total
 
 
-def _size_sd(point: Point, equations: Normal) -> NDArray:
-    """Standard deviations of the scaled sizes, all else free."""
-    k, sizes = len(point.vector), len(point.hypothesis.sizes)
-    covariance = np.linalg.inv(equations.hessian + 1e-9 * np.eye(k))
-    return np.sqrt(np.diag(covariance)[k - sizes :])
+def _covariance(equations: Normal) -> NDArray:
+    """Of the scaled vector, all else free."""
+    return np.linalg.inv(equations.hessian + 1e-9 * np.eye(len(equations.hessian)))
 
 
 def _occam(point: Point, sd: NDArray) -> float:
     """What a fitted size costs: its range over what the data leave of it (Laplace)."""
     sizes = point.hypothesis.sizes
     widths = np.array([abs(size.high - size.low) / size.scale for size in sizes])
-    left = np.minimum(np.sqrt(2 * np.pi) * sd, widths)
+    left = np.minimum(np.sqrt(2 * np.pi) * sd[len(sd) - len(sizes) :], widths)
     return float(np.sum(np.log(widths / left)))

@@ -4,6 +4,7 @@ import re
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import norm
 
 from identification.gap.bootstrap import LEVEL
@@ -70,13 +71,12 @@ def values(diagnosis: Diagnosis, found: Assessed) -> dict[str, float]:
 def magnitudes(found: Assessed) -> dict[str, tuple[float, float, float]]:
     """Value and ends of the 90 % interval of each size, by symbol_unit [SI]."""
     quantile = norm.ppf(0.5 + LEVEL / 2)
-    form = SYSTEMATIC if any(not cause.exact for cause in found.point.hypothesis.causes) else 0.0
     sizes = found.point.hypothesis.sizes
     vector = found.point.vector[len(found.point.vector) - len(sizes) :]
+    deviations = np.sqrt(np.diag(covariance(found)))[len(found.point.vector) - len(sizes) :]
     result = {}
-    for size, scaled, sd in zip(sizes, vector, found.size_sd, strict=True):
-        value = float(scaled * size.scale)
-        margin = float(quantile * np.hypot(sd, form * (value - size.off)))
+    for size, scaled, sd in zip(sizes, vector, deviations, strict=True):
+        value, margin = float(scaled * size.scale), float(quantile * sd)
         low, high = sorted((size.low, size.high))
         result[f"{size.symbol}_{unit_name(size.unit)}"] = (
             value,
@@ -84,6 +84,17 @@ def magnitudes(found: Assessed) -> dict[str, tuple[float, float, float]]:
             min(value + margin, high),
         )
     return result
+
+
+def covariance(found: Assessed) -> NDArray:
+    """Of calibrated parameters and sizes (k, k) [SI], with the errors of form that no recording shows."""
+    exact = [cause.exact for cause in found.point.hypothesis.causes for _ in cause.sizes]
+    sizes = found.point.hypothesis.sizes
+    first = len(found.point.vector) - len(sizes)
+    form = np.zeros(len(found.point.vector))
+    for i, (size, known) in enumerate(zip(sizes, exact, strict=True), start=first):
+        form[i] = 0.0 if known else SYSTEMATIC * (found.point.vector[i] * size.scale - size.off)
+    return found.covariance + np.diag(form**2)
 
 
 def unit_name(unit: str) -> str:

@@ -7,13 +7,16 @@ from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
 
+from scipy.stats import chi2
+
 from epv_env.plant.files import write_text
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from epv_env.plant.region import Region
 from identification.bench.programme_file import save_programmes
 from identification.gap.diagnosis import Diagnosis, diagnose, label
-from identification.gap.export import as_json, values
+from identification.gap.evidence import inflation
+from identification.gap.export import as_json, covariance, values
 from identification.gap.fits import Fits
 from identification.gap.section import sections
 from identification.gap_valve.programmes import FILE_NAME as PROGRAMME
@@ -24,6 +27,9 @@ from identification.recordings.files import read_campaign
 from identification.report.page import write_page
 
 GAP, REPORT, PLANT, JOURNAL = "gap.json", "report.html", "plant.json", "fits.jsonl"
+
+JOINT = 0.95
+"""Probability that the plant file's region holds."""
 
 STEPS = 18
 """Of a diagnosis with pairs; without, two of them are left out."""
@@ -74,14 +80,24 @@ def _report(found: Diagnosis, valve: Valve, name: str, out: Path, steps: Callabl
 
 
 def refitted_plant(found: Diagnosis, valve: Valve, name: str) -> Plant:
-    """The plant refitted together with the cause that the verdict names, else recalibrated."""
+    """The plant refitted together with the cause that the verdict names, else recalibrated.
+
+    Its region is where the recordings leave the four parameters and the sizes, jointly; autocorrelated
+    residuals widen it.
+    """
     named = found.conclusion.ambiguity[:1]
-    fitted = values(found, named[0].found if named else found.verdicts.none)
-    parameters = Parameters({**valve.base, **fitted})
+    best = named[0].found if named else found.verdicts.none
+    parameters = Parameters({**valve.base, **values(found, best)})
+    symbols = tuple(size.symbol for size in found.verdicts.fitter.sizes(best.point))
     return Plant(
         parameters=parameters,
-        region=Region(centre=parameters),
-        name=f"{name} with {label(named[0].found)}" if named else f"{name}, recalibrated",
+        region=Region(
+            centre=parameters,
+            symbols=symbols,
+            covariance=covariance(best) * inflation(found.verdicts.fitter, best.residuals),
+            chi_square=float(chi2.ppf(JOINT, len(symbols))),
+        ),
+        name=f"{name} with {label(best)}" if named else f"{name}, recalibrated",
         provenance={
             "method": "joint refit with the cause of the gap" if named else "recalibration",
             "software": f"epv-valve {version('epv-valve')}",

@@ -92,7 +92,7 @@ def test_what_is_left_is_located_only_where_something_is():
 
 def test_an_interval_stays_within_the_physical_range():
     found = diagnosed("known").conclusion.causes[0].found
-    wide = replace(found, size_sd=np.full(1, 1.0))
+    wide = replace(found, covariance=np.eye(len(found.point.vector)))
     size = wide.point.hypothesis.sizes[0]
     ((_, low, high),) = magnitudes(wide).values()
     assert (low, high) == (size.low, size.high)

@@ -66,6 +66,16 @@ def test_its_plant_file_goes_into_the_environment(diagnosed):
     assert np.all(np.isfinite(observation))
 
 
+def test_the_plant_file_knows_how_sure_it_is(diagnosed):
+    """Its region spreads the four and the size together; the bench's true plant is not far off."""
+    region = load_plant(diagnosed / "out" / "plant.json").region
+    assert region.symbols == ("alphaMV", "alphaPV", "RML", "R", "G_eddy")
+    drawn = [region.draw(np.random.default_rng(seed)) for seed in range(50)]
+    spread = np.std([plant["G_eddy"] for plant in drawn]) / 4e-3
+    assert 0.02 < spread < 0.2
+    gymnasium.make("EPValve-v0", plant=str(diagnosed / "out" / "plant.json"), parameters="confidence")
+
+
 def test_finished_fits_are_taken_up_again(diagnosed, monkeypatch, tmp_path):
     first = json.loads((diagnosed / "out" / "gap.json").read_text())
 
