@@ -4,6 +4,8 @@ from typing import Protocol
 
 from numpy.typing import NDArray
 
+from epv_env.task import LimitingTask
+
 
 class Controller(Protocol):
     """Decides for n valves at once from what an ECU can measure (epv_env.observation.LAYOUT)."""
@@ -19,4 +21,12 @@ class Controller(Protocol):
 
     def act(self, observations: NDArray) -> NDArray:
         """Actions for observations (n, entries), as the environment's action space wants them."""
+        ...
+
+
+class Privileged(Controller, Protocol):
+    """A controller that sees what no ECU measures: a bound for the others, not a rival."""
+
+    def watch(self, task: LimitingTask) -> None:
+        """See the episodes that have just begun; called after the environment's reset, before `act`."""
         ...

@@ -6,11 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.pwm_design import Design
+from controllers.statics import opening_pressure
 from epv_env.observation import decode
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.supply import BAR
-
-QUARTER_PI = np.pi / 4
 
 
 @dataclass(kw_only=True)
@@ -44,12 +43,6 @@ class PWM:
         self._integral = np.zeros(n)
         self._working = np.zeros(n, dtype=bool)
 
-    def opening_pressure(self, p1: NDArray, p2: NDArray) -> NDArray:
-        """p3 at which the protection valve begins to open [bar] (eq. 22 at rest)."""
-        p = self.parameters
-        piston, seat = QUARTER_PI * p["d1"] ** 2, QUARTER_PI * p["d2"] ** 2
-        return p1 - ((p1 - p2) * seat + p["cPV"] * p["xPV0"] / BAR) / piston
-
     def act(self, observations: NDArray) -> NDArray:
         """Actions (n, 1) in [-1, 1]: 2 duty - 1."""
         error = decode(observations, "p2_error")
@@ -59,7 +52,8 @@ class PWM:
 
         deviation = error - self.setpoint
         asked = self.design.outer_gain * (deviation + self._integral)
-        wanted_p3 = self.opening_pressure(p1, p2) + np.maximum(asked, -self.depth)
+        opening = opening_pressure(self.parameters, p1 * BAR, p2 * BAR) / BAR
+        wanted_p3 = opening + np.maximum(asked, -self.depth)
         duty = self.design.duty + self.design.inner_gain * (wanted_p3 - p3)
         duty = np.where(self._working, duty, 1.0)
         inside = (

@@ -63,6 +63,10 @@ class Design:
     """Degrees."""
     crossover: float
     """Gain crossover [rad/s]."""
+    point: OperatingPoint
+    """Where the valve was linearised."""
+    period: float
+    """Of the PWM [s]."""
 
     def __str__(self) -> str:
         return (
@@ -141,6 +145,20 @@ def outer_loop(
     return -pi * closed(z)
 
 
+def response(
+    point: OperatingPoint, inner_gain: float, integral_time: float, period: float
+) -> control.FrequencyResponseData:
+    """`outer_loop` from 0.1 rad/s to half the sampling frequency, as python-control takes it."""
+    frequency = np.geomspace(0.1, np.pi / period, 400)
+    z = np.exp(1j * frequency * period)
+    return control.frd(outer_loop(point, inner_gain, integral_time, period, z), frequency)
+
+
+def open_loop(d: Design) -> control.FrequencyResponseData:
+    """Frequency response of a design's open loop, from p2's error to p2."""
+    return d.outer_gain * response(d.point, d.inner_gain, d.integral_time, d.period)
+
+
 def design(
     p: Parameters,
     *,
@@ -161,16 +179,15 @@ def design(
     point = linearise(p, p1=p1, p2=p2)
     pole, drift = np.exp(-period / inner_time), np.exp(point.a * period)
     lag = switching_lag(p, p1=p1, p2=p2, supply_voltage=supply_voltage)
-    inner_gain = (drift - pole) / ((drift - 1) / point.a * point.b / BAR)
-    frequency = np.geomspace(0.1, np.pi / period, 400)
-    unit = outer_loop(point, inner_gain, integral_time, period, np.exp(1j * frequency * period))
+    inner_gain = float((drift - pole) / ((drift - 1) / point.a * point.b / BAR))
+    unit = response(point, inner_gain, integral_time, period)
     for gain in np.geomspace(3.0, 1e-2, 40):
-        margin, phase, _, crossover = map(float, control.margin(control.frd(gain * unit, frequency)))
+        margin, phase, _, crossover = map(float, control.margin(gain * unit))
         if margin > 1 and phase >= phase_margin:
             return Design(
-                inner_gain=float(inner_gain), outer_gain=float(gain), integral_time=integral_time,
+                inner_gain=inner_gain, outer_gain=float(gain), integral_time=integral_time,
                 duty=point.duty + lag / period,
-                gain_margin=margin, phase_margin=phase, crossover=crossover,
+                gain_margin=margin, phase_margin=phase, crossover=crossover, point=point, period=period,
             )  # fmt: skip
     raise ValueError(
         f"no gain keeps a phase margin of {phase_margin:g} degrees with an integral time of "

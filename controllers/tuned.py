@@ -9,6 +9,9 @@ from typing import Any
 
 from controllers.base import Controller
 from controllers.hysteresis import Hysteresis
+from controllers.mpc import MPC
+from controllers.pulse import Pulse
+from controllers.pulse_table import pulse_table
 from controllers.pwm import PWM
 from controllers.pwm_design import design
 from epv_env.plant.files import write_text
@@ -37,6 +40,8 @@ class Tuning:
     """Evaluations spent."""
     mean_return: float
     """Mean return of the best on the tuning scenarios."""
+    episodes: int
+    """Episodes of one evaluation."""
 
 
 def build(kind: str, values: dict[str, Any], parameters: Parameters) -> Controller:
@@ -50,15 +55,28 @@ def build(kind: str, values: dict[str, Any], parameters: Parameters) -> Controll
         chosen = design(parameters, p1=DESIGN_P1, p2=DESIGN_P2, period=PWM_PERIOD, **shaped)
         rest = {name: value for name, value in values.items() if name not in shaped}
         return PWM(design=chosen, parameters=parameters, control_period=PWM_PERIOD, **rest)
+    if kind == "pulse":
+        return Pulse(table=pulse_table(parameters), **values)
+    if kind == "MPC":
+        return MPC(parameters=parameters, threads=1, **values)
     raise ControllersFileError(f"unknown controller {kind!r}: choose one of {', '.join(KINDS)}")
 
 
-KINDS = ("hysteresis", "hysteresis, extrapolating", "PWM")
-"""The classic controllers."""
+KINDS = ("hysteresis", "hysteresis, extrapolating", "PWM", "pulse", "MPC")
+"""The controllers that are tuned, not trained."""
 
 
 def load_tunings(path: str | PathLike[str] | None = None) -> dict[str, Tuning]:
     """Tunings by kind, from a file or (None) those that come with the package."""
+    return {kind: Tuning(**entry) for kind, entry in _content(path)["controllers"].items()}
+
+
+def load_search(path: str | PathLike[str] | None = None) -> dict[str, Any]:
+    """How the tunings of such a file were searched: method, budget, seed, plants."""
+    return _content(path)["search"]
+
+
+def _content(path: str | PathLike[str] | None) -> dict[str, Any]:
     if path is None:
         text = resources.files("controllers").joinpath("tuned.json").read_text(encoding="utf-8")
     else:
@@ -69,7 +87,7 @@ def load_tunings(path: str | PathLike[str] | None = None) -> dict[str, Tuning]:
             f"controllers file has format {content.get('format')!r}, this version reads {FORMAT!r}: "
             "tune anew with `python training/tune.py`"
         )
-    return {kind: Tuning(**entry) for kind, entry in content["controllers"].items()}
+    return content
 
 
 def save_tunings(tunings: dict[str, Tuning], path: str | PathLike[str], search: dict[str, Any]) -> None:

@@ -1,6 +1,7 @@
 """Tune the classic controllers: the same budget, scenarios and objective for each.
 
     python training/tune.py --trials 100 --out controllers/tuned.json
+    python training/tune.py --only pulse --out controllers/tuned.json    # keeps the file's others
 
 The objective is the mean return on the training scenarios, the very reward that PPO maximises.
 """
@@ -14,7 +15,7 @@ import optuna
 from optuna.trial import Trial
 from tqdm import tqdm
 
-from controllers.tuned import KINDS, Tuning, build, save_tunings
+from controllers.tuned import KINDS, Tuning, build, load_search, load_tunings, save_tunings
 from epv_env.observation import P2_LAGS
 from epv_env.plant.commandline import fail_clearly, writable_file
 from epv_env.plant.parameters import Parameters
@@ -25,6 +26,10 @@ TUNING_REGION = "ten_percent"
 
 TUNING_SEED = 1_000_000
 """First seed of the tuning scenarios; evaluations use others."""
+
+REDUCED = {"MPC": (16, 32)}
+"""Trials, and episodes of each, of kinds that simulate the plant as they decide: a thousandfold the
+computing of the others buys them less than an equal budget, not more."""
 
 
 def search_space(kind: str, trial: Trial) -> dict[str, Any]:
@@ -38,6 +43,22 @@ def search_space(kind: str, trial: Trial) -> dict[str, Any]:
             "setpoint": trial.suggest_float("setpoint", -0.3, 0.2),
             "engage_below": trial.suggest_float("engage_below", -0.4, 0.3),
             "rest_above": trial.suggest_float("rest_above", -0.3, 0.4),
+        }
+    if kind == "pulse":
+        return {
+            "trigger": trial.suggest_float("trigger", -0.3, 0.1),
+            "aim": trial.suggest_float("aim", -0.1, 0.3),
+            "filter_time": trial.suggest_float("filter_time", 0.004, 0.04, log=True),
+            "look_ahead": trial.suggest_float("look_ahead", 0.3, 1.5),
+            "rounding": trial.suggest_float("rounding", 0.2, 1.2),
+        }
+    if kind == "MPC":
+        return {
+            "tail": trial.suggest_float("tail", 0.02, 0.3, log=True),
+            "floor": trial.suggest_float("floor", -0.2, 0.0),
+            "upkeep": trial.suggest_float("upkeep", 5.0, 40.0),
+            "setpoint": trial.suggest_float("setpoint", -0.05, 0.15),
+            "reluctance": trial.suggest_float("reluctance", 0.0, 0.2),
         }
     values: dict[str, Any] = {
         "open_below": trial.suggest_float("open_below", -0.45, 0.3),
@@ -55,7 +76,9 @@ def tune(
 ) -> Tuning:
     """Search one kind of controller. Values that contradict each other cost a trial."""
     parameters = Parameters.calibrated()
-    seeds = list(range(TUNING_SEED, TUNING_SEED + episodes))
+    most_trials, most_episodes = REDUCED.get(kind, (trials, episodes))
+    trials, fewer = min(trials, most_trials), min(episodes, most_episodes)
+    seeds = list(range(TUNING_SEED, TUNING_SEED + fewer))
 
     def objective(trial: Trial) -> float:
         try:
@@ -74,7 +97,21 @@ def tune(
             bar.update()
 
         study.optimize(objective, n_trials=trials, callbacks=[count])
-    return Tuning(values=study.best_params, trials=trials, mean_return=study.best_value)
+    return Tuning(
+        values=study.best_params, trials=trials, mean_return=study.best_value, episodes=fewer
+    )  # fmt: skip
+
+
+def kept(path: Path, search: dict[str, Any]) -> dict[str, Tuning]:
+    """What a file holds already. Raises ValueError if that was searched otherwise: budgets are equal."""
+    if not path.exists():
+        return {}
+    if load_search(path) != search:
+        raise ValueError(
+            f"{path} was searched with {load_search(path)}, not {search}: search all kinds anew "
+            "(leave --only out), or choose another --out"
+        )
+    return load_tunings(path)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -85,13 +122,19 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--duration", type=float, default=6.0, help="length of an episode [s]")
     parser.add_argument("--seed", type=int, default=0, help="of the search")
     parser.add_argument("--out", type=writable_file, required=True, help="JSON file to write")
+    parser.add_argument("--only", choices=KINDS, nargs="+", help="kinds to search; --out keeps others")
     chosen = parser.parse_args(arguments)
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     options = {"parameters": TUNING_REGION}
     settings = {"trials": chosen.trials, "episodes": chosen.episodes, "duration": chosen.duration}
-    tunings = {kind: tune(kind, **settings, seed=chosen.seed, options=options) for kind in KINDS}
     search = {"method": "Optuna TPE on the mean return", **settings, "seed": chosen.seed, **options}
-    save_tunings(tunings, Path(chosen.out), search)
+    if chosen.only:
+        kept(chosen.out, search)  # before the work, since it may refuse
+    tunings = {
+        kind: tune(kind, **settings, seed=chosen.seed, options=options) for kind in chosen.only or KINDS
+    }
+    others = kept(chosen.out, search) if chosen.only else {}
+    save_tunings({**others, **tunings}, chosen.out, search)
     for kind, tuning in tunings.items():
         print(f"{kind}: mean return {tuning.mean_return:.1f} with {tuning.values}")
     return 0

@@ -7,19 +7,25 @@ import pytest
 
 from controllers.tuned import KINDS, ControllersFileError, Tuning, load_tunings, save_tunings
 
+pytest.importorskip("optuna")
+from training.tune import REDUCED
+
 pytestmark = pytest.mark.training
 
 
 def test_tunings_survive_a_round_trip(tmp_path):
-    tunings = {"hysteresis": Tuning(values={"open_below": -0.1}, trials=3, mean_return=-1.5)}
+    tunings = {"hysteresis": Tuning(values={"open_below": -0.1}, trials=3, mean_return=-1.5, episodes=4)}
     save_tunings(tunings, tmp_path / "t.json", {"seed": 0})
     assert load_tunings(tmp_path / "t.json") == tunings
 
 
-def test_every_classic_controller_was_tuned_with_the_same_budget():
+def test_every_controller_was_tuned_with_the_same_budget_or_a_stated_smaller_one():
     tunings = load_tunings()
     assert tuple(tunings) == KINDS
-    assert len({tuning.trials for tuning in tunings.values()}) == 1
+    full = {(t.trials, t.episodes) for kind, t in tunings.items() if kind not in REDUCED}
+    assert full == {(100, 128)}
+    for kind, budget in REDUCED.items():
+        assert (tunings[kind].trials, tunings[kind].episodes) == budget
 
 
 def test_another_version_is_refused(tmp_path):

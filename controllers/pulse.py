@@ -1,0 +1,93 @@
+"""Pulse control: the calibrated model, inverted, says how long the coil must be off.
+
+The idea is the report's own deactivation pulse (section 3), planned instead of fixed. The filter is the
+fading-memory g-h filter of Brookner, Tracking and Kalman Filtering Made Easy (1998), chapter 1.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controllers.pulse_table import PulseTable
+from epv_env.observation import decode
+
+
+@dataclass(kw_only=True)
+class Pulse:
+    """Raises p2 by pulses of a planned pressure, each from a trigger to an aim.
+
+    A pulse begins when p2 - target, extrapolated with the slope that consumption gives p2 to the instant
+    at which the vented control chamber would let the valve open, is below the trigger. While the coil is
+    off its remaining time is planned anew every period, from the measured pressures: what the model
+    foresaw wrongly is corrected until the last period. The coil switches at whole periods only, and one
+    period may be worth 200 mbar; `rounding` says which of two neighbouring instants is taken.
+
+    A pulse may follow another as soon as the valve has shut. If p3 is still low it opens the sooner, and
+    the extrapolation, being to that instant, waits the longer.
+    """
+
+    table: PulseTable
+    trigger: float
+    """Predicted p2 - target below which a pulse begins [bar]."""
+    aim: float
+    """p2 - target at which a pulse shall end [bar]."""
+    filter_time: float
+    """Time in which the weight of a reading of p2 fades by 1/e [s]."""
+    look_ahead: float
+    """Share of the time to open over which p2 is extrapolated."""
+    rounding: float
+    """Remaining time below which a pulse ends now, in periods: 0.5 rounds, 1 never exceeds the aim."""
+    control_period: float = 5e-3
+    name: str = "pulse"
+    environment: str = "EPValve-v0"
+    _on: NDArray = field(default_factory=lambda: np.ones(0, dtype=np.int64), repr=False)
+    _error: NDArray = field(default_factory=lambda: np.zeros(0), repr=False)
+    _slope: NDArray = field(default_factory=lambda: np.zeros(0), repr=False)
+    _was_shut: NDArray = field(default_factory=lambda: np.zeros(0, dtype=bool), repr=False)
+
+    def __post_init__(self) -> None:
+        if self.trigger >= self.aim:
+            raise ValueError(
+                f"trigger = {self.trigger:g} bar is not below aim = {self.aim:g} bar: a pulse only adds "
+                "pressure, give trigger < aim"
+            )
+
+    def reset(self, n: int) -> None:
+        """All coils on, no consumption known."""
+        self._on = np.ones(n, dtype=np.int64)
+        self._error = np.zeros(n)
+        self._slope = np.zeros(n)
+        self._was_shut = np.zeros(n, dtype=bool)
+
+    def act(self, observations: NDArray) -> NDArray:
+        """0 (off) or 1 (on) for each valve."""
+        error, target, p1, p3 = (
+            decode(observations, name).astype(float) for name in ("p2_error", "target", "p1", "p3")
+        )
+        p2 = error + target
+        opens_in = self.table.time_to_open(p1, p2, p3)
+        shut = opens_in > 0
+        self._estimate(error, shut)
+        falls = np.minimum(self._slope, 0.0)  # only consumption moves p2 behind a shut valve
+
+        ahead = self.look_ahead * (opens_in + self.table.release_lag)
+        begins = shut & (self._error + falls * ahead < self.trigger)
+        remaining = self.table.duration(p1, p2, p3, self.aim - self._error, falls)
+        ends = remaining < self.rounding * self.control_period
+        self._on = np.where(self._on == 1, np.where(begins, 0, 1), np.where(ends, 1, 0))
+        return self._on.copy()
+
+    def _estimate(self, error: NDArray, shut: NDArray) -> None:
+        """Follow p2 - target and its slope while the valve is shut; while it is open keep the slope.
+
+        shut: (n,) whether it is. The filter's gains are those of critical damping.
+        """
+        fading = np.exp(-self.control_period / self.filter_time)
+        expected = self._error + self._slope * self.control_period
+        surprise = error - expected
+        follows = shut & self._was_shut
+        self._error = np.where(follows, expected + (1 - fading**2) * surprise, error)
+        growth = (1 - fading) ** 2 * surprise / self.control_period
+        self._slope = self._slope + np.where(follows, growth, 0.0)
+        self._was_shut = shut

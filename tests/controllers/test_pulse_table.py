@@ -1,0 +1,132 @@
+"""The pulse table answers as a simulation of the same pulse does, forwards and backwards."""
+
+import numpy as np
+import pytest
+
+from controllers.pulse_table import STAY, pulse_table
+from controllers.statics import opening_pressure
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.simulate import energised
+from epv_env.plant.supply import BAR
+from epv_env.plant.valves import Valves
+
+pytestmark = pytest.mark.training
+CLOSE = 0.03
+"""What interpolating between the table's nodes may cost, on pulses of up to 0.6 bar [bar]."""
+
+
+@pytest.fixture(scope="module")
+def plant():
+    return Parameters.calibrated()
+
+
+@pytest.fixture(scope="module")
+def table(plant):
+    return pulse_table(plant)
+
+
+@pytest.fixture(scope="module")
+def cases():
+    """p1, p2, p3 between the table's nodes, p3 down to near where the valve opens [bar]."""
+    rng = np.random.default_rng(5)
+    p1, p2 = rng.uniform(10.5, 12.5, 200), rng.uniform(5.5, 9.3, 200)
+    p3 = p1 * rng.uniform(0.75, 1.0, 200)
+    return p1, p2, p3
+
+
+def pulsed(plant, p1, p2, p3, stay, *, at_rest=False):
+    """p2 added by a real pulse from an armature that has let go, or from rest with p3 = p1."""
+    valves = Valves(len(p1), threads=1)
+    valves.set_parameters(np.arange(len(p1)), plant)
+    start = energised(plant, p1=p1 * BAR, p2=p2 * BAR, U=24.0)
+    if not at_rest:
+        start = start._replace(p3=p3 * BAR, xMV=0.0, I=0.0, I_coil=0.0)
+    for field, value in zip(valves.state, start, strict=True):
+        field[:] = value
+    valves.advance(stay)
+    valves.inputs.U[:] = 24.0
+    valves.advance(60e-3)
+    assert not np.any(valves.state.xPV)
+    return valves.state.p2 / BAR - p2
+
+
+def test_gains_between_the_nodes_are_those_of_the_simulation(plant, table, cases):
+    p1, p2, p3 = cases
+    stay = table.time_to_open(p1, p2, p3) + np.linspace(-5e-3, 15e-3, len(p1))
+    added = pulsed(plant, p1, p2, p3, stay)
+    small = added < 0.6
+    assert np.sum(small) > 100
+    error = np.abs(table.gained(p1, p2, p3, stay) - added)
+    assert np.max(error[small]) < CLOSE
+    assert np.max(error / np.maximum(added, 0.6)) < 0.05
+
+
+def test_a_pulse_from_rest_adds_what_was_asked(plant, table, cases):
+    p1, p2, _ = cases
+    asked = np.linspace(0.02, 0.6, len(p1))
+    duration = table.duration(p1, p2, p1, asked) + table.release_lag
+    assert np.max(np.abs(pulsed(plant, p1, p2, p1, duration, at_rest=True) - asked)) < CLOSE
+
+
+def test_a_pulse_begun_before_p3_has_recovered_adds_what_was_asked(plant, table, cases):
+    p1, p2, p3 = cases
+    asked = np.linspace(0.02, 0.6, len(p1))
+    added = pulsed(plant, p1, p2, p3, table.duration(p1, p2, p3, asked))
+    assert np.max(np.abs(added - asked)) < CLOSE
+
+
+def test_the_check_can_fail_a_pulse_planned_for_another_valve_misses(plant, cases):
+    other = pulse_table(plant.replace(alphaMV=1.1 * plant["alphaMV"]))
+    p1, p2, p3 = cases
+    asked = np.full(len(p1), 0.3)
+    added = pulsed(plant, p1, p2, p3, other.duration(p1, p2, p3, asked))
+    assert np.mean(np.abs(added - asked)) > 3 * CLOSE
+
+
+def test_consumption_during_a_pulse_is_allowed_for(table, cases):
+    """With a slope the change of p2 is meant, without one the gain: they differ by what is consumed."""
+    p1, p2, p3 = cases
+    stay = table.time_to_open(p1, p2, p3) + 8e-3
+    fall = table.gained(p1, p2, p3, stay, -2.0) - table.gained(p1, p2, p3, stay)
+    assert np.all(fall < -2.0 * stay)
+    assert np.all(fall > -2.0 * (stay + 60e-3))
+    longer = table.duration(p1, p2, p3, np.full(len(p1), 0.1), -2.0)
+    assert np.all(longer > table.duration(p1, p2, p3, np.full(len(p1), 0.1)))
+    back = table.gained(p1, p2, p3, longer, -2.0)
+    assert back == pytest.approx(0.1, abs=1e-9)
+
+
+def test_nothing_is_to_be_added_where_enough_is_under_way(table):
+    wide_open = (np.array([11.5]), np.array([8.0]), np.array([5.0]))
+    under_way = table.gained(*wide_open, np.zeros(1))
+    assert under_way[0] > 0.3
+    assert table.duration(*wide_open, 0.9 * under_way)[0] == 0.0
+    assert table.duration(*wide_open, 1.1 * under_way)[0] > 0.0
+    assert table.duration(*wide_open, np.array([99.0]))[0] <= STAY[-1]
+
+
+def test_p3_vents_at_one_rate_until_the_valve_opens(plant, table):
+    """The axis of the table: ln p3 falls linearly, so the opening pressure is met when foretold."""
+    p1, p2 = np.array([11.0]), np.array([7.0])
+    opening = opening_pressure(plant, p1 * BAR, p2 * BAR)
+    valves = Valves(1, threads=1)
+    for field, value in zip(
+        valves.state, energised(plant, p1=p1 * BAR, p2=p2 * BAR, U=24.0), strict=True
+    ):
+        field[:] = value
+    valves.advance(float(table.time_to_open(p1, p2, p1)[0]) + table.release_lag)
+    assert valves.state.p3 == pytest.approx(opening, rel=1e-3)
+
+
+def test_one_valve_is_answered_as_a_batch_to_the_bit(table, cases):
+    asked = np.linspace(0.0, 1.0, len(cases[0]))
+    together = table.duration(*cases, asked, -1.5), table.gained(*cases, asked / 20, -1.5)
+    for i in range(0, len(asked), 7):
+        one = [x[i : i + 1] for x in (*cases, asked)]
+        assert table.duration(*one, -1.5)[0] == together[0][i]
+        assert table.gained(*one[:3], one[3] / 20, -1.5)[0] == together[1][i]
+
+
+def test_a_coil_too_weak_to_shut_the_valve_is_refused(plant):
+    with pytest.raises(ValueError, match="a pulse cannot be planned"):
+        pulse_table(plant, supply_voltage=3.0)

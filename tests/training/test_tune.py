@@ -1,0 +1,36 @@
+"""Tuning some kinds keeps what the file holds of the others, and refuses to mix budgets."""
+
+import pytest
+
+from controllers.tuned import Tuning, load_tunings, save_tunings
+from training.tune import kept, main
+
+pytestmark = pytest.mark.training
+SHORT = ("--trials", "1", "--episodes", "1", "--duration", "0.1")
+SEARCH = {
+    "method": "Optuna TPE on the mean return", "trials": 1, "episodes": 1, "duration": 0.1, "seed": 0,
+    "parameters": "ten_percent",
+}  # fmt: skip
+OTHER = Tuning(values={"open_below": -0.1, "shut_above": 0.1}, trials=1, mean_return=-9.0, episodes=1)
+
+
+def test_one_kind_alone_is_searched_and_the_others_are_kept(tmp_path):
+    path = tmp_path / "tuned.json"
+    save_tunings({"hysteresis": OTHER}, path, SEARCH)
+    kinds = ("--only", "hysteresis, extrapolating")
+    assert main([*SHORT, *kinds, "--out", str(path), "--seed", "0"]) == 0
+    found = load_tunings(path)
+    assert list(found) == ["hysteresis", "hysteresis, extrapolating"]
+    assert found["hysteresis"] == OTHER
+
+
+def test_another_budget_is_refused_and_the_file_left_alone(tmp_path):
+    path = tmp_path / "tuned.json"
+    save_tunings({"hysteresis": OTHER}, path, {**SEARCH, "trials": 100})
+    with pytest.raises(ValueError, match="search all kinds anew"):
+        main([*SHORT, "--only", "hysteresis", "--out", str(path)])
+    assert load_tunings(path) == {"hysteresis": OTHER}
+
+
+def test_nothing_is_kept_of_a_file_that_is_not_there(tmp_path):
+    assert kept(tmp_path / "none.json", SEARCH) == {}

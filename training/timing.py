@@ -1,0 +1,121 @@
+"""Time per decision of every controller against the control period: one valve, as an ECU has it.
+
+    python training/timing.py --out runs/timing --controllers pulse PWM runs/ppo
+
+Times are those of this implementation, Python and NumPy, on this machine: processor time of all the
+process's threads without garbage collection, since an ECU has neither other programs to wait for nor
+garbage. The exported C's are another matter (docs/deploy.md).
+"""
+
+import argparse
+import gc
+import json
+import sys
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from controllers.base import Controller
+from controllers.tuned import load_tunings
+from epv_env.plant.commandline import fail_clearly, writable_folder
+from epv_env.plant.consumption import check_scenario
+from epv_env.plant.files import write_text
+from epv_env.plant.plantfile import load_plant
+from epv_env.reward import REFERENCE_PERIOD
+from training.rollout import make_env
+from training.sweep_controllers import named_controllers
+
+WARM_UP = 50
+"""Decisions that are not counted: the first ones compile and fill caches."""
+TIMING_SEED = 3_000_000
+"""Of the episode; training, tuning and evaluation use others."""
+
+
+def decision_times(
+    controller: Controller, *, decisions: int, seed: int = TIMING_SEED, options: Mapping[str, Any]
+) -> NDArray:
+    """Processor time of each decision of one valve's episode [s] (decisions,).
+
+    options: of the environment. Only `act` is timed. A privileged controller sees the task, as in a
+    rollout.
+    """
+    env = make_env(controller, 1, threads=1, **options)
+    observation, _ = env.reset(seed=[seed])
+    controller.reset(1)
+    if hasattr(controller, "watch"):
+        controller.watch(env.task)  # type: ignore[attr-defined]
+    seconds = np.zeros(WARM_UP + decisions)
+    collects = gc.isenabled()
+    gc.disable()  # as timeit does
+    try:
+        for k in range(len(seconds)):
+            begin = time.process_time()
+            action = controller.act(observation)
+            seconds[k] = time.process_time() - begin
+            observation = env.task.step(*env.action.decode(action)).observation
+    finally:
+        if collects:
+            gc.enable()
+    return seconds[WARM_UP:]
+
+
+def timing_table(seconds: Mapping[str, NDArray], period: float = REFERENCE_PERIOD) -> pd.DataFrame:
+    """A row per controller: median, 99.9 % and worst time, and the worst's share of the period [s]."""
+    rows = [
+        {
+            "controller": label,
+            "decisions": len(times),
+            "median_us": 1e6 * float(np.median(times)),
+            "p99.9_us": 1e6 * float(np.quantile(times, 0.999)),
+            "worst_us": 1e6 * float(np.max(times)),
+            "median_share_of_period": float(np.median(times)) / period,
+            "worst_share_of_period": float(np.max(times)) / period,
+        }
+        for label, times in seconds.items()
+    ]
+    return pd.DataFrame(rows)
+
+
+def parse(arguments: list[str] | None) -> argparse.Namespace:
+    """The command line's options, checked."""
+    parser = argparse.ArgumentParser(description="Time per decision against the control period.")
+    parser.add_argument("--out", type=writable_folder, default=Path("runs/timing"))
+    parser.add_argument(
+        "--controllers", nargs="+", default=None, metavar="KIND|FOLDER",
+        help="tuned kinds, and folders of policies; default: every tuned kind",
+    )  # fmt: skip
+    parser.add_argument("--decisions", type=int, default=4000, help="of each controller")
+    parser.add_argument("--scenario", default="steps", help="consumption of the episode")
+    parser.add_argument("--plant", default=None, help="plant file; default: the report's calibration")
+    chosen = parser.parse_args(arguments)
+    if chosen.decisions < 1:
+        parser.error(f"--decisions {chosen.decisions}: give at least 1")
+    return chosen
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Command line; returns the exit status."""
+    chosen = parse(arguments)
+    plant = load_plant(chosen.plant)
+    options = {"plant": plant, "scenario": check_scenario(chosen.scenario)}
+    sources = chosen.controllers or list(load_tunings())
+    controllers, _ = named_controllers(sources, plant.parameters)
+    table = timing_table(
+        {
+            label: decision_times(controller, decisions=chosen.decisions, options=options)
+            for label, controller in controllers.items()
+        }
+    )
+    write_text(chosen.out / "timing.csv", table.to_csv(index=False))
+    write_text(chosen.out / "timing.json", json.dumps(table.to_dict(orient="records"), indent=1) + "\n")
+    print(table.to_string(index=False, float_format="%.4g"))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(fail_clearly(main))
