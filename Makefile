@@ -10,7 +10,7 @@ PACKAGES := epv_env identification controllers training
 
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help venv train test test-oldest identify gap blind real-bench circle pictures bench tune tradeoff gif lint check format wheel clean
+.PHONY: help venv train test test-oldest identify gap blind real-bench circle pictures bench tune tradeoff results gif lint check format wheel clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z][a-z-]*\):.*## /\1	/p' Makefile | while IFS='	' read -r name text; do \
@@ -57,8 +57,19 @@ bench: $(VENV)/.installed ## measure speed and memory of plant and identificatio
 tune: $(VENV)/.installed ## search the classic controllers' settings anew (minutes)
 	$(PY) training/tune.py --out controllers/tuned.json $(ARGS)
 
-tradeoff: $(VENV)/.installed ## switching against excursion at several prices (half an hour)
+tradeoff: $(VENV)/.installed ## optimise controllers at several prices of switching (half an hour)
 	$(PY) training/tradeoff.py $(ARGS)
+
+results: $(VENV)/.installed ## compare all controllers, and write docs/controllers.md's figures (half an hour)
+	$(PY) training/compare.py --policies runs/seeds --out runs/comparison --images docs/images \
+		--pages docs/controllers.md README.md $(if $(wildcard runs/tradeoff),--tradeoff runs/tradeoff) $(ARGS)
+
+robustness: $(VENV)/.installed ## sweep parameters, effects and conditions, and write docs/robustness.md's figures
+	$(PY) training/sweep.py --controllers "hysteresis, extrapolating" PWM pulse PPO=runs/ppo \
+		--out runs/robustness --images docs/images --pages docs/robustness.md $(ARGS)
+
+export: $(VENV)/.installed ## turn the policy of `make train` into C and ONNX (needs a C compiler)
+	$(PY) training/export.py runs/ppo --out runs/ecu $(ARGS)
 
 identify: $(VENV)/.installed ## calibrate a plant on a virtual bench's recordings, with a report
 	rm -rf runs/bench

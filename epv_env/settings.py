@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from epv_env.plant.consumption import MIXED, check_scenario
+from epv_env.plant.consumption import MIXED, Scenario, check_scenario
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
@@ -77,7 +77,7 @@ class Settings:
     control_period: float
     """Time between decisions [s]."""
     supply: Supply = field(default_factory=Supply.reservoirs)
-    scenario: str = MIXED
+    scenario: str | Scenario = MIXED
     target_bar: Range = (6.0, 9.5)
     p2_bar: Range | None = None
     """First circuit pressure; None: `drop_bar` below the target (an excess could not be undone)."""
@@ -88,7 +88,8 @@ class Settings:
     """Solenoid voltage when on [V]."""
     settling_time: float = 0.5
     """Time after which the band of C1 has to hold [s]."""
-    sensor_noise: bool = True
+    sensor_noise: float = 1.0
+    """Standard deviations of the sensors' noise relative to Table 3's; True is 1, False is 0."""
     weights: RewardWeights = field(default_factory=RewardWeights)
 
     def __post_init__(self) -> None:
@@ -99,6 +100,8 @@ class Settings:
             )
         if not 0 <= self.settling_time < np.inf:
             raise OptionError(f"settling_time = {self.settling_time!r} s must be at least 0")
+        if not 0 <= self.sensor_noise < np.inf:
+            raise OptionError(f"sensor_noise = {self.sensor_noise!r} must be at least 0: 1 is Table 3's")
         if not isinstance(self.weights, RewardWeights):
             raise OptionError(f"weights is {self.weights!r}: give a RewardWeights")
         self._check_pressures()

@@ -272,7 +272,8 @@ class LimitingTask:
         for i in where[place == 0]:
             rng = self._noise[i]
             if rng is not None and self.settings.sensor_noise:
-                self._noise_block[i] = rng.standard_normal((NOISE_BLOCK, len(MEASURED)))
+                drawn = rng.standard_normal((NOISE_BLOCK, len(MEASURED)))
+                self._noise_block[i] = self.settings.sensor_noise * drawn
         normal = self._noise_block[where, place]
         true = {name: value[where] for name, value in self.valves.readings().items()}
         units = {name: BAR if name in PRESSURES else 1.0 for name in MEASURED}

@@ -4,15 +4,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
-from scipy.stats import binomtest, bootstrap
 
 from controllers.base import Controller
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
-from training.metrics import EpisodeMetrics
+from training.metrics import EpisodeMetrics, summary
 from training.rollout import Trace, run_episodes
 
 EVALUATION_SEED = 2_000_000
@@ -80,36 +77,6 @@ def compare(
             traces[controller.name] = trace
     rows = [{"plants": p, "controller": c, **summary(m)} for (p, c), m in metrics.items()]
     return Comparison(table=pd.DataFrame(rows), metrics=metrics, traces=traces)
-
-
-def summary(m: EpisodeMetrics) -> dict[str, float]:
-    """A row of the table; intervals are 95 %: Clopper-Pearson for the share, bootstrap for means."""
-    share = binomtest(int(m.stayed.sum()), len(m.stayed)).proportion_ci(0.95, "exact")
-    breakdown = _mean_interval(m.breakdown_bar)
-    return {
-        "C1_stayed": float(m.stayed.mean()),
-        "C1_stayed_low": float(share.low),
-        "C1_stayed_high": float(share.high),
-        "C1_worst_excursion_bar": float(m.excursion_bar.max()),
-        "C2_largest_breakdown_bar": float(m.breakdown_bar.max()),
-        "C2_mean_breakdown_bar": float(m.breakdown_bar.mean()),
-        "C2_mean_breakdown_low_bar": breakdown[0],
-        "C2_mean_breakdown_high_bar": breakdown[1],
-        "C2_longest_recovery_s": float(m.recovery_s.max()),
-        "rms_error_bar": float(np.sqrt(np.mean(m.rms_bar**2))),
-        "switchings_per_s": float(m.switchings_per_s.mean()),
-        "vented_g_per_s": float(m.vented_g_per_s.mean()),
-        "mean_return": float(m.episode_return.mean()),
-    }
-
-
-def _mean_interval(values: NDArray) -> tuple[float, float]:
-    if np.ptp(values) == 0:
-        return float(values[0]), float(values[0])
-    interval = bootstrap(
-        (values,), np.mean, n_resamples=2000, method="percentile", rng=np.random.default_rng(0)
-    ).confidence_interval
-    return float(interval.low), float(interval.high)
 
 
 HEADINGS = {

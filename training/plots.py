@@ -7,7 +7,6 @@ import matplotlib as mpl
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
-import pandas as pd
 from matplotlib.figure import Figure
 
 from epv_env.reward import BAND_BAR
@@ -16,9 +15,6 @@ from training.rollout import Trace
 
 COLOURS = plt.rcParams["axes.prop_cycle"].by_key()["color"]
 
-
-TRADEOFF_TOP_BAR = 0.8
-"""Top of the trade-off's pressure axes; points above it are in its table."""
 
 WIDEST_BAR = 1.2
 """Right end of the excursion axis; the table holds what lies beyond."""
@@ -93,32 +89,5 @@ def excursion_distribution(comparison: Comparison, path: Path) -> None:
         axis.grid(alpha=0.3, which="both")
     np.atleast_1d(axes)[0].set_ylabel("episodes with a larger excursion [%]")
     handles = np.atleast_1d(axes)[0].get_legend_handles_labels()
-    figure.legend(*handles, fontsize=8, ncols=len(handles[0]), loc="outside upper center")
-    save_figure(figure, path)
-
-
-def tradeoff(table: pd.DataFrame, path: Path) -> None:
-    """Worst excursion, breakdown and rms error over switchings; the small numbers are prices."""
-    figures = {
-        "C1_worst_excursion_bar": "worst |p2 - target| [bar]",
-        "C2_largest_breakdown_bar": "largest breakdown [bar]",
-        "rms_error_bar": "rms error [bar]",
-    }
-    figure, axes = plt.subplots(1, len(figures), figsize=(12, 3.8), layout="constrained")
-    for axis, (column, label) in zip(axes, figures.items(), strict=True):
-        for name, rows in table.groupby("controller", sort=False):
-            rows = rows.sort_values("switchings_per_s")
-            axis.plot(rows["switchings_per_s"], rows[column], "o", label=name)
-            for _, row in rows.iterrows():
-                axis.annotate(
-                    f"{row['switching_price']:g}", (row["switchings_per_s"], row[column]),
-                    xytext=(4, 4), textcoords="offset points", fontsize=7, color="0.4",
-                )  # fmt: skip
-        if column.startswith("C"):
-            axis.axhline(BAND_BAR, color="0.4", ls="--", lw=0.9)
-        axis.set(xlabel="coil switchings [1/s]", ylabel=label, ylim=(0, TRADEOFF_TOP_BAR))
-        axis.grid(alpha=0.3)
-    axes[-1].set_ylim(0, None)
-    handles = axes[0].get_legend_handles_labels()
     figure.legend(*handles, fontsize=8, ncols=len(handles[0]), loc="outside upper center")
     save_figure(figure, path)

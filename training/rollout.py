@@ -48,18 +48,25 @@ def run_episodes(
     seeds: list[int],
     duration: float,
     options: dict[str, Any],
+    each: dict[str, list[Any]] | None = None,
     trace_of: int | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> tuple[EpisodeMetrics, Trace | None]:
     """Run one episode per seed.
 
-    duration: of each episode [s]. options: of the environment. trace_of: index of an episode to record.
-    progress: called with the share done. An episode whose circuit empties counts as left (C1); its
-    valve runs on, since the batch runs as one.
+    duration: of each episode [s]. options: of the environment. each: options of its reset, lists with
+    one value for each episode (plants that are listed, not drawn). trace_of: index of an episode to
+    record. progress: called with the share done. A privileged controller gets to see the task after
+    the reset. An episode whose circuit empties counts as left (C1); its valve runs on, since the batch
+    runs as one.
     """
     env = make_env(controller, len(seeds), **options)
-    observation, _ = env.reset(seed=list(seeds))
+    observation, _ = env.reset(seed=list(seeds), options=each)
     controller.reset(len(seeds))
+    watch = getattr(controller, "watch", None)
+    if watch is not None:  # a privileged controller sees what no ECU measures
+        watch(env.task)
+    energy_before = env.task.valves.state.coil_energy.copy()
     period = env.settings.control_period
     steps = round(duration / period)
     meter = Meter(len(seeds), period, env.settings.settling_time)
@@ -83,11 +90,12 @@ def run_episodes(
         if step % 50 == 0:
             progress(step / steps)
     progress(1.0)
+    metrics = meter.result(env.task.valves.state.coil_energy - energy_before)
     if trace_of is None:
-        return meter.result(), None
+        return metrics, None
     columns = np.array(rows).T
     trace = Trace(
         time=np.arange(1, steps + 1) * period, p2_bar=columns[0], p3_bar=columns[1],
         target_bar=float(env.task.target[trace_of]), coil=columns[2], consumption_g_per_s=columns[3],
     )  # fmt: skip
-    return meter.result(), trace
+    return metrics, trace

@@ -1,110 +1,103 @@
-"""Switching against excursion: PPO and the extrapolating hysteresis, each optimised at several prices.
+"""Controllers for the trade-off of switching against excursion: each optimised at several prices.
 
-    python training/tradeoff.py --prices 0.2 0.3 0.5
+    python training/tradeoff.py --prices 0.2 0.3 0.5 --out runs/tradeoff
 
-What is finished in --out is kept and not done again.
+trains PPO and tunes classic controllers at every price; what is finished in --out is kept. Measured and
+drawn they are by training/compare.py --tradeoff runs/tradeoff.
 """
 
 import argparse
-import json
 import sys
 from pathlib import Path
 from typing import Any
 
 import optuna
-import pandas as pd
 
 from controllers.base import Controller
 from controllers.learned import CONTRACT_FILE, load_policy
-from controllers.tuned import build, load_tunings, save_tunings, tuned_controllers
-from epv_env.actions import OnOff
+from controllers.tuned import KINDS, build, load_search, load_tunings, save_tunings
 from epv_env.plant.commandline import fail_clearly, writable_folder
-from epv_env.plant.files import write_text
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.plantfile import Plant
-from epv_env.plant.region import Region
 from epv_env.reward import RewardWeights
-from training.evaluate import EVALUATION_SEED, HEADINGS, summary
-from training.rollout import run_episodes
+from training.compare_plan import Contender
+from training.policies import trained_policy
 from training.tune import TUNING_REGION, tune
 
-RIVAL = "hysteresis, extrapolating"
+FOLDER = "price-{:g}"
 TUNED_FILE = "tuned.json"
 
 
-def learned(folder: Path, price: float, timesteps: int, seed: int) -> Controller:
-    """PPO trained at this price, or as it was trained before."""
-    if not (folder / CONTRACT_FILE).exists():
-        from training.policy_files import save_policy
-        from training.ppo import Hyperparameters, train
-
-        model, _ = train(
-            Hyperparameters(), folder=folder, plant=Plant.calibrated(), scenario="mixed",
-            parameters=TUNING_REGION, weights=RewardWeights(switching=price), timesteps=timesteps,
-            seed=seed, device="cpu", resume=True,
-        )  # fmt: skip
-        save_policy(
-            model,
-            folder,
-            control_period=OnOff.default_period,
-            provenance={"switching_price": price, "seed": seed},
-        )
-    return load_policy(folder)
-
-
-def rival(folder: Path, price: float, trials: int, seed: int) -> Controller:
-    """The classic rival tuned at this price, or as it was tuned before."""
+def tuned_at(folder: Path, kinds: list[str], price: float, trials: int, seed: int) -> None:
+    """Tune the classic controllers at this price, but those that are tuned already."""
     path = folder / TUNED_FILE
-    if not path.exists():
-        options: dict[str, Any] = {
-            "parameters": TUNING_REGION, "weights": RewardWeights(switching=price),
-        }  # fmt: skip
-        found = tune(RIVAL, trials=trials, episodes=128, duration=6.0, seed=seed, options=options)
-        save_tunings({RIVAL: found}, path, {"trials": trials, "switching_price": price, "seed": seed})
-    return build(RIVAL, load_tunings(path)[RIVAL].values, Parameters.calibrated())
+    search = {
+        "method": "Optuna TPE on the mean return", "trials": trials, "episodes": 128, "duration": 6.0,
+        "seed": seed, "parameters": TUNING_REGION, "switching_price": price,
+    }  # fmt: skip
+    options: dict[str, Any] = {
+        "parameters": TUNING_REGION, "weights": RewardWeights(switching=price),
+    }  # fmt: skip
+    if path.exists() and load_search(path) != search:
+        raise ValueError(
+            f"{path} was searched with {load_search(path)}, not {search}: choose another --out"
+        )
+    tunings = load_tunings(path) if path.exists() else {}
+    for kind in kinds:
+        if kind not in tunings:
+            tunings[kind] = tune(
+                kind, trials=trials, episodes=128, duration=6.0, seed=seed, options=options
+            )
+            save_tunings(tunings, path, search)
 
 
-def measure(controller: Controller, episodes: int, duration: float) -> dict[str, float]:
-    """Its figures on unseen scenarios with plants within ±10 %."""
-    region = Region.named(TUNING_REGION, Parameters.calibrated())
-    seeds = list(range(EVALUATION_SEED, EVALUATION_SEED + episodes))
-    metrics, _ = run_episodes(controller, seeds=seeds, duration=duration, options={"parameters": region})
-    return summary(metrics)
+def finished_variants(folder: Path | None) -> list[Contender]:
+    """The controllers that a folder of this command holds, by price; none without a folder.
+
+    Raises ValueError if the folder holds none.
+    """
+    if folder is None:
+        return []
+    found = []
+    for path in sorted(folder.glob("price-*")):
+        price = float(path.name.removeprefix("price-"))
+        controllers: list[Controller] = []
+        if (path / CONTRACT_FILE).exists():
+            controllers.append(load_policy(path))
+        if (path / TUNED_FILE).exists():
+            tunings = load_tunings(path / TUNED_FILE)
+            plant = Parameters.calibrated()
+            controllers += [build(kind, tuning.values, plant) for kind, tuning in tunings.items()]
+        found += [
+            Contender(name=c.name, runs={f"{c.name}, price {price:g}": c}, price=price)
+            for c in controllers
+        ]
+    if not found:
+        raise ValueError(f"{folder} holds no controllers: make them with `python training/tradeoff.py`")
+    return found
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Command line; returns the exit status."""
-    parser = argparse.ArgumentParser(description="Switching against excursion at several prices.")
+    parser = argparse.ArgumentParser(description="Optimise controllers at several prices of switching.")
     parser.add_argument("--out", type=writable_folder, default=Path("runs/tradeoff"))
-    parser.add_argument("--prices", type=float, nargs="+", default=[0.2, 0.3, 0.5])
+    parser.add_argument("--prices", type=float, nargs="+", default=[0.2, 0.5, 1.0])
     parser.add_argument("--timesteps", type=int, default=5_000_000, help="training steps at each price")
-    parser.add_argument("--trials", type=int, default=60, help="tuning evaluations at each price")
-    parser.add_argument("--episodes", type=int, default=256)
-    parser.add_argument("--duration", type=float, default=10.0, help="length of an episode [s]")
+    parser.add_argument(
+        "--kinds", nargs="+", choices=KINDS, default=["hysteresis, extrapolating"],
+        help="classic controllers to tune",
+    )  # fmt: skip
+    parser.add_argument("--trials", type=int, default=100, help="tuning evaluations of each of them")
     parser.add_argument("--seed", type=int, default=0)
     chosen = parser.parse_args(arguments)
     optuna.logging.set_verbosity(optuna.logging.WARNING)
-    rows = []
     for price in chosen.prices:
-        folder = chosen.out / f"price-{price:g}"
-        for controller in (
-            learned(folder, price, chosen.timesteps, chosen.seed),
-            rival(folder, price, chosen.trials, chosen.seed),
-        ):
-            figures = measure(controller, chosen.episodes, chosen.duration)
-            rows.append({"controller": controller.name, "switching_price": price, **figures})
-    for controller in tuned_controllers():
-        if controller.name == "PWM":
-            figures = measure(controller, chosen.episodes, chosen.duration)
-            rows.append({"controller": "PWM", "switching_price": RewardWeights().switching, **figures})
-
-    from training.plots import tradeoff
-
-    table = pd.DataFrame(rows)
-    write_text(chosen.out / "table.json", json.dumps(rows, indent=1) + "\n")
-    tradeoff(table, chosen.out / "tradeoff.png")
-    shown = ["switching_price", *HEADINGS]
-    print(table.loc[:, shown].to_string(index=False, float_format="%.3f"))
+        folder = chosen.out / FOLDER.format(price)
+        tuned_at(folder, chosen.kinds, price, chosen.trials, chosen.seed)
+        trained_policy(
+            folder, timesteps=chosen.timesteps, seed=chosen.seed,
+            weights=RewardWeights(switching=price),
+        )  # fmt: skip
+    print(f"controllers in {chosen.out}; measure them with training/compare.py --tradeoff {chosen.out}")
     return 0
 
 

@@ -88,19 +88,24 @@ SCENARIOS: dict[str, Scenario] = {
 MIXED = "mixed"
 
 
-def check_scenario(name: str) -> str:
-    """The name, if it is one of SCENARIOS or "mixed"; else ValueError."""
-    if not isinstance(name, str) or (name != MIXED and name not in SCENARIOS):
-        known = ", ".join([MIXED, *SCENARIOS])
-        raise ValueError(f"unknown consumption scenario {name!r}: choose one of {known}")
-    return name
+def check_scenario(scenario: str | Scenario) -> str | Scenario:
+    """The scenario, if it is a Scenario, the name of one of SCENARIOS, or "mixed"; else ValueError."""
+    known = [MIXED, *SCENARIOS]
+    if isinstance(scenario, Scenario) or (isinstance(scenario, str) and scenario in known):
+        return scenario
+    raise ValueError(
+        f"unknown consumption scenario {scenario!r}: choose one of {', '.join(known)}, "
+        "or give a Scenario"
+    )
 
 
-def draw_profile(name: str, rng: np.random.Generator) -> Profile:
-    """One episode's consumption from the scenario `name` (or "mixed")."""
-    if name == MIXED:
-        name = list(SCENARIOS)[rng.integers(len(SCENARIOS))]
-    return SCENARIOS[name].draw(rng)
+def draw_profile(scenario: str | Scenario, rng: np.random.Generator) -> Profile:
+    """One episode's consumption from a scenario, or from that of this name (or "mixed")."""
+    if isinstance(scenario, Scenario):
+        return scenario.draw(rng)
+    if scenario == MIXED:
+        scenario = list(SCENARIOS)[rng.integers(len(SCENARIOS))]
+    return SCENARIOS[scenario].draw(rng)
 
 
 def _ramped(time: NDArray, start: NDArray, width: NDArray) -> NDArray:

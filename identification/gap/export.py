@@ -87,7 +87,7 @@ def magnitudes(found: Assessed) -> dict[str, tuple[float, float, float]]:
 
 
 def covariance(found: Assessed) -> NDArray:
-    """Of calibrated parameters and sizes (k, k) [SI], with the errors of form that no recording shows."""
+    """Of calibrated parameters and sizes (k, k) [SI], with errors of form that no recording shows."""
     exact = [cause.exact for cause in found.point.hypothesis.causes for _ in cause.sizes]
     sizes = found.point.hypothesis.sizes
     first = len(found.point.vector) - len(sizes)

@@ -96,12 +96,13 @@ def test_a_valve_that_cannot_be_integrated_ends_its_episode_with_finite_figures(
     assert all(np.all(np.isfinite(values)) for values in infos.values())
 
 
+@pytest.mark.parametrize("factor", [1.0, 4.0])
 @pytest.mark.parametrize("name", MEASURED)
-def test_noise_is_table_3_s(name):
+def test_noise_is_table_3_s(name, factor):
     """Noise before rounding: the variances of both add up."""
     sensor = SENSORS[name]
-    seen = readings(name)
-    expected = np.hypot(sensor.noise, sensor.resolution / np.sqrt(12))
+    seen = readings(name, sensor_noise=factor)
+    expected = np.hypot(factor * sensor.noise, sensor.resolution / np.sqrt(12))
     assert np.std(seen) == pytest.approx(expected, rel=0.05)
     assert np.ptp(readings(name, sensor_noise=False)) < 1e-6
     assert np.mean(seen) == pytest.approx(

@@ -44,6 +44,7 @@ AT_CONSTRUCTION = [
     ({"supply_voltage": 48.0}, "supply_voltage = 48 V must lie in"),
     ({"settling_time": float("nan")}, "settling_time = nan s must be at least 0"),
     ({"settling_time": -1.0}, "settling_time = -1.0 s must be at least 0"),
+    ({"sensor_noise": -1.0}, "sensor_noise = -1.0 must be at least 0"),
     ({"weights": {"band": 1.0}}, "weights is .*: give a RewardWeights"),
     ({"drop_bar": (2.0, 1.0)}, r"drop_bar = \[2, 1\] must satisfy"),
     ({"drop_bar": (-20.0, -20.0)}, r"drop_bar = \[-20, -20\] must satisfy"),

@@ -14,6 +14,7 @@ ROOT = Path(__file__).parents[2]
 WRITTEN = (
     "checkpoint.zip", "config.json", "episode.png", "excursions.png", "learning_curve.csv",
     "learning_curve.png", "model.zip", "policy.json", "policy.safetensors", "table.csv", "table.json",
+    "validation.csv",
 )  # fmt: skip
 
 
@@ -86,13 +87,16 @@ def test_tuning_in_its_shortest_form(tmp_path):
 
 
 def test_the_tradeoff_in_its_shortest_form_keeps_what_is_done(tmp_path):
-    short = ("--prices", 0.2, "--timesteps", 32768, "--trials", 1, "--episodes", 2, "--duration", 0.8)
+    short = ("--prices", 0.2, "--timesteps", 16384, "--trials", 1)
     script = "training/tradeoff.py"
     first = command(*short, "--out", tmp_path, script=script)
     assert first.returncode == 0, first.stderr
-    assert (tmp_path / "tradeoff.png").stat().st_size > 0
-    rows = json.loads((tmp_path / "table.json").read_text())
-    assert [row["controller"] for row in rows] == ["PPO", "hysteresis, extrapolating", "PWM"]
-    weights = (tmp_path / "price-0.2" / "policy.safetensors").read_bytes()
+    folder = tmp_path / "price-0.2"
+    written = ("policy.safetensors", "tuned.json")
+    before = [(folder / name).read_bytes() for name in written]
+    assert json.loads(before[1])["search"]["switching_price"] == 0.2
     assert command(*short, "--out", tmp_path, script=script).returncode == 0
-    assert (tmp_path / "price-0.2" / "policy.safetensors").read_bytes() == weights
+    assert [(folder / name).read_bytes() for name in written] == before
+    other = command(*short[:-1], 2, "--out", tmp_path, script=script)
+    assert other.returncode == 2
+    assert "choose another --out" in other.stderr

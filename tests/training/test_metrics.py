@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from training.metrics import Meter
+from training.metrics import EpisodeMetrics, Meter, left_interval, summary, tail_excursion
 
 PERIOD = 0.1
 
 
-def run(deviations, settling_time=0.0, failed=None):
+def run(deviations, settling_time=0.0, failed=None, consumption=None):
     """The metrics of one episode with these deviations [bar], a switching and 1 mg in each period."""
     meter = Meter(1, PERIOD, settling_time)
     for k, deviation in enumerate(deviations):
@@ -16,6 +16,7 @@ def run(deviations, settling_time=0.0, failed=None):
             "deviation_bar": np.array([deviation]),
             "switchings": np.array([1]),
             "vented_g": np.array([1e-3]),
+            "consumption_g_per_s": np.array([0.0 if consumption is None else consumption[k]]),
         }
         meter.update(np.array([-1.0]), np.array([failed == k]), info)
     return meter.result()
@@ -46,3 +47,82 @@ def test_overshoot_is_an_excursion_but_no_breakdown():
 
 def test_a_failed_episode_has_not_stayed():
     assert not run([0.0, 0.0], failed=1).stayed[0]
+
+
+DRAWN = 2.0  # g/s, well above the threshold of an event
+
+
+def test_an_events_breakdown_is_its_own():
+    drawn = [0.0, DRAWN, DRAWN, 0.0, 0.0, DRAWN, 0.0]
+    m = run([-0.9, -0.1, -0.2, -0.4, -0.1, -0.3, 0.1], consumption=drawn)
+    assert m.events[0] == 2
+    assert m.event_breakdown_bar[0] == pytest.approx((0.4 + 0.3) / 2)  # what came before is nobody's
+    assert m.breakdown_bar[0] == pytest.approx(0.9)
+
+
+def test_recovery_lasts_from_the_events_beginning_until_p2_is_back_above_the_shortfall():
+    drawn = [0.0, DRAWN, DRAWN, 0.0, 0.0]
+    m = run([0.0, -0.1, -0.3, -0.4, -0.2], consumption=drawn)
+    assert m.event_recovery_s[0] == pytest.approx(3 * PERIOD)
+    assert m.longest_event_recovery_s[0] == pytest.approx(3 * PERIOD)
+
+
+def test_a_shallow_event_needs_no_recovery():
+    assert run([0.0, -0.2, -0.2], consumption=[0.0, DRAWN, DRAWN]).event_recovery_s[0] == 0.0
+
+
+def test_a_dip_late_in_a_long_draw_is_no_answer_to_its_beginning():
+    late = [0.0, *[-0.1] * 8, -0.4, -0.1]
+    m = run(late, consumption=[0.0, *[DRAWN] * 10])
+    assert m.event_recovery_s[0] == 0.0
+    assert m.event_breakdown_bar[0] == pytest.approx(0.4)
+
+
+def test_a_shortfall_long_after_an_event_is_not_its_breakdown():
+    quiet = [0.0] * 12
+    m = run([-0.1, *quiet, -0.4], consumption=[DRAWN, *quiet, 0.0])
+    assert m.event_breakdown_bar[0] == pytest.approx(0.1)
+
+
+def test_a_leak_is_no_event():
+    assert run([-0.1] * 4, consumption=[0.0, 0.8, 0.8, 0.8]).events[0] == 0
+
+
+def test_events_of_one_episode_do_not_touch_anothers():
+    both = Meter(2, PERIOD, 0.0)
+    for k, drawn in enumerate([0.0, DRAWN, 0.0]):
+        both.update(
+            np.zeros(2), np.zeros(2, dtype=bool),
+            {
+                "deviation_bar": np.array([-0.1 * k, -0.4]),
+                "switchings": np.zeros(2),
+                "vented_g": np.zeros(2),
+                "consumption_g_per_s": np.array([drawn, 0.0]),
+            },
+        )  # fmt: skip
+    m = both.result(np.array([3.0, 6.0]))
+    assert m.events.tolist() == [1, 0]
+    np.testing.assert_allclose(m.event_breakdown_bar, [0.2, 0.0])
+    np.testing.assert_allclose(m.coil_W, [10.0, 20.0])
+
+
+def test_the_exact_bound_needs_3688_episodes_for_a_thousandth():
+    """Clopper and Pearson with no event: 1 - (alpha / 2)^(1 / n)."""
+    assert left_interval(np.ones(3687, dtype=bool))[1] > 1e-3
+    assert left_interval(np.ones(3688, dtype=bool))[1] <= 1e-3
+    assert left_interval(np.ones(10, dtype=bool)) == (0.0, pytest.approx(1 - 0.025**0.1))
+
+
+def test_the_tail_excursion_is_exceeded_by_one_episode_in_a_thousand():
+    excursion = np.arange(2000.0)
+    assert np.sum(excursion > tail_excursion(excursion)) == 2
+    assert tail_excursion(excursion[:500]) == 499.0
+
+
+def test_episodes_join_and_their_events_weigh_equally():
+    one = run([-0.3], consumption=[DRAWN])
+    three = run([-0.1, -0.1] * 3, consumption=[DRAWN, 0.0] * 3)
+    both = EpisodeMetrics.joined([one, three])
+    assert len(both) == 2
+    assert summary(both)["C2_event_breakdown_bar"] == pytest.approx((0.3 + 3 * 0.1) / 4)
+    assert len(both.first(1)) == 1

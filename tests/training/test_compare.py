@@ -1,0 +1,267 @@
+"""The comparison's command in its short form, its plan, its bars, and its generated pages."""
+
+import json
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+pytest.importorskip("pandas")
+pytest.importorskip("joblib")
+
+from controllers.hysteresis import Hysteresis
+from tests.training.policies import random_layers, write_policy
+from training.compare import main, parse
+from training.compare_bars import against_oracle, against_rival, leaving, lost
+from training.compare_output import PARTS, RESULTS_FILE, TABLES_FILE
+from training.compare_plan import (
+    EXPENSIVE,
+    PLANTS,
+    TUNING,
+    Contender,
+    Expense,
+    Sizes,
+    chosen_run,
+    plan,
+)
+from training.compare_scores import Contest, duels, figures, trade
+from training.generated import check_pages, fill, markdown
+from training.metrics import EpisodeMetrics
+from training.scenarios import RANDOM
+from training.tune import TUNING_REGION
+
+pytestmark = pytest.mark.training
+
+SIZES = Sizes(named=10, random=20, bound=1000, tuning=5)
+FIGURES = (
+    "results.json", "tables.md", "excursions.png", "episode.png", "tradeoff.png",
+    "comparison-scenarios.png", "comparison-means.png", "comparison-duels.png",
+)  # fmt: skip
+
+
+@dataclass
+class Told(Hysteresis):
+    """A controller that is shown the plant."""
+
+    def watch(self, task):
+        self.task = task
+
+
+def controller(name, kind=Hysteresis):
+    return kind(open_below=-0.1, shut_above=0.0, shut_lookahead=0.03, name=name)
+
+
+def classic(name, kind=Hysteresis):
+    return Contender(name=name, runs={name: controller(name, kind)})
+
+
+def learned(seeds):
+    runs = {f"PPO, seed {k}": controller(f"{k}") for k in range(seeds)}
+    return Contender(name="PPO", runs=runs, learned=True)
+
+
+def episodes(n, *, left=0, breakdown=0.3, rms=0.1, switchings=4.0, returned=-10.0):
+    """n episodes whose figures are all the same, but that some left the band."""
+    stayed = np.arange(n) >= left
+    same = {f: np.zeros(n) for f in EpisodeMetrics.__dataclass_fields__}
+    return EpisodeMetrics(
+        **{
+            **same, "stayed": stayed, "excursion_bar": np.where(stayed, breakdown, 0.7),
+            "breakdown_bar": np.full(n, breakdown), "rms_bar": np.full(n, rms),
+            "switchings_per_s": np.full(n, switchings), "episode_return": np.full(n, returned),
+        }
+    )  # fmt: skip
+
+
+def contest(**figures_of):
+    """One classic contender for each name, PPO being the learned one; the same in every plant set."""
+    contenders = [
+        Contender(name="PPO", runs={"PPO": controller("PPO")}, learned=True) if name == "PPO"
+        else classic(name, Told if "oracle" in name else Hysteresis)
+        for name in figures_of
+    ]  # fmt: skip
+    results = {
+        (name, plants, scenario): given
+        for name, given in figures_of.items()
+        for plants in PLANTS
+        for scenario in (RANDOM, "steps")
+    }
+    return Contest(contenders, [RANDOM, "steps"], results)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    out = tmp_path_factory.mktemp("comparison")
+    for seed in range(2):
+        write_policy(random_layers(seed=seed, widths=(8, 8)), out / "seeds" / f"seed-{seed}")
+    page = out / "page.md"
+    page.write_text("before\n<!-- generated: short -->\nold\n<!-- end: short -->\nafter\n")
+    arguments = [
+        "--quick", "--duration", "0.6", "--scenarios", RANDOM, "steps", "--workers", "1",
+        "--out", str(out), "--policies", str(out / "seeds"), "--seeds", "2",
+        "--pages", str(page), "--images", str(out / "i"),
+    ]  # fmt: skip
+    assert main(arguments) == 0
+    return out, arguments
+
+
+def test_the_short_form_writes_everything(finished):
+    out, _ = finished
+    assert {path.name for path in out.iterdir()} >= set(FIGURES)
+    assert {path.name for path in (out / "i").iterdir()} == {n for n in FIGURES if n.endswith("png")}
+    content = json.loads((out / RESULTS_FILE).read_text())
+    names = [row["controller"] for row in content["figures"] if row["plants"] == "calibrated"]
+    assert names[:2] == ["PPO", "PPO, all seeds"]
+    assert "hysteresis, extrapolating" in names
+    assert content["chosen"]["PPO"] in ("PPO, seed 0", "PPO, seed 1")
+    assert all(f"# {part}\n" in (out / TABLES_FILE).read_text() for part in PARTS)
+
+
+def test_the_page_holds_the_table_between_its_markers(finished):
+    text = (finished[0] / "page.md").read_text()
+    assert text.startswith("before\n<!-- generated: short -->\n| ")
+    assert text.endswith("|\n<!-- end: short -->\nafter\n")
+    assert "old" not in text
+
+
+def test_a_second_run_takes_what_is_there_and_says_the_same(finished):
+    out, arguments = finished
+    before = {name: (out / name).read_bytes() for name in (RESULTS_FILE, "blocks.jsonl", "page.md")}
+    assert main(arguments) == 0
+    assert {name: (out / name).read_bytes() for name in before} == before
+
+
+def test_the_blocks_hold_as_many_episodes_as_the_sizes_say_in_batches():
+    blocks = plan([classic("a")], [RANDOM, "steps"], SIZES)
+    counts = {}
+    for block in blocks:
+        key = block.plants, block.scenario
+        counts[key] = counts.get(key, 0) + block.count
+    assert counts == {
+        ("calibrated", RANDOM): 20, ("calibrated", "steps"): 10, ("confidence", RANDOM): 1000,
+        ("sensitive_ten_percent", RANDOM): 1000, ("sensitive_ten_percent", "steps"): 10,
+    }  # fmt: skip
+    assert max(block.count for block in blocks) <= 512
+    assert len({block.name for block in blocks}) == len(blocks)
+
+
+def test_an_expensive_controller_runs_the_first_of_the_others_episodes(monkeypatch):
+    monkeypatch.setitem(EXPENSIVE, "slow", Expense(times=100, fewer=4))
+    (slow, cheap) = (plan([classic(name)], ["steps"], SIZES)[0] for name in ("slow", "a"))
+    assert (slow.first_seed, slow.count, cheap.count) == (cheap.first_seed, 3, 10)
+    assert slow.episodes == 300  # its cost, in those of a cheap one
+
+
+def test_the_training_seed_is_chosen_on_the_tuning_scenarios_alone():
+    both = learned(2)
+    results = {
+        ("PPO, seed 0", TUNING_REGION, TUNING): episodes(5, returned=-20.0),
+        ("PPO, seed 1", TUNING_REGION, TUNING): episodes(5, returned=-10.0),
+        ("PPO, seed 0", "calibrated", RANDOM): episodes(5, returned=0.0),
+        ("PPO, seed 1", "calibrated", RANDOM): episodes(5, returned=-99.0),
+    }
+    assert chosen_run(both, results) == "PPO, seed 1"
+    assert {block.plants for block in plan([both], [RANDOM], SIZES)} >= {TUNING_REGION}
+
+
+def test_the_bound_is_met_with_enough_episodes_only():
+    enough, few = contest(PPO=episodes(4096)), contest(PPO=episodes(1000))
+    assert leaving(enough, enough.contenders[0], "confidence", 1e-3).met
+    assert not leaving(few, few.contenders[0], "confidence", 1e-3).met
+    once = contest(PPO=episodes(4096, left=1))
+    assert not leaving(once, once.contenders[0], "confidence", 1e-3).met
+
+
+@pytest.mark.parametrize(
+    ("rival", "met"),
+    [
+        ({"breakdown": 0.4, "rms": 0.2}, [True, True]),
+        ({"breakdown": 0.2, "rms": 0.2}, [False, True]),
+        ({"breakdown": 0.4, "rms": 0.2, "switchings": 3.9}, [False, False]),
+    ],
+)
+def test_a_rival_is_beaten_only_at_equal_or_fewer_switches(rival, met):
+    c = contest(PPO=episodes(50), other=episodes(50, **rival))
+    assert [bar.met for bar in against_rival(c, *c.contenders)] == met
+
+
+def test_the_oracle_is_a_limit_and_no_rival():
+    c = contest(PPO=episodes(50), oracle=episodes(20, breakdown=0.25, rms=0.05))
+    assert c.contenders[1].privileged
+    assert [bar.met for bar in against_oracle(c, *c.contenders)] == [True, False]
+
+
+def test_where_a_model_based_rival_wins_is_listed():
+    c = contest(PPO=episodes(50), MPC=episodes(10, breakdown=0.2))
+    found = lost(c, c.contenders[0])
+    assert {(row["scenario"], row["figure"]) for row in found} == {
+        (RANDOM, "largest breakdown"), ("steps", "largest breakdown"),
+    }  # fmt: skip
+
+
+def test_a_duel_says_by_how_much_and_how_often():
+    c = contest(PPO=episodes(50), other=episodes(10, rms=0.3))
+    found = duels(c, c.contenders[0]).set_index(["plants", "score"])
+    row = found.loc[("calibrated", "rms_bar")]
+    assert row["difference"] == pytest.approx(-0.2)
+    assert row["better"] == 1.0
+    assert found.loc[("calibrated", "episode_return"), "better"] == 0.5
+
+
+def test_all_seeds_count_beside_the_chosen_one():
+    both = learned(2)
+    results = {
+        (f"PPO, seed {k}", plants, RANDOM): episodes(10, left=k)
+        for k in range(2)
+        for plants in (*PLANTS, TUNING_REGION)
+    }
+    results |= {(run, TUNING_REGION, TUNING): episodes(2) for run in both.runs}
+    table = figures(Contest([both], [RANDOM], results))
+    rows = table.loc[table["plants"] == "calibrated"].set_index("controller")
+    assert rows.loc["PPO", "C1_stayed"] == 1.0
+    assert rows.loc["PPO, all seeds", "C1_stayed"] == pytest.approx(19 / 20)
+
+
+def test_a_dominated_controller_is_off_the_front():
+    c = contest(
+        good=episodes(9), worse=episodes(9, rms=0.2, breakdown=0.4), fast=episodes(9, switchings=1.0)
+    )
+    found = trade(c, [], 5).set_index("controller")
+    assert found["rms_error_bar_on_front"].to_dict() == {"good": False, "worse": False, "fast": True}
+    assert set(found["episodes"]) == {5}
+
+
+def test_pages_that_cannot_be_filled_are_refused(tmp_path):
+    page = tmp_path / "page.md"
+    for text, words in (
+        ("plain", "asks for none of the parts"),
+        ("<!-- generated: nonsense -->\n<!-- end: nonsense -->", "asks for none of the parts"),
+        ("<!-- generated: short -->", "add it"),
+    ):
+        page.write_text(text)
+        with pytest.raises(ValueError, match=words):
+            check_pages([page], PARTS)
+    with pytest.raises(ValueError, match="no page"):
+        check_pages([tmp_path / "none.md"], PARTS)
+
+
+def test_filling_a_page_twice_changes_nothing(tmp_path):
+    page = tmp_path / "page.md"
+    others = "<!-- generated: of another command -->\nx\n<!-- end: of another command -->\n"
+    page.write_text(f"a\n<!-- generated: short -->\n<!-- end: short -->\nb\n{others}")
+    parts = {"short": markdown(["x"], [["1"]])}
+    fill(page, parts)
+    once = page.read_text()
+    fill(page, parts)
+    written = "a\n<!-- generated: short -->\n| x |\n| --- |\n| 1 |\n<!-- end: short -->\nb\n"
+    assert page.read_text() == once == written + others
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--duration", "0"], ["--scenarios", "steps"], ["--scenarios", "flood"]]
+)
+def test_wrong_options_are_refused(arguments, capsys):
+    with pytest.raises(SystemExit) as stop:
+        parse(arguments)
+    assert stop.value.code == 2
+    assert arguments[0] in capsys.readouterr().err

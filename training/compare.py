@@ -1,0 +1,162 @@
+"""Compare every controller on the same unseen episodes, and say how sure the differences are.
+
+    python training/compare.py --policies runs/seeds --out runs/comparison
+
+The classic controllers are those of controllers/tuned.json; --policies holds a folder per training seed
+and is filled with what is missing. What is finished in --out is kept: an interrupted comparison goes on
+where it was. After a change of the plant or of a controller's code, choose another --out.
+"""
+
+import argparse
+import sys
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from controllers.oracle import Oracle
+from controllers.tuned import tuned_controllers
+from epv_env.plant.commandline import fail_clearly, writable_folder
+from epv_env.plant.consumption import MIXED
+from epv_env.plant.plantfile import Plant
+from epv_env.plant.valves import available_cores
+from identification.journal import Journal
+from training.compare_output import PARTS, findings, write_figures, write_tables
+from training.compare_plan import Block, Contender, Results, Sizes, collect, plan
+from training.compare_scores import Contest
+from training.evaluate import EVALUATION_SEED
+from training.generated import check_pages
+from training.metrics import EpisodeMetrics
+from training.policies import seed_folder, trained_seeds
+from training.rollout import Trace, run_episodes
+from training.scenarios import EVALUATION, RANDOM
+from training.sweep_run import run_tasks, workplace
+from training.sweep_tasks import Study
+from training.tradeoff import finished_variants
+
+JOURNAL_FILE = "blocks.jsonl"
+CURVE_FILE = "learning_curve.csv"
+
+QUICK: dict[str, Any] = {
+    "named": 4, "random": 16, "bound": 16, "tuning": 4, "duration": 0.8, "seeds": 1,
+    "timesteps": 32_768, "scenarios": [RANDOM, "steps", "anti-lock"],
+}  # fmt: skip
+"""The defaults under --quick: everything is done, too little to learn or to conclude anything."""
+
+
+def parse(arguments: list[str] | None) -> argparse.Namespace:
+    """The command line's options, checked."""
+    parser = argparse.ArgumentParser(description="Compare controllers (docs/controllers.md).")
+    parser.add_argument("--out", type=writable_folder, default=Path("runs/comparison"))
+    parser.add_argument(
+        "--policies", type=writable_folder, help="folder with a learned policy for each training seed"
+    )
+    parser.add_argument("--seeds", type=int, default=10, help="training seeds that --policies holds")
+    parser.add_argument("--timesteps", type=int, default=5_000_000, help="steps to train a missing one")
+    parser.add_argument(
+        "--tradeoff", type=Path, help="folder of training/tradeoff.py: its controllers join the front"
+    )
+    parser.add_argument("--scenarios", nargs="+", choices=list(EVALUATION), default=list(EVALUATION))
+    parser.add_argument("--named", type=int, default=128, help="episodes in each named scenario")
+    parser.add_argument("--random", type=int, default=1024, help="random ones on the calibrated plant")
+    parser.add_argument(
+        "--bound", type=int, default=4096,
+        help="random ones on each region, to bound the probability of leaving the band",
+    )  # fmt: skip
+    parser.add_argument("--tuning", type=int, default=512, help="episodes that choose a training seed")
+    parser.add_argument("--duration", type=float, default=10.0, help="length of an episode [s]")
+    parser.add_argument("--workers", type=int, default=available_cores(), help="processes")
+    parser.add_argument("--cluster", help="address of a Dask scheduler to run on instead")
+    parser.add_argument("--images", type=writable_folder, help="another folder for the figures")
+    parser.add_argument(
+        "--pages", type=Path, nargs="+", default=[], help="pages whose generated parts are written"
+    )
+    parser.add_argument("--quick", action="store_true", help="a short run that shows that all works")
+    if parser.parse_known_args(arguments)[0].quick:
+        parser.set_defaults(**QUICK)  # what is given beside --quick still holds
+    chosen = parser.parse_args(arguments)
+    for name in ("seeds", "timesteps", "named", "random", "bound", "tuning", "duration", "workers"):
+        if getattr(chosen, name) <= 0:
+            parser.error(f"--{name} must be positive")
+    if RANDOM not in chosen.scenarios:
+        parser.error(f"--scenarios must hold {RANDOM!r}: the probabilities refer to it")
+    return chosen
+
+
+def contenders(chosen: argparse.Namespace) -> list[Contender]:
+    """Everyone who takes part in all scenarios, the learned one first and the oracle last."""
+    found = []
+    if chosen.policies is not None:
+        policies = trained_seeds(chosen.policies, count=chosen.seeds, timesteps=chosen.timesteps)
+        name = next(iter(policies.values())).name
+        runs = {f"{name}, {seed}": policy for seed, policy in policies.items()}
+        found.append(Contender(name=name, runs=runs, learned=True))
+    others = [*tuned_controllers(), Oracle(threads=1)]
+    return found + [Contender(name=c.name, runs={c.name: c}) for c in others]
+
+
+def run_blocks(blocks: list[Block], everyone: list[Contender], chosen: argparse.Namespace) -> Results:
+    """The blocks' episodes: those that --out lacks are run, side by side."""
+    controllers = {run: controller for c in everyone for run, controller in c.runs.items()}
+    plant = Plant.calibrated()
+    study = Study(
+        controllers=controllers, plant=plant, scenario=MIXED, duration=chosen.duration
+    )  # fmt: skip
+    subject = {
+        "plant": dict(plant.parameters),
+        "duration": chosen.duration,
+        "figures": [entry.name for entry in fields(EpisodeMetrics)],
+        "scenarios": {name: repr(scenario.options) for name, scenario in EVALUATION.items()},
+    }
+    journal = Journal(chosen.out / JOURNAL_FILE, subject)
+    with workplace(chosen.workers, chosen.cluster) as run:
+        outcomes = run_tasks(blocks, study, journal, run)
+    return collect(blocks, {name: outcome["result"] for name, outcome in outcomes.items()})
+
+
+def same_episode(c: Contest, duration: float) -> dict[str, Trace]:
+    """One random episode of the calibrated plant under each contender's chosen run, in time."""
+    traces = {}
+    for contender in c.contenders:
+        controller = contender.runs[c.chosen[contender.name]]
+        _, trace = run_episodes(
+            controller, seeds=[EVALUATION_SEED], duration=duration, trace_of=0,
+            options=EVALUATION[RANDOM].options,
+        )  # fmt: skip
+        if trace is not None:
+            traces[contender.name] = trace
+    return traces
+
+
+def learning_curves(chosen: argparse.Namespace) -> dict[str, pd.DataFrame]:
+    """The learning curves that lie beside the policies, by training seed."""
+    if chosen.policies is None:
+        return {}
+    paths = {f"seed {k}": seed_folder(chosen.policies, k) / CURVE_FILE for k in range(chosen.seeds)}
+    return {name: pd.read_csv(path) for name, path in paths.items() if path.exists()}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Command line; returns the exit status."""
+    chosen = parse(arguments)
+    check_pages(chosen.pages, PARTS)
+    sizes = Sizes(
+        named=chosen.named, random=chosen.random, bound=chosen.bound, tuning=chosen.tuning
+    )  # fmt: skip
+    everyone = contenders(chosen)
+    variants = finished_variants(chosen.tradeoff)
+    blocks = plan([*everyone, *variants], chosen.scenarios, sizes)
+    results = run_blocks(blocks, [*everyone, *variants], chosen)
+    contest = Contest(everyone, chosen.scenarios, results)
+    found = findings(contest, variants, trade_episodes=chosen.random)
+    settings = {name: getattr(chosen, name) for name in (*QUICK, "quick")}
+    print(write_tables(contest, found, settings=settings, out=chosen.out, pages=chosen.pages))
+    traces, curves = same_episode(contest, chosen.duration), learning_curves(chosen)
+    write_figures(contest, found, traces=traces, curves=curves, out=chosen.out, images=chosen.images)
+    print(f"\nresults in {chosen.out}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(fail_clearly(main))

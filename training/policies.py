@@ -1,0 +1,46 @@
+"""Learned policies, one folder each: trained if they are missing, loaded if they are there."""
+
+from pathlib import Path
+
+from controllers.base import Controller
+from controllers.learned import CONTRACT_FILE, load_policy
+from epv_env.actions import OnOff
+from epv_env.plant.consumption import MIXED
+from epv_env.plant.plantfile import Plant
+from epv_env.reward import RewardWeights
+from training.tune import TUNING_REGION
+
+
+def trained_policy(
+    folder: Path, *, timesteps: int, seed: int, weights: RewardWeights | None = None
+) -> Controller:
+    """PPO on the report's plant within ±10 %, or as it was trained before.
+
+    weights: prices of the reward; None: the environment's own. An interrupted training goes on.
+    """
+    if not (folder / CONTRACT_FILE).exists():
+        from training.policy_files import save_policy  # torch takes seconds to import: only now
+        from training.ppo import Hyperparameters, train
+
+        chosen = weights or RewardWeights()
+        model, _ = train(
+            Hyperparameters(), folder=folder, plant=Plant.calibrated(), scenario=MIXED,
+            parameters=TUNING_REGION, weights=chosen, timesteps=timesteps, seed=seed, device="cpu",
+            resume=True,
+        )  # fmt: skip
+        provenance = {"timesteps": timesteps, "seed": seed, "switching_price": chosen.switching}
+        save_policy(model, folder, control_period=OnOff.default_period, provenance=provenance)
+    return load_policy(folder)
+
+
+def seed_folder(folder: Path, seed: int) -> Path:
+    """Where the policy of a training seed lies among those of a folder."""
+    return folder / f"seed-{seed}"
+
+
+def trained_seeds(folder: Path, *, count: int, timesteps: int) -> dict[str, Controller]:
+    """One policy per training seed 0, 1, ..., by name."""
+    return {
+        f"seed {seed}": trained_policy(seed_folder(folder, seed), timesteps=timesteps, seed=seed)
+        for seed in range(count)
+    }

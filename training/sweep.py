@@ -1,0 +1,161 @@
+"""How far each controller holds: plants, effects, sensors and timing off by much, and the worst of all.
+
+    python training/sweep.py --out runs/sweep
+    python training/sweep.py --out runs/sweep --cluster tcp://HOST:8786
+
+Killed, it goes on where it was when it is started again. docs/robustness.md says what it does.
+"""
+
+import argparse
+import hashlib
+import json
+import sys
+from dataclasses import asdict
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from epv_env.plant.commandline import fail_clearly, writable_folder
+from epv_env.plant.consumption import check_scenario
+from epv_env.plant.files import write_text
+from epv_env.plant.plantfile import Plant, load_plant
+from epv_env.plant.valves import available_cores
+from identification.journal import Journal
+from training.generated import check_pages
+from training.sweep_controllers import DEFAULT, named_controllers
+from training.sweep_cost import cost, episode_cpu, overhead
+from training.sweep_designs import DESIGNS
+from training.sweep_plan import Size, cells, chosen_points, searches
+from training.sweep_report import PARTS, report
+from training.sweep_run import run_tasks, workplace
+from training.sweep_tasks import Study
+from training.sweep_worst import Effort
+
+CONFIG, JOURNAL, COST = "config.json", "finished.jsonl", "cost.json"
+
+QUICK: dict[str, Any] = {
+    "controllers": DEFAULT[:1], "episodes": 4, "joint_episodes": 16, "duration": 0.6, "screened": 16,
+    "generations": 1,
+    "factors": ["R", "V2", "piston_friction", "sensor noise", "control period", "latency"],
+}  # fmt: skip
+"""The defaults under --quick: everything is done, with too few episodes to tell anything."""
+
+
+def parse(arguments: list[str] | None) -> argparse.Namespace:
+    """The command line's options, checked."""
+    parser = argparse.ArgumentParser(description="Robustness of controllers (docs/robustness.md).")
+    parser.add_argument(
+        "--out", type=writable_folder, default=Path("runs/sweep"), help="folder of results"
+    )
+    parser.add_argument(
+        "--controllers", nargs="+", default=list(DEFAULT), metavar="NAME",
+        help="kinds of controllers/tuned.json, folders of policies, or LABEL=FOLDER",
+    )  # fmt: skip
+    parser.add_argument("--designs", nargs="+", choices=DESIGNS, default=list(DESIGNS))
+    parser.add_argument(
+        "--factors", nargs="+", default=[], help="change only these, one at a time; default: all"
+    )
+    parser.add_argument("--episodes", type=int, default=256, help="at each point that changes one thing")
+    parser.add_argument(
+        "--joint-episodes", type=int, default=4096, help="at each region, and in the hypercube"
+    )
+    parser.add_argument("--screened", type=int, default=1024, help="plants that begin a search")
+    parser.add_argument("--generations", type=int, default=15, help="of that search")
+    parser.add_argument("--duration", type=float, default=10.0, help="length of an episode [s]")
+    parser.add_argument("--scenario", default="mixed", help="consumption, where it is not what changes")
+    parser.add_argument("--plant", default=None, help="plant file; default: the report's calibration")
+    parser.add_argument("--seed", type=int, default=0, help="of episodes, hypercube and searches")
+    parser.add_argument("--workers", type=int, default=None, help="processes; default: all cores")
+    parser.add_argument("--cluster", default=None, help="address of a Dask scheduler, tcp://HOST:8786")
+    parser.add_argument(
+        "--images", type=writable_folder, default=None, help="another folder for the figures"
+    )
+    parser.add_argument(
+        "--pages", type=Path, nargs="+", default=[], help="pages whose generated parts are written"
+    )
+    parser.add_argument("--quick", action="store_true", help="a short run that shows that all works")
+    if parser.parse_known_args(arguments)[0].quick:
+        parser.set_defaults(**QUICK)  # what is given beside --quick still holds
+    chosen = parser.parse_args(arguments)
+    for name in ("episodes", "joint_episodes", "duration", "generations", "workers"):
+        if getattr(chosen, name) is not None and getattr(chosen, name) <= 0:
+            parser.error(f"--{name.replace('_', '-')} must be positive")
+    if chosen.screened < 8:
+        parser.error("--screened must be at least 8")
+    if chosen.seed < 0:
+        parser.error("--seed must not be negative")
+    return chosen
+
+
+def configuration(
+    chosen: argparse.Namespace, size: Size, plant: Plant, digests: dict[str, str]
+) -> dict[str, Any]:
+    """Everything that the results depend on."""
+    region = plant.region
+    described = repr([*plant.parameters.items(), region.boxes, region.symbols, region.chi_square])
+    described += "" if region.covariance is None else repr(region.covariance.tolist())
+    depends = ("designs", "factors", "scenario", "duration", "seed")
+    return {
+        "software": version("epv-valve"),
+        "controllers": digests,
+        "plant": {"name": plant.name, "sha256": hashlib.sha256(described.encode()).hexdigest()},
+        "size": asdict(size),
+        **{name: getattr(chosen, name) for name in depends},
+    }
+
+
+def check_folder(folder: Path, config: dict[str, Any]) -> None:
+    """Raises ValueError if the folder holds a sweep with another configuration."""
+    path = folder / CONFIG
+    earlier = json.loads(path.read_text(encoding="utf-8")) if path.exists() else config
+    for name, value in config.items():
+        if earlier.get(name) != value:
+            raise ValueError(
+                f"{folder} holds a sweep with {name} {earlier.get(name)}, not {value}: go on with the "
+                "same, or choose another --out"
+            )
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Command line; returns the exit status."""
+    chosen = parse(arguments)
+    check_pages(chosen.pages, PARTS)
+    check_scenario(chosen.scenario)
+    plant = load_plant(chosen.plant)
+    controllers, digests = named_controllers(chosen.controllers, plant.parameters)
+    size = Size(
+        episodes=chosen.episodes, joint_episodes=chosen.joint_episodes,
+        effort=Effort(screened=chosen.screened, generations=chosen.generations),
+    )  # fmt: skip
+    points = chosen_points(plant, chosen.designs, chosen.factors, size, chosen.seed)
+    config = configuration(chosen, size, plant, digests)
+    check_folder(chosen.out, config)
+    write_text(chosen.out / CONFIG, json.dumps(config, indent=1) + "\n")
+
+    study = Study(
+        controllers=controllers, plant=plant, scenario=chosen.scenario, duration=chosen.duration
+    )
+    planned = cells(points, list(controllers), size, chosen.seed)
+    hunts = searches(plant, list(controllers), size, chosen.seed) if "worst" in chosen.designs else []
+    tasks = [*hunts, *(batch for cell in planned for batch in cell.batches)]
+    cores = available_cores()
+    with workplace(chosen.workers or cores, chosen.cluster) as run:
+        outcomes = run_tasks(tasks, study, Journal(chosen.out / JOURNAL, config), run)
+        handing_out = overhead(run, study)
+    spent = cost(
+        episode_cpu(planned, outcomes), handing_out, cores=cores, duration=chosen.duration,
+        where="Dask" if chosen.cluster else "joblib",
+    )  # fmt: skip
+    write_text(chosen.out / COST, json.dumps(spent, indent=1) + "\n")
+    print(
+        report(
+            chosen.out, config, planned, hunts, outcomes, study, spent,
+            images=chosen.images, pages=chosen.pages,
+        )
+    )  # fmt: skip
+    print(f"\nresults in {chosen.out}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(fail_clearly(main))

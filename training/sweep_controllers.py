@@ -1,0 +1,51 @@
+"""The controllers of a sweep by what a user calls them: tuned kinds, and folders of policies."""
+
+import hashlib
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from controllers.base import Controller
+from controllers.learned import CONTRACT_FILE, WEIGHTS_FILE, load_policy
+from controllers.tuned import build, load_tunings
+from epv_env.plant.parameters import Parameters
+
+DEFAULT = ("hysteresis, extrapolating", "pulse", "PWM")
+"""Controllers that are swept unless others are named: good ones that compute little."""
+
+
+def named_controllers(
+    sources: Sequence[str], parameters: Parameters
+) -> tuple[dict[str, Controller], dict[str, str]]:
+    """Controllers by label, and a digest of what each was made from.
+
+    sources: a tuned kind (controllers/tuned.json), a folder that training wrote, or LABEL=FOLDER.
+    parameters: of the plant that the classic ones are designed for. Raises ValueError.
+    """
+    controllers: dict[str, Controller] = {}
+    digests: dict[str, str] = {}
+    for source in sources:
+        label, controller, content = _named(source, parameters)
+        if label in controllers:
+            raise ValueError(f"two controllers are called {label!r}: give one as LABEL=FOLDER")
+        controllers[label] = controller
+        digests[label] = hashlib.sha256(content).hexdigest()
+    return controllers, digests
+
+
+def _named(source: str, parameters: Parameters) -> tuple[str, Controller, bytes]:
+    """Label, controller, and the bytes that define it."""
+    tunings = load_tunings()
+    if source in tunings:
+        values = tunings[source].values
+        return source, build(source, values, parameters), json.dumps(values, sort_keys=True).encode()
+    label, _, folder = source.rpartition("=")
+    path = Path(folder)
+    if not path.is_dir():
+        raise ValueError(
+            f"no controller {source!r}: give a folder that training wrote, or one of "
+            f"{', '.join(tunings)}"
+        )
+    policy = load_policy(path)
+    content = (path / CONTRACT_FILE).read_bytes() + (path / WEIGHTS_FILE).read_bytes()
+    return label or policy.name, policy, content
