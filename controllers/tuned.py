@@ -1,6 +1,7 @@
 """The tuned classic controllers, as data: what the search found, and how it searched."""
 
 import json
+from collections.abc import Collection
 from dataclasses import asdict, dataclass
 from importlib import resources
 from os import PathLike
@@ -65,6 +66,9 @@ def build(kind: str, values: dict[str, Any], parameters: Parameters) -> Controll
 KINDS = ("hysteresis", "hysteresis, extrapolating", "PWM", "pulse", "MPC")
 """The controllers that are tuned, not trained."""
 
+SEARCHING = ("MPC",)
+"""Those of them that simulate the plant as they decide: a second or more of computing per episode."""
+
 
 def load_tunings(path: str | PathLike[str] | None = None) -> dict[str, Tuning]:
     """Tunings by kind, from a file or (None) those that come with the package."""
@@ -100,7 +104,10 @@ def save_tunings(tunings: dict[str, Tuning], path: str | PathLike[str], search: 
     write_text(Path(path), json.dumps(content, indent=1) + "\n")
 
 
-def tuned_controllers(parameters: Parameters | None = None) -> list[Controller]:
+def tuned_controllers(
+    parameters: Parameters | None = None, *, without: Collection[str] = ()
+) -> list[Controller]:
     """The classic controllers as tuned, designed for a plant (None: the report's calibration)."""
     plant = parameters or Parameters.calibrated()
-    return [build(kind, tuning.values, plant) for kind, tuning in load_tunings().items()]
+    tunings = load_tunings()
+    return [build(kind, tunings[kind].values, plant) for kind in tunings if kind not in without]

@@ -16,7 +16,7 @@ import pandas as pd
 
 from controllers.base import Controller
 from controllers.learned import CONTRACT_FILE, load_policy
-from controllers.tuned import tuned_controllers
+from controllers.tuned import SEARCHING, tuned_controllers
 from epv_env.actions import OnOff
 from epv_env.plant.commandline import fail_clearly, writable_folder
 from epv_env.plant.files import write_text
@@ -29,7 +29,7 @@ from training.circle_report import report
 
 SCENARIO = "mixed"
 TRAINED_ON = "ten_percent"
-"""Region of plants around the simulated one that PPO trains on, as in train_ppo.py."""
+"""Region of plants around the simulated one that PPO trains on: no wider, so that a gap is felt."""
 
 SWITCHING_PRICE = 0.2
 """Below the default: where switching is dear, so short a training has not learned to control yet."""
@@ -143,8 +143,9 @@ def stage(name: str, simulated: Plant, chosen: argparse.Namespace) -> pd.DataFra
     path = folder / EPISODES
     if not path.exists():
         plants = {PROMISED: simulated, DELIVERED: load_plant(chosen.out / WITHHELD)}
+        rivals = tuned_controllers(without=SEARCHING)
         episodes = deployed(
-            [policy, *tuned_controllers()], plants, scenario=SCENARIO, count=chosen.episodes,
+            [policy, *rivals], plants, scenario=SCENARIO, count=chosen.episodes,
             duration=chosen.duration, what=f"deployment {name}",
         )  # fmt: skip
         write_text(path, episodes.to_csv(index=False))

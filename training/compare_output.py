@@ -15,9 +15,9 @@ from training import compare_report as report
 from training import compare_scores as scores
 from training import plots
 from training.compare_bars import Bar, bars, lost
-from training.compare_plan import PLANTS, TRADED_ON, Contender
+from training.compare_plan import TRADED_ON, Contender
 from training.compare_scores import Contest, records
-from training.evaluate import Comparison
+from training.evaluate import PLANTS, Comparison
 from training.generated import fill
 from training.rollout import Trace
 

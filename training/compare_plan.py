@@ -10,19 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.base import Controller
-from training.evaluate import EVALUATION_SEED, plant_region
+from training.evaluate import EVALUATION_SEED, PLANTS, plant_region
 from training.metrics import EpisodeMetrics
 from training.scenarios import EVALUATION, RANDOM
 from training.sweep_tasks import Study
 from training.tune import TUNING_REGION, TUNING_SEED
-
-PLANTS = {
-    "calibrated": "the calibrated plant",
-    "confidence": "drawn from its confidence region",
-    "sensitive_ten_percent": "all 13 sensitive parameters each within ±10 %",
-}
-"""Plant sets of the comparison. The confidence region is so narrow (Table 14: ±0.05 %) that the named
-scenarios run on the other two only."""
 
 BOUNDED = ("confidence", "sensitive_ten_percent")
 """Plant sets on which the probability of leaving the band is bounded: many random episodes."""

@@ -7,8 +7,8 @@ import pandas as pd
 
 from controllers.tuned import load_search, load_tunings
 from training.compare_bars import Bar
-from training.compare_plan import PLANTS
 from training.compare_scores import FRONT, SCORES, Contest, records
+from training.evaluate import PLANTS
 from training.generated import markdown
 from training.scenarios import EVALUATION, NAMED
 
@@ -131,8 +131,7 @@ def budget_text(c: Contest) -> str:
     search, tunings = load_search(), load_tunings()
     efforts: dict[tuple[int, int], list[str]] = {}
     for kind, tuning in tunings.items():
-        effort = tuning.trials, tuning.episodes or search["episodes"]
-        efforts.setdefault(effort, []).append(kind)
+        efforts.setdefault((tuning.trials, tuning.episodes), []).append(kind)
     each = (f"{t} trials of {e} episodes for {'; '.join(kinds)}" for (t, e), kinds in efforts.items())
     text = (
         f"Tuning: {search['method']}, seed {search['seed']}, episodes of {search['duration']:g} s on "

@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from epv_env.reward import RewardWeights
-from training.compare_plan import PLANTS, TRADED_ON, Contender, Results, chosen_run
+from training.compare_plan import TRADED_ON, Contender, Results, chosen_run
 from training.estimates import (
     Estimate,
     estimate,
@@ -17,6 +17,7 @@ from training.estimates import (
     pareto_front,
     probability_of_improvement,
 )
+from training.evaluate import PLANTS
 from training.metrics import EpisodeMetrics, summary
 from training.scenarios import RANDOM
 

@@ -18,7 +18,7 @@ EVALUATION_SEED = 2_000_000
 PLANTS = {
     "calibrated": "the calibrated plant",
     "confidence": "drawn from its confidence region (C3)",
-    "ten_percent": "the four calibrated parameters each within ±10 % (C3)",
+    "sensitive_ten_percent": "all 13 sensitive parameters each within ±10 % (C3)",
 }
 """The plants on which controllers are compared."""
 

@@ -5,12 +5,22 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from numpy.typing import NDArray
 from safetensors.numpy import save
 from stable_baselines3 import PPO
 
-from controllers.learned import CONTRACT_FILE, FORMAT, WEIGHTS_FILE
+from controllers.learned import CONTRACT_FILE, FORMAT, WEIGHTS_FILE, LearnedPolicy
 from epv_env.observation import contract
 from epv_env.plant.files import write_bytes, write_text
+
+
+def greedy_policy(model: PPO) -> LearnedPolicy:
+    """The model's actor as a controller. It shares the model's weights: training changes it.
+
+    Raises TypeError for a policy that is not a plain multilayer perceptron with tanh layers.
+    """
+    layers = _linear_layers(model)
+    return LearnedPolicy(layers=[(_array(layer.weight), _array(layer.bias)) for layer in layers])
 
 
 def save_policy(model: PPO, folder: Path, *, control_period: float, provenance: dict[str, Any]) -> None:
@@ -18,15 +28,14 @@ def save_policy(model: PPO, folder: Path, *, control_period: float, provenance: 
 
     Raises TypeError for a policy that is not a plain multilayer perceptron with tanh layers.
     """
-    layers = _linear_layers(model)
+    policy = greedy_policy(model)
     arrays = {}
-    for i, layer in enumerate(layers):
-        arrays[f"{i}.weight"] = layer.weight.detach().cpu().numpy()
-        arrays[f"{i}.bias"] = layer.bias.detach().cpu().numpy()
+    for i, (weight, bias) in enumerate(policy.layers):
+        arrays[f"{i}.weight"], arrays[f"{i}.bias"] = weight, bias
     content = {
         "format": FORMAT,
-        "environment": "EPValve-v0",
-        "layers": len(layers),
+        "environment": policy.environment,
+        "layers": len(policy.layers),
         "activation": "tanh",
         "action": "argmax of the logits: 0 = coil off, 1 = coil on",
         "observation": contract(control_period),
@@ -41,3 +50,7 @@ def _linear_layers(model: PPO) -> list[torch.nn.Linear]:
     if any(not isinstance(m, (torch.nn.Linear, torch.nn.Tanh)) for m in hidden):
         raise TypeError("only policies of linear and tanh layers can be written")
     return [m for m in [*hidden, model.policy.action_net] if isinstance(m, torch.nn.Linear)]
+
+
+def _array(parameter: torch.Tensor) -> NDArray:
+    return parameter.detach().cpu().numpy()

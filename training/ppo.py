@@ -1,52 +1,91 @@
-"""PPO on the native vector environment: hyperparameters, model, progress, checkpoints."""
+"""PPO on the native vector environment: hyperparameters, model, training with selection and resume."""
 
-import csv
-import io
-import os
-import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.vec_env import VecMonitor
-from tqdm import tqdm
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
-from epv_env.plant.files import write_text
+from controllers.base import Controller
+from controllers.tuned import build, load_tunings
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from epv_env.sb3 import make_sb3_env
+from training.curriculum import FadingEntropy, RisingPrice
+from training.imitation import imitate
+from training.learning_log import CHECKPOINT_FILE, CURVE_FILE, TrainingLog, read_rows
+from training.selection import Selection, validation_points
 
-CHECKPOINT_FILE = "checkpoint.zip"
-CURVE_FILE = "learning_curve.csv"
-CURVE_COLUMNS = ("timesteps", "seconds", "episode_return", "success_rate")
+TEACHER = "pulse"
+"""Whom a model imitates first: on the calibrated plant the best of the controllers without a search."""
+
+RESUMED_SEED = 1_000_000_000
+"""From here on are the seeds of resumed trainings' episodes, which nothing else uses."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Hyperparameters:
     """What defines the training; the rest is stable-baselines3's default."""
 
-    num_envs: int = 512
+    num_envs: int = 256
     episode_steps: int = 600
     """Control periods of a training episode (3 s)."""
     n_steps: int = 64
-    batch_size: int = 8192
-    n_epochs: int = 6
-    learning_rate: float = 1e-3
-    """At the start; it falls linearly to a tenth."""
+    batch_size: int = 2048
+    n_epochs: int = 3
+    learning_rate: float = 7e-4
+    """At the start; it falls linearly to `last_learning_rate`."""
+    last_learning_rate: float = 2e-5
+    reward_scale: float = 0.02
+    """What the learner gets of a reward of 1, so that the critic's errors are about as large as the
+    actor's advantages: PPO clips the gradients of both in common."""
+    band_price: float = 6.0
+    """Price of being outside the band in training, unless the reward's own is higher: leaving it is so
+    rare for a good policy that at the reward's own price learning would hardly notice."""
+    imitation_epochs: int = 8
+    """Passes over the demonstration that the model imitates first (training/imitation.py)."""
     gamma: float = 0.995
     gae_lambda: float = 0.95
     ent_coef: float = 0.003
-    first_switching_price: float = 0.02
-    """The price of switching rises linearly from this to the reward's own over `rising_share`: priced in
-    full from the start, learning tends to end where the coil is never switched."""
+    """At the start; it falls linearly to nothing, since the policy is used greedily."""
+    first_switching_price: float | None = None
+    """The price of switching rises linearly from this to the reward's own over `rising_share`; None: it
+    is the reward's own from the start."""
     rising_share: float = 0.6
     """Share of the training over which it rises."""
     width: int = 64
     """Of the two hidden layers."""
+    validations: int = 8
+    """How many of the policies are validated, evenly from `first_validation` to the end."""
+    first_validation: float = 0.75
+    """Share of the training before the first of them."""
+    validation_episodes: int = 512
+    validation_duration: float = 6.0
+    """Length of a validation episode [s]."""
+
+
+BUSY = Hyperparameters(imitation_epochs=0, first_switching_price=0.02, reward_scale=1.0, band_price=10.0)
+"""For the way of control with tens of switchings a second, at prices of 0.25 and below. Training did not
+get there from the teacher's sparing way; from nothing, with cheap switching at first, it does."""
+
+
+class ScaledReward(VecEnvWrapper):
+    """Rewards times a constant; the monitor inside counts them as they are."""
+
+    def __init__(self, env: VecMonitor, scale: float):
+        super().__init__(env)
+        self._scale = scale
+
+    def reset(self) -> VecEnvObs:
+        return self.venv.reset()
+
+    def step_wait(self) -> VecEnvStepReturn:
+        observation, reward, done, infos = self.venv.step_wait()
+        return observation, self._scale * reward, done, infos
 
 
 def make_training_env(
@@ -57,8 +96,11 @@ def make_training_env(
     parameters: str,
     seed: int,
     weights: RewardWeights,
-) -> VecMonitor:
-    """Episodes on plants drawn from a region, "confidence" or another (epv_env.settings)."""
+) -> ScaledReward:
+    """Episodes on plants drawn from a region, "confidence" or another (epv_env.settings).
+
+    Trainings with different seeds meet different episodes.
+    """
     env = make_sb3_env(
         "EPValve-v0",
         h.num_envs,
@@ -68,19 +110,20 @@ def make_training_env(
         scenario=scenario,
         weights=weights,
     )
-    env.seed(seed)
-    return VecMonitor(env)
+    env.seed(seed * h.num_envs)
+    return ScaledReward(VecMonitor(env), h.reward_scale)
 
 
-def make_model(h: Hyperparameters, env: VecMonitor, *, seed: int, device: str) -> PPO:
+def make_model(h: Hyperparameters, env: VecEnv, *, seed: int, device: str) -> PPO:
     """A new PPO model."""
+    first, last = h.learning_rate, h.last_learning_rate
     return PPO(
         "MlpPolicy",
         env,
         n_steps=h.n_steps,
         batch_size=h.batch_size,
         n_epochs=h.n_epochs,
-        learning_rate=lambda remaining: h.learning_rate * (0.1 + 0.9 * remaining),
+        learning_rate=lambda remaining: last + (first - last) * remaining,
         gamma=h.gamma,
         gae_lambda=h.gae_lambda,
         ent_coef=h.ent_coef,
@@ -90,97 +133,9 @@ def make_model(h: Hyperparameters, env: VecMonitor, *, seed: int, device: str) -
     )
 
 
-class RisingPrice(BaseCallback):
-    """Raises the price of switching as training goes on."""
-
-    def __init__(self, h: Hyperparameters, weights: RewardWeights, total: int):
-        super().__init__()
-        self._first = min(h.first_switching_price, weights.switching)
-        self._weights = weights
-        self._steps = h.rising_share * total
-
-    def _on_step(self) -> bool:
-        return True
-
-    def _on_rollout_start(self) -> None:
-        share = min(self.num_timesteps / self._steps, 1.0)
-        price = self._first + share * (self._weights.switching - self._first)
-        self.training_env.env_method("set_weights", replace(self._weights, switching=price))
-
-
-class TrainingLog(BaseCallback):
-    """Progress bar with estimate and success rate, learning curve, and checkpoints to resume from."""
-
-    def __init__(self, folder: Path, total: int, *, checkpoint_seconds: float = 20.0, quiet: bool):
-        super().__init__()
-        self._folder = folder
-        self._total = total
-        self._quiet = quiet
-        self._checkpoint_seconds = checkpoint_seconds
-        self._saved_at = time.monotonic()
-        self.rows = read_curve(folder / CURVE_FILE)
-        self._bar: tqdm | None = None
-
-    def _on_training_start(self) -> None:
-        self.rows = [row for row in self.rows if row["timesteps"] <= self.num_timesteps]
-        self._spent = self.rows[-1]["seconds"] if self.rows else 0.0
-        self._begun = time.monotonic()
-        self._bar = tqdm(
-            total=self._total, initial=self.num_timesteps, desc="PPO", unit="step",
-            unit_scale=True, disable=self._quiet, mininterval=0.5,
-        )  # fmt: skip
-
-    def _on_step(self) -> bool:
-        return True
-
-    def _on_rollout_end(self) -> None:
-        episodes = self.model.ep_info_buffer or []
-        successes = self.model.ep_success_buffer or []
-        row = {
-            "timesteps": float(self.num_timesteps),
-            "seconds": self._spent + time.monotonic() - self._begun,
-            "episode_return": float(np.mean([e["r"] for e in episodes])) if episodes else np.nan,
-            "success_rate": float(np.mean(successes)) if successes else np.nan,
-        }
-        self.rows.append(row)
-        if self._bar is not None:
-            self._bar.update(min(self.num_timesteps, self._total) - self._bar.n)
-            self._bar.set_postfix(
-                success=f"{row['success_rate']:.0%}", episode_return=f"{row['episode_return']:.1f}"
-            )
-        if time.monotonic() - self._saved_at > self._checkpoint_seconds:
-            self.save()
-
-    def _on_training_end(self) -> None:
-        self.save()
-        if self._bar is not None:
-            self._bar.close()
-
-    def save(self) -> None:
-        """Write checkpoint and learning curve."""
-        save_model(self.model, self._folder / CHECKPOINT_FILE)
-        text = io.StringIO()
-        writer: csv.DictWriter[str] = csv.DictWriter(text, list(CURVE_COLUMNS))
-        writer.writeheader()
-        writer.writerows(self.rows)
-        write_text(self._folder / CURVE_FILE, text.getvalue())
-        self._saved_at = time.monotonic()
-
-
-def save_model(model: Any, path: Path) -> None:
-    """Save a stable-baselines3 model, whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_suffix(".part.zip")
-    model.save(temporary)
-    os.replace(temporary, path)
-
-
-def read_curve(path: Path) -> list[dict[str, float]]:
-    """The learning curve so far; empty if there is none."""
-    if not path.exists():
-        return []
-    with path.open(newline="", encoding="utf-8") as stream:
-        return [{key: float(value) for key, value in row.items()} for row in csv.DictReader(stream)]
+def teacher(plant: Plant) -> Controller:
+    """The TEACHER as tuned, designed for the plant."""
+    return build(TEACHER, load_tunings()[TEACHER].values, plant.parameters)
 
 
 def train(
@@ -197,32 +152,54 @@ def train(
     resume: bool,
     quiet: bool = False,
 ) -> tuple[PPO, TrainingLog]:
-    """Train until `timesteps`; resume goes on from the folder's checkpoint.
+    """Train until `timesteps` and return the best model that was validated (training/selection.py).
 
-    An interruption (Ctrl-C) leaves the newest checkpoint behind. A resumed run draws new episodes, so it
-    is a continuation, not a repetition, of an uninterrupted one.
+    weights: prices of the reward; that of leaving the band is raised (`Hyperparameters.band_price`).
+    resume: go on from the folder's checkpoint. An interruption (Ctrl-C) leaves the newest checkpoint
+    behind. A resumed run draws new episodes, so it is a continuation, not a repetition, of an
+    uninterrupted one.
     """
+    weights = replace(weights, band=max(weights.band, h.band_price))
     torch.set_num_threads(1)  # sums do not depend on the machine's cores; the plant uses them all
     checkpoint = folder / CHECKPOINT_FILE
     done = 0
-    env = make_training_env(
-        h, plant=plant, scenario=scenario, parameters=parameters, weights=weights, seed=seed
-    )
+    task: dict[str, Any] = {
+        "plant": plant,
+        "parameters": parameters,
+        "scenario": scenario,
+        "weights": weights,
+    }
+    env = make_training_env(h, seed=seed, **task)
     model = make_model(h, env, seed=seed, device=device)
     if resume and checkpoint.exists():
         model.set_parameters(str(checkpoint), device=device)
-        done = int(read_curve(folder / CURVE_FILE)[-1]["timesteps"])
-        env.seed(seed + done)
+        done = int(read_rows(folder / CURVE_FILE)[-1]["timesteps"])
+        env.seed(RESUMED_SEED + seed * h.num_envs + done)
+    elif h.imitation_epochs:
+        steps = h.episode_steps - 1
+        imitate(model, teacher(plant), env, steps=steps, epochs=h.imitation_epochs, seed=seed)
+    selection = Selection(
+        folder,
+        points=validation_points(timesteps, first_share=h.first_validation, count=h.validations),
+        episodes=h.validation_episodes,
+        duration=h.validation_duration,
+        options=task,
+    )
     log = TrainingLog(folder, timesteps, quiet=quiet)
+    callbacks: list[BaseCallback] = [
+        FadingEntropy(h.ent_coef, total=timesteps),
+        selection,
+        log,  # last: what it saves at the end has been validated
+    ]
+    if h.first_switching_price is not None:
+        steps = h.rising_share * timesteps
+        callbacks.append(RisingPrice(weights, first=h.first_switching_price, steps=steps))
     if done < timesteps:
         model.num_timesteps = done
         try:
-            model.learn(
-                timesteps - done,
-                callback=[RisingPrice(h, weights, timesteps), log],
-                reset_num_timesteps=done == 0,
-            )
+            model.learn(timesteps - done, callback=callbacks, reset_num_timesteps=done == 0)
         except KeyboardInterrupt:
             log.save()
             raise
+    selection.restore_best(model)
     return model, log

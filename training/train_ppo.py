@@ -19,7 +19,7 @@ from tqdm import tqdm
 
 from controllers.learned import load_policy
 from controllers.pwm import PWM
-from controllers.tuned import tuned_controllers
+from controllers.tuned import SEARCHING, tuned_controllers
 from epv_env.actions import OnOff
 from epv_env.plant.commandline import fail_clearly, writable_folder
 from epv_env.plant.consumption import check_scenario
@@ -28,10 +28,14 @@ from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.region import REGIONS
 from epv_env.reward import RewardWeights
 from training.evaluate import Comparison, as_text, compare
+from training.tune import TUNING_REGION
 
 CONFIG_FILE = "config.json"
 QUICK = {"timesteps": 65_536, "episodes": 16, "duration": 2.0}
 """The defaults under --quick: everything is done, too short to learn anything."""
+QUICK_HYPERPARAMETERS: dict[str, Any] = {
+    "imitation_epochs": 1, "validations": 1, "validation_episodes": 16, "validation_duration": 2.0,
+}  # fmt: skip
 
 
 def parse(arguments: list[str] | None) -> argparse.Namespace:
@@ -49,7 +53,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--plant", default=None, help="plant file; default: the report's calibration")
     parser.add_argument("--scenario", default="mixed", help="consumption scenario")
     parser.add_argument(
-        "--parameters", choices=REGIONS, default="ten_percent", help="plants to train on"
+        "--parameters", choices=REGIONS, default=TUNING_REGION, help="plants to train on"
     )
     parser.add_argument(
         "--switching-price",
@@ -109,7 +113,7 @@ def check_resume(chosen: argparse.Namespace) -> None:
 
 def evaluate(chosen: argparse.Namespace, plant: Plant) -> Comparison:
     """The comparison on unseen scenarios, with a progress bar."""
-    contenders = [load_policy(chosen.out), *tuned_controllers(plant.parameters)]
+    contenders = [load_policy(chosen.out), *tuned_controllers(plant.parameters, without=SEARCHING)]
     with tqdm(
         total=100,
         desc="evaluation",
@@ -139,9 +143,9 @@ def main(arguments: list[str] | None = None) -> int:
     check_resume(chosen)
 
     from training.policy_files import save_policy  # torch takes seconds to import: only now
-    from training.ppo import Hyperparameters, save_model, train
+    from training.ppo import Hyperparameters, train
 
-    hyperparameters = Hyperparameters()
+    hyperparameters = Hyperparameters(**(QUICK_HYPERPARAMETERS if chosen.quick else {}))
     config = configuration(chosen, plant, hyperparameters)
     write_text(chosen.out / CONFIG_FILE, json.dumps(config, indent=1) + "\n")
     model, log = train(
@@ -149,7 +153,6 @@ def main(arguments: list[str] | None = None) -> int:
         parameters=chosen.parameters, weights=RewardWeights(switching=chosen.switching_price),
         timesteps=chosen.timesteps, seed=chosen.seed, device=chosen.device, resume=chosen.resume,
     )  # fmt: skip
-    save_model(model, chosen.out / "model.zip")
     save_policy(model, chosen.out, control_period=OnOff.default_period, provenance=config)
 
     comparison = evaluate(chosen, plant)

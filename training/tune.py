@@ -21,7 +21,7 @@ from epv_env.plant.commandline import fail_clearly, writable_file
 from epv_env.plant.parameters import Parameters
 from training.rollout import run_episodes
 
-TUNING_REGION = "ten_percent"
+TUNING_REGION = "sensitive_ten_percent"
 """Plants tuned on: those that PPO trains on."""
 
 TUNING_SEED = 1_000_000

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from controllers.tuned import KINDS, SEARCHING
+
 pytest.importorskip("stable_baselines3")
 pytestmark = pytest.mark.training
 
@@ -37,9 +39,9 @@ def finished(tmp_path_factory):
 def test_the_short_run_writes_everything_and_prints_the_table(finished):
     out, result = finished
     assert sorted(path.name for path in out.iterdir()) == sorted(WRITTEN)
-    for heading in ("C1 stayed", "C2 largest breakdown [bar]", "ten_percent", "PPO", "PWM"):
+    for heading in ("C1 stayed", "C2 largest breakdown [bar]", "sensitive_ten_percent", "PPO", "PWM"):
         assert heading in result.stdout
-    assert len(json.loads((out / "table.json").read_text())) == 3 * 4
+    assert len(json.loads((out / "table.json").read_text())) == 3 * (1 + len(KINDS) - len(SEARCHING))
 
 
 def test_a_run_resumes_from_its_checkpoint(finished):

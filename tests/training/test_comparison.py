@@ -7,7 +7,7 @@ pytest.importorskip("pandas")
 
 from controllers.hysteresis import Hysteresis
 from epv_env.plant.plantfile import Plant
-from training.evaluate import compare
+from training.evaluate import PLANTS, compare
 from training.rollout import run_episodes
 
 pytestmark = pytest.mark.training
@@ -32,7 +32,7 @@ def test_an_episode_does_not_depend_on_its_companions():
 def test_the_comparison_separates_good_from_late():
     found = compare([GOOD, LATE], plant=Plant.calibrated(), scenario="steps", episodes=24, duration=3.0)
     table = found.table.set_index(["plants", "controller"])
-    for plants in ("calibrated", "confidence", "ten_percent"):
+    for plants in PLANTS:
         good, late = table.loc[(plants, "good")], table.loc[(plants, "late")]
         assert good["C1_stayed"] > late["C1_stayed"]
         assert good["C1_stayed_low"] <= good["C1_stayed"] <= good["C1_stayed_high"]

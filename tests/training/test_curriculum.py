@@ -1,4 +1,4 @@
-"""The price of switching rises during training and ends at the reward's own."""
+"""The price of switching rises during training and ends at the reward's own; exploration fades."""
 
 import pytest
 
@@ -6,26 +6,66 @@ pytest.importorskip("stable_baselines3")
 
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
-from training.ppo import Hyperparameters, RisingPrice, make_model, make_training_env
+from training.curriculum import FadingEntropy, RisingPrice
+from training.ppo import Hyperparameters, make_model, make_training_env
 
 pytestmark = pytest.mark.training
 
 
-def test_the_price_rises_from_the_first_to_the_full_one():
-    h = Hyperparameters(
-        num_envs=4, n_steps=8, batch_size=32, first_switching_price=0.1, rising_share=0.5
-    )
-    weights = RewardWeights(switching=0.5)
+@pytest.fixture(scope="module")
+def model():
+    h = Hyperparameters(num_envs=4, n_steps=8, batch_size=32)
     env = make_training_env(
-        h, plant=Plant.calibrated(), scenario="mixed", parameters="exact", weights=weights, seed=0
-    )
-    model = make_model(h, env, seed=0, device="cpu")
-    rising = RisingPrice(h, weights, total=1000)
-    rising.init_callback(model)
-    prices = []
+        h, plant=Plant.calibrated(), scenario="mixed", parameters="exact", weights=RewardWeights(),
+        seed=0,
+    )  # fmt: skip
+    return make_model(h, env, seed=0, device="cpu")
+
+
+def over_time(callback, model, read):
+    """What `read` gives after 0, 250, 500 and 1000 steps."""
+    callback.init_callback(model)
+    values = []
     for done in (0, 250, 500, 1000):
-        rising.num_timesteps = done
-        rising.on_rollout_start()
-        prices.append(env.get_attr("settings")[0].weights.switching)
+        callback.num_timesteps = done
+        callback.on_rollout_start()
+        values.append(read())
+    return values
+
+
+def test_the_price_rises_from_the_first_to_the_full_one(model):
+    weights = RewardWeights(switching=0.5, band=3.0)
+    env = model.get_env()
+    prices = over_time(
+        RisingPrice(weights, first=0.1, steps=500),
+        model,
+        lambda: env.get_attr("settings")[0].weights.switching,
+    )
     assert prices == pytest.approx([0.1, 0.3, 0.5, 0.5])
-    assert env.get_attr("task")[0].settings.weights.band == weights.band
+    assert env.get_attr("task")[0].settings.weights.band == 3.0
+
+
+def test_a_price_below_the_first_one_does_not_rise(model):
+    weights = RewardWeights(switching=0.05)
+    env = model.get_env()
+    rising = RisingPrice(weights, first=0.1, steps=500)
+    prices = over_time(rising, model, lambda: env.get_attr("settings")[0].weights.switching)
+    assert prices == pytest.approx([0.05] * 4)
+
+
+def test_exploration_fades_to_nothing(model):
+    bonus = over_time(FadingEntropy(0.004, total=1000), model, lambda: model.ent_coef)
+    assert bonus == pytest.approx([0.004, 0.003, 0.002, 0.0])
+
+
+def test_trainings_with_neighbouring_seeds_share_no_episode():
+    h = Hyperparameters(num_envs=4)
+    targets = []
+    for seed in (0, 1):
+        env = make_training_env(
+            h, plant=Plant.calibrated(), scenario="mixed", parameters="exact",
+            weights=RewardWeights(), seed=seed,
+        )  # fmt: skip
+        env.reset()
+        targets += env.get_attr("task")[0].target.tolist()
+    assert len(set(targets)) == 8

@@ -3,13 +3,13 @@
 import pytest
 
 from controllers.tuned import Tuning, load_tunings, save_tunings
-from training.tune import kept, main
+from training.tune import TUNING_REGION, kept, main
 
 pytestmark = pytest.mark.training
 SHORT = ("--trials", "1", "--episodes", "1", "--duration", "0.1")
 SEARCH = {
     "method": "Optuna TPE on the mean return", "trials": 1, "episodes": 1, "duration": 0.1, "seed": 0,
-    "parameters": "ten_percent",
+    "parameters": TUNING_REGION,
 }  # fmt: skip
 OTHER = Tuning(values={"open_below": -0.1, "shut_above": 0.1}, trials=1, mean_return=-9.0, episodes=1)
 
