@@ -22,17 +22,17 @@ from epv_env.plant.consumption import MIXED
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.valves import available_cores
 from identification.journal import Journal
-from training.compare_output import PARTS, findings, write_figures, write_tables
-from training.compare_plan import Block, Contender, Results, Sizes, collect, plan
-from training.compare_scores import Contest
+from training.comparison.output import PARTS, findings, write_figures, write_tables
+from training.comparison.plan import Block, Contender, Results, Sizes, collect, plan
+from training.comparison.scores import Contest
 from training.evaluate import EVALUATION_SEED
 from training.generated import check_pages
 from training.metrics import EpisodeMetrics
 from training.policies import seed_folder, trained_seeds
 from training.rollout import Trace, run_episodes
 from training.scenarios import EVALUATION, RANDOM
-from training.sweep_run import run_tasks, workplace
-from training.sweep_tasks import Study
+from training.sweeps.run import run_tasks, workplace
+from training.sweeps.tasks import Study
 from training.tradeoff import finished_variants
 
 JOURNAL_FILE = "blocks.jsonl"

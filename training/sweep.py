@@ -22,14 +22,14 @@ from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.valves import available_cores
 from identification.journal import Journal
 from training.generated import check_pages
-from training.sweep_controllers import DEFAULT, named_controllers
-from training.sweep_cost import cost, episode_cpu, overhead
-from training.sweep_designs import DESIGNS
-from training.sweep_plan import Size, cells, chosen_points, searches
-from training.sweep_report import PARTS, report
-from training.sweep_run import run_tasks, workplace
-from training.sweep_tasks import Study
-from training.sweep_worst import Effort
+from training.sweeps.controllers import DEFAULT, named_controllers
+from training.sweeps.cost import cost, episode_cpu, overhead
+from training.sweeps.designs import DESIGNS
+from training.sweeps.plan import Size, cells, chosen_points, searches
+from training.sweeps.report import PARTS, report
+from training.sweeps.run import run_tasks, workplace
+from training.sweeps.tasks import Study
+from training.sweeps.worst import Effort
 
 CONFIG, JOURNAL, COST = "config.json", "finished.jsonl", "cost.json"
 

@@ -28,7 +28,7 @@ from epv_env.plant.files import write_text
 from epv_env.plant.plantfile import load_plant
 from epv_env.reward import REFERENCE_PERIOD
 from training.rollout import make_env
-from training.sweep_controllers import named_controllers
+from training.sweeps.controllers import named_controllers
 
 WARM_UP = 50
 """Decisions that are not counted: the first ones compile and fill caches."""

@@ -19,7 +19,7 @@ from controllers.tuned import KINDS, build, load_search, load_tunings, save_tuni
 from epv_env.plant.commandline import fail_clearly, writable_folder
 from epv_env.plant.parameters import Parameters
 from epv_env.reward import RewardWeights
-from training.compare_plan import Contender
+from training.comparison.plan import Contender
 from training.policies import trained_policy
 from training.tune import TUNING_REGION, tune
 

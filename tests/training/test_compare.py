@@ -12,9 +12,9 @@ pytest.importorskip("joblib")
 from controllers.hysteresis import Hysteresis
 from tests.training.policies import random_layers, write_policy
 from training.compare import main, parse
-from training.compare_bars import against_oracle, against_rival, leaving, lost
-from training.compare_output import PARTS, RESULTS_FILE, TABLES_FILE
-from training.compare_plan import (
+from training.comparison.bars import against_oracle, against_rival, leaving, lost
+from training.comparison.output import PARTS, RESULTS_FILE, TABLES_FILE
+from training.comparison.plan import (
     EXPENSIVE,
     PLANTS,
     TUNING,
@@ -24,7 +24,7 @@ from training.compare_plan import (
     chosen_run,
     plan,
 )
-from training.compare_scores import Contest, duels, figures, trade
+from training.comparison.scores import Contest, duels, figures, trade
 from training.generated import check_pages, fill, markdown
 from training.metrics import EpisodeMetrics
 from training.scenarios import RANDOM

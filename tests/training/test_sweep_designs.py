@@ -13,14 +13,14 @@ from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import CALIBRATED_SYMBOLS, Region
 from epv_env.settings import make_settings
 from training.rollout import run_episodes
-from training.sweep_designs import ONE_AT_A_TIME, hypercube, parameters, regions
-from training.sweep_effects import LEVELS, effect_levels
-from training.sweep_plan import BATCH, SWEEP_SEED, Size, cells, chosen_points
-from training.sweep_results import point_table
-from training.sweep_run import Outcome
-from training.sweep_space import Space
-from training.sweep_tasks import Batch, Study, condensed
-from training.sweep_worst import Effort
+from training.sweeps.designs import ONE_AT_A_TIME, hypercube, parameters, regions
+from training.sweeps.effects import LEVELS, effect_levels
+from training.sweeps.plan import BATCH, SWEEP_SEED, Size, cells, chosen_points
+from training.sweeps.results import point_table
+from training.sweeps.run import Outcome
+from training.sweeps.space import Space
+from training.sweeps.tasks import Batch, Study, condensed
+from training.sweeps.worst import Effort
 
 pytestmark = pytest.mark.training
 

@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 
 from training.generated import markdown
-from training.sweep_designs import ONE_AT_A_TIME
+from training.sweeps.designs import ONE_AT_A_TIME
 
 MOST = 6
 """Levels that are named for each controller and design."""
@@ -96,7 +96,7 @@ def worst_table(worst: Sequence[Mapping[str, Any]], nominal: Mapping[str, float]
 
 
 def cost_table(content: Mapping[str, Any], machines: int) -> str:
-    """What a million episodes cost, and from what that follows (sweep_cost.py)."""
+    """What a million episodes cost, and from what that follows (cost.py)."""
     rows = [
         [
             name, f"{1e3 * each['core_s_per_episode']:.1f} ms",

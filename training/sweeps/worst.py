@@ -15,8 +15,8 @@ from scipy.optimize import differential_evolution
 
 from epv_env.plant.consumption import MIXED, SCENARIOS
 from epv_env.settings import as_region
-from training.sweep_space import Space
-from training.sweep_tasks import MICROBAR, Study
+from training.sweeps.space import Space
+from training.sweeps.tasks import MICROBAR, Study
 
 NEAR = 0.05
 """Half the width of the last search's box, as a share of the region's."""
@@ -65,7 +65,7 @@ class _Found:
 
 @dataclass(frozen=True, kw_only=True)
 class Search:
-    """A task (sweep_tasks.py): one search for one controller over one region."""
+    """A task (tasks.py): one search for one controller over one region."""
 
     name: str
     controller: str

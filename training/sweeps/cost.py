@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from training.sweep_plan import BATCH, Cell
-from training.sweep_run import Map, Outcome
-from training.sweep_tasks import Study
+from training.sweeps.plan import BATCH, Cell
+from training.sweeps.run import Map, Outcome
+from training.sweeps.tasks import Study
 
 MILLION = 1_000_000
 MACHINES = 100

@@ -8,13 +8,13 @@ from typing import Any
 from epv_env.plant.files import write_text
 from training.generated import fill
 from training.rollout import Trace
-from training.sweep_cost import MACHINES
-from training.sweep_plan import Cell
-from training.sweep_results import hypercube_table, point_table
-from training.sweep_run import Outcome
-from training.sweep_tables import cost_table, harm_table, joint_table, worst_table
-from training.sweep_tasks import Study
-from training.sweep_worst import Search
+from training.sweeps.cost import MACHINES
+from training.sweeps.plan import Cell
+from training.sweeps.results import hypercube_table, point_table
+from training.sweeps.run import Outcome
+from training.sweeps.tables import cost_table, harm_table, joint_table, worst_table
+from training.sweeps.tasks import Study
+from training.sweeps.worst import Search
 
 FORMAT = "epv-sweep/1"
 
@@ -36,7 +36,7 @@ def report(
 ) -> str:
     """Write tables, results.json and figures into the folder; returns the tables to print.
 
-    spent: `sweep_cost.cost`. images: another folder for the figures, for documents. pages: Markdown
+    spent: `cost.cost`. images: another folder for the figures, for documents. pages: Markdown
     files whose generated PARTS are written.
     """
     points, ranks = point_table(cells, outcomes), hypercube_table(cells, outcomes)
@@ -56,15 +56,13 @@ def report(
             write_text(folder / f"{name}.csv", table.to_csv(index=False))
     write_text(folder / "results.json", json.dumps(content, indent=1) + "\n")
 
-    from training import sweep_plots  # matplotlib is needed only here
+    from training.sweeps import plots  # matplotlib is needed only here
 
     traces = [_trace(found, study) for found in worst]
     for place in filter(None, (folder, images)):
-        sweep_plots.draw(points, ranks, place)
+        plots.draw(points, ranks, place)
         if worst:
-            sweep_plots.worst_episodes(
-                worst, traces, study.plant.parameters, place / "robustness-worst.png"
-            )
+            plots.worst_episodes(worst, traces, study.plant.parameters, place / "robustness-worst.png")
     texts = {
         "joint": joint_table(points),
         "one at a time": harm_table(points),

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from epv_env.plant.plantfile import Plant
-from training.sweep_designs import ONE_AT_A_TIME, Point, hypercube, regions
-from training.sweep_tasks import Batch
-from training.sweep_worst import Effort, Search
+from training.sweeps.designs import ONE_AT_A_TIME, Point, hypercube, regions
+from training.sweeps.tasks import Batch
+from training.sweeps.worst import Effort, Search
 
 SWEEP_SEED = 3_000_000
 """First seed of the sweep's episodes; neither training, tuning nor the comparison has met them."""

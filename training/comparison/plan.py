@@ -13,7 +13,7 @@ from controllers.base import Controller
 from training.evaluate import EVALUATION_SEED, PLANTS, plant_region
 from training.metrics import EpisodeMetrics
 from training.scenarios import EVALUATION, RANDOM
-from training.sweep_tasks import Study
+from training.sweeps.tasks import Study
 from training.tune import TUNING_REGION, TUNING_SEED
 
 BOUNDED = ("confidence", "sensitive_ten_percent")

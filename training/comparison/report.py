@@ -6,8 +6,8 @@ from typing import Any
 import pandas as pd
 
 from controllers.tuned import load_search, load_tunings
-from training.compare_bars import Bar
-from training.compare_scores import FRONT, SCORES, Contest, records
+from training.comparison.bars import Bar
+from training.comparison.scores import FRONT, SCORES, Contest, records
 from training.evaluate import PLANTS
 from training.generated import markdown
 from training.scenarios import EVALUATION, NAMED
@@ -27,7 +27,7 @@ FIGURES = {
 
 
 def results_table(table: pd.DataFrame) -> str:
-    """The main table: rows of `compare_scores.figures`."""
+    """The main table: rows of `scores.figures`."""
     headings = ["plants", "controller", "episodes", "C1 left the band (95 % interval)", *FIGURES]
     rows, last = [], ""
     for row in records(table):

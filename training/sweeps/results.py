@@ -8,8 +8,8 @@ import pandas as pd
 from scipy.stats import spearmanr
 
 from training.metrics import left_interval, tail_excursion
-from training.sweep_plan import Cell
-from training.sweep_run import Outcome
+from training.sweeps.plan import Cell
+from training.sweeps.run import Outcome
 
 FIGURES = ("breakdown_bar", "recovery_s", "rms_bar", "switchings_per_s", "vented_g_per_s")
 """Figures of an episode that the table holds beside the excursion (training/metrics.py)."""

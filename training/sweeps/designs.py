@@ -10,8 +10,8 @@ from epv_env.plant.parameters import table
 from epv_env.plant.plantfile import Plant
 from epv_env.settings import as_region
 from identification.sensitivity.one_at_a_time import changed_values
-from training.sweep_effects import effect_levels
-from training.sweep_space import Space
+from training.sweeps.effects import effect_levels
+from training.sweeps.space import Space
 
 JOINT = ("exact", "confidence", "ten_percent", "sensitive_ten_percent")
 """Regions from which every episode draws a plant of its own."""
@@ -107,4 +107,4 @@ ONE_AT_A_TIME: dict[str, Callable[[Plant], Iterator[Point]]] = {
 """Designs that change one thing at a time, by name."""
 
 DESIGNS = ("regions", *ONE_AT_A_TIME, "hypercube", "worst")
-"""All designs; the last is no list of points but a search (sweep_worst.py)."""
+"""All designs; the last is no list of points but a search (worst.py)."""

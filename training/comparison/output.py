@@ -10,13 +10,12 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from epv_env.plant.files import write_bytes, write_text
-from training import compare_figures as draw
-from training import compare_report as report
-from training import compare_scores as scores
 from training import plots
-from training.compare_bars import Bar, bars, lost
-from training.compare_plan import TRADED_ON, Contender
-from training.compare_scores import Contest, records
+from training.comparison import figures as draw
+from training.comparison import report, scores
+from training.comparison.bars import Bar, bars, lost
+from training.comparison.plan import TRADED_ON, Contender
+from training.comparison.scores import Contest, records
 from training.evaluate import PLANTS, Comparison
 from training.generated import fill
 from training.rollout import Trace

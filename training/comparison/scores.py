@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from epv_env.reward import RewardWeights
-from training.compare_plan import TRADED_ON, Contender, Results, chosen_run
+from training.comparison.plan import TRADED_ON, Contender, Results, chosen_run
 from training.estimates import (
     Estimate,
     estimate,

@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from identification.journal import Journal
-from training.sweep_tasks import Study, Task
+from training.sweeps.tasks import Study, Task
 
 WAIT = 60
 """Longest wait for a cluster's first worker [s]."""

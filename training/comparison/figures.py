@@ -1,4 +1,4 @@
-"""The comparison's figures. Each takes tables of compare_scores and gives a Figure."""
+"""The comparison's figures. Each takes tables of scores.py and gives a Figure."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 
 from epv_env.reward import BAND_BAR
-from training.compare_scores import FRONT, HIGHER_IS_BETTER, JUDGED_ON, SCORES, records
+from training.comparison.scores import FRONT, HIGHER_IS_BETTER, JUDGED_ON, SCORES, records
 from training.plots import COLOURS, plt
 
 HIGHEST_BAR = 1.0

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from training.compare_plan import Contender
-from training.compare_scores import JUDGED_ON, Contest
+from training.comparison.plan import Contender
+from training.comparison.scores import JUDGED_ON, Contest
 from training.metrics import EpisodeMetrics, left_interval, summary
 from training.scenarios import RANDOM
 

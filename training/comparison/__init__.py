@@ -1,0 +1,1 @@
+"""The parts of the comparison: its plan, scores, bars, tables and figures."""
