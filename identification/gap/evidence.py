@@ -28,6 +28,9 @@ GENERIC_STRETCHES = (1.5e-3, STRETCH, 20e-3)
 AT_END = 1e-4
 """Share of its range within which a size counts as lying at its end."""
 
+SINGULAR = 1e-12
+"""Eigenvalue of a correlation matrix below which it is rounding."""
+
 GENERIC = np.logspace(-4, 3, 29)
 """Variances, in noise variances, that a misfit without a name may have in a stretch."""
 
@@ -207,8 +210,10 @@ def _misfits(fitter: Fitter, r: int, residual: NDArray, effects: NDArray) -> NDA
 
 
 def _covariance(equations: Normal) -> NDArray:
-    """Of the scaled vector, all else free."""
-    return np.linalg.inv(equations.hessian + 1e-9 * np.eye(len(equations.hessian)))
+    """Of the scaled vector, all else free; wide, but finite, where the recordings say nothing."""
+    size = np.sqrt(np.maximum(np.diag(equations.hessian), np.finfo(float).tiny))
+    values, vectors = np.linalg.eigh(equations.hessian / np.outer(size, size))
+    return (vectors / np.maximum(values, SINGULAR)) @ vectors.T / np.outer(size, size)
 
 
 def _occam(point: Point, sd: NDArray) -> float:
