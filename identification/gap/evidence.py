@@ -211,7 +211,7 @@ def _misfits(fitter: Fitter, r: int, residual: NDArray, effects: NDArray) -> NDA
 
 def _covariance(equations: Normal) -> NDArray:
     """Of the scaled vector, all else free; wide, but finite, where the recordings say nothing."""
-    size = np.sqrt(np.maximum(np.diag(equations.hessian), np.finfo(float).tiny))
+    size = np.sqrt(np.diag(equations.hessian) + 1e-9)  # a number may do nothing at all
     values, vectors = np.linalg.eigh(equations.hessian / np.outer(size, size))
     return (vectors / np.maximum(values, SINGULAR)) @ vectors.T / np.outer(size, size)
 
