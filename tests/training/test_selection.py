@@ -28,7 +28,7 @@ pytestmark = pytest.mark.training
 
 TINY = Hyperparameters(
     imitation_epochs=1,
-    num_envs=8, n_steps=16, batch_size=64, episode_steps=40, learning_rate=0.05,
+    num_envs=8, n_steps=16, batch_size=64, episode_steps=40, learning_rate=0.01,
     validations=4, first_validation=0.25, validation_episodes=6, validation_duration=0.8,
 )  # fmt: skip
 TASK = {
