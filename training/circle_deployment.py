@@ -9,9 +9,10 @@ import pandas as pd
 from controllers.base import Controller
 from epv_env.plant.plantfile import Plant
 from identification.progress import progress
-from training.evaluate import EVALUATION_SEED, plant_region
+from training.evaluate import plant_region
 from training.metrics import EpisodeMetrics
 from training.rollout import run_episodes
+from training.seeds import EVALUATION_SEED
 
 BEFORE, AFTER = "before", "after"
 """Stages: trained on the nominal plant, retrained on the corrected one."""

@@ -25,12 +25,12 @@ from identification.journal import Journal
 from training.comparison.output import PARTS, findings, write_figures, write_tables
 from training.comparison.plan import Block, Contender, Results, Sizes, collect, plan
 from training.comparison.scores import Contest
-from training.evaluate import EVALUATION_SEED
 from training.generated import check_pages
 from training.metrics import EpisodeMetrics
 from training.policies import seed_folder, trained_seeds
 from training.rollout import Trace, run_episodes
 from training.scenarios import EVALUATION, RANDOM
+from training.seeds import EVALUATION_SEED
 from training.sweeps.run import run_tasks, workplace
 from training.sweeps.tasks import Study
 from training.tradeoff import finished_variants

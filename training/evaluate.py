@@ -11,9 +11,7 @@ from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
 from training.metrics import EpisodeMetrics, summary
 from training.rollout import Trace, run_episodes
-
-EVALUATION_SEED = 2_000_000
-"""First seed of the evaluation scenarios; neither training nor tuning has met them."""
+from training.seeds import EVALUATION_SEED
 
 PLANTS = {
     "calibrated": "the calibrated plant",

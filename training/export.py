@@ -31,13 +31,8 @@ from training.ecu.quantise import ExportError, quantise
 from training.ecu.sources import Export, checks, sources
 from training.ecu.states import states_table, visit
 from training.ecu.summary import as_text
+from training.seeds import CALIBRATION_SEED, CLOSED_LOOP_SEED, STATES_SEED
 
-CALIBRATION_SEED = 6_000_000
-"""First seed of the episodes on whose states the integers are calibrated."""
-STATES_SEED = 7_000_000
-"""First seed of the episodes on whose states the code is compared."""
-CLOSED_LOOP_SEED = 8_000_000
-"""First seed of the episodes that the compiled code controls."""
 EPISODES, PERIODS = 20, 500
 """10,000 states: so many episodes of so many control periods (2.5 s)."""
 

@@ -18,13 +18,11 @@ from epv_env.sb3 import make_sb3_env
 from training.curriculum import FadingEntropy, RisingPrice
 from training.imitation import imitate
 from training.learning_log import CHECKPOINT_FILE, CURVE_FILE, TrainingLog, read_rows
+from training.seeds import RESUMED_SEED, TRAINING_SEED
 from training.selection import Selection, validation_points
 
 TEACHER = "pulse"
 """Whom a model imitates first: on the calibrated plant the best of the controllers without a search."""
-
-RESUMED_SEED = 1_000_000_000
-"""From here on are the seeds of resumed trainings' episodes, which nothing else uses."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,7 +108,7 @@ def make_training_env(
         scenario=scenario,
         weights=weights,
     )
-    env.seed(seed * h.num_envs)
+    env.seed(TRAINING_SEED + seed * h.num_envs)
     return ScaledReward(VecMonitor(env), h.reward_scale)
 
 

@@ -15,9 +15,7 @@ from training.learning_log import read_rows, save_model, write_rows
 from training.metrics import EpisodeMetrics
 from training.policy_files import greedy_policy
 from training.rollout import run_episodes
-
-VALIDATION_SEED = 3_000_000
-"""First seed of the validation scenarios; training, tuning and evaluation use others."""
+from training.seeds import VALIDATION_SEED
 
 VALIDATION_FILE = "validation.csv"
 BEST_FILE = "model.zip"

@@ -22,6 +22,7 @@ from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.valves import available_cores
 from identification.journal import Journal
 from training.generated import check_pages
+from training.seeds import SWEEP_SEED
 from training.sweeps.controllers import DEFAULT, named_controllers
 from training.sweeps.cost import cost, episode_cpu, overhead
 from training.sweeps.designs import DESIGNS
@@ -100,6 +101,7 @@ def configuration(
         "controllers": digests,
         "plant": {"name": plant.name, "sha256": hashlib.sha256(described.encode()).hexdigest()},
         "size": asdict(size),
+        "first_seed": SWEEP_SEED,
         **{name: getattr(chosen, name) for name in depends},
     }
 

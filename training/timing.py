@@ -28,12 +28,11 @@ from epv_env.plant.files import write_text
 from epv_env.plant.plantfile import load_plant
 from epv_env.reward import REFERENCE_PERIOD
 from training.rollout import make_env
+from training.seeds import TIMING_SEED
 from training.sweeps.controllers import named_controllers
 
 WARM_UP = 50
 """Decisions that are not counted: the first ones compile and fill caches."""
-TIMING_SEED = 3_000_000
-"""Of the episode; training, tuning and evaluation use others."""
 
 
 def decision_times(

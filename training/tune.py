@@ -20,12 +20,10 @@ from epv_env.observation import P2_LAGS
 from epv_env.plant.commandline import fail_clearly, writable_file
 from epv_env.plant.parameters import Parameters
 from training.rollout import run_episodes
+from training.seeds import TUNING_SEED
 
 TUNING_REGION = "sensitive_ten_percent"
 """Plants tuned on: those that PPO trains on."""
-
-TUNING_SEED = 1_000_000
-"""First seed of the tuning scenarios; evaluations use others."""
 
 REDUCED = {"MPC": (16, 32)}
 """Trials, and episodes of each, of kinds that simulate the plant as they decide: a thousandfold the

@@ -23,7 +23,8 @@ from training.ecu.measure import follow
 from training.ecu.quantise import FULL, FixedPolicy, quantise
 from training.ecu.sources import Export, sources
 from training.ecu.states import visit
-from training.export import CALIBRATION_SEED, EPISODES, FILES, PERIODS, main
+from training.export import EPISODES, FILES, PERIODS, main
+from training.seeds import CALIBRATION_SEED
 
 pytestmark = [
     pytest.mark.training,

@@ -10,19 +10,13 @@ pytest.importorskip("stable_baselines3")
 from controllers.learned import LearnedPolicy
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
-from training.evaluate import EVALUATION_SEED
 from training.learning_log import read_rows
 from training.metrics import EpisodeMetrics
 from training.policy_files import greedy_policy
-from training.ppo import RESUMED_SEED, Hyperparameters, train
+from training.ppo import Hyperparameters, train
 from training.rollout import run_episodes
-from training.selection import (
-    VALIDATION_FILE,
-    VALIDATION_SEED,
-    score,
-    validation_points,
-)
-from training.tune import TUNING_SEED
+from training.seeds import VALIDATION_SEED
+from training.selection import VALIDATION_FILE, score, validation_points
 
 pytestmark = pytest.mark.training
 
@@ -103,8 +97,3 @@ def test_an_episode_that_leaves_the_band_weighs_more_than_a_few_points_of_return
     once_left = replace(zeros, stayed=np.arange(n) > 0, episode_return=np.full(n, -100.0))
     assert score(inside) > score(once_left)
     assert score(inside) == -102.0
-
-
-def test_training_tuning_evaluation_and_validation_have_seeds_of_their_own():
-    starts = sorted((0, TUNING_SEED, EVALUATION_SEED, VALIDATION_SEED, RESUMED_SEED))
-    assert min(np.diff(starts)) >= 1_000_000

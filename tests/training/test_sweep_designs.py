@@ -13,9 +13,10 @@ from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import CALIBRATED_SYMBOLS, Region
 from epv_env.settings import make_settings
 from training.rollout import run_episodes
+from training.seeds import SWEEP_SEED
 from training.sweeps.designs import ONE_AT_A_TIME, hypercube, parameters, regions
 from training.sweeps.effects import LEVELS, effect_levels
-from training.sweeps.plan import BATCH, SWEEP_SEED, Size, cells, chosen_points
+from training.sweeps.plan import BATCH, Size, cells, chosen_points
 from training.sweeps.results import point_table
 from training.sweeps.run import Outcome
 from training.sweeps.space import Space

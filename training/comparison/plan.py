@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.base import Controller
-from training.evaluate import EVALUATION_SEED, PLANTS, plant_region
+from training.evaluate import PLANTS, plant_region
 from training.metrics import EpisodeMetrics
 from training.scenarios import EVALUATION, RANDOM
+from training.seeds import EVALUATION_SEED, TUNING_SEED
 from training.sweeps.tasks import Study
-from training.tune import TUNING_REGION, TUNING_SEED
+from training.tune import TUNING_REGION
 
 BOUNDED = ("confidence", "sensitive_ten_percent")
 """Plant sets on which the probability of leaving the band is bounded: many random episodes."""

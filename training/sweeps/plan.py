@@ -4,12 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from epv_env.plant.plantfile import Plant
+from training.seeds import SWEEP_SEED
 from training.sweeps.designs import ONE_AT_A_TIME, Point, hypercube, regions
 from training.sweeps.tasks import Batch
 from training.sweeps.worst import Effort, Search
-
-SWEEP_SEED = 3_000_000
-"""First seed of the sweep's episodes; neither training, tuning nor the comparison has met them."""
 
 BATCH = 512
 """Most episodes of a task: more gain little, and a killed sweep loses what its tasks had begun."""

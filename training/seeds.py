@@ -1,0 +1,36 @@
+"""First seeds of all episodes that are run here: a range of its own for each purpose.
+
+An episode depends on its seed alone, so one that was trained, tuned or chosen on says nothing about how
+a controller does on new ones. A range goes from its first seed up to the next one's (tests/training/
+test_seeds.py says how much of it the commands use).
+"""
+
+TRAINING_SEED = 0
+"""Training with seed k uses as many from k times its number of environments on."""
+
+TUNING_SEED = 1_000_000
+"""On which the classic controllers are tuned, and one of several training seeds is chosen."""
+
+EVALUATION_SEED = 2_000_000
+"""On which controllers are compared, and deployed in the circle."""
+
+VALIDATION_SEED = 3_000_000
+"""On which a training chooses among the policies that it passes through."""
+
+SWEEP_SEED = 5_000_000
+"""Of sweeps and their worst-case searches; --seed counts from here."""
+
+CALIBRATION_SEED = 6_000_000
+"""On whose states an export calibrates its integers."""
+
+STATES_SEED = 7_000_000
+"""On whose states an export compares its code with the policy."""
+
+CLOSED_LOOP_SEED = 8_000_000
+"""That an export's compiled code controls."""
+
+TIMING_SEED = 9_000_000
+"""Of the episode in which decisions are timed."""
+
+RESUMED_SEED = 1_000_000_000
+"""Of resumed trainings: the steps done before count from here, so that none meets an episode twice."""
