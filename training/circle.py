@@ -18,7 +18,13 @@ from controllers.base import Controller
 from controllers.learned import CONTRACT_FILE, load_policy
 from controllers.tuned import SEARCHING, tuned_controllers
 from epv_env.actions import OnOff
-from epv_env.plant.commandline import fail_clearly, writable_folder
+from epv_env.plant.commandline import (
+    check_not_negative,
+    check_positive,
+    fail_clearly,
+    parse_with_quick,
+    writable_folder,
+)
 from epv_env.plant.files import write_text
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.reward import RewardWeights
@@ -26,6 +32,7 @@ from identification.__main__ import main as identification
 from identification.bench.programmes import SUITES
 from training.circle_deployment import AFTER, BEFORE, DELIVERED, PROMISED, deployed
 from training.circle_report import report
+from training.results_folder import check_options, write_options
 
 SCENARIO = "mixed"
 TRAINED_ON = "ten_percent"
@@ -40,7 +47,7 @@ SMALLER_STEPS: dict[str, Any] = {"num_envs": 128, "batch_size": 1024, "n_epochs"
 QUICK: dict[str, Any] = {"timesteps": 8192, "episodes": 8, "duration": 1.0, "suite": "report"}
 """The defaults under --quick: everything is done, too short to learn anything."""
 
-CONFIG, WITHHELD, CAMPAIGN = "config.json", "withheld/plant.json", "campaign"
+WITHHELD, CAMPAIGN = "withheld/plant.json", "campaign"
 GAP, CORRECTED = "diagnosis/gap.json", "diagnosis/plant.json"
 EPISODES = "episodes.csv"
 
@@ -67,28 +74,10 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--images", type=writable_folder, default=None, help="another folder for circle.png"
     )
-    parser.add_argument("--quick", action="store_true", help="a short run that shows that all works")
-    if parser.parse_known_args(arguments)[0].quick:
-        parser.set_defaults(**QUICK)  # what is given beside --quick still holds
-    chosen = parser.parse_args(arguments)
-    for name in ("timesteps", "episodes", "duration"):
-        if getattr(chosen, name) <= 0:
-            parser.error(f"--{name} must be positive")
-    if chosen.seed < 0:
-        parser.error("--seed must not be negative")
+    chosen = parse_with_quick(parser, arguments, QUICK)
+    check_positive(parser, chosen, "timesteps", "episodes", "duration")
+    check_not_negative(parser, chosen, "seed")
     return chosen
-
-
-def check_options(chosen: argparse.Namespace) -> None:
-    """Raises ValueError if the folder holds a circle with other options."""
-    path = chosen.out / CONFIG
-    earlier = json.loads(path.read_text(encoding="utf-8")) if path.exists() else options(chosen)
-    for name, value in options(chosen).items():
-        if earlier[name] != value:
-            raise ValueError(
-                f"{chosen.out} holds a circle with {name} {earlier[name]}, not {value}: go on with the "
-                "same, or choose another --out"
-            )
 
 
 def options(chosen: argparse.Namespace) -> dict[str, Any]:
@@ -160,10 +149,10 @@ def say(step: str) -> None:
 def main(arguments: list[str] | None = None) -> int:
     """Command line; returns the exit status."""
     chosen = parse(arguments)
-    check_options(chosen)
+    check_options(chosen.out, options(chosen), "circle")
     say("1 of 4: the bench records its valve")
     record(chosen)
-    write_text(chosen.out / CONFIG, json.dumps(options(chosen), indent=1) + "\n")
+    write_options(chosen.out, options(chosen))
     say("2 of 4: train on the nominal plant, deploy")
     before = stage(BEFORE, load_plant(None), chosen)
     say("3 of 4: diagnose the campaign")

@@ -17,7 +17,12 @@ import pandas as pd
 
 from controllers.oracle import Oracle
 from controllers.tuned import tuned_controllers
-from epv_env.plant.commandline import fail_clearly, writable_folder
+from epv_env.plant.commandline import (
+    check_positive,
+    fail_clearly,
+    parse_with_quick,
+    writable_folder,
+)
 from epv_env.plant.consumption import MIXED
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.valves import available_cores
@@ -72,13 +77,11 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--pages", type=Path, nargs="+", default=[], help="pages whose generated parts are written"
     )
-    parser.add_argument("--quick", action="store_true", help="a short run that shows that all works")
-    if parser.parse_known_args(arguments)[0].quick:
-        parser.set_defaults(**QUICK)  # what is given beside --quick still holds
-    chosen = parser.parse_args(arguments)
-    for name in ("seeds", "timesteps", "named", "random", "bound", "tuning", "duration", "workers"):
-        if getattr(chosen, name) <= 0:
-            parser.error(f"--{name} must be positive")
+    chosen = parse_with_quick(parser, arguments, QUICK)
+    check_positive(
+        parser, chosen,
+        "seeds", "timesteps", "named", "random", "bound", "tuning", "duration", "workers",
+    )  # fmt: skip
     if RANDOM not in chosen.scenarios:
         parser.error(f"--scenarios must hold {RANDOM!r}: the probabilities refer to it")
     return chosen

@@ -21,7 +21,7 @@ import numpy as np
 from tqdm import tqdm
 
 from controllers.learned import CONTRACT_FILE, WEIGHTS_FILE, LearnedPolicy, load_policy
-from epv_env.plant.commandline import fail_clearly, writable_folder
+from epv_env.plant.commandline import check_positive, fail_clearly, writable_folder
 from training.ecu import measure
 from training.ecu.compiled import CompiledPolicy, find_compiler, library
 from training.ecu.contract import deployment_contract
@@ -58,9 +58,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--episodes", type=int, default=256, help="episodes under the compiled code")
     parser.add_argument("--duration", type=float, default=10.0, help="length of one of them [s]")
     chosen = parser.parse_args(arguments)
-    for name in ("episodes", "duration"):
-        if not getattr(chosen, name) > 0:
-            parser.error(f"--{name} must be positive")
+    check_positive(parser, chosen, "episodes", "duration")
     return chosen
 
 

@@ -15,13 +15,20 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from epv_env.plant.commandline import fail_clearly, writable_folder
+from epv_env.plant.commandline import (
+    check_not_negative,
+    check_positive,
+    fail_clearly,
+    parse_with_quick,
+    writable_folder,
+)
 from epv_env.plant.consumption import check_scenario
 from epv_env.plant.files import write_text
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.valves import available_cores
 from identification.journal import Journal
 from training.generated import check_pages
+from training.results_folder import check_options, write_options
 from training.seeds import SWEEP_SEED
 from training.sweeps.controllers import DEFAULT, named_controllers
 from training.sweeps.cost import cost, episode_cpu, overhead
@@ -32,7 +39,7 @@ from training.sweeps.run import run_tasks, workplace
 from training.sweeps.tasks import Study
 from training.sweeps.worst import Effort
 
-CONFIG, JOURNAL, COST = "config.json", "finished.jsonl", "cost.json"
+JOURNAL, COST = "finished.jsonl", "cost.json"
 
 QUICK: dict[str, Any] = {
     "controllers": DEFAULT[:1], "episodes": 4, "joint_episodes": 16, "duration": 0.6, "screened": 16,
@@ -74,17 +81,13 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--pages", type=Path, nargs="+", default=[], help="pages whose generated parts are written"
     )
-    parser.add_argument("--quick", action="store_true", help="a short run that shows that all works")
-    if parser.parse_known_args(arguments)[0].quick:
-        parser.set_defaults(**QUICK)  # what is given beside --quick still holds
-    chosen = parser.parse_args(arguments)
-    for name in ("episodes", "joint_episodes", "duration", "generations", "workers"):
-        if getattr(chosen, name) is not None and getattr(chosen, name) <= 0:
-            parser.error(f"--{name.replace('_', '-')} must be positive")
+    chosen = parse_with_quick(parser, arguments, QUICK)
+    check_positive(
+        parser, chosen, "episodes", "joint_episodes", "duration", "generations", "workers"
+    )  # fmt: skip
+    check_not_negative(parser, chosen, "seed")
     if chosen.screened < 8:
         parser.error("--screened must be at least 8")
-    if chosen.seed < 0:
-        parser.error("--seed must not be negative")
     return chosen
 
 
@@ -106,18 +109,6 @@ def configuration(
     }
 
 
-def check_folder(folder: Path, config: dict[str, Any]) -> None:
-    """Raises ValueError if the folder holds a sweep with another configuration."""
-    path = folder / CONFIG
-    earlier = json.loads(path.read_text(encoding="utf-8")) if path.exists() else config
-    for name, value in config.items():
-        if earlier.get(name) != value:
-            raise ValueError(
-                f"{folder} holds a sweep with {name} {earlier.get(name)}, not {value}: go on with the "
-                "same, or choose another --out"
-            )
-
-
 def main(arguments: list[str] | None = None) -> int:
     """Command line; returns the exit status."""
     chosen = parse(arguments)
@@ -131,8 +122,8 @@ def main(arguments: list[str] | None = None) -> int:
     )  # fmt: skip
     points = chosen_points(plant, chosen.designs, chosen.factors, size, chosen.seed)
     config = configuration(chosen, size, plant, digests)
-    check_folder(chosen.out, config)
-    write_text(chosen.out / CONFIG, json.dumps(config, indent=1) + "\n")
+    check_options(chosen.out, config, "sweep")
+    write_options(chosen.out, config)
 
     study = Study(
         controllers=controllers, plant=plant, scenario=chosen.scenario, duration=chosen.duration

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from controllers.base import Controller
 from controllers.tuned import load_tunings
-from epv_env.plant.commandline import fail_clearly, writable_folder
+from epv_env.plant.commandline import check_positive, fail_clearly, writable_folder
 from epv_env.plant.consumption import check_scenario
 from epv_env.plant.files import write_text
 from epv_env.plant.plantfile import load_plant
@@ -92,8 +92,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--scenario", default="steps", help="consumption of the episode")
     parser.add_argument("--plant", default=None, help="plant file; default: the report's calibration")
     chosen = parser.parse_args(arguments)
-    if chosen.decisions < 1:
-        parser.error(f"--decisions {chosen.decisions}: give at least 1")
+    check_positive(parser, chosen, "decisions")
     return chosen
 
 

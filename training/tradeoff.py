@@ -16,7 +16,12 @@ import optuna
 from controllers.base import Controller
 from controllers.learned import CONTRACT_FILE, load_policy
 from controllers.tuned import KINDS, build, load_search, load_tunings, save_tunings
-from epv_env.plant.commandline import fail_clearly, writable_folder
+from epv_env.plant.commandline import (
+    check_not_negative,
+    check_positive,
+    fail_clearly,
+    writable_folder,
+)
 from epv_env.plant.parameters import Parameters
 from epv_env.reward import RewardWeights
 from training.comparison.plan import Contender
@@ -89,6 +94,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--trials", type=int, default=100, help="tuning evaluations of each of them")
     parser.add_argument("--seed", type=int, default=0)
     chosen = parser.parse_args(arguments)
+    check_positive(parser, chosen, "timesteps", "trials")
+    check_not_negative(parser, chosen, "seed")
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     for price in chosen.prices:
         folder = chosen.out / FOLDER.format(price)

@@ -21,7 +21,13 @@ from controllers.learned import load_policy
 from controllers.pwm import PWM
 from controllers.tuned import SEARCHING, tuned_controllers
 from epv_env.actions import OnOff
-from epv_env.plant.commandline import fail_clearly, writable_folder
+from epv_env.plant.commandline import (
+    check_not_negative,
+    check_positive,
+    fail_clearly,
+    parse_with_quick,
+    writable_folder,
+)
 from epv_env.plant.consumption import check_scenario
 from epv_env.plant.files import write_text
 from epv_env.plant.plantfile import Plant, load_plant
@@ -65,15 +71,9 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         "--device", default="cpu", help="torch device; cpu is fastest for so small a net"
     )
     parser.add_argument("--resume", action="store_true", help="go on from the folder's checkpoint")
-    parser.add_argument(
-        "--quick", action="store_true", help="a run of seconds that shows that all works"
-    )
-    if parser.parse_known_args(arguments)[0].quick:
-        parser.set_defaults(**QUICK)  # what is given beside --quick still holds
-    chosen = parser.parse_args(arguments)
-    for name in ("timesteps", "episodes", "duration"):
-        if getattr(chosen, name) <= 0:
-            parser.error(f"--{name} must be positive")
+    chosen = parse_with_quick(parser, arguments, QUICK)
+    check_positive(parser, chosen, "timesteps", "episodes", "duration")
+    check_not_negative(parser, chosen, "seed")
     return chosen
 
 

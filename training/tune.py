@@ -17,7 +17,12 @@ from tqdm import tqdm
 
 from controllers.tuned import KINDS, Tuning, build, load_search, load_tunings, save_tunings
 from epv_env.observation import P2_LAGS
-from epv_env.plant.commandline import fail_clearly, writable_file
+from epv_env.plant.commandline import (
+    check_not_negative,
+    check_positive,
+    fail_clearly,
+    writable_file,
+)
 from epv_env.plant.parameters import Parameters
 from training.rollout import run_episodes
 from training.seeds import TUNING_SEED
@@ -122,6 +127,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--out", type=writable_file, required=True, help="JSON file to write")
     parser.add_argument("--only", choices=KINDS, nargs="+", help="kinds to search; --out keeps others")
     chosen = parser.parse_args(arguments)
+    check_positive(parser, chosen, "trials", "episodes", "duration")
+    check_not_negative(parser, chosen, "seed")
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     options = {"parameters": TUNING_REGION}
     settings = {"trials": chosen.trials, "episodes": chosen.episodes, "duration": chosen.duration}

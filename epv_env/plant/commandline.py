@@ -1,10 +1,12 @@
-"""What the command lines share: checked paths, and errors as one sentence."""
+"""What the command lines share: checked paths and numbers, --quick, and errors as one sentence."""
 
 import argparse
+import math
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 
 def fail_clearly(main: Callable[[], int]) -> int:
@@ -39,3 +41,28 @@ def writable_folder(text: str) -> Path:
     if not os.access(existing, os.W_OK | os.X_OK):
         raise argparse.ArgumentTypeError(f"{existing} cannot be written: choose another path")
     return path
+
+
+def parse_with_quick(
+    parser: argparse.ArgumentParser, arguments: list[str] | None, quick: Mapping[str, Any]
+) -> argparse.Namespace:
+    """The options. With --quick, `quick` are the defaults: what is given beside it still holds."""
+    parser.add_argument("--quick", action="store_true", help="a short run that shows that all works")
+    if parser.parse_known_args(arguments)[0].quick:
+        parser.set_defaults(**quick)
+    return parser.parse_args(arguments)
+
+
+def check_positive(parser: argparse.ArgumentParser, chosen: argparse.Namespace, *names: str) -> None:
+    """End with one sentence unless each of these numbers is finite and above 0, or None."""
+    for name in names:
+        value = getattr(chosen, name)
+        if value is not None and not 0 < value < math.inf:
+            parser.error(f"--{name.replace('_', '-')} must be positive and finite")
+
+
+def check_not_negative(parser: argparse.ArgumentParser, chosen: argparse.Namespace, *names: str) -> None:
+    """End with one sentence if one of these numbers is below 0."""
+    for name in names:
+        if getattr(chosen, name) < 0:
+            parser.error(f"--{name.replace('_', '-')} must not be negative")

@@ -65,6 +65,8 @@ def test_resuming_with_another_seed_is_refused(finished):
         (["--scenario", "flood"], "unknown consumption scenario 'flood'"),
         (["--plant", "nowhere.json"], "cannot read plant file nowhere.json"),
         (["--timesteps", "0"], "--timesteps must be positive"),
+        (["--duration", "inf"], "--duration must be positive and finite"),
+        (["--seed", "-1"], "--seed must not be negative"),
         (["--out", "/dev/null/x"], "is not a folder"),
         (["--resume"], "nothing to resume"),
     ],
@@ -86,6 +88,14 @@ def test_tuning_in_its_shortest_form(tmp_path):
     )
     assert result.returncode == 0, result.stderr
     assert json.loads(out.read_text())["search"]["trials"] == 2
+
+
+@pytest.mark.parametrize("script", ["training/tune.py", "training/tradeoff.py"])
+def test_tuning_without_a_trial_is_refused(script, tmp_path):
+    result = command("--trials", 0, "--out", tmp_path / "out", script=script)
+    assert result.returncode == 2
+    assert "--trials must be positive" in result.stderr
+    assert not (tmp_path / "out").exists()
 
 
 def test_the_tradeoff_in_its_shortest_form_keeps_what_is_done(tmp_path):
