@@ -2,13 +2,12 @@
 
 from typing import Any
 
-import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
-from scipy.stats import bootstrap
 
 from training.circle_deployment import AROUND, DELIVERED, ITSELF, PROMISED, metrics_of
-from training.evaluate import summary
+from training.estimates import mean_interval
+from training.generated import markdown
+from training.metrics import summary
 
 KEYS = ["controller", "stage", "place"]
 
@@ -76,16 +75,6 @@ def gaps(episodes: pd.DataFrame) -> pd.DataFrame:
     return _by_controller(rows)
 
 
-def mean_interval(values: NDArray) -> tuple[float, float]:
-    """Ends of the 95 % percentile interval of a mean."""
-    if np.ptp(values) == 0:
-        return float(values[0]), float(values[0])
-    found = bootstrap(
-        (values,), np.mean, n_resamples=2000, method="percentile", rng=np.random.default_rng(0)
-    )
-    return float(found.confidence_interval.low), float(found.confidence_interval.high)
-
-
 def as_markdown(aims: pd.DataFrame, differences: pd.DataFrame) -> str:
     """Both tables as they are printed and stand in docs/circle.md."""
     shown = aims.loc[:, [*KEYS, *FIGURES]]
@@ -116,7 +105,8 @@ def _ends(name: str) -> list[str]:
 
 def _table(rows: pd.DataFrame) -> str:
     """Markdown, floats with three digits."""
-    lines = [list(rows.columns), ["---"] * rows.shape[1]]
-    for row in rows.itertuples(index=False):
-        lines.append([f"{cell:.3f}" if isinstance(cell, float) else str(cell) for cell in row])
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+    cells = [
+        [f"{cell:.3f}" if isinstance(cell, float) else str(cell) for cell in row]
+        for row in rows.itertuples(index=False)
+    ]
+    return markdown(list(rows.columns), cells)
