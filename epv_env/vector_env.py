@@ -1,6 +1,5 @@
 """EPValve-v0 and EPValvePWM-v0 as native vector environments: n valves in one compiled batch."""
 
-from dataclasses import replace
 from typing import Any, ClassVar
 
 import gymnasium
@@ -14,7 +13,6 @@ from epv_env.actions import PWM, OnOff
 from epv_env.infos import batch_info
 from epv_env.observation import observation_space
 from epv_env.plant.plantfile import load_plant
-from epv_env.reward import RewardWeights
 from epv_env.settings import OptionError, make_settings, with_options
 from epv_env.task import LimitingTask
 
@@ -117,11 +115,6 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         if self.mode is AutoresetMode.SAME_STEP and np.any(self._done):
             observation = self._restart(observation, infos)
         return observation, reward, terminated, truncated, infos
-
-    def set_weights(self, weights: RewardWeights) -> None:
-        """Price the reward anew from the next step on, for curricula."""
-        self.settings = replace(self.settings, weights=weights)
-        self.task.settings = self.settings
 
     def _restart(self, observation: NDArray, infos: dict[str, Any]) -> NDArray:
         """Begin the ended episodes anew within the step that ended them."""

@@ -1,30 +1,7 @@
-"""What changes as training goes on: switching becomes dear, exploration fades."""
-
-from dataclasses import replace
+"""What changes as training goes on: exploration fades."""
 
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
-
-from epv_env.reward import RewardWeights
-
-
-class RisingPrice(BaseCallback):
-    """Raises the price of switching linearly, then leaves it at the reward's own."""
-
-    def __init__(self, weights: RewardWeights, *, first: float, steps: float):
-        """first: price at the start, at most the reward's own. steps: over which it rises."""
-        super().__init__()
-        self._first = min(first, weights.switching)
-        self._weights = weights
-        self._steps = steps
-
-    def _on_step(self) -> bool:
-        return True
-
-    def _on_rollout_start(self) -> None:
-        share = min(self.num_timesteps / self._steps, 1.0)
-        price = self._first + share * (self._weights.switching - self._first)
-        self.training_env.env_method("set_weights", replace(self._weights, switching=price))
 
 
 class FadingEntropy(BaseCallback):

@@ -15,7 +15,7 @@ from controllers.tuned import build, load_tunings
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from epv_env.sb3 import make_sb3_env
-from training.curriculum import FadingEntropy, RisingPrice
+from training.curriculum import FadingEntropy
 from training.imitation import imitate
 from training.learning_log import CHECKPOINT_FILE, CURVE_FILE, TrainingLog, read_rows
 from training.seeds import RESUMED_SEED, TRAINING_SEED
@@ -50,11 +50,6 @@ class Hyperparameters:
     gae_lambda: float = 0.95
     ent_coef: float = 0.003
     """At the start; it falls linearly to nothing, since the policy is used greedily."""
-    first_switching_price: float | None = None
-    """The price of switching rises linearly from this to the reward's own over `rising_share`; None: it
-    is the reward's own from the start."""
-    rising_share: float = 0.6
-    """Share of the training over which it rises."""
     width: int = 64
     """Of the two hidden layers."""
     validations: int = 8
@@ -64,11 +59,6 @@ class Hyperparameters:
     validation_episodes: int = 512
     validation_duration: float = 6.0
     """Length of a validation episode [s]."""
-
-
-BUSY = Hyperparameters(imitation_epochs=0, first_switching_price=0.02, reward_scale=1.0, band_price=10.0)
-"""For the way of control with tens of switchings a second, at prices of 0.25 and below. Training did not
-get there from the teacher's sparing way; from nothing, with cheap switching at first, it does."""
 
 
 class ScaledReward(VecEnvWrapper):
@@ -189,9 +179,6 @@ def train(
         selection,
         log,  # last: what it saves at the end has been validated
     ]
-    if h.first_switching_price is not None:
-        steps = h.rising_share * timesteps
-        callbacks.append(RisingPrice(weights, first=h.first_switching_price, steps=steps))
     if done < timesteps:
         model.num_timesteps = done
         try:

@@ -137,7 +137,7 @@ def learning_curves(curves: Mapping[str, pd.DataFrame]) -> Figure:
         steps = curve["timesteps"] / 1e6
         top.plot(steps, curve["episode_return"], lw=0.9, label=name)
         bottom.plot(steps, 100 * curve["success_rate"], lw=0.9)
-    top.set_ylabel("return of an episode\n(exploring, price rising)")
+    top.set_ylabel("return of an episode\n(exploring)")
     bottom.set_ylabel("episodes inside ±500 mbar\nafter settling [%]")
     bottom.set(xlabel="environment steps [millions]", ylim=(-2, 102))
     for axes in (top, bottom):
