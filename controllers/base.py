@@ -1,6 +1,6 @@
 """The one protocol of all controllers: observations of a batch in, actions of a batch out."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from numpy.typing import NDArray
 
@@ -24,6 +24,7 @@ class Controller(Protocol):
         ...
 
 
+@runtime_checkable
 class Privileged(Controller, Protocol):
     """A controller that sees what no ECU measures: a bound for the others, not a rival."""
 

@@ -114,7 +114,7 @@ def run_blocks(blocks: list[Block], everyone: list[Contender], chosen: argparse.
     }
     journal = Journal(chosen.out / JOURNAL_FILE, subject)
     with workplace(chosen.workers, chosen.cluster) as run:
-        outcomes = run_tasks(blocks, study, journal, run)
+        outcomes = run_tasks(blocks, study, journal, run, what="comparison")
     return collect(blocks, {name: outcome["result"] for name, outcome in outcomes.items()})
 
 

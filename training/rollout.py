@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import epv_env  # noqa: F401 - registers the ids
-from controllers.base import Controller
+from controllers.base import Controller, Privileged
 from epv_env.infos import batch_info
 from epv_env.plant.supply import BAR
 from epv_env.vector_env import EPValvePWMVectorEnv, EPValveVectorEnv
@@ -42,6 +42,24 @@ def make_env(controller: Controller, n: int, **options: Any) -> EPValveVectorEnv
     )  # type: ignore[return-value]
 
 
+def begin_episodes(
+    env: EPValveVectorEnv | EPValvePWMVectorEnv,
+    controller: Controller,
+    seeds: list[int],
+    each: dict[str, list[Any]] | None = None,
+) -> NDArray:
+    """Start an episode for each seed under the controller; returns the first observations.
+
+    each: options of the reset, lists with one value for each episode. A privileged controller gets to
+    see the task.
+    """
+    observation, _ = env.reset(seed=list(seeds), options=each)
+    controller.reset(len(seeds))
+    if isinstance(controller, Privileged):
+        controller.watch(env.task)
+    return observation
+
+
 def run_episodes(
     controller: Controller,
     *,
@@ -56,16 +74,11 @@ def run_episodes(
 
     duration: of each episode [s]. options: of the environment. each: options of its reset, lists with
     one value for each episode (plants that are listed, not drawn). trace_of: index of an episode to
-    record. progress: called with the share done. A privileged controller gets to see the task after
-    the reset. An episode whose circuit empties counts as left (C1); its valve runs on, since the batch
-    runs as one.
+    record. progress: called with the share done. An episode whose circuit empties counts as left (C1);
+    its valve runs on, since the batch runs as one.
     """
     env = make_env(controller, len(seeds), **options)
-    observation, _ = env.reset(seed=list(seeds), options=each)
-    controller.reset(len(seeds))
-    watch = getattr(controller, "watch", None)
-    if watch is not None:  # a privileged controller sees what no ECU measures
-        watch(env.task)
+    observation = begin_episodes(env, controller, seeds, each)
     energy_before = env.task.valves.state.coil_energy.copy()
     period = env.settings.control_period
     steps = round(duration / period)

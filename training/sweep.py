@@ -133,7 +133,7 @@ def main(arguments: list[str] | None = None) -> int:
     tasks = [*hunts, *(batch for cell in planned for batch in cell.batches)]
     cores = available_cores()
     with workplace(chosen.workers or cores, chosen.cluster) as run:
-        outcomes = run_tasks(tasks, study, Journal(chosen.out / JOURNAL, config), run)
+        outcomes = run_tasks(tasks, study, Journal(chosen.out / JOURNAL, config), run, what="sweep")
         handing_out = overhead(run, study)
     spent = cost(
         episode_cpu(planned, outcomes), handing_out, cores=cores, duration=chosen.duration,

@@ -27,7 +27,7 @@ from epv_env.plant.consumption import check_scenario
 from epv_env.plant.files import write_text
 from epv_env.plant.plantfile import load_plant
 from epv_env.reward import REFERENCE_PERIOD
-from training.rollout import make_env
+from training.rollout import begin_episodes, make_env
 from training.seeds import TIMING_SEED
 from training.sweeps.controllers import named_controllers
 
@@ -40,14 +40,10 @@ def decision_times(
 ) -> NDArray:
     """Processor time of each decision of one valve's episode [s] (decisions,).
 
-    options: of the environment. Only `act` is timed. A privileged controller sees the task, as in a
-    rollout.
+    options: of the environment. Only `act` is timed.
     """
     env = make_env(controller, 1, threads=1, **options)
-    observation, _ = env.reset(seed=[seed])
-    controller.reset(1)
-    if hasattr(controller, "watch"):
-        controller.watch(env.task)  # type: ignore[attr-defined]
+    observation = begin_episodes(env, controller, [seed])
     seconds = np.zeros(WARM_UP + decisions)
     collects = gc.isenabled()
     gc.disable()  # as timeit does

@@ -9,7 +9,7 @@ import joblib
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.base import Controller
+from controllers.base import Controller, Privileged
 from training.evaluate import PLANTS, plant_region
 from training.metrics import EpisodeMetrics
 from training.scenarios import EVALUATION, RANDOM
@@ -80,7 +80,7 @@ class Contender:
     @property
     def privileged(self) -> bool:
         """Whether it is told what no ECU can measure: a limit, not a rival."""
-        return hasattr(next(iter(self.runs.values())), "watch")
+        return isinstance(next(iter(self.runs.values())), Privileged)
 
     @property
     def model_based(self) -> bool:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from controllers.base import Controller
 from epv_env.observation import LAYOUT, decode
-from training.rollout import make_env
+from training.rollout import begin_episodes, make_env
 
 PLANTS = "ten_percent"
 SCENARIO = "mixed"
@@ -37,8 +37,7 @@ class VisitedStates:
 def visit(controller: Controller, *, first_seed: int, episodes: int, periods: int) -> VisitedStates:
     """Follow a controller through seeded episodes."""
     env = make_env(controller, episodes, scenario=SCENARIO, parameters=PLANTS)
-    observation, _ = env.reset(seed=list(range(first_seed, first_seed + episodes)))
-    controller.reset(episodes)
+    observation = begin_episodes(env, controller, list(range(first_seed, first_seed + episodes)))
     observations, actions = [], []
     for _ in range(periods):
         action = controller.act(observation)

@@ -29,16 +29,19 @@ Map = Callable[[Iterable[Task], Study], Iterator[tuple[str, Outcome]]]
 """Runs tasks side by side; yields name and outcome in the order in which they finish."""
 
 
-def run_tasks(tasks: Sequence[Task], study: Study, journal: Journal, run: Map) -> dict[str, Outcome]:
+def run_tasks(
+    tasks: Sequence[Task], study: Study, journal: Journal, run: Map, *, what: str
+) -> dict[str, Outcome]:
     """Outcomes by name, in the order of the tasks; those in the journal are not run again.
 
-    The longest begin first, so that none is left running alone at the end.
+    what: name of the progress bar. The longest tasks begin first, so that none is left running alone at
+    the end.
     """
     missing = [task for task in tasks if task.name not in journal]
     size = {task.name: task.episodes for task in missing}
     quiet = 0.2 if sys.stderr.isatty() else 10.0
     with tqdm(
-        total=sum(size.values()), desc="sweep", unit="episode", file=sys.stderr, mininterval=quiet
+        total=sum(size.values()), desc=what, unit="episode", file=sys.stderr, mininterval=quiet
     ) as bar:
         for name, outcome in run(sorted(missing, key=lambda task: -task.episodes), study):
             journal.add(name, outcome)
