@@ -115,22 +115,24 @@ class Region:
         """One plant of the region."""
         changes = {symbol: float(rng.uniform(*ends)) for symbol, ends in self.boxes.items()}
         if self.covariance is not None:
-            changes |= dict(zip(self.symbols, self._joint(rng, self.covariance), strict=True))
+            k = len(self.symbols)
+            direction = rng.standard_normal(k)
+            ball = direction * rng.uniform() ** (1 / k) / np.linalg.norm(direction)
+            changes |= dict(zip(self.symbols, self.joint(ball[None])[0].tolist(), strict=True))
         return self.centre.replace(**changes)
 
-    def _joint(self, rng: np.random.Generator, covariance: NDArray) -> list[float]:
-        """A uniform point of the ellipsoid, by scaling a direction; kept inside the domains."""
-        k = len(self.symbols)
-        direction = rng.standard_normal(k)
-        radius = np.sqrt(self.chi_square) * rng.uniform() ** (1 / k) / np.linalg.norm(direction)
-        values, vectors = np.linalg.eigh(_correlation(covariance))
-        offset = vectors @ (np.sqrt(np.maximum(values, 0)) * direction) * radius
-        offset *= np.sqrt(np.diag(covariance))
-        domains = [table()[symbol].domain or (-np.inf, np.inf) for symbol in self.symbols]
-        return [
-            float(np.clip(self.centre[symbol] + change, low, high))
-            for symbol, change, (low, high) in zip(self.symbols, offset, domains, strict=True)
-        ]
+    def joint(self, ball: NDArray) -> NDArray:
+        """Points of the ellipsoid (points, k) for those of the unit ball; kept inside the domains [SI].
+
+        Uniform points of the ball give uniform ones of the ellipsoid.
+        """
+        if self.covariance is None:
+            return ball  # without coordinates, since there are no joint symbols
+        variances, axes = np.linalg.eigh(_correlation(self.covariance))
+        offset = (ball * np.sqrt(np.maximum(variances, 0))) @ axes.T
+        offset *= np.sqrt(self.chi_square * np.diag(self.covariance))
+        low, high = np.transpose([table()[s].domain or (-np.inf, np.inf) for s in self.symbols])
+        return np.clip([self.centre[s] for s in self.symbols] + offset, low, high)
 
 
 def _correlation(covariance: NDArray) -> NDArray:

@@ -29,31 +29,25 @@ class Space:
         boxes = self.region.boxes
         ends = np.array(list(boxes.values())).reshape(-1, 2)
         boxed = ends[:, 0] + coordinates[:, : len(boxes)] * np.ptp(ends, axis=1)
-        points = np.hstack([boxed, self._joint(2 * coordinates[:, len(boxes) :] - 1)])
+        points = np.hstack([boxed, self.region.joint(_ball(2 * coordinates[:, len(boxes) :] - 1))])
         return [
             {symbol: _inside(symbol, value) for symbol, value in zip(self.symbols, row, strict=True)}
             for row in points.tolist()
         ]
-
-    def _joint(self, cube: NDArray) -> NDArray:
-        """Points of the ellipsoid (points, k) for those of the cube from -1 to 1."""
-        region = self.region
-        if region.covariance is None:
-            return cube
-        length = np.linalg.norm(cube, axis=1, keepdims=True)
-        ball = cube * np.max(np.abs(cube), axis=1, keepdims=True) / np.where(length > 0, length, 1.0)
-        deviation = np.sqrt(np.diag(region.covariance))
-        scale = np.where(deviation > 0, deviation, 1.0)
-        variances, axes = np.linalg.eigh(region.covariance / np.outer(scale, scale))
-        offset = (ball * np.sqrt(np.maximum(variances, 0))) @ axes.T * deviation
-        return np.array([region.centre[s] for s in region.symbols]) + offset * np.sqrt(region.chi_square)
 
     def latin_hypercube(self, points: int, seed: int) -> NDArray:
         """Coordinates (points, symbols): each symbol's range is cut into slices of one point each."""
         return qmc.LatinHypercube(len(self.symbols), rng=seed).random(points)
 
 
+def _ball(cube: NDArray) -> NDArray:
+    """Points of the unit ball (points, k): those of the cube from -1 to 1, drawn in along their rays."""
+    length = np.linalg.norm(cube, axis=1, keepdims=True)
+    furthest = np.max(np.abs(cube), axis=1, keepdims=True, initial=0.0)
+    return cube * furthest / np.where(length > 0, length, 1.0)
+
+
 def _inside(symbol: str, value: float) -> float:
-    """The value within the parameter's domain: rounding or an ellipsoid may step over its end."""
+    """The value within the parameter's domain: rounding may step over its end."""
     low, high = table()[symbol].domain or (value, value)
     return min(max(value, low), high)
