@@ -63,11 +63,11 @@ class Search:
         self.depth = 0
         """Layers that lie ahead of the episodes."""
         self._steps = task.steps.copy()
-        self._consumption = deepcopy(task._consumption)
+        self._consumption = deepcopy(task.consumption)
         self._valves = Valves(task.n * 2 * width, threads=threads)
         self._owner = np.repeat(np.arange(task.n), 2 * width)
         p = {symbol: np.array([plant[symbol] for plant in plants]) for symbol in plants[0]}
-        volume = np.array([supply.volume for supply in task._supplies])
+        volume = np.array([supply.volume for supply in task.supplies])
         self._valves.set_parameters(
             np.arange(self._valves.n), {s: v[self._owner] for s, v in p.items()}, volume[self._owner]
         )
@@ -84,7 +84,7 @@ class Search:
         price[:, 0] = 0.0
         return Nodes(
             state=State(*map(spread, self._task.valves.state)), price=price,
-            compressor=spread(self._task._compressor), coil=spread(self._task._coil),
+            compressor=spread(self._task.compressor), coil=spread(self._task.coil),
             moves=np.zeros(shape, dtype=np.uint64),
         )  # fmt: skip
 
@@ -125,7 +125,7 @@ class Search:
             field[:] = values.ravel()
         compressor, refill = parents.compressor, np.zeros(coil.shape)
         slope = np.zeros(task.n)
-        for i, supply in enumerate(task._supplies):
+        for i, supply in enumerate(task.supplies):
             compressor[i] = supply.compressor_runs(parents.state.p1[i], compressor[i])
             refill[i] = supply.delivery * compressor[i]
             slope[i] = supply.slope(time[i : i + 1], task.period)[0]

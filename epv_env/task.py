@@ -95,11 +95,14 @@ class LimitingTask:
         """Target pressure [bar absolute]."""
         self.steps = np.zeros(n, dtype=np.int64)
         self.violated = np.zeros(n, dtype=bool)
-        self._supplies = [settings.supply] * n
+        self.supplies = [settings.supply] * n
+        self.consumption = Profiles(n)
+        """What is drawn from each circuit, the rest of the episode included."""
+        self.compressor = np.zeros(n, dtype=bool)
+        """Whether it runs."""
+        self.coil = np.ones(n, dtype=bool)
+        """Whether it is on at the end of the last period."""
         self._special_supply = False
-        self._consumption = Profiles(n)
-        self._compressor = np.zeros(n, dtype=bool)
-        self._coil = np.ones(n, dtype=bool)
         self._action = np.ones(n)
         self._waited = np.zeros(n)
         self._noise: list[np.random.Generator | None] = [None] * n
@@ -134,16 +137,16 @@ class LimitingTask:
         for i, start in zip(where.tolist(), starts, strict=True):
             self.parameters[i] = start.parameters
             self.target[i] = start.target
-            self._supplies[i] = start.supply
-            self._consumption.start(i, start.consumption)
+            self.supplies[i] = start.supply
+            self.consumption.start(i, start.consumption)
             self._noise[i] = start.noise
         self.steps[where] = 0
         self.violated[where] = False
-        self._compressor[where] = False
-        self._coil[where] = True
+        self.compressor[where] = False
+        self.coil[where] = True
         self._action[where] = 1.0
         self._waited[where] = LONGEST_WAIT
-        self._special_supply = any(s is not self.settings.supply for s in self._supplies)
+        self._special_supply = any(s is not self.settings.supply for s in self.supplies)
         return self._observe(where, fresh=True)
 
     def step(self, on_time: NDArray, action: NDArray) -> StepResult:
@@ -153,7 +156,7 @@ class LimitingTask:
         """
         switchings = self._switch(on_time, action)
         time = self.time()
-        consumption = self._consumption.mean_flow(time, self.period)
+        consumption = self.consumption.mean_flow(time, self.period)
         before = State(*(field.copy() for field in self.valves.state))
         self._drive(on_time, time, consumption)
         lost = self._restore_lost(before)
@@ -193,8 +196,8 @@ class LimitingTask:
         """Count the coil's switchings in this period and remember its last state."""
         begins_on = on_time > 0
         ends_on = on_time >= self.period
-        switchings = (begins_on != self._coil).astype(np.int64) + (begins_on != ends_on)
-        self._coil = ends_on
+        switchings = (begins_on != self.coil).astype(np.int64) + (begins_on != ends_on)
+        self.coil = ends_on
         self._action = action.astype(float)
         since = np.where(begins_on & ~ends_on, self.period - on_time, self.period)
         self._waited = np.where(switchings > 0, since, self._waited + self.period)
@@ -230,13 +233,13 @@ class LimitingTask:
         inputs, p1 = self.valves.inputs, self.valves.state.p1
         if not self._special_supply:
             supply = self.settings.supply
-            self._compressor = supply.compressor_runs(p1, self._compressor)
-            inputs.refill[:] = supply.delivery * self._compressor
+            self.compressor = supply.compressor_runs(p1, self.compressor)
+            inputs.refill[:] = supply.delivery * self.compressor
             inputs.p1_slope[:] = supply.slope(time, self.period)
             return
-        for i, supply in enumerate(self._supplies):
-            self._compressor[i] = supply.compressor_runs(p1[i], self._compressor[i])
-            inputs.refill[i] = supply.delivery * self._compressor[i]
+        for i, supply in enumerate(self.supplies):
+            self.compressor[i] = supply.compressor_runs(p1[i], self.compressor[i])
+            inputs.refill[i] = supply.delivery * self.compressor[i]
             inputs.p1_slope[i] = supply.slope(time[i : i + 1], self.period)[0]
 
     def _observe(self, where: NDArray, *, fresh: bool) -> NDArray:
