@@ -60,20 +60,12 @@ class Assessed:
     def at_end(self) -> bool:
         """Whether a size lies at an end of its physical range: the data ask for what cannot be."""
         sizes = self.point.hypothesis.sizes
-        for size, scaled in zip(
-            sizes, self.point.vector[len(self.point.vector) - len(sizes) :], strict=True
-        ):
+        for size, scaled in zip(sizes, self.point.vector[self.point.first_size :], strict=True):
             low, high = sorted((size.low, size.high))
             value, margin = scaled * size.scale, AT_END * (high - low)
             if min(value - low, high - value) < margin and abs(value - size.off) > margin:
                 return True
         return False
-
-    @property
-    def size_sd(self) -> NDArray:
-        """Standard deviations of the sizes [SI]."""
-        deviations = np.sqrt(np.diag(self.covariance))
-        return deviations[len(deviations) - len(self.point.hypothesis.sizes) :]
 
     @property
     def name(self) -> tuple[str, ...]:
@@ -176,7 +168,7 @@ def stretches(series: NDArray, period: float, stretch: float = STRETCH) -> NDArr
 def _effects(point: Point, run: Linear) -> NDArray:
     """What each cause of uncertain form changes, linear in its sizes, (values, causes)."""
     causes = point.hypothesis.causes
-    column = len(point.vector) - len(point.hypothesis.sizes)
+    column = point.first_size
     own, found = 0, []
     for cause in causes:
         at, mine = slice(column, column + len(cause.sizes)), slice(own, own + len(cause.local))

@@ -164,7 +164,7 @@ def _effects(
     """What each point's causes of uncertain form change in each run, (values, causes)."""
     without, of = [], []
     for index, point in enumerate(points):
-        column = len(point.vector) - len(point.hypothesis.sizes)
+        column = point.first_size
         for cause in point.hypothesis.causes:
             vector = point.vector.copy()
             for size in cause.sizes:

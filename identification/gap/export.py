@@ -72,8 +72,8 @@ def magnitudes(found: Assessed) -> dict[str, tuple[float, float, float]]:
     """Value and ends of the 90 % interval of each size, by symbol_unit [SI]."""
     quantile = norm.ppf(0.5 + LEVEL / 2)
     sizes = found.point.hypothesis.sizes
-    vector = found.point.vector[len(found.point.vector) - len(sizes) :]
-    deviations = np.sqrt(np.diag(covariance(found)))[len(found.point.vector) - len(sizes) :]
+    vector = found.point.vector[found.point.first_size :]
+    deviations = np.sqrt(np.diag(covariance(found)))[found.point.first_size :]
     result = {}
     for size, scaled, sd in zip(sizes, vector, deviations, strict=True):
         value, margin = float(scaled * size.scale), float(quantile * sd)
@@ -90,9 +90,8 @@ def covariance(found: Assessed) -> NDArray:
     """Of calibrated parameters and sizes (k, k) [SI], with errors of form that no recording shows."""
     exact = [cause.exact for cause in found.point.hypothesis.causes for _ in cause.sizes]
     sizes = found.point.hypothesis.sizes
-    first = len(found.point.vector) - len(sizes)
     form = np.zeros(len(found.point.vector))
-    for i, (size, known) in enumerate(zip(sizes, exact, strict=True), start=first):
+    for i, (size, known) in enumerate(zip(sizes, exact, strict=True), start=found.point.first_size):
         form[i] = 0.0 if known else SYSTEMATIC * (found.point.vector[i] * size.scale - size.off)
     return found.covariance + np.diag(form**2)
 

@@ -84,6 +84,11 @@ class Point:
     converged: bool = False
     given_up: bool = False
 
+    @property
+    def first_size(self) -> int:
+        """Where the causes' sizes begin in the vector."""
+        return len(self.vector) - len(self.hypothesis.sizes)
+
 
 class Fitter:
     """Fits hypotheses to the runs that may be fitted to."""

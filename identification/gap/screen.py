@@ -59,8 +59,8 @@ def screen(fitter: Fitter, base: Point, found: Sequence[Signature]) -> list[Scre
     """Every cause's best trial beside the base's own causes, the most promising first.
 
     The change that a cause makes at a trial size is taken to grow in proportion to its size, and to turn
-    round with its sign; with the
-    calibrated parameters and all nuisances it is fitted to the base's residual.
+    round with its sign; with the calibrated parameters and all nuisances it is fitted to the base's
+    residual.
     """
     own = fitter.linearise([base], fitter.fitted)[0]
     best: dict[str, Screened] = {}

@@ -13,12 +13,16 @@ from identification.gap.model import GreyBox
 from identification.gap.screen import Screened, screen, signatures
 from identification.gap.separability import Separability, separability
 
-SINGLES = 10
+SINGLES = 20
 """Causes that are refitted, the most promising ones."""
 
-FINALISTS = (8, 4)
+FINALISTS = (14, 5)
 """Causes that are fitted on with nuisances linearised where each of them stands: so many, then fewer.
 Half as many pairs."""
+
+NEAR = 250.0
+"""Log evidence by which the best fit may lead one that is fitted on, or half of what the best gains on
+the recalibrated model, if that is more."""
 
 ALIKE = 0.8
 """Correlation with a finalist's signature above which a cause that was screened out is refitted."""
@@ -26,16 +30,13 @@ ALIKE = 0.8
 PARTNERS = 8
 """Causes that are tried beside each of the best two, where one cause leaves too much."""
 
-SMALL = 0.005
-"""Share of the recalibrated model's squared misfit up to which what a cause leaves is its form's error:
-some 7 % in amplitude. No second cause is sought for it, unless it is CLEAR."""
+WORTH = 200.0
+"""Sum of squares that the best cause must leave, beyond noise or predictably, for a second cause to be
+sought: less is soon in a form's error, or in chance."""
 
-CLEAR = 500.0
-"""Log evidence by which a leftover without a name beats errors of the form, where a second cause is
-sought however small the leftover: a form errs along with its cause, another cause acts on its own."""
-
-CLOSED = 0.3
-"""Share of what a cause leaves that a pair may leave at most, to be more than that cause alone."""
+CLOSED = 0.6
+"""Share of what its better half leaves that a pair may leave at most. Where forms err, any further
+number lowers the misfit a little; a cause that acts lowers it a good deal."""
 
 RIVAL = 3.0
 """Times what the best cause leaves, up to which a pair is also sought beside the second best."""
@@ -82,9 +83,13 @@ def which(plant: GreyBox, fits: Fits | None = None) -> Verdicts:
         singles = _ranked([*singles, *assess(fitter, more)])
     none = _finals(fitter, assess(fitter, [base]), (1, 1), "recalibration", fits)[0]
     begun = {single.name: single.point for single in singles}
-    singles = _finals(fitter, singles, FINALISTS, "causes", fits)
-    pairs = _without_twins(_pairs(fitter, none, singles, begun, fits))
-    pairs = _finals(fitter, _ranked(pairs), [n // 2 for n in FINALISTS], "pairs", fits)
+    margin = max(NEAR, 0.5 * (singles[0].log_evidence - none.log_evidence)) if singles else NEAR
+    singles = _finals(fitter, singles, FINALISTS, "causes", fits, margin)
+    floor = min(0.0, *(found.excess for found in (none, *singles)))
+    pairs = _without_twins(_pairs(fitter, singles, begun, floor, fits))
+    pairs = _finals(fitter, _ranked(pairs), [n // 2 for n in FINALISTS], "pairs", fits, margin)
+    singles = _finals(fitter, _halves(fitter, singles, pairs, fits), (1,), "halves", fits)
+    pairs = [pair for pair in pairs if _closes(pair, singles, floor)]
     return _weighed(fitter, none, singles, pairs, separable)
 
 
@@ -116,15 +121,26 @@ def _alike(
 
 
 def _finals(
-    fitter: Fitter, found: list[Assessed], counts: Sequence[int], what: str, fits: Fits
+    fitter: Fitter,
+    found: list[Assessed],
+    counts: Sequence[int],
+    what: str,
+    fits: Fits,
+    margin: float = np.inf,
 ) -> list[Assessed]:
     """The best of them fitted on, with nuisances linearised where each of them stands.
 
-    found: the most probable first, as what is returned. counts: how many of them, round by round.
+    found: the most probable first, as what is returned. counts: how many of them at most, round by
+    round. margin: log evidence by which the best one may lead them.
     """
-    for number, count in enumerate(counts if found else (), start=1):
-        points = [assessed.point for assessed in found[:count]]
-        own = frames(fitter, points, [assessed.tolerances for assessed in found[:count]])
+    for number, most in enumerate(counts if found else (), start=1):
+        near = [
+            assessed
+            for assessed in found[:most]
+            if found[0].log_evidence - assessed.log_evidence <= margin
+        ]
+        count, points = len(near), [assessed.point for assessed in near]
+        own = frames(fitter, points, [assessed.tolerances for assessed in near])
         starts = [replace(_again(p), frame=frame) for p, frame in zip(points, own, strict=True)]
         fitted = fits(f"{what}: own nuisances, round {number}", partial(fitter.fit, starts))
         framed = [replace(p, frame=frame) for p, frame in zip(fitted, own, strict=True)]
@@ -134,32 +150,35 @@ def _finals(
 
 def _pairs(
     fitter: Fitter,
-    none: Assessed,
     singles: list[Assessed],
     begun: Mapping[tuple[str, ...], Point],
+    floor: float,
     fits: Fits,
 ) -> list[Assessed]:
-    """Pairs that explain what the best causes leave, where that is predictable and not SMALL, or CLEAR.
+    """Pairs that may explain what the best causes leave, where that is WORTH it.
 
-    A pair must close a good part of what its better half leaves: where forms err, any further number
-    lowers the misfit a little. begun: where each cause was before its nuisances followed what it lacks;
-    from there a partner is seen best.
+    begun: where each cause was before its nuisances followed what it lacks; from there a partner is seen
+    best. floor: as of `_left`.
     """
-    if not singles:
+    if not singles or _left(singles[0], floor) <= WORTH:
         return []
-    best = singles[0]
-    predictable = best.with_leftover - best.log_evidence
-    floor = min(0.0, *(found.excess for found in (none, *singles)))
-    small = best.excess - floor <= SMALL * (none.excess - floor)
-    if predictable <= (CLEAR if small else 0.0):
-        return []
-    found = []
-    for single in singles[:2]:
-        left = single.excess - floor
-        if single is best or left <= RIVAL * (best.excess - floor):
-            both = assess(fitter, _partners(fitter, begun[single.name], fits))
-            found += [pair for pair in both if pair.excess - floor <= CLOSED * left]
-    return found
+    most = RIVAL * _left(singles[0], floor)
+    bases = [single for single in singles[:2] if _left(single, floor) <= most]
+    return [pair for base in bases for pair in assess(fitter, _partners(fitter, begun[base.name], fits))]
+
+
+def _closes(pair: Assessed, singles: Sequence[Assessed], floor: float) -> bool:
+    """Whether a pair is more than its better half alone."""
+    halves = [_left(single, floor) for single in singles if single.name[0] in pair.name]
+    return not pair.at_end and _left(pair, floor) <= CLOSED * min(halves, default=np.inf)
+
+
+def _left(found: Assessed, floor: float) -> float:
+    """Sum of squares that a hypothesis leaves: beyond the floor, or what is predictable of it.
+
+    floor: where the noise is known too large, what the best hypothesis leaves.
+    """
+    return max(found.excess - floor, 2.0 * (found.with_leftover - found.log_evidence))
 
 
 def _partners(fitter: Fitter, base: Point, fits: Fits) -> list[Point]:
@@ -187,11 +206,29 @@ def _refit(fitter: Fitter, base: Point, promising: Sequence[Screened]) -> list[P
     return [point for point in fitter.fit(starts, base.chi_square) if not point.given_up]
 
 
-def _without_twins(pairs: Sequence[Assessed]) -> list[Assessed]:
-    """The better of two fits of the same causes, begun from either of them."""
+def _halves(
+    fitter: Fitter, singles: list[Assessed], pairs: Sequence[Assessed], fits: Fits
+) -> list[Assessed]:
+    """Singles, of which those in the best pair have also been fitted from where they stand there.
+
+    Far from its size a cause may get stuck, and a pair find the way round.
+    """
+    if not pairs:
+        return singles
+    pair, base = pairs[0].point, fitter.values(pairs[0].point)
+    starts = [
+        replace(fitter.start(Hypothesis(causes=(cause,)), base), frame=pair.frame)
+        for cause in pair.hypothesis.causes
+    ]
+    alone = assess(fitter, fits("halves of the best pair", lambda: fitter.fit(starts)))
+    return _ranked(_without_twins([*singles, *alone]))
+
+
+def _without_twins(found: Sequence[Assessed]) -> list[Assessed]:
+    """The best of several fits of the same causes, begun from different places."""
     best: dict[frozenset[str], Assessed] = {}
-    for pair in sorted(pairs, key=lambda found: found.log_evidence):
-        best[frozenset(pair.name)] = pair
+    for one in sorted(found, key=lambda assessed: assessed.log_evidence):
+        best[frozenset(one.name)] = one
     return list(best.values())
 
 

@@ -5,8 +5,10 @@ import pytest
 
 from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import recorded
-from identification.gap.evidence import stretches
-from identification.gap.which import recalibrated, which
+from identification.gap.evidence import Assessed, assess, stretches
+from identification.gap.fit import Fitter, Hypothesis
+from identification.gap.fits import Fits
+from identification.gap.which import _closes, _halves, recalibrated, which
 
 
 @pytest.mark.parametrize(("name", "size"), [("leak", 4e-3), ("lag", 4.0), ("evaporation", 8e-4)])
@@ -17,7 +19,7 @@ def test_the_cause_that_made_the_recordings_is_found_with_its_size(name, size):
     assert found.probability[0] > 0.7
     fitted = found.fitter.values(best.point)
     assert fitted["c"] == pytest.approx(0.021, rel=0.02)
-    assert fitted[name] == pytest.approx(size, abs=4 * best.size_sd[0])
+    assert fitted[name] == pytest.approx(size, abs=4 * np.sqrt(best.covariance[-1, -1]))
     held_out = np.concatenate([best.residuals[2].ravel()])
     assert np.sqrt(np.mean(held_out**2)) == pytest.approx(1.0, abs=0.15)
 
@@ -42,6 +44,30 @@ def test_two_causes_are_found_together():
     found = which(Tank(recorded({"leak": 4e-3, "lag": 5.0})))
     assert set(found.candidates[0].name) == {"leak", "lag"}
     assert found.probability[0] > 0.9
+
+
+def assessed(fitter: Fitter, **sizes: float) -> tuple[Assessed, Assessed]:
+    """Causes as they stand at given sizes, and fitted from there."""
+    causes = tuple(cause for cause in fitter.plant.causes if cause.name in sizes)
+    start = fitter.start(Hypothesis(causes=causes), {"c": 0.021, **sizes})
+    at, fitted = assess(fitter, [start, *fitter.fit([start])])
+    return at, fitted
+
+
+@pytest.mark.parametrize(("lag", "counts"), [(5.0, True), (0.0, False)])
+def test_a_pair_counts_if_it_closes_a_good_part_of_what_its_half_leaves(lag, counts):
+    fitter, _ = recalibrated(Tank(recorded({"leak": 4e-3, "lag": lag})))
+    (_, leak), (_, both) = assessed(fitter, leak=3e-3), assessed(fitter, leak=3e-3, lag=2.0)
+    assert _closes(both, [leak], floor=min(leak.excess, 0.0)) == counts
+
+
+def test_a_cause_that_got_stuck_alone_is_fitted_again_from_where_the_best_pair_has_it():
+    fitter, _ = recalibrated(Tank(recorded({"leak": 4e-3})))
+    (stuck, fitted), (_, pair) = assessed(fitter, leak=1e-4), assessed(fitter, leak=3e-3, lag=1.0)
+    mended = {found.name: found for found in _halves(fitter, [stuck], [pair], Fits(fitter.plant))}
+    assert mended[("leak",)].log_evidence == pytest.approx(fitted.log_evidence, abs=1.0)
+    assert fitted.log_evidence > stuck.log_evidence + 100.0
+    assert set(mended) == {("leak",), ("lag",)}
 
 
 def test_the_same_recordings_give_the_same_verdict():
