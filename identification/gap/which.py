@@ -38,6 +38,13 @@ CLOSED = 0.6
 """Share of what its better half leaves that a pair may leave at most. Where forms err, any further
 number lowers the misfit a little; a cause that acts lowers it a good deal."""
 
+SMALL = 0.005
+"""Share of the recalibrated model's squared misfit up to which what a cause leaves is soon its form's error:
+some 7 % in amplitude. There a pair must be CLEAR."""
+
+CLEAR = 500.0
+"""Log evidence by which such a pair must beat its better half."""
+
 RIVAL = 3.0
 """Times what the best cause leaves, up to which a pair is also sought beside the second best."""
 
@@ -89,7 +96,7 @@ def which(plant: GreyBox, fits: Fits | None = None) -> Verdicts:
     pairs = _without_twins(_pairs(fitter, singles, begun, floor, fits))
     pairs = _finals(fitter, _ranked(pairs), [n // 2 for n in FINALISTS], "pairs", fits, margin)
     singles = _finals(fitter, _halves(fitter, singles, pairs, fits), (1,), "halves", fits)
-    pairs = [pair for pair in pairs if _closes(pair, singles, floor)]
+    pairs = [pair for pair in pairs if _counts(pair, singles, none, floor)]
     return _weighed(fitter, none, singles, pairs, separable)
 
 
@@ -167,10 +174,15 @@ def _pairs(
     return [pair for base in bases for pair in assess(fitter, _partners(fitter, begun[base.name], fits))]
 
 
-def _closes(pair: Assessed, singles: Sequence[Assessed], floor: float) -> bool:
-    """Whether a pair is more than its better half alone."""
-    halves = [_left(single, floor) for single in singles if single.name[0] in pair.name]
-    return not pair.at_end and _left(pair, floor) <= CLOSED * min(halves, default=np.inf)
+def _counts(pair: Assessed, singles: Sequence[Assessed], none: Assessed, floor: float) -> bool:
+    """Whether a pair is more than its better half alone, whose form errs."""
+    halves = [single for single in singles if single.name[0] in pair.name]
+    if pair.at_end or not halves:
+        return not pair.at_end
+    left = min(_left(half, floor) for half in halves)
+    small = left <= SMALL * (none.excess - floor)
+    gain = pair.log_evidence - max(half.log_evidence for half in halves)
+    return _left(pair, floor) <= CLOSED * left and (gain > CLEAR or not small)
 
 
 def _left(found: Assessed, floor: float) -> float:

@@ -8,7 +8,7 @@ from docs.examples.tank.recordings import recorded
 from identification.gap.evidence import Assessed, assess, stretches
 from identification.gap.fit import Fitter, Hypothesis
 from identification.gap.fits import Fits
-from identification.gap.which import _closes, _halves, recalibrated, which
+from identification.gap.which import _counts, _halves, recalibrated, which
 
 
 @pytest.mark.parametrize(("name", "size"), [("leak", 4e-3), ("lag", 4.0), ("evaporation", 8e-4)])
@@ -56,9 +56,9 @@ def assessed(fitter: Fitter, **sizes: float) -> tuple[Assessed, Assessed]:
 
 @pytest.mark.parametrize(("lag", "counts"), [(5.0, True), (0.0, False)])
 def test_a_pair_counts_if_it_closes_a_good_part_of_what_its_half_leaves(lag, counts):
-    fitter, _ = recalibrated(Tank(recorded({"leak": 4e-3, "lag": lag})))
+    fitter, base = recalibrated(Tank(recorded({"leak": 4e-3, "lag": lag})))
     (_, leak), (_, both) = assessed(fitter, leak=3e-3), assessed(fitter, leak=3e-3, lag=2.0)
-    assert _closes(both, [leak], floor=min(leak.excess, 0.0)) == counts
+    assert _counts(both, [leak], assess(fitter, [base])[0], min(leak.excess, 0.0)) == counts
 
 
 def test_a_cause_that_got_stuck_alone_is_fitted_again_from_where_the_best_pair_has_it():
