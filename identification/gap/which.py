@@ -39,8 +39,8 @@ CLOSED = 0.6
 number lowers the misfit a little; a cause that acts lowers it a good deal."""
 
 SMALL = 0.005
-"""Share of the recalibrated model's squared misfit up to which what a cause leaves is soon its form's error:
-some 7 % in amplitude. There a pair must be CLEAR."""
+"""Share of the recalibrated model's squared misfit up to which what a cause leaves is soon its form's
+error: some 7 % in amplitude. There a pair must be CLEAR."""
 
 CLEAR = 500.0
 """Log evidence by which such a pair must beat its better half."""
