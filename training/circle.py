@@ -30,7 +30,7 @@ from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.reward import RewardWeights
 from identification.__main__ import main as identification
 from identification.bench.programmes import SUITES
-from training.circle_deployment import AFTER, BEFORE, DELIVERED, PROMISED, deployed
+from training.circle_deployment import AFTER, BEFORE, DELIVERED, PROMISED, deployed, read_episodes
 from training.circle_report import report
 from training.results_folder import check_options, write_options
 
@@ -138,7 +138,7 @@ def stage(name: str, simulated: Plant, chosen: argparse.Namespace) -> pd.DataFra
             duration=chosen.duration, what=f"deployment {name}",
         )  # fmt: skip
         write_text(path, episodes.to_csv(index=False))
-    return pd.read_csv(path).assign(stage=name)
+    return read_episodes(path).assign(stage=name)
 
 
 def say(step: str) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -48,6 +49,18 @@ def deployed(
         rows = pd.DataFrame({"episode": np.arange(count), **asdict(metrics)})
         found.append(rows.assign(place=place, plants=plant_set, controller=controller.name))
     return pd.concat(found, ignore_index=True)
+
+
+def read_episodes(path: Path) -> pd.DataFrame:
+    """What `deployed` gave, from a file. Raises ValueError for a table of another version."""
+    found = pd.read_csv(path)
+    missing = [f.name for f in fields(EpisodeMetrics) if f.name not in found]
+    if missing:
+        raise ValueError(
+            f"{path} has no column {missing[0]}: another version of this program wrote it; remove its "
+            "folder, or choose another --out"
+        )
+    return found
 
 
 def metrics_of(episodes: pd.DataFrame) -> EpisodeMetrics:

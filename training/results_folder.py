@@ -10,12 +10,17 @@ CONFIG = "config.json"
 
 
 def check_options(folder: Path, options: dict[str, Any], what: str) -> None:
-    """Raises ValueError if the folder was begun with other options.
+    """Raises ValueError if the folder was begun with other options, or what it says cannot be read.
 
     options: all that the results depend on, as JSON gives it back. what: the results, in a word.
     """
     path = folder / CONFIG
-    earlier = json.loads(path.read_text(encoding="utf-8")) if path.exists() else options
+    try:
+        earlier = json.loads(path.read_text(encoding="utf-8")) if path.exists() else options
+    except json.JSONDecodeError as error:
+        raise ValueError(
+            f"{path} is damaged ({error}): remove the folder, or choose another --out"
+        ) from None
     for name, value in options.items():
         if earlier.get(name) != value:
             raise ValueError(

@@ -15,7 +15,16 @@ from epv_env.plant.plantfile import Plant, save_plant
 from epv_env.plant.region import Region
 from training.circle import main
 from training.circle_aims import FIGURES, GAPS, as_markdown, figures, gaps
-from training.circle_deployment import AFTER, AROUND, BEFORE, DELIVERED, ITSELF, PROMISED, deployed
+from training.circle_deployment import (
+    AFTER,
+    AROUND,
+    BEFORE,
+    DELIVERED,
+    ITSELF,
+    PROMISED,
+    deployed,
+    read_episodes,
+)
 from training.circle_figure import circle_figure
 from training.circle_report import said
 
@@ -129,6 +138,22 @@ def test_a_plant_without_a_named_cause_is_said_to_be_recalibrated_only():
 def test_another_effect_in_the_same_folder_is_refused(finished):
     with pytest.raises(ValueError, match=r"holds a circle with effect command_delay=.*, not seat_leak"):
         circle(finished, "--effect", "seat_leak=1e-7")
+
+
+def test_a_folder_whose_options_are_damaged_is_refused(tmp_path):
+    (tmp_path / "config.json").write_text('{"effect": ')
+    with pytest.raises(ValueError, match=r"config.json is damaged .* choose another --out"):
+        main(["--quick", "--out", str(tmp_path)])
+    assert [path.name for path in tmp_path.iterdir()] == ["config.json"]
+
+
+def test_episodes_are_read_back_but_not_those_of_another_version(late, tmp_path):
+    path = tmp_path / "episodes.csv"
+    late.to_csv(path, index=False)
+    pd.testing.assert_frame_equal(read_episodes(path), late)
+    late.drop(columns="rms_bar").to_csv(path, index=False)
+    with pytest.raises(ValueError, match="has no column rms_bar: another version"):
+        read_episodes(path)
 
 
 def test_an_unknown_effect_is_refused_before_anything_is_written(tmp_path):
