@@ -18,7 +18,7 @@ from epv_env.sb3 import make_sb3_env
 from training.curriculum import FadingEntropy
 from training.imitation import imitate
 from training.learning_log import CHECKPOINT_FILE, CURVE_FILE, TrainingLog, read_rows
-from training.seeds import RESUMED_SEED, TRAINING_SEED
+from training.seeds import RESUMED_SEED, training_seeds
 from training.selection import Selection, validation_points
 
 TEACHER = "pulse"
@@ -87,7 +87,8 @@ def make_training_env(
 ) -> ScaledReward:
     """Episodes on plants drawn from a region, "confidence" or another (epv_env.settings).
 
-    Trainings with different seeds meet different episodes.
+    Trainings with different seeds meet different episodes. Raises ValueError for a seed that is too
+    large (training/seeds.py).
     """
     env = make_sb3_env(
         "EPValve-v0",
@@ -98,7 +99,7 @@ def make_training_env(
         scenario=scenario,
         weights=weights,
     )
-    env.seed(TRAINING_SEED + seed * h.num_envs)
+    env.seed(training_seeds(seed, h.num_envs)[0])
     return ScaledReward(VecMonitor(env), h.reward_scale)
 
 

@@ -6,7 +6,7 @@ test_seeds.py says how much of it the commands use).
 """
 
 TRAINING_SEED = 0
-"""Training with seed k uses as many from k times its number of environments on."""
+"""Training with seed k uses as many from k times its number of environments on (`training_seeds`)."""
 
 TUNING_SEED = 1_000_000
 """On which the classic controllers are tuned, and one of several training seeds is chosen."""
@@ -34,3 +34,14 @@ TIMING_SEED = 9_000_000
 
 RESUMED_SEED = 1_000_000_000
 """Of resumed trainings: the steps done before count from here, so that none meets an episode twice."""
+
+
+def training_seeds(seed: int, num_envs: int) -> range:
+    """Of the first episodes of a training. Raises ValueError if others are tuned on them."""
+    first = TRAINING_SEED + seed * num_envs
+    if first + num_envs > TUNING_SEED:
+        most = (TUNING_SEED - TRAINING_SEED) // num_envs - 1
+        raise ValueError(
+            f"training seed {seed} would meet episodes kept for tuning: give one up to {most}"
+        )
+    return range(first, first + num_envs)

@@ -92,3 +92,10 @@ def test_every_first_seed_is_where_a_purpose_begins():
     firsts = sorted(seed for name, seed in vars(seeds).items() if name.endswith("_SEED"))
     assert sorted(begin for begin, _ in used().values()) == firsts
     assert min(b - a for a, b in pairwise(firsts)) >= 1_000_000
+
+
+def test_a_training_seed_that_would_meet_the_tuning_is_refused():
+    assert seeds.training_seeds(3, 256) == range(768, 1024)
+    assert seeds.training_seeds(3905, 256)[-1] < seeds.TUNING_SEED
+    with pytest.raises(ValueError, match=r"training seed 3906 .* give one up to 3905"):
+        seeds.training_seeds(3906, 256)
