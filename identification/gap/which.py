@@ -1,15 +1,16 @@
 """Which cause: screening, joint refits of singles and pairs, probabilities."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from identification.gap.evidence import Assessed, assess, inflation
-from identification.gap.fit import Fitter, Hypothesis, Point, frames
+from identification.gap.fit import Fitter
 from identification.gap.fits import Fits
 from identification.gap.model import GreyBox
+from identification.gap.pairs import counts, pairs, with_halves
+from identification.gap.refit import fitted_on, ranked, recalibrated, refitted, without_twins
 from identification.gap.screen import Screened, screen, signatures
 from identification.gap.separability import Separability, separability
 
@@ -26,27 +27,6 @@ the recalibrated model, if that is more."""
 
 ALIKE = 0.8
 """Correlation with a finalist's signature above which a cause that was screened out is refitted."""
-
-PARTNERS = 8
-"""Causes that are tried beside each of the best two, where one cause leaves too much."""
-
-WORTH = 200.0
-"""Sum of squares that the best cause must leave, beyond noise or predictably, for a second cause to be
-sought: less is soon in a form's error, or in chance."""
-
-CLOSED = 0.6
-"""Share of what its better half leaves that a pair may leave at most. Where forms err, any further
-number lowers the misfit a little; a cause that acts lowers it a good deal."""
-
-SMALL = 0.005
-"""Share of the recalibrated model's squared misfit up to which what a cause leaves is soon its form's
-error: some 7 % in amplitude. There a pair must be CLEAR."""
-
-CLEAR = 500.0
-"""Log evidence by which such a pair must beat its better half."""
-
-RIVAL = 3.0
-"""Times what the best cause leaves, up to which a pair is also sought beside the second best."""
 
 LEFTOVER = 0.02
 """Share of the recalibrated model's squared misfit that a cause may leave and still be called the cause:
@@ -82,41 +62,22 @@ def which(plant: GreyBox, fits: Fits | None = None) -> Verdicts:
     found = signatures(fitter, base, plant.causes)
     separable = separability(fitter, base, found)
     promising = screen(fitter, base, found)
-    first = fits("single causes", lambda: _refit(fitter, base, promising[:SINGLES]))
-    singles = _ranked(assess(fitter, first))
+    first = fits("single causes", lambda: refitted(fitter, base, promising[:SINGLES]))
+    singles = ranked(assess(fitter, first))
     like = _alike(singles[: FINALISTS[1]], promising[SINGLES:], separable)
     if like:
-        more = fits("causes like the best", lambda: _refit(fitter, base, like))
-        singles = _ranked([*singles, *assess(fitter, more)])
-    none = _finals(fitter, assess(fitter, [base]), (1, 1), "recalibration", fits)[0]
+        more = fits("causes like the best", lambda: refitted(fitter, base, like))
+        singles = ranked([*singles, *assess(fitter, more)])
+    none = fitted_on(fitter, assess(fitter, [base]), (1, 1), "recalibration", fits)[0]
     begun = {single.name: single.point for single in singles}
     margin = max(NEAR, 0.5 * (singles[0].log_evidence - none.log_evidence)) if singles else NEAR
-    singles = _finals(fitter, singles, FINALISTS, "causes", fits, margin)
+    singles = fitted_on(fitter, singles, FINALISTS, "causes", fits, margin)
     floor = min(0.0, *(found.excess for found in (none, *singles)))
-    pairs = _without_twins(_pairs(fitter, singles, begun, floor, fits))
-    pairs = _finals(fitter, _ranked(pairs), [n // 2 for n in FINALISTS], "pairs", fits, margin)
-    singles = _finals(fitter, _halves(fitter, singles, pairs, fits), (1,), "halves", fits)
-    pairs = [pair for pair in pairs if _counts(pair, singles, none, floor)]
-    return _weighed(fitter, none, singles, pairs, separable)
-
-
-def recalibrated(plant: GreyBox, fits: Fits | None = None) -> tuple[Fitter, Point]:
-    """The nominal model with its calibrated parameters refitted, and a fitter that knows nuisances."""
-    fits = fits or Fits(plant)
-    rough = Fitter(plant)
-    start = rough.start(Hypothesis(causes=()), {})
-    point = fits("calibration", lambda: rough.fit([start]))[0]
-    fitter = Fitter(plant, frames(rough, [point], [np.zeros(len(plant.tolerances))])[0])
-    return fitter, fits("recalibration", lambda: fitter.fit([_again(point)]))[0]
-
-
-def _again(point: Point) -> Point:
-    """The point as the beginning of another fit."""
-    return replace(point, chi_square=np.inf, damping=1e-3, converged=False, given_up=False)
-
-
-def _ranked(found: Sequence[Assessed]) -> list[Assessed]:
-    return sorted(found, key=lambda assessed: -assessed.log_evidence)
+    both = without_twins(pairs(fitter, singles, begun, floor, fits))
+    both = fitted_on(fitter, ranked(both), [n // 2 for n in FINALISTS], "pairs", fits, margin)
+    singles = fitted_on(fitter, with_halves(fitter, singles, both, fits), (1,), "halves", fits)
+    both = [pair for pair in both if counts(pair, singles, none, floor)]
+    return _weighed(fitter, none, singles, both, separable)
 
 
 def _alike(
@@ -125,123 +86,6 @@ def _alike(
     """Causes that were screened out, though what they change looks like what one of the best does."""
     labels = [label for found in best for label in separable.like(found.name[0], ALIKE)]
     return [screened for screened in others if screened.cause.label in labels]
-
-
-def _finals(
-    fitter: Fitter,
-    found: list[Assessed],
-    counts: Sequence[int],
-    what: str,
-    fits: Fits,
-    margin: float = np.inf,
-) -> list[Assessed]:
-    """The best of them fitted on, with nuisances linearised where each of them stands.
-
-    found: the most probable first, as what is returned. counts: how many of them at most, round by
-    round. margin: log evidence by which the best one may lead them.
-    """
-    for number, most in enumerate(counts if found else (), start=1):
-        near = [
-            assessed
-            for assessed in found[:most]
-            if found[0].log_evidence - assessed.log_evidence <= margin
-        ]
-        count, points = len(near), [assessed.point for assessed in near]
-        own = frames(fitter, points, [assessed.tolerances for assessed in near])
-        starts = [replace(_again(p), frame=frame) for p, frame in zip(points, own, strict=True)]
-        fitted = fits(f"{what}: own nuisances, round {number}", partial(fitter.fit, starts))
-        framed = [replace(p, frame=frame) for p, frame in zip(fitted, own, strict=True)]
-        found = _ranked([*assess(fitter, framed), *found[count:]])
-    return found
-
-
-def _pairs(
-    fitter: Fitter,
-    singles: list[Assessed],
-    begun: Mapping[tuple[str, ...], Point],
-    floor: float,
-    fits: Fits,
-) -> list[Assessed]:
-    """Pairs that may explain what the best causes leave, where that is WORTH it.
-
-    begun: where each cause was before its nuisances followed what it lacks; from there a partner is seen
-    best. floor: as of `_left`.
-    """
-    if not singles or _left(singles[0], floor) <= WORTH:
-        return []
-    most = RIVAL * _left(singles[0], floor)
-    bases = [single for single in singles[:2] if _left(single, floor) <= most]
-    return [pair for base in bases for pair in assess(fitter, _partners(fitter, begun[base.name], fits))]
-
-
-def _counts(pair: Assessed, singles: Sequence[Assessed], none: Assessed, floor: float) -> bool:
-    """Whether a pair is more than its better half alone, whose form errs."""
-    halves = [single for single in singles if single.name[0] in pair.name]
-    if pair.at_end or not halves:
-        return not pair.at_end
-    left = min(_left(half, floor) for half in halves)
-    small = left <= SMALL * (none.excess - floor)
-    gain = pair.log_evidence - max(half.log_evidence for half in halves)
-    return _left(pair, floor) <= CLOSED * left and (gain > CLEAR or not small)
-
-
-def _left(found: Assessed, floor: float) -> float:
-    """Sum of squares that a hypothesis leaves: beyond the floor, or what is predictable of it.
-
-    floor: where the noise is known too large, what the best hypothesis leaves.
-    """
-    return max(found.excess - floor, 2.0 * (found.with_leftover - found.log_evidence))
-
-
-def _partners(fitter: Fitter, base: Point, fits: Fits) -> list[Point]:
-    """Fits of pairs: what may act beside the causes of the base."""
-    own = base.hypothesis.causes[0].name
-    others = [cause for cause in fitter.plant.causes if cause.name != own]
-
-    def refit() -> list[Point]:
-        promising = screen(fitter, base, signatures(fitter, base, others))[:PARTNERS]
-        return _refit(fitter, base, promising)
-
-    return fits(f"pairs with {' and '.join(base.hypothesis.name)}", refit)
-
-
-def _refit(fitter: Fitter, base: Point, promising: Sequence[Screened]) -> list[Point]:
-    """Each promising cause added to the base and refitted."""
-    starts = []
-    for found in promising:
-        joint = Hypothesis(causes=(*base.hypothesis.causes, found.cause))
-        sizes = {s.symbol: v for s, v in zip(found.cause.sizes, found.sizes, strict=True)}
-        point = fitter.start(joint, {**fitter.values(base), **sizes})
-        own = len(base.hypothesis.local)
-        point.local[:, :own] = base.local
-        starts.append(replace(point, frame=base.frame))
-    return [point for point in fitter.fit(starts, base.chi_square) if not point.given_up]
-
-
-def _halves(
-    fitter: Fitter, singles: list[Assessed], pairs: Sequence[Assessed], fits: Fits
-) -> list[Assessed]:
-    """Singles, of which those in the best pair have also been fitted from where they stand there.
-
-    Far from its size a cause may get stuck, and a pair find the way round.
-    """
-    if not pairs:
-        return singles
-    pair, base = pairs[0].point, fitter.values(pairs[0].point)
-    starts = [
-        replace(fitter.start(Hypothesis(causes=(cause,)), base), frame=pair.frame)
-        for cause in pair.hypothesis.causes
-    ]
-    alone = assess(fitter, fits("halves of the best pair", lambda: fitter.fit(starts)))
-    return _ranked(_without_twins([*singles, *alone]))
-
-
-def _without_twins(found: Sequence[Assessed]) -> list[Assessed]:
-    """The best of several fits of the same causes, begun from different places."""
-    best: dict[frozenset[str], Assessed] = {}
-    for one in sorted(found, key=lambda assessed: assessed.log_evidence):
-        best[frozenset(one.name)] = one
-    return list(best.values())
 
 
 def _weighed(

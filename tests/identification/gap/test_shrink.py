@@ -10,9 +10,9 @@ from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import NOISE, recorded
 from identification.gap.fit import Fitter, Hypothesis, Point
 from identification.gap.prediction import percent, predict
+from identification.gap.refit import recalibrated
 from identification.gap.shrink import Shrinkage, shrinkage
 from identification.gap.shrink_figures import gaps, shares
-from identification.gap.which import recalibrated
 
 
 def points(tank: Tank, causes: tuple[str, ...]) -> tuple[Fitter, dict[str, Point]]:

@@ -12,10 +12,10 @@ from identification.gap.fit import Fitter, Point
 from identification.gap.forcing import candidate, needed, window_edges
 from identification.gap.model import Trace
 from identification.gap.processes import courses
+from identification.gap.refit import recalibrated
 from identification.gap.regimes import regime_gaps
 from identification.gap.where import Where, locate
 from identification.gap.where_figures import forcing_figure, heat_map, residual_figure, shape_figure
-from identification.gap.which import recalibrated
 
 LEAK = 2e-3
 """Of the tank [1/s]."""

@@ -8,7 +8,9 @@ from docs.examples.tank.recordings import recorded
 from identification.gap.evidence import Assessed, assess, stretches
 from identification.gap.fit import Fitter, Hypothesis
 from identification.gap.fits import Fits
-from identification.gap.which import _counts, _halves, recalibrated, which
+from identification.gap.pairs import counts, with_halves
+from identification.gap.refit import recalibrated
+from identification.gap.which import which
 
 
 @pytest.mark.parametrize(("name", "size"), [("leak", 4e-3), ("lag", 4.0), ("evaporation", 8e-4)])
@@ -54,17 +56,17 @@ def assessed(fitter: Fitter, **sizes: float) -> tuple[Assessed, Assessed]:
     return at, fitted
 
 
-@pytest.mark.parametrize(("lag", "counts"), [(5.0, True), (0.0, False)])
-def test_a_pair_counts_if_it_closes_a_good_part_of_what_its_half_leaves(lag, counts):
+@pytest.mark.parametrize(("lag", "more"), [(5.0, True), (0.0, False)])
+def test_a_pair_counts_if_it_closes_a_good_part_of_what_its_half_leaves(lag, more):
     fitter, base = recalibrated(Tank(recorded({"leak": 4e-3, "lag": lag})))
     (_, leak), (_, both) = assessed(fitter, leak=3e-3), assessed(fitter, leak=3e-3, lag=2.0)
-    assert _counts(both, [leak], assess(fitter, [base])[0], min(leak.excess, 0.0)) == counts
+    assert counts(both, [leak], assess(fitter, [base])[0], min(leak.excess, 0.0)) == more
 
 
 def test_a_cause_that_got_stuck_alone_is_fitted_again_from_where_the_best_pair_has_it():
     fitter, _ = recalibrated(Tank(recorded({"leak": 4e-3})))
     (stuck, fitted), (_, pair) = assessed(fitter, leak=1e-4), assessed(fitter, leak=3e-3, lag=1.0)
-    mended = {found.name: found for found in _halves(fitter, [stuck], [pair], Fits(fitter.plant))}
+    mended = {found.name: found for found in with_halves(fitter, [stuck], [pair], Fits(fitter.plant))}
     assert mended[("leak",)].log_evidence == pytest.approx(fitted.log_evidence, abs=1.0)
     assert fitted.log_evidence > stuck.log_evidence + 100.0
     assert set(mended) == {("leak",), ("lag",)}
