@@ -58,18 +58,18 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         "--policies", type=writable_folder, help="folder with a learned policy for each training seed"
     )
     parser.add_argument("--seeds", type=int, default=10, help="training seeds that --policies holds")
-    parser.add_argument("--timesteps", type=int, default=5_000_000, help="steps to train a missing one")
+    parser.add_argument("--timesteps", type=int, default=2_000_000, help="steps to train a missing one")
     parser.add_argument(
         "--tradeoff", type=Path, help="folder of training/tradeoff.py: its controllers join the front"
     )
     parser.add_argument("--scenarios", nargs="+", choices=list(EVALUATION), default=list(EVALUATION))
-    parser.add_argument("--named", type=int, default=128, help="episodes in each named scenario")
-    parser.add_argument("--random", type=int, default=1024, help="random ones on the calibrated plant")
+    parser.add_argument("--named", type=int, default=32, help="episodes in each named scenario")
+    parser.add_argument("--random", type=int, default=512, help="random ones on the calibrated plant")
     parser.add_argument(
         "--bound", type=int, default=4096,
         help="random ones on each region, to bound the probability of leaving the band",
     )  # fmt: skip
-    parser.add_argument("--tuning", type=int, default=512, help="episodes that choose a training seed")
+    parser.add_argument("--tuning", type=int, default=256, help="episodes that choose a training seed")
     parser.add_argument("--duration", type=float, default=10.0, help="length of an episode [s]")
     parser.add_argument("--workers", type=int, default=available_cores(), help="processes")
     parser.add_argument("--cluster", help="address of a Dask scheduler to run on instead")
