@@ -87,7 +87,7 @@ blind: $(VENV)/.installed ## how often the diagnosis is right on 300 sealed camp
 real-bench: $(VENV)/.installed ## ask which effects give the report's printed errors (3 minutes)
 	$(PY) -m identification gap --tables --out runs/real-bench --images docs/images $(ARGS)
 
-circle: $(VENV)/.installed ## train, deploy on a bench, diagnose, retrain, deploy again (3 minutes)
+circle: $(VENV)/.installed ## train, deploy on a bench, diagnose, retrain, deploy again (5 minutes)
 	$(PY) training/circle.py --out runs/circle --images docs/images $(ARGS)
 
 pictures: $(VENV)/.installed ## draw the figures of docs/identification.md
