@@ -66,7 +66,7 @@ results: $(VENV)/.installed ## compare all controllers, and write docs/controlle
 
 robustness: $(VENV)/.installed ## sweep parameters, effects and conditions, and write docs/robustness.md's figures
 	$(PY) training/sweep.py --controllers "hysteresis, extrapolating" PWM pulse PPO=runs/ppo \
-		--episodes 128 --screened 512 --out runs/robustness --images docs/images --pages docs/robustness.md $(ARGS)
+		--out runs/robustness --images docs/images --pages docs/robustness.md $(ARGS)
 
 export: $(VENV)/.installed ## turn the policy of `make train` into C and ONNX (needs a C compiler)
 	$(PY) training/export.py runs/ppo --out runs/ecu $(ARGS)
