@@ -52,9 +52,11 @@ def pairs(
 
 def counts(pair: Assessed, singles: Sequence[Assessed], none: Assessed, floor: float) -> bool:
     """Whether a pair is more than its better half alone, whose form errs."""
+    if pair.at_end:
+        return False
     halves = [single for single in singles if single.name[0] in pair.name]
-    if pair.at_end or not halves:
-        return not pair.at_end
+    if not halves:
+        return True
     left = min(_left(half, floor) for half in halves)
     small = left <= SMALL * (none.excess - floor)
     gain = pair.log_evidence - max(half.log_evidence for half in halves)
