@@ -1,7 +1,14 @@
-"""Two causes at once: which partners are tried, and when a pair is more than its better half."""
+"""Two causes at once: which partners are tried, and how likely a second cause is beside an erring form.
+
+Where the form of a cause errs, any second one helps, and evidence that counts every stretch apart is
+soon sure of it, since such errors persist. So no pair is surer against its better half than experience
+allows: the blind trials of seeds 2027 and 2028, opened for it (docs/gap.md).
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from identification.gap.evidence import Assessed, assess
 from identification.gap.fit import Fitter, Hypothesis, Point
@@ -9,23 +16,30 @@ from identification.gap.fits import Fits
 from identification.gap.refit import ranked, refitted, without_twins
 from identification.gap.screen import screen, signatures
 
-PARTNERS = 8
-"""Causes that are tried beside each of the best two, where one cause leaves too much."""
+PARTNERS, FEW = 8, 4
+"""Causes that are tried beside each of the best two, where one cause leaves too much; beside the best,
+where it does not."""
 
 WORTH = 200.0
-"""Sum of squares that the best cause must leave, beyond noise or predictably, for a second cause to be
-sought: less is soon in a form's error, or in chance."""
+"""Sum of squares, beyond noise or predictable, up to which what a cause leaves is not too much."""
+
+CERTAIN = 10.0
+"""Log evidence of a cause against none from which a second one is sought at all."""
+
+EVEN = 7.5e-3
+"""Log evidence per reading that a pair gains on its better half, both beside a misfit without a name, at
+which a second cause is as likely as an error of form; the odds go with its square."""
+
+CHANCE, FAINT = 15.0, 0.12
+"""Such a gain up to which a second cause is chance, and the least odds of one that gains more: beside a
+strong cause a faint one gains little."""
+
+NEVER = 1e-6
+"""Odds of chance."""
 
 CLOSED = 0.6
-"""Share of what its better half leaves that a pair may leave at most. Where forms err, any further
-number lowers the misfit a little; a cause that acts lowers it a good deal."""
-
-SMALL = 0.005
-"""Share of the recalibrated model's squared misfit up to which what a cause leaves is soon its form's
-error: some 7 % in amplitude. There a pair must be CLEAR."""
-
-CLEAR = 500.0
-"""Log evidence by which such a pair must beat its better half."""
+"""Share of what its better half leaves that a pair may leave at most to vouch for that half: what both
+fail to explain may have no name."""
 
 RIVAL = 3.0
 """Times what the best cause leaves, up to which a pair is also sought beside the second best."""
@@ -33,34 +47,66 @@ RIVAL = 3.0
 
 def pairs(
     fitter: Fitter,
+    none: Assessed,
     singles: list[Assessed],
     begun: Mapping[tuple[str, ...], Point],
     floor: float,
     fits: Fits,
 ) -> list[Assessed]:
-    """Pairs that may explain what the best causes leave, where that is WORTH it.
+    """Pairs that may explain what the best causes leave; beside a cause that is CERTAIN alone.
 
     begun: where each cause was before its nuisances followed what it lacks; from there a partner is seen
     best. floor: as of `_left`.
     """
-    if not singles or _left(singles[0], floor) <= WORTH:
+    if not singles or singles[0].log_evidence - none.log_evidence < CERTAIN:
         return []
-    most = RIVAL * _left(singles[0], floor)
-    bases = [single for single in singles[:2] if _left(single, floor) <= most]
-    return [pair for base in bases for pair in assess(fitter, _partners(fitter, begun[base.name], fits))]
+    count, most = (PARTNERS, 2) if leaves_much(singles[0], floor) else (FEW, 1)
+    enough = RIVAL * _left(singles[0], floor)
+    bases = [single for single in singles[:most] if _left(single, floor) <= enough]
+    return [
+        pair
+        for base in bases
+        for pair in assess(fitter, _partners(fitter, begun[base.name], count, fits))
+    ]
 
 
-def counts(pair: Assessed, singles: Sequence[Assessed], none: Assessed, floor: float) -> bool:
-    """Whether a pair is more than its better half alone, whose form errs."""
-    if pair.at_end:
-        return False
-    halves = [single for single in singles if single.name[0] in pair.name]
-    if not halves:
-        return True
-    left = min(_left(half, floor) for half in halves)
-    small = left <= SMALL * (none.excess - floor)
-    gain = pair.log_evidence - max(half.log_evidence for half in halves)
-    return _left(pair, floor) <= CLOSED * left and (gain > CLEAR or not small)
+def doubted(found: Sequence[Assessed], scores: Sequence[float], floor: float) -> list[float]:
+    """Log probabilities, but for a constant, in which no pair is surer of itself than its odds allow.
+
+    A pair that closes what its better half leaves vouches for this half: it is raised to the pair's
+    odds. Otherwise all pairs with this half are lowered to them. floor: as of `_left`.
+    """
+    doubted = list(scores)
+    mine: dict[int, list[int]] = {}
+    for i, one in enumerate(found):
+        half = _better_half(one, found) if len(one.name) > 1 else None
+        if half is not None:
+            mine.setdefault(found.index(half), []).append(i)
+    for half, with_half in mine.items():
+        best = max(with_half, key=lambda pair: scores[pair])
+        surplus = scores[best] - _log_odds(found[best], found[half]) - scores[half]
+        if surplus <= 0:
+            continue
+        closed = _left(found[best], floor) <= CLOSED * _left(found[half], floor)
+        if closed and leaves_much(found[half], floor):
+            doubted[half] += surplus
+        else:
+            for pair in with_half:
+                doubted[pair] -= surplus
+    return doubted
+
+
+def _better_half(pair: Assessed, found: Sequence[Assessed]) -> Assessed | None:
+    """The half that does better alone; None if neither does within its range."""
+    halves = [one for one in found if len(one.name) == 1 and one.name[0] in pair.name and not one.at_end]
+    return max(halves, key=lambda half: half.log_evidence, default=None)
+
+
+def _log_odds(pair: Assessed, half: Assessed) -> float:
+    """How much likelier a second cause is than an error of the first one's form."""
+    gain = pair.with_leftover - half.with_leftover
+    even = EVEN * sum(np.count_nonzero(residual) for residual in pair.residuals)
+    return float(np.log((gain / even) ** 2 + FAINT if gain > CHANCE else NEVER))
 
 
 def with_halves(
@@ -71,8 +117,6 @@ def with_halves(
     Far from its size a cause may get stuck, and a pair find the way round. found: pairs, the most
     probable first.
     """
-    if not found:
-        return singles
     pair, base = found[0].point, fitter.values(found[0].point)
     starts = [
         replace(fitter.start(Hypothesis(causes=(cause,)), base), frame=pair.frame)
@@ -82,13 +126,18 @@ def with_halves(
     return ranked(without_twins([*singles, *alone]))
 
 
-def _partners(fitter: Fitter, base: Point, fits: Fits) -> list[Point]:
+def leaves_much(found: Assessed, floor: float) -> bool:
+    """Whether a hypothesis leaves more than it is WORTH. floor: as of `_left`."""
+    return _left(found, floor) > WORTH
+
+
+def _partners(fitter: Fitter, base: Point, count: int, fits: Fits) -> list[Point]:
     """Fits of pairs: what may act beside the causes of the base."""
     own = base.hypothesis.causes[0].name
     others = [cause for cause in fitter.plant.causes if cause.name != own]
 
     def refit() -> list[Point]:
-        promising = screen(fitter, base, signatures(fitter, base, others))[:PARTNERS]
+        promising = screen(fitter, base, signatures(fitter, base, others))[:count]
         return refitted(fitter, base, promising)
 
     return fits(f"pairs with {' and '.join(base.hypothesis.name)}", refit)

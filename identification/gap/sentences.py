@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from identification.gap.diagnosis import Diagnosis, label
 from identification.gap.export import magnitudes
 from identification.gap.gaps import FLOOR
-from identification.gap.quantities import chance, gap, interval, quantity, share, short, spread
+from identification.gap.quantities import chance, gap, interval, quantity, share, spread
 from identification.gap.shrink import FELT, NOMINAL, RECALIBRATED
-from identification.gap.verdict import AMBIGUOUS, DOUBT, KNOWN, NO_GAP, Ranked, explained
+from identification.gap.verdict import AMBIGUOUS, KNOWN, NO_GAP, Ranked
 from identification.gap.where import Where
 
 AT_END = 1e-6
@@ -47,7 +47,8 @@ def _ambiguous(diagnosis: Diagnosis) -> str:
     labels = [cause.found.name for cause in rivals]
     common = [name for name in labels[0] if all(name in others for others in labels)]
     names = " or ".join(
-        f"{' + '.join(name for name in own if name not in common)} ({chance(cause.probability)})"
+        f"{' + '.join(name for name in own if name not in common) or 'nothing else'} "
+        f"({chance(cause.probability)})"
         for own, cause in zip(labels, rivals, strict=True)
     )
     together = f"{' and '.join(common)} together with " if common else ""
@@ -80,10 +81,7 @@ def _faint(diagnosis: Diagnosis) -> str:
     found["something outside the catalogue"] = verdicts.unknown
     name = max(found, key=found.__getitem__)
     text = f"In doubt: {name} may act ({chance(found[name])}), but"
-    if verdicts.no_cause > DOUBT:
-        return f"{text} that no cause acts ({chance(verdicts.no_cause)}) cannot be ruled out."
-    percent = short(100 * explained(verdicts))
-    return f"{text} it explains {percent} % of the noise's sum of squares: too little to matter."
+    return f"{text} that no cause acts ({chance(verdicts.no_cause)}) cannot be ruled out."
 
 
 def _unknown(diagnosis: Diagnosis) -> str:

@@ -3,20 +3,14 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from identification.gap.evidence import Assessed
 from identification.gap.where import Where
 from identification.gap.which import Verdicts
 
 NO_GAP, KNOWN, AMBIGUOUS, UNKNOWN = "no_gap", "known", "ambiguous", "unknown"
 
-DOUBT = 0.1
+DOUBT = 0.001
 """Probability of no cause above which none is named: a false alarm costs more than a faint cause."""
-
-MATERIAL = 0.001
-"""Share of the noise's sum of squares that must be explained for a gap to be worth a name: what is less
-moves the gap from 1 to 1.0005, and sensors are not known so well."""
 
 HELD = 0.9
 """Share of the probability that an ambiguity set holds."""
@@ -60,14 +54,6 @@ def conclude(verdicts: Verdicts, where: Where) -> Conclusion:
         ambiguity=ambiguity,
         component=components(verdicts, where),
     )
-
-
-def explained(verdicts: Verdicts) -> float:
-    """What the best explanation takes off the recalibrated misfit, as a share of the noise's squares."""
-    every = [verdicts.none, *verdicts.candidates]
-    best = max(max(found.log_evidence, found.with_leftover) for found in every)
-    readings = sum(np.count_nonzero(run.trusted) for run in verdicts.fitter.plant.runs)
-    return 2.0 * (best - verdicts.none.log_evidence) / readings
 
 
 def ranked(verdicts: Verdicts) -> list[Ranked]:
@@ -128,6 +114,6 @@ def _located(where: Where) -> Mapping[str, float]:
 
 
 def _verdict(verdicts: Verdicts) -> str:
-    if verdicts.no_cause > DOUBT or explained(verdicts) < MATERIAL:
+    if verdicts.no_cause > DOUBT:
         return NO_GAP
     return UNKNOWN if verdicts.unknown > sum(verdicts.probability) else KNOWN

@@ -9,7 +9,7 @@ from identification.gap.evidence import Assessed, assess, inflation
 from identification.gap.fit import Fitter
 from identification.gap.fits import Fits
 from identification.gap.model import GreyBox
-from identification.gap.pairs import counts, pairs, with_halves
+from identification.gap.pairs import doubted, leaves_much, pairs, with_halves
 from identification.gap.refit import fitted_on, ranked, recalibrated, refitted, without_twins
 from identification.gap.screen import Screened, screen, signatures
 from identification.gap.separability import Separability, separability
@@ -28,9 +28,9 @@ the recalibrated model, if that is more."""
 ALIKE = 0.8
 """Correlation with a finalist's signature above which a cause that was screened out is refitted."""
 
-LEFTOVER = 0.02
+LEFTOVER = 0.025
 """Share of the recalibrated model's squared misfit that a cause may leave and still be called the cause:
-an error of its form of some 14 % in amplitude."""
+an error of its form of some 16 % in amplitude."""
 
 PRIOR = {"none": 0.4, "single": 0.4, "pair": 0.1, "unknown": 0.1}
 """Probabilities before any data."""
@@ -73,11 +73,12 @@ def which(plant: GreyBox, fits: Fits | None = None) -> Verdicts:
     margin = max(NEAR, 0.5 * (singles[0].log_evidence - none.log_evidence)) if singles else NEAR
     singles = fitted_on(fitter, singles, FINALISTS, "causes", fits, margin)
     floor = min(0.0, *(found.excess for found in (none, *singles)))
-    both = without_twins(pairs(fitter, singles, begun, floor, fits))
+    both = without_twins(pairs(fitter, none, singles, begun, floor, fits))
     both = fitted_on(fitter, ranked(both), [n // 2 for n in FINALISTS], "pairs", fits, margin)
-    singles = fitted_on(fitter, with_halves(fitter, singles, both, fits), (1,), "halves", fits)
-    both = [pair for pair in both if counts(pair, singles, none, floor)]
-    return _weighed(fitter, none, singles, both, separable)
+    if both and leaves_much(singles[0], floor):
+        singles = fitted_on(fitter, with_halves(fitter, singles, both, fits), (1,), "halves", fits)
+    both = [pair for pair in both if not pair.at_end]
+    return _weighed(fitter, none, [*singles, *both], floor, separable)
 
 
 def _alike(
@@ -91,13 +92,12 @@ def _alike(
 def _weighed(
     fitter: Fitter,
     none: Assessed,
-    singles: list[Assessed],
-    pairs: list[Assessed],
+    candidates: list[Assessed],
+    floor: float,
     separable: Separability,
 ) -> Verdicts:
     """Probabilities of all hypotheses."""
     causes = sum(cause.prior for cause in fitter.plant.causes)
-    candidates = [*singles, *pairs]
     best = max([none, *candidates], key=lambda found: found.log_evidence)
     temper = 1.0 / inflation(fitter, best.residuals)
     small = [found.excess <= LEFTOVER * none.excess and not found.at_end for found in candidates]
@@ -109,7 +109,7 @@ def _weighed(
     no_cause = temper * none.log_evidence + np.log(PRIOR["none"])
     large = [none, *(found for found, s in zip(candidates, small, strict=True) if not s)]
     unknown = temper * max(found.with_leftover for found in large) + np.log(PRIOR["unknown"])
-    scores = np.array([*scores, no_cause, unknown])
+    scores = np.array([*doubted(candidates, scores, floor), no_cause, unknown])
     weights = np.exp(scores - np.max(scores))
     weights /= np.sum(weights)
     order = np.argsort(-weights[: len(candidates)], kind="stable")

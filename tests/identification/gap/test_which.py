@@ -8,7 +8,7 @@ from docs.examples.tank.recordings import recorded
 from identification.gap.evidence import Assessed, assess, stretches
 from identification.gap.fit import Fitter, Hypothesis
 from identification.gap.fits import Fits
-from identification.gap.pairs import counts, with_halves
+from identification.gap.pairs import doubted, with_halves
 from identification.gap.refit import recalibrated
 from identification.gap.which import which
 
@@ -56,11 +56,14 @@ def assessed(fitter: Fitter, **sizes: float) -> tuple[Assessed, Assessed]:
     return at, fitted
 
 
-@pytest.mark.parametrize(("lag", "more"), [(5.0, True), (0.0, False)])
-def test_a_pair_counts_if_it_closes_a_good_part_of_what_its_half_leaves(lag, more):
-    fitter, base = recalibrated(Tank(recorded({"leak": 4e-3, "lag": lag})))
+@pytest.mark.parametrize(("lag", "likelier"), [(5.0, True), (0.0, False)])
+def test_no_pair_is_surer_beside_its_better_half_than_what_it_gains_allows(lag, likelier):
+    fitter, _ = recalibrated(Tank(recorded({"leak": 4e-3, "lag": lag})))
     (_, leak), (_, both) = assessed(fitter, leak=3e-3), assessed(fitter, leak=3e-3, lag=2.0)
-    assert counts(both, [leak], assess(fitter, [base])[0], min(leak.excess, 0.0)) == more
+    half, pair = doubted([leak, both], [0.0, 1000.0], min(leak.excess, both.excess, 0.0))
+    assert (pair > half) == likelier
+    assert (half > 0.0) == likelier  # the pair vouches for it; else the pair is lowered
+    assert (pair == 1000.0) == likelier
 
 
 def test_a_cause_that_got_stuck_alone_is_fitted_again_from_where_the_best_pair_has_it():
