@@ -81,7 +81,7 @@ def doubted(found: Sequence[Assessed], scores: Sequence[float], floor: float) ->
     for i, one in enumerate(found):
         half = _better_half(one, found) if len(one.name) > 1 else None
         if half is not None:
-            mine.setdefault(found.index(half), []).append(i)
+            mine.setdefault(half, []).append(i)
     for half, with_half in mine.items():
         best = max(with_half, key=lambda pair: scores[pair])
         surplus = scores[best] - _log_odds(found[best], found[half]) - scores[half]
@@ -96,10 +96,14 @@ def doubted(found: Sequence[Assessed], scores: Sequence[float], floor: float) ->
     return doubted
 
 
-def _better_half(pair: Assessed, found: Sequence[Assessed]) -> Assessed | None:
-    """The half that does better alone; None if neither does within its range."""
-    halves = [one for one in found if len(one.name) == 1 and one.name[0] in pair.name and not one.at_end]
-    return max(halves, key=lambda half: half.log_evidence, default=None)
+def _better_half(pair: Assessed, found: Sequence[Assessed]) -> int | None:
+    """Place of the half that does better alone; None if neither does within its range."""
+    halves = [
+        i
+        for i, one in enumerate(found)
+        if len(one.name) == 1 and one.name[0] in pair.name and not one.at_end
+    ]
+    return max(halves, key=lambda half: found[half].log_evidence, default=None)
 
 
 def _log_odds(pair: Assessed, half: Assessed) -> float:
