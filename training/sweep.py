@@ -29,7 +29,7 @@ from epv_env.plant.valves import available_cores
 from identification.journal import Journal
 from training.generated import check_pages
 from training.results_folder import check_options, write_options
-from training.seeds import SWEEP_SEED
+from training.seeds import CALIBRATION_SEED, SWEEP_SEED
 from training.sweeps.controllers import DEFAULT, named_controllers
 from training.sweeps.cost import cost, episode_cpu, overhead
 from training.sweeps.designs import DESIGNS
@@ -88,6 +88,13 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     check_not_negative(parser, chosen, "seed")
     if chosen.screened < 8:
         parser.error("--screened must be at least 8")
+    used = max(chosen.episodes, chosen.joint_episodes, 2 * chosen.screened)
+    most = CALIBRATION_SEED - SWEEP_SEED - used
+    if chosen.seed > most:
+        parser.error(
+            f"--seed {chosen.seed} would meet episodes kept for exports (training/seeds.py): with "
+            f"{used} episodes give one up to {most}"
+        )
     return chosen
 
 

@@ -99,3 +99,10 @@ def test_a_training_seed_that_would_meet_the_tuning_is_refused():
     assert seeds.training_seeds(3905, 256)[-1] < seeds.TUNING_SEED
     with pytest.raises(ValueError, match=r"training seed 3906 .* give one up to 3905"):
         seeds.training_seeds(3906, 256)
+
+
+def test_a_sweep_that_would_meet_the_exports_episodes_is_refused(capsys):
+    assert sweep.parse(["--seed", "995904"]).seed == 995904
+    with pytest.raises(SystemExit):
+        sweep.parse(["--seed", "995905"])
+    assert "with 4096 episodes give one up to 995904" in capsys.readouterr().err
