@@ -46,16 +46,17 @@ def _ambiguous(diagnosis: Diagnosis) -> str:
     rivals = diagnosis.conclusion.ambiguity
     labels = [cause.found.name for cause in rivals]
     common = [name for name in labels[0] if all(name in others for others in labels)]
+    rests = [" + ".join(name for name in own if name not in common) for own in labels]
     names = " or ".join(
-        f"{' + '.join(name for name in own if name not in common) or 'nothing else'} "
-        f"({chance(cause.probability)})"
-        for own, cause in zip(labels, rivals, strict=True)
+        f"{rest or 'nothing else'} ({chance(cause.probability)})"
+        for rest, cause in zip(rests, rivals, strict=True)
     )
     together = f"{' and '.join(common)} together with " if common else ""
     shares = " or ".join(dict.fromkeys(closed(diagnosis, cause) for cause in rivals))
+    doubt = "which" if all(rests) else "whether another cause acts or the form of the first one errs"
     return (
         f"{together}{names} explains the gap and closes {shares} of it; these recordings cannot tell "
-        f"which."
+        f"{doubt}."
     )
 
 

@@ -109,18 +109,24 @@ def test_what_rivals_share_is_said_once():
         point = replace(point, hypothesis=replace(point.hypothesis, causes=causes))
         return replace(ranked, found=replace(ranked.found, point=point))
 
-    pairs = [beside(leak), beside(seep)]
+    def said(*rivals):
+        return verdict(
+            replace(
+                found,
+                conclusion=replace(found.conclusion, ambiguity=list(rivals)),
+                shrinkage=replace(found.shrinkage, shrink=known),
+            ),
+            "",
+        )[1]
+
     shrink = found.shrinkage.shrink
-    known = {f"lag + {name}": share for name, share in shrink.items()}
-    text = verdict(
-        replace(
-            found,
-            conclusion=replace(found.conclusion, ambiguity=pairs),
-            shrinkage=replace(found.shrinkage, shrink=known),
-        ),
-        "",
-    )[1]
-    assert text.startswith("lag together with leak (")
+    known = dict(shrink) | {f"lag + {name}": share for name, share in shrink.items()}
+    both = said(beside(leak), beside(seep))
+    assert both.startswith("lag together with leak (")
+    assert "cannot tell which" in both
+    alone = said(leak, beside(leak))
+    assert alone.startswith("leak together with nothing else (")
+    assert "whether another cause acts or the form of the first one errs" in alone
 
 
 def test_twins_are_announced_beside_their_correlation():
