@@ -76,7 +76,7 @@ def doubted(found: Sequence[Assessed], scores: Sequence[float], floor: float) ->
     A pair that closes what its better half leaves vouches for this half: it is raised to the pair's
     odds. Otherwise all pairs with this half are lowered to them. floor: as of `_left`.
     """
-    doubted = list(scores)
+    changed = list(scores)
     mine: dict[int, list[int]] = {}
     for i, one in enumerate(found):
         half = _better_half(one, found) if len(one.name) > 1 else None
@@ -89,11 +89,11 @@ def doubted(found: Sequence[Assessed], scores: Sequence[float], floor: float) ->
             continue
         closed = _left(found[best], floor) <= CLOSED * _left(found[half], floor)
         if closed and leaves_much(found[half], floor):
-            doubted[half] += surplus
+            changed[half] += surplus
         else:
             for pair in with_half:
-                doubted[pair] -= surplus
-    return doubted
+                changed[pair] -= surplus
+    return changed
 
 
 def _better_half(pair: Assessed, found: Sequence[Assessed]) -> int | None:
