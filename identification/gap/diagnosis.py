@@ -6,6 +6,7 @@ from identification.gap.evidence import Assessed
 from identification.gap.fit import Hypothesis, Point
 from identification.gap.fits import Fits
 from identification.gap.model import GreyBox
+from identification.gap.second_look import second_look
 from identification.gap.shrink import NOMINAL, RECALIBRATED, Shrinkage, shrinkage
 from identification.gap.verdict import AMBIGUOUS, KNOWN, UNKNOWN, Conclusion, Ranked, conclude
 from identification.gap.where import Where, locate
@@ -59,6 +60,15 @@ def diagnose(plant: GreyBox, *, seed: int = 0, fits: Fits | None = None) -> Diag
     fitter, none = verdicts.fitter, verdicts.none
     fits.say("where")
     where = locate(fitter, none.point, none.residuals, seed)
+    fits.say("how far it shrinks")
+    found = _judged(verdicts, where, seed)
+    reconsidered = second_look(verdicts, found.conclusion.verdict, found.shrinkage.unexplained)
+    return found if reconsidered is verdicts else _judged(reconsidered, where, seed)
+
+
+def _judged(verdicts: Verdicts, where: Where, seed: int) -> Diagnosis:
+    """What probabilities amount to, and how far the causes that count close the gap."""
+    fitter, none = verdicts.fitter, verdicts.none
     conclusion = conclude(verdicts, where)
     first = max(len(conclusion.ambiguity), 1)
     others = [cause for cause in conclusion.causes[first:] if len(cause.effects) == 1]
@@ -67,7 +77,6 @@ def diagnose(plant: GreyBox, *, seed: int = 0, fits: Fits | None = None) -> Diag
     if conclusion.verdict == UNKNOWN and judged:
         best = judged[0].found
         left = locate(fitter, best.point, best.residuals, seed)
-    fits.say("how far it shrinks")
     nominal = fitter.start(Hypothesis(causes=()), {})
     points = {NOMINAL: nominal, RECALIBRATED: none.point}
     points |= {label(cause.found): cause.found.point for cause in judged}

@@ -126,8 +126,9 @@ def with_halves(
         replace(fitter.start(Hypothesis(causes=(cause,)), base), frame=pair.frame)
         for cause in pair.hypothesis.causes
     ]
-    alone = assess(fitter, fits("halves of the best pair", lambda: fitter.fit(starts)))
-    return ranked(without_twins([*singles, *alone]))
+    alone = fits("halves of the best pair", lambda: fitter.fit(starts))
+    framed = [replace(point, frame=pair.frame) for point in alone]  # a journal keeps no frames
+    return ranked(without_twins([*singles, *assess(fitter, framed)]))
 
 
 def leaves_much(found: Assessed, floor: float) -> bool:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import softmax
 
 from identification.gap.evidence import Assessed, assess, inflation
 from identification.gap.fit import Fitter
@@ -44,6 +45,8 @@ class Verdicts:
     none: Assessed
     candidates: list[Assessed]
     """Causes and pairs, the most probable first."""
+    scores: list[float]
+    """Log probability of `candidates`, but for a constant."""
     probability: list[float]
     """Of `candidates`."""
     no_cause: float
@@ -109,14 +112,14 @@ def _weighed(
     no_cause = temper * none.log_evidence + np.log(PRIOR["none"])
     large = [none, *(found for found, s in zip(candidates, small, strict=True) if not s)]
     unknown = temper * max(found.with_leftover for found in large) + np.log(PRIOR["unknown"])
-    scores = np.array([*doubted(candidates, scores, floor), no_cause, unknown])
-    weights = np.exp(scores - np.max(scores))
-    weights /= np.sum(weights)
-    order = np.argsort(-weights[: len(candidates)], kind="stable")
+    scores = doubted(candidates, scores, floor)
+    weights = softmax([*scores, no_cause, unknown])
+    order = np.argsort(-np.array(scores), kind="stable")
     return Verdicts(
         fitter=fitter,
         none=none,
         candidates=[candidates[i] for i in order],
+        scores=[scores[i] for i in order],
         probability=weights[order].tolist(),
         no_cause=float(weights[-2]),
         unknown=float(weights[-1]),
