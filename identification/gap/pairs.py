@@ -118,8 +118,8 @@ def with_halves(
 ) -> list[Assessed]:
     """Singles, of which those in the best pair have also been fitted from where they stand there.
 
-    Far from its size a cause may get stuck, and a pair find the way round. found: pairs, the most
-    probable first.
+    Far from its size a cause may get stuck, and a pair find the way round. found: pairs, at least
+    one, the most probable first.
     """
     pair, base = found[0].point, fitter.values(found[0].point)
     starts = [

@@ -81,8 +81,10 @@ def _faint(diagnosis: Diagnosis) -> str:
     found = {label(cause.found): cause.probability for cause in diagnosis.conclusion.causes}
     found["something outside the catalogue"] = verdicts.unknown
     name = max(found, key=found.__getitem__)
-    text = f"In doubt: {name} may act ({chance(found[name])}), but"
-    return f"{text} that no cause acts ({chance(verdicts.no_cause)}) cannot be ruled out."
+    return (
+        f"In doubt: {name} may act ({chance(found[name])}), but that no cause acts "
+        f"({chance(verdicts.no_cause)}) cannot be ruled out."
+    )
 
 
 def _unknown(diagnosis: Diagnosis) -> str:

@@ -5,22 +5,17 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 
-from controllers.tuned import tuned_controllers
+from controllers.tuned import build, load_tunings
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from training.imitation import demonstrate, imitate
 from training.policy_files import greedy_policy
-from training.ppo import Hyperparameters, make_model, make_training_env, teacher
+from training.ppo import TEACHER, Hyperparameters, make_model, make_training_env, teacher
 
 pytestmark = pytest.mark.training
 
 H = Hyperparameters(num_envs=64, episode_steps=300, n_steps=8, batch_size=64)
 PLANT = Plant.calibrated()
-MEMORYLESS = next(
-    controller
-    for controller in tuned_controllers(PLANT.parameters)
-    if controller.name == "hysteresis, extrapolating"
-)
 
 
 def environment(seed=0):
@@ -40,14 +35,14 @@ def test_the_returns_are_the_discounted_sums_of_what_follows():
 
 
 @pytest.mark.parametrize(
-    ("example", "epochs", "least"),
+    ("kind", "epochs", "least"),
     [
-        (MEMORYLESS, 36, 0.97),
-        (teacher(PLANT), 12, 0.93),  # it remembers past pulses, which an observation does not hold
+        ("hysteresis, extrapolating", 36, 0.97),
+        (TEACHER, 12, 0.93),  # it remembers past pulses, which an observation does not hold
     ],
-    ids=["memoryless", "remembering"],
 )
-def test_the_model_decides_as_its_teacher_does_on_episodes_that_it_has_not_seen(example, epochs, least):
+def test_the_model_decides_as_its_teacher_does_on_episodes_that_it_has_not_seen(kind, epochs, least):
+    example = build(kind, load_tunings()[kind].values, PLANT.parameters)
     env = environment()
     model = make_model(H, env, seed=0, device="cpu")
     unseen = demonstrate(example, environment(seed=9), steps=299, gamma=H.gamma, seed=1)
