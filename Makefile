@@ -82,7 +82,7 @@ gap: $(VENV)/.installed ## say which effect a virtual bench has that the model l
 	$(PY) -m identification gap runs/gap-bench --out runs/gap $(ARGS)
 
 blind: $(VENV)/.installed ## how often the diagnosis is right on 300 sealed campaigns (an hour)
-	$(PY) -m identification blind --trials 300 --seed 2029 --out runs/blind --images docs/images $(ARGS)
+	$(PY) -m identification blind --trials 300 --seed 2030 --out runs/blind --images docs/images $(ARGS)
 
 real-bench: $(VENV)/.installed ## ask which effects give the report's printed errors (3 minutes)
 	$(PY) -m identification gap --tables --out runs/real-bench --images docs/images $(ARGS)

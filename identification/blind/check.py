@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from identification.blind import figures
-from identification.blind.score import Scored, scored, true_shrink
+from identification.blind.score import Scored, rival_distance, scored, true_shrink
 from identification.blind.seal import opened
 from identification.blind.section import blind_json, blind_section
 from identification.blind.trials import (
@@ -66,4 +66,5 @@ def _opened_and_scored(out: Path, number: int, committed: str) -> Scored:
     folder = trial_folder(out, number)
     answer = answer_of(folder)
     label, truth = opened(folder, committed)
-    return scored(label, answer, true_shrink(answer, truth))
+    rival = rival_distance(label, answer, truth)
+    return scored(label, answer, true_shrink(answer, truth), rival)

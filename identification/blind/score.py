@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from epv_env.plant.parameters import Parameters
-from identification.blind.noise_free import NoiseFree, held_out_gap
+from identification.blind.noise_free import NoiseFree, distance, held_out_gap
 from identification.blind.truth import LEFT_OUT, NONE, PARAMETER
 from identification.gap_valve.causes import COMPONENTS, PARAMETER_COMPONENTS
 
@@ -64,6 +64,8 @@ class Scored:
     component: str
     """The likeliest; '' where none is named."""
     component_right: bool
+    rival: float | None
+    """Distance of the nearest rival that is in the set with the truth (`rival_distance`)."""
     explainable: float
     """Noise-free gap that no unit of the nominal design explains."""
     magnitudes: tuple[Magnitude, ...]
@@ -71,7 +73,12 @@ class Scored:
     seconds: float | None
 
 
-def scored(label: Mapping[str, Any], answer: Mapping[str, Any] | None, shrink: Shrink | None) -> Scored:
+def scored(
+    label: Mapping[str, Any],
+    answer: Mapping[str, Any] | None,
+    shrink: Shrink | None,
+    rival: float | None = None,
+) -> Scored:
     """A label against its answer (docs/gap.md; None: there is none)."""
     said = answer or {"verdict": "failed"}
     causes = said.get("causes", [])
@@ -93,6 +100,7 @@ def scored(label: Mapping[str, Any], answer: Mapping[str, Any] | None, shrink: S
         probability=sum(cause["probability"] for cause in right),
         component=component,
         component_right=component in {component_of(effect) for effect in label["visible"]},
+        rival=rival,
         explainable=label["gap"]["explainable"],
         magnitudes=tuple(_magnitudes(label, right[0])) if right and named else (),
         shrink=shrink,
@@ -134,6 +142,24 @@ def true_shrink(answer: Mapping[str, Any] | None, truth: Sequence[NoiseFree]) ->
     sizes = {symbol: value[0] for symbol, value in _sizes(answer["causes"][0]).items()}
     after = held_out_gap(truth, _known({**sizes, **parameters["with_cause"]}))
     return Shrink(true=(before - after) / (before - 1.0), low=said["low"], high=said["high"])
+
+
+def rival_distance(
+    label: Mapping[str, Any], answer: Mapping[str, Any] | None, truth: Sequence[NoiseFree]
+) -> float | None:
+    """How near to the noise-free truth a cause comes that stands in the ambiguity set beside it.
+
+    Of the nearest, in noise deviations (noise_free.distance). A cause that holds all of the truth is no
+    rival: it comes as near as the truth by leaving the rest at nothing. None where the truth has none.
+    """
+    if answer is None or answer["verdict"] != "ambiguous":
+        return None
+    members = [cause for cause in answer["causes"] if cause["effects"] in answer["ambiguity_set"]]
+    if not any(is_right(label, cause["effects"]) for cause in members):
+        return None
+    rivals = [cause for cause in members if not set(label["visible"]) <= set(cause["effects"])]
+    starts = [{symbol: value[0] for symbol, value in _sizes(cause).items()} for cause in rivals]
+    return min((distance(truth, start) for start in starts if all(start.values())), default=None)
 
 
 def row_of(kind: str) -> str:

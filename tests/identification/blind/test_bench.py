@@ -6,9 +6,10 @@ from functools import cache
 import numpy as np
 import pytest
 
+from epv_env.plant.parameters import Parameters
 from identification.bench import campaign as bench
 from identification.blind.bench import SUITE, run_programme, true_recordings
-from identification.blind.noise_free import held_out_gap, recalibrated
+from identification.blind.noise_free import distance, held_out_gap, recalibrated
 from identification.blind.score import true_shrink
 from identification.blind.seal import explainable, noise_free, packed, unpacked
 from identification.blind.truth import NONE, ONE, Trial, draw_trial
@@ -122,6 +123,16 @@ def test_a_parameter_that_is_off_is_beyond_what_units_scatter():
     unit = trial().unit
     off = replace(trial(), sizes={"xPV0": 1.04 * unit["xPV0"]})
     assert explainable(replace(off, kind=ONE), noise_free(true_recordings(off, 0)))["explainable"] > 1.5
+
+
+def test_more_turns_are_hardly_told_from_a_shorter_magnetic_circuit_but_well_from_a_stiffer_spring():
+    """The core's inductance knows turns and length by one quotient; the spring works elsewhere."""
+    truth = recordings("parameter:N")
+    turns, nominal = trial("parameter:N").sizes["N"], Parameters.calibrated()
+    off = turns / nominal["N"]
+    own, twin = (distance(truth, start) for start in ({"N": turns}, {"dMB": nominal["dMB"] / off}))
+    assert max(own, twin) < 1.0
+    assert distance(truth, {"cMV": 1.05 * nominal["cMV"]}) > 10.0
 
 
 def test_a_biased_start_of_the_circuit_is_read_with_its_bias():

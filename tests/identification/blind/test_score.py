@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from identification.blind.score import ABSORBED, Shrink, is_right, scored
+from identification.blind.score import ABSORBED, Shrink, is_right, rival_distance, scored
 from identification.blind.section import blind_json, blind_section, well_judged
 from identification.blind.summary import BARS, Share, by_size, means, shares, verdict_matrix
 
@@ -38,8 +38,8 @@ EDDY = (["eddy_current"], 0.9, {"G_eddy_S": [2.2e-3, 1.9e-3, 2.5e-3]})
 CLAMP = (["flyback_voltage"], 0.08, {"U_clamp_V": [1.0, 0.5, 1.5]})
 
 
-def score(label, answer, shrink=None):
-    return scored(label, answer, shrink)
+def score(label, answer, shrink=None, rival=None):
+    return scored(label, answer, shrink, rival)
 
 
 def test_the_right_cause():
@@ -63,6 +63,26 @@ def test_the_wrong_cause():
 def test_a_truth_that_is_second_in_the_set():
     found = score(label(effects=["flyback_voltage"]), answer("ambiguous", EDDY, CLAMP, named=2))
     assert (found.first_right, found.in_set, found.set_size) == (False, True, 2)
+
+
+def test_a_tie_that_no_test_could_decide_is_counted_apart():
+    """Whether chance put the truth first in it or not."""
+    second, first = (label(effects=[cause]) for cause in ("flyback_voltage", "eddy_current"))
+    tied = answer("ambiguous", EDDY, CLAMP, named=2)
+    found = [score(second, tied, rival=0.4), score(first, tied, rival=0.4)]
+    found += [score(second, tied, rival=5.0), score(first, answer("known", EDDY))]
+    counted = shares(found)
+    assert counted["first cause right"] == Share(hits=2, of=4)
+    assert counted["first cause right, where data can tell"] == Share(hits=1, of=2)
+
+
+def test_only_a_cause_that_lacks_some_of_the_truth_is_its_rival():
+    both = ["eddy_current", "flyback_voltage"], 0.1, {"G_eddy_S": [2e-3, 1e-3, 3e-3]}
+    truth = label(effects=["eddy_current"])
+    assert rival_distance(truth, answer("known", EDDY), []) is None
+    assert rival_distance(truth, answer("ambiguous", EDDY, both, named=2), []) is None
+    assert rival_distance(truth, answer("ambiguous", CLAMP, both, named=1), []) is None
+    assert rival_distance(truth, None, []) is None
 
 
 def test_the_order_of_a_pair_does_not_matter_and_a_hidden_effect_need_not_be_named():
