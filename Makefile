@@ -61,8 +61,8 @@ tradeoff: $(VENV)/.installed ## optimise controllers at several prices of switch
 	$(PY) training/tradeoff.py $(ARGS)
 
 results: $(VENV)/.installed ## compare all controllers, and write docs/controllers.md's figures (half an hour)
-	$(PY) training/compare.py --policies runs/seeds --out runs/comparison --images docs/images \
-		--pages docs/controllers.md README.md $(if $(wildcard runs/tradeoff),--tradeoff runs/tradeoff) $(ARGS)
+	$(PY) training/compare.py --recurrent runs/recurrent --policies runs/seeds --out runs/comparison \
+		--images docs/images --pages docs/controllers.md README.md $(if $(wildcard runs/tradeoff),--tradeoff runs/tradeoff) $(ARGS)
 
 robustness: $(VENV)/.installed ## sweep parameters, effects and conditions, and write docs/robustness.md's figures
 	$(PY) training/sweep.py --controllers "hysteresis, extrapolating" PWM pulse PPO=runs/ppo \

@@ -1,11 +1,11 @@
 """A trained policy behind the controllers' protocol: weights as safetensors, meaning as JSON.
 
 Nothing here runs code from a file: the weights are arrays, the contract is data, the network is the
-multilayer perceptron below.
+multilayer perceptron below, with a gated recurrent unit before it if the policy has a memory.
 """
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -27,24 +27,74 @@ class PolicyError(ValueError):
     """A policy cannot be used here: the message says why and what to do."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class GatedUnit:
+    """A gated recurrent unit of m cells (Cho et al., EMNLP 2014), its arrays as torch.nn.GRU has them.
+
+    The rows of all four arrays belong to the reset gate, the update gate and the candidate, m each.
+    """
+
+    weight_input: NDArray
+    """(3m, inputs)"""
+    weight_memory: NDArray
+    """(3m, m)"""
+    bias_input: NDArray
+    """(3m,)"""
+    bias_memory: NDArray
+    """(3m,)"""
+
+    @property
+    def width(self) -> int:
+        """m."""
+        return self.weight_memory.shape[1]
+
+    def step(self, observations: NDArray, memory: NDArray) -> NDArray:
+        """The next memory (n, m) after observations (n, inputs), float32."""
+        new = dense(observations, self.weight_input, self.bias_input)
+        old = dense(memory, self.weight_memory, self.bias_memory)
+        (new_reset, new_update, new_value), (old_reset, old_update, old_value) = (
+            np.split(part, 3, axis=1) for part in (new, old)
+        )
+        update = _logistic(new_update + old_update)
+        candidate = np.tanh(new_value + _logistic(new_reset + old_reset) * old_value)
+        return (1 - update) * candidate + update * memory
+
+
 @dataclass(kw_only=True)
 class LearnedPolicy:
     """Greedy actions of a multilayer perceptron with tanh layers; Discrete actions only."""
 
     layers: list[tuple[NDArray, NDArray]]
     """Weight (outputs, inputs) and bias (outputs,) of each layer; the last gives the logits."""
+    cell: GatedUnit | None = None
+    """What the policy remembers with: the layers see its memory beside the observation."""
     name: str = "PPO"
     environment: str = "EPValve-v0"
+    _memory: NDArray = field(init=False, repr=False, default_factory=lambda: np.empty((0, 0)))
 
     def reset(self, n: int) -> None:
-        """Nothing to forget: the policy has no memory of its own."""
+        """Forget everything; n episodes begin."""
+        width = 0 if self.cell is None else self.cell.width
+        self._memory = np.zeros((n, width), dtype=np.float32)
 
     def act(self, observations: NDArray) -> NDArray:
         """The action with the largest logit for each valve."""
+        return np.argmax(self.logits(observations), axis=1)
+
+    def logits(self, observations: NDArray) -> NDArray:
+        """A figure for each action, (n, actions); a policy with a memory goes one period on."""
         signal = observations.astype(np.float32)
+        if self.cell is not None:
+            self._memory = self.cell.step(signal, self._memory)
+            signal = np.concatenate([signal, self._memory], axis=1)
         for weight, bias in self.layers[:-1]:
             signal = np.tanh(dense(signal, weight, bias))
-        return np.argmax(dense(signal, *self.layers[-1]), axis=1)
+        return dense(signal, *self.layers[-1])
+
+
+def _logistic(signal: NDArray) -> NDArray:
+    """1 / (1 + exp(-signal)), without overflow."""
+    return 0.5 + 0.5 * np.tanh(0.5 * signal)
 
 
 def load_policy(folder: str | PathLike[str]) -> LearnedPolicy:
@@ -79,4 +129,9 @@ def load_policy(folder: str | PathLike[str]) -> LearnedPolicy:
             "train it anew, or use the version that wrote it"
         )
     layers = [(arrays[f"{i}.weight"], arrays[f"{i}.bias"]) for i in range(content["layers"])]
-    return LearnedPolicy(layers=layers, environment=content["environment"])
+    cell = None
+    if content.get("memory") is not None:
+        cell = GatedUnit(**{entry.name: arrays[f"memory.{entry.name}"] for entry in fields(GatedUnit)})
+    policy = LearnedPolicy(layers=layers, cell=cell, environment=content["environment"])
+    policy.name = content.get("name", policy.name)
+    return policy

@@ -6,8 +6,9 @@ serves pulses from rest and pulses in quick succession: pressure gained, as a fu
 age of the venting (since p3 stood 5 % above the opening pressure) and the time that the coil stays off.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,10 +45,10 @@ class PulseTable:
     valve's answer is the same to the bit whatever n.
     """
 
-    parameters: Mapping[str, float]
-    vent_rate: float
+    parameters: Mapping[str, Any]
+    vent_rate: float | NDArray
     """-d ln(p3)/dt while the coil is off [1/s]."""
-    release_lag: float
+    release_lag: float | NDArray
     """From switching off to the control chamber's venting [s]."""
     gain: NDArray
     """p2 added until the valve has shut again [bar]; shape of the axes SUPPLY, RATIO, AGE, STAY."""
@@ -104,9 +105,32 @@ class PulseTable:
             for (_, share), upper in zip(places, corner, strict=True):
                 weight = weight * (share if upper else 1 - share)
             nodes = tuple(node + upper for (node, _), upper in zip(places, corner, strict=True))
-            gain += weight[:, None] * self.gain[nodes]
-            lasts += weight[:, None] * self.lasts[nodes]
+            gain += weight[:, None] * self._rows(self.gain, nodes)
+            lasts += weight[:, None] * self._rows(self.lasts, nodes)
         return gain + np.reshape(slope, (-1, 1)) * (lasts - np.minimum(age, 0.0)[:, None])
+
+    def _rows(self, table: NDArray, nodes: tuple[NDArray, ...]) -> NDArray:
+        """The table's rows (n, STAY) at nodes (n,) of the other axes."""
+        return table[nodes]
+
+
+class PulseTables(PulseTable):
+    """A table for each of n valves: arrays with a first axis (n,), parameters (n,) by symbol."""
+
+    @classmethod
+    def of(cls, plants: Sequence[Mapping[str, float]]) -> "PulseTables":
+        """The tables of these plants, in their order."""
+        tables = [pulse_table(plant) for plant in plants]
+        return cls(
+            parameters={s: np.array([plant[s] for plant in plants]) for s in plants[0]},
+            vent_rate=np.array([table.vent_rate for table in tables]),
+            release_lag=np.array([table.release_lag for table in tables]),
+            gain=np.array([table.gain for table in tables]),
+            lasts=np.array([table.lasts for table in tables]),
+        )
+
+    def _rows(self, table: NDArray, nodes: tuple[NDArray, ...]) -> NDArray:
+        return table[np.arange(len(table)), *nodes]
 
 
 def pulse_table(p: Mapping[str, float], *, supply_voltage: float = 24.0) -> PulseTable:

@@ -45,7 +45,8 @@ CURVE_FILE = "learning_curve.csv"
 
 QUICK: dict[str, Any] = {
     "named": 4, "random": 16, "bound": 16, "tuning": 4, "duration": 0.8, "seeds": 1,
-    "timesteps": 32_768, "scenarios": [RANDOM, "steps", "anti-lock"],
+    "timesteps": 32_768, "recurrent_seeds": 1, "recurrent_timesteps": 32_768,
+    "scenarios": [RANDOM, "steps", "anti-lock"],
 }  # fmt: skip
 """The defaults under --quick: everything is done, too little to learn or to conclude anything."""
 
@@ -59,6 +60,13 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--seeds", type=int, default=10, help="training seeds that --policies holds")
     parser.add_argument("--timesteps", type=int, default=2_000_000, help="steps to train a missing one")
+    parser.add_argument("--recurrent", type=writable_folder, help="the same for policies with a memory")
+    parser.add_argument(
+        "--recurrent-seeds", type=int, default=2, help="training seeds that --recurrent holds"
+    )
+    parser.add_argument(
+        "--recurrent-timesteps", type=int, default=5_000_000, help="steps to train a missing one"
+    )
     parser.add_argument(
         "--tradeoff", type=Path, help="folder of training/tradeoff.py: its controllers join the front"
     )
@@ -80,7 +88,8 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     chosen = parse_with_quick(parser, arguments, QUICK)
     check_positive(
         parser, chosen,
-        "seeds", "timesteps", "named", "random", "bound", "tuning", "duration", "workers",
+        "seeds", "recurrent_seeds", "timesteps", "recurrent_timesteps", "named", "random", "bound",
+        "tuning", "duration", "workers",
     )  # fmt: skip
     if RANDOM not in chosen.scenarios:
         parser.error(f"--scenarios must hold {RANDOM!r}: the probabilities refer to it")
@@ -88,10 +97,14 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
 
 
 def contenders(chosen: argparse.Namespace) -> list[Contender]:
-    """Everyone who takes part in all scenarios, the learned one first and the oracle last."""
+    """Everyone who takes part in all scenarios, the learned ones first and the oracle last."""
     found = []
-    if chosen.policies is not None:
-        policies = trained_seeds(chosen.policies, count=chosen.seeds, timesteps=chosen.timesteps)
+    recurrent = chosen.recurrent, chosen.recurrent_seeds, chosen.recurrent_timesteps
+    plain = chosen.policies, chosen.seeds, chosen.timesteps
+    for (folder, count, timesteps), remembers in ((recurrent, True), (plain, False)):
+        if folder is None:
+            continue
+        policies = trained_seeds(folder, count=count, timesteps=timesteps, recurrent=remembers)
         name = next(iter(policies.values())).name
         runs = {f"{name}, {seed}": policy for seed, policy in policies.items()}
         found.append(Contender(name=name, runs=runs, learned=True))

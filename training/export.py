@@ -78,7 +78,12 @@ def prepare(policy: LearnedPolicy, folder: Path) -> tuple[Export, dict[str, Any]
 
 
 def check(policy: LearnedPolicy, folder: Path) -> None:
-    """Raises ExportError if the policy does not decide between off and on, or is damaged."""
+    """Raises ExportError if the policy does not decide between off and on, remembers, or is damaged."""
+    if policy.cell is not None:
+        raise ExportError(
+            f"the policy in {folder} has a memory: only policies without one can be exported; train one "
+            "with `python training/train_ppo.py`"
+        )
     outputs = len(policy.layers[-1][1])
     if policy.environment != "EPValve-v0" or outputs != 2:
         raise ExportError(

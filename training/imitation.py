@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecEnv
 
-from controllers.base import Controller
+from controllers.base import Controller, Privileged
+from epv_env.observation import LAYOUT
 
 SLIPS = 0.02
 """Share of the actions that are executed wrongly, so that the learner sees how to recover."""
@@ -26,15 +27,18 @@ def demonstrate(
     """The teacher's decisions from the start of an episode in every sub-environment.
 
     Returns observations (steps, n, entries), the teacher's actions (steps, n) and the discounted sums of
-    the rewards that follow (steps, n). `steps` must be less than an episode has.
+    the rewards that follow (steps, n). `steps` must be less than an episode has. The teacher sees the
+    entries of epv_env.observation, whatever else the environment shows.
     """
     rng = np.random.default_rng(seed)
     observation = env.reset()
     assert isinstance(observation, np.ndarray)
     teacher.reset(env.num_envs)
+    if isinstance(teacher, Privileged):
+        teacher.watch(env.get_attr("task")[0])
     observations, actions, rewards = [], [], []
     for _ in range(steps):
-        action = teacher.act(observation)
+        action = teacher.act(observation[:, : len(LAYOUT)])
         observations.append(observation)
         actions.append(action)
         slips = rng.random(env.num_envs) < SLIPS

@@ -1,6 +1,7 @@
 """Learned policies, one folder each: trained if they are missing, loaded if they are there."""
 
 from pathlib import Path
+from typing import Any
 
 from controllers.base import Controller
 from controllers.learned import CONTRACT_FILE, load_policy
@@ -12,24 +13,34 @@ from training.tune import TUNING_REGION
 
 
 def trained_policy(
-    folder: Path, *, timesteps: int, seed: int, weights: RewardWeights | None = None
+    folder: Path,
+    *,
+    timesteps: int,
+    seed: int,
+    weights: RewardWeights | None = None,
+    recurrent: bool = False,
 ) -> Controller:
     """PPO on the report's plant within ±10 %, or as it was trained before.
 
-    weights: prices of the reward; None: the environment's own. An interrupted training goes on.
+    weights: prices of the reward; None: the environment's own. recurrent: with a memory
+    (training/distil.py). An interrupted training goes on.
     """
     if not (folder / CONTRACT_FILE).exists():
-        from training.policy_files import save_policy  # torch takes seconds to import: only now
+        from training.distil import train_recurrent  # torch takes seconds to import: only now
+        from training.policy_files import greedy_policy, save_policy
         from training.ppo import Hyperparameters, train
 
         chosen = weights or RewardWeights()
-        model, _ = train(
-            Hyperparameters(), folder=folder, plant=Plant.calibrated(), scenario=MIXED,
-            parameters=TUNING_REGION, weights=chosen, timesteps=timesteps, seed=seed, device="cpu",
-            resume=True,
-        )  # fmt: skip
+        task: dict[str, Any] = {
+            "plant": Plant.calibrated(), "scenario": MIXED, "parameters": TUNING_REGION,
+            "weights": chosen, "timesteps": timesteps, "seed": seed, "device": "cpu", "resume": True,
+        }  # fmt: skip
+        if recurrent:
+            policy, _ = train_recurrent(folder=folder, **task)
+        else:
+            policy = greedy_policy(train(Hyperparameters(), folder=folder, **task)[0])
         provenance = {"timesteps": timesteps, "seed": seed, "switching_price": chosen.switching}
-        save_policy(model, folder, control_period=OnOff.default_period, provenance=provenance)
+        save_policy(policy, folder, control_period=OnOff.default_period, provenance=provenance)
     return load_policy(folder)
 
 
@@ -38,9 +49,13 @@ def seed_folder(folder: Path, seed: int) -> Path:
     return folder / f"seed-{seed}"
 
 
-def trained_seeds(folder: Path, *, count: int, timesteps: int) -> dict[str, Controller]:
+def trained_seeds(
+    folder: Path, *, count: int, timesteps: int, recurrent: bool = False
+) -> dict[str, Controller]:
     """One policy per training seed 0, 1, ..., by name."""
     return {
-        f"seed {seed}": trained_policy(seed_folder(folder, seed), timesteps=timesteps, seed=seed)
+        f"seed {seed}": trained_policy(
+            seed_folder(folder, seed), timesteps=timesteps, seed=seed, recurrent=recurrent
+        )
         for seed in range(count)
     }

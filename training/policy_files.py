@@ -23,18 +23,22 @@ def greedy_policy(model: PPO) -> LearnedPolicy:
     return LearnedPolicy(layers=[(_array(layer.weight), _array(layer.bias)) for layer in layers])
 
 
-def save_policy(model: PPO, folder: Path, *, control_period: float, provenance: dict[str, Any]) -> None:
-    """Write the actor's weights and what its inputs and outputs mean.
-
-    Raises TypeError for a policy that is not a plain multilayer perceptron with tanh layers.
-    """
-    policy = greedy_policy(model)
+def save_policy(
+    policy: LearnedPolicy, folder: Path, *, control_period: float, provenance: dict[str, Any]
+) -> None:
+    """Write a policy's weights and what its inputs and outputs mean."""
     arrays = {}
     for i, (weight, bias) in enumerate(policy.layers):
         arrays[f"{i}.weight"], arrays[f"{i}.bias"] = weight, bias
+    memory = None
+    if policy.cell is not None:
+        arrays |= {f"memory.{name}": array for name, array in vars(policy.cell).items()}
+        memory = {"unit": "GRU", "cells": policy.cell.width}
     content = {
         "format": FORMAT,
+        "name": policy.name,
         "environment": policy.environment,
+        "memory": memory,
         "layers": len(policy.layers),
         "activation": "tanh",
         "action": "argmax of the logits: 0 = coil off, 1 = coil on",

@@ -17,7 +17,9 @@ from epv_env.reward import RewardWeights
 from epv_env.sb3 import make_sb3_env
 from training.curriculum import FadingEntropy
 from training.imitation import imitate
+from training.informed import Informed, InformedEnv, InformedPulse
 from training.learning_log import CHECKPOINT_FILE, CURVE_FILE, TrainingLog, read_rows
+from training.policy_files import greedy_policy
 from training.seeds import RESUMED_SEED, training_seeds
 from training.selection import Selection, validation_points
 
@@ -84,9 +86,11 @@ def make_training_env(
     parameters: str,
     seed: int,
     weights: RewardWeights,
-) -> ScaledReward:
+    informed: bool = False,
+) -> VecEnvWrapper:
     """Episodes on plants drawn from a region, "confidence" or another (epv_env.settings).
 
+    informed: whether observations end with the plant's parameters (training/informed.py).
     Trainings with different seeds meet different episodes. Raises ValueError for a seed that is too
     large (training/seeds.py).
     """
@@ -100,7 +104,8 @@ def make_training_env(
         weights=weights,
     )
     env.seed(training_seeds(seed, h.num_envs)[0])
-    return ScaledReward(VecMonitor(env), h.reward_scale)
+    scaled = ScaledReward(VecMonitor(env), h.reward_scale)
+    return InformedEnv(scaled) if informed else scaled
 
 
 def make_model(h: Hyperparameters, env: VecEnv, *, seed: int, device: str) -> PPO:
@@ -122,9 +127,15 @@ def make_model(h: Hyperparameters, env: VecEnv, *, seed: int, device: str) -> PP
     )
 
 
-def teacher(plant: Plant) -> Controller:
-    """The TEACHER as tuned, designed for the plant."""
-    return build(TEACHER, load_tunings()[TEACHER].values, plant.parameters)
+def teacher(plant: Plant, *, informed: bool = False) -> Controller:
+    """The TEACHER as tuned, designed for the plant, or (informed) for each valve's own."""
+    values = load_tunings()[TEACHER].values
+    return InformedPulse(values) if informed else build(TEACHER, values, plant.parameters)
+
+
+def informed_policy(model: PPO) -> Informed:
+    """The actor of a model that was trained with `informed`, as a controller."""
+    return Informed(greedy_policy(model))
 
 
 def train(
@@ -139,11 +150,13 @@ def train(
     seed: int,
     device: str,
     resume: bool,
+    informed: bool = False,
     quiet: bool = False,
 ) -> tuple[PPO, TrainingLog]:
     """Train until `timesteps` and return the best model that was validated (training/selection.py).
 
     weights: prices of the reward; that of leaving the band is raised (`Hyperparameters.band_price`).
+    informed: whether the model is shown the plant's parameters (training/informed.py).
     resume: go on from the folder's checkpoint. An interruption (Ctrl-C) leaves the newest checkpoint
     behind. A resumed run draws new episodes, so it is a continuation, not a repetition, of an
     uninterrupted one.
@@ -158,21 +171,22 @@ def train(
         "scenario": scenario,
         "weights": weights,
     }
-    env = make_training_env(h, seed=seed, **task)
+    env = make_training_env(h, seed=seed, informed=informed, **task)
     model = make_model(h, env, seed=seed, device=device)
     if resume and checkpoint.exists():
         model.set_parameters(str(checkpoint), device=device)
         done = int(read_rows(folder / CURVE_FILE)[-1]["timesteps"])
         env.seed(RESUMED_SEED + seed * h.num_envs + done)
     elif h.imitation_epochs:
-        steps = h.episode_steps - 1
-        imitate(model, teacher(plant), env, steps=steps, epochs=h.imitation_epochs, seed=seed)
+        example, steps = teacher(plant, informed=informed), h.episode_steps - 1
+        imitate(model, example, env, steps=steps, epochs=h.imitation_epochs, seed=seed)
     selection = Selection(
         folder,
         points=validation_points(timesteps, first_share=h.first_validation, count=h.validations),
         episodes=h.validation_episodes,
         duration=h.validation_duration,
         options=task,
+        controller=informed_policy if informed else greedy_policy,
     )
     log = TrainingLog(folder, timesteps, quiet=quiet)
     callbacks: list[BaseCallback] = [

@@ -17,6 +17,9 @@ EVALUATION_SEED = 2_000_000
 VALIDATION_SEED = 3_000_000
 """On which a training chooses among the policies that it passes through."""
 
+DISTILLATION_SEED = 4_000_000
+"""On which a policy with a memory imitates an informed one; a training seed takes a stretch of them."""
+
 SWEEP_SEED = 5_000_000
 """Of sweeps and their worst-case searches; --seed counts from here."""
 
@@ -34,6 +37,17 @@ TIMING_SEED = 9_000_000
 
 RESUMED_SEED = 1_000_000_000
 """Of resumed trainings: the steps done before count from here, so that none meets an episode twice."""
+
+
+def distillation_seeds(seed: int, count: int) -> range:
+    """Of the episodes of a distillation. Raises ValueError if others are swept on them."""
+    first = DISTILLATION_SEED + seed * count
+    if first + count > SWEEP_SEED:
+        most = (SWEEP_SEED - DISTILLATION_SEED) // count - 1
+        raise ValueError(
+            f"training seed {seed} would meet episodes kept for sweeps: give one up to {most}"
+        )
+    return range(first, first + count)
 
 
 def training_seeds(seed: int, num_envs: int) -> range:

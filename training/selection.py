@@ -4,16 +4,16 @@ The choice is part of the training, as early stopping is: it sees neither the sc
 evaluation nor those on which the classic controllers are tuned.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
+from controllers.base import Controller
 from training.learning_log import read_rows, save_model, write_rows
 from training.metrics import EpisodeMetrics
-from training.policy_files import greedy_policy
 from training.rollout import run_episodes
 from training.seeds import VALIDATION_SEED
 
@@ -47,14 +47,19 @@ class Selection(BaseCallback):
         episodes: int,
         duration: float,
         options: dict[str, Any],
+        controller: Callable[[PPO], Controller],
     ):
-        """points: steps at which to validate. duration: of an episode [s]. options: environment's."""
+        """points: steps at which to validate. duration: of an episode [s]. options: environment's.
+
+        controller: makes a controller of a model, its greedy policy.
+        """
         super().__init__()
         self._folder = folder
         self._points = sorted(points)
         self._seeds = list(range(VALIDATION_SEED, VALIDATION_SEED + episodes))
         self._duration = duration
         self._options = options
+        self._controller = controller
         self.rows = read_rows(folder / VALIDATION_FILE)
         """One for each validation, that of a resumed training's earlier part included."""
 
@@ -82,8 +87,9 @@ class Selection(BaseCallback):
     def _validate(self) -> None:
         assert isinstance(self.model, PPO)
         metrics, _ = run_episodes(
-            greedy_policy(self.model), seeds=self._seeds, duration=self._duration, options=self._options
-        )
+            self._controller(self.model), seeds=self._seeds, duration=self._duration,
+            options=self._options,
+        )  # fmt: skip
         best = max((row["score"] for row in self.rows), default=float("-inf"))
         self.rows.append({"timesteps": float(self.num_timesteps), **figures(metrics)})
         if self.rows[-1]["score"] > best:

@@ -9,7 +9,7 @@ import argparse
 import json
 import platform
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -40,7 +40,13 @@ CONFIG_FILE = "config.json"
 QUICK = {"timesteps": 65_536, "episodes": 16, "duration": 2.0}
 """The defaults under --quick: everything is done, too short to learn anything."""
 QUICK_HYPERPARAMETERS: dict[str, Any] = {
-    "imitation_epochs": 1, "validations": 1, "validation_episodes": 16, "validation_duration": 2.0,
+    "num_envs": 32, "imitation_epochs": 1, "validations": 1, "validation_episodes": 16,
+    "validation_duration": 2.0,
+}  # fmt: skip
+
+QUICK_DISTILLATION: dict[str, Any] = {
+    "rounds": 2, "episodes": 32, "periods": 100, "batch": 16, "validations": 1,
+    "validation_episodes": 16, "validation_duration": 2.0,
 }  # fmt: skip
 
 
@@ -67,6 +73,10 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         default=RewardWeights().switching,
         help="reward's price of one switching of the coil: trades wear against excursions",
     )
+    parser.add_argument(
+        "--recurrent", action="store_true",
+        help="train PPO with the plant's parameters in sight, then a policy with a memory to imitate it",
+    )  # fmt: skip
     parser.add_argument(
         "--device", default="cpu", help="torch device; cpu is fastest for so small a net"
     )
@@ -102,8 +112,8 @@ def check_resume(chosen: argparse.Namespace) -> None:
         return
     if not chosen.resume:
         return
-    earlier = json.loads(path.read_text(encoding="utf-8"))["options"]
-    for name in ("seed", "plant", "scenario", "parameters", "switching_price"):
+    earlier = {"recurrent": False} | json.loads(path.read_text(encoding="utf-8"))["options"]
+    for name in ("seed", "plant", "scenario", "parameters", "switching_price", "recurrent"):
         if earlier[name] != getattr(chosen, name):
             raise ValueError(
                 f"{chosen.out} was trained with {name} {earlier[name]}, not "
@@ -142,18 +152,31 @@ def main(arguments: list[str] | None = None) -> int:
     check_scenario(chosen.scenario)
     check_resume(chosen)
 
-    from training.policy_files import save_policy  # torch takes seconds to import: only now
+    from training import distil  # torch takes seconds to import: only now
+    from training.policy_files import greedy_policy, save_policy
     from training.ppo import Hyperparameters, train
 
-    hyperparameters = Hyperparameters(**(QUICK_HYPERPARAMETERS if chosen.quick else {}))
+    hyperparameters = distil.INFORMED if chosen.recurrent else Hyperparameters()
+    distillation = distil.Distillation()
+    if chosen.quick:
+        hyperparameters = replace(hyperparameters, **QUICK_HYPERPARAMETERS)
+        distillation = replace(distillation, **QUICK_DISTILLATION)
     config = configuration(chosen, plant, hyperparameters)
+    if chosen.recurrent:
+        config["distillation"] = asdict(distillation)
     write_text(chosen.out / CONFIG_FILE, json.dumps(config, indent=1) + "\n")
-    model, log = train(
-        hyperparameters, folder=chosen.out, plant=plant, scenario=chosen.scenario,
-        parameters=chosen.parameters, weights=RewardWeights(switching=chosen.switching_price),
-        timesteps=chosen.timesteps, seed=chosen.seed, device=chosen.device, resume=chosen.resume,
-    )  # fmt: skip
-    save_policy(model, chosen.out, control_period=OnOff.default_period, provenance=config)
+    task: dict[str, Any] = {
+        "folder": chosen.out, "plant": plant, "scenario": chosen.scenario,
+        "parameters": chosen.parameters, "weights": RewardWeights(switching=chosen.switching_price),
+        "timesteps": chosen.timesteps, "seed": chosen.seed, "device": chosen.device,
+        "resume": chosen.resume,
+    }  # fmt: skip
+    if chosen.recurrent:
+        policy, log = distil.train_recurrent(hyperparameters, distillation, **task)
+    else:
+        model, log = train(hyperparameters, **task)
+        policy = greedy_policy(model)
+    save_policy(policy, chosen.out, control_period=OnOff.default_period, provenance=config)
 
     comparison = evaluate(chosen, plant)
     report(comparison, log.rows, chosen.out)

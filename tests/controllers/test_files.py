@@ -39,7 +39,7 @@ def test_a_written_policy_acts_as_the_model_it_came_from(tmp_path):
     from controllers.learned import PolicyError, load_policy
     from epv_env.plant.plantfile import Plant
     from epv_env.reward import RewardWeights
-    from training.policy_files import save_policy
+    from training.policy_files import greedy_policy, save_policy
     from training.ppo import Hyperparameters, make_model, make_training_env
 
     h = Hyperparameters(num_envs=4, n_steps=8, batch_size=32)
@@ -52,7 +52,7 @@ def test_a_written_policy_acts_as_the_model_it_came_from(tmp_path):
         seed=0,
     )
     model = make_model(h, env, seed=3, device="cpu")
-    save_policy(model, tmp_path, control_period=5e-3, provenance={})
+    save_policy(greedy_policy(model), tmp_path, control_period=5e-3, provenance={})
     policy = load_policy(tmp_path)
     observations = np.random.default_rng(0).normal(size=(500, policy.layers[0][0].shape[1])).astype("f4")
     expected, _ = model.predict(observations, deterministic=True)

@@ -52,6 +52,15 @@ def test_a_run_resumes_from_its_checkpoint(finished):
     assert (out / "learning_curve.csv").read_text().splitlines()[: len(before)] == before
 
 
+def test_a_policy_with_a_memory_is_trained_in_the_short_form_too(tmp_path):
+    result = command("--quick", "--recurrent", "--timesteps", "16384", "--out", tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert "PPO, recurrent" in result.stdout
+    assert json.loads((tmp_path / "policy.json").read_text())["memory"]["unit"] == "GRU"
+    result = command("--quick", "--out", tmp_path, "--resume")
+    assert "was trained with recurrent True, not False" in result.stderr
+
+
 def test_resuming_with_another_seed_is_refused(finished):
     out, _ = finished
     result = command("--quick", "--out", out, "--resume", "--seed", "5")

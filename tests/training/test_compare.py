@@ -8,6 +8,7 @@ import pytest
 
 pytest.importorskip("pandas")
 pytest.importorskip("joblib")
+pytest.importorskip("stable_baselines3")
 
 from controllers.hysteresis import Hysteresis
 from tests.training.policies import random_layers, write_policy
@@ -25,8 +26,10 @@ from training.comparison.plan import (
     plan,
 )
 from training.comparison.scores import Contest, duels, figures, trade
+from training.distil import NAME, Distillation, Student, policy_of
 from training.generated import check_pages, fill, markdown
 from training.metrics import EpisodeMetrics
+from training.policy_files import save_policy
 from training.scenarios import RANDOM
 from training.tune import TUNING_REGION
 
@@ -94,12 +97,14 @@ def finished(tmp_path_factory):
     out = tmp_path_factory.mktemp("comparison")
     for seed in range(2):
         write_policy(random_layers(seed=seed, widths=(8, 8)), out / "seeds" / f"seed-{seed}")
+    remembers = policy_of(Student(Distillation(memory=4, width=8)))
+    save_policy(remembers, out / "memory" / "seed-0", control_period=5e-3, provenance={})
     page = out / "page.md"
     page.write_text("before\n<!-- generated: short -->\nold\n<!-- end: short -->\nafter\n")
     arguments = [
         "--quick", "--duration", "0.6", "--scenarios", RANDOM, "steps", "--workers", "1",
         "--out", str(out), "--policies", str(out / "seeds"), "--seeds", "2",
-        "--pages", str(page), "--images", str(out / "i"),
+        "--recurrent", str(out / "memory"), "--pages", str(page), "--images", str(out / "i"),
     ]  # fmt: skip
     assert main(arguments) == 0
     return out, arguments
@@ -111,7 +116,8 @@ def test_the_short_form_writes_everything(finished):
     assert {path.name for path in (out / "i").iterdir()} == {n for n in FIGURES if n.endswith("png")}
     content = json.loads((out / RESULTS_FILE).read_text())
     names = [row["controller"] for row in content["figures"] if row["plants"] == "calibrated"]
-    assert names[:2] == ["PPO", "PPO, all seeds"]
+    assert names[:3] == [NAME, "PPO", "PPO, all seeds"]
+    assert {bar["controller"] for bar in content["bars"]} == {NAME, "PPO"}
     assert "hysteresis, extrapolating" in names
     assert content["chosen"]["PPO"] in ("PPO, seed 0", "PPO, seed 1")
     assert all(f"# {part}\n" in (out / TABLES_FILE).read_text() for part in PARTS)

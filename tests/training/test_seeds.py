@@ -10,6 +10,7 @@ from controllers.hysteresis import Hysteresis
 from epv_env.plant.plantfile import Plant
 from training import compare, export, seeds, sweep
 from training.comparison.plan import TUNING, Contender, Sizes, plan
+from training.distil import Distillation
 from training.ppo import Hyperparameters
 from training.sweeps.plan import Size, cells, chosen_points, searches
 from training.sweeps.worst import Effort
@@ -55,12 +56,13 @@ def swept() -> Span:
 
 def used() -> dict[str, Span]:
     """The seeds that the commands use by default, by purpose."""
-    h, chosen = Hyperparameters(), compare.parse([])
+    h, d, chosen = Hyperparameters(), Distillation(), compare.parse([])
     exported = export.parse(["policy", "--out", "ecu"])
     trained = chosen.seeds * h.num_envs
     counted = {
         "training": (seeds.TRAINING_SEED, trained),
         "validation": (seeds.VALIDATION_SEED, h.validation_episodes),
+        "distillation": (seeds.DISTILLATION_SEED, chosen.recurrent_seeds * d.rounds * d.episodes),
         "calibration": (seeds.CALIBRATION_SEED, export.EPISODES),
         "states": (seeds.STATES_SEED, export.EPISODES),
         "closed loop": (seeds.CLOSED_LOOP_SEED, exported.episodes),
@@ -99,6 +101,12 @@ def test_a_training_seed_that_would_meet_the_tuning_is_refused():
     assert seeds.training_seeds(3905, 256)[-1] < seeds.TUNING_SEED
     with pytest.raises(ValueError, match=r"training seed 3906 .* give one up to 3905"):
         seeds.training_seeds(3906, 256)
+
+
+def test_a_distillation_that_would_meet_the_sweeps_is_refused():
+    assert seeds.distillation_seeds(2, 100)[0] == seeds.DISTILLATION_SEED + 200
+    with pytest.raises(ValueError, match=r"training seed 10 .* give one up to 9"):
+        seeds.distillation_seeds(10, 100_000)
 
 
 def test_a_sweep_that_would_meet_the_exports_episodes_is_refused(capsys):

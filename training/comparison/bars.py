@@ -20,8 +20,9 @@ JUDGED = {"C2_largest_breakdown_bar": "largest breakdown", "rms_error_bar": "rms
 
 @dataclass(frozen=True, kw_only=True)
 class Bar:
-    """One requirement."""
+    """One requirement of a learned controller."""
 
+    controller: str
     bar: str
     measured: str
     met: bool
@@ -43,6 +44,7 @@ def leaving(c: Contest, ours: Contender, plants: str, limit: float) -> Bar:
     upper = left_interval(stayed)[1]
     keep = sum(left_interval(c.results[run, plants, RANDOM].stayed)[1] <= limit for run in ours.runs)
     return Bar(
+        controller=ours.name,
         bar=f"upper 95 % bound of leaving ±500 mbar at most {100 * limit:g} %, {plants}",
         measured=f"{100 * upper:.3f} % ({int((~stayed).sum())} of {len(stayed)} episodes left; "
         f"{keep} of {len(ours.runs)} training seeds keep it)",
@@ -56,6 +58,7 @@ def against_rival(c: Contest, ours: Contender, rival: Contender) -> Iterator[Bar
     switching = f"switchings {mine['switchings_per_s']:.2f} against {its['switchings_per_s']:.2f} /s"
     for figure, meaning in JUDGED.items():
         yield Bar(
+            controller=ours.name,
             bar=f"{meaning} below that of {rival.name}, at equal or fewer switches, calibrated",
             measured=f"{1e3 * mine[figure]:.0f} against {1e3 * its[figure]:.0f} mbar, {switching}",
             met=mine[figure] < its[figure] and mine["switchings_per_s"] <= its["switchings_per_s"],
@@ -67,6 +70,7 @@ def against_oracle(c: Contest, ours: Contender, oracle: Contender) -> Iterator[B
     mine, its = (summary(m) for m in _common(c, ours, oracle))
     for figure, meaning in JUDGED.items():
         yield Bar(
+            controller=ours.name,
             bar=f"{meaning} within {NEAR_ORACLE:g} times that of {oracle.name}, calibrated",
             measured=f"{1e3 * mine[figure]:.0f} against {1e3 * its[figure]:.0f} mbar",
             met=mine[figure] <= NEAR_ORACLE * its[figure],

@@ -42,7 +42,7 @@ class Findings:
     means: pd.DataFrame
     traded: pd.DataFrame
     ours: Contender | None
-    """The learned contender, if one takes part."""
+    """The first learned contender, if one takes part."""
     duels: pd.DataFrame
     bars: list[Bar]
     lost: list[dict[str, str | float]]
@@ -50,7 +50,8 @@ class Findings:
 
 def findings(c: Contest, variants: list[Contender], *, trade_episodes: int) -> Findings:
     """Compute all tables. variants: join the trade-off, which uses the first `trade_episodes`."""
-    ours = next((each for each in c.contenders if each.learned), None)
+    learned = [each for each in c.contenders if each.learned]
+    ours = learned[0] if learned else None
     return Findings(
         figures=scores.figures(c),
         scenarios=scores.by_scenario(c),
@@ -58,7 +59,7 @@ def findings(c: Contest, variants: list[Contender], *, trade_episodes: int) -> F
         traded=scores.trade(c, variants, trade_episodes),
         ours=ours,
         duels=pd.DataFrame() if ours is None else scores.duels(c, ours),
-        bars=[] if ours is None else bars(c, ours),
+        bars=[bar for each in learned for bar in bars(c, each)],
         lost=[] if ours is None else lost(c, ours),
     )
 

@@ -93,8 +93,8 @@ def _grouped(table: pd.DataFrame, who: str) -> dict[tuple[str, str], list[dict[s
 
 def bar_table(found: Sequence[Bar], lost: Sequence[dict[str, str | float]]) -> str:
     """The requirements, and where a model-based rival is better."""
-    rows = [[bar.bar, bar.measured, "yes" if bar.met else "**no**"] for bar in found]
-    return markdown(["bar", "measured", "met?"], rows) + "\n\n" + lost_text(lost)
+    rows = [[b.controller, b.bar, b.measured, "yes" if b.met else "**no**"] for b in found]
+    return markdown(["controller", "bar", "measured", "met?"], rows) + "\n\n" + lost_text(lost)
 
 
 def lost_text(lost: Sequence[dict[str, str | float]]) -> str:
