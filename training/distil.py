@@ -7,7 +7,7 @@ that it got into: DAgger (Ross, Gordon and Bagnell, AISTATS 2011).
 """
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from torch.nn.functional import binary_cross_entropy_with_logits
 from tqdm import tqdm
 
 from controllers.learned import GatedUnit, LearnedPolicy
-from epv_env.observation import LAYOUT
+from epv_env.observation import INDEX, LAYOUT
 from training.imitation import SLIPS
 from training.informed import Informed
 from training.learning_log import TrainingLog
@@ -64,6 +64,11 @@ class Distillation:
     validation_episodes: int = 512
     validation_duration: float = 6.0
     """Length of a validation episode [s]."""
+    trims: tuple[float, ...] = (0.0, 0.01, 0.02, 0.03, 0.04, 0.05)
+    """By how much p2 may be taken for higher than it is measured [bar]: what `trim` chooses from."""
+    trim_episodes: int = 2048
+    trim_duration: float = 10.0
+    """Length of an episode that a trim is chosen on [s]."""
 
 
 FULL = Distillation()
@@ -120,7 +125,8 @@ def train_recurrent(
     model, log = train(h, folder=informed, informed=True, resume=resume, quiet=quiet, **task)
     names = ("plant", "scenario", "parameters", "weights")
     options = {name: task[name] for name in names}
-    return distil(d, informed_policy(model), options=options, seed=task["seed"], quiet=quiet), log
+    student = distil(d, informed_policy(model), options=options, seed=task["seed"], quiet=quiet)
+    return trim(d, student, options=options), log
 
 
 def distil(
@@ -151,6 +157,32 @@ def distil(
             if (found := _validated(d, policy, options)) > best:
                 best, chosen = found, policy
     return chosen
+
+
+def trim(d: Distillation, policy: LearnedPolicy, *, options: dict[str, Any]) -> LearnedPolicy:
+    """The policy with the trim with which it leaves the band least often on validation episodes.
+
+    An imitation errs where it is unsure, and more to one side of the band than to the other. Equals are
+    decided by the mean return.
+    """
+    seeds = list(range(VALIDATION_SEED, VALIDATION_SEED + d.trim_episodes))
+    found = []
+    for bar in d.trims:
+        candidate = trimmed(policy, bar)
+        metrics, _ = run_episodes(candidate, seeds=seeds, duration=d.trim_duration, options=options)
+        found.append((int((~metrics.stayed).sum()), -float(metrics.episode_return.mean()), candidate))
+    return min(found, key=lambda each: each[:2])[2]
+
+
+def trimmed(policy: LearnedPolicy, bar: float) -> LearnedPolicy:
+    """A policy with a memory that acts as this one would if p2 were measured higher by so much [bar]."""
+    assert policy.cell is not None, "only a policy with a memory is trimmed"
+    row = INDEX["p2_error"]
+    change = np.float32(bar / LAYOUT[row].scale)
+    unit = policy.cell
+    cell = replace(unit, bias_input=unit.bias_input + change * unit.weight_input[:, row])
+    (weight, bias), *rest = policy.layers
+    return replace(policy, layers=[(weight, bias + change * weight[:, row]), *rest], cell=cell)
 
 
 def _lesson(

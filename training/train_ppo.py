@@ -46,7 +46,7 @@ QUICK_HYPERPARAMETERS: dict[str, Any] = {
 
 QUICK_DISTILLATION: dict[str, Any] = {
     "rounds": 2, "episodes": 32, "periods": 100, "batch": 16, "validations": 1,
-    "validation_episodes": 16, "validation_duration": 2.0,
+    "validation_episodes": 16, "validation_duration": 2.0, "trim_episodes": 16, "trim_duration": 2.0,
 }  # fmt: skip
 
 

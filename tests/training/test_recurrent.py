@@ -1,6 +1,8 @@
 """A policy with a memory: the unit is torch's, its teacher sees the plant, a seed means one policy."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -15,7 +17,16 @@ from epv_env.observation import INDEX, LAYOUT
 from epv_env.plant.parameters import Parameters, sensitive_symbols
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
-from training.distil import NAME, Distillation, Student, distil, policy_of, train_recurrent
+from training.distil import (
+    NAME,
+    Distillation,
+    Student,
+    distil,
+    policy_of,
+    train_recurrent,
+    trim,
+    trimmed,
+)
 from training.ecu.quantise import ExportError
 from training.export import check
 from training.informed import FARTHEST, Informed, plant_code
@@ -32,7 +43,8 @@ OPTIONS = {
 }  # fmt: skip
 TINY = Distillation(
     memory=8, width=16, rounds=3, episodes=16, periods=60, handover=2, kept=2, epochs=1, batch=8,
-    validations=2, validation_episodes=8, validation_duration=0.8,
+    validations=2, validation_episodes=8, validation_duration=0.8, trims=(0.0, 0.05), trim_episodes=8,
+    trim_duration=0.8,
 )  # fmt: skip
 TINY_PPO = Hyperparameters(
     num_envs=8, n_steps=16, batch_size=64, episode_steps=30, imitation_epochs=1, validations=2,
@@ -110,6 +122,33 @@ def test_a_written_policy_remembers_as_the_one_it_came_from(student, readings, t
 def test_a_policy_with_a_memory_is_not_exported(student, tmp_path):
     with pytest.raises(ExportError, match="has a memory"):
         check(policy_of(student), tmp_path)
+
+
+def test_a_trimmed_policy_takes_p2_for_higher(student, readings):
+    shifted = readings.copy()
+    shifted[..., INDEX["p2_error"]] += 0.04 / LAYOUT[INDEX["p2_error"]].scale
+    policy, high = policy_of(student), trimmed(policy_of(student), 0.04)
+    for each in (policy, high):
+        each.reset(6)
+    for part, higher in zip(readings, shifted, strict=True):
+        np.testing.assert_allclose(high.logits(part), policy.logits(higher), atol=1e-5)
+
+
+def test_the_trim_is_the_one_with_which_fewest_leave():
+    """Of equals, the one with the best return."""
+
+    def run(policy, *, seeds, duration, options):
+        left = {0.0: 3, 0.02: 1, 0.03: 1}[policy]
+        returns = {0.0: -10.0, 0.02: -12.0, 0.03: -11.0}[policy]
+        stayed = np.arange(len(seeds)) >= left
+        return SimpleNamespace(stayed=stayed, episode_return=np.array([returns])), None
+
+    d = replace(TINY, trims=(0.0, 0.02, 0.03))
+    with (
+        patch("training.distil.run_episodes", run),
+        patch("training.distil.trimmed", lambda _, bar: bar),
+    ):
+        assert trim(d, None, options={}) == 0.03  # type: ignore[arg-type]
 
 
 def test_the_code_is_the_distance_from_the_centre_in_tenths():
