@@ -97,14 +97,17 @@ def finished(tmp_path_factory):
     out = tmp_path_factory.mktemp("comparison")
     for seed in range(2):
         write_policy(random_layers(seed=seed, widths=(8, 8)), out / "seeds" / f"seed-{seed}")
-    remembers = policy_of(Student(Distillation(memory=4, width=8)))
-    save_policy(remembers, out / "memory" / "seed-0", control_period=5e-3, provenance={})
+    for seed in range(3):
+        remembers = policy_of(Student(Distillation(memory=4, width=8)))
+        folder = out / "memory" / f"seed-{seed}"
+        save_policy(remembers, folder, control_period=5e-3, provenance={})
     page = out / "page.md"
     page.write_text("before\n<!-- generated: short -->\nold\n<!-- end: short -->\nafter\n")
     arguments = [
         "--quick", "--duration", "0.6", "--scenarios", RANDOM, "steps", "--workers", "1",
         "--out", str(out), "--policies", str(out / "seeds"), "--seeds", "2",
-        "--recurrent", str(out / "memory"), "--pages", str(page), "--images", str(out / "i"),
+        "--recurrent", str(out / "memory"), "--recurrent-seeds", "3",
+        "--pages", str(page), "--images", str(out / "i"),
     ]  # fmt: skip
     assert main(arguments) == 0
     return out, arguments
@@ -116,7 +119,7 @@ def test_the_short_form_writes_everything(finished):
     assert {path.name for path in (out / "i").iterdir()} == {n for n in FIGURES if n.endswith("png")}
     content = json.loads((out / RESULTS_FILE).read_text())
     names = [row["controller"] for row in content["figures"] if row["plants"] == "calibrated"]
-    assert names[:3] == [NAME, "PPO", "PPO, all seeds"]
+    assert names[:4] == [NAME, f"{NAME}, all seeds", "PPO", "PPO, all seeds"]
     assert {bar["controller"] for bar in content["bars"]} == {NAME, "PPO"}
     assert "hysteresis, extrapolating" in names
     assert content["chosen"]["PPO"] in ("PPO, seed 0", "PPO, seed 1")

@@ -1,6 +1,6 @@
 """What a comparison's episodes say: figures of the aims, interquartile means, duels, Pareto front."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -118,15 +118,21 @@ def interquartile_means(c: Contest) -> pd.DataFrame:
 def duels(c: Contest, ours: Contender) -> pd.DataFrame:
     """A row per plant set, rival and score: ours against the rival, paired by episode.
 
+    A rival that has learned too is its chosen run: its training seeds have nothing to do with ours.
     Columns: difference (ours - rival's) and probability that ours is better, each with its interval.
     """
     return _rows(
         {"plants": plants, "rival": rival.name, "score": field, **_duel(c, ours, rival, plants, field)}
         for plants in JUDGED_ON
-        for rival in c.contenders
-        if rival is not ours
+        for rival in (_represented(c, other) for other in c.contenders if other is not ours)
         for field in SCORES
     )
+
+
+def _represented(c: Contest, contender: Contender) -> Contender:
+    """The contender with its chosen run alone."""
+    run = c.chosen[contender.name]
+    return replace(contender, runs={run: contender.runs[run]})
 
 
 def _duel(c: Contest, ours: Contender, rival: Contender, plants: str, field: str) -> dict[str, float]:
