@@ -1,6 +1,7 @@
 """What the tests of sweeps share: short sweeps, and policies that need no training."""
 
 import json
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -49,8 +50,13 @@ def sweep_process(out: Path, *arguments) -> subprocess.Popen:
     command = [sys.executable, ROOT / "training/sweep.py", *SHORT, "--out", out, *arguments]
     return subprocess.Popen(
         [str(part) for part in command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-        start_new_session=True,
+        start_new_session=True, preexec_fn=_heed_interrupts,
     )  # fmt: skip
+
+
+def _heed_interrupts() -> None:
+    """Tests that run in the background of a script have been told to ignore them, and so would it."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def finished(out: Path) -> list[str]:
