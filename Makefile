@@ -60,7 +60,7 @@ tune: $(VENV)/.installed ## search the classic controllers' settings anew (minut
 tradeoff: $(VENV)/.installed ## optimise controllers at several prices of switching (half an hour)
 	$(PY) training/tradeoff.py $(ARGS)
 
-results: $(VENV)/.installed ## compare all controllers, and write docs/controllers.md's figures (half an hour)
+results: $(VENV)/.installed ## compare all controllers, and write docs/controllers.md's figures (an hour; what is trained or run is kept)
 	$(PY) training/compare.py --recurrent runs/recurrent --policies runs/seeds --out runs/comparison \
 		--images docs/images --pages docs/controllers.md README.md $(if $(wildcard runs/tradeoff),--tradeoff runs/tradeoff) $(ARGS)
 

@@ -128,10 +128,15 @@ def load_policy(folder: str | PathLike[str]) -> LearnedPolicy:
             f"policy {folder} was trained on another observation layout than this version's: "
             "train it anew, or use the version that wrote it"
         )
-    layers = [(arrays[f"{i}.weight"], arrays[f"{i}.bias"]) for i in range(content["layers"])]
     cell = None
-    if content.get("memory") is not None:
-        cell = GatedUnit(**{entry.name: arrays[f"memory.{entry.name}"] for entry in fields(GatedUnit)})
-    policy = LearnedPolicy(layers=layers, cell=cell, environment=content["environment"])
-    policy.name = content.get("name", policy.name)
-    return policy
+    try:
+        layers = [(arrays[f"{i}.weight"], arrays[f"{i}.bias"]) for i in range(content["layers"])]
+        if content.get("memory") is not None:
+            names = [entry.name for entry in fields(GatedUnit)]
+            cell = GatedUnit(**{name: arrays[f"memory.{name}"] for name in names})
+    except KeyError as missing_array:
+        raise PolicyError(
+            f"policy {folder} lacks the array {missing_array} in {WEIGHTS_FILE}: train it anew"
+        ) from None
+    name = content.get("name", LearnedPolicy.name)
+    return LearnedPolicy(layers=layers, cell=cell, name=name, environment=content["environment"])

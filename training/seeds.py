@@ -41,21 +41,20 @@ RESUMED_SEED = 1_000_000_000
 
 def distillation_seeds(seed: int, count: int) -> range:
     """Of the episodes of a distillation. Raises ValueError if others are swept on them."""
-    first = DISTILLATION_SEED + seed * count
-    if first + count > SWEEP_SEED:
-        most = (SWEEP_SEED - DISTILLATION_SEED) // count - 1
-        raise ValueError(
-            f"training seed {seed} would meet episodes kept for sweeps: give one up to {most}"
-        )
-    return range(first, first + count)
+    return _stretch(DISTILLATION_SEED, seed, count, end=SWEEP_SEED, kept_for="sweeps")
 
 
 def training_seeds(seed: int, num_envs: int) -> range:
     """Of the first episodes of a training. Raises ValueError if others are tuned on them."""
-    first = TRAINING_SEED + seed * num_envs
-    if first + num_envs > TUNING_SEED:
-        most = (TUNING_SEED - TRAINING_SEED) // num_envs - 1
+    return _stretch(TRAINING_SEED, seed, num_envs, end=TUNING_SEED, kept_for="tuning")
+
+
+def _stretch(begin: int, seed: int, count: int, *, end: int, kept_for: str) -> range:
+    """The training seed's stretch of the range from `begin` to `end`, where others' episodes begin."""
+    first = begin + seed * count
+    if first + count > end:
+        most = (end - begin) // count - 1
         raise ValueError(
-            f"training seed {seed} would meet episodes kept for tuning: give one up to {most}"
+            f"training seed {seed} would meet episodes kept for {kept_for}: give one up to {most}"
         )
-    return range(first, first + num_envs)
+    return range(first, first + count)

@@ -157,7 +157,7 @@ def main(arguments: list[str] | None = None) -> int:
     from training.ppo import Hyperparameters, train
 
     hyperparameters = distil.INFORMED if chosen.recurrent else Hyperparameters()
-    distillation = distil.Distillation()
+    distillation = distil.FULL
     if chosen.quick:
         hyperparameters = replace(hyperparameters, **QUICK_HYPERPARAMETERS)
         distillation = replace(distillation, **QUICK_DISTILLATION)

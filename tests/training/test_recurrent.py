@@ -9,9 +9,10 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 import torch
+from safetensors.numpy import load_file, save_file
 
 from controllers.base import Privileged
-from controllers.learned import LearnedPolicy, load_policy
+from controllers.learned import WEIGHTS_FILE, LearnedPolicy, PolicyError, load_policy
 from controllers.pulse_table import PulseTables, pulse_table
 from epv_env.observation import INDEX, LAYOUT
 from epv_env.plant.parameters import Parameters, sensitive_symbols
@@ -117,6 +118,15 @@ def test_a_written_policy_remembers_as_the_one_it_came_from(student, readings, t
         each.reset(6)
     for part in readings:
         assert np.array_equal(loaded.logits(part), policy.logits(part))
+
+
+def test_a_policy_whose_memory_is_missing_is_refused(student, tmp_path):
+    policy = policy_of(student)
+    save_policy(policy, tmp_path, control_period=5e-3, provenance={})
+    without = {k: v for k, v in load_file(tmp_path / WEIGHTS_FILE).items() if "memory" not in k}
+    save_file(without, tmp_path / WEIGHTS_FILE)
+    with pytest.raises(PolicyError, match=r"lacks the array 'memory\.weight_input'"):
+        load_policy(tmp_path)
 
 
 def test_a_policy_with_a_memory_is_not_exported(student, tmp_path):
