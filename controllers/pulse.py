@@ -23,6 +23,7 @@ class Pulse:
     foresaw wrongly is corrected until the last period. The coil switches at whole periods only, and one
     period may be worth 200 mbar; `rounding` says which of two neighbouring instants is taken.
 
+    What the coil did is read, not remembered: whoever overrules this controller is taken into account.
     A pulse may follow another as soon as the valve has shut. If p3 is still low it opens the sooner, and
     the extrapolation, being to that instant, waits the longer.
     """
@@ -41,7 +42,6 @@ class Pulse:
     control_period: float = 5e-3
     name: str = "pulse"
     environment: str = "EPValve-v0"
-    _on: NDArray = field(default_factory=lambda: np.ones(0, dtype=np.int64), repr=False)
     _error: NDArray = field(default_factory=lambda: np.zeros(0), repr=False)
     _slope: NDArray = field(default_factory=lambda: np.zeros(0), repr=False)
     _was_shut: NDArray = field(default_factory=lambda: np.zeros(0, dtype=bool), repr=False)
@@ -54,16 +54,16 @@ class Pulse:
             )
 
     def reset(self, n: int) -> None:
-        """All coils on, no consumption known."""
-        self._on = np.ones(n, dtype=np.int64)
+        """No consumption is known."""
         self._error = np.zeros(n)
         self._slope = np.zeros(n)
         self._was_shut = np.zeros(n, dtype=bool)
 
     def act(self, observations: NDArray) -> NDArray:
         """0 (off) or 1 (on) for each valve."""
-        error, target, p1, p3 = (
-            decode(observations, name).astype(float) for name in ("p2_error", "target", "p1", "p3")
+        error, target, p1, p3, coil = (
+            decode(observations, name).astype(float)
+            for name in ("p2_error", "target", "p1", "p3", "action")
         )
         p2 = error + target
         opens_in = self.table.time_to_open(p1, p2, p3)
@@ -75,8 +75,7 @@ class Pulse:
         begins = shut & (self._error + falls * ahead < self.trigger)
         remaining = self.table.duration(p1, p2, p3, self.aim - self._error, falls)
         ends = remaining < self.rounding * self.control_period
-        self._on = np.where(self._on == 1, np.where(begins, 0, 1), np.where(ends, 1, 0))
-        return self._on.copy()
+        return np.where(coil > 0.5, np.where(begins, 0, 1), np.where(ends, 1, 0))
 
     def _estimate(self, error: NDArray, shut: NDArray) -> None:
         """Follow p2 - target and its slope while the valve is shut; while it is open keep the slope.

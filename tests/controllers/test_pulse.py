@@ -54,11 +54,10 @@ def test_the_check_can_fail_another_valves_table_misses():
 
 
 def observe(error, p3=11.0):
-    """One observation at rest, p1 = 11 bar, with a given p2 - target [bar]."""
+    """One observation at rest, p1 = 11 bar, the coil on, with a given p2 - target [bar]."""
     values = {quantity.name: np.full(1, quantity.centre) for quantity in LAYOUT}
-    return encode(
-        {**values, "p1": np.full(1, 11.0), "p3": np.full(1, p3), "p2_error": np.full(1, error)}
-    )
+    given = {"p1": 11.0, "p3": p3, "p2_error": error, "action": 1.0}
+    return encode(values | {name: np.full(1, value) for name, value in given.items()})
 
 
 def begins_at(pulse: Pulse, p3: float = 11.0) -> float:
