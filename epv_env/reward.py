@@ -15,10 +15,12 @@ REFERENCE_PERIOD = 5e-3
 
 @dataclass(frozen=True, kw_only=True)
 class RewardWeights:
-    """Price of each term; every term is zero at best. Running terms are per 5 ms."""
+    """Price of each term, and the band; every term is zero at best. Running terms are per 5 ms."""
 
     band: float = 2.0
-    """Outside target ±500 mbar at any instant of the period (C1)."""
+    """Outside target ±`band_bar` at any instant of the period (C1)."""
+    band_bar: float = BAND_BAR
+    """Half-width of the band that is priced, C1's own unless a training wants a margin [bar]."""
     tracking: float = 0.25
     """|p2 - target| at the end of the period, in units of 500 mbar."""
     breakdown: float = 0.25
@@ -34,9 +36,7 @@ class RewardWeights:
         for entry in fields(self):
             value = getattr(self, entry.name)
             if not (np.isfinite(value) and value >= 0):
-                raise ValueError(
-                    f"reward weight {entry.name} = {value!r} must be a finite price of at least 0"
-                )
+                raise ValueError(f"reward weight {entry.name} = {value!r} must be finite and at least 0")
 
 
 class RewardTerms(NamedTuple):
@@ -74,7 +74,7 @@ def reward_terms(
     switchings: coil switchings; vented_kg: air blown off [kg]; failed: whether the circuit is empty.
     """
     scale = period / REFERENCE_PERIOD
-    outside = np.maximum(highest_error_bar, -lowest_error_bar) > BAND_BAR
+    outside = np.maximum(highest_error_bar, -lowest_error_bar) > weights.band_bar
     shortfall = np.maximum(-lowest_error_bar, 0.0)
     return RewardTerms(
         band=-weights.band * scale * outside,

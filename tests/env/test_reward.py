@@ -8,7 +8,8 @@ import pytest
 from epv_env.reward import RewardTerms, RewardWeights, reward_terms
 from tests.env.rollouts import ENDING, IDS, actions, native, run
 
-WEIGHTS = [field.name for field in fields(RewardWeights)]
+WEIGHTS = [field.name for field in fields(RewardWeights) if field.name != "band_bar"]
+"""The prices."""
 PRICES = RewardWeights(
     band=1.0, tracking=0.25, breakdown=0.25, switching=0.1, vented_air=2.0, failure=100.0
 )
@@ -73,7 +74,15 @@ def test_a_weight_scales_its_term_alone(name):
     assert double == pytest.approx({**usual, name: 2 * usual[name]})
 
 
-@pytest.mark.parametrize("name", WEIGHTS)
+def test_a_training_may_price_a_narrower_band():
+    narrow = replace(PRICES, band_bar=0.35)
+    assert terms(narrow, highest_error_bar=0.36) == pytest.approx(
+        {**dict.fromkeys(RewardTerms._fields, 0.0), "band": -1.0}
+    )
+    assert terms(narrow, highest_error_bar=0.34)["band"] == 0
+
+
+@pytest.mark.parametrize("name", [*WEIGHTS, "band_bar"])
 @pytest.mark.parametrize("value", [-0.1, np.nan, np.inf])
 def test_a_price_is_finite_and_not_negative(name, value):
     with pytest.raises(ValueError, match=f"reward weight {name} = .* at least 0"):
