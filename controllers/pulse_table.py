@@ -8,6 +8,7 @@ age of the venting (since p3 stood 5 % above the opening pressure) and the time 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -120,7 +121,7 @@ class PulseTables(PulseTable):
     @classmethod
     def of(cls, plants: Sequence[Mapping[str, float]]) -> "PulseTables":
         """The tables of these plants, in their order."""
-        tables = [pulse_table(plant) for plant in plants]
+        tables = [_table_met_before(tuple(plant.items())) for plant in plants]
         return cls(
             parameters={s: np.array([plant[s] for plant in plants]) for s in plants[0]},
             vent_rate=np.array([table.vent_rate for table in tables]),
@@ -151,6 +152,12 @@ def pulse_table(p: Mapping[str, float], *, supply_voltage: float = 24.0) -> Puls
         parameters=p, vent_rate=vent_rate, release_lag=release_lag,
         gain=shaped((p2 - left_off.p2[:, :1]) / BAR), lasts=shaped(STAY + shutting),
     )  # fmt: skip
+
+
+@lru_cache(maxsize=1024)
+def _table_met_before(plant: tuple[tuple[str, float], ...]) -> PulseTable:
+    """The table of a plant, made once: searches and lessons meet the same plants again and again."""
+    return pulse_table(dict(plant))
 
 
 def _place(axis: NDArray, value: NDArray) -> tuple[NDArray, NDArray]:

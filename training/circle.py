@@ -109,19 +109,15 @@ def diagnose(chosen: argparse.Namespace) -> dict[str, Any]:
 def trained(folder: Path, plant: Plant, chosen: argparse.Namespace) -> Controller:
     """PPO trained on plants around this one, or as it was trained before."""
     if not (folder / CONTRACT_FILE).exists():
-        from training.policy_files import (  # torch takes seconds to import: only now
-            greedy_policy,
-            save_policy,
-        )
+        from training.policy_files import save_policy  # torch takes seconds to import: only now
         from training.ppo import Hyperparameters, train
 
-        model, _ = train(
+        policy, _ = train(
             Hyperparameters(**SMALLER_STEPS), folder=folder, plant=plant, scenario=SCENARIO,
             parameters=TRAINED_ON, weights=RewardWeights(switching=SWITCHING_PRICE),
             timesteps=chosen.timesteps, seed=chosen.seed, device="cpu", resume=True,
         )  # fmt: skip
         provenance = {"plant": plant.name, "timesteps": chosen.timesteps, "seed": chosen.seed}
-        policy = greedy_policy(model)
         save_policy(policy, folder, control_period=OnOff.default_period, provenance=provenance)
     return load_policy(folder)
 

@@ -1,13 +1,15 @@
-"""A policy with a memory learns to act as an informed one does, from what an ECU measures alone.
+"""A policy with a memory learns to act as a controller that knows its plant, from measurements alone.
 
-The informed policy (training/informed.py) knows its plant. What it would do depends on that, so whoever
-imitates it from measurements has to find the plant out from what they show, and to remember it. The
-student drives more and more of the episodes and is told what the teacher would have done in each state
-that it got into: DAgger (Ross, Gordon and Bagnell, AISTATS 2011).
+What a pulse controller with a table of the valve's own plant would do (controllers/informed_pulse.py)
+depends on that plant, so whoever imitates it from what an ECU measures has to find the plant out from
+what the valve shows, and to remember it: "learning by cheating" (Chen et al., CoRL 2019). The student
+drives more and more of the episodes and is told what the teacher would have done in each state that it
+got into: DAgger (Ross, Gordon and Bagnell, AISTATS 2011). Then PPO goes on from there (training/ppo.py).
 """
 
 from collections import deque
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,22 +19,32 @@ from numpy.typing import NDArray
 from torch.nn.functional import binary_cross_entropy_with_logits
 from tqdm import tqdm
 
-from controllers.learned import GatedUnit, LearnedPolicy
+from controllers.base import Controller
+from controllers.informed_pulse import InformedPulse
+from controllers.learned import CONTRACT_FILE, GatedUnit, LearnedPolicy, load_policy
+from controllers.pulse_table import PulseTables
+from epv_env.actions import OnOff
 from epv_env.observation import INDEX, LAYOUT
+from epv_env.plant.plantfile import Plant
+from epv_env.plant.region import Region
 from training.imitation import SLIPS
-from training.informed import Informed
 from training.learning_log import TrainingLog
-from training.ppo import Hyperparameters, informed_policy, train
+from training.policy_files import save_policy
+from training.ppo import Hyperparameters, train
 from training.rollout import begin_episodes, make_env, run_episodes
 from training.seeds import VALIDATION_SEED, distillation_seeds
 from training.selection import score
 
 NAME = "PPO, recurrent"
-INFORMED_FOLDER = "informed"
+STUDENT_FOLDER = "student"
 
-INFORMED = Hyperparameters(band_price=10.0, n_epochs=5)
-"""Whoever knows the plant can stay within the band: leaving it may cost more than it does for a policy
-that has to guess. What it starts from is good, so it may learn more from each step."""
+GOING_ON = Hyperparameters(
+    band_price=10.0, band_bar=0.4, sharpness=5.0, ent_coef=0.0, learning_rate=5e-5,
+    last_learning_rate=5e-6, n_steps=128, batch_size=8192, gae_lambda=0.98, first_validation=0.05,
+)  # fmt: skip
+"""PPO's, from a student on. One period more or less of a pulse is worth 200 mbar, so that exploring more
+than the student doubts teaches nothing but caution; and who can keep within the band may pay more for
+coming near its edge."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,8 +56,10 @@ class Distillation:
     width: int = 64
     """Of the two hidden layers."""
     rounds: int = 32
+    plants: int = 512
+    """Drawn once: a teacher's table of a plant takes longer than the episodes on it."""
     episodes: int = 256
-    """Of each round, side by side."""
+    """Of each round, side by side, on plants picked from those."""
     periods: int = 700
     """Control periods of an episode (3.5 s)."""
     handover: int = 4
@@ -108,7 +122,7 @@ def policy_of(student: Student) -> LearnedPolicy:
 
 
 def train_recurrent(
-    h: Hyperparameters = INFORMED,
+    h: Hyperparameters = GOING_ON,
     d: Distillation = FULL,
     *,
     folder: Path,
@@ -116,23 +130,47 @@ def train_recurrent(
     quiet: bool = False,
     **task: Any,
 ) -> tuple[LearnedPolicy, TrainingLog]:
-    """Train an informed model in a folder within `folder`, then the policy that imitates it.
+    """Train a student, kept in a folder within `folder`, and go on from it with PPO.
 
-    task: `train`'s other arguments. An interruption loses no more of the first than `train` does, but
-    the second begins anew.
+    task: `train`'s other arguments. An interruption loses the student if it is not finished, and no more
+    of the rest than `train` does.
     """
-    informed = folder / INFORMED_FOLDER
-    model, log = train(h, folder=informed, informed=True, resume=resume, quiet=quiet, **task)
-    names = ("plant", "scenario", "parameters", "weights")
-    options = {name: task[name] for name in names}
-    student = distil(d, informed_policy(model), options=options, seed=task["seed"], quiet=quiet)
-    return trim(d, student, options=options), log
+    kept = folder / STUDENT_FOLDER
+    if not (resume and (kept / CONTRACT_FILE).exists()):
+        names = ("plant", "scenario", "parameters", "weights")
+        options = {name: task[name] for name in names}
+        plants = known_plants(d.plants, options, seed=task["seed"], quiet=quiet)
+        student = distil(d, InformedPulse(), plants, options=options, seed=task["seed"], quiet=quiet)
+        period, provenance = OnOff.default_period, {"distillation": asdict(d), "seed": task["seed"]}
+        save_policy(student, kept, control_period=period, provenance=provenance)
+    return train(h, folder=folder, student=load_policy(kept), resume=resume, quiet=quiet, **task)
+
+
+def known_plants(
+    count: int, options: dict[str, Any], *, seed: int, quiet: bool
+) -> list[Mapping[str, float]]:
+    """Plants drawn from the environment's region, for which the informed pulse has its tables ready."""
+    plant: Plant = options["plant"]
+    region, rng = Region.named(options["parameters"], plant.parameters), np.random.default_rng(seed)
+    plants = [region.draw(rng) for _ in range(count)]
+    for each in tqdm(plants, desc="tables", unit="plant", disable=quiet):
+        PulseTables.of([each])
+    return list(plants)
 
 
 def distil(
-    d: Distillation, teacher: Informed, *, options: dict[str, Any], seed: int, quiet: bool = False
+    d: Distillation,
+    teacher: Controller,
+    plants: Sequence[Mapping[str, float]],
+    *,
+    options: dict[str, Any],
+    seed: int,
+    quiet: bool = False,
 ) -> LearnedPolicy:
-    """The best student that was validated. options: of the environment; seed: of the training."""
+    """The best student that was validated.
+
+    plants: of the lessons. options: of the environment. seed: of the training.
+    """
     torch.set_num_threads(1)  # sums do not depend on the machine's cores
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
@@ -143,10 +181,10 @@ def distil(
     best, chosen = -np.inf, policy_of(student)
     progress = tqdm(range(d.rounds), desc="memory", unit="round", disable=quiet)
     for number in progress:
-        share = max(0.0, 1 - number / d.handover)
         own = list(seeds[number * d.episodes : (number + 1) * d.episodes])
-        driven = rng.random(d.episodes) < share
-        lessons.append(_lesson(policy_of(student), teacher, own, driven, d.periods, options, rng))
+        met = [dict(plants[k]) for k in rng.choice(len(plants), d.episodes)]
+        driven = rng.random(d.episodes) < 1 - number / d.handover
+        lessons.append(_lesson(policy_of(student), teacher, own, met, driven, d.periods, options, rng))
         left = 1 - number / d.rounds
         for group in optimiser.param_groups:
             group["lr"] = d.last_learning_rate + left * (d.learning_rate - d.last_learning_rate)
@@ -187,32 +225,34 @@ def trimmed(policy: LearnedPolicy, bar: float) -> LearnedPolicy:
 
 def _lesson(
     student: LearnedPolicy,
-    teacher: Informed,
+    teacher: Controller,
     seeds: list[int],
+    plants: list[dict[str, float]],
     driven: NDArray,
     periods: int,
     options: dict[str, Any],
     rng: np.random.Generator,
 ) -> tuple[torch.Tensor, torch.Tensor]:
-    """What the valves showed (n, periods, entries), and how likely the teacher energises (n, periods).
+    """What the valves showed (n, periods, entries), and what the teacher would have done (n, periods).
 
     driven: (n,) which episodes the teacher drives; a few actions are executed wrongly.
     """
     env = make_env(student, len(seeds), **options)
-    observation = begin_episodes(env, teacher, seeds)
+    observation = begin_episodes(env, teacher, seeds, {"parameters": plants})
     student.reset(len(seeds))
     seen, wanted = [], []
     for _ in range(periods):
-        logits = teacher.logits(observation)
-        odds = logits[:, 1] - logits[:, 0]
-        action = np.where(driven, odds > 0, student.act(observation)).astype(int)
+        right = teacher.act(observation)
+        action = np.where(driven, right, student.act(observation))
         slips = rng.random(len(seeds)) < SLIPS
         seen.append(observation)
-        wanted.append(odds)
-        observation, *_ = env.step(np.where(slips, 1 - action, action))
+        wanted.append(right)
+        done = np.where(slips, 1 - action, action)
+        # Through the task: a bad student's circuit may empty, and the others' episodes go on.
+        observation = env.task.step(*env.action.decode(done)).observation
     env.close()
-    likely = torch.sigmoid(torch.as_tensor(np.array(wanted).T))
-    return torch.as_tensor(np.array(seen).swapaxes(0, 1).copy()), likely
+    shown = np.array(seen).swapaxes(0, 1).copy()
+    return torch.as_tensor(shown), torch.as_tensor(np.array(wanted, dtype=np.float32).T.copy())
 
 
 def _learn(

@@ -52,9 +52,19 @@ def demonstrate(
 
 
 def imitate(
-    model: PPO, teacher: Controller, env: VecEnv, *, steps: int, epochs: int, seed: int
+    model: PPO,
+    teacher: Controller,
+    env: VecEnv,
+    *,
+    steps: int,
+    epochs: int,
+    seed: int,
+    learn_actor: bool = True,
 ) -> list[float]:
-    """Fit actor and critic to a demonstration; returns the actor's mean cross-entropy in each epoch."""
+    """Fit actor and critic to a demonstration; returns the actor's mean cross-entropy in each epoch.
+
+    learn_actor: False if the actor is the teacher already.
+    """
     observations, actions, returns = demonstrate(teacher, env, steps=steps, gamma=model.gamma, seed=seed)
     known = max(steps // 2, 1)
     """The returns of later steps miss too much of what comes after the demonstration."""
@@ -71,7 +81,7 @@ def imitate(
             clone = -log_probability.mean()
             error = (values.flatten() - value[rows]) * trusted[rows]
             optimiser.zero_grad()
-            (clone + (error**2).mean()).backward()
+            (learn_actor * clone + (error**2).mean()).backward()
             optimiser.step()
             total += float(clone.detach()) * len(rows)
         losses.append(total / len(x))

@@ -27,7 +27,7 @@ def trained_policy(
     """
     if not (folder / CONTRACT_FILE).exists():
         from training.distil import train_recurrent  # torch takes seconds to import: only now
-        from training.policy_files import greedy_policy, save_policy
+        from training.policy_files import save_policy
         from training.ppo import Hyperparameters, train
 
         chosen = weights or RewardWeights()
@@ -38,7 +38,7 @@ def trained_policy(
         if recurrent:
             policy, _ = train_recurrent(folder=folder, **task)
         else:
-            policy = greedy_policy(train(Hyperparameters(), folder=folder, **task)[0])
+            policy, _ = train(Hyperparameters(), folder=folder, **task)
         provenance = {"timesteps": timesteps, "seed": seed, "switching_price": chosen.switching}
         save_policy(policy, folder, control_period=OnOff.default_period, provenance=provenance)
     return load_policy(folder)

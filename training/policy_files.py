@@ -1,6 +1,7 @@
 """Writing a policy so that others can load it without running code: safetensors and a contract."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +15,25 @@ from epv_env.observation import contract
 from epv_env.plant.files import write_bytes, write_text
 
 
-def greedy_policy(model: PPO) -> LearnedPolicy:
+def greedy_policy(model: PPO, student: LearnedPolicy | None = None) -> LearnedPolicy:
     """The model's actor as a controller. It shares the model's weights: training changes it.
 
+    student: the policy that the model went on from; what it remembers with, and its name, are kept.
     Raises TypeError for a policy that is not a plain multilayer perceptron with tanh layers.
     """
-    layers = _linear_layers(model)
-    return LearnedPolicy(layers=[(_array(layer.weight), _array(layer.bias)) for layer in layers])
+    layers = [(_array(layer.weight), _array(layer.bias)) for layer in _linear_layers(model)]
+    return replace(student, layers=layers) if student else LearnedPolicy(layers=layers)
+
+
+def put_layers(model: PPO, policy: LearnedPolicy, sharpness: float) -> None:
+    """Make the policy's layers the model's actor, its logits times `sharpness`.
+
+    Raises RuntimeError if the shapes differ.
+    """
+    *hidden, (weight, bias) = policy.layers
+    layers = [*hidden, (sharpness * weight, sharpness * bias)]
+    for layer, (weight, bias) in zip(_linear_layers(model), layers, strict=True):
+        layer.load_state_dict({"weight": torch.as_tensor(weight), "bias": torch.as_tensor(bias)})
 
 
 def save_policy(

@@ -10,16 +10,16 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
-from controllers.base import Controller
+from controllers.learned import LearnedPolicy
 from controllers.tuned import build, load_tunings
 from epv_env.plant.plantfile import Plant
-from epv_env.reward import RewardWeights
+from epv_env.reward import BAND_BAR, RewardWeights
 from epv_env.sb3 import make_sb3_env
 from training.curriculum import FadingEntropy
 from training.imitation import imitate
-from training.informed import Informed, InformedEnv, InformedPulse
 from training.learning_log import CHECKPOINT_FILE, CURVE_FILE, TrainingLog, read_rows
-from training.policy_files import greedy_policy
+from training.policy_files import greedy_policy, put_layers
+from training.remembering import RememberingEnv
 from training.seeds import RESUMED_SEED, training_seeds
 from training.selection import Selection, validation_points
 
@@ -46,8 +46,12 @@ class Hyperparameters:
     band_price: float = 6.0
     """Price of being outside the band in training, unless the reward's own is higher: leaving it is so
     rare for a good policy that at the reward's own price learning would hardly notice."""
+    band_bar: float = BAND_BAR
+    """Half-width of the band that is priced so, at most C1's; a narrower one keeps a margin [bar]."""
     imitation_epochs: int = 8
     """Passes over the demonstration that the model imitates first (training/imitation.py)."""
+    sharpness: float = 1.0
+    """Factor of the logits of a student to go on from: the larger, the less it explores."""
     gamma: float = 0.995
     gae_lambda: float = 0.95
     ent_coef: float = 0.003
@@ -86,11 +90,11 @@ def make_training_env(
     parameters: str,
     seed: int,
     weights: RewardWeights,
-    informed: bool = False,
+    student: LearnedPolicy | None = None,
 ) -> VecEnvWrapper:
     """Episodes on plants drawn from a region, "confidence" or another (epv_env.settings).
 
-    informed: whether observations end with the plant's parameters (training/informed.py).
+    student: a policy whose memory ends the observations (training/remembering.py), if it has one.
     Trainings with different seeds meet different episodes. Raises ValueError for a seed that is too
     large (training/seeds.py).
     """
@@ -105,7 +109,7 @@ def make_training_env(
     )
     env.seed(training_seeds(seed, h.num_envs)[0])
     scaled = ScaledReward(VecMonitor(env), h.reward_scale)
-    return InformedEnv(scaled) if informed else scaled
+    return RememberingEnv(scaled, student.cell) if student and student.cell else scaled
 
 
 def make_model(h: Hyperparameters, env: VecEnv, *, seed: int, device: str) -> PPO:
@@ -127,17 +131,6 @@ def make_model(h: Hyperparameters, env: VecEnv, *, seed: int, device: str) -> PP
     )
 
 
-def teacher(plant: Plant, *, informed: bool = False) -> Controller:
-    """The TEACHER as tuned, designed for the plant, or (informed) for each valve's own."""
-    values = load_tunings()[TEACHER].values
-    return InformedPulse(values) if informed else build(TEACHER, values, plant.parameters)
-
-
-def informed_policy(model: PPO) -> Informed:
-    """The actor of a model that was trained with `informed`, as a controller."""
-    return Informed(greedy_policy(model))
-
-
 def train(
     h: Hyperparameters,
     *,
@@ -150,18 +143,20 @@ def train(
     seed: int,
     device: str,
     resume: bool,
-    informed: bool = False,
+    student: LearnedPolicy | None = None,
     quiet: bool = False,
-) -> tuple[PPO, TrainingLog]:
-    """Train until `timesteps` and return the best model that was validated (training/selection.py).
+) -> tuple[LearnedPolicy, TrainingLog]:
+    """Train until `timesteps` and return the best policy that was validated (training/selection.py).
 
     weights: prices of the reward; that of leaving the band is raised (`Hyperparameters.band_price`).
-    informed: whether the model is shown the plant's parameters (training/informed.py).
+    student: a policy to go on from; None: the model imitates the TEACHER first. What the student
+    remembers with stays as it is.
     resume: go on from the folder's checkpoint. An interruption (Ctrl-C) leaves the newest checkpoint
     behind. A resumed run draws new episodes, so it is a continuation, not a repetition, of an
     uninterrupted one.
     """
-    weights = replace(weights, band=max(weights.band, h.band_price))
+    price, edge = max(weights.band, h.band_price), min(weights.band_bar, h.band_bar)
+    weights = replace(weights, band=price, band_bar=edge)
     torch.set_num_threads(1)  # sums do not depend on the machine's cores; the plant uses them all
     checkpoint = folder / CHECKPOINT_FILE
     done = 0
@@ -171,22 +166,31 @@ def train(
         "scenario": scenario,
         "weights": weights,
     }
-    env = make_training_env(h, seed=seed, informed=informed, **task)
+    env = make_training_env(h, seed=seed, student=student, **task)
     model = make_model(h, env, seed=seed, device=device)
     if resume and checkpoint.exists():
         model.set_parameters(str(checkpoint), device=device)
         done = int(read_rows(folder / CURVE_FILE)[-1]["timesteps"])
         env.seed(RESUMED_SEED + seed * h.num_envs + done)
     elif h.imitation_epochs:
-        example, steps = teacher(plant, informed=informed), h.episode_steps - 1
-        imitate(model, example, env, steps=steps, epochs=h.imitation_epochs, seed=seed)
+        example = student or build(TEACHER, load_tunings()[TEACHER].values, plant.parameters)
+        if student:
+            put_layers(model, student, h.sharpness)
+        imitate(
+            model, example, env, steps=h.episode_steps - 1, epochs=h.imitation_epochs, seed=seed,
+            learn_actor=student is None,
+        )  # fmt: skip
+
+    def policy_of(trained: PPO) -> LearnedPolicy:
+        return greedy_policy(trained, student)
+
     selection = Selection(
         folder,
         points=validation_points(timesteps, first_share=h.first_validation, count=h.validations),
         episodes=h.validation_episodes,
         duration=h.validation_duration,
         options=task,
-        controller=informed_policy if informed else greedy_policy,
+        controller=policy_of,
     )
     log = TrainingLog(folder, timesteps, quiet=quiet)
     callbacks: list[BaseCallback] = [
@@ -202,4 +206,4 @@ def train(
             log.save()
             raise
     selection.restore_best(model)
-    return model, log
+    return policy_of(model), log

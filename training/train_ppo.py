@@ -153,10 +153,10 @@ def main(arguments: list[str] | None = None) -> int:
     check_resume(chosen)
 
     from training import distil  # torch takes seconds to import: only now
-    from training.policy_files import greedy_policy, save_policy
+    from training.policy_files import save_policy
     from training.ppo import Hyperparameters, train
 
-    hyperparameters = distil.INFORMED if chosen.recurrent else Hyperparameters()
+    hyperparameters = distil.GOING_ON if chosen.recurrent else Hyperparameters()
     distillation = distil.FULL
     if chosen.quick:
         hyperparameters = replace(hyperparameters, **QUICK_HYPERPARAMETERS)
@@ -174,8 +174,7 @@ def main(arguments: list[str] | None = None) -> int:
     if chosen.recurrent:
         policy, log = distil.train_recurrent(hyperparameters, distillation, **task)
     else:
-        model, log = train(hyperparameters, **task)
-        policy = greedy_policy(model)
+        policy, log = train(hyperparameters, **task)
     save_policy(policy, chosen.out, control_period=OnOff.default_period, provenance=config)
 
     comparison = evaluate(chosen, plant)

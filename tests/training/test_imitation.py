@@ -10,12 +10,16 @@ from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from training.imitation import demonstrate, imitate
 from training.policy_files import greedy_policy
-from training.ppo import TEACHER, Hyperparameters, make_model, make_training_env, teacher
+from training.ppo import TEACHER, Hyperparameters, make_model, make_training_env
 
 pytestmark = pytest.mark.training
 
 H = Hyperparameters(num_envs=64, episode_steps=300, n_steps=8, batch_size=64)
 PLANT = Plant.calibrated()
+
+
+def built(kind):
+    return build(kind, load_tunings()[kind].values, PLANT.parameters)
 
 
 def environment(seed=0):
@@ -26,11 +30,11 @@ def environment(seed=0):
 
 def test_the_returns_are_the_discounted_sums_of_what_follows():
     env = environment()
-    observations, actions, returns = demonstrate(teacher(PLANT), env, steps=40, gamma=0.9, seed=0)
+    observations, actions, returns = demonstrate(built(TEACHER), env, steps=40, gamma=0.9, seed=0)
     assert observations.shape[:2] == actions.shape == returns.shape == (40, 64)
     rewards = returns[:-1] - np.float32(0.9) * returns[1:]
     assert np.all(rewards <= 1e-5)  # every term of the reward is zero at best
-    longer = demonstrate(teacher(PLANT), environment(), steps=41, gamma=0.9, seed=0)[2]
+    longer = demonstrate(built(TEACHER), environment(), steps=41, gamma=0.9, seed=0)[2]
     assert longer[0] == pytest.approx(returns[0] + 0.9**40 * longer[40], rel=1e-4)
 
 
@@ -42,7 +46,7 @@ def test_the_returns_are_the_discounted_sums_of_what_follows():
     ],
 )
 def test_the_model_decides_as_its_teacher_does_on_episodes_that_it_has_not_seen(kind, epochs, least):
-    example = build(kind, load_tunings()[kind].values, PLANT.parameters)
+    example = built(kind)
     env = environment()
     model = make_model(H, env, seed=0, device="cpu")
     unseen = demonstrate(example, environment(seed=9), steps=299, gamma=H.gamma, seed=1)

@@ -12,10 +12,13 @@ import torch
 from safetensors.numpy import load_file, save_file
 
 from controllers.base import Privileged
-from controllers.learned import WEIGHTS_FILE, LearnedPolicy, PolicyError, load_policy
+from controllers.hysteresis import Hysteresis
+from controllers.informed_pulse import InformedPulse
+from controllers.learned import WEIGHTS_FILE, PolicyError, load_policy
 from controllers.pulse_table import PulseTables, pulse_table
+from controllers.tuned import build, load_tunings
 from epv_env.observation import INDEX, LAYOUT
-from epv_env.plant.parameters import Parameters, sensitive_symbols
+from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from training.distil import (
@@ -23,6 +26,7 @@ from training.distil import (
     Distillation,
     Student,
     distil,
+    known_plants,
     policy_of,
     train_recurrent,
     trim,
@@ -30,9 +34,8 @@ from training.distil import (
 )
 from training.ecu.quantise import ExportError
 from training.export import check
-from training.informed import FARTHEST, Informed, plant_code
-from training.policy_files import save_policy
-from training.ppo import Hyperparameters, make_training_env, teacher
+from training.policy_files import greedy_policy, put_layers, save_policy
+from training.ppo import Hyperparameters, make_model, make_training_env
 from training.rollout import begin_episodes, make_env, run_episodes
 
 pytestmark = pytest.mark.training
@@ -43,12 +46,12 @@ OPTIONS = {
     "weights": RewardWeights(),
 }  # fmt: skip
 TINY = Distillation(
-    memory=8, width=16, rounds=3, episodes=16, periods=60, handover=2, kept=2, epochs=1, batch=8,
-    validations=2, validation_episodes=8, validation_duration=0.8, trims=(0.0, 0.05), trim_episodes=8,
-    trim_duration=0.8,
+    memory=8, width=16, rounds=3, plants=4, episodes=16, periods=60, handover=2, kept=2, epochs=1,
+    batch=8, validations=2, validation_episodes=8, validation_duration=0.8, trims=(0.0, 0.05),
+    trim_episodes=8, trim_duration=0.8,
 )  # fmt: skip
 TINY_PPO = Hyperparameters(
-    num_envs=8, n_steps=16, batch_size=64, episode_steps=30, imitation_epochs=1, validations=2,
+    num_envs=8, width=16, n_steps=16, batch_size=64, episode_steps=30, imitation_epochs=1, validations=2,
     validation_episodes=4, validation_duration=0.8,
 )  # fmt: skip
 
@@ -74,12 +77,10 @@ def same(one, other) -> bool:
     return all(np.array_equal(a, b) for a, b in zip(weights(one), weights(other), strict=True))
 
 
-def simple_teacher():
-    """It energises where p2, extrapolated over 10 ms, is above the target."""
-    row = np.zeros(len(LAYOUT) + len(sensitive_symbols()), dtype=np.float32)
-    row[INDEX["p2_error"]], row[INDEX["p2_change_4"]] = 40.0, 4.0
-    layer = np.stack([0 * row, row]), np.zeros(2, dtype=np.float32)
-    return Informed(LearnedPolicy(layers=[layer]))
+SIMPLE = Hysteresis(
+    open_below=0.0, shut_above=0.0, open_lookahead=0.01, shut_lookahead=0.01, name="simple"
+)
+"""It energises where p2, extrapolated over 10 ms, is above the target."""
 
 
 def test_the_policy_computes_what_torch_does(student, readings):
@@ -161,38 +162,46 @@ def test_the_trim_is_the_one_with_which_fewest_leave():
         assert trim(d, None, options={}) == 0.03  # type: ignore[arg-type]
 
 
-def test_the_code_is_the_distance_from_the_centre_in_tenths():
-    symbols = sensitive_symbols()
-    centre = PLANT.parameters
-    options = {**OPTIONS, "parameters": {symbols[0]: 1.1 * centre[symbols[0]]}}
-    env = make_env(teacher(PLANT), 2, **options)
-    env.reset(seed=0)
-    # The centre of an exact choice is the plant itself.
-    np.testing.assert_array_equal(plant_code(env.task), 0)
-    env = make_env(teacher(PLANT), 64, **OPTIONS)
-    env.reset(seed=0)
-    code = plant_code(env.task)
-    assert code.shape == (64, len(symbols))
-    assert 0.9 < np.abs(code).max() <= 1.0
-    plant = env.task.parameters[5]
-    assert plant is not None
-    assert plant[symbols[3]] == pytest.approx(centre[symbols[3]] * (1 + code[5, 3] / 10))
-
-
-def test_each_observation_shows_the_plant_of_its_own_episode():
+def test_an_observation_ends_with_what_the_policy_remembers_in_its_own_episode(student):
     """Also the last one of an episode, which comes with the first one of the next."""
+    policy = policy_of(student)
     h = replace(TINY_PPO, num_envs=3, episode_steps=5)
-    env = make_training_env(h, seed=0, informed=True, **OPTIONS)
+    env = make_training_env(h, seed=0, student=policy, **OPTIONS)
     entries = len(LAYOUT)
-    first = np.asarray(env.reset())[:, entries:]
-    assert np.all(np.abs(first) <= FARTHEST)
-    for _ in range(h.episode_steps - 1):
-        env.step(np.ones(3, dtype=int))
-    observation, _, done, infos = env.step(np.ones(3, dtype=int))
-    assert np.all(done)
-    last = np.array([info["terminal_observation"][entries:] for info in infos])
-    assert np.array_equal(last, first)
-    assert not np.any(np.all(np.asarray(observation)[:, entries:] == first, axis=1))
+    policy.reset(3)
+    first = shown = np.asarray(env.reset())
+    ends: list[np.ndarray] = []
+    while not ends:
+        assert np.array_equal(policy.logits(shown[:, :entries]), layers_alone(policy, shown))
+        shown, _, done, infos = env.step(np.ones(3, dtype=int))
+        shown = np.asarray(shown)
+        ends = [info["terminal_observation"] for info in np.array(infos)[done]]
+    last = np.array(ends)
+    assert np.array_equal(policy.logits(last[:, :entries]), layers_alone(policy, last))
+    policy.reset(3)
+    assert np.array_equal(policy.logits(shown[:, :entries]), layers_alone(policy, shown))
+    assert not np.array_equal(last[:, entries:], first[:, entries:])
+
+
+def layers_alone(policy, observations):
+    """The logits of the layers, which see the memory in the observations."""
+    return replace(policy, cell=None).logits(observations)
+
+
+def test_ppo_goes_on_from_the_student(student, readings):
+    """Its actor is the student's, and its policy has the student's unit; sharper, it doubts less."""
+    policy = policy_of(student)
+    env = make_training_env(TINY_PPO, seed=0, student=policy, **OPTIONS)
+    model = make_model(TINY_PPO, env, seed=4, device="cpu")
+    assert not same(greedy_policy(model, policy), policy)
+    put_layers(model, policy, 1.0)
+    assert same(greedy_policy(model, policy), policy)
+    put_layers(model, policy, 3.0)
+    sharp = greedy_policy(model, policy)
+    for each in (sharp, policy):
+        each.reset(6)
+    for part in readings:
+        np.testing.assert_allclose(sharp.logits(part), 3 * policy.logits(part), atol=1e-5)
 
 
 def test_each_valve_s_table_is_that_of_its_plant_to_the_bit():
@@ -206,9 +215,10 @@ def test_each_valve_s_table_is_that_of_its_plant_to_the_bit():
     assert len(set(together)) == 3  # else the plants would not matter
 
 
-@pytest.mark.parametrize("informed", [True, False])
+@pytest.mark.parametrize("informed", [False, True])
 def test_only_a_pulse_that_knows_its_plant_holds_the_band_on_others(informed):
-    example = teacher(PLANT, informed=informed)
+    tuned = build("pulse", load_tunings()["pulse"].values, PLANT.parameters)
+    example = InformedPulse() if informed else tuned
     assert isinstance(example, Privileged) == informed
     metrics, _ = run_episodes(example, seeds=list(range(40, 64)), duration=4.0, options=OPTIONS)
     assert np.all(metrics.stayed) == informed
@@ -235,10 +245,10 @@ def untrained_policy(d, seed):
 
 def test_a_student_comes_to_act_as_its_teacher():
     longer = replace(TINY, rounds=10, epochs=4, learning_rate=1e-2)
-    example = simple_teacher()
-    student = distil(longer, example, options=OPTIONS, seed=1, quiet=True)
-    assert agreement(student, example) > 0.9
-    untrained = [agreement(untrained_policy(longer, seed), example) for seed in range(6)]
+    plants = known_plants(longer.plants, OPTIONS, seed=1, quiet=True)
+    student = distil(longer, SIMPLE, plants, options=OPTIONS, seed=1, quiet=True)
+    assert agreement(student, SIMPLE) > 0.9
+    untrained = [agreement(untrained_policy(longer, seed), SIMPLE) for seed in range(6)]
     assert np.mean(untrained) < 0.7  # else there was nothing to learn
 
 

@@ -12,7 +12,6 @@ from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from training.learning_log import read_rows
 from training.metrics import EpisodeMetrics
-from training.policy_files import greedy_policy
 from training.ppo import Hyperparameters, train
 from training.rollout import run_episodes
 from training.seeds import VALIDATION_SEED
@@ -33,11 +32,11 @@ TIMESTEPS = 1024
 
 
 def trained(folder, *, timesteps=TIMESTEPS, seed=1, resume=False):
-    model, _ = train(
+    policy, _ = train(
         TINY, folder=folder, **TASK, timesteps=timesteps, seed=seed, device="cpu",
         resume=resume, quiet=True,
     )  # fmt: skip
-    return greedy_policy(model)
+    return policy
 
 
 def same(one: LearnedPolicy, other: LearnedPolicy) -> bool:
