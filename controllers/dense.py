@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 @numba.njit(cache=True, nogil=True)
 def _sums(signal: NDArray, weight: NDArray, bias: NDArray) -> NDArray:
-    out = np.empty((signal.shape[0], weight.shape[1]), np.float32)
+    out = np.empty((signal.shape[0], weight.shape[1]), signal.dtype)
     for row in range(signal.shape[0]):
         for j in range(weight.shape[1]):
             out[row, j] = bias[j]
@@ -22,5 +22,8 @@ def _sums(signal: NDArray, weight: NDArray, bias: NDArray) -> NDArray:
 
 
 def dense(signal: NDArray, weight: NDArray, bias: NDArray) -> NDArray:
-    """signal @ weight.T + bias: float32 (n, inputs), (outputs, inputs), (outputs,) -> (n, outputs)."""
+    """signal @ weight.T + bias: (n, inputs), (outputs, inputs), (outputs,) -> (n, outputs).
+
+    All of one precision, and the sums too.
+    """
     return _sums(np.ascontiguousarray(signal), np.ascontiguousarray(weight.T), bias)

@@ -49,7 +49,7 @@ class GatedUnit:
         return self.weight_memory.shape[1]
 
     def step(self, observations: NDArray, memory: NDArray) -> NDArray:
-        """The next memory (n, m) after observations (n, inputs), float32."""
+        """The next memory (n, m) after observations (n, inputs)."""
         new = dense(observations, self.weight_input, self.bias_input)
         old = dense(memory, self.weight_memory, self.bias_memory)
         (new_reset, new_update, new_value), (old_reset, old_update, old_value) = (
@@ -72,10 +72,19 @@ class LearnedPolicy:
     environment: str = "EPValve-v0"
     _memory: NDArray = field(init=False, repr=False, default_factory=lambda: np.empty((0, 0)))
 
+    @property
+    def cells(self) -> int:
+        """How many figures it carries from one period to the next."""
+        return 0 if self.cell is None else self.cell.width
+
+    @property
+    def precision(self) -> np.dtype:
+        """Of its weights, and so of all that it computes: single, as training writes it."""
+        return self.layers[0][0].dtype
+
     def reset(self, n: int) -> None:
         """Forget everything; n episodes begin."""
-        width = 0 if self.cell is None else self.cell.width
-        self._memory = np.zeros((n, width), dtype=np.float32)
+        self._memory = np.zeros((n, self.cells), dtype=self.precision)
 
     def act(self, observations: NDArray) -> NDArray:
         """The action with the largest logit for each valve."""
@@ -83,7 +92,7 @@ class LearnedPolicy:
 
     def logits(self, observations: NDArray) -> NDArray:
         """A figure for each action, (n, actions); a policy with a memory goes one period on."""
-        signal = observations.astype(np.float32)
+        signal = observations.astype(self.precision)
         if self.cell is not None:
             self._memory = self.cell.step(signal, self._memory)
             signal = np.concatenate([signal, self._memory], axis=1)

@@ -25,12 +25,14 @@ from epv_env.plant.commandline import check_positive, fail_clearly, writable_fol
 from training.ecu import measure
 from training.ecu.compiled import CompiledPolicy, find_compiler, library
 from training.ecu.contract import deployment_contract
+from training.ecu.exact import in_double
 from training.ecu.folder import check_free, write_folder
 from training.ecu.onnx_model import onnx_model
 from training.ecu.quantise import ExportError, quantise
 from training.ecu.sources import Export, checks, sources
 from training.ecu.states import states_table, visit
 from training.ecu.summary import as_text
+from training.ecu.tables import named_layers
 from training.seeds import CALIBRATION_SEED, CLOSED_LOOP_SEED, STATES_SEED
 
 EPISODES, PERIODS = 20, 500
@@ -70,7 +72,7 @@ def prepare(policy: LearnedPolicy, folder: Path) -> tuple[Export, dict[str, Any]
     calibration = visit(policy, first_seed=CALIBRATION_SEED, episodes=EPISODES, periods=PERIODS)
     export = Export(
         policy=policy,
-        fixed=quantise(policy, calibration.flat),
+        fixed=quantise(policy, calibration.observations),
         period=content["observation"]["control_period_s"],
         weights_sha256=digest,
     )
@@ -78,19 +80,14 @@ def prepare(policy: LearnedPolicy, folder: Path) -> tuple[Export, dict[str, Any]
 
 
 def check(policy: LearnedPolicy, folder: Path) -> None:
-    """Raises ExportError if the policy does not decide between off and on, remembers, or is damaged."""
-    if policy.cell is not None:
-        raise ExportError(
-            f"the policy in {folder} has a memory: only policies without one can be exported; train one "
-            "with `python training/train_ppo.py`"
-        )
+    """Raises ExportError if the policy does not decide between off and on, or is damaged."""
     outputs = len(policy.layers[-1][1])
     if policy.environment != "EPValve-v0" or outputs != 2:
         raise ExportError(
             f"the policy in {folder} decides {outputs} things in {policy.environment}: only decisions "
             "between off and on (EPValve-v0) can be exported"
         )
-    if not all(np.all(np.isfinite(array)) for layer in policy.layers for array in layer):
+    if not all(np.all(np.isfinite(array)) for layer in named_layers(policy).values() for array in layer):
         raise ExportError(f"the policy in {folder} has weights that are not finite: train it anew")
 
 
@@ -106,9 +103,11 @@ def verify(
         put(folder, files)
         code = library(compiler, folder)
         agreement = measure.agreement(policy, code, states)
-        fixed_actions = measure.follow(CompiledPolicy(code=code, variant="fixed"), states)
+        fixed_actions = measure.follow(
+            CompiledPolicy(code=code, variant="fixed", cells=policy.cells), states
+        )
         agreement["fixed_agrees"] = int(np.sum(fixed_actions == states.actions))
-        margins = measure.margins(policy, states.flat, np.float64)
+        margins = measure.margins(in_double(policy), states)
         tests = checks(states.actions.size, rounding=agreement["rounding_of_c"])
         tests["states.csv"] = states_table(states, margins, fixed_actions)
         put(folder, tests)

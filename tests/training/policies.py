@@ -9,17 +9,20 @@ from numpy.typing import NDArray
 from safetensors.numpy import save_file
 
 from controllers.base import Controller
-from controllers.learned import CONTRACT_FILE, FORMAT, WEIGHTS_FILE
+from controllers.learned import CONTRACT_FILE, FORMAT, WEIGHTS_FILE, GatedUnit
 from epv_env.observation import LAYOUT, contract
+from training.ecu.exact import memory_along
 from training.ecu.states import visit
 
 Layers = list[tuple[NDArray, NDArray]]
 
 
-def random_layers(*, seed: int, widths: tuple[int, ...] = (24, 40, 8), outputs: int = 2) -> Layers:
-    """A net of tanh layers whose weights mean nothing."""
+def random_layers(
+    *, seed: int, widths: tuple[int, ...] = (24, 40, 8), outputs: int = 2, cells: int = 0
+) -> Layers:
+    """A net of tanh layers whose weights mean nothing. cells: of a unit before it."""
     rng = np.random.default_rng(seed)
-    sizes = [len(LAYOUT), *widths, outputs]
+    sizes = [len(LAYOUT) + cells, *widths, outputs]
     return [
         (
             rng.normal(scale=1.5 / np.sqrt(before), size=(after, before)).astype(np.float32),
@@ -29,15 +32,35 @@ def random_layers(*, seed: int, widths: tuple[int, ...] = (24, 40, 8), outputs: 
     ]
 
 
-def fitted_layers(controller: Controller, *, seed: int) -> Layers:
+def random_unit(*, seed: int, cells: int) -> GatedUnit:
+    """A gated recurrent unit whose weights mean nothing; it forgets within some ten periods."""
+    rng = np.random.default_rng(seed)
+
+    def normal(*shape: int) -> NDArray:
+        return rng.normal(scale=0.7, size=shape).astype(np.float32)
+
+    slower = np.repeat(np.array([0, 2, 0], np.float32), cells)  # rows of the update gate
+    return GatedUnit(
+        weight_input=normal(3 * cells, len(LAYOUT)),
+        weight_memory=normal(3 * cells, cells),
+        bias_input=normal(3 * cells) + slower,
+        bias_memory=normal(3 * cells),
+    )
+
+
+def fitted_layers(controller: Controller, *, seed: int, unit: GatedUnit | None = None) -> Layers:
     """A net of 64 and 64 units that acts much like a controller.
 
-    The hidden layers are random, the last is fitted by least squares to what the controller decides on
-    the states that it visits.
+    The hidden layers are random, and so is the unit before them; the last is fitted by least squares to
+    what the controller decides on the states that it visits.
     """
     seen = visit(controller, first_seed=seed, episodes=32, periods=300)
-    hidden = random_layers(seed=seed, widths=(64,), outputs=64)
-    signal = seen.flat
+    signal, cells = seen.flat, 0
+    if unit is not None:
+        cells = unit.width
+        memory = memory_along(unit, seen.observations)[:, 1:].reshape(-1, cells)
+        signal = np.concatenate([signal, memory], axis=1)
+    hidden = random_layers(seed=seed, widths=(64,), outputs=64, cells=cells)
     for weight, bias in hidden:
         signal = np.tanh(signal @ weight.T + bias)
     columns = np.column_stack([signal, np.ones(len(signal))])
@@ -49,16 +72,21 @@ def fitted_layers(controller: Controller, *, seed: int) -> Layers:
     return [*hidden, (np.ascontiguousarray(last[:, :-1]), np.ascontiguousarray(last[:, -1]))]
 
 
-def write_policy(layers: Layers, folder: Path) -> Path:
+def write_policy(layers: Layers, folder: Path, unit: GatedUnit | None = None) -> Path:
     """Write a policy's two files; returns the folder."""
     folder.mkdir(parents=True)
     arrays = {}
     for k, (weight, bias) in enumerate(layers):
         arrays |= {f"{k}.weight": weight, f"{k}.bias": bias}
+    memory = None
+    if unit is not None:
+        arrays |= {f"memory.{name}": array for name, array in vars(unit).items()}
+        memory = {"unit": "GRU", "cells": unit.width}
     save_file(arrays, folder / WEIGHTS_FILE)
     content = {
         "format": FORMAT,
         "environment": "EPValve-v0",
+        "memory": memory,
         "layers": len(layers),
         "observation": contract(0.005),
         "provenance": {},

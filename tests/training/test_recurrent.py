@@ -1,5 +1,6 @@
 """A policy with a memory: the unit is torch's, its teacher sees the plant, a seed means one policy."""
 
+from copy import deepcopy
 from dataclasses import replace
 from types import SimpleNamespace
 from unittest.mock import patch
@@ -32,8 +33,7 @@ from training.distil import (
     trim,
     trimmed,
 )
-from training.ecu.quantise import ExportError
-from training.export import check
+from training.ecu.exact import in_double, logits_along
 from training.policy_files import greedy_policy, put_layers, save_policy
 from training.ppo import Hyperparameters, make_model, make_training_env
 from training.rollout import begin_episodes, make_env, run_episodes
@@ -92,6 +92,15 @@ def test_the_policy_computes_what_torch_does(student, readings):
     np.testing.assert_allclose(logits[..., 1] - logits[..., 0], expected, atol=1e-5)
 
 
+def test_in_double_precision_too(student, readings):
+    """Where the order of sums is of no account."""
+    along = readings.swapaxes(0, 1).copy()
+    with torch.no_grad():
+        expected = deepcopy(student).double()(torch.as_tensor(along).double()).numpy()
+    logits = logits_along(in_double(policy_of(student)), along)
+    np.testing.assert_allclose(logits[..., 1] - logits[..., 0], expected, atol=1e-12)
+
+
 def test_a_valve_is_decided_alone_as_in_a_batch_to_the_bit(student, readings):
     together, alone = policy_of(student), policy_of(student)
     together.reset(readings.shape[1])
@@ -128,11 +137,6 @@ def test_a_policy_whose_memory_is_missing_is_refused(student, tmp_path):
     save_file(without, tmp_path / WEIGHTS_FILE)
     with pytest.raises(PolicyError, match=r"lacks the array 'memory\.weight_input'"):
         load_policy(tmp_path)
-
-
-def test_a_policy_with_a_memory_is_not_exported(student, tmp_path):
-    with pytest.raises(ExportError, match="has a memory"):
-        check(policy_of(student), tmp_path)
 
 
 def test_a_trimmed_policy_takes_p2_for_higher(student, readings):

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.observation import HISTORY, LAYOUT
+from epv_env.observation import HISTORY
 from training.ecu.quantise import ExportError
 from training.ecu.states import READINGS, readings_of
 
@@ -27,15 +27,17 @@ READINGS_TYPE = {
     variant: np.dtype([*((name, number) for name in READINGS[:-1]), (READINGS[-1], "u1")], align=True)
     for variant, number in NUMBER.items()
 }
-MEMORY_TYPE = {
-    variant: np.dtype(
-        [("p2", number, HISTORY), ("p3", number, HISTORY), ("waited", "u2"), ("newest", "u1"),
-         ("coil", "u1"), ("begun", "u1")],
+"""The C structure, laid out as C lays it out."""
+
+
+def memory_type(variant: str, cells: int) -> np.dtype:
+    """The C structure of a variant's memory, for a policy with so many cells or with none."""
+    number = NUMBER[variant]
+    return np.dtype(
+        [("p2", number, HISTORY), ("p3", number, HISTORY), ("cell", number, cells), ("waited", "u2"),
+         ("newest", "u1"), ("coil", "u1"), ("begun", "u1")],
         align=True,
-    )
-    for variant, number in NUMBER.items()
-}  # fmt: skip
-"""The C structures, laid out as C lays them out."""
+    )  # fmt: skip
 
 
 def find_compiler(command: str) -> list[str]:
@@ -76,6 +78,8 @@ class CompiledPolicy:
     code: ctypes.CDLL
     variant: str
     """One of VARIANTS."""
+    cells: int
+    """Of the policy: its memory's size depends on them."""
     environment: str = "EPValve-v0"
     name: str = field(init=False)
 
@@ -86,7 +90,7 @@ class CompiledPolicy:
 
     def reset(self, n: int) -> None:
         """n valves, nothing remembered."""
-        self._memory = np.zeros(n, dtype=MEMORY_TYPE[self.variant])
+        self._memory = np.zeros(n, dtype=memory_type(self.variant, self.cells))
 
     def act(self, observations: NDArray) -> NDArray:
         """Actions (n,) for the readings behind observations (n, entries)."""
@@ -109,13 +113,15 @@ def as_structures(readings: dict[str, NDArray], variant: str) -> NDArray:
     return structures
 
 
-def float_logits(code: ctypes.CDLL, observations: NDArray) -> NDArray:
-    """Logits (n, 2) of the float code for observations (n, entries)."""
+def float_logits(code: ctypes.CDLL, observations: NDArray, *, cells: int) -> NDArray:
+    """Logits (episodes, periods, 2) of the float code along observations of episodes."""
     given = np.ascontiguousarray(observations, dtype=np.float32)
-    logits = np.empty((len(given), 2), dtype=np.float32)
+    logits = np.empty((*given.shape[:2], 2), dtype=np.float32)
     function: Any = code.epv_float_logits
-    function.argtypes = (ctypes.c_void_p, ctypes.c_void_p)
+    function.argtypes = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
     function.restype = None
-    for i in range(len(given)):
-        function(given.ctypes.data + 4 * i * len(LAYOUT), logits.ctypes.data + 8 * i)
+    for episode in range(len(given)):
+        memory = np.zeros(1, dtype=memory_type("float", cells))
+        for k in range(given.shape[1]):
+            function(memory.ctypes.data, given[episode, k].ctypes.data, logits[episode, k].ctypes.data)
     return logits

@@ -14,20 +14,19 @@ from numpy.typing import NDArray
 from controllers.base import Controller
 from controllers.learned import LearnedPolicy
 from training.ecu.compiled import CODE, VARIANTS, CompiledPolicy, build, float_logits
+from training.ecu.exact import in_double, logits_along
 from training.ecu.quantise import ExportError
 from training.ecu.states import PLANTS, SCENARIO, VisitedStates
 from training.rollout import run_episodes
 
 
-def margins(policy: LearnedPolicy, observations: NDArray, dtype: type) -> NDArray:
-    """Logit of on minus logit of off (n,), in single or double precision."""
-    signal = observations.astype(dtype)
-    layers = [(weight.astype(dtype), bias.astype(dtype)) for weight, bias in policy.layers]
-    for weight, bias in layers[:-1]:
-        signal = np.tanh(signal @ weight.T + bias)
-    weight, bias = layers[-1]
-    logits = signal @ weight.T + bias
-    return logits[:, 1] - logits[:, 0]
+def margins(policy: LearnedPolicy, states: VisitedStates) -> NDArray:
+    """Logit of on minus logit of off (episodes, periods), in the policy's precision along the states."""
+    return _difference(logits_along(policy, states.observations))
+
+
+def _difference(logits: NDArray) -> NDArray:
+    return logits[..., 1].astype(np.float64) - logits[..., 0]
 
 
 def agreement(policy: LearnedPolicy, code: ctypes.CDLL, states: VisitedStates) -> dict[str, Any]:
@@ -35,21 +34,21 @@ def agreement(policy: LearnedPolicy, code: ctypes.CDLL, states: VisitedStates) -
 
     Raises ExportError if they differ on any state.
     """
-    logits = float_logits(code, states.flat)
-    differs = np.flatnonzero((logits[:, 0] < logits[:, 1]) != states.actions.ravel())
-    exact = margins(policy, states.flat, np.float64)
-    if len(differs):
+    logits = float_logits(code, states.observations, cells=policy.cells)
+    differs = (logits[..., 0] < logits[..., 1]) != states.actions
+    exact = margins(in_double(policy), states)
+    if np.any(differs):
         worst = np.abs(exact[differs]).max()
         raise ExportError(
-            f"the C code decides otherwise than the policy on {len(differs)} of {exact.size} states, "
+            f"the C code decides otherwise than the policy on {differs.sum()} of {exact.size} states, "
             f"where the logits are up to {worst:.2g} apart: below 1e-4 that is rounding at a tie, train "
             "a little longer; above it the code is wrong"
         )
-    rounding_c = np.abs(logits[:, 1].astype(np.float64) - logits[:, 0] - exact).max()
-    rounding_python = np.abs(margins(policy, states.flat, np.float32) - exact).max()
+    rounding_c = np.abs(_difference(logits) - exact).max()
+    rounding_python = np.abs(margins(policy, states) - exact).max()
     return {
         "states": exact.size,
-        "float_agrees": exact.size - len(differs),
+        "float_agrees": int(np.sum(~differs)),
         "least_margin": float(np.abs(exact).min()),
         "rounding_of_c": float(rounding_c),
         "rounding_of_python": float(rounding_python),
@@ -73,7 +72,8 @@ def closed_loop(
     progress: Callable[[float], None],
 ) -> dict[str, dict[str, float]]:
     """Figures of the policy and of each compiled variant on the same episodes, by controller's name."""
-    contenders = [policy, *(CompiledPolicy(code=code, variant=variant) for variant in VARIANTS)]
+    compiled = (CompiledPolicy(code=code, variant=name, cells=policy.cells) for name in VARIANTS)
+    contenders = [policy, *compiled]
     found = {}
     for k, controller in enumerate(contenders):
         metrics, _ = run_episodes(

@@ -5,14 +5,13 @@ from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
 from string import Template
-from textwrap import fill
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controllers.learned import LearnedPolicy
 from epv_env.observation import HISTORY, LAYOUT, LONGEST_WAIT, P2_LAGS, P3_LAGS
 from training.ecu.quantise import FixedPolicy
+from training.ecu.tables import fixed_tables, float_tables, listed, literal
 
 TEMPLATES = Path(__file__).parent / "templates"
 TITLE = "Pressure limiting by an electro-pneumatic protection valve: a trained policy."
@@ -39,6 +38,14 @@ FIXED_VALUES = FLOAT_VALUES | {
     "action": "now->coil ? 1000 : 0",
 }
 """The same in the units of epv_fixed."""
+
+SIGNALS = {"float": "float", "fixed": "int16_t"}
+"""What the layers take in."""
+CELLS = {
+    "float": "    float cell[{}]; /* of the gated recurrent unit */\n",
+    "fixed": "    int32_t cell[{}]; /* of the gated recurrent unit, 32767 * 32768 stands for 1 */\n",
+}
+"""The member of the memory that a policy without cells lacks: C99 has no array of none."""
 
 CHANGES = {
     f"{name}_change_{lag}": f"change(m->{name}, m->newest, {lag})"
@@ -74,15 +81,29 @@ def sources(export: Export) -> dict[str, str]:
         "period_us": round(export.period * 1e6),
         "layers": len(export.policy.layers),
         "widest": export.widest,
+        "cells": export.policy.cells,
         "longest_wait": ceil(LONGEST_WAIT / export.period - 1e-9),
     }
     filled = {}
-    for variant, numbers in (("float", _float_numbers(export)), ("fixed", _fixed_numbers(export.fixed))):
-        remember = _fill("remember.c", {"variant": variant, "capital": variant.upper()})
+    for variant, numbers in (
+        ("float", _float_numbers(export.policy, export.period)),
+        ("fixed", _fixed_numbers(export.fixed)),
+    ):
+        parts = _parts(variant, export.policy.cells, numbers)
         for suffix in ("h", "c"):
             name = f"epv_{variant}.{suffix}"
-            filled[name] = _fill(name, common | numbers | {"remember": remember})
+            filled[name] = _fill(name, common | numbers | parts)
     return filled
+
+
+def _parts(variant: str, cells: int, numbers: dict[str, str]) -> dict[str, str]:
+    """What the variants share, and what only a policy with cells has."""
+    names = {"variant": variant, "capital": variant.upper(), "signal": SIGNALS[variant]}
+    return {
+        "remember": _fill("remember.c", names),
+        "cell_member": CELLS[variant].format(cells) if cells else "",
+        "see": _fill(f"cells_{variant}.c" if cells else "cells_none.c", names | numbers),
+    }
 
 
 def checks(states: int, *, rounding: float) -> dict[str, str]:
@@ -102,41 +123,25 @@ def _fill(name: str, values: Mapping[str, object]) -> str:
     return Template((TEMPLATES / name).read_text(encoding="utf-8")).substitute(values)
 
 
-def _float_numbers(export: Export) -> dict[str, str]:
-    arrays, rows = [], []
-    for k, (weight, bias) in enumerate(export.policy.layers):
-        arrays.append(_array(f"const float WEIGHT_{k}[{weight.size}]", weight.astype(np.float32)))
-        arrays.append(_array(f"const float BIAS_{k}[{bias.size}]", bias.astype(np.float32)))
-        rows.append(f"    {{WEIGHT_{k}, BIAS_{k}, {weight.shape[1]}, {weight.shape[0]}}},\n")
-    return {
-        "centre": _listed(np.array([quantity.centre for quantity in LAYOUT])),
-        "scale": _listed(np.array([quantity.scale for quantity in LAYOUT])),
-        "limit": _listed(np.array([quantity.limit for quantity in LAYOUT])),
-        "period": _literal(export.period),
-        "longest": _literal(LONGEST_WAIT),
-        "arrays": "\n".join(arrays),
-        "network": "".join(rows),
+def _float_numbers(policy: LearnedPolicy, period: float) -> dict[str, str]:
+    return float_tables(policy) | {
+        "centre": listed(np.array([quantity.centre for quantity in LAYOUT])),
+        "scale": listed(np.array([quantity.scale for quantity in LAYOUT])),
+        "limit": listed(np.array([quantity.limit for quantity in LAYOUT])),
+        "period": literal(period),
+        "longest": literal(LONGEST_WAIT),
         "values": _values(FLOAT_VALUES),
     }
 
 
 def _fixed_numbers(fixed: FixedPolicy) -> dict[str, str]:
-    arrays, rows = [], []
-    for k, layer in enumerate(fixed.layers):
-        outputs, inputs = layer.weight.shape
-        arrays.append(_array(f"const int8_t WEIGHT_{k}[{layer.weight.size}]", layer.weight))
-        arrays.append(_array(f"const uint32_t FACTOR_{k}[{outputs}]", layer.factor))
-        arrays.append(_array(f"const int32_t BIAS_{k}[{outputs}]", layer.bias))
-        rows.append(f"    {{WEIGHT_{k}, FACTOR_{k}, BIAS_{k}, {inputs}, {outputs}, {layer.shift}}},\n")
-    return {
+    return fixed_tables(fixed) | {
         "longest_us": str(round(LONGEST_WAIT * 1e6)),
-        "centre": _listed(fixed.inputs.centre),
-        "reach": _listed(fixed.inputs.reach),
-        "factor": _listed(fixed.inputs.factor),
+        "centre": listed(fixed.inputs.centre),
+        "reach": listed(fixed.inputs.reach),
+        "factor": listed(fixed.inputs.factor),
         "factor_shift": str(fixed.inputs.shift),
-        "arrays": "\n".join(arrays),
-        "network": "".join(rows),
-        "tangent": _listed(fixed.tangent),
+        "tangent": listed(fixed.tangent),
         "values": _values(FIXED_VALUES),
     }
 
@@ -145,21 +150,3 @@ def _values(expressions: dict[str, str]) -> str:
     """Assignments to value[] in the order of the layout; a KeyError says that an entry is new."""
     known = expressions | CHANGES
     return "\n".join(f"    value[{i}] = {known[quantity.name]};" for i, quantity in enumerate(LAYOUT))
-
-
-def _array(declaration: str, values: NDArray) -> str:
-    return f"static {declaration} = {{{_listed(values)}}};\n"
-
-
-def _listed(values: NDArray) -> str:
-    """Numbers as C writes them, on indented lines of their own."""
-    text = ", ".join(_literal(value) for value in values.ravel())
-    return f"\n{fill(text, 100, initial_indent='    ', subsequent_indent='    ')}\n"
-
-
-def _literal(value: float | np.generic) -> str:
-    """A number in C; nine digits give a float back to the bit."""
-    if isinstance(value, (float, np.floating)):
-        text = f"{value:.9g}"
-        return f"{text}f" if any(mark in text for mark in ".e") else f"{text}.0f"
-    return f"{value}u" if isinstance(value, np.unsignedinteger) else str(value)

@@ -65,7 +65,7 @@ def readings_of(observations: NDArray) -> dict[str, NDArray]:
 def states_table(states: VisitedStates, margins: NDArray, fixed_actions: NDArray) -> str:
     """states.csv: episode, readings, observation, and what the policy and the integer code decide.
 
-    margins: (episodes · periods,) the policy's logit of on minus that of off.
+    margins: (episodes, periods) the policy's logit of on minus that of off.
     """
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
@@ -74,7 +74,6 @@ def states_table(states: VisitedStates, margins: NDArray, fixed_actions: NDArray
          "policy_action", "policy_margin", "fixed_action"]
     )  # fmt: skip
     readings = readings_of(states.observations)
-    margins = margins.reshape(states.actions.shape)
     for e, k in np.ndindex(states.actions.shape):
         numbers = [*(readings[name][e, k] for name in READINGS), *states.observations[e, k]]
         written = (f"{number:.9g}" for number in numbers)  # nine digits give a float back to the bit

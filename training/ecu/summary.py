@@ -32,11 +32,13 @@ def _cost(report: dict[str, Any], contract: dict[str, Any]) -> list[str]:
 
 def _loop(report: dict[str, Any]) -> list[str]:
     loop = report["closed_loop"]
+    width = max(len(name) for name in loop["controllers"])
     return [
         f"in closed loop, {loop['episodes']} episodes of {loop['duration_s']:g} s:",
         *(
-            f"  {name:8} stayed {row['C1_stayed']:.1%}, worst {row['C1_worst_excursion_bar']:.3f} bar, "
-            f"rms {row['rms_error_bar']:.4f} bar, {row['switchings_per_s']:.2f} switchings/s"
+            f"  {name:{width}} stayed {row['C1_stayed']:.1%}, "
+            f"worst {row['C1_worst_excursion_bar']:.3f} bar, rms {row['rms_error_bar']:.4f} bar, "
+            f"{row['switchings_per_s']:.2f} switchings/s"
             for name, row in loop["controllers"].items()
         ),
     ]

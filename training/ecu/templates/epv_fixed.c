@@ -9,7 +9,7 @@
  */
 #include "epv_fixed.h"
 
-enum { LAYERS = $layers, WIDEST = $widest, LONGEST_WAIT = $longest_wait };
+enum { LAYERS = $layers, WIDEST = $widest, CELLS = $cells, LONGEST_WAIT = $longest_wait };
 enum { PERIOD_US = EPV_FIXED_PERIOD_US, LONGEST_US = $longest_us };
 
 /* Of the observation's entries, in Pa, uA, us and 1/1000: the centre, the reach to either side, and what
@@ -92,11 +92,13 @@ static int32_t row(const layer *l, int j, const int16_t *signal)
     return scaled(sum, l->factor[j], l->shift) + l->bias[j];
 }
 
-void epv_fixed_logits(const int16_t observation[EPV_FIXED_INPUTS], int32_t logits[2])
+$see
+void epv_fixed_logits(epv_fixed_memory *m, const int16_t observation[EPV_FIXED_INPUTS], int32_t logits[2])
 {
-    int16_t buffers[2][WIDEST];
-    const int16_t *signal = observation;
+    int16_t seen[EPV_FIXED_INPUTS + CELLS], buffers[2][WIDEST];
+    const int16_t *signal = seen;
     int k, j;
+    see(m, observation, seen);
     for (k = 0; k < LAYERS - 1; k++) {
         int16_t *out = buffers[k % 2];
         for (j = 0; j < NETWORK[k].outputs; j++)
@@ -107,10 +109,10 @@ void epv_fixed_logits(const int16_t observation[EPV_FIXED_INPUTS], int32_t logit
         logits[j] = row(&NETWORK[LAYERS - 1], j, signal);
 }
 
-int epv_fixed_decide(const int16_t observation[EPV_FIXED_INPUTS])
+int epv_fixed_decide(epv_fixed_memory *m, const int16_t observation[EPV_FIXED_INPUTS])
 {
     int32_t logits[2];
-    epv_fixed_logits(observation, logits);
+    epv_fixed_logits(m, observation, logits);
     return logits[0] >= logits[1] ? 0 : 1;
 }
 
@@ -118,5 +120,5 @@ int epv_fixed_step(epv_fixed_memory *m, const epv_fixed_readings *now)
 {
     int16_t observation[EPV_FIXED_INPUTS];
     epv_fixed_observe(m, now, observation);
-    return epv_fixed_decide(observation);
+    return epv_fixed_decide(m, observation);
 }

@@ -38,7 +38,7 @@ typedef struct {
 typedef struct {
     int32_t p2[EPV_FIXED_HISTORY]; /* rings of the latest readings, Pa */
     int32_t p3[EPV_FIXED_HISTORY];
-    uint16_t waited; /* periods since the coil was switched, saturating */
+${cell_member}    uint16_t waited; /* periods since the coil was switched, saturating */
     uint8_t newest;  /* place of the newest readings in the rings */
     uint8_t coil;
     uint8_t begun;
@@ -51,10 +51,12 @@ int epv_fixed_step(epv_fixed_memory *memory, const epv_fixed_readings *now);
  * entry (contract.json); beyond its reach an entry saturates. */
 void epv_fixed_observe(epv_fixed_memory *memory, const epv_fixed_readings *now,
                        int16_t observation[EPV_FIXED_INPUTS]);
-int epv_fixed_decide(const int16_t observation[EPV_FIXED_INPUTS]);
+int epv_fixed_decide(epv_fixed_memory *memory, const int16_t observation[EPV_FIXED_INPUTS]);
 
-/* What the decision compares: {off, on}, 65536 stands for 1. */
-void epv_fixed_logits(const int16_t observation[EPV_FIXED_INPUTS], int32_t logits[2]);
+/* What the decision compares: {off, on}, 65536 stands for 1. A policy that remembers more than
+ * readings goes one period on with each call: call this or epv_fixed_decide, not both. */
+void epv_fixed_logits(epv_fixed_memory *memory, const int16_t observation[EPV_FIXED_INPUTS],
+                      int32_t logits[2]);
 
 #ifdef __cplusplus
 }

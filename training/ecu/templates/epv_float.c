@@ -5,7 +5,7 @@
  */
 #include "epv_float.h"
 
-enum { LAYERS = $layers, WIDEST = $widest, LONGEST_WAIT = $longest_wait };
+enum { LAYERS = $layers, WIDEST = $widest, CELLS = $cells, LONGEST_WAIT = $longest_wait };
 
 static const float PERIOD = $period;
 static const float LONGEST = $longest;
@@ -74,11 +74,13 @@ static float row(const layer *l, int j, const float *signal)
     return sum;
 }
 
-void epv_float_logits(const float observation[EPV_FLOAT_INPUTS], float logits[2])
+$see
+void epv_float_logits(epv_float_memory *m, const float observation[EPV_FLOAT_INPUTS], float logits[2])
 {
-    float buffers[2][WIDEST];
-    const float *signal = observation;
+    float seen[EPV_FLOAT_INPUTS + CELLS], buffers[2][WIDEST];
+    const float *signal = seen;
     int k, j;
+    see(m, observation, seen);
     for (k = 0; k < LAYERS - 1; k++) {
         float *out = buffers[k % 2];
         for (j = 0; j < NETWORK[k].outputs; j++)
@@ -89,10 +91,10 @@ void epv_float_logits(const float observation[EPV_FLOAT_INPUTS], float logits[2]
         logits[j] = row(&NETWORK[LAYERS - 1], j, signal);
 }
 
-int epv_float_decide(const float observation[EPV_FLOAT_INPUTS])
+int epv_float_decide(epv_float_memory *m, const float observation[EPV_FLOAT_INPUTS])
 {
     float logits[2];
-    epv_float_logits(observation, logits);
+    epv_float_logits(m, observation, logits);
     return logits[0] >= logits[1] ? 0 : 1; /* not-a-number compares false: 1, shut */
 }
 
@@ -100,5 +102,5 @@ int epv_float_step(epv_float_memory *m, const epv_float_readings *now)
 {
     float observation[EPV_FLOAT_INPUTS];
     epv_float_observe(m, now, observation);
-    return epv_float_decide(observation);
+    return epv_float_decide(m, observation);
 }

@@ -37,7 +37,7 @@ typedef struct {
 typedef struct {
     float p2[EPV_FLOAT_HISTORY]; /* rings of the latest readings, bar */
     float p3[EPV_FLOAT_HISTORY];
-    uint16_t waited; /* periods since the coil was switched, saturating */
+${cell_member}    uint16_t waited; /* periods since the coil was switched, saturating */
     uint8_t newest;  /* place of the newest readings in the rings */
     uint8_t coil;
     uint8_t begun;
@@ -50,10 +50,12 @@ int epv_float_step(epv_float_memory *memory, const epv_float_readings *now);
  * A reading that is not a number gives 1: the valve shuts. */
 void epv_float_observe(epv_float_memory *memory, const epv_float_readings *now,
                        float observation[EPV_FLOAT_INPUTS]);
-int epv_float_decide(const float observation[EPV_FLOAT_INPUTS]);
+int epv_float_decide(epv_float_memory *memory, const float observation[EPV_FLOAT_INPUTS]);
 
-/* What the decision compares: {off, on}. */
-void epv_float_logits(const float observation[EPV_FLOAT_INPUTS], float logits[2]);
+/* What the decision compares: {off, on}. A policy that remembers more than readings goes one
+ * period on with each call: call this or epv_float_decide, not both. */
+void epv_float_logits(epv_float_memory *memory, const float observation[EPV_FLOAT_INPUTS],
+                      float logits[2]);
 
 #ifdef __cplusplus
 }

@@ -22,7 +22,7 @@ int main(void)
 {
     int k, i, decided = 0, stepped = 0, repeated = 0, fixed = 0;
     float off = 0.0f, apart = 0.0f;
-    epv_float_memory memory;
+    epv_float_memory memory, given, copy; /* its own chain; Python's observations given */
     epv_fixed_memory fixed_memory;
     read_states("states.csv");
     for (k = 0; k < STATES; k++) {
@@ -32,15 +32,17 @@ int main(void)
         int coil;
         if (k == 0 || s->episode != STATE[k - 1].episode) {
             memset(&memory, 0, sizeof memory);
+            memset(&given, 0, sizeof given);
             memset(&fixed_memory, 0, sizeof fixed_memory);
         }
         epv_float_observe(&memory, &s->readings, observation);
         for (i = 0; i < EPV_FLOAT_INPUTS; i++)
             off = larger(off, observation[i] - s->observation[i]);
-        epv_float_logits(s->observation, logits);
+        copy = given;
+        epv_float_logits(&copy, s->observation, logits);
         apart = larger(apart, logits[1] - logits[0] - s->margin);
-        decided += epv_float_decide(s->observation) == s->action;
-        stepped += epv_float_decide(observation) == s->action;
+        decided += epv_float_decide(&given, s->observation) == s->action;
+        stepped += epv_float_decide(&memory, observation) == s->action;
         coil = epv_fixed_step(&fixed_memory, &integers);
         repeated += coil == s->fixed_action;
         fixed += coil == s->action;
