@@ -15,6 +15,7 @@ from typing import Any
 
 import pandas as pd
 
+from controllers.informed_pulse import InformedPulse
 from controllers.oracle import Oracle
 from controllers.tuned import tuned_controllers
 from epv_env.plant.commandline import (
@@ -65,7 +66,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         "--recurrent-seeds", type=int, default=2, help="training seeds that --recurrent holds"
     )
     parser.add_argument(
-        "--recurrent-timesteps", type=int, default=5_000_000, help="steps to train a missing one"
+        "--recurrent-timesteps", type=int, default=1_500_000, help="PPO's steps for a missing one"
     )
     parser.add_argument(
         "--tradeoff", type=Path, help="folder of training/tradeoff.py: its controllers join the front"
@@ -108,7 +109,7 @@ def contenders(chosen: argparse.Namespace) -> list[Contender]:
         name = next(iter(policies.values())).name
         runs = {f"{name}, {seed}": policy for seed, policy in policies.items()}
         found.append(Contender(name=name, runs=runs, learned=True))
-    others = [*tuned_controllers(), Oracle(threads=1)]
+    others = [*tuned_controllers(), InformedPulse(), Oracle(threads=1)]
     return found + [Contender(name=c.name, runs={c.name: c}) for c in others]
 
 
@@ -164,8 +165,8 @@ def main(arguments: list[str] | None = None) -> int:
     variants = finished_variants(chosen.tradeoff)
     blocks = plan([*everyone, *variants], chosen.scenarios, sizes)
     results = run_blocks(blocks, [*everyone, *variants], chosen)
-    contest = Contest(everyone, chosen.scenarios, results)
-    found = findings(contest, variants, trade_episodes=chosen.random)
+    contest = Contest(everyone, chosen.scenarios, results, variants)
+    found = findings(contest, trade_episodes=chosen.random)
     settings = {name: getattr(chosen, name) for name in (*QUICK, "quick")}
     print(write_tables(contest, found, settings=settings, out=chosen.out, pages=chosen.pages))
     traces, curves = same_episode(contest, chosen.duration), learning_curves(chosen)

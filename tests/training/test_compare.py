@@ -194,6 +194,21 @@ def test_a_rival_is_beaten_only_at_equal_or_fewer_switches(rival, met):
     assert [bar.met for bar in against_rival(c, *c.contenders)] == met
 
 
+def test_a_rival_that_switches_less_is_met_at_another_price():
+    """By the variant that switches most among those that switch no more; by none where it is worse."""
+    c = contest(PPO=episodes(50), other=episodes(50, breakdown=0.4, rms=0.15, switchings=3.0))
+    figures_at = {2.0: (2.9, 0.12), 5.0: (1.0, 0.11), 1.0: (3.5, 0.10)}
+    for price, (switchings, rms) in figures_at.items():
+        run = f"PPO, price {price:g}"
+        c.variants.append(Contender(name="PPO", runs={run: controller(run)}, price=price))
+        c.results[run, "calibrated", RANDOM] = episodes(50, switchings=switchings, rms=rms)
+    found = list(against_rival(c, *c.contenders))
+    assert [(bar.controller, bar.met) for bar in found] == [("PPO, price 2", True)] * 2
+    assert "120 against 150 mbar" in found[1].measured
+    c.results["PPO, price 2", "calibrated", RANDOM] = episodes(50, switchings=2.9, rms=0.2)
+    assert [bar.met for bar in against_rival(c, *c.contenders)] == [True, False]
+
+
 def test_the_oracle_is_a_limit_and_no_rival():
     c = contest(PPO=episodes(50), oracle=episodes(20, breakdown=0.25, rms=0.05))
     assert c.contenders[1].privileged
@@ -235,7 +250,7 @@ def test_a_dominated_controller_is_off_the_front():
     c = contest(
         good=episodes(9), worse=episodes(9, rms=0.2, breakdown=0.4), fast=episodes(9, switchings=1.0)
     )
-    found = trade(c, [], 5).set_index("controller")
+    found = trade(c, 5).set_index("controller")
     assert found["rms_error_bar_on_front"].to_dict() == {"good": False, "worse": False, "fast": True}
     assert set(found["episodes"]) == {5}
 

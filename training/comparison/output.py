@@ -48,15 +48,15 @@ class Findings:
     lost: list[dict[str, str | float]]
 
 
-def findings(c: Contest, variants: list[Contender], *, trade_episodes: int) -> Findings:
-    """Compute all tables. variants: join the trade-off, which uses the first `trade_episodes`."""
+def findings(c: Contest, *, trade_episodes: int) -> Findings:
+    """Compute all tables. trade_episodes: so many, the first, are the trade-off's."""
     learned = [each for each in c.contenders if each.learned]
     ours = learned[0] if learned else None
     return Findings(
         figures=scores.figures(c),
         scenarios=scores.by_scenario(c),
         means=scores.interquartile_means(c),
-        traded=scores.trade(c, variants, trade_episodes),
+        traded=scores.trade(c, trade_episodes),
         ours=ours,
         duels=pd.DataFrame() if ours is None else scores.duels(c, ours),
         bars=[bar for each in learned for bar in bars(c, each)],

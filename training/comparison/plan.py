@@ -23,6 +23,9 @@ BOUNDED = ("confidence", "sensitive_ten_percent")
 TRADED_ON = "sensitive_ten_percent"
 """Plant set on which switching is set against excursion."""
 
+BARS_ON = "calibrated"
+"""Plant set on which figures are set against each rival's at equal or fewer switchings."""
+
 LARGEST_BATCH = 512
 """Episodes side by side; larger batches are hardly faster, smaller ones resume in finer steps."""
 
@@ -39,8 +42,12 @@ class Expense(NamedTuple):
     """How many times fewer episodes it runs: the first of the others', so that the pairing holds."""
 
 
-EXPENSIVE = {"MPC": Expense(times=200, fewer=32), "oracle": Expense(times=200, fewer=32)}
-"""By contender."""
+EXPENSIVE = {
+    "MPC": Expense(times=200, fewer=32),
+    "oracle": Expense(times=200, fewer=32),
+    "pulse, informed": Expense(times=30, fewer=8),
+}
+"""By contender. The informed pulse's is the table of each plant."""
 
 CHEAP = Expense(times=1, fewer=1)
 
@@ -146,7 +153,7 @@ def plan(contenders: list[Contender], scenarios: list[str], sizes: Sizes) -> lis
 def _cases(contender: Contender, scenarios: list[str], sizes: Sizes) -> dict[tuple[str, str], int]:
     """Episodes of each run by plant set and scenario."""
     if contender.price is not None:
-        return {(TRADED_ON, RANDOM): sizes.random}
+        return {(plants, RANDOM): sizes.random for plants in (TRADED_ON, BARS_ON)}
     cases = {(p, scenario): sizes.of(p, scenario) for p in PLANTS for scenario in scenarios}
     if len(contender.runs) > 1:
         cases[TUNING_REGION, TUNING] = sizes.tuning

@@ -1,6 +1,6 @@
 """What a comparison's episodes say: figures of the aims, interquartile means, duels, Pareto front."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -47,6 +47,8 @@ class Contest:
     contenders: list[Contender]
     scenarios: list[str]
     results: Results
+    variants: list[Contender] = field(default_factory=list)
+    """Of the contenders by name, each optimised at another price of switching."""
 
     @cached_property
     def chosen(self) -> dict[str, str]:
@@ -56,6 +58,11 @@ class Contest:
     def metrics(self, contender: str, plants: str, scenario: str = RANDOM) -> EpisodeMetrics:
         """Episodes of a contender's chosen run."""
         return self.results[self.chosen[contender], plants, scenario]
+
+    def at_prices(self, contender: Contender) -> dict[str, str]:
+        """The runs of a contender at each price of switching, by the name that a table gives them."""
+        others = [run for v in self.variants if v.name == contender.name for run in v.runs]
+        return {contender.name: self.chosen[contender.name], **{run: run for run in others}}
 
     def scores(self, contender: Contender, plants: str, field: str) -> NDArray:
         """A field of every run, scenario and episode: (runs, scenarios, episodes).
@@ -160,14 +167,13 @@ FRONT = {
 """Figures that are set against the switchings."""
 
 
-def trade(c: Contest, variants: list[Contender], episodes: int) -> pd.DataFrame:
+def trade(c: Contest, episodes: int) -> pd.DataFrame:
     """A row per contender and variant: `summary` of the first episodes on TRADED_ON, and the front.
 
-    variants: controllers optimised at other prices of switching. FIGURE_on_front: no other row is as
-    good in the figure and in switchings, and better in one of them.
+    FIGURE_on_front: no other row is as good in the figure and in switchings, and better in one of them.
     """
     rows = []
-    for contender in [*c.contenders, *variants]:
+    for contender in [*c.contenders, *c.variants]:
         run = c.chosen[contender.name] if contender.price is None else next(iter(contender.runs))
         found = c.results[run, TRADED_ON, RANDOM].first(episodes)
         price = RewardWeights().switching if contender.price is None else contender.price
