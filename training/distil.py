@@ -9,7 +9,7 @@ got into: DAgger (Ross, Gordon and Bagnell, AISTATS 2011). Then PPO goes on from
 
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ from controllers.informed_pulse import InformedPulse
 from controllers.learned import CONTRACT_FILE, GatedUnit, LearnedPolicy, load_policy
 from controllers.pulse_table import PulseTables
 from epv_env.actions import OnOff
-from epv_env.observation import INDEX, LAYOUT
+from epv_env.observation import LAYOUT
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
 from training.imitation import SLIPS
@@ -78,11 +78,6 @@ class Distillation:
     validation_episodes: int = 512
     validation_duration: float = 6.0
     """Length of a validation episode [s]."""
-    trims: tuple[float, ...] = (0.0, 0.01, 0.02, 0.03, 0.04, 0.05)
-    """By how much p2 may be taken for higher than it is measured [bar]: what `trim` chooses from."""
-    trim_episodes: int = 2048
-    trim_duration: float = 10.0
-    """Length of an episode that a trim is chosen on [s]."""
 
 
 FULL = Distillation()
@@ -195,32 +190,6 @@ def distil(
             if (found := _validated(d, policy, options)) > best:
                 best, chosen = found, policy
     return chosen
-
-
-def trim(d: Distillation, policy: LearnedPolicy, *, options: dict[str, Any]) -> LearnedPolicy:
-    """The policy with the trim with which it leaves the band least often on validation episodes.
-
-    An imitation errs where it is unsure, and more to one side of the band than to the other. Equals are
-    decided by the mean return.
-    """
-    seeds = list(range(VALIDATION_SEED, VALIDATION_SEED + d.trim_episodes))
-    found = []
-    for bar in d.trims:
-        candidate = trimmed(policy, bar)
-        metrics, _ = run_episodes(candidate, seeds=seeds, duration=d.trim_duration, options=options)
-        found.append((int((~metrics.stayed).sum()), -float(metrics.episode_return.mean()), candidate))
-    return min(found, key=lambda each: each[:2])[2]
-
-
-def trimmed(policy: LearnedPolicy, bar: float) -> LearnedPolicy:
-    """A policy with a memory that acts as this one would if p2 were measured higher by so much [bar]."""
-    assert policy.cell is not None, "only a policy with a memory is trimmed"
-    row = INDEX["p2_error"]
-    change = np.float32(bar / LAYOUT[row].scale)
-    unit = policy.cell
-    cell = replace(unit, bias_input=unit.bias_input + change * unit.weight_input[:, row])
-    (weight, bias), *rest = policy.layers
-    return replace(policy, layers=[(weight, bias + change * weight[:, row]), *rest], cell=cell)
 
 
 def _lesson(

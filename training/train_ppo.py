@@ -47,8 +47,8 @@ QUICK_HYPERPARAMETERS: dict[str, Any] = {
 }  # fmt: skip
 
 QUICK_DISTILLATION: dict[str, Any] = {
-    "rounds": 2, "episodes": 32, "periods": 100, "batch": 16, "validations": 1,
-    "validation_episodes": 16, "validation_duration": 2.0, "trim_episodes": 16, "trim_duration": 2.0,
+    "rounds": 2, "plants": 16, "episodes": 32, "periods": 100, "batch": 16, "validations": 1,
+    "validation_episodes": 16, "validation_duration": 2.0,
 }  # fmt: skip
 
 

@@ -2,8 +2,6 @@
 
 from copy import deepcopy
 from dataclasses import replace
-from types import SimpleNamespace
-from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -18,7 +16,7 @@ from controllers.informed_pulse import InformedPulse
 from controllers.learned import WEIGHTS_FILE, PolicyError, load_policy
 from controllers.pulse_table import PulseTables, pulse_table
 from controllers.tuned import build, load_tunings
-from epv_env.observation import INDEX, LAYOUT
+from epv_env.observation import LAYOUT
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
@@ -30,8 +28,6 @@ from training.distil import (
     known_plants,
     policy_of,
     train_recurrent,
-    trim,
-    trimmed,
 )
 from training.ecu.exact import in_double, logits_along
 from training.policy_files import greedy_policy, put_layers, save_policy
@@ -47,8 +43,7 @@ OPTIONS = {
 }  # fmt: skip
 TINY = Distillation(
     memory=8, width=16, rounds=3, plants=4, episodes=16, periods=60, handover=2, kept=2, epochs=1,
-    batch=8, validations=2, validation_episodes=8, validation_duration=0.8, trims=(0.0, 0.05),
-    trim_episodes=8, trim_duration=0.8,
+    batch=8, validations=2, validation_episodes=8, validation_duration=0.8,
 )  # fmt: skip
 TINY_PPO = Hyperparameters(
     num_envs=8, width=16, n_steps=16, batch_size=64, episode_steps=30, imitation_epochs=1, validations=2,
@@ -137,33 +132,6 @@ def test_a_policy_whose_memory_is_missing_is_refused(student, tmp_path):
     save_file(without, tmp_path / WEIGHTS_FILE)
     with pytest.raises(PolicyError, match=r"lacks the array 'memory\.weight_input'"):
         load_policy(tmp_path)
-
-
-def test_a_trimmed_policy_takes_p2_for_higher(student, readings):
-    shifted = readings.copy()
-    shifted[..., INDEX["p2_error"]] += 0.04 / LAYOUT[INDEX["p2_error"]].scale
-    policy, high = policy_of(student), trimmed(policy_of(student), 0.04)
-    for each in (policy, high):
-        each.reset(6)
-    for part, higher in zip(readings, shifted, strict=True):
-        np.testing.assert_allclose(high.logits(part), policy.logits(higher), atol=1e-5)
-
-
-def test_the_trim_is_the_one_with_which_fewest_leave():
-    """Of equals, the one with the best return."""
-
-    def run(policy, *, seeds, duration, options):
-        left = {0.0: 3, 0.02: 1, 0.03: 1}[policy]
-        returns = {0.0: -10.0, 0.02: -12.0, 0.03: -11.0}[policy]
-        stayed = np.arange(len(seeds)) >= left
-        return SimpleNamespace(stayed=stayed, episode_return=np.array([returns])), None
-
-    d = replace(TINY, trims=(0.0, 0.02, 0.03))
-    with (
-        patch("training.distil.run_episodes", run),
-        patch("training.distil.trimmed", lambda _, bar: bar),
-    ):
-        assert trim(d, None, options={}) == 0.03  # type: ignore[arg-type]
 
 
 def test_an_observation_ends_with_what_the_policy_remembers_in_its_own_episode(student):

@@ -61,7 +61,7 @@ def used() -> dict[str, Span]:
     trained = chosen.seeds * h.num_envs
     counted = {
         "training": (seeds.TRAINING_SEED, trained),
-        "validation": (seeds.VALIDATION_SEED, max(h.validation_episodes, d.trim_episodes)),
+        "validation": (seeds.VALIDATION_SEED, max(h.validation_episodes, d.validation_episodes)),
         "distillation": (seeds.DISTILLATION_SEED, chosen.recurrent_seeds * d.rounds * d.episodes),
         "calibration": (seeds.CALIBRATION_SEED, export.EPISODES),
         "states": (seeds.STATES_SEED, export.EPISODES),
