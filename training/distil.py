@@ -122,22 +122,23 @@ def train_recurrent(
     *,
     folder: Path,
     resume: bool,
+    student: Path | None = None,
     quiet: bool = False,
     **task: Any,
 ) -> tuple[LearnedPolicy, TrainingLog]:
     """Train a student, kept in a folder within `folder`, and go on from it with PPO.
 
-    task: `train`'s other arguments. An interruption loses the student if it is not finished, and no more
-    of the rest than `train` does.
+    student: folder of a student that is there already. task: `train`'s other arguments. An interruption
+    loses the student if it is not finished, and no more of the rest than `train` does.
     """
-    kept = folder / STUDENT_FOLDER
-    if not (resume and (kept / CONTRACT_FILE).exists()):
+    kept = student or folder / STUDENT_FOLDER
+    if student is None and not (resume and (kept / CONTRACT_FILE).exists()):
         names = ("plant", "scenario", "parameters", "weights")
         options = {name: task[name] for name in names}
         plants = known_plants(d.plants, options, seed=task["seed"], quiet=quiet)
-        student = distil(d, InformedPulse(), plants, options=options, seed=task["seed"], quiet=quiet)
+        found = distil(d, InformedPulse(), plants, options=options, seed=task["seed"], quiet=quiet)
         period, provenance = OnOff.default_period, {"distillation": asdict(d), "seed": task["seed"]}
-        save_policy(student, kept, control_period=period, provenance=provenance)
+        save_policy(found, kept, control_period=period, provenance=provenance)
     return train(h, folder=folder, student=load_policy(kept), resume=resume, quiet=quiet, **task)
 
 

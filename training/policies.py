@@ -19,11 +19,13 @@ def trained_policy(
     seed: int,
     weights: RewardWeights | None = None,
     recurrent: bool = False,
+    student: Path | None = None,
 ) -> Controller:
     """PPO on the report's plant within ±10 %, or as it was trained before.
 
     weights: prices of the reward; None: the environment's own. recurrent: with a memory
-    (training/distil.py). An interrupted training goes on.
+    (training/distil.py). student: folder of the one that this goes on from; None: it is trained, too.
+    An interrupted training goes on.
     """
     if not (folder / CONTRACT_FILE).exists():
         from training.distil import train_recurrent  # torch takes seconds to import: only now
@@ -36,7 +38,7 @@ def trained_policy(
             "weights": chosen, "timesteps": timesteps, "seed": seed, "device": "cpu", "resume": True,
         }  # fmt: skip
         if recurrent:
-            policy, _ = train_recurrent(folder=folder, **task)
+            policy, _ = train_recurrent(folder=folder, student=student, **task)
         else:
             policy, _ = train(Hyperparameters(), folder=folder, **task)
         provenance = {"timesteps": timesteps, "seed": seed, "switching_price": chosen.switching}

@@ -2,8 +2,9 @@
 
     python training/tradeoff.py --prices 0.2 0.3 0.5 --out runs/tradeoff
 
-trains PPO and tunes classic controllers at every price; what is finished in --out is kept. Measured and
-drawn they are by training/compare.py --tradeoff runs/tradeoff.
+trains PPO and tunes classic controllers at every price; what is finished in --out is kept. With
+--student, PPO also goes on at every price from a policy with a memory. Measured and drawn they are by
+training/compare.py --tradeoff runs/tradeoff.
 """
 
 import argparse
@@ -30,6 +31,8 @@ from training.tune import TUNING_REGION, tune
 
 FOLDER = "price-{:g}"
 TUNED_FILE = "tuned.json"
+RECURRENT_FOLDER = "recurrent"
+"""Within that of a price."""
 
 
 def tuned_at(folder: Path, kinds: list[str], price: float, trials: int, seed: int) -> None:
@@ -66,8 +69,8 @@ def finished_variants(folder: Path | None) -> list[Contender]:
     for path in sorted(folder.glob("price-*")):
         price = float(path.name.removeprefix("price-"))
         controllers: list[Controller] = []
-        if (path / CONTRACT_FILE).exists():
-            controllers.append(load_policy(path))
+        learned = (path, path / RECURRENT_FOLDER)
+        controllers += [load_policy(each) for each in learned if (each / CONTRACT_FILE).exists()]
         if (path / TUNED_FILE).exists():
             tunings = load_tunings(path / TUNED_FILE)
             plant = Parameters.calibrated()
@@ -92,10 +95,15 @@ def main(arguments: list[str] | None = None) -> int:
         help="classic controllers to tune",
     )  # fmt: skip
     parser.add_argument("--trials", type=int, default=100, help="tuning evaluations of each of them")
+    parser.add_argument(
+        "--student", type=Path, help="folder `student` of a `train_ppo.py --recurrent` to go on from"
+    )
     parser.add_argument("--seed", type=int, default=0)
     chosen = parser.parse_args(arguments)
     check_positive(parser, chosen, "timesteps", "trials")
     check_not_negative(parser, chosen, "seed")
+    if chosen.student is not None:
+        load_policy(chosen.student)  # before the work, since it may refuse
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     for price in chosen.prices:
         folder = chosen.out / FOLDER.format(price)
@@ -104,6 +112,11 @@ def main(arguments: list[str] | None = None) -> int:
             folder, timesteps=chosen.timesteps, seed=chosen.seed,
             weights=RewardWeights(switching=price),
         )  # fmt: skip
+        if chosen.student is not None:
+            trained_policy(
+                folder / RECURRENT_FOLDER, timesteps=chosen.timesteps, seed=chosen.seed,
+                weights=RewardWeights(switching=price), recurrent=True, student=chosen.student,
+            )  # fmt: skip
     print(f"controllers in {chosen.out}; measure them with training/compare.py --tradeoff {chosen.out}")
     return 0
 

@@ -10,6 +10,10 @@ import pytest
 from controllers.tuned import KINDS, SEARCHING
 
 pytest.importorskip("stable_baselines3")
+from training.distil import Distillation, Student, policy_of
+from training.policy_files import save_policy
+from training.tradeoff import finished_variants
+
 pytestmark = pytest.mark.training
 
 ROOT = Path(__file__).parents[2]
@@ -108,12 +112,18 @@ def test_tuning_without_a_trial_is_refused(script, tmp_path):
 
 
 def test_the_tradeoff_in_its_shortest_form_keeps_what_is_done(tmp_path):
-    short = ("--prices", 0.2, "--timesteps", 16384, "--trials", 1)
+    student = policy_of(Student(Distillation(memory=4)))
+    save_policy(student, tmp_path / "student", control_period=5e-3, provenance={})
+    short = ("--student", tmp_path / "student", "--prices", 0.2, "--timesteps", 16384, "--trials", 1)
     script = "training/tradeoff.py"
     first = command(*short, "--out", tmp_path, script=script)
     assert first.returncode == 0, first.stderr
     folder = tmp_path / "price-0.2"
-    written = ("policy.safetensors", "tuned.json")
+    variants = {next(iter(each.runs)) for each in finished_variants(tmp_path)}
+    assert variants == {
+        f"{name}, price 0.2" for name in ("PPO", "PPO, recurrent", "hysteresis, extrapolating")
+    }
+    written = ("policy.safetensors", "tuned.json", "recurrent/policy.safetensors")
     before = [(folder / name).read_bytes() for name in written]
     assert json.loads(before[1])["search"]["switching_price"] == 0.2
     assert command(*short, "--out", tmp_path, script=script).returncode == 0
