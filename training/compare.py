@@ -66,7 +66,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         "--recurrent-seeds", type=int, default=2, help="training seeds that --recurrent holds"
     )
     parser.add_argument(
-        "--recurrent-timesteps", type=int, default=1_500_000, help="PPO's steps for a missing one"
+        "--recurrent-timesteps", type=int, default=5_000_000, help="PPO's steps for a missing one"
     )
     parser.add_argument(
         "--tradeoff", type=Path, help="folder of training/tradeoff.py: its controllers join the front"

@@ -39,12 +39,13 @@ NAME = "PPO, recurrent"
 STUDENT_FOLDER = "student"
 
 GOING_ON = Hyperparameters(
-    band_price=10.0, band_bar=0.4, sharpness=5.0, ent_coef=0.0, learning_rate=5e-5,
-    last_learning_rate=5e-6, n_steps=128, batch_size=8192, gae_lambda=0.98, first_validation=0.05,
+    band_price=10.0, band_bar=0.32, breakdown_price=2.0, sharpness=3.0, ent_coef=0.0,
+    learning_rate=1e-4, last_learning_rate=5e-6, n_steps=128, batch_size=8192, gae_lambda=0.98,
+    first_validation=0.05,
 )  # fmt: skip
 """PPO's, from a student on. One period more or less of a pulse is worth 200 mbar, so that exploring more
 than the student doubts teaches nothing but caution; and who can keep within the band may pay more for
-coming near its edge."""
+coming near its edge, and for a breakdown."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -48,6 +48,8 @@ class Hyperparameters:
     rare for a good policy that at the reward's own price learning would hardly notice."""
     band_bar: float = BAND_BAR
     """Half-width of the band that is priced so, at most C1's; a narrower one keeps a margin [bar]."""
+    breakdown_price: float = 0.0
+    """Of the shortfall below the target in training, unless the reward's own is higher."""
     imitation_epochs: int = 8
     """Passes over the demonstration that the model imitates first (training/imitation.py)."""
     sharpness: float = 1.0
@@ -148,15 +150,17 @@ def train(
 ) -> tuple[LearnedPolicy, TrainingLog]:
     """Train until `timesteps` and return the best policy that was validated (training/selection.py).
 
-    weights: prices of the reward; that of leaving the band is raised (`Hyperparameters.band_price`).
+    weights: prices of the reward; some are raised for the training (`Hyperparameters`).
     student: a policy to go on from; None: the model imitates the TEACHER first. What the student
     remembers with stays as it is.
     resume: go on from the folder's checkpoint. An interruption (Ctrl-C) leaves the newest checkpoint
     behind. A resumed run draws new episodes, so it is a continuation, not a repetition, of an
     uninterrupted one.
     """
-    price, edge = max(weights.band, h.band_price), min(weights.band_bar, h.band_bar)
-    weights = replace(weights, band=price, band_bar=edge)
+    weights = replace(
+        weights, band=max(weights.band, h.band_price), band_bar=min(weights.band_bar, h.band_bar),
+        breakdown=max(weights.breakdown, h.breakdown_price),
+    )  # fmt: skip
     torch.set_num_threads(1)  # sums do not depend on the machine's cores; the plant uses them all
     checkpoint = folder / CHECKPOINT_FILE
     done = 0

@@ -37,8 +37,6 @@ from training.evaluate import Comparison, as_text, compare
 from training.tune import TUNING_REGION
 
 CONFIG_FILE = "config.json"
-TIMESTEPS = {False: 5_000_000, True: 1_500_000}
-"""Without a memory, and with one: there PPO only goes on from what imitation has reached."""
 QUICK = {"timesteps": 65_536, "episodes": 16, "duration": 2.0}
 """The defaults under --quick: everything is done, too short to learn anything."""
 QUICK_HYPERPARAMETERS: dict[str, Any] = {
@@ -60,10 +58,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--out", type=writable_folder, default=Path("runs/ppo"), help="folder of results"
     )
-    parser.add_argument(
-        "--timesteps", type=int,
-        help="environment steps to train (default: 5 million, or 1.5 million with --recurrent)",
-    )  # fmt: skip
+    parser.add_argument("--timesteps", type=int, default=5_000_000, help="environment steps to train")
     parser.add_argument("--episodes", type=int, default=256, help="evaluation episodes per plant set")
     parser.add_argument("--duration", type=float, default=10.0, help="length of one of them [s]")
     parser.add_argument("--seed", type=int, default=0, help="of the training")
@@ -87,8 +82,6 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--resume", action="store_true", help="go on from the folder's checkpoint")
     chosen = parse_with_quick(parser, arguments, QUICK)
-    if chosen.timesteps is None:
-        chosen.timesteps = TIMESTEPS[chosen.recurrent]
     check_positive(parser, chosen, "timesteps", "episodes", "duration")
     check_not_negative(parser, chosen, "seed")
     return chosen
