@@ -57,8 +57,9 @@ bench: $(VENV)/.installed ## measure speed and memory of plant and identificatio
 tune: $(VENV)/.installed ## search the classic controllers' settings anew (minutes)
 	$(PY) training/tune.py --out controllers/tuned.json $(ARGS)
 
+STUDENT := runs/recurrent/seed-0/student
 tradeoff: $(VENV)/.installed ## optimise controllers at several prices of switching (half an hour)
-	$(PY) training/tradeoff.py $(ARGS)
+	$(PY) training/tradeoff.py $(if $(wildcard $(STUDENT)),--student $(STUDENT)) $(ARGS)
 
 results: $(VENV)/.installed ## compare all controllers, and write docs/controllers.md's figures (an hour; what is trained or run is kept)
 	$(PY) training/compare.py --recurrent runs/recurrent --policies runs/seeds --out runs/comparison \
