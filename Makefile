@@ -67,7 +67,7 @@ results: $(VENV)/.installed ## compare all controllers, and write docs/controlle
 
 robustness: $(VENV)/.installed ## sweep parameters, effects and conditions, and write docs/robustness.md's figures
 	$(PY) training/sweep.py --controllers "hysteresis, extrapolating" PWM pulse PPO=runs/ppo \
-		"PPO, recurrent=runs/recurrent/seed-0" \
+		"PPO, recurrent=runs/recurrent/seed-1" \
 		--out runs/robustness --images docs/images --pages docs/robustness.md $(ARGS)
 
 export: $(VENV)/.installed ## turn the policy of `make train` into C and ONNX (needs a C compiler)
