@@ -248,10 +248,13 @@ def test_all_seeds_count_beside_the_chosen_one():
 
 def test_a_dominated_controller_is_off_the_front():
     c = contest(
-        good=episodes(9), worse=episodes(9, rms=0.2, breakdown=0.4), fast=episodes(9, switchings=1.0)
-    )
+        good=episodes(9), worse=episodes(9, rms=0.2, breakdown=0.4), fast=episodes(9, switchings=1.0),
+        oracle=episodes(9, switchings=0.5, rms=0.01),
+    )  # fmt: skip
     found = trade(c, 5).set_index("controller")
-    assert found["rms_error_bar_on_front"].to_dict() == {"good": False, "worse": False, "fast": True}
+    assert found["rms_error_bar_on_front"].to_dict() == {
+        "good": False, "worse": False, "fast": True, "oracle": False,
+    }  # fmt: skip
     assert set(found["episodes"]) == {5}
 
 

@@ -170,18 +170,23 @@ FRONT = {
 def trade(c: Contest, episodes: int) -> pd.DataFrame:
     """A row per contender and variant: `summary` of the first episodes on TRADED_ON, and the front.
 
-    FIGURE_on_front: no other row is as good in the figure and in switchings, and better in one of them.
+    FIGURE_on_front: no other row is as good in the figure and in switchings, and better in one of them;
+    who sees the plant is a limit, and not on it.
     """
-    rows = []
+    rows, fair = [], []
     for contender in [*c.contenders, *c.variants]:
         run = c.chosen[contender.name] if contender.price is None else next(iter(contender.runs))
         found = c.results[run, TRADED_ON, RANDOM].first(episodes)
         price = RewardWeights().switching if contender.price is None else contender.price
         rows.append({"controller": contender.name, "switching_price": price, **summary(found)})
+        fair.append(not contender.privileged)
     table = pd.DataFrame(rows)
     for column in FRONT:
-        points = zip(table["switchings_per_s"], table[column], strict=True)
-        table[f"{column}_on_front"] = pareto_front(points)
+        rivals = table.loc[fair]
+        table[f"{column}_on_front"] = False
+        table.loc[fair, f"{column}_on_front"] = pareto_front(
+            zip(rivals["switchings_per_s"], rivals[column], strict=True)
+        )
     return table
 
 
