@@ -25,6 +25,7 @@ from controllers.learned import CONTRACT_FILE, GatedUnit, LearnedPolicy, load_po
 from controllers.pulse_table import PulseTables
 from epv_env.actions import OnOff
 from epv_env.observation import LAYOUT
+from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
 from training.imitation import SLIPS
@@ -140,19 +141,30 @@ def train_recurrent(
         found = distil(d, InformedPulse(), plants, options=options, seed=task["seed"], quiet=quiet)
         period, provenance = OnOff.default_period, {"distillation": asdict(d), "seed": task["seed"]}
         save_policy(found, kept, control_period=period, provenance=provenance)
-    return train(h, folder=folder, student=load_policy(kept), resume=resume, quiet=quiet, **task)
+    return train(h, folder=folder, student=load_student(kept, h), resume=resume, quiet=quiet, **task)
 
 
-def known_plants(
-    count: int, options: dict[str, Any], *, seed: int, quiet: bool
-) -> list[Mapping[str, float]]:
+def load_student(folder: Path, h: Hyperparameters = GOING_ON) -> LearnedPolicy:
+    """A policy that PPO can go on from. Raises ValueError if it cannot, PolicyError if it is damaged."""
+    student = load_policy(folder)
+    widths = [len(bias) for _, bias in student.layers[:-1]]
+    if student.cell is None or widths != [h.width, h.width]:
+        raise ValueError(
+            f"the policy in {folder} has {student.cells} cells and hidden layers of {widths}: PPO goes "
+            f"on from a policy with a memory and layers of {[h.width, h.width]}, give the folder "
+            f"`{STUDENT_FOLDER}` that `python training/train_ppo.py --recurrent` wrote"
+        )
+    return student
+
+
+def known_plants(count: int, options: dict[str, Any], *, seed: int, quiet: bool) -> list[Parameters]:
     """Plants drawn from the environment's region, for which the informed pulse has its tables ready."""
     plant: Plant = options["plant"]
     region, rng = Region.named(options["parameters"], plant.parameters), np.random.default_rng(seed)
     plants = [region.draw(rng) for _ in range(count)]
     for each in tqdm(plants, desc="tables", unit="plant", disable=quiet):
         PulseTables.of([each])
-    return list(plants)
+    return plants
 
 
 def distil(

@@ -26,10 +26,7 @@ def greedy_policy(model: PPO, student: LearnedPolicy | None = None) -> LearnedPo
 
 
 def put_layers(model: PPO, policy: LearnedPolicy, sharpness: float) -> None:
-    """Make the policy's layers the model's actor, its logits times `sharpness`.
-
-    Raises RuntimeError if the shapes differ.
-    """
+    """Make the policy's layers the model's actor, of the same shapes; its logits times `sharpness`."""
     *hidden, (weight, bias) = policy.layers
     layers = [*hidden, (sharpness * weight, sharpness * bias)]
     for layer, (weight, bias) in zip(_linear_layers(model), layers, strict=True):

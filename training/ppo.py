@@ -1,6 +1,7 @@
 """PPO on the native vector environment: hyperparameters, model, training with selection and resume."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
-from controllers.learned import LearnedPolicy
+from controllers.learned import GatedUnit, LearnedPolicy
 from controllers.tuned import build, load_tunings
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import BAND_BAR, RewardWeights
@@ -92,11 +93,11 @@ def make_training_env(
     parameters: str,
     seed: int,
     weights: RewardWeights,
-    student: LearnedPolicy | None = None,
+    cell: GatedUnit | None = None,
 ) -> VecEnvWrapper:
     """Episodes on plants drawn from a region, "confidence" or another (epv_env.settings).
 
-    student: a policy whose memory ends the observations (training/remembering.py), if it has one.
+    cell: a unit whose memory ends the observations (training/remembering.py).
     Trainings with different seeds meet different episodes. Raises ValueError for a seed that is too
     large (training/seeds.py).
     """
@@ -111,7 +112,7 @@ def make_training_env(
     )
     env.seed(training_seeds(seed, h.num_envs)[0])
     scaled = ScaledReward(VecMonitor(env), h.reward_scale)
-    return RememberingEnv(scaled, student.cell) if student and student.cell else scaled
+    return RememberingEnv(scaled, cell) if cell else scaled
 
 
 def make_model(h: Hyperparameters, env: VecEnv, *, seed: int, device: str) -> PPO:
@@ -170,7 +171,7 @@ def train(
         "scenario": scenario,
         "weights": weights,
     }
-    env = make_training_env(h, seed=seed, student=student, **task)
+    env = make_training_env(h, seed=seed, cell=student.cell if student else None, **task)
     model = make_model(h, env, seed=seed, device=device)
     if resume and checkpoint.exists():
         model.set_parameters(str(checkpoint), device=device)
@@ -184,17 +185,14 @@ def train(
             model, example, env, steps=h.episode_steps - 1, epochs=h.imitation_epochs, seed=seed,
             learn_actor=student is None,
         )  # fmt: skip
-
-    def policy_of(trained: PPO) -> LearnedPolicy:
-        return greedy_policy(trained, student)
-
+    greedy = partial(greedy_policy, student=student)
     selection = Selection(
         folder,
         points=validation_points(timesteps, first_share=h.first_validation, count=h.validations),
         episodes=h.validation_episodes,
         duration=h.validation_duration,
         options=task,
-        controller=policy_of,
+        controller=greedy,
     )
     log = TrainingLog(folder, timesteps, quiet=quiet)
     callbacks: list[BaseCallback] = [
@@ -210,4 +208,4 @@ def train(
             log.save()
             raise
     selection.restore_best(model)
-    return policy_of(model), log
+    return greedy(model), log

@@ -103,7 +103,9 @@ def main(arguments: list[str] | None = None) -> int:
     check_positive(parser, chosen, "timesteps", "trials")
     check_not_negative(parser, chosen, "seed")
     if chosen.student is not None:
-        load_policy(chosen.student)  # before the work, since it may refuse
+        from training.distil import load_student  # torch takes seconds to import: only now
+
+        load_student(chosen.student)  # before the work, since it may refuse
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     for price in chosen.prices:
         folder = chosen.out / FOLDER.format(price)

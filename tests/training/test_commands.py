@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -109,6 +110,20 @@ def test_tuning_without_a_trial_is_refused(script, tmp_path):
     assert result.returncode == 2
     assert "--trials must be positive" in result.stderr
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("shape", [{"memory": 4, "width": 8}, None])
+def test_the_tradeoff_goes_on_from_no_other_kind_of_policy(shape, tmp_path):
+    """One of other layers, and one without a memory."""
+    wrong = policy_of(Student(Distillation(**(shape or {}))))
+    wrong = wrong if shape else replace(wrong, cell=None)
+    save_policy(wrong, tmp_path / "wrong", control_period=5e-3, provenance={})
+    out = tmp_path / "out"
+    result = command("--student", tmp_path / "wrong", "--out", out, script="training/tradeoff.py")
+    assert result.returncode == 2
+    assert "give the folder `student`" in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert not out.exists()
 
 
 def test_the_tradeoff_in_its_shortest_form_keeps_what_is_done(tmp_path):

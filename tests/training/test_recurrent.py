@@ -138,7 +138,7 @@ def test_an_observation_ends_with_what_the_policy_remembers_in_its_own_episode(s
     """Also the last one of an episode, which comes with the first one of the next."""
     policy = policy_of(student)
     h = replace(TINY_PPO, num_envs=3, episode_steps=5)
-    env = make_training_env(h, seed=0, student=policy, **OPTIONS)
+    env = make_training_env(h, seed=0, cell=policy.cell, **OPTIONS)
     entries = len(LAYOUT)
     policy.reset(3)
     first = shown = np.asarray(env.reset())
@@ -163,7 +163,7 @@ def layers_alone(policy, observations):
 def test_ppo_goes_on_from_the_student(student, readings):
     """Its actor is the student's, and its policy has the student's unit; sharper, it doubts less."""
     policy = policy_of(student)
-    env = make_training_env(TINY_PPO, seed=0, student=policy, **OPTIONS)
+    env = make_training_env(TINY_PPO, seed=0, cell=policy.cell, **OPTIONS)
     model = make_model(TINY_PPO, env, seed=4, device="cpu")
     assert not same(greedy_policy(model, policy), policy)
     put_layers(model, policy, 1.0)
