@@ -52,11 +52,10 @@ class GatedUnit:
         """The next memory (n, m) after observations (n, inputs)."""
         new = dense(observations, self.weight_input, self.bias_input)
         old = dense(memory, self.weight_memory, self.bias_memory)
-        (new_reset, new_update, new_value), (old_reset, old_update, old_value) = (
-            np.split(part, 3, axis=1) for part in (new, old)
-        )
-        update = _logistic(new_update + old_update)
-        candidate = np.tanh(new_value + _logistic(new_reset + old_reset) * old_value)
+        m = self.width
+        gates = _logistic(new[:, : 2 * m] + old[:, : 2 * m])
+        reset, update = gates[:, :m], gates[:, m:]
+        candidate = np.tanh(new[:, 2 * m :] + reset * old[:, 2 * m :])
         return (1 - update) * candidate + update * memory
 
 

@@ -157,19 +157,20 @@ class LimitingTask:
         switchings = self._switch(on_time, action)
         time = self.time()
         consumption = self.consumption.mean_flow(time, self.period)
-        before = State(*(field.copy() for field in self.valves.state))
+        state = self.valves.state
+        before = State(*(field.copy() for field in state))
         self._drive(on_time, time, consumption)
         lost = self._restore_lost(before)
         self.steps += 1
 
-        error = self.valves.state.p2 / BAR - self.target
+        error = state.p2 / BAR - self.target
         highest = self.valves.highest_p2 / BAR - self.target
         lowest = self.valves.lowest_p2 / BAR - self.target
         deviation = np.where(highest > -lowest, highest, lowest)
-        failed = lost | (self.valves.state.p2 <= EMPTY_CIRCUIT_BAR * BAR)
+        failed = lost | (state.p2 <= EMPTY_CIRCUIT_BAR * BAR)
         settled = self.time() > self.settings.settling_time
         self.violated |= settled & (np.abs(deviation) > BAND_BAR)
-        vented_kg = self.valves.state.air_vented - before.air_vented
+        vented_kg = state.air_vented - before.air_vented
         terms = reward_terms(
             self.settings.weights,
             period=self.period,

@@ -5,7 +5,9 @@ be a step or a ramp; the flow over a control period is the exact mean of the pro
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -108,16 +110,18 @@ def draw_profile(scenario: str | Scenario, rng: np.random.Generator) -> Profile:
     return SCENARIOS[scenario].draw(rng)
 
 
-def _ramped(time: NDArray, start: NDArray, width: NDArray) -> NDArray:
+@numba.njit(cache=True)
+def _ramped(time: float, start: float, width: float) -> float:
     """Integral up to `time` of a flow that rises from 0 to 1 over `width` from `start` [s]."""
-    since = np.maximum(time - start, 0.0)
-    width = np.maximum(width, _SHORTEST_RAMP)
-    rising = np.minimum(since, width)
-    return rising * rising / (2 * width) + np.maximum(since - width, 0.0)
+    since = max(time - start, 0.0)
+    width = max(width, _SHORTEST_RAMP)
+    rising = min(since, width)
+    return rising * rising / (2 * width) + max(since - width, 0.0)
 
 
-def _passed(application: NDArray, begin: NDArray, end: NDArray) -> NDArray:
-    """Air taken by one application per valve (5, n) between two times (n,) [kg]."""
+@numba.njit(cache=True)
+def _passed(application: NDArray, begin: float, end: float) -> float:
+    """Air taken by an application (5,) between two times [kg]."""
     start, rise, hold, fall, flow = application
     release = start + rise + hold
     grown = _ramped(end, start, rise) - _ramped(begin, start, rise)
@@ -125,24 +129,53 @@ def _passed(application: NDArray, begin: NDArray, end: NDArray) -> NDArray:
     return flow * (grown - faded)
 
 
+class Progress(NamedTuple):
+    """n sequences of applications, and how far they have been read."""
+
+    applications: NDArray
+    """(n, APPLICATIONS, 5)"""
+    span: NDArray
+    """Length of each sequence [s]."""
+    now: NDArray
+    """Number of the application under way, or else of the next one."""
+    offset: NDArray
+    """When the sequence began last [s]."""
+
+
+@numba.njit(cache=True)
+def _taken(p: Progress, time: NDArray, period: float) -> NDArray:
+    """Air taken by each valve's applications (n,) in the period from `time` (n,) on [kg]."""
+    taken = np.zeros(len(time))
+    for i, applications in enumerate(p.applications):
+        start, rise, hold, fall, _ = applications[p.now[i]]
+        if time[i] - p.offset[i] >= start + rise + hold + max(fall, _SHORTEST_RAMP):
+            p.now[i] += 1
+        if p.now[i] == APPLICATIONS:
+            p.now[i] = 0
+            p.offset[i] += p.span[i]
+        begin = time[i] - p.offset[i]
+        for application in applications[p.now[i] : p.now[i] + 2]:
+            taken[i] += _passed(application, begin, begin + period)
+    return taken
+
+
 class Profiles:
     """The consumption of n episodes, read forward in time."""
 
     def __init__(self, n: int):
         self._leak = np.zeros(n)
-        self._applications = np.zeros((5, APPLICATIONS, n))
-        self._span = np.ones(n)
-        self._now = np.zeros(n, dtype=np.int64)
-        self._offset = np.zeros(n)
-        self._all = np.arange(n)
+        self._progress = Progress(
+            applications=np.zeros((n, APPLICATIONS, 5)), span=np.ones(n),
+            now=np.zeros(n, dtype=np.int64), offset=np.zeros(n),
+        )  # fmt: skip
 
     def start(self, i: int, profile: Profile) -> None:
         """Begin episode i with a profile at time 0."""
         self._leak[i] = profile.leak
-        self._applications[:, :, i] = profile.applications
-        self._span[i] = profile.span
-        self._now[i] = 0
-        self._offset[i] = 0.0
+        self._progress.applications[i] = profile.applications.T
+        self._progress.span[i] = profile.span
+        self._progress.now[i] = 0
+        self._progress.offset[i] = 0.0
 
     def mean_flow(self, time: NDArray, period: float) -> NDArray:
         """Mean consumption over the period that starts at `time` (n,) [kg/s].
@@ -150,15 +183,4 @@ class Profiles:
         Applications do not overlap, so at most the present one and the next can touch a period that
         is shorter than a pause.
         """
-        begin = time - self._offset
-        start, rise, hold, fall, _ = self._applications[:, self._now, self._all]
-        self._now += begin >= start + rise + hold + np.maximum(fall, _SHORTEST_RAMP)
-        wrapped = self._now == APPLICATIONS
-        self._now[wrapped] = 0
-        self._offset += self._span * wrapped
-        begin = time - self._offset
-        present = self._applications[:, self._now, self._all]
-        following = self._applications[:, np.minimum(self._now + 1, APPLICATIONS - 1), self._all]
-        taken = _passed(present, begin, begin + period)
-        taken += np.where(self._now + 1 < APPLICATIONS, _passed(following, begin, begin + period), 0)
-        return self._leak + taken / period
+        return self._leak + _taken(self._progress, time, period) / period
