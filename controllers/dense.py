@@ -11,13 +11,21 @@ from numpy.typing import NDArray
 
 @numba.njit(cache=True, nogil=True)
 def _sums(signal: NDArray, weight: NDArray, bias: NDArray) -> NDArray:
-    out = np.empty((signal.shape[0], weight.shape[1]), signal.dtype)
-    for row in range(signal.shape[0]):
-        for j in range(weight.shape[1]):
+    inputs, outputs = weight.shape
+    out = np.empty((len(signal), outputs), signal.dtype)
+    for row in range(len(signal)):
+        for j in range(outputs):
             out[row, j] = bias[j]
-        for i in range(weight.shape[0]):  # outputs side by side: that is what a CPU can vectorise
-            for j in range(weight.shape[1]):
+        for i in range(inputs % 4):  # outputs side by side: that is what a CPU can vectorise
+            for j in range(outputs):
                 out[row, j] += signal[row, i] * weight[i, j]
+        for i in range(inputs % 4, inputs, 4):  # and the row of them is fetched a quarter as often
+            a, b, c, d = signal[row, i], signal[row, i + 1], signal[row, i + 2], signal[row, i + 3]
+            for j in range(outputs):
+                total = out[row, j] + a * weight[i, j]
+                total = total + b * weight[i + 1, j]
+                total = total + c * weight[i + 2, j]
+                out[row, j] = total + d * weight[i + 3, j]
     return out
 
 

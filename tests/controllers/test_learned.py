@@ -24,6 +24,20 @@ def test_a_layer_is_the_product_of_matrices():
     np.testing.assert_allclose(dense(signal, weight, bias), signal @ weight.T + bias, atol=1e-5)
 
 
+@pytest.mark.parametrize("inputs", range(1, 10))
+def test_a_layer_adds_its_inputs_in_their_order(inputs):
+    """To the bit, as the exported C does; another order rounds otherwise."""
+    rng = np.random.default_rng(inputs)
+    (weight, bias), signal = layer(rng, inputs, 5), rng.normal(size=(200, inputs)).astype("f4")
+    total = np.broadcast_to(bias, (200, 5))
+    for i in range(inputs):
+        total = total + signal[:, i : i + 1] * weight[:, i]
+    np.testing.assert_array_equal(dense(signal, weight, bias), total)
+    if inputs > 2:
+        other = dense(signal[:, ::-1], weight[:, ::-1], bias)
+        assert not np.array_equal(other, total)
+
+
 def test_a_state_is_decided_the_same_in_every_batch():
     """To the bit: also where the two logits are all but equal."""
     rng = np.random.default_rng(1)
