@@ -28,8 +28,9 @@ from epv_env.plant.consumption import MIXED
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.valves import available_cores
 from identification.journal import Journal
+from training.comparison.blocks import Block, collect, plan
 from training.comparison.output import PARTS, findings, write_figures, write_tables
-from training.comparison.plan import Block, Contender, Results, Sizes, collect, plan
+from training.comparison.plan import Contender, Results, Sizes
 from training.comparison.scores import Contest
 from training.generated import check_pages
 from training.metrics import EpisodeMetrics
@@ -63,7 +64,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--timesteps", type=int, default=2_000_000, help="steps to train a missing one")
     parser.add_argument("--recurrent", type=writable_folder, help="the same for policies with a memory")
     parser.add_argument(
-        "--recurrent-seeds", type=int, default=2, help="training seeds that --recurrent holds"
+        "--recurrent-seeds", type=int, default=10, help="training seeds that --recurrent holds"
     )
     parser.add_argument(
         "--recurrent-timesteps", type=int, default=5_000_000, help="PPO's steps for a missing one"

@@ -1,7 +1,7 @@
 """The comparison's command in its short form, its plan, its bars, and its generated pages."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -11,26 +11,29 @@ pytest.importorskip("joblib")
 pytest.importorskip("stable_baselines3")
 
 from controllers.hysteresis import Hysteresis
+from epv_env.plant.consumption import MIXED
+from epv_env.plant.plantfile import Plant
 from tests.training.policies import random_layers, write_policy
 from training.compare import main, parse
 from training.comparison.bars import against_oracle, against_rival, leaving, lost
+from training.comparison.blocks import collect, plan
 from training.comparison.output import PARTS, RESULTS_FILE, TABLES_FILE
 from training.comparison.plan import (
     EXPENSIVE,
-    PLANTS,
     TUNING,
     Contender,
     Expense,
     Sizes,
     chosen_run,
-    plan,
 )
 from training.comparison.scores import Contest, duels, figures, trade
 from training.distil import NAME, Distillation, Student, policy_of
+from training.evaluate import PLANTS
 from training.generated import check_pages, fill, markdown
 from training.metrics import EpisodeMetrics
 from training.policy_files import save_policy
-from training.scenarios import RANDOM
+from training.scenarios import EVALUATION, RANDOM
+from training.sweeps.tasks import Study
 from training.tune import TUNING_REGION
 
 pytestmark = pytest.mark.training
@@ -140,13 +143,19 @@ def test_a_second_run_takes_what_is_there_and_says_the_same(finished):
     assert {name: (out / name).read_bytes() for name in before} == before
 
 
-def test_the_blocks_hold_as_many_episodes_as_the_sizes_say_in_batches():
-    blocks = plan([classic("a")], [RANDOM, "steps"], SIZES)
+def counted(blocks):
+    """Episodes by plant set and scenario."""
     counts = {}
     for block in blocks:
-        key = block.plants, block.scenario
-        counts[key] = counts.get(key, 0) + block.count
-    assert counts == {
+        for scenario in block.scenarios:
+            key = block.plants, scenario
+            counts[key] = counts.get(key, 0) + block.count
+    return counts
+
+
+def test_the_blocks_hold_as_many_episodes_as_the_sizes_say_in_batches():
+    blocks = plan([classic("a")], [RANDOM, "steps"], SIZES)
+    assert counted(blocks) == {
         ("calibrated", RANDOM): 20, ("calibrated", "steps"): 10, ("confidence", RANDOM): 1000,
         ("sensitive_ten_percent", RANDOM): 1000, ("sensitive_ten_percent", "steps"): 10,
     }  # fmt: skip
@@ -154,11 +163,45 @@ def test_the_blocks_hold_as_many_episodes_as_the_sizes_say_in_batches():
     assert len({block.name for block in blocks}) == len(blocks)
 
 
+def test_scenarios_of_one_supply_and_voltage_run_side_by_side():
+    blocks = plan([classic("a")], list(EVALUATION), SIZES)
+    alone = {b.scenarios for b in blocks if b.plants == "calibrated" and len(b.scenarios) == 1}
+    others = ("compressor off", "low supply", "low target", "low battery", RANDOM)
+    assert alone == {(name,) for name in others}
+    many = plan([classic("a")], list(EVALUATION), replace(SIZES, named=200))
+    assert max(len(b.scenarios) * b.count for b in many) <= 512
+    expected = {s: 200 if s != RANDOM else 20 for s in EVALUATION}
+    assert {s: n for (p, s), n in counted(many).items() if p == "calibrated"} == expected
+
+
+def test_an_episode_is_the_same_beside_other_scenarios_as_alone():
+    """To the bit; and in which scenario it is matters."""
+    tried = ["steps", "leak", "high target"]
+    apart = [plan([classic("a")], [name], replace(SIZES, named=3))[0] for name in tried]
+    (beside,) = (b for b in plan([classic("a")], tried, replace(SIZES, named=3)) if len(b.scenarios) > 1
+                 and b.plants == "calibrated")  # fmt: skip
+    study = Study(
+        controllers={"a": controller("a")}, plant=Plant.calibrated(), scenario=MIXED, duration=0.8
+    )
+    together = collect([beside], {beside.name: beside.run(study)})
+    alone = collect(apart, {block.name: block.run(study) for block in apart})
+    assert together.keys() == alone.keys()
+    returns = {key[2]: found.episode_return.tolist() for key, found in together.items()}
+    assert returns == {key[2]: found.episode_return.tolist() for key, found in alone.items()}
+    assert returns["steps"] != returns["leak"] != returns["high target"]
+
+
 def test_an_expensive_controller_runs_the_first_of_the_others_episodes(monkeypatch):
-    monkeypatch.setitem(EXPENSIVE, "slow", Expense(times=100, fewer=4))
+    monkeypatch.setitem(EXPENSIVE, "slow", Expense(times=100, fewer=4, random=15))
     (slow, cheap) = (plan([classic(name)], ["steps"], SIZES)[0] for name in ("slow", "a"))
     assert (slow.first_seed, slow.count, cheap.count) == (cheap.first_seed, 3, 10)
     assert slow.episodes == 300  # its cost, in those of a cheap one
+    random = counted(plan([classic("slow")], [RANDOM], SIZES))
+    assert random == {
+        ("calibrated", RANDOM): 15, ("confidence", RANDOM): 250, ("sensitive_ten_percent", RANDOM): 250
+    }  # fmt: skip
+    few = counted(plan([classic("slow")], [RANDOM], replace(SIZES, random=2)))
+    assert few["calibrated", RANDOM] == 2
 
 
 def test_the_training_seed_is_chosen_on_the_tuning_scenarios_alone():

@@ -9,7 +9,8 @@ pytest.importorskip("stable_baselines3")
 from controllers.hysteresis import Hysteresis
 from epv_env.plant.plantfile import Plant
 from training import compare, export, seeds, sweep
-from training.comparison.plan import TUNING, Contender, Sizes, plan
+from training.comparison.blocks import plan
+from training.comparison.plan import TUNING, Contender, Sizes
 from training.distil import Distillation
 from training.ppo import Hyperparameters
 from training.sweeps.plan import Size, cells, chosen_points, searches
@@ -32,7 +33,7 @@ def compared() -> dict[str, Span]:
     runs = {f"{k}": Hysteresis(open_below=-0.1, shut_above=0.0) for k in range(2)}
     sizes = Sizes(named=chosen.named, random=chosen.random, bound=chosen.bound, tuning=chosen.tuning)
     blocks = plan([Contender(name="PPO", runs=runs, learned=True)], chosen.scenarios, sizes)
-    spans = [(b.scenario == TUNING, (b.first_seed, b.first_seed + b.count)) for b in blocks]
+    spans = [(TUNING in b.scenarios, (b.first_seed, b.first_seed + b.count)) for b in blocks]
     return {
         "tuning": joined(*(span for tuned, span in spans if tuned)),
         "evaluation": joined(*(span for tuned, span in spans if not tuned)),

@@ -1,20 +1,12 @@
-"""Who is compared on what: contenders, and the blocks of episodes that each of them runs."""
+"""Who is compared on what: contenders, and how many episodes each of them runs."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
-from functools import partial
-from typing import Any, NamedTuple
-
-import joblib
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
 
 from controllers.base import Controller, Privileged
-from training.evaluate import PLANTS, plant_region
 from training.metrics import EpisodeMetrics
-from training.scenarios import EVALUATION, RANDOM
-from training.seeds import EVALUATION_SEED, TUNING_SEED
-from training.sweeps.tasks import Study
+from training.scenarios import RANDOM
 from training.tune import TUNING_REGION
 
 BOUNDED = ("confidence", "sensitive_ten_percent")
@@ -25,9 +17,6 @@ TRADED_ON = "sensitive_ten_percent"
 
 BARS_ON = "calibrated"
 """Plant set on which figures are set against each rival's at equal or fewer switchings."""
-
-LARGEST_BATCH = 512
-"""Episodes side by side; larger batches are hardly faster, smaller ones resume in finer steps."""
 
 TUNING = "tuning"
 """The scenarios of the tuning, on which one of the training seeds is chosen."""
@@ -40,16 +29,23 @@ class Expense(NamedTuple):
     """CPU time of an episode, in those of the others (measured, 512 side by side against 16)."""
     fewer: int
     """How many times fewer episodes it runs: the first of the others', so that the pairing holds."""
+    random: int
+    """But of the random scenario at least so many, if the others run as many."""
+
+    def episodes(self, scenario: str, wanted: int) -> int:
+        """How many it runs where the others run so many."""
+        least = self.random if scenario == RANDOM else 0
+        return max(-(-wanted // self.fewer), min(wanted, least))
 
 
 EXPENSIVE = {
-    "MPC": Expense(times=200, fewer=32),
-    "oracle": Expense(times=200, fewer=32),
-    "pulse, informed": Expense(times=30, fewer=8),
+    "MPC": Expense(times=200, fewer=32, random=128),
+    "oracle": Expense(times=200, fewer=32, random=128),
+    "pulse, informed": Expense(times=30, fewer=8, random=512),
 }
 """By contender. The informed pulse's is the table of each plant."""
 
-CHEAP = Expense(times=1, fewer=1)
+CHEAP = Expense(times=1, fewer=1, random=0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,91 +91,8 @@ class Contender:
         return "MPC" in self.name
 
 
-def fingerprint(controller: Controller) -> str:
-    """Changes with the controller's settings or weights."""
-    return str(joblib.hash(controller))[:12]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Block:
-    """Episodes side by side of one controller in one scenario and plant set."""
-
-    run_name: str
-    """Which of the study's controllers."""
-    version: str
-    """Its fingerprint: what an earlier version found is not taken for this one's."""
-    plants: str
-    scenario: str
-    first_seed: int
-    count: int
-    cost: int = 1
-    """Of an episode, in those of a cheap controller."""
-
-    @property
-    def episodes(self) -> int:
-        """What it costs, in episodes of a cheap controller: for the progress, and the order of work."""
-        return self.count * self.cost
-
-    @property
-    def name(self) -> str:
-        """Its own among all blocks."""
-        last = self.first_seed + self.count - 1
-        where = f"{self.plants}, {self.scenario}, seeds {self.first_seed} to {last}"
-        return f"{self.run_name} [{self.version}], {where}"
-
-    def run(self, study: Study) -> dict[str, Any]:
-        """Every figure of every episode, ready for JSON."""
-        scenario = EVALUATION[RANDOM if self.scenario == TUNING else self.scenario]
-        options = {**scenario.options, "parameters": plant_region(self.plants, study.plant)}
-        seeds = list(range(self.first_seed, self.first_seed + self.count))
-        metrics, _ = study.run(self.run_name, seeds, options)
-        return {name: np.asarray(values).tolist() for name, values in asdict(metrics).items()}
-
-
-def plan(contenders: list[Contender], scenarios: list[str], sizes: Sizes) -> list[Block]:
-    """All blocks of a comparison."""
-    blocks = []
-    for contender in contenders:
-        expense = EXPENSIVE.get(contender.name, CHEAP)
-        for run_name, controller in contender.runs.items():
-            own = partial(Block, run_name=run_name, version=fingerprint(controller), cost=expense.times)
-            for (plants, scenario), wanted in _cases(contender, scenarios, sizes).items():
-                first = TUNING_SEED if scenario == TUNING else EVALUATION_SEED
-                block = partial(own, plants=plants, scenario=scenario)
-                blocks += _cut(block, first, -(-wanted // expense.fewer))
-    return blocks
-
-
-def _cases(contender: Contender, scenarios: list[str], sizes: Sizes) -> dict[tuple[str, str], int]:
-    """Episodes of each run by plant set and scenario."""
-    if contender.price is not None:
-        return {(plants, RANDOM): sizes.random for plants in (TRADED_ON, BARS_ON)}
-    cases = {(p, scenario): sizes.of(p, scenario) for p in PLANTS for scenario in scenarios}
-    if len(contender.runs) > 1:
-        cases[TUNING_REGION, TUNING] = sizes.tuning
-    return cases
-
-
-def _cut(block: Callable[..., Block], first: int, count: int) -> list[Block]:
-    """Batches that hold `count` episodes."""
-    return [
-        block(first_seed=first + begin, count=min(LARGEST_BATCH, count - begin))
-        for begin in range(0, count, LARGEST_BATCH)
-    ]
-
-
 Results = dict[tuple[str, str, str], EpisodeMetrics]
 """Episodes by run, plant set and scenario."""
-
-
-def collect(blocks: list[Block], found: Mapping[str, dict[str, Any]]) -> Results:
-    """The blocks' episodes put together. found: what each block's `run` gave, by its name."""
-    parts: dict[tuple[str, str, str], list[EpisodeMetrics]] = {}
-    for block in blocks:
-        arrays: dict[str, NDArray] = {k: np.array(v) for k, v in found[block.name].items()}
-        key = block.run_name, block.plants, block.scenario
-        parts.setdefault(key, []).append(EpisodeMetrics(**arrays))
-    return {key: EpisodeMetrics.joined(several) for key, several in parts.items()}
 
 
 def chosen_run(contender: Contender, results: Results) -> str:
