@@ -10,7 +10,7 @@ PACKAGES := epv_env identification controllers training
 
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help venv train test test-oldest identify gap blind real-bench circle pictures bench tune tradeoff results gif lint check format wheel clean
+.PHONY: help venv train test test-oldest identify gap blind real-bench circle pictures bench tune tradeoff results robustness export gif lint check format wheel clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z][a-z-]*\):.*## /\1	/p' Makefile | while IFS='	' read -r name text; do \
@@ -57,13 +57,13 @@ bench: $(VENV)/.installed ## measure speed and memory of plant and identificatio
 tune: $(VENV)/.installed ## search the classic controllers' settings anew (minutes)
 	$(PY) training/tune.py --out controllers/tuned.json $(ARGS)
 
-STUDENT := runs/recurrent/seed-0/student
 tradeoff: $(VENV)/.installed ## optimise controllers at several prices of switching (half an hour)
-	$(PY) training/tradeoff.py $(if $(wildcard $(STUDENT)),--student $(STUDENT)) $(ARGS)
+	$(PY) training/tradeoff.py --recurrent runs/recurrent --out runs/tradeoff $(ARGS)
 
-results: $(VENV)/.installed ## compare all controllers, and write docs/controllers.md's figures (an hour; what is trained or run is kept)
-	$(PY) training/compare.py --recurrent runs/recurrent --policies runs/seeds --out runs/comparison \
-		--images docs/images --pages docs/controllers.md README.md $(if $(wildcard runs/tradeoff),--tradeoff runs/tradeoff) $(ARGS)
+results: $(VENV)/.installed ## train and compare all controllers, and write docs/controllers.md's figures (hours; what is there is kept)
+	$(PY) training/tradeoff.py --recurrent runs/recurrent --out runs/tradeoff
+	$(PY) training/compare.py --recurrent runs/recurrent --policies runs/seeds --tradeoff runs/tradeoff \
+		--out runs/comparison --images docs/images --pages docs/controllers.md README.md $(ARGS)
 
 robustness: $(VENV)/.installed ## sweep parameters, effects and conditions, and write docs/robustness.md's figures
 	$(PY) training/sweep.py --controllers "hysteresis, extrapolating" PWM pulse PPO=runs/ppo \

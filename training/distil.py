@@ -151,8 +151,8 @@ def load_student(folder: Path, h: Hyperparameters = GOING_ON) -> LearnedPolicy:
     if student.cell is None or widths != [h.width, h.width]:
         raise ValueError(
             f"the policy in {folder} has {student.cells} cells and hidden layers of {widths}: PPO goes "
-            f"on from a policy with a memory and layers of {[h.width, h.width]}, give the folder "
-            f"`{STUDENT_FOLDER}` that `python training/train_ppo.py --recurrent` wrote"
+            f"on from one with a memory and layers of {[h.width, h.width]}, as `python "
+            f"training/train_ppo.py --recurrent` writes into its folder `{STUDENT_FOLDER}`"
         )
     return student
 

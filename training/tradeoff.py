@@ -1,10 +1,10 @@
 """Controllers for the trade-off of switching against excursion: each optimised at several prices.
 
-    python training/tradeoff.py --prices 0.2 0.3 0.5 --out runs/tradeoff
+    python training/tradeoff.py --prices 0.5 1 2 --out runs/tradeoff
 
 trains PPO and tunes classic controllers at every price; what is finished in --out is kept. With
---student, PPO also goes on at every price from a policy with a memory. Measured and drawn they are by
-training/compare.py --tradeoff runs/tradeoff.
+--recurrent, PPO also goes on at every price from a policy with a memory. Measured and drawn they are
+by training/compare.py --tradeoff runs/tradeoff.
 """
 
 import argparse
@@ -26,7 +26,7 @@ from epv_env.plant.commandline import (
 from epv_env.plant.parameters import Parameters
 from epv_env.reward import RewardWeights
 from training.comparison.plan import Contender
-from training.policies import trained_policy
+from training.policies import seed_folder, trained_policy
 from training.tune import TUNING_REGION, tune
 
 FOLDER = "price-{:g}"
@@ -84,11 +84,24 @@ def finished_variants(folder: Path | None) -> list[Contender]:
     return found
 
 
+def first_student(folder: Path, timesteps: int) -> Path:
+    """Folder of the student of training seed 0; it and its policy are trained if they are missing.
+
+    Raises ValueError or PolicyError if PPO cannot go on from what is there.
+    """
+    from training.distil import STUDENT_FOLDER, load_student  # torch takes seconds to import: only now
+
+    home = seed_folder(folder, 0)
+    trained_policy(home, timesteps=timesteps, seed=0, recurrent=True)
+    load_student(home / STUDENT_FOLDER)
+    return home / STUDENT_FOLDER
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Command line; returns the exit status."""
     parser = argparse.ArgumentParser(description="Optimise controllers at several prices of switching.")
     parser.add_argument("--out", type=writable_folder, default=Path("runs/tradeoff"))
-    parser.add_argument("--prices", type=float, nargs="+", default=[0.2, 0.5, 1.0])
+    parser.add_argument("--prices", type=float, nargs="+", default=[0.5, 1.0, 2.0])
     parser.add_argument("--timesteps", type=int, default=5_000_000, help="training steps at each price")
     parser.add_argument(
         "--kinds", nargs="+", choices=KINDS, default=["hysteresis, extrapolating"],
@@ -96,16 +109,15 @@ def main(arguments: list[str] | None = None) -> int:
     )  # fmt: skip
     parser.add_argument("--trials", type=int, default=100, help="tuning evaluations of each of them")
     parser.add_argument(
-        "--student", type=Path, help="folder `student` of a `train_ppo.py --recurrent` to go on from"
-    )
+        "--recurrent", type=writable_folder,
+        help="folder of policies with a memory, as compare.py fills it: what the first one of them "
+        "imitated its teacher to is gone on from, and trained if it is missing",
+    )  # fmt: skip
     parser.add_argument("--seed", type=int, default=0)
     chosen = parser.parse_args(arguments)
     check_positive(parser, chosen, "timesteps", "trials")
     check_not_negative(parser, chosen, "seed")
-    if chosen.student is not None:
-        from training.distil import load_student  # torch takes seconds to import: only now
-
-        load_student(chosen.student)  # before the work, since it may refuse
+    student = None if chosen.recurrent is None else first_student(chosen.recurrent, chosen.timesteps)
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     for price in chosen.prices:
         folder = chosen.out / FOLDER.format(price)
@@ -114,10 +126,10 @@ def main(arguments: list[str] | None = None) -> int:
             folder, timesteps=chosen.timesteps, seed=chosen.seed,
             weights=RewardWeights(switching=price),
         )  # fmt: skip
-        if chosen.student is not None:
+        if student is not None:
             trained_policy(
                 folder / RECURRENT_FOLDER, timesteps=chosen.timesteps, seed=chosen.seed,
-                weights=RewardWeights(switching=price), recurrent=True, student=chosen.student,
+                weights=RewardWeights(switching=price), recurrent=True, student=student,
             )  # fmt: skip
     print(f"controllers in {chosen.out}; measure them with training/compare.py --tradeoff {chosen.out}")
     return 0

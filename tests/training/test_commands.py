@@ -117,19 +117,25 @@ def test_the_tradeoff_goes_on_from_no_other_kind_of_policy(shape, tmp_path):
     """One of other layers, and one without a memory."""
     wrong = policy_of(Student(Distillation(**(shape or {}))))
     wrong = wrong if shape else replace(wrong, cell=None)
-    save_policy(wrong, tmp_path / "wrong", control_period=5e-3, provenance={})
+    save_recurrent(wrong, tmp_path / "memory")
     out = tmp_path / "out"
-    result = command("--student", tmp_path / "wrong", "--out", out, script="training/tradeoff.py")
+    result = command("--recurrent", tmp_path / "memory", "--out", out, script="training/tradeoff.py")
     assert result.returncode == 2
-    assert "give the folder `student`" in result.stderr
+    assert "its folder `student`" in result.stderr
     assert result.stderr.count("\n") == 1
     assert not out.exists()
 
 
+def save_recurrent(student, folder):
+    """The first training seed's student, and its policy, as compare.py fills a folder."""
+    for kept in (folder / "seed-0", folder / "seed-0" / "student"):
+        save_policy(student, kept, control_period=5e-3, provenance={})
+
+
 def test_the_tradeoff_in_its_shortest_form_keeps_what_is_done(tmp_path):
     student = policy_of(Student(Distillation(memory=4)))
-    save_policy(student, tmp_path / "student", control_period=5e-3, provenance={})
-    short = ("--student", tmp_path / "student", "--prices", 0.2, "--timesteps", 16384, "--trials", 1)
+    save_recurrent(student, tmp_path / "memory")
+    short = ("--recurrent", tmp_path / "memory", "--prices", 0.2, "--timesteps", 16384, "--trials", 1)
     script = "training/tradeoff.py"
     first = command(*short, "--out", tmp_path, script=script)
     assert first.returncode == 0, first.stderr
