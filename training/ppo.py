@@ -8,6 +8,7 @@ from typing import Any
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
@@ -118,7 +119,7 @@ def make_training_env(
 def make_model(h: Hyperparameters, env: VecEnv, *, seed: int, device: str) -> PPO:
     """A new PPO model."""
     first, last = h.learning_rate, h.last_learning_rate
-    return PPO(
+    model = PPO(
         "MlpPolicy",
         env,
         n_steps=h.n_steps,
@@ -132,6 +133,8 @@ def make_model(h: Hyperparameters, env: VecEnv, *, seed: int, device: str) -> PP
         seed=seed,
         device=device,
     )
+    model.set_logger(Logger(folder=None, output_formats=[]))  # its own leaves an empty folder in /tmp
+    return model
 
 
 def train(

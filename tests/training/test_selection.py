@@ -64,9 +64,13 @@ def test_what_training_returns_is_the_best_that_was_validated(finished):
     assert score(metrics) == pytest.approx(max(scores), rel=1e-12)
 
 
-def test_a_seed_means_one_policy(finished, tmp_path):
+def test_a_seed_means_one_policy(finished, tmp_path, monkeypatch):
+    """And a training leaves nothing but its folder."""
     folder, policy = finished
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
     assert same(trained(tmp_path / "again"), policy)
+    assert not list((tmp_path / "temporary").iterdir())
     again = (tmp_path / "again" / VALIDATION_FILE).read_bytes()
     assert again == (folder / VALIDATION_FILE).read_bytes()
     assert not same(trained(tmp_path / "other", seed=2), policy)
