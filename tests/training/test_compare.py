@@ -191,6 +191,17 @@ def test_an_episode_is_the_same_beside_other_scenarios_as_alone():
     assert returns["steps"] != returns["leak"] != returns["high target"]
 
 
+def test_every_scenario_can_be_run():
+    """Also one whose supply is below the default targets."""
+    blocks = plan([classic("a")], list(EVALUATION), replace(SIZES, named=1, random=1, bound=1))
+    study = Study(
+        controllers={"a": controller("a")}, plant=Plant.calibrated(), scenario=MIXED, duration=0.02
+    )
+    found = collect(blocks, {block.name: block.run(study) for block in blocks})
+    assert {scenario for _, _, scenario in found} == set(EVALUATION)
+    assert all(len(episodes) == 1 for episodes in found.values())
+
+
 def test_an_expensive_controller_runs_the_first_of_the_others_episodes(monkeypatch):
     monkeypatch.setitem(EXPENSIVE, "slow", Expense(times=100, fewer=4, random=15))
     (slow, cheap) = (plan([classic(name)], ["steps"], SIZES)[0] for name in ("slow", "a"))

@@ -74,9 +74,10 @@ class Block:
     def run(self, study: Study) -> dict[str, Any]:
         """Every figure of every episode, one scenario after another, ready for JSON."""
         asked = [_options(scenario) for scenario in self.scenarios]
-        common = {name: value for name, value in asked[0].items() if name not in OF_EACH}
+        differing = OF_EACH if len(asked) > 1 else ()
+        common = {name: value for name, value in asked[0].items() if name not in differing}
         common["parameters"] = plant_region(self.plants, study.plant)
-        each = {o: [own.get(o) for own in asked for _ in range(self.count)] for o in OF_EACH}
+        each = {o: [own.get(o) for own in asked for _ in range(self.count)] for o in differing}
         seeds = list(range(self.first_seed, self.first_seed + self.count)) * len(asked)
         metrics, _ = study.run(self.run_name, seeds, common, each)
         return {name: np.asarray(values).tolist() for name, values in asdict(metrics).items()}
