@@ -57,11 +57,12 @@ bench: $(VENV)/.installed ## measure speed and memory of plant and identificatio
 tune: $(VENV)/.installed ## search the classic controllers' settings anew (minutes)
 	$(PY) training/tune.py --out controllers/tuned.json $(ARGS)
 
+TRADEOFF := training/tradeoff.py --recurrent runs/recurrent --out runs/tradeoff
 tradeoff: $(VENV)/.installed ## optimise controllers at several prices of switching (half an hour)
-	$(PY) training/tradeoff.py --recurrent runs/recurrent --out runs/tradeoff $(ARGS)
+	$(PY) $(TRADEOFF) $(ARGS)
 
 results: $(VENV)/.installed ## train and compare all controllers, and write docs/controllers.md's figures (hours; what is there is kept)
-	$(PY) training/tradeoff.py --recurrent runs/recurrent --out runs/tradeoff
+	$(PY) $(TRADEOFF)
 	$(PY) training/compare.py --recurrent runs/recurrent --policies runs/seeds --tradeoff runs/tradeoff \
 		--out runs/comparison --images docs/images --pages docs/controllers.md README.md $(ARGS)
 

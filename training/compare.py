@@ -34,7 +34,7 @@ from training.comparison.plan import Contender, Results, Sizes
 from training.comparison.scores import Contest
 from training.generated import check_pages
 from training.metrics import EpisodeMetrics
-from training.policies import seed_folder, trained_seeds
+from training.policies import RECURRENT_TIMESTEPS, seed_folder, trained_seeds
 from training.rollout import Trace, run_episodes
 from training.scenarios import EVALUATION, RANDOM
 from training.seeds import EVALUATION_SEED
@@ -67,7 +67,10 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         "--recurrent-seeds", type=int, default=10, help="training seeds that --recurrent holds"
     )
     parser.add_argument(
-        "--recurrent-timesteps", type=int, default=5_000_000, help="PPO's steps for a missing one"
+        "--recurrent-timesteps",
+        type=int,
+        default=RECURRENT_TIMESTEPS,
+        help="PPO's steps for a missing one",
     )
     parser.add_argument(
         "--tradeoff", type=Path, help="folder of training/tradeoff.py: its controllers join the front"

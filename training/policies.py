@@ -11,6 +11,9 @@ from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from training.tune import TUNING_REGION
 
+RECURRENT_TIMESTEPS = 5_000_000
+"""PPO's steps for a policy with a memory."""
+
 
 def trained_policy(
     folder: Path,

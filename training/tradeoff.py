@@ -26,7 +26,7 @@ from epv_env.plant.commandline import (
 from epv_env.plant.parameters import Parameters
 from epv_env.reward import RewardWeights
 from training.comparison.plan import Contender
-from training.policies import seed_folder, trained_policy
+from training.policies import RECURRENT_TIMESTEPS, seed_folder, trained_policy
 from training.tune import TUNING_REGION, tune
 
 FOLDER = "price-{:g}"
@@ -84,7 +84,7 @@ def finished_variants(folder: Path | None) -> list[Contender]:
     return found
 
 
-def first_student(folder: Path, timesteps: int) -> Path:
+def first_student(folder: Path) -> Path:
     """Folder of the student of training seed 0; it and its policy are trained if they are missing.
 
     Raises ValueError or PolicyError if PPO cannot go on from what is there.
@@ -92,7 +92,7 @@ def first_student(folder: Path, timesteps: int) -> Path:
     from training.distil import STUDENT_FOLDER, load_student  # torch takes seconds to import: only now
 
     home = seed_folder(folder, 0)
-    trained_policy(home, timesteps=timesteps, seed=0, recurrent=True)
+    trained_policy(home, timesteps=RECURRENT_TIMESTEPS, seed=0, recurrent=True)
     load_student(home / STUDENT_FOLDER)
     return home / STUDENT_FOLDER
 
@@ -110,14 +110,14 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--trials", type=int, default=100, help="tuning evaluations of each of them")
     parser.add_argument(
         "--recurrent", type=writable_folder,
-        help="folder of policies with a memory, as compare.py fills it: what the first one of them "
-        "imitated its teacher to is gone on from, and trained if it is missing",
+        help="folder of policies with a memory, as compare.py fills it: PPO goes on from the student of "
+        "its first training seed, which is trained if it is missing",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, default=0)
     chosen = parser.parse_args(arguments)
     check_positive(parser, chosen, "timesteps", "trials")
     check_not_negative(parser, chosen, "seed")
-    student = None if chosen.recurrent is None else first_student(chosen.recurrent, chosen.timesteps)
+    student = None if chosen.recurrent is None else first_student(chosen.recurrent)
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     for price in chosen.prices:
         folder = chosen.out / FOLDER.format(price)

@@ -144,7 +144,10 @@ class Progress(NamedTuple):
 
 @numba.njit(cache=True)
 def _taken(p: Progress, time: NDArray, period: float) -> NDArray:
-    """Air taken by each valve's applications (n,) in the period from `time` (n,) on [kg]."""
+    """Air taken by each valve's applications (n,) in the period from `time` (n,) on [kg].
+
+    p is read on as far as `time`.
+    """
     taken = np.zeros(len(time))
     for i, applications in enumerate(p.applications):
         start, rise, hold, fall, _ = applications[p.now[i]]

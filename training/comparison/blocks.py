@@ -17,6 +17,7 @@ from training.comparison.plan import (
     TRADED_ON,
     TUNING,
     Contender,
+    Expense,
     Results,
     Sizes,
 )
@@ -74,7 +75,7 @@ class Block:
     def run(self, study: Study) -> dict[str, Any]:
         """Every figure of every episode, one scenario after another, ready for JSON."""
         asked = [_options(scenario) for scenario in self.scenarios]
-        differing = OF_EACH if len(asked) > 1 else ()
+        differing = [o for o in OF_EACH if any(own.get(o) != asked[0].get(o) for own in asked)]
         common = {name: value for name, value in asked[0].items() if name not in differing}
         common["parameters"] = plant_region(self.plants, study.plant)
         each = {o: [own.get(o) for own in asked for _ in range(self.count)] for o in differing}
@@ -93,16 +94,10 @@ def plan(contenders: list[Contender], scenarios: list[str], sizes: Sizes) -> lis
     blocks = []
     for contender in contenders:
         expense = EXPENSIVE.get(contender.name, CHEAP)
-        cases = _cases(contender, scenarios, sizes)
-        together: dict[Any, list[str]] = {}
-        for (plants, scenario), wanted in cases.items():
-            common = {name: v for name, v in _options(scenario).items() if name not in OF_EACH}
-            first = TUNING_SEED if scenario == TUNING else EVALUATION_SEED
-            key = plants, repr(common), first, expense.episodes(scenario, wanted)
-            together.setdefault(key, []).append(scenario)
+        together = _alike(_cases(contender, scenarios, sizes), expense)
         for run_name, controller in contender.runs.items():
             own = partial(Block, run_name=run_name, version=fingerprint(controller), cost=expense.times)
-            for (plants, _, first, count), alike in together.items():
+            for (plants, first, count, _), alike in together.items():
                 blocks += _cut(partial(own, plants=plants), alike, first, count)
     return blocks
 
@@ -115,6 +110,19 @@ def _cases(contender: Contender, scenarios: list[str], sizes: Sizes) -> dict[tup
     if len(contender.runs) > 1:
         cases[TUNING_REGION, TUNING] = sizes.tuning
     return cases
+
+
+def _alike(
+    cases: dict[tuple[str, str], int], expense: Expense
+) -> dict[tuple[str, int, int, str], list[str]]:
+    """Scenarios that can share blocks, by plant set, first seed, episodes, and options but OF_EACH."""
+    together: dict[tuple[str, int, int, str], list[str]] = {}
+    for (plants, scenario), wanted in cases.items():
+        first = TUNING_SEED if scenario == TUNING else EVALUATION_SEED
+        others = {name: v for name, v in _options(scenario).items() if name not in OF_EACH}
+        key = plants, first, expense.episodes(scenario, wanted), repr(others)
+        together.setdefault(key, []).append(scenario)
+    return together
 
 
 def _cut(block: Callable[..., Block], scenarios: list[str], first: int, count: int) -> list[Block]:
