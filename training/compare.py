@@ -34,7 +34,13 @@ from training.comparison.plan import Contender, Results, Sizes
 from training.comparison.scores import Contest
 from training.generated import check_pages
 from training.metrics import EpisodeMetrics
-from training.policies import RECURRENT_TIMESTEPS, seed_folder, trained_seeds
+from training.policies import (
+    RECURRENT_TIMESTEPS,
+    seed_folder,
+    seed_policies,
+    seed_trainings,
+    train_missing,
+)
 from training.rollout import Trace, run_episodes
 from training.scenarios import EVALUATION, RANDOM
 from training.seeds import EVALUATION_SEED
@@ -106,10 +112,14 @@ def contenders(chosen: argparse.Namespace) -> list[Contender]:
     found = []
     recurrent = chosen.recurrent, chosen.recurrent_seeds, chosen.recurrent_timesteps
     plain = chosen.policies, chosen.seeds, chosen.timesteps
-    for (folder, count, timesteps), remembers in ((recurrent, True), (plain, False)):
-        if folder is None:
-            continue
-        policies = trained_seeds(folder, count=count, timesteps=timesteps, recurrent=remembers)
+    kinds = [
+        seed_trainings(folder, count=count, timesteps=timesteps, recurrent=remembers)
+        for (folder, count, timesteps), remembers in ((recurrent, True), (plain, False))
+        if folder is not None
+    ]
+    train_missing([training for kind in kinds for training in kind], workers=chosen.workers)
+    for kind in kinds:
+        policies = seed_policies(kind)
         name = next(iter(policies.values())).name
         runs = {f"{name}, {seed}": policy for seed, policy in policies.items()}
         found.append(Contender(name=name, runs=runs, learned=True))

@@ -1,7 +1,13 @@
-"""Learned policies, one folder each: trained if they are missing, loaded if they are there."""
+"""Learned policies, one folder each: trained if missing, side by side; loaded if they are there."""
 
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+from joblib import Parallel, delayed
+from tqdm import tqdm
 
 from controllers.base import Controller
 from controllers.learned import CONTRACT_FILE, load_policy
@@ -15,38 +21,66 @@ RECURRENT_TIMESTEPS = 5_000_000
 """PPO's steps for a policy with a memory."""
 
 
-def trained_policy(
-    folder: Path,
-    *,
-    timesteps: int,
-    seed: int,
-    weights: RewardWeights | None = None,
-    recurrent: bool = False,
-    student: Path | None = None,
-) -> Controller:
-    """PPO on the report's plant within ±10 %, or as it was trained before.
+@dataclass(frozen=True, kw_only=True)
+class Training:
+    """PPO on the report's plant within ±10 %."""
 
-    weights: prices of the reward; None: the environment's own. recurrent: with a memory
-    (training/distil.py). student: folder of the one that this goes on from; None: it is trained, too.
-    An interrupted training goes on.
-    """
-    if not (folder / CONTRACT_FILE).exists():
+    folder: Path
+    """Where the policy lies, or will."""
+    timesteps: int
+    seed: int
+    weights: RewardWeights = field(default_factory=RewardWeights)
+    """Prices of the reward."""
+    recurrent: bool = False
+    """With a memory (training/distil.py)."""
+    student: Path | None = None
+    """Folder of the one that a policy with a memory goes on from; None: it is trained, too."""
+
+    @property
+    def finished(self) -> bool:
+        """Whether the policy is there."""
+        return (self.folder / CONTRACT_FILE).exists()
+
+    @property
+    def own_student(self) -> Path:
+        """Folder of the student that a training with a memory trains, if it is given none."""
+        from training.distil import STUDENT_FOLDER  # torch takes seconds to import: only now
+
+        return self.folder / STUDENT_FOLDER
+
+    def run(self, *, quiet: bool = False) -> None:
+        """Train it. An interrupted training goes on."""
         from training.distil import train_recurrent  # torch takes seconds to import: only now
         from training.policy_files import save_policy
         from training.ppo import Hyperparameters, train
 
-        chosen = weights or RewardWeights()
         task: dict[str, Any] = {
             "plant": Plant.calibrated(), "scenario": MIXED, "parameters": TUNING_REGION,
-            "weights": chosen, "timesteps": timesteps, "seed": seed, "device": "cpu", "resume": True,
+            "weights": self.weights, "timesteps": self.timesteps, "seed": self.seed, "device": "cpu",
+            "folder": self.folder, "resume": True, "quiet": quiet,
         }  # fmt: skip
-        if recurrent:
-            policy, _ = train_recurrent(folder=folder, student=student, **task)
+        if self.recurrent:
+            policy, _ = train_recurrent(student=self.student, **task)
         else:
-            policy, _ = train(Hyperparameters(), folder=folder, **task)
-        provenance = {"timesteps": timesteps, "seed": seed, "switching_price": chosen.switching}
-        save_policy(policy, folder, control_period=OnOff.default_period, provenance=provenance)
-    return load_policy(folder)
+            policy, _ = train(Hyperparameters(), **task)
+        prices = {"switching_price": self.weights.switching}
+        provenance = {"timesteps": self.timesteps, "seed": self.seed, **prices}
+        save_policy(policy, self.folder, control_period=OnOff.default_period, provenance=provenance)
+
+
+def train_missing(trainings: Sequence[Training], *, workers: int) -> None:
+    """Train what is not finished, in so many processes; a policy does not depend on how many."""
+    missing = [training for training in trainings if not training.finished]
+    if len(missing) < 2:
+        for training in missing:
+            training.run()
+        return
+    # The longest first, so that none is left running alone at the end.
+    missing.sort(key=lambda training: (not training.recurrent, -training.timesteps))
+    pool: Any = Parallel(n_jobs=workers, return_as="generator_unordered")
+    done = pool(delayed(training.run)(quiet=True) for training in missing)
+    for _ in tqdm(done, total=len(missing), desc="training", unit="policy", file=sys.stderr):
+        pass
 
 
 def seed_folder(folder: Path, seed: int) -> Path:
@@ -54,13 +88,16 @@ def seed_folder(folder: Path, seed: int) -> Path:
     return folder / f"seed-{seed}"
 
 
-def trained_seeds(
+def seed_trainings(
     folder: Path, *, count: int, timesteps: int, recurrent: bool = False
-) -> dict[str, Controller]:
-    """One policy per training seed 0, 1, ..., by name."""
-    return {
-        f"seed {seed}": trained_policy(
-            seed_folder(folder, seed), timesteps=timesteps, seed=seed, recurrent=recurrent
-        )
+) -> list[Training]:
+    """One for each training seed 0, 1, ..."""
+    return [
+        Training(folder=seed_folder(folder, seed), timesteps=timesteps, seed=seed, recurrent=recurrent)
         for seed in range(count)
-    }
+    ]
+
+
+def seed_policies(trainings: Sequence[Training]) -> dict[str, Controller]:
+    """The policies of finished trainings, by the name of their seed."""
+    return {f"seed {training.seed}": load_policy(training.folder) for training in trainings}

@@ -24,9 +24,10 @@ from epv_env.plant.commandline import (
     writable_folder,
 )
 from epv_env.plant.parameters import Parameters
+from epv_env.plant.valves import available_cores
 from epv_env.reward import RewardWeights
 from training.comparison.plan import Contender
-from training.policies import RECURRENT_TIMESTEPS, seed_folder, trained_policy
+from training.policies import RECURRENT_TIMESTEPS, Training, seed_trainings, train_missing
 from training.tune import TUNING_REGION, tune
 
 FOLDER = "price-{:g}"
@@ -84,17 +85,40 @@ def finished_variants(folder: Path | None) -> list[Contender]:
     return found
 
 
-def first_student(folder: Path) -> Path:
-    """Folder of the student of training seed 0; it and its policy are trained if they are missing.
+def first_memory(chosen: argparse.Namespace) -> Training | None:
+    """The policy with a memory whose student the variants go on from, if they shall.
 
-    Raises ValueError or PolicyError if PPO cannot go on from what is there.
+    Raises ValueError or PolicyError if it is there and PPO cannot go on from it.
     """
-    from training.distil import STUDENT_FOLDER, load_student  # torch takes seconds to import: only now
+    if chosen.recurrent is None:
+        return None
+    from training.distil import load_student  # torch takes seconds to import: only now
 
-    home = seed_folder(folder, 0)
-    trained_policy(home, timesteps=RECURRENT_TIMESTEPS, seed=0, recurrent=True)
-    load_student(home / STUDENT_FOLDER)
-    return home / STUDENT_FOLDER
+    (first,) = seed_trainings(
+        chosen.recurrent, count=1, timesteps=RECURRENT_TIMESTEPS, recurrent=True
+    )  # fmt: skip
+    if first.finished:
+        load_student(first.own_student)
+    return first
+
+
+def train_variants(chosen: argparse.Namespace, first: Training | None) -> None:
+    """Train what is missing at every price, and `first`."""
+    options: dict[str, Any] = {"timesteps": chosen.timesteps, "seed": chosen.seed}
+    priced = [(chosen.out / FOLDER.format(p), RewardWeights(switching=p)) for p in chosen.prices]
+    plain = [Training(folder=folder, weights=weights, **options) for folder, weights in priced]
+    if first is None:
+        train_missing(plain, workers=chosen.workers)
+        return
+    train_missing([first, *plain], workers=chosen.workers)
+    remembering = [
+        Training(
+            folder=folder / RECURRENT_FOLDER, weights=weights, recurrent=True,
+            student=first.own_student, **options,
+        )
+        for folder, weights in priced
+    ]  # fmt: skip
+    train_missing(remembering, workers=chosen.workers)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -114,23 +138,18 @@ def main(arguments: list[str] | None = None) -> int:
         "its first training seed, which is trained if it is missing",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument(
+        "--workers", type=int, default=available_cores(), help="processes that train"
+    )  # fmt: skip
     chosen = parser.parse_args(arguments)
-    check_positive(parser, chosen, "timesteps", "trials")
+    check_positive(parser, chosen, "timesteps", "trials", "workers")
     check_not_negative(parser, chosen, "seed")
-    student = None if chosen.recurrent is None else first_student(chosen.recurrent)
+    first = first_memory(chosen)
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     for price in chosen.prices:
         folder = chosen.out / FOLDER.format(price)
         tuned_at(folder, chosen.kinds, price, chosen.trials, chosen.seed)
-        trained_policy(
-            folder, timesteps=chosen.timesteps, seed=chosen.seed,
-            weights=RewardWeights(switching=price),
-        )  # fmt: skip
-        if student is not None:
-            trained_policy(
-                folder / RECURRENT_FOLDER, timesteps=chosen.timesteps, seed=chosen.seed,
-                weights=RewardWeights(switching=price), recurrent=True, student=student,
-            )  # fmt: skip
+    train_variants(chosen, first)
     print(f"controllers in {chosen.out}; measure them with training/compare.py --tradeoff {chosen.out}")
     return 0
 

@@ -1,0 +1,32 @@
+"""Training side by side: what is missing, and the same as one after the other."""
+
+import pytest
+
+pytest.importorskip("joblib")
+pytest.importorskip("stable_baselines3")
+
+from training.policies import seed_policies, seed_trainings, train_missing
+
+pytestmark = pytest.mark.training
+
+
+def test_policies_do_not_depend_on_how_many_are_trained_at_a_time(tmp_path):
+    short = {"count": 2, "timesteps": 16_384}
+    together, alone = seed_trainings(tmp_path / "two", **short), seed_trainings(tmp_path, **short)[1]
+    train_missing(together, workers=2)
+    train_missing([alone], workers=2)
+    assert set(seed_policies(together)) == {"seed 0", "seed 1"}
+    first, second, same = (
+        (each.folder / "policy.safetensors").read_bytes() for each in (*together, alone)
+    )
+    assert first != second
+    assert second == same
+
+
+def test_what_is_there_is_kept(tmp_path):
+    trainings = seed_trainings(tmp_path, count=2, timesteps=16_384)
+    for each in trainings:
+        each.folder.mkdir()
+        (each.folder / "policy.json").write_text("{}")
+    train_missing(trainings, workers=2)
+    assert [path.name for path in sorted(tmp_path.rglob("*.*"))] == ["policy.json", "policy.json"]
