@@ -248,14 +248,19 @@ def test_a_rival_is_beaten_only_at_equal_or_fewer_switches(rival, met):
     assert [bar.met for bar in against_rival(c, *c.contenders)] == met
 
 
+def add_variant(c, price, figures):
+    """PPO at another price of switching."""
+    run = f"PPO, price {price:g}"
+    c.variants.append(Contender(name="PPO", runs={run: controller(run)}, price=price))
+    c.results[run, "calibrated", RANDOM] = figures
+
+
 def test_a_rival_that_switches_less_is_met_at_another_price():
     """By the variant that switches most among those that switch no more; by none where it is worse."""
     c = contest(PPO=episodes(50), other=episodes(50, breakdown=0.4, rms=0.15, switchings=3.0))
     figures_at = {2.0: (2.9, 0.12), 5.0: (1.0, 0.11), 1.0: (3.5, 0.10)}
     for price, (switchings, rms) in figures_at.items():
-        run = f"PPO, price {price:g}"
-        c.variants.append(Contender(name="PPO", runs={run: controller(run)}, price=price))
-        c.results[run, "calibrated", RANDOM] = episodes(50, switchings=switchings, rms=rms)
+        add_variant(c, price, episodes(50, switchings=switchings, rms=rms))
     found = list(against_rival(c, *c.contenders))
     assert [(bar.controller, bar.met) for bar in found] == [("PPO, price 2", True)] * 2
     assert "120 against 150 mbar" in found[1].measured
@@ -267,6 +272,14 @@ def test_the_oracle_is_a_limit_and_no_rival():
     c = contest(PPO=episodes(50), oracle=episodes(20, breakdown=0.25, rms=0.05))
     assert c.contenders[1].privileged
     assert [bar.met for bar in against_oracle(c, *c.contenders)] == [True, False]
+
+
+def test_how_near_the_oracle_cheaper_switching_comes_is_said_too():
+    c = contest(PPO=episodes(50), oracle=episodes(20, breakdown=0.25, rms=0.05))
+    add_variant(c, 2.0, episodes(50, switchings=1.0, rms=0.01))
+    add_variant(c, 0.0, episodes(50, switchings=90.0, rms=0.07))
+    found = [(bar.controller, bar.met) for bar in against_oracle(c, *c.contenders)]
+    assert found == [("PPO", True), ("PPO", False), ("PPO, price 0", True), ("PPO, price 0", True)]
 
 
 def test_where_a_model_based_rival_wins_is_listed():
