@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from numpy.typing import NDArray
 
 from controllers.oracle_search import LONGEST_LOOK, Search
+from epv_env.reward import RewardWeights
 from epv_env.task import LimitingTask
 
 
@@ -26,6 +27,8 @@ class Oracle:
     """Nodes kept for each episode."""
     look_ahead: int = 60
     """Control periods of foresight."""
+    weights: RewardWeights | None = None
+    """Prices of what it avoids; None: those of the task."""
     threads: int | None = None
     name: str = "oracle"
     environment: str = "EPValve-v0"
@@ -51,7 +54,7 @@ class Oracle:
         if self._task is None:
             raise ValueError("the oracle sees no task: call watch(env.task) after the reset")
         if self._search is None:
-            self._search = Search(self._task, self.width, self.threads)
+            self._search = Search(self._task, self.width, self.threads, self.weights)
         while self._search.depth < self.look_ahead:
             self._search.expand()
         return self._search.decide()

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from epv_env.plant.equations import State
 from epv_env.plant.supply import BAR
 from epv_env.plant.valves import Valves
-from epv_env.reward import reward_terms
+from epv_env.reward import RewardWeights, reward_terms
 from epv_env.settings import EMPTY_CIRCUIT_BAR
 from epv_env.task import LimitingTask
 
@@ -51,8 +51,13 @@ class Nodes:
 class Search:
     """Searches ahead of n running episodes from where they stand, without touching them."""
 
-    def __init__(self, task: LimitingTask, width: int, threads: int | None):
-        """task: just begun or under way. width: nodes kept of a layer. Raises ValueError."""
+    def __init__(
+        self, task: LimitingTask, width: int, threads: int | None, weights: RewardWeights | None = None
+    ):
+        """task: just begun or under way. width: nodes kept of a layer. Raises ValueError.
+
+        weights: prices of the reward; None: the task's.
+        """
         plants = [p for p in task.parameters if p is not None]
         if any(p["t_delay"] > 0 for p in plants):
             raise ValueError(
@@ -60,6 +65,7 @@ class Search:
                 "t_delay = 0, or leave the oracle out"
             )
         self._task, self._width = task, width
+        self._weights = weights or task.settings.weights
         self.depth = 0
         """Layers that lie ahead of the episodes."""
         self._steps = task.steps.copy()
@@ -147,7 +153,7 @@ class Search:
             for values in (self._valves.highest_p2, self._valves.lowest_p2)
         )
         terms = reward_terms(
-            task.settings.weights,
+            self._weights,
             period=task.period,
             error_bar=state.p2 / BAR - target,
             highest_error_bar=highest,
@@ -160,9 +166,8 @@ class Search:
 
     def _invested(self, nodes: Nodes) -> NDArray:
         """What a node has paid before it yields: air vented from the control chamber, switching off."""
-        weights = self._task.settings.weights
         vented = np.maximum(nodes.state.p1 - nodes.state.p3, 0.0) * self._air_per_pressure
-        return weights.vented_air * 1e3 * vented + weights.switching * ~nodes.coil
+        return self._weights.vented_air * 1e3 * vented + self._weights.switching * ~nodes.coil
 
     def _distinct(self, nodes: Nodes) -> NDArray:
         """Ranks (n, k), price less investment; infinite but for the best node of each cell."""

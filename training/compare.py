@@ -9,7 +9,7 @@ where it was. After a change of the plant or of a controller's code, choose anot
 
 import argparse
 import sys
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ from epv_env.plant.commandline import (
 from epv_env.plant.consumption import MIXED
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.valves import available_cores
+from epv_env.reward import RewardWeights
 from identification.journal import Journal
 from training.comparison.blocks import Block, collect, plan
 from training.comparison.output import PARTS, findings, write_figures, write_tables
@@ -46,7 +47,7 @@ from training.scenarios import EVALUATION, RANDOM
 from training.seeds import EVALUATION_SEED
 from training.sweeps.run import run_tasks, workplace
 from training.sweeps.tasks import Study
-from training.tradeoff import finished_variants
+from training.tradeoff import finished_variants, priced
 
 JOURNAL_FILE = "blocks.jsonl"
 CURVE_FILE = "learning_curve.csv"
@@ -127,6 +128,16 @@ def contenders(chosen: argparse.Namespace) -> list[Contender]:
     return found + [Contender(name=c.name, runs={c.name: c}) for c in others]
 
 
+def limit_at_least_price(variants: list[Contender]) -> list[Contender]:
+    """The oracle at the variants' least price of switching, if that is below the reward's own."""
+    prices = [v.price for v in variants if v.price is not None]
+    weights = RewardWeights()
+    if not prices or (least := min(prices)) >= weights.switching:
+        return []
+    oracle = Oracle(threads=1, weights=replace(weights, switching=least))
+    return [Contender(name=oracle.name, runs={priced(oracle.name, least): oracle}, price=least)]
+
+
 def run_blocks(blocks: list[Block], everyone: list[Contender], chosen: argparse.Namespace) -> Results:
     """The blocks' episodes: those that --out lacks are run, side by side."""
     controllers = {run: controller for c in everyone for run, controller in c.runs.items()}
@@ -177,6 +188,7 @@ def main(arguments: list[str] | None = None) -> int:
     )  # fmt: skip
     everyone = contenders(chosen)
     variants = finished_variants(chosen.tradeoff)
+    variants += limit_at_least_price(variants)
     blocks = plan([*everyone, *variants], chosen.scenarios, sizes)
     results = run_blocks(blocks, [*everyone, *variants], chosen)
     contest = Contest(everyone, chosen.scenarios, results, variants)

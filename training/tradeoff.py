@@ -36,6 +36,11 @@ RECURRENT_FOLDER = "recurrent"
 """Within that of a price."""
 
 
+def priced(name: str, price: float) -> str:
+    """Name of a controller that was optimised at a price of switching."""
+    return f"{name}, price {price:g}"
+
+
 def tuned_at(folder: Path, kinds: list[str], price: float, trials: int, seed: int) -> None:
     """Tune the classic controllers at this price, but those that are tuned already."""
     path = folder / TUNED_FILE
@@ -77,8 +82,7 @@ def finished_variants(folder: Path | None) -> list[Contender]:
             plant = Parameters.calibrated()
             controllers += [build(kind, tuning.values, plant) for kind, tuning in tunings.items()]
         found += [
-            Contender(name=c.name, runs={f"{c.name}, price {price:g}": c}, price=price)
-            for c in controllers
+            Contender(name=c.name, runs={priced(c.name, price): c}, price=price) for c in controllers
         ]
     if not found:
         raise ValueError(f"{folder} holds no controllers: make them with `python training/tradeoff.py`")
@@ -105,8 +109,8 @@ def first_memory(chosen: argparse.Namespace) -> Training | None:
 def train_variants(chosen: argparse.Namespace, first: Training | None) -> None:
     """Train what is missing at every price, and `first`."""
     options: dict[str, Any] = {"timesteps": chosen.timesteps, "seed": chosen.seed}
-    priced = [(chosen.out / FOLDER.format(p), RewardWeights(switching=p)) for p in chosen.prices]
-    plain = [Training(folder=folder, weights=weights, **options) for folder, weights in priced]
+    at = [(chosen.out / FOLDER.format(p), RewardWeights(switching=p)) for p in chosen.prices]
+    plain = [Training(folder=folder, weights=weights, **options) for folder, weights in at]
     if first is None:
         train_missing(plain, workers=chosen.workers)
         return
@@ -116,7 +120,7 @@ def train_variants(chosen: argparse.Namespace, first: Training | None) -> None:
             folder=folder / RECURRENT_FOLDER, weights=weights, recurrent=True,
             student=first.own_student, **options,
         )
-        for folder, weights in priced
+        for folder, weights in at
     ]  # fmt: skip
     train_missing(remembering, workers=chosen.workers)
 

@@ -8,6 +8,7 @@ import pytest
 from controllers.oracle import Oracle
 from controllers.oracle_search import Search
 from controllers.tuned import tuned_controllers
+from epv_env.reward import RewardWeights
 from epv_env.vector_env import EPValveVectorEnv
 
 READY = {"target_bar": 8.0, "p2_bar": 7.95, "p3_bar": 7.4, "supply": 12.0}
@@ -76,6 +77,25 @@ def test_each_episode_of_a_batch_is_decided_as_it_would_be_alone():
         decided.append(np.array(moves)[:, 0])
     np.testing.assert_array_equal(*decided)
     assert np.ptp(decided[0]) == 1
+
+
+def test_it_avoids_what_its_own_prices_say():
+    """Prices of its own decide as the task's would; where switching is free it switches more."""
+    free = RewardWeights(switching=0.0)
+    cases = {"given": (free, {}), "the task's": (None, {"weights": free}), "usual": (None, {})}
+    decided = {}
+    for case, (weights, options) in cases.items():
+        env, observation = begun(2, scenario="steps", **READY, **options)
+        oracle = Oracle(width=16, look_ahead=20, threads=1, weights=weights)
+        oracle.watch(env.task)
+        moves = []
+        for _ in range(100):
+            moves.append(oracle.act(observation))
+            observation = env.task.step(*env.action.decode(moves[-1])).observation
+        decided[case] = np.array(moves)
+    np.testing.assert_array_equal(decided["given"], decided["the task's"])
+    switchings = {case: np.abs(np.diff(moves, axis=0)).sum() for case, moves in decided.items()}
+    assert switchings["given"] > 2 * switchings["usual"]
 
 
 def test_foresight_beats_the_tuned_hysteresis():

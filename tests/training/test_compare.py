@@ -11,10 +11,12 @@ pytest.importorskip("joblib")
 pytest.importorskip("stable_baselines3")
 
 from controllers.hysteresis import Hysteresis
+from controllers.oracle import Oracle
 from epv_env.plant.consumption import MIXED
 from epv_env.plant.plantfile import Plant
+from epv_env.reward import RewardWeights
 from tests.training.policies import random_layers, write_policy
-from training.compare import main, parse
+from training.compare import limit_at_least_price, main, parse
 from training.comparison.bars import against_oracle, against_rival, leaving, lost
 from training.comparison.blocks import collect, plan
 from training.comparison.output import PARTS, RESULTS_FILE, TABLES_FILE
@@ -34,6 +36,7 @@ from training.metrics import EpisodeMetrics
 from training.policy_files import save_policy
 from training.scenarios import EVALUATION, RANDOM
 from training.sweeps.tasks import Study
+from training.tradeoff import priced
 from training.tune import TUNING_REGION
 
 pytestmark = pytest.mark.training
@@ -248,10 +251,10 @@ def test_a_rival_is_beaten_only_at_equal_or_fewer_switches(rival, met):
     assert [bar.met for bar in against_rival(c, *c.contenders)] == met
 
 
-def add_variant(c, price, figures):
-    """PPO at another price of switching."""
-    run = f"PPO, price {price:g}"
-    c.variants.append(Contender(name="PPO", runs={run: controller(run)}, price=price))
+def add_variant(c, price, figures, name="PPO"):
+    """A contender at another price of switching."""
+    run = priced(name, price)
+    c.variants.append(Contender(name=name, runs={run: controller(run)}, price=price))
     c.results[run, "calibrated", RANDOM] = figures
 
 
@@ -280,6 +283,19 @@ def test_how_near_the_oracle_cheaper_switching_comes_is_said_too():
     add_variant(c, 0.0, episodes(50, switchings=90.0, rms=0.07))
     found = [(bar.controller, bar.met) for bar in against_oracle(c, *c.contenders)]
     assert found == [("PPO", True), ("PPO", False), ("PPO, price 0", True), ("PPO, price 0", True)]
+    add_variant(c, 0.0, episodes(20, switchings=90.0, rms=0.01, breakdown=0.1), name="oracle")
+    found = [(bar.controller, bar.met) for bar in against_oracle(c, *c.contenders)]
+    assert found[4:] == [("PPO, price 0", False), ("PPO, price 0", False)]
+
+
+def test_the_oracle_is_asked_at_the_least_price_below_the_usual_one():
+    own, least = classic("PPO"), [replace(classic("PPO"), price=price) for price in (1.0, 0.1)]
+    (limit,) = limit_at_least_price([*least, own])
+    oracle = limit.runs["oracle, price 0.1"]
+    assert isinstance(oracle, Oracle)
+    assert oracle.weights == RewardWeights(switching=0.1)
+    assert limit.privileged
+    assert limit_at_least_price(least[:1]) == limit_at_least_price([]) == []
 
 
 def test_where_a_model_based_rival_wins_is_listed():

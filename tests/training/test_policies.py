@@ -11,8 +11,10 @@ pytestmark = pytest.mark.training
 
 
 def test_policies_do_not_depend_on_how_many_are_trained_at_a_time(tmp_path):
-    short = {"count": 2, "timesteps": 16_384}
-    together, alone = seed_trainings(tmp_path / "two", **short), seed_trainings(tmp_path, **short)[1]
+    together, others = (
+        seed_trainings(tmp_path / name, count=2, timesteps=16_384) for name in ("two", "one")
+    )
+    alone = others[1]
     train_missing(together, workers=2)
     train_missing([alone], workers=2)
     assert set(seed_policies(together)) == {"seed 0", "seed 1"}

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from epv_env.reward import RewardWeights
 from training.comparison.plan import BARS_ON, Contender
 from training.comparison.scores import JUDGED_ON, Contest
 from training.metrics import EpisodeMetrics, left_interval, summary
@@ -62,7 +63,9 @@ def against_rival(c: Contest, ours: Contender, rival: Contender) -> Iterator[Bar
     For ours at the price of switching at which it switches most among those at which it switches no more
     than the rival; if there is none, at its own.
     """
-    its, at = _figures(c, ours, rival)
+    names, runs = zip(*c.at_prices(ours).values(), strict=True)
+    its, *found = _figures(c, c.chosen[rival.name], *runs)
+    at = dict(zip(names, found, strict=True))
     fewer = [n for n, m in at.items() if m["switchings_per_s"] <= its["switchings_per_s"]]
     name = max(fewer, key=lambda n: at[n]["switchings_per_s"], default=ours.name)
     mine = at[name]
@@ -79,30 +82,33 @@ def against_rival(c: Contest, ours: Contender, rival: Contender) -> Iterator[Bar
 def against_oracle(c: Contest, ours: Contender, oracle: Contender) -> Iterator[Bar]:
     """Figures near what is physically possible, on the calibrated plant.
 
-    For ours, and for its variant that switches most: how near it comes where switching costs least.
+    For ours, and for ours where switching costs least: against the oracle, and that one's at this price.
     """
-    its, at = _figures(c, ours, oracle)
-    most = max(at, key=lambda n: at[n]["switchings_per_s"])
-    for name in dict.fromkeys((ours.name, most)):
-        mine = at[name]
-        switching = f"switchings {mine['switchings_per_s']:.2f} against {its['switchings_per_s']:.2f} /s"
-        for figure, meaning in JUDGED.items():
-            yield Bar(
-                controller=name,
-                bar=f"{meaning} within {NEAR_ORACLE:g} times that of {oracle.name}, calibrated",
-                measured=f"{1e3 * mine[figure]:.0f} against {1e3 * its[figure]:.0f} mbar, {switching}",
-                met=mine[figure] <= NEAR_ORACLE * its[figure],
-            )
+    at, limits = c.at_prices(ours), c.at_prices(oracle)
+    own, least = RewardWeights().switching, min(at)
+    for price, limit in dict.fromkeys([(own, own), (least, own), (least, least)]):
+        if limit in limits:
+            yield from _near(c, at[price], limits[limit])
 
 
-def _figures(
-    c: Contest, ours: Contender, rival: Contender
-) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
-    """The rival's figures, and ours at each price by name, of the episodes that all of them have run."""
-    its = c.metrics(rival.name, BARS_ON)
-    at = {name: c.results[run, BARS_ON, RANDOM] for name, run in c.at_prices(ours).items()}
-    fewest = min(map(len, (its, *at.values())))
-    return summary(its.first(fewest)), {name: summary(m.first(fewest)) for name, m in at.items()}
+def _near(c: Contest, ours: tuple[str, str], oracle: tuple[str, str]) -> Iterator[Bar]:
+    """How near one run comes to another, each by its name and its run."""
+    mine, its = _figures(c, ours[1], oracle[1])
+    switching = f"switchings {mine['switchings_per_s']:.2f} against {its['switchings_per_s']:.2f} /s"
+    for figure, meaning in JUDGED.items():
+        yield Bar(
+            controller=ours[0],
+            bar=f"{meaning} within {NEAR_ORACLE:g} times that of {oracle[0]}, calibrated",
+            measured=f"{1e3 * mine[figure]:.0f} against {1e3 * its[figure]:.0f} mbar, {switching}",
+            met=mine[figure] <= NEAR_ORACLE * its[figure],
+        )
+
+
+def _figures(c: Contest, *runs: str) -> list[dict[str, float]]:
+    """Of random episodes on BARS_ON that all these runs have run."""
+    found = [c.results[run, BARS_ON, RANDOM] for run in runs]
+    fewest = min(map(len, found))
+    return [summary(m.first(fewest)) for m in found]
 
 
 def _common(

@@ -120,7 +120,7 @@ def _alike(
     for (plants, scenario), wanted in cases.items():
         first = TUNING_SEED if scenario == TUNING else EVALUATION_SEED
         others = {name: v for name, v in _options(scenario).items() if name not in OF_EACH}
-        key = plants, first, expense.episodes(scenario, wanted), repr(others)
+        key = plants, first, expense.episodes(plants, scenario, wanted), repr(others)
         together.setdefault(key, []).append(scenario)
     return together
 

@@ -30,17 +30,18 @@ class Expense(NamedTuple):
     fewer: int
     """How many times fewer episodes it runs: the first of the others', so that the pairing holds."""
     random: int
-    """But of the random scenario at least so many, if the others run as many."""
+    """But of the random scenario at least so many where figures are set against each other (BARS_ON,
+    TRADED_ON), if the others run as many."""
 
-    def episodes(self, scenario: str, wanted: int) -> int:
+    def episodes(self, plants: str, scenario: str, wanted: int) -> int:
         """How many it runs where the others run so many."""
-        least = self.random if scenario == RANDOM else 0
+        least = self.random if scenario == RANDOM and plants in (BARS_ON, TRADED_ON) else 0
         return max(-(-wanted // self.fewer), min(wanted, least))
 
 
 EXPENSIVE = {
-    "MPC": Expense(times=200, fewer=32, random=128),
-    "oracle": Expense(times=200, fewer=32, random=128),
+    "MPC": Expense(times=200, fewer=128, random=128),
+    "oracle": Expense(times=200, fewer=128, random=128),
     "pulse, informed": Expense(times=30, fewer=8, random=512),
 }
 """By contender. The informed pulse's is the table of each plant."""

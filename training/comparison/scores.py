@@ -59,10 +59,11 @@ class Contest:
         """Episodes of a contender's chosen run."""
         return self.results[self.chosen[contender], plants, scenario]
 
-    def at_prices(self, contender: Contender) -> dict[str, str]:
-        """The runs of a contender at each price of switching, by the name that a table gives them."""
-        others = [run for v in self.variants if v.name == contender.name for run in v.runs]
-        return {contender.name: self.chosen[contender.name], **{run: run for run in others}}
+    def at_prices(self, contender: Contender) -> dict[float, tuple[str, str]]:
+        """By price of switching: the name that a table gives a contender, and its run."""
+        own = RewardWeights().switching, (contender.name, self.chosen[contender.name])
+        others = [(v.price, run) for v in self.variants if v.name == contender.name for run in v.runs]
+        return dict([own, *((price, (run, run)) for price, run in others if price is not None)])
 
     def scores(self, contender: Contender, plants: str, field: str) -> NDArray:
         """A field of every run, scenario and episode: (runs, scenarios, episodes).
