@@ -57,18 +57,20 @@ bench: $(VENV)/.installed ## measure speed and memory of plant and identificatio
 tune: $(VENV)/.installed ## search the classic controllers' settings anew (minutes)
 	$(PY) training/tune.py --out controllers/tuned.json $(ARGS)
 
-TRADEOFF := training/tradeoff.py --recurrent runs/recurrent --out runs/tradeoff
+# The policies of docs/controllers.md, trained once and kept. To train them anew, remove the folder first.
+TRAINED := controllers/trained
+TRADEOFF := training/tradeoff.py --recurrent $(TRAINED)/recurrent --out $(TRAINED)/tradeoff
 tradeoff: $(VENV)/.installed ## optimise controllers at several prices of switching (half an hour)
 	$(PY) $(TRADEOFF) $(ARGS)
 
-results: $(VENV)/.installed ## train and compare all controllers, and write docs/controllers.md's figures (hours; what is there is kept)
+results: $(VENV)/.installed ## compare all controllers, and write docs/controllers.md's figures (half an hour; trains what is missing)
 	$(PY) $(TRADEOFF)
-	$(PY) training/compare.py --recurrent runs/recurrent --policies runs/seeds --tradeoff runs/tradeoff \
+	$(PY) training/compare.py --recurrent $(TRAINED)/recurrent --policies $(TRAINED)/plain --tradeoff $(TRAINED)/tradeoff \
 		--out runs/comparison --images docs/images --pages docs/controllers.md README.md $(ARGS)
 
 robustness: $(VENV)/.installed ## sweep parameters, effects and conditions, and write docs/robustness.md's figures
-	$(PY) training/sweep.py --controllers "hysteresis, extrapolating" PWM pulse PPO=runs/ppo \
-		"PPO, recurrent=runs/recurrent/seed-1" \
+	$(PY) training/sweep.py --controllers "hysteresis, extrapolating" PWM pulse PPO=$(TRAINED)/plain/seed-0 \
+		"PPO, recurrent=$(TRAINED)/recurrent/seed-7" \
 		--out runs/robustness --images docs/images --pages docs/robustness.md $(ARGS)
 
 export: $(VENV)/.installed ## turn the policy of `make train` into C and ONNX (needs a C compiler)

@@ -9,7 +9,7 @@ got into: DAgger (Ross, Gordon and Bagnell, AISTATS 2011). Then PPO goes on from
 
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ from epv_env.observation import LAYOUT
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
+from epv_env.reward import RewardWeights
 from training.imitation import SLIPS
 from training.learning_log import TrainingLog
 from training.policy_files import save_policy
@@ -47,6 +48,15 @@ GOING_ON = Hyperparameters(
 """PPO's, from a student on. One period more or less of a pulse is worth 200 mbar, so that exploring more
 than the student doubts teaches nothing but caution; and who can keep within the band may pay more for
 coming near its edge, and for a breakdown."""
+
+EXPLORING = replace(GOING_ON, sharpness=1.0, learning_rate=3e-4)
+"""PPO's at a price of switching that is not the reward's own: there another way of control than the
+student's may pay, and has to be found."""
+
+
+def going_on(weights: RewardWeights) -> Hyperparameters:
+    """PPO's from a student on, at these prices."""
+    return GOING_ON if weights.switching == RewardWeights().switching else EXPLORING
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,7 +129,7 @@ def policy_of(student: Student) -> LearnedPolicy:
 
 
 def train_recurrent(
-    h: Hyperparameters = GOING_ON,
+    h: Hyperparameters,
     d: Distillation = FULL,
     *,
     folder: Path,

@@ -50,7 +50,7 @@ class Training:
 
     def run(self, *, quiet: bool = False) -> None:
         """Train it. An interrupted training goes on."""
-        from training.distil import train_recurrent  # torch takes seconds to import: only now
+        from training.distil import going_on, train_recurrent  # torch takes seconds to import: only now
         from training.policy_files import save_policy
         from training.ppo import Hyperparameters, train
 
@@ -60,7 +60,7 @@ class Training:
             "folder": self.folder, "resume": True, "quiet": quiet,
         }  # fmt: skip
         if self.recurrent:
-            policy, _ = train_recurrent(student=self.student, **task)
+            policy, _ = train_recurrent(going_on(self.weights), student=self.student, **task)
         else:
             policy, _ = train(Hyperparameters(), **task)
         prices = {"switching_price": self.weights.switching}

@@ -156,7 +156,8 @@ def main(arguments: list[str] | None = None) -> int:
     from training.policy_files import save_policy
     from training.ppo import Hyperparameters, train
 
-    hyperparameters = distil.GOING_ON if chosen.recurrent else Hyperparameters()
+    weights = RewardWeights(switching=chosen.switching_price)
+    hyperparameters = distil.going_on(weights) if chosen.recurrent else Hyperparameters()
     distillation = distil.FULL
     if chosen.quick:
         hyperparameters = replace(hyperparameters, **QUICK_HYPERPARAMETERS)
@@ -167,7 +168,7 @@ def main(arguments: list[str] | None = None) -> int:
     write_text(chosen.out / CONFIG_FILE, json.dumps(config, indent=1) + "\n")
     task: dict[str, Any] = {
         "folder": chosen.out, "plant": plant, "scenario": chosen.scenario,
-        "parameters": chosen.parameters, "weights": RewardWeights(switching=chosen.switching_price),
+        "parameters": chosen.parameters, "weights": weights,
         "timesteps": chosen.timesteps, "seed": chosen.seed, "device": chosen.device,
         "resume": chosen.resume,
     }  # fmt: skip
