@@ -21,6 +21,9 @@ from epv_env.observation import contract
 FORMAT = "epv-policy/1"
 WEIGHTS_FILE = "policy.safetensors"
 CONTRACT_FILE = "policy.json"
+TRAINED = Path(__file__).parent / "trained"
+"""Policies that come with the project, those of docs/controllers.md: recurrent/seed-0 to 9, plain/seed-0
+to 9, and by price of switching tradeoff/price-*."""
 
 
 class PolicyError(ValueError):
