@@ -20,6 +20,9 @@ from training.tune import TUNING_REGION
 RECURRENT_TIMESTEPS = 5_000_000
 """PPO's steps for a policy with a memory."""
 
+IMITATION = 25_000_000
+"""Steps of PPO that take about as long as the imitation that comes before (training/distil.py)."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Training:
@@ -40,6 +43,12 @@ class Training:
     def finished(self) -> bool:
         """Whether the policy is there."""
         return (self.folder / CONTRACT_FILE).exists()
+
+    @property
+    def cost(self) -> int:
+        """How long it takes, in steps of PPO."""
+        imitates = self.recurrent and self.student is None
+        return self.timesteps + (IMITATION if imitates else 0)
 
     @property
     def own_student(self) -> Path:
@@ -71,16 +80,23 @@ class Training:
 def train_missing(trainings: Sequence[Training], *, workers: int) -> None:
     """Train what is not finished, in so many processes; a policy does not depend on how many."""
     missing = [training for training in trainings if not training.finished]
-    if len(missing) < 2:
+    if workers == 1 or len(missing) < 2:
         for training in missing:
             training.run()
         return
     # The longest first, so that none is left running alone at the end.
-    missing.sort(key=lambda training: (not training.recurrent, -training.timesteps))
+    missing.sort(key=lambda training: -training.cost)
+    total = sum(training.cost for training in missing)
     pool: Any = Parallel(n_jobs=workers, return_as="generator_unordered")
-    done = pool(delayed(training.run)(quiet=True) for training in missing)
-    for _ in tqdm(done, total=len(missing), desc="training", unit="policy", file=sys.stderr):
-        pass
+    with tqdm(total=total, desc="training", unit="step", unit_scale=True, file=sys.stderr) as bar:
+        for cost in pool(delayed(_trained)(training) for training in missing):
+            bar.update(cost)
+
+
+def _trained(training: Training) -> int:
+    """Train without a word; returns the cost."""
+    training.run(quiet=True)
+    return training.cost
 
 
 def seed_folder(folder: Path, seed: int) -> Path:

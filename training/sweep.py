@@ -63,7 +63,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--factors", nargs="+", default=[], help="change only these, one at a time; default: all"
     )
-    parser.add_argument("--episodes", type=int, default=256, help="at each point that changes one thing")
+    parser.add_argument("--episodes", type=int, default=128, help="at each point that changes one thing")
     parser.add_argument(
         "--joint-episodes", type=int, default=4096, help="at each region, and in the hypercube"
     )
