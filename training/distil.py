@@ -9,7 +9,7 @@ got into: DAgger (Ross, Gordon and Bagnell, AISTATS 2011). Then PPO goes on from
 
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -49,14 +49,14 @@ GOING_ON = Hyperparameters(
 than the student doubts teaches nothing but caution; and who can keep within the band may pay more for
 coming near its edge, and for a breakdown."""
 
-EXPLORING = replace(GOING_ON, sharpness=1.0, learning_rate=3e-4)
-"""PPO's at a price of switching that is not the reward's own: there another way of control than the
-student's may pay, and has to be found."""
+EXPLORING = Hyperparameters(sharpness=0.5)
+"""PPO's where a switching costs less than usual: there another way of control than the student's pays,
+and has to be found."""
 
 
 def going_on(weights: RewardWeights) -> Hyperparameters:
     """PPO's from a student on, at these prices."""
-    return GOING_ON if weights.switching == RewardWeights().switching else EXPLORING
+    return EXPLORING if weights.switching < RewardWeights().switching else GOING_ON
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,6 +1,6 @@
 """Controllers for the trade-off of switching against excursion: each optimised at several prices.
 
-    python training/tradeoff.py --prices 0 1 --out runs/tradeoff
+    python training/tradeoff.py --prices 0.5 1 2 --out runs/tradeoff
 
 trains PPO and tunes classic controllers at every price; what is finished in --out is kept. With
 --recurrent, PPO also goes on at every price from a policy with a memory. Measured and drawn they are
@@ -120,7 +120,7 @@ def train_variants(chosen: argparse.Namespace, first: Training | None) -> None:
     remembering = [
         Training(
             folder=folder / RECURRENT_FOLDER, weights=weights, recurrent=True,
-            student=first.own_student, timesteps=chosen.recurrent_timesteps, seed=chosen.seed,
+            student=first.own_student, timesteps=chosen.timesteps, seed=chosen.seed,
         )
         for folder, weights in at
     ]  # fmt: skip
@@ -131,11 +131,8 @@ def main(arguments: list[str] | None = None) -> int:
     """Command line; returns the exit status."""
     parser = argparse.ArgumentParser(description="Optimise controllers at several prices of switching.")
     parser.add_argument("--out", type=writable_folder, default=Path("runs/tradeoff"))
-    parser.add_argument("--prices", type=float, nargs="+", default=[0.0, 0.1, 0.5, 1.0, 2.0])
+    parser.add_argument("--prices", type=float, nargs="+", default=[0.5, 1.0, 2.0])
     parser.add_argument("--timesteps", type=int, default=5_000_000, help="training steps at each price")
-    parser.add_argument(
-        "--recurrent-timesteps", type=int, default=10_000_000, help="the same, from --recurrent on"
-    )
     parser.add_argument(
         "--kinds", nargs="+", choices=KINDS, default=["hysteresis, extrapolating"],
         help="classic controllers to tune",
@@ -151,7 +148,7 @@ def main(arguments: list[str] | None = None) -> int:
         "--workers", type=int, default=available_cores(), help="processes that train"
     )  # fmt: skip
     chosen = parser.parse_args(arguments)
-    check_positive(parser, chosen, "timesteps", "recurrent_timesteps", "trials", "workers")
+    check_positive(parser, chosen, "timesteps", "trials", "workers")
     check_not_negative(parser, chosen, "seed")
     first = first_memory(chosen)
     optuna.logging.set_verbosity(optuna.logging.WARNING)

@@ -135,8 +135,7 @@ def save_recurrent(student, folder):
 def test_the_tradeoff_in_its_shortest_form_keeps_what_is_done(tmp_path):
     student = policy_of(Student(Distillation(memory=4)))
     save_recurrent(student, tmp_path / "memory")
-    steps = ("--timesteps", 16384, "--recurrent-timesteps", 32768)
-    short = ("--recurrent", tmp_path / "memory", "--prices", 0.2, *steps, "--trials", 1)
+    short = ("--recurrent", tmp_path / "memory", "--prices", 0.2, "--timesteps", 16384, "--trials", 1)
     script = "training/tradeoff.py"
     first = command(*short, "--out", tmp_path, script=script)
     assert first.returncode == 0, first.stderr
