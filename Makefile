@@ -61,11 +61,11 @@ tune: $(VENV)/.installed ## search the classic controllers' settings anew (minut
 TRAINED := controllers/trained
 TRADEOFF := training/tradeoff.py --recurrent $(TRAINED)/recurrent --out $(TRAINED)/tradeoff
 # Where a switching costs nothing there is most to learn.
-tradeoff: $(VENV)/.installed ## optimise controllers at several prices of switching (an hour; what is there is kept)
+tradeoff: $(VENV)/.installed ## optimise controllers at several prices of switching (what is there is kept)
 	$(PY) $(TRADEOFF) --prices 0.5 1 2
 	$(PY) $(TRADEOFF) --prices 0 --timesteps 20000000
 
-results: tradeoff ## compare all controllers, and write docs/controllers.md's figures (half an hour; trains what is missing)
+results: tradeoff ## compare all controllers, and write docs/controllers.md's figures (trains what is missing)
 	$(PY) training/compare.py --recurrent $(TRAINED)/recurrent --policies $(TRAINED)/plain --tradeoff $(TRAINED)/tradeoff \
 		--out runs/comparison --images docs/images --pages docs/controllers.md README.md $(ARGS)
 

@@ -47,7 +47,7 @@ from training.scenarios import EVALUATION, RANDOM
 from training.seeds import EVALUATION_SEED
 from training.sweeps.run import run_tasks, workplace
 from training.sweeps.tasks import Study
-from training.tradeoff import finished_variants, priced
+from training.tradeoff import finished_variants, variant
 
 JOURNAL_FILE = "blocks.jsonl"
 CURVE_FILE = "learning_curve.csv"
@@ -134,8 +134,7 @@ def limit_at_least_price(variants: list[Contender]) -> list[Contender]:
     weights = RewardWeights()
     if not prices or (least := min(prices)) >= weights.switching:
         return []
-    oracle = Oracle(threads=1, weights=replace(weights, switching=least))
-    return [Contender(name=oracle.name, runs={priced(oracle.name, least): oracle}, price=least)]
+    return [variant(Oracle(threads=1, weights=replace(weights, switching=least)), least)]
 
 
 def run_blocks(blocks: list[Block], everyone: list[Contender], chosen: argparse.Namespace) -> Results:

@@ -36,9 +36,11 @@ RECURRENT_FOLDER = "recurrent"
 """Within that of a price."""
 
 
-def priced(name: str, price: float) -> str:
-    """Name of a controller that was optimised at a price of switching."""
-    return f"{name}, price {price:g}"
+def variant(controller: Controller, price: float) -> Contender:
+    """A controller that was optimised at a price of switching."""
+    return Contender(
+        name=controller.name, runs={f"{controller.name}, price {price:g}": controller}, price=price
+    )
 
 
 def tuned_at(folder: Path, kinds: list[str], price: float, trials: int, seed: int) -> None:
@@ -81,9 +83,7 @@ def finished_variants(folder: Path | None) -> list[Contender]:
             tunings = load_tunings(path / TUNED_FILE)
             plant = Parameters.calibrated()
             controllers += [build(kind, tuning.values, plant) for kind, tuning in tunings.items()]
-        found += [
-            Contender(name=c.name, runs={priced(c.name, price): c}, price=price) for c in controllers
-        ]
+        found += [variant(controller, price) for controller in controllers]
     if not found:
         raise ValueError(f"{folder} holds no controllers: make them with `python training/tradeoff.py`")
     return found

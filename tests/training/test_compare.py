@@ -36,7 +36,7 @@ from training.metrics import EpisodeMetrics
 from training.policy_files import save_policy
 from training.scenarios import EVALUATION, RANDOM
 from training.sweeps.tasks import Study
-from training.tradeoff import priced
+from training.tradeoff import variant
 from training.tune import TUNING_REGION
 
 pytestmark = pytest.mark.training
@@ -253,9 +253,8 @@ def test_a_rival_is_beaten_only_at_equal_or_fewer_switches(rival, met):
 
 def add_variant(c, price, figures, name="PPO"):
     """A contender at another price of switching."""
-    run = priced(name, price)
-    c.variants.append(Contender(name=name, runs={run: controller(run)}, price=price))
-    c.results[run, "calibrated", RANDOM] = figures
+    c.variants.append(variant(controller(name), price))
+    c.results[f"{name}, price {price:g}", "calibrated", RANDOM] = figures
 
 
 def test_a_rival_that_switches_less_is_met_at_another_price():
