@@ -19,6 +19,7 @@ from tests.training.policies import random_layers, write_policy
 from training.compare import limit_at_least_price, main, parse
 from training.comparison.bars import against_oracle, against_rival, leaving, lost
 from training.comparison.blocks import collect, plan
+from training.comparison.figures import trade_figure
 from training.comparison.output import PARTS, RESULTS_FILE, TABLES_FILE
 from training.comparison.plan import (
     EXPENSIVE,
@@ -274,6 +275,13 @@ def test_the_oracle_is_a_limit_and_no_rival():
     c = contest(PPO=episodes(50), oracle=episodes(20, breakdown=0.25, rms=0.05))
     assert c.contenders[1].privileged
     assert [bar.met for bar in against_oracle(c, *c.contenders)] == [True, False]
+
+
+def test_what_lies_above_a_panel_of_the_tradeoff_is_named():
+    far = episodes(50, breakdown=1.2)
+    found = trade(contest(PPO=episodes(50), far=far, pulse=episodes(50)), 50)
+    titles = [axes.get_title() for axes in trade_figure(found).axes]
+    assert titles == ["above: far", "above: far", ""]
 
 
 def test_how_near_the_oracle_cheaper_switching_comes_is_said_too():

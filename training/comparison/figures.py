@@ -104,7 +104,7 @@ def duel_figure(found: pd.DataFrame, ours: str) -> Figure:
 def trade_figure(traded: pd.DataFrame) -> Figure:
     """Excursion, breakdown and rms error over switchings; the line is the Pareto front.
 
-    Small numbers: prices of switching, where there are several.
+    Small numbers: prices of switching, where there are several. What lies above a panel is named there.
     """
     figure, panels = plt.subplots(1, len(FRONT), figsize=(12, 3.8), layout="constrained")
     for axes, (column, label) in zip(panels, FRONT.items(), strict=True):
@@ -124,6 +124,8 @@ def trade_figure(traded: pd.DataFrame) -> Figure:
         axes.xaxis.set_major_formatter(ScalarFormatter())
         axes.xaxis.set_minor_formatter(NullFormatter())
         axes.set_ylim(0, HIGHEST_BAR)
+        beyond = traded.loc[traded[column] > HIGHEST_BAR, "controller"].unique()
+        axes.set_title(f"above: {', '.join(beyond)}" if len(beyond) else "", fontsize=8)
         axes.grid(alpha=0.3, which="both")
     handles = panels[0].get_legend_handles_labels()
     figure.legend(*handles, fontsize=8, ncols=len(handles[0]), loc="outside upper center")
