@@ -59,11 +59,12 @@ tune: $(VENV)/.installed ## search the classic controllers' settings anew (minut
 
 # The policies of docs/controllers.md, trained once and kept. To train them anew, remove the folder first.
 TRAINED := controllers/trained
-TRADEOFF := training/tradeoff.py --recurrent $(TRAINED)/recurrent --out $(TRAINED)/tradeoff
-# Where a switching costs nothing there is most to learn.
+TRADEOFF := training/tradeoff.py --out $(TRAINED)/tradeoff
+# Where a switching costs nothing there is most to learn: long without a memory, then with one.
 tradeoff: $(VENV)/.installed ## optimise controllers at several prices of switching (what is there is kept)
-	$(PY) $(TRADEOFF) --prices 0.5 1 2
+	$(PY) $(TRADEOFF) --prices 0.5 1 2 --recurrent $(TRAINED)/recurrent
 	$(PY) $(TRADEOFF) --prices 0 --timesteps 20000000
+	$(PY) $(TRADEOFF) --prices 0 --timesteps 12000000 --recurrent $(TRAINED)/recurrent
 
 results: tradeoff ## compare all controllers, and write docs/controllers.md's figures (trains what is missing)
 	$(PY) training/compare.py --recurrent $(TRAINED)/recurrent --policies $(TRAINED)/plain --tradeoff $(TRAINED)/tradeoff \

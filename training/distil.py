@@ -5,11 +5,14 @@ depends on that plant, so whoever imitates it from what an ECU measures has to f
 what the valve shows, and to remember it: "learning by cheating" (Chen et al., CoRL 2019). The student
 drives more and more of the episodes and is told what the teacher would have done in each state that it
 got into: DAgger (Ross, Gordon and Bagnell, AISTATS 2011). Then PPO goes on from there (training/ppo.py).
+
+That teacher lets the valve rest. Where switching is so cheap that this does not pay, PPO trains a policy
+without a memory first, and goes on from it with what the student remembers.
 """
 
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +42,7 @@ from training.selection import score
 
 NAME = "PPO, recurrent"
 STUDENT_FOLDER = "student"
+MEMORYLESS_FOLDER = "memoryless"
 
 GOING_ON = Hyperparameters(
     band_price=10.0, band_bar=0.32, breakdown_price=2.0, sharpness=3.0, ent_coef=0.0,
@@ -49,14 +53,18 @@ GOING_ON = Hyperparameters(
 than the student doubts teaches nothing but caution; and who can keep within the band may pay more for
 coming near its edge, and for a breakdown."""
 
-EXPLORING = Hyperparameters(sharpness=0.5)
-"""PPO's where a switching costs less than usual: there another way of control than the student's pays,
-and has to be found."""
+BUSY = Hyperparameters(learning_rate=4e-4, breakdown_price=0.6, first_validation=0.05)
+"""PPO's where a switching costs less than usual, from a policy without a memory on (`is_cheap`)."""
+
+
+def is_cheap(weights: RewardWeights) -> bool:
+    """Whether a switching costs less than usual: then another way of control than the student's pays."""
+    return weights.switching < RewardWeights().switching
 
 
 def going_on(weights: RewardWeights) -> Hyperparameters:
-    """PPO's from a student on, at these prices."""
-    return EXPLORING if weights.switching < RewardWeights().switching else GOING_ON
+    """PPO's with a memory, at these prices."""
+    return BUSY if is_cheap(weights) else GOING_ON
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,23 +143,47 @@ def train_recurrent(
     folder: Path,
     resume: bool,
     student: Path | None = None,
+    memoryless: Path | None = None,
     quiet: bool = False,
     **task: Any,
 ) -> tuple[LearnedPolicy, TrainingLog]:
     """Train a student, kept in a folder within `folder`, and go on from it with PPO.
 
-    student: folder of a student that is there already. task: `train`'s other arguments. An interruption
-    loses the student if it is not finished, and no more of the rest than `train` does.
+    Where switching is cheap PPO goes on from a policy that it has trained without a memory, kept beside
+    the student, and gives it the student's.
+
+    student, memoryless: folders of those that are there already. task: `train`'s other arguments. An
+    interruption loses the student if it is not finished, and no more of the rest than `train` does.
     """
-    kept = student or folder / STUDENT_FOLDER
+    kept, provenance = student or folder / STUDENT_FOLDER, {"seed": task["seed"]}
+    period = OnOff.default_period
     if student is None and not (resume and (kept / CONTRACT_FILE).exists()):
         names = ("plant", "scenario", "parameters", "weights")
         options = {name: task[name] for name in names}
         plants = known_plants(d.plants, options, seed=task["seed"], quiet=quiet)
         found = distil(d, InformedPulse(), plants, options=options, seed=task["seed"], quiet=quiet)
-        period, provenance = OnOff.default_period, {"distillation": asdict(d), "seed": task["seed"]}
-        save_policy(found, kept, control_period=period, provenance=provenance)
-    return train(h, folder=folder, student=load_student(kept, h), resume=resume, quiet=quiet, **task)
+        distillation = {"distillation": asdict(d), **provenance}
+        save_policy(found, kept, control_period=period, provenance=distillation)
+    begun = load_student(kept, h)
+    if is_cheap(task["weights"]):
+        kept = memoryless or folder / MEMORYLESS_FOLDER
+        if memoryless is None and not (resume and (kept / CONTRACT_FILE).exists()):
+            usual = Hyperparameters()
+            rates = {"learning_rate": usual.learning_rate, "breakdown_price": usual.breakdown_price}
+            found, _ = train(replace(h, **rates), folder=kept, resume=resume, quiet=quiet, **task)
+            save_policy(found, kept, control_period=period, provenance=provenance)
+        begun = with_memory_of(begun, load_policy(kept))
+    return train(h, folder=folder, student=begun, resume=resume, quiet=quiet, **task)
+
+
+def with_memory_of(student: LearnedPolicy, policy: LearnedPolicy) -> LearnedPolicy:
+    """A policy without a memory, with the student's, which its layers do not heed yet.
+
+    It acts as before until it learns more (Net2Net: Chen, Goodfellow and Shlens, ICLR 2016).
+    """
+    (weight, bias), *rest = policy.layers
+    unheeded = np.zeros((len(weight), student.cells), dtype=weight.dtype)
+    return replace(student, layers=[(np.concatenate([weight, unheeded], axis=1), bias), *rest])
 
 
 def load_student(folder: Path, h: Hyperparameters = GOING_ON) -> LearnedPolicy:

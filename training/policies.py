@@ -38,6 +38,8 @@ class Training:
     """With a memory (training/distil.py)."""
     student: Path | None = None
     """Folder of the one that a policy with a memory goes on from; None: it is trained, too."""
+    memoryless: Path | None = None
+    """Folder of the policy that gets the student's memory where switching is cheap; None: the same."""
 
     @property
     def finished(self) -> bool:
@@ -69,7 +71,9 @@ class Training:
             "folder": self.folder, "resume": True, "quiet": quiet,
         }  # fmt: skip
         if self.recurrent:
-            policy, _ = train_recurrent(going_on(self.weights), student=self.student, **task)
+            policy, _ = train_recurrent(
+                going_on(self.weights), student=self.student, memoryless=self.memoryless, **task
+            )
         else:
             policy, _ = train(Hyperparameters(), **task)
         prices = {"switching_price": self.weights.switching}

@@ -3,8 +3,8 @@
     python training/tradeoff.py --prices 0.5 1 2 --out runs/tradeoff
 
 trains PPO and tunes classic controllers at every price; what is finished in --out is kept. With
---recurrent, PPO also goes on at every price from a policy with a memory. Measured and drawn they are
-by training/compare.py --tradeoff runs/tradeoff.
+--recurrent, PPO also trains a policy with a memory at every price (training/distil.py). Measured and
+drawn they are by training/compare.py --tradeoff runs/tradeoff.
 """
 
 import argparse
@@ -120,7 +120,7 @@ def train_variants(chosen: argparse.Namespace, first: Training | None) -> None:
     remembering = [
         Training(
             folder=folder / RECURRENT_FOLDER, weights=weights, recurrent=True,
-            student=first.own_student, timesteps=chosen.timesteps, seed=chosen.seed,
+            student=first.own_student, memoryless=folder, timesteps=chosen.timesteps, seed=chosen.seed,
         )
         for folder, weights in at
     ]  # fmt: skip
@@ -140,8 +140,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--trials", type=int, default=100, help="tuning evaluations of each of them")
     parser.add_argument(
         "--recurrent", type=writable_folder,
-        help="folder of policies with a memory, as compare.py fills it: PPO goes on from the student of "
-        "its first training seed, which is trained if it is missing",
+        help="folder of policies with a memory, as compare.py fills it: PPO takes the student of its "
+        "first training seed, which is trained if it is missing",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument(

@@ -13,13 +13,14 @@ from safetensors.numpy import load_file, save_file
 from controllers.base import Privileged
 from controllers.hysteresis import Hysteresis
 from controllers.informed_pulse import InformedPulse
-from controllers.learned import WEIGHTS_FILE, PolicyError, load_policy
+from controllers.learned import WEIGHTS_FILE, LearnedPolicy, PolicyError, load_policy
 from controllers.pulse_table import PulseTables, pulse_table
 from controllers.tuned import build, load_tunings
 from epv_env.observation import LAYOUT
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
+from tests.training.policies import random_layers
 from training.distil import (
     NAME,
     Distillation,
@@ -28,6 +29,7 @@ from training.distil import (
     known_plants,
     policy_of,
     train_recurrent,
+    with_memory_of,
 )
 from training.ecu.exact import in_double, logits_along
 from training.policy_files import greedy_policy, put_layers, save_policy
@@ -236,3 +238,31 @@ def test_a_seed_means_one_policy_and_an_interrupted_training_goes_on(tmp_path):
     assert same(trained(tmp_path / "again", seed=1), policy)
     assert same(trained(tmp_path / "one", seed=1, resume=True), policy)  # nothing was left to do
     assert not same(trained(tmp_path / "other", seed=2), policy)
+
+
+def test_a_policy_that_is_given_a_memory_acts_as_before(student):
+    plain = LearnedPolicy(layers=random_layers(seed=5))
+    remembering = with_memory_of(policy_of(student), plain)
+    assert remembering.cells == TINY.memory
+    plain.reset(4)
+    remembering.reset(4)
+    for seen in np.random.default_rng(1).normal(size=(20, 4, len(LAYOUT))):
+        np.testing.assert_allclose(remembering.logits(seen), plain.logits(seen), rtol=1e-5)
+
+
+def test_where_switching_is_cheap_ppo_goes_on_from_a_policy_without_a_memory(tmp_path):
+    def trained(folder, price, student=None, memoryless=None):
+        options = OPTIONS | {"weights": RewardWeights(switching=price)}
+        policy, _ = train_recurrent(
+            TINY_PPO, TINY, folder=folder, student=student, memoryless=memoryless, timesteps=256, seed=1,
+            device="cpu", resume=True, quiet=True, **options,
+        )  # fmt: skip
+        return policy
+
+    cheap, usual = trained(tmp_path / "cheap", 0.0), trained(tmp_path / "usual", 0.3)
+    assert not same(cheap, usual)
+    assert not (tmp_path / "usual" / "memoryless").exists()
+    kept = {name: tmp_path / "cheap" / name for name in ("student", "memoryless")}
+    assert load_policy(kept["memoryless"]).cell is None
+    assert same(trained(tmp_path / "given", 0.0, **kept), cheap)
+    assert not [path for path in (tmp_path / "given").iterdir() if path.is_dir()]
