@@ -9,6 +9,7 @@ import pytest
 pytest.importorskip("pandas")
 pytest.importorskip("joblib")
 pytest.importorskip("stable_baselines3")
+import matplotlib.pyplot as plt
 
 from controllers.hysteresis import Hysteresis
 from controllers.oracle import Oracle
@@ -280,8 +281,9 @@ def test_the_oracle_is_a_limit_and_no_rival():
 def test_what_lies_above_a_panel_of_the_tradeoff_is_named():
     far = episodes(50, breakdown=1.2)
     found = trade(contest(PPO=episodes(50), far=far, pulse=episodes(50)), 50)
-    titles = [axes.get_title() for axes in trade_figure(found).axes]
-    assert titles == ["above: far", "above: far", ""]
+    figure = trade_figure(found)
+    plt.close(figure)
+    assert [axes.get_title() for axes in figure.axes] == ["above: far", "above: far", ""]
 
 
 def test_how_near_the_oracle_cheaper_switching_comes_is_said_too():
