@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from epv_env.plant.coefficients import coefficients, effect_sizes
+from epv_env.plant.equations import Inputs
 from identification.bench.automaton import COMPILED, X
 from identification.bench.schedule import Schedule
 
@@ -57,7 +58,7 @@ def final_p2(schedule: Schedule, method: str, clip: str) -> tuple[float, str]:
 
     Kindly, the run is split where inputs change.
     """
-    u = np.zeros(4)
+    u = np.zeros(len(Inputs._fields))
     rates = _right_hand_side(schedule, u, clip)
     y = np.array(schedule.initial, dtype=float)
     for k, (start, end) in enumerate(zip(schedule.borders[:-1], schedule.borders[1:], strict=True)):
