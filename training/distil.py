@@ -155,25 +155,40 @@ def train_recurrent(
     student, memoryless: folders of those that are there already. task: `train`'s other arguments. An
     interruption loses the student if it is not finished, and no more of the rest than `train` does.
     """
-    kept, provenance = student or folder / STUDENT_FOLDER, {"seed": task["seed"]}
-    period = OnOff.default_period
-    if student is None and not (resume and (kept / CONTRACT_FILE).exists()):
-        names = ("plant", "scenario", "parameters", "weights")
-        options = {name: task[name] for name in names}
-        plants = known_plants(d.plants, options, seed=task["seed"], quiet=quiet)
-        found = distil(d, InformedPulse(), plants, options=options, seed=task["seed"], quiet=quiet)
-        distillation = {"distillation": asdict(d), **provenance}
-        save_policy(found, kept, control_period=period, provenance=distillation)
-    begun = load_student(kept, h)
+    if student is None:
+        student = folder / STUDENT_FOLDER
+        if not (resume and _is_finished(student)):
+            _distil_into(student, d, quiet=quiet, **task)
+    begun = load_student(student, h)
     if is_cheap(task["weights"]):
-        kept = memoryless or folder / MEMORYLESS_FOLDER
-        if memoryless is None and not (resume and (kept / CONTRACT_FILE).exists()):
-            usual = Hyperparameters()
-            rates = {"learning_rate": usual.learning_rate, "breakdown_price": usual.breakdown_price}
-            found, _ = train(replace(h, **rates), folder=kept, resume=resume, quiet=quiet, **task)
-            save_policy(found, kept, control_period=period, provenance=provenance)
-        begun = with_memory_of(begun, load_policy(kept))
+        if memoryless is None:
+            memoryless = folder / MEMORYLESS_FOLDER
+            if not (resume and _is_finished(memoryless)):
+                _train_memoryless_into(memoryless, h, resume=resume, quiet=quiet, **task)
+        begun = with_memory_of(begun, load_policy(memoryless))
     return train(h, folder=folder, student=begun, resume=resume, quiet=quiet, **task)
+
+
+def _is_finished(folder: Path) -> bool:
+    return (folder / CONTRACT_FILE).exists()
+
+
+def _distil_into(folder: Path, d: Distillation, *, quiet: bool, **task: Any) -> None:
+    """Train a student. task: `train`'s arguments."""
+    options = {name: task[name] for name in ("plant", "scenario", "parameters", "weights")}
+    plants = known_plants(d.plants, options, seed=task["seed"], quiet=quiet)
+    found = distil(d, InformedPulse(), plants, options=options, seed=task["seed"], quiet=quiet)
+    provenance = {"distillation": asdict(d), "seed": task["seed"]}
+    save_policy(found, folder, control_period=OnOff.default_period, provenance=provenance)
+
+
+def _train_memoryless_into(folder: Path, h: Hyperparameters, **task: Any) -> None:
+    """Train a policy without a memory, as usual but for its size. task: `train`'s arguments."""
+    usual = Hyperparameters()
+    rates = {"learning_rate": usual.learning_rate, "breakdown_price": usual.breakdown_price}
+    found, _ = train(replace(h, **rates), folder=folder, **task)
+    provenance = {"timesteps": task["timesteps"], "seed": task["seed"]}
+    save_policy(found, folder, control_period=OnOff.default_period, provenance=provenance)
 
 
 def with_memory_of(student: LearnedPolicy, policy: LearnedPolicy) -> LearnedPolicy:
