@@ -108,6 +108,11 @@ def _logistic(signal: NDArray) -> NDArray:
     return 0.5 + 0.5 * np.tanh(0.5 * signal)
 
 
+def holds_policy(folder: Path) -> bool:
+    """Whether a policy has been written into a folder: its contract is written last."""
+    return (folder / CONTRACT_FILE).exists()
+
+
 def load_policy(folder: str | PathLike[str]) -> LearnedPolicy:
     """A policy from its folder (policy.safetensors and policy.json).
 

@@ -15,7 +15,7 @@ from typing import Any
 import pandas as pd
 
 from controllers.base import Controller
-from controllers.learned import CONTRACT_FILE, load_policy
+from controllers.learned import holds_policy, load_policy
 from controllers.tuned import SEARCHING, tuned_controllers
 from epv_env.actions import OnOff
 from epv_env.plant.commandline import (
@@ -108,7 +108,7 @@ def diagnose(chosen: argparse.Namespace) -> dict[str, Any]:
 
 def trained(folder: Path, plant: Plant, chosen: argparse.Namespace) -> Controller:
     """PPO trained on plants around this one, or as it was trained before."""
-    if not (folder / CONTRACT_FILE).exists():
+    if not holds_policy(folder):
         from training.policy_files import save_policy  # torch takes seconds to import: only now
         from training.ppo import Hyperparameters, train
 

@@ -24,7 +24,7 @@ from tqdm import tqdm
 
 from controllers.base import Controller
 from controllers.informed_pulse import InformedPulse
-from controllers.learned import CONTRACT_FILE, GatedUnit, LearnedPolicy, load_policy
+from controllers.learned import GatedUnit, LearnedPolicy, holds_policy, load_policy
 from controllers.pulse_table import PulseTables
 from epv_env.actions import OnOff
 from epv_env.observation import LAYOUT
@@ -157,20 +157,16 @@ def train_recurrent(
     """
     if student is None:
         student = folder / STUDENT_FOLDER
-        if not (resume and _is_finished(student)):
+        if not (resume and holds_policy(student)):
             _distil_into(student, d, quiet=quiet, **task)
     begun = load_student(student, h)
     if is_cheap(task["weights"]):
         if memoryless is None:
             memoryless = folder / MEMORYLESS_FOLDER
-            if not (resume and _is_finished(memoryless)):
+            if not (resume and holds_policy(memoryless)):
                 _train_memoryless_into(memoryless, h, resume=resume, quiet=quiet, **task)
         begun = with_memory_of(begun, load_policy(memoryless))
     return train(h, folder=folder, student=begun, resume=resume, quiet=quiet, **task)
-
-
-def _is_finished(folder: Path) -> bool:
-    return (folder / CONTRACT_FILE).exists()
 
 
 def _distil_into(folder: Path, d: Distillation, *, quiet: bool, **task: Any) -> None:

@@ -10,7 +10,7 @@ from joblib import Parallel, delayed
 from tqdm import tqdm
 
 from controllers.base import Controller
-from controllers.learned import CONTRACT_FILE, load_policy
+from controllers.learned import holds_policy, load_policy
 from epv_env.actions import OnOff
 from epv_env.plant.consumption import MIXED
 from epv_env.plant.plantfile import Plant
@@ -44,7 +44,7 @@ class Training:
     @property
     def finished(self) -> bool:
         """Whether the policy is there."""
-        return (self.folder / CONTRACT_FILE).exists()
+        return holds_policy(self.folder)
 
     @property
     def cost(self) -> int:

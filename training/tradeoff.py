@@ -15,7 +15,7 @@ from typing import Any
 import optuna
 
 from controllers.base import Controller
-from controllers.learned import CONTRACT_FILE, load_policy
+from controllers.learned import holds_policy, load_policy
 from controllers.tuned import KINDS, build, load_search, load_tunings, save_tunings
 from epv_env.plant.commandline import (
     check_not_negative,
@@ -78,7 +78,7 @@ def finished_variants(folder: Path | None) -> list[Contender]:
         price = float(path.name.removeprefix("price-"))
         controllers: list[Controller] = []
         learned = (path, path / RECURRENT_FOLDER)
-        controllers += [load_policy(each) for each in learned if (each / CONTRACT_FILE).exists()]
+        controllers += [load_policy(each) for each in learned if holds_policy(each)]
         if (path / TUNED_FILE).exists():
             tunings = load_tunings(path / TUNED_FILE)
             plant = Parameters.calibrated()

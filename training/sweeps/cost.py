@@ -31,13 +31,11 @@ class Idle:
 def overhead(run: Map, study: Study) -> float:
     """Time from one empty task to the next [s]: how fast tasks can be handed out, whatever they do."""
     idle = [Idle(name=str(k)) for k in range(IDLE)]
-    taken = 0.0
-    for _ in range(2):  # the second time all workers are up: idle ones stop after minutes
-        began = time.perf_counter()
-        for _ in run(idle, study):
-            pass
-        taken = time.perf_counter() - began
-    return taken / IDLE
+    for _ in run(idle, study):  # starts the workers: those without work stop after minutes
+        pass
+    began = time.perf_counter()
+    done = sum(1 for _ in run(idle, study))
+    return (time.perf_counter() - began) / done
 
 
 def episode_cpu(cells: Sequence[Cell], outcomes: Mapping[str, Outcome]) -> dict[str, float]:
