@@ -95,7 +95,7 @@ real-bench: $(VENV)/.installed ## ask which effects give the report's printed er
 	$(PY) -m identification gap --tables --out runs/real-bench --images docs/images $(ARGS)
 
 circle: $(VENV)/.installed ## train, deploy on a bench, diagnose, retrain, deploy again (5 minutes)
-	$(PY) training/circle.py --out runs/circle --images docs/images $(ARGS)
+	$(PY) training/sim_to_real.py --out runs/circle --images docs/images $(ARGS)
 
 pictures: $(VENV)/.installed ## draw the figures of docs/identification.md
 	$(PY) docs/pictures.py --out docs/images --coverage runs/coverage $(ARGS)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.statics import opening_pressure
+from controllers.opening_pressure import opening_pressure
 from epv_env.plant.equations import State
 from epv_env.plant.simulate import energised
 from epv_env.plant.supply import BAR

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from controllers.opening_pressure import opening_pressure
 from controllers.pwm_design import Design
-from controllers.statics import opening_pressure
 from epv_env.observation import decode
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.supply import BAR

@@ -15,7 +15,7 @@ from controllers.pulse import Pulse
 from controllers.pulse_table import pulse_table
 from controllers.pwm import PWM
 from controllers.pwm_design import design
-from epv_env.plant.files import write_text
+from epv_env.common.files import write_text
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.supply import BAR
 

@@ -11,8 +11,8 @@ import numpy as np
 from PIL import Image
 
 from controllers.tuned import tuned_controllers
+from epv_env.common.command_line import fail_clearly, writable_file
 from epv_env.env import EPValveEnv
-from epv_env.plant.commandline import fail_clearly, writable_file
 
 SIZE = (800, 450)
 

@@ -10,15 +10,16 @@ from tempfile import TemporaryDirectory
 
 from matplotlib.figure import Figure
 
-from epv_env.plant.commandline import fail_clearly, writable_folder
+from epv_env.common.command_line import fail_clearly, writable_folder
 from epv_env.plant.parameters import Parameters
 from identification.bench.programmes import REPORT_SUITE
 from identification.bench.session import run_bench
-from identification.calibration.starts import METHODS
-from identification.confidence import figures
-from identification.confidence.coverage import coverage_study
-from identification.report.response_figures import overlay
-from identification.stages import Identification
+from identification.calibration.multi_start import METHODS
+from identification.confidence import confidence_figures as figures
+from identification.pipeline.stages import Identification
+from identification.replay.response_figures import overlay
+from identification.studies.coverage.coverage import coverage_study
+from identification.studies.coverage.coverage_figure import distances
 
 
 def drawn(coverage: Path, campaigns: int) -> dict[str, Figure]:
@@ -30,7 +31,7 @@ def drawn(coverage: Path, campaigns: int) -> dict[str, Figure]:
         return {
             "calibration.png": overlay(identification.calibration.after[METHODS[0]][0]),
             "region.png": figures.region(identification.confidence),
-            "coverage.png": figures.distances(study),
+            "coverage.png": distances(study),
         }
 
 

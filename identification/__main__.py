@@ -7,24 +7,24 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
-from epv_env.plant.commandline import fail_clearly, writable_folder
+from epv_env.common.command_line import fail_clearly, writable_folder
 from epv_env.plant.effects import CATALOGUE
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import load_plant, save_plant
 from identification.bench.programme_file import load_programmes
 from identification.bench.programmes import SUITES
 from identification.bench.session import run_bench
-from identification.blind.command import add_blind, blind
 from identification.calibration.calibrate import STARTS
-from identification.cases import RATE
-from identification.confidence.coverage import CAMPAIGNS, coverage_study
-from identification.confidence.section import coverage_json, coverage_section
-from identification.gap_valve.command import add_gap, gap
-from identification.recordings.files import check_vacant, read_campaign, write_campaign
-from identification.report.results import as_text, write_results
-from identification.reproduce.reproduce import reproduce
-from identification.run import PLANT_FILE, run
-from identification.stages import STAGES, Identification
+from identification.commands.blind import add_blind, blind
+from identification.commands.gap import add_gap, gap
+from identification.pipeline.run import PLANT_FILE, run
+from identification.pipeline.stages import STAGES, Identification
+from identification.recordings.campaign_files import check_vacant, read_campaign, write_campaign
+from identification.report.result_files import as_text, write_results
+from identification.report_2003.cases import RATE
+from identification.studies.coverage.coverage import CAMPAIGNS, coverage_study
+from identification.studies.coverage.coverage_section import coverage_json, coverage_section
+from identification.studies.reproduction.reproduction import reproduce
 
 JOURNAL = "searches.jsonl"
 

@@ -11,6 +11,9 @@ ROOT = Path(__file__).parents[1]
 HEAVY = ("torch", "stable_baselines3", "matplotlib", "pygame", "pandas")
 
 FORBIDDEN = {
+    "epv_env/common": (
+        "epv_env", "gymnasium", "controllers", "training", "identification", "torch", "pandas",
+    ),
     "epv_env/plant": (
         "epv_env", "gymnasium", "controllers", "training", "identification", *HEAVY,
     ),
@@ -20,7 +23,10 @@ FORBIDDEN = {
 }  # fmt: skip
 """What the files of a folder do not import."""
 
-ALLOWED = {"epv_env/plant": ("epv_env.plant",)}
+ALLOWED = {
+    "epv_env/common": ("epv_env.common",),
+    "epv_env/plant": ("epv_env.plant", "epv_env.common"),
+}
 """What they may import all the same."""
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from controllers.pwm import PWM
 from controllers.pwm_design import Design, open_loop
 from controllers.tuned import build, load_tunings
-from epv_env.plant.commandline import fail_clearly, writable_file
+from epv_env.common.command_line import fail_clearly, writable_file
 from epv_env.plant.plantfile import load_plant
 
 
@@ -23,7 +23,11 @@ def bode(design: Design, path: Path) -> Path:
     Margins are python-control's of the very response that is drawn. The axis ends at half the sampling
     frequency of the PWM, beyond which a sampled loop has nothing to show.
     """
-    from training.plots import COLOURS, plt, save_figure  # matplotlib only where it is drawn with
+    from training.evaluation.plots import (  # matplotlib only where it is drawn with
+        COLOURS,
+        plt,
+        save_figure,
+    )
 
     loop = open_loop(design)
     gain_margin, phase_margin, at_phase, at_gain = map(float, control.margin(loop))

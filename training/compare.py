@@ -15,38 +15,38 @@ from typing import Any
 
 import pandas as pd
 
-from controllers.informed_pulse import InformedPulse
 from controllers.oracle import Oracle
+from controllers.privileged_pulse import InformedPulse
 from controllers.tuned import tuned_controllers
-from epv_env.plant.commandline import (
+from epv_env.common.command_line import (
     check_positive,
     fail_clearly,
     parse_with_quick,
     writable_folder,
 )
+from epv_env.common.journal import Journal
 from epv_env.plant.consumption import MIXED
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.valves import available_cores
 from epv_env.reward import RewardWeights
-from identification.journal import Journal
-from training.comparison.blocks import Block, collect, plan
-from training.comparison.output import PARTS, findings, write_figures, write_tables
-from training.comparison.plan import Contender, Results, Sizes
-from training.comparison.scores import Contest
-from training.generated import check_pages
-from training.metrics import EpisodeMetrics
-from training.policies import (
+from training.evaluation.metrics import EpisodeMetrics
+from training.evaluation.rollout import Trace, run_episodes
+from training.evaluation.scenarios import EVALUATION, RANDOM
+from training.evaluation.seeds import EVALUATION_SEED
+from training.learners.policy_folders import (
     RECURRENT_TIMESTEPS,
     seed_folder,
     seed_policies,
     seed_trainings,
     train_missing,
 )
-from training.rollout import Trace, run_episodes
-from training.scenarios import EVALUATION, RANDOM
-from training.seeds import EVALUATION_SEED
-from training.sweeps.run import run_tasks, workplace
-from training.sweeps.tasks import Study
+from training.studies.comparison.blocks import Block, collect, plan
+from training.studies.comparison.output import PARTS, findings, write_figures, write_tables
+from training.studies.comparison.plan import Contender, Results, Sizes
+from training.studies.comparison.scores import Contest
+from training.studies.page_parts import check_pages
+from training.studies.sweeps.run import run_tasks, workplace
+from training.studies.sweeps.tasks import Study
 from training.tradeoff import finished_variants, variant
 
 JOURNAL_FILE = "blocks.jsonl"

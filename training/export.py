@@ -21,19 +21,19 @@ import numpy as np
 from tqdm import tqdm
 
 from controllers.learned import CONTRACT_FILE, WEIGHTS_FILE, LearnedPolicy, load_policy
-from epv_env.plant.commandline import check_positive, fail_clearly, writable_folder
-from training.ecu import measure
-from training.ecu.compiled import CompiledPolicy, find_compiler, library
-from training.ecu.contract import deployment_contract
-from training.ecu.exact import in_double
-from training.ecu.folder import check_free, write_folder
-from training.ecu.onnx_model import onnx_model
-from training.ecu.quantise import ExportError, quantise
-from training.ecu.sources import Export, checks, sources
-from training.ecu.states import states_table, visit
-from training.ecu.summary import as_text
-from training.ecu.tables import named_layers
-from training.seeds import CALIBRATION_SEED, CLOSED_LOOP_SEED, STATES_SEED
+from epv_env.common.command_line import check_positive, fail_clearly, writable_folder
+from training.deploy import measurements as measure
+from training.deploy.atomic_folder import check_free, write_folder
+from training.deploy.compiled_export import CompiledPolicy, find_compiler, library
+from training.deploy.contract import deployment_contract
+from training.deploy.double_precision import in_double
+from training.deploy.onnx_model import onnx_model
+from training.deploy.quantise import ExportError, quantise
+from training.deploy.sources import Export, checks, sources
+from training.deploy.summary import as_text
+from training.deploy.tables import named_layers
+from training.deploy.visited_states import states_table, visit
+from training.evaluation.seeds import CALIBRATION_SEED, CLOSED_LOOP_SEED, STATES_SEED
 
 EPISODES, PERIODS = 20, 500
 """10,000 states: so many episodes of so many control periods (2.5 s)."""

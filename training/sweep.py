@@ -15,29 +15,29 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from epv_env.plant.commandline import (
+from epv_env.common.command_line import (
     check_not_negative,
     check_positive,
     fail_clearly,
     parse_with_quick,
     writable_folder,
 )
+from epv_env.common.files import write_text
+from epv_env.common.journal import Journal
 from epv_env.plant.consumption import check_scenario
-from epv_env.plant.files import write_text
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.valves import available_cores
-from identification.journal import Journal
-from training.generated import check_pages
-from training.results_folder import check_options, write_options
-from training.seeds import CALIBRATION_SEED, SWEEP_SEED
-from training.sweeps.controllers import DEFAULT, named_controllers
-from training.sweeps.cost import cost, episode_cpu, overhead
-from training.sweeps.designs import DESIGNS
-from training.sweeps.plan import Size, cells, chosen_points, searches
-from training.sweeps.report import PARTS, report
-from training.sweeps.run import run_tasks, workplace
-from training.sweeps.tasks import Study
-from training.sweeps.worst import Effort
+from training.evaluation.seeds import CALIBRATION_SEED, SWEEP_SEED
+from training.studies.page_parts import check_pages
+from training.studies.results_folder import check_options, write_options
+from training.studies.sweeps.controllers import DEFAULT, named_controllers
+from training.studies.sweeps.cost import cost, episode_cpu, overhead
+from training.studies.sweeps.designs import DESIGNS
+from training.studies.sweeps.plan import Size, cells, chosen_points, searches
+from training.studies.sweeps.report import PARTS, report
+from training.studies.sweeps.run import run_tasks, workplace
+from training.studies.sweeps.tasks import Study
+from training.studies.sweeps.worst_case_search import Effort
 
 JOURNAL, COST = "finished.jsonl", "cost.json"
 
@@ -92,7 +92,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     most = CALIBRATION_SEED - SWEEP_SEED - used
     if chosen.seed > most:
         parser.error(
-            f"--seed {chosen.seed} would meet episodes kept for exports (training/seeds.py): with "
+            f"--seed {chosen.seed} would meet episodes kept for exports (evaluation/seeds.py): with "
             f"{used} episodes give one up to {most}"
         )
     return chosen

@@ -22,14 +22,14 @@ from numpy.typing import NDArray
 
 from controllers.base import Controller
 from controllers.tuned import load_tunings
-from epv_env.plant.commandline import check_positive, fail_clearly, writable_folder
+from epv_env.common.command_line import check_positive, fail_clearly, writable_folder
+from epv_env.common.files import write_text
 from epv_env.plant.consumption import check_scenario
-from epv_env.plant.files import write_text
 from epv_env.plant.plantfile import load_plant
 from epv_env.reward import REFERENCE_PERIOD
-from training.rollout import begin_episodes, make_env
-from training.seeds import TIMING_SEED
-from training.sweeps.controllers import named_controllers
+from training.evaluation.rollout import begin_episodes, make_env
+from training.evaluation.seeds import TIMING_SEED
+from training.studies.sweeps.controllers import named_controllers
 
 WARM_UP = 50
 """Decisions that are not counted: the first ones compile and fill caches."""

@@ -3,7 +3,7 @@
     python training/tradeoff.py --prices 0.5 1 2 --out runs/tradeoff
 
 trains PPO and tunes classic controllers at every price; what is finished in --out is kept. With
---recurrent, PPO also trains a policy with a memory at every price (training/distil.py). Measured and
+--recurrent, PPO also trains a policy with a memory at every price (distillation.py). Measured and
 drawn they are by training/compare.py --tradeoff runs/tradeoff.
 """
 
@@ -17,7 +17,7 @@ import optuna
 from controllers.base import Controller
 from controllers.learned import holds_policy, load_policy
 from controllers.tuned import KINDS, build, load_search, load_tunings, save_tunings
-from epv_env.plant.commandline import (
+from epv_env.common.command_line import (
     check_not_negative,
     check_positive,
     fail_clearly,
@@ -26,9 +26,10 @@ from epv_env.plant.commandline import (
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.valves import available_cores
 from epv_env.reward import RewardWeights
-from training.comparison.plan import Contender
-from training.policies import RECURRENT_TIMESTEPS, Training, seed_trainings, train_missing
-from training.tune import TUNING_REGION, tune
+from training.evaluation.scenarios import TUNING_REGION
+from training.learners.policy_folders import RECURRENT_TIMESTEPS, Training, seed_trainings, train_missing
+from training.studies.comparison.plan import Contender
+from training.tune import tune
 
 FOLDER = "price-{:g}"
 TUNED_FILE = "tuned.json"
@@ -96,7 +97,7 @@ def first_memory(chosen: argparse.Namespace) -> Training | None:
     """
     if chosen.recurrent is None:
         return None
-    from training.distil import load_student  # torch takes seconds to import: only now
+    from training.learners.distillation import load_student  # torch takes seconds to import: only now
 
     (first,) = seed_trainings(
         chosen.recurrent, count=1, timesteps=RECURRENT_TIMESTEPS, recurrent=True

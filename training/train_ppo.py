@@ -21,20 +21,20 @@ from controllers.learned import load_policy
 from controllers.pwm import PWM
 from controllers.tuned import SEARCHING, tuned_controllers
 from epv_env.actions import OnOff
-from epv_env.plant.commandline import (
+from epv_env.common.command_line import (
     check_not_negative,
     check_positive,
     fail_clearly,
     parse_with_quick,
     writable_folder,
 )
+from epv_env.common.files import write_text
 from epv_env.plant.consumption import check_scenario
-from epv_env.plant.files import write_text
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.region import REGIONS
 from epv_env.reward import RewardWeights
-from training.evaluate import Comparison, as_text, compare
-from training.tune import TUNING_REGION
+from training.evaluation.controller_table import Comparison, as_text, compare
+from training.evaluation.scenarios import TUNING_REGION
 
 CONFIG_FILE = "config.json"
 QUICK = {"timesteps": 65_536, "episodes": 16, "duration": 2.0}
@@ -152,9 +152,9 @@ def main(arguments: list[str] | None = None) -> int:
     check_scenario(chosen.scenario)
     check_resume(chosen)
 
-    from training import distil  # torch takes seconds to import: only now
-    from training.policy_files import save_policy
-    from training.ppo import Hyperparameters, train
+    from training.learners import distillation as distil
+    from training.learners.policy_files import save_policy
+    from training.learners.ppo import Hyperparameters, train
 
     weights = RewardWeights(switching=chosen.switching_price)
     hyperparameters = distil.going_on(weights) if chosen.recurrent else Hyperparameters()
@@ -185,7 +185,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def report(comparison: Comparison, curve: list[dict[str, float]], folder: Path) -> None:
     """Write table and figures, and print the table."""
-    from training import plots
+    from training.evaluation import plots
 
     table = comparison.table
     write_text(folder / "table.csv", table.to_csv(index=False))

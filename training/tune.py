@@ -16,19 +16,17 @@ from optuna.trial import Trial
 from tqdm import tqdm
 
 from controllers.tuned import KINDS, Tuning, build, load_search, load_tunings, save_tunings
-from epv_env.observation import P2_LAGS
-from epv_env.plant.commandline import (
+from epv_env.common.command_line import (
     check_not_negative,
     check_positive,
     fail_clearly,
     writable_file,
 )
+from epv_env.observation import P2_LAGS
 from epv_env.plant.parameters import Parameters
-from training.rollout import run_episodes
-from training.seeds import TUNING_SEED
-
-TUNING_REGION = "sensitive_ten_percent"
-"""Plants tuned on: those that PPO trains on."""
+from training.evaluation.rollout import run_episodes
+from training.evaluation.scenarios import TUNING_REGION
+from training.evaluation.seeds import TUNING_SEED
 
 REDUCED = {"MPC": (16, 32)}
 """Trials, and episodes of each, of kinds that simulate the plant as they decide: a thousandfold the

@@ -7,7 +7,7 @@ from pathlib import Path
 from docs.component_data.figure import drawn
 from docs.component_data.findings import found_in
 from docs.component_data.tables import chamber_table, friction_table, solenoid_table
-from epv_env.plant.commandline import fail_clearly, writable_folder
+from epv_env.common.command_line import fail_clearly, writable_folder
 
 
 def main() -> int:

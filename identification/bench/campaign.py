@@ -14,8 +14,8 @@ from epv_env.plant.simulate import energised
 from identification.bench.automaton import simulate_reference
 from identification.bench.programmes import Programme
 from identification.bench.schedule import delayed_schedule, scheduled
-from identification.cases import RATE
 from identification.recordings.recording import CHANNELS, UNITS, Campaign, Recording
+from identification.report_2003.cases import RATE
 
 RESERVOIR = 0.08
 """The bench's two reservoirs of 40 litres (section 3) [m^3]; air drawn from them lowers p1."""

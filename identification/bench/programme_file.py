@@ -6,11 +6,11 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from epv_env.plant.files import write_text
+from epv_env.common.files import write_text
 from epv_env.plant.sensors import SENSORS
 from identification.bench.programmes import BAR, Programme
-from identification.cases import Case
 from identification.recordings.recording import HOLD, ROLES
+from identification.report_2003.cases import Case
 
 FORMAT = "epv-programme/1"
 

@@ -2,7 +2,14 @@
 
 from dataclasses import dataclass
 
-from identification.cases import CALIBRATION_CASES, CIRCUIT, SUPPLY, VALIDATION_CASE, VOLTAGE, Case
+from identification.report_2003.cases import (
+    CALIBRATION_CASES,
+    CIRCUIT,
+    SUPPLY,
+    VALIDATION_CASE,
+    VOLTAGE,
+    Case,
+)
 
 BAR = 1e5
 

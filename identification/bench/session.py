@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 
+from epv_env.common.progress import progress
 from epv_env.plant.parameters import Parameters
 from identification.bench.campaign import measured_campaign, run_programme
 from identification.bench.programmes import Programme
-from identification.cases import RATE
-from identification.progress import progress
 from identification.recordings.recording import Campaign
+from identification.report_2003.cases import RATE
 
 SLOWEST, FASTEST = 500.0, 20_000.0
 """Sampling rates of the bench [1/s]."""

@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from epv_env.common.journal import Journal
 from epv_env.plant.parameters import Parameters
-from identification.calibration.fits import Fit
+from identification.calibration.methods import Fit
+from identification.calibration.multi_start import best, fit_from_all, starting_points
 from identification.calibration.problem import Problem
-from identification.calibration.starts import best, fit_from_all, starting_points
 from identification.calibration.warnings import warnings_of
-from identification.journal import Journal
 from identification.replay.responses import Response, responses
 
 STARTS = 6

@@ -5,9 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.calibration.fits import Fit
+from identification.calibration.methods import Fit
+from identification.calibration.multi_start import METHODS, best, reached_the_best
 from identification.calibration.problem import Problem
-from identification.calibration.starts import METHODS, best, reached_the_best
 
 NEAR_BOUND = 1e-3
 """Share of a domain within which an estimate counts as on its end."""

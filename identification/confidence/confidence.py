@@ -14,7 +14,7 @@ from identification.calibration.calibrate import Calibration
 from identification.calibration.problem import Problem
 from identification.confidence.bootstrap import block_bootstrap
 from identification.confidence.covariance import Covariance, covariance
-from identification.confidence.eq23 import PROBABILITY, ReportInterval, report_interval
+from identification.confidence.printed_interval import PROBABILITY, ReportInterval, report_interval
 
 DIFFERENCE = 1e-3
 """Relative step of the gradient and the Hessian of the total error."""

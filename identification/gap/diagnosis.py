@@ -2,15 +2,15 @@
 
 from dataclasses import dataclass
 
-from identification.gap.evidence import Assessed
-from identification.gap.fit import Hypothesis, Point
-from identification.gap.fits import Fits
-from identification.gap.model import GreyBox
-from identification.gap.second_look import second_look
-from identification.gap.shrink import NOMINAL, RECALIBRATED, Shrinkage, shrinkage
-from identification.gap.verdict import AMBIGUOUS, KNOWN, UNKNOWN, Conclusion, Ranked, conclude
-from identification.gap.where import Where, locate
-from identification.gap.which import Verdicts, which
+from identification.gap.fit.fit_cache import Fits
+from identification.gap.fit.fitter import Hypothesis, Point
+from identification.gap.locate.fault_localisation import Where, locate
+from identification.gap.model.grey_box import GreyBox
+from identification.gap.rank.evidence import Assessed
+from identification.gap.rank.predictive_check import second_look
+from identification.gap.rank.ranking import Verdicts, which
+from identification.gap.rank.verdict import AMBIGUOUS, KNOWN, UNKNOWN, Conclusion, Ranked, conclude
+from identification.gap.reduce.discrepancy_reduction import NOMINAL, RECALIBRATED, Shrinkage, shrinkage
 
 RUNNERS_UP = 3
 """Single causes beyond the ambiguity set whose shrinking is judged too."""

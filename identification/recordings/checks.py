@@ -12,7 +12,11 @@ from numpy.typing import NDArray
 
 from epv_env.plant.sensors import SENSORS, Sensor
 from identification.recordings.columns import CHANNEL_OF, TIME, line
-from identification.recordings.gauge import check_above_ambient, check_against_supply, check_discharge
+from identification.recordings.pressure_reference import (
+    check_above_ambient,
+    check_against_supply,
+    check_discharge,
+)
 from identification.recordings.recording import HOLD, CampaignError
 from identification.recordings.timing import sampling_period
 

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.parameters import Parameters
-from identification.error import partial_error, relative_error, total_error
 from identification.recordings.recording import OUTPUTS, Recording
 from identification.replay.drive import drive_of
 from identification.replay.misfit import measured_outputs
 from identification.replay.model import Replay
+from identification.report_2003.output_error import partial_error, relative_error, total_error
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from epv_env.plant.files import write_text
+from epv_env.common.files import write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from epv_env.plant.parameters import table
-from identification.printed import printed_sensitivities
+from identification.report_2003.printed_values import printed_sensitivities
 from identification.sensitivity.one_at_a_time import Sensitivity
 from identification.sensitivity.results import FIXED_STEP_STUDY, OneAtATime
 from identification.sensitivity.study import STUDY

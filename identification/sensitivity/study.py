@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from epv_env.plant.equations import State
 from epv_env.plant.simulate import Trajectory, energised, simulate
-from identification.cases import CALIBRATION_CASES, CIRCUIT, RATE, SUPPLY, VOLTAGE, Case
-from identification.error import partial_error, relative_error, total_error
 from identification.recordings.recording import OUTPUTS
+from identification.report_2003.cases import CALIBRATION_CASES, CIRCUIT, RATE, SUPPLY, VOLTAGE, Case
+from identification.report_2003.output_error import partial_error, relative_error, total_error
 
 
 class Simulator(Protocol):

@@ -16,11 +16,11 @@ from threadpoolctl import threadpool_limits
 from epv_env.plant.parameters import Parameters
 from identification.bench.campaign import Truth, measured_campaign, run_programme
 from identification.bench.programmes import DIAGNOSIS_SUITE, REPORT_SUITE
-from identification.calibration.fits import Fit, nelder_mead, weighted_least_squares
+from identification.calibration.methods import Fit, nelder_mead, weighted_least_squares
 from identification.calibration.problem import Problem, calibration_problem
-from identification.confidence.coverage import CAMPAIGNS
-from identification.recordings.files import write_campaign
+from identification.recordings.campaign_files import write_campaign
 from identification.recordings.recording import Campaign
+from identification.studies.coverage.coverage import CAMPAIGNS
 from tests.benchmarks.commandline import run
 from tests.benchmarks.measure import CPU, Row, Table, durations
 from tests.benchmarks.processes import identification_process

@@ -39,8 +39,8 @@ def test_a_written_policy_acts_as_the_model_it_came_from(tmp_path):
     from controllers.learned import PolicyError, load_policy
     from epv_env.plant.plantfile import Plant
     from epv_env.reward import RewardWeights
-    from training.policy_files import greedy_policy, save_policy
-    from training.ppo import Hyperparameters, make_model, make_training_env
+    from training.learners.policy_files import greedy_policy, save_policy
+    from training.learners.ppo import Hyperparameters, make_model, make_training_env
 
     h = Hyperparameters(num_envs=4, n_steps=8, batch_size=32)
     env = make_training_env(

@@ -10,7 +10,7 @@ from controllers.pulse_table import PulseTable, pulse_table
 from epv_env.observation import LAYOUT, encode
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.supply import BAR
-from training.rollout import make_env
+from training.evaluation.rollout import make_env
 
 pytestmark = pytest.mark.training
 EPISODES = 24

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from controllers.opening_pressure import opening_pressure
 from controllers.pulse_table import STAY, pulse_table
-from controllers.statics import opening_pressure
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised
 from epv_env.plant.supply import BAR

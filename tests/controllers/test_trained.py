@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("safetensors")
 
 from controllers.learned import CONTRACT_FILE, TRAINED, load_policy
-from training.rollout import run_episodes
+from training.evaluation.rollout import run_episodes
 
 FOLDERS = sorted(path.parent for path in TRAINED.rglob(CONTRACT_FILE))
 SEEDS = [folder for folder in FOLDERS if folder.name.startswith("seed-")]

@@ -12,8 +12,8 @@ import epv_env  # noqa: F401 - registers the environments
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import load_plant
 from identification.__main__ import main
-from identification.calibration import starts
-from identification.recordings.files import read_campaign
+from identification.calibration import multi_start as starts
+from identification.recordings.campaign_files import read_campaign
 
 
 @pytest.fixture(scope="module")

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from identification.cases import CALIBRATION_CASES, RATE, VALIDATION_CASE
-from identification.error import partial_error, relative_error, total_error
+from identification.report_2003.cases import CALIBRATION_CASES, RATE, VALIDATION_CASE
+from identification.report_2003.output_error import partial_error, relative_error, total_error
 
 TIME = np.linspace(0.0, 2.0, 2001)
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from controllers.hysteresis import Hysteresis
 from controllers.learned import GatedUnit
+from epv_env.common.command_line import fail_clearly
 from epv_env.observation import LAYOUT
-from epv_env.plant.commandline import fail_clearly
 from tests.training.policies import Layers, fitted_layers, random_unit, write_policy
 from training.export import EPISODES, PERIODS, main
 

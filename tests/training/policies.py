@@ -11,8 +11,8 @@ from safetensors.numpy import save_file
 from controllers.base import Controller
 from controllers.learned import CONTRACT_FILE, FORMAT, WEIGHTS_FILE, GatedUnit
 from epv_env.observation import LAYOUT, contract
-from training.ecu.exact import memory_along
-from training.ecu.states import visit
+from training.deploy.double_precision import memory_along
+from training.deploy.visited_states import visit
 
 Layers = list[tuple[NDArray, NDArray]]
 

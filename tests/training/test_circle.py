@@ -13,9 +13,9 @@ from controllers.hysteresis import Hysteresis
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant, save_plant
 from epv_env.plant.region import Region
-from training.circle import main
-from training.circle_aims import FIGURES, GAPS, as_markdown, figures, gaps
-from training.circle_deployment import (
+from training.sim_to_real import main
+from training.studies.sim_to_real.aims import FIGURES, GAPS, as_markdown, figures, gaps
+from training.studies.sim_to_real.deployment import (
     AFTER,
     AROUND,
     BEFORE,
@@ -25,8 +25,8 @@ from training.circle_deployment import (
     deployed,
     read_episodes,
 )
-from training.circle_figure import circle_figure
-from training.circle_report import said
+from training.studies.sim_to_real.figure import circle_figure
+from training.studies.sim_to_real.report import said
 
 pytestmark = pytest.mark.training
 

@@ -11,8 +11,8 @@ import pytest
 from controllers.tuned import KINDS, SEARCHING
 
 pytest.importorskip("stable_baselines3")
-from training.distil import Distillation, Student, policy_of
-from training.policy_files import save_policy
+from training.learners.distillation import Distillation, Student, policy_of
+from training.learners.policy_files import save_policy
 from training.tradeoff import finished_variants
 
 pytestmark = pytest.mark.training

@@ -18,11 +18,16 @@ from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from tests.training.policies import random_layers, write_policy
 from training.compare import limit_at_least_price, main, parse
-from training.comparison.bars import against_oracle, against_rival, leaving, lost
-from training.comparison.blocks import collect, plan
-from training.comparison.figures import trade_figure
-from training.comparison.output import PARTS, RESULTS_FILE, TABLES_FILE
-from training.comparison.plan import (
+from training.evaluation.controller_table import PLANTS
+from training.evaluation.metrics import EpisodeMetrics
+from training.evaluation.scenarios import EVALUATION, RANDOM, TUNING_REGION
+from training.learners.distillation import NAME, Distillation, Student, policy_of
+from training.learners.policy_files import save_policy
+from training.studies.comparison.acceptance_criteria import against_oracle, against_rival, leaving, lost
+from training.studies.comparison.blocks import collect, plan
+from training.studies.comparison.figures import trade_figure
+from training.studies.comparison.output import PARTS, RESULTS_FILE, TABLES_FILE
+from training.studies.comparison.plan import (
     EXPENSIVE,
     TUNING,
     Contender,
@@ -30,16 +35,10 @@ from training.comparison.plan import (
     Sizes,
     chosen_run,
 )
-from training.comparison.scores import Contest, duels, figures, trade
-from training.distil import NAME, Distillation, Student, policy_of
-from training.evaluate import PLANTS
-from training.generated import check_pages, fill, markdown
-from training.metrics import EpisodeMetrics
-from training.policy_files import save_policy
-from training.scenarios import EVALUATION, RANDOM
-from training.sweeps.tasks import Study
+from training.studies.comparison.scores import Contest, duels, figures, trade
+from training.studies.page_parts import check_pages, fill, markdown
+from training.studies.sweeps.tasks import Study
 from training.tradeoff import variant
-from training.tune import TUNING_REGION
 
 pytestmark = pytest.mark.training
 

@@ -7,8 +7,8 @@ pytest.importorskip("pandas")
 
 from controllers.hysteresis import Hysteresis
 from epv_env.plant.plantfile import Plant
-from training.evaluate import PLANTS, compare
-from training.rollout import run_episodes
+from training.evaluation.controller_table import PLANTS, compare
+from training.evaluation.rollout import run_episodes
 
 pytestmark = pytest.mark.training
 

@@ -6,8 +6,8 @@ pytest.importorskip("stable_baselines3")
 
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
-from training.curriculum import FadingEntropy
-from training.ppo import Hyperparameters, make_model, make_training_env
+from training.learners.entropy_schedule import FadingEntropy
+from training.learners.ppo import Hyperparameters, make_model, make_training_env
 
 pytestmark = pytest.mark.training
 

@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip("pandas")
 
-from training.estimates import (
+from training.evaluation.statistics import (
     estimate,
     iqm,
     mean,

@@ -14,8 +14,8 @@ pytest.importorskip("onnx")
 pytest.importorskip("safetensors")
 
 from controllers.learned import load_policy
+from epv_env.common.command_line import fail_clearly
 from epv_env.observation import contract
-from epv_env.plant.commandline import fail_clearly
 from tests.training.exports import (
     GOOD,
     column,
@@ -28,13 +28,20 @@ from tests.training.exports import (
     recurrent_export,
 )
 from tests.training.policies import fitted_layers, random_layers, random_unit, write_policy
-from training.ecu.compiled import VARIANTS, CompiledPolicy, build, float_logits, library, memory_type
-from training.ecu.exact import logits_along
-from training.ecu.measure import follow
-from training.ecu.quantise import quantise
-from training.ecu.sources import Export, sources
-from training.ecu.states import visit
-from training.ecu.tables import named_layers
+from training.deploy.compiled_export import (
+    VARIANTS,
+    CompiledPolicy,
+    build,
+    float_logits,
+    library,
+    memory_type,
+)
+from training.deploy.double_precision import logits_along
+from training.deploy.measurements import follow
+from training.deploy.quantise import quantise
+from training.deploy.sources import Export, sources
+from training.deploy.tables import named_layers
+from training.deploy.visited_states import visit
 from training.export import EPISODES, FILES, PERIODS, main
 
 pytestmark = [

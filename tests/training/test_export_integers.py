@@ -13,13 +13,13 @@ from controllers.learned import GatedUnit, LearnedPolicy, load_policy
 from epv_env.observation import INDEX, LAYOUT
 from tests.training.exports import copied, export_of, recurrent_export
 from tests.training.policies import random_layers
-from training.ecu.compiled import library, memory_type
-from training.ecu.exact import in_double, memory_along
-from training.ecu.quantise import FULL, GATE, FixedLayer, FixedPolicy, quantise
-from training.ecu.sources import Export, sources
-from training.ecu.states import visit
+from training.deploy.compiled_export import library, memory_type
+from training.deploy.double_precision import in_double, memory_along
+from training.deploy.quantise import FULL, GATE, FixedLayer, FixedPolicy, quantise
+from training.deploy.sources import Export, sources
+from training.deploy.visited_states import visit
+from training.evaluation.seeds import CALIBRATION_SEED
 from training.export import EPISODES, PERIODS
-from training.seeds import CALIBRATION_SEED
 
 pytestmark = [
     pytest.mark.training,

@@ -13,9 +13,9 @@ pytest.importorskip("safetensors")
 from controllers.learned import load_policy
 from epv_env.observation import INDEX, P2_LAGS
 from tests.training.exports import copied, parity_with, recurrent_export
-from training.ecu.compiled import CompiledPolicy, library
-from training.ecu.measure import follow
-from training.ecu.states import VisitedStates, visit
+from training.deploy.compiled_export import CompiledPolicy, library
+from training.deploy.measurements import follow
+from training.deploy.visited_states import VisitedStates, visit
 
 pytestmark = [
     pytest.mark.training,

@@ -8,9 +8,9 @@ pytest.importorskip("stable_baselines3")
 from controllers.tuned import build, load_tunings
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
-from training.imitation import demonstrate, imitate
-from training.policy_files import greedy_policy
-from training.ppo import TEACHER, Hyperparameters, make_model, make_training_env
+from training.learners.imitation import demonstrate, imitate
+from training.learners.policy_files import greedy_policy
+from training.learners.ppo import TEACHER, Hyperparameters, make_model, make_training_env
 
 pytestmark = pytest.mark.training
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from training.metrics import EpisodeMetrics, Meter, left_interval, summary, tail_excursion
+from training.evaluation.metrics import EpisodeMetrics, Meter, left_interval, summary, tail_excursion
 
 PERIOD = 0.1
 

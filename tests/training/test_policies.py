@@ -5,7 +5,7 @@ import pytest
 pytest.importorskip("joblib")
 pytest.importorskip("stable_baselines3")
 
-from training.policies import seed_policies, seed_trainings, train_missing
+from training.learners.policy_folders import seed_policies, seed_trainings, train_missing
 
 pytestmark = pytest.mark.training
 

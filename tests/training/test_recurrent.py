@@ -12,8 +12,8 @@ from safetensors.numpy import load_file, save_file
 
 from controllers.base import Privileged
 from controllers.hysteresis import Hysteresis
-from controllers.informed_pulse import InformedPulse
 from controllers.learned import WEIGHTS_FILE, LearnedPolicy, PolicyError, load_policy
+from controllers.privileged_pulse import InformedPulse
 from controllers.pulse_table import PulseTables, pulse_table
 from controllers.tuned import build, load_tunings
 from epv_env.observation import LAYOUT
@@ -21,7 +21,9 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from tests.training.policies import random_layers
-from training.distil import (
+from training.deploy.double_precision import in_double, logits_along
+from training.evaluation.rollout import begin_episodes, make_env, run_episodes
+from training.learners.distillation import (
     NAME,
     Distillation,
     Student,
@@ -31,10 +33,8 @@ from training.distil import (
     train_recurrent,
     with_memory_of,
 )
-from training.ecu.exact import in_double, logits_along
-from training.policy_files import greedy_policy, put_layers, save_policy
-from training.ppo import Hyperparameters, make_model, make_training_env
-from training.rollout import begin_episodes, make_env, run_episodes
+from training.learners.policy_files import greedy_policy, put_layers, save_policy
+from training.learners.ppo import Hyperparameters, make_model, make_training_env
 
 pytestmark = pytest.mark.training
 

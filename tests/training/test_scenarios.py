@@ -11,8 +11,8 @@ from controllers.hysteresis import Hysteresis
 from epv_env.plant.consumption import SCENARIOS, Profiles, Scenario, draw_profile
 from epv_env.plant.plantfile import Plant
 from epv_env.settings import make_settings
-from training.rollout import run_episodes
-from training.scenarios import EVALUATION, NAMED, RANDOM
+from training.evaluation.rollout import run_episodes
+from training.evaluation.scenarios import EVALUATION, NAMED, RANDOM
 
 pytestmark = pytest.mark.training
 

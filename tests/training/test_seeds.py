@@ -8,13 +8,14 @@ pytest.importorskip("stable_baselines3")
 
 from controllers.hysteresis import Hysteresis
 from epv_env.plant.plantfile import Plant
-from training import compare, export, seeds, sweep
-from training.comparison.blocks import plan
-from training.comparison.plan import TUNING, Contender, Sizes
-from training.distil import Distillation
-from training.ppo import Hyperparameters
-from training.sweeps.plan import Size, cells, chosen_points, searches
-from training.sweeps.worst import Effort
+from training import compare, export, sweep
+from training.evaluation import seeds
+from training.learners.distillation import Distillation
+from training.learners.ppo import Hyperparameters
+from training.studies.comparison.blocks import plan
+from training.studies.comparison.plan import TUNING, Contender, Sizes
+from training.studies.sweeps.plan import Size, cells, chosen_points, searches
+from training.studies.sweeps.worst_case_search import Effort
 
 pytestmark = pytest.mark.training
 

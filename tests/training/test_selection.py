@@ -10,12 +10,12 @@ pytest.importorskip("stable_baselines3")
 from controllers.learned import LearnedPolicy
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
-from training.learning_log import read_rows
-from training.metrics import EpisodeMetrics
-from training.ppo import Hyperparameters, train
-from training.rollout import run_episodes
-from training.seeds import VALIDATION_SEED
-from training.selection import VALIDATION_FILE, score, validation_points
+from training.evaluation.metrics import EpisodeMetrics
+from training.evaluation.rollout import run_episodes
+from training.evaluation.seeds import VALIDATION_SEED
+from training.learners.checkpoint_selection import VALIDATION_FILE, score, validation_points
+from training.learners.learning_log import read_rows
+from training.learners.ppo import Hyperparameters, train
 
 pytestmark = pytest.mark.training
 

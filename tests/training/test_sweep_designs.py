@@ -12,16 +12,16 @@ from epv_env.plant.parameters import Parameters, sensitive_symbols, table
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import CALIBRATED_SYMBOLS, Region
 from epv_env.settings import make_settings
-from training.rollout import run_episodes
-from training.seeds import SWEEP_SEED
-from training.sweeps.designs import ONE_AT_A_TIME, hypercube, parameters, regions
-from training.sweeps.effects import LEVELS, effect_levels
-from training.sweeps.plan import BATCH, Size, cells, chosen_points
-from training.sweeps.results import point_table
-from training.sweeps.run import Outcome
-from training.sweeps.space import Space
-from training.sweeps.tasks import Batch, Study, condensed
-from training.sweeps.worst import Effort
+from training.evaluation.rollout import run_episodes
+from training.evaluation.seeds import SWEEP_SEED
+from training.studies.sweeps.designs import ONE_AT_A_TIME, hypercube, parameters, regions
+from training.studies.sweeps.effect_levels import LEVELS, effect_levels
+from training.studies.sweeps.plan import BATCH, Size, cells, chosen_points
+from training.studies.sweeps.results import point_table
+from training.studies.sweeps.run import Outcome
+from training.studies.sweeps.space import Space
+from training.studies.sweeps.tasks import Batch, Study, condensed
+from training.studies.sweeps.worst_case_search import Effort
 
 pytestmark = pytest.mark.training
 

@@ -10,8 +10,8 @@ from controllers.hysteresis import Hysteresis
 from epv_env.observation import decode
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
-from training.sweeps.tasks import Study
-from training.sweeps.worst import Effort, Search
+from training.studies.sweeps.tasks import Study
+from training.studies.sweeps.worst_case_search import Effort, Search
 
 pytestmark = pytest.mark.training
 

@@ -3,7 +3,8 @@
 import pytest
 
 from controllers.tuned import Tuning, load_tunings, save_tunings
-from training.tune import TUNING_REGION, kept, main
+from training.evaluation.scenarios import TUNING_REGION
+from training.tune import kept, main
 
 pytestmark = pytest.mark.training
 SHORT = ("--trials", "1", "--episodes", "1", "--duration", "0.1")

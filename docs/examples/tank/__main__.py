@@ -7,13 +7,13 @@ from pathlib import Path
 
 from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import read_runs, recorded, write_runs
-from epv_env.plant.commandline import fail_clearly, writable_folder
-from epv_env.plant.files import write_text
+from epv_env.common.command_line import fail_clearly, writable_folder
+from epv_env.common.files import write_text
 from identification.gap.diagnosis import diagnose
-from identification.gap.export import as_json
-from identification.gap.section import sections
-from identification.gap.sentences import verdict
-from identification.gap.where_figures import shape_figure
+from identification.gap.report.json_export import as_json
+from identification.gap.report.localisation_figures import shape_figure
+from identification.gap.report.sections import sections
+from identification.gap.report.sentences import verdict
 from identification.report.page import write_page
 
 LEAKING = {"c": 0.021, "leak": 4e-3}

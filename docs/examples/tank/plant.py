@@ -1,4 +1,4 @@
-"""The tank behind the protocol that the diagnosis knows (identification/gap/model.py)."""
+"""The tank behind the protocol that the diagnosis knows (identification/gap/model/grey_box.py)."""
 
 from collections.abc import Mapping, Sequence
 
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from docs.examples.tank.recordings import NOISE
 from docs.examples.tank.simulator import NOMINAL, levels, readings
-from identification.gap.model import Cause, Channel, Equation, Nuisance, Run, Size, Trace
+from identification.gap.model.grey_box import Cause, Channel, Equation, Nuisance, Run, Size, Trace
 
 
 class Tank:

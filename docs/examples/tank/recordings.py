@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from docs.examples.tank.simulator import levels, readings
-from epv_env.plant.files import write_text
-from identification.gap.model import Run
+from epv_env.common.files import write_text
+from identification.gap.model.grey_box import Run
 
 HEADER = "time_s,inflow_m3_per_s,level_m"
 

@@ -8,7 +8,7 @@ import pytest
 from epv_env.plant.sensors import SENSORS
 from identification.bench.campaign import OFFSETS, TRENDS, measured, measured_campaign
 from identification.bench.programmes import DIAGNOSIS_SUITE, SUITES
-from identification.recordings.files import read_campaign, write_campaign
+from identification.recordings.campaign_files import read_campaign, write_campaign
 from identification.recordings.recording import CHANNELS, UNITS
 from tests.identification.twins import REPORT, TRUE, truth, twin
 

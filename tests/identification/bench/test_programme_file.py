@@ -14,8 +14,8 @@ from identification.bench.programme_file import (
     save_programmes,
 )
 from identification.bench.programmes import DIAGNOSIS_SUITE, Programme
-from identification.cases import Case
-from identification.recordings.files import read_campaign
+from identification.recordings.campaign_files import read_campaign
+from identification.report_2003.cases import Case
 
 SHORT = Programme(
     name="short", role="calibration", p1=9.3e5, p2=5.1e5, U_on=22.5,

@@ -2,7 +2,7 @@
 
 import pytest
 
-from identification.journal import Journal
+from epv_env.common.journal import Journal
 
 SUBJECT = {"recordings": ["a", "b"], "seed": 0}
 

@@ -5,13 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from epv_env.common.journal import Journal
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import CALIBRATED_SYMBOLS
-from identification.calibration import starts
+from identification.calibration import multi_start as starts
 from identification.calibration.calibrate import calibrate
-from identification.calibration.starts import METHODS, fit_from_all, reached_the_best, starting_points
+from identification.calibration.multi_start import (
+    METHODS,
+    fit_from_all,
+    reached_the_best,
+    starting_points,
+)
 from identification.calibration.warnings import warnings_of
-from identification.journal import Journal
 from identification.replay.vector import Vector
 from tests.identification.twins import calibration, problem
 
@@ -77,7 +82,7 @@ def test_one_start_is_the_reference_alone():
 
 
 def test_a_start_in_another_basin_is_reported(tmp_path, monkeypatch):
-    monkeypatch.setattr("identification.calibration.fits.MOST_EVALUATIONS", 200)
+    monkeypatch.setattr("identification.calibration.methods.MOST_EVALUATIONS", 200)
     points = np.array([np.ones(4), BAD_BASIN])
     fits = fit_from_all(problem(), points, Journal(tmp_path / "journal", {}))
     for method in METHODS:

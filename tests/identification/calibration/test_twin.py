@@ -8,7 +8,7 @@ import pytest
 from epv_env.plant.parameters import ParameterError
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.bench.campaign import OFFSETS
-from identification.calibration.fits import Fit, nelder_mead, weighted_least_squares
+from identification.calibration.methods import Fit, nelder_mead, weighted_least_squares
 from identification.calibration.problem import calibration_problem
 from identification.recordings.recording import CHANNELS, UNITS, CampaignError
 from identification.replay.responses import total

@@ -6,10 +6,10 @@ import pytest
 
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import CALIBRATED_SYMBOLS
-from identification.calibration import fits as searches
+from identification.calibration import methods as searches
 from identification.calibration.calibrate import calibrate
+from identification.calibration.calibration_section import calibration_json, calibration_section
 from identification.calibration.problem import calibration_problem
-from identification.calibration.section import calibration_json, calibration_section
 from identification.calibration.warnings import warnings_of
 from tests.identification.twins import TRUE, calibration, problem, twin
 

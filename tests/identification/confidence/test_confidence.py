@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from identification.confidence.confidence import confidence
-from identification.confidence.section import confidence_json, confidence_section
+from identification.confidence.confidence_section import confidence_json, confidence_section
 from tests.identification.confidence.results import found
 from tests.identification.twins import TRUE, calibration, problem
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
-from identification.calibration.fits import weighted_least_squares
+from identification.calibration.methods import weighted_least_squares
 from identification.confidence import covariance as stage
 from identification.confidence.bootstrap import block_bootstrap
 from identification.confidence.covariance import correlation_lags, covariance

@@ -8,7 +8,7 @@ import numpy as np
 from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import recorded
 from identification.gap.diagnosis import Diagnosis, diagnose
-from identification.gap.model import Cause, Size
+from identification.gap.model.grey_box import Cause, Size
 
 
 def leaking() -> Tank:

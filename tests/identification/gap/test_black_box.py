@@ -4,8 +4,8 @@ import numpy as np
 
 from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import recorded
-from identification.gap.black_box import Task, ridge
-from identification.gap.predictable import p_value
+from identification.gap.reduce.black_box import Task, ridge
+from identification.gap.reduce.predictability import p_value
 
 
 def task(seed: int, wave: float) -> Task:

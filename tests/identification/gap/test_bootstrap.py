@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal, stats
 
-from identification.gap.bootstrap import block_starts, block_sums, block_weights, interval
+from identification.gap.reduce.block_bootstrap import block_starts, block_sums, block_weights, interval
 
 
 @pytest.mark.parametrize("samples", [7, 40, 1301, 1349])

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from identification.gap.evidence import _covariance
-from identification.gap.normal import Normal
+from identification.gap.fit.variable_projection import Normal
+from identification.gap.rank.evidence import _covariance
 
 
 def test_what_no_reading_tells_is_wide_but_known_to_be():

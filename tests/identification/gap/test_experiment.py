@@ -11,13 +11,20 @@ from scipy.integrate import quad
 from scipy.special import expit, logsumexp
 from scipy.stats import norm
 
-from identification.gap.evidence import FORM_ERRORS
-from identification.gap.experiment import Posterior, Rivals, gaussians, outlooks, posteriors, rivals_of
-from identification.gap.fit import Fitter, frames
-from identification.gap.model import Cause, Channel, Nuisance, Run, Size
-from identification.gap.normal import Linear, normal
-from identification.gap.outlook import divergences, odds, outlook
-from identification.gap.which import Verdicts, which
+from identification.gap.design.experiment import (
+    Posterior,
+    Rivals,
+    gaussians,
+    outlooks,
+    posteriors,
+    rivals_of,
+)
+from identification.gap.design.information_gain import divergences, odds, outlook
+from identification.gap.fit.fitter import Fitter, frames
+from identification.gap.fit.variable_projection import Linear, normal
+from identification.gap.model.grey_box import Cause, Channel, Nuisance, Run, Size
+from identification.gap.rank.evidence import FORM_ERRORS
+from identification.gap.rank.ranking import Verdicts, which
 
 NOISE, SAMPLES, PERIOD = 0.02, 40, 1e-3
 SUPPLIES = (12.0, 10.0, 8.0, 6.0, 4.0)

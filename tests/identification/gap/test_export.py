@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.export import as_json, location, magnitudes, unit_name
+from identification.gap.report.json_export import as_json, location, magnitudes, unit_name
 from tests.identification.gap.tanks import TANKS, diagnosed
 
 KEYS = {

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from identification.gap.normal import FARTHEST, Linear, freed, normal
+from identification.gap.fit.variable_projection import FARTHEST, Linear, freed, normal
 
 RNG = np.random.default_rng(2)
 SD = np.array([0.3, 2.0])

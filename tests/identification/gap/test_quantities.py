@@ -2,8 +2,16 @@
 
 import pytest
 
-from identification.gap.bootstrap import Interval
-from identification.gap.quantities import chance, interval, quantity, readable, share, short, spread
+from identification.gap.reduce.block_bootstrap import Interval
+from identification.gap.report.quantities import (
+    chance,
+    interval,
+    quantity,
+    readable,
+    share,
+    short,
+    spread,
+)
 
 
 @pytest.mark.parametrize(

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from identification.gap.diagnosis import diagnose
-from identification.gap.second_look import DOUBTED, NEAR, TRUSTED, second_look
-from identification.gap.shrink import Unexplained
-from identification.gap.verdict import AMBIGUOUS, KNOWN, NO_GAP, UNKNOWN
-from identification.gap.which import Verdicts
+from identification.gap.rank.predictive_check import DOUBTED, NEAR, TRUSTED, second_look
+from identification.gap.rank.ranking import Verdicts
+from identification.gap.rank.verdict import AMBIGUOUS, KNOWN, NO_GAP, UNKNOWN
+from identification.gap.reduce.discrepancy_reduction import Unexplained
 from tests.identification.gap.tanks import TANKS, diagnosed
 
 

@@ -10,12 +10,12 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
-from identification.gap import which_figures
 from identification.gap.diagnosis import Diagnosis
-from identification.gap.export import as_json
-from identification.gap.quantities import quantity
-from identification.gap.section import sections
-from identification.gap.sentences import alike, ends, hidden, verdict
+from identification.gap.report import ranking_figures as which_figures
+from identification.gap.report.json_export import as_json
+from identification.gap.report.quantities import quantity
+from identification.gap.report.sections import sections
+from identification.gap.report.sentences import alike, ends, hidden, verdict
 from identification.report.page import Picture, Section, Table, write_page
 from tests.identification.gap.tanks import TANKS, diagnosed
 

@@ -8,11 +8,11 @@ import pytest
 
 from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import NOISE, recorded
-from identification.gap.fit import Fitter, Hypothesis, Point
-from identification.gap.prediction import percent, predict
-from identification.gap.refit import recalibrated
-from identification.gap.shrink import Shrinkage, shrinkage
-from identification.gap.shrink_figures import gaps, shares
+from identification.gap.fit.fitter import Fitter, Hypothesis, Point
+from identification.gap.fit.prediction import percent, predict
+from identification.gap.rank.refit import recalibrated
+from identification.gap.reduce.discrepancy_reduction import Shrinkage, shrinkage
+from identification.gap.report.reduction_figures import gaps, shares
 
 
 def points(tank: Tank, causes: tuple[str, ...]) -> tuple[Fitter, dict[str, Point]]:

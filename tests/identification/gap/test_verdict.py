@@ -6,10 +6,12 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from identification.gap.evidence import Assessed
-from identification.gap.fit import Hypothesis
-from identification.gap.model import Cause, Equation
-from identification.gap.verdict import (
+from identification.gap.fit.fitter import Hypothesis
+from identification.gap.locate.fault_localisation import Forcing, Where
+from identification.gap.model.grey_box import Cause, Equation
+from identification.gap.rank.evidence import Assessed
+from identification.gap.rank.ranking import Verdicts
+from identification.gap.rank.verdict import (
     AMBIGUOUS,
     KNOWN,
     NO_GAP,
@@ -20,8 +22,6 @@ from identification.gap.verdict import (
     ranked,
     smallest,
 )
-from identification.gap.where import Forcing, Where
-from identification.gap.which import Verdicts
 from tests.identification.gap.tanks import diagnosed
 
 LEAK = Cause(name="leak", component="tank", sizes=())

@@ -7,15 +7,20 @@ import pytest
 
 from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import recorded
-from identification.gap.evidence import assess
-from identification.gap.fit import Fitter, Point
-from identification.gap.forcing import candidate, needed, window_edges
-from identification.gap.model import Trace
-from identification.gap.processes import courses
-from identification.gap.refit import recalibrated
-from identification.gap.regimes import regime_gaps
-from identification.gap.where import Where, locate
-from identification.gap.where_figures import forcing_figure, heat_map, residual_figure, shape_figure
+from identification.gap.fit.fitter import Fitter, Point
+from identification.gap.locate.fault_localisation import Where, locate
+from identification.gap.locate.forcing import candidate, needed, window_edges
+from identification.gap.locate.forcing_processes import courses
+from identification.gap.locate.regimes import regime_gaps
+from identification.gap.model.grey_box import Trace
+from identification.gap.rank.evidence import assess
+from identification.gap.rank.refit import recalibrated
+from identification.gap.report.localisation_figures import (
+    forcing_figure,
+    heat_map,
+    residual_figure,
+    shape_figure,
+)
 
 LEAK = 2e-3
 """Of the tank [1/s]."""

@@ -5,12 +5,12 @@ import pytest
 
 from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import recorded
-from identification.gap.evidence import Assessed, assess, stretches
-from identification.gap.fit import Fitter, Hypothesis
-from identification.gap.fits import Fits
-from identification.gap.pairs import doubted, with_halves
-from identification.gap.refit import recalibrated
-from identification.gap.which import which
+from identification.gap.fit.fit_cache import Fits
+from identification.gap.fit.fitter import Fitter, Hypothesis
+from identification.gap.rank.cause_pairs import doubted, with_halves
+from identification.gap.rank.evidence import Assessed, assess, stretches
+from identification.gap.rank.ranking import which
+from identification.gap.rank.refit import recalibrated
 
 
 @pytest.mark.parametrize(("name", "size"), [("leak", 4e-3), ("lag", 4.0), ("evaporation", 8e-4)])

@@ -6,7 +6,7 @@ from scipy import stats
 
 from epv_env.plant.sensors import SENSORS
 from identification.quality.dependence import white_band
-from identification.quality.reported import CORRELATIONS, DESCRIPTIONS, FACTORS, OFFSETS, SAMPLES
+from identification.quality.published_noise import CORRELATIONS, DESCRIPTIONS, FACTORS, OFFSETS, SAMPLES
 from identification.recordings.recording import CHANNELS
 
 

@@ -6,11 +6,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from identification.quality import figures
+from identification.quality import quality_figures as figures
 from identification.quality.assess import assess
-from identification.quality.export import as_json, as_text
-from identification.quality.reported import CORRELATIONS, DESCRIPTIONS, FACTORS
-from identification.quality.section import quality_section
+from identification.quality.published_noise import CORRELATIONS, DESCRIPTIONS, FACTORS
+from identification.quality.quality_export import as_json, as_text
+from identification.quality.quality_section import quality_section
 from identification.recordings.recording import CHANNELS
 from identification.report.page import Picture, Table, write_page
 from tests.identification.quality.records import AMBIENT, rest_record, with_channel

@@ -9,7 +9,7 @@ from scipy import signal
 
 from epv_env.plant.sensors import SENSORS
 from identification.quality.assess import assess, sensor_offsets
-from identification.quality.reported import DESCRIPTIONS, OFFSETS
+from identification.quality.published_noise import DESCRIPTIONS, OFFSETS
 from identification.quality.verdicts import CHECKS, findings, verdict, worst
 from identification.recordings.recording import CHANNELS, UNITS, CampaignError
 from tests.identification.quality.records import (

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-import identification.recordings.files as campaign_files
-from identification.recordings.files import read_campaign, write_campaign
+import identification.recordings.campaign_files as campaign_files
+from identification.recordings.campaign_files import read_campaign, write_campaign
 from identification.recordings.recording import CampaignError
 from identification.recordings.timing import sampling_period
 from tests.identification.recordings.good_campaign import campaign_of, good_campaign, resting, switching

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from identification.recordings.files import read_campaign, write_campaign
+from identification.recordings.campaign_files import read_campaign, write_campaign
 from identification.recordings.recording import CampaignError
 from tests.identification.recordings.good_campaign import campaign_of, good_campaign, resting, switching
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.error import partial_error, relative_error, total_error
 from identification.replay.misfit import (
     Misfit,
     measured_outputs,
     noise_weights,
     report_weights,
 )
+from identification.report_2003.output_error import partial_error, relative_error, total_error
 from tests.identification.twins import TRUE, problem
 
 

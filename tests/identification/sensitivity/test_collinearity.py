@@ -7,10 +7,10 @@ import pytest
 
 from epv_env.plant.parameters import Parameters, confidence_intervals, sensitive_symbols
 from epv_env.plant.sensors import SENSORS
-from identification.cases import CALIBRATION_CASES, CIRCUIT, RATE, SUPPLY, VOLTAGE
 from identification.recordings.recording import OUTPUTS, UNITS
 from identification.replay.drive import Drive
 from identification.replay.model import Replay
+from identification.report_2003.cases import CALIBRATION_CASES, CIRCUIT, RATE, SUPPLY, VOLTAGE
 from identification.sensitivity.collinearity import (
     CRITICAL,
     Sensitivities,

@@ -7,7 +7,7 @@ import pytest
 
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import SimulationError, energised, simulate
-from identification.cases import CALIBRATION_CASES
+from identification.report_2003.cases import CALIBRATION_CASES
 from identification.sensitivity.fixed_step import simulate_fixed_step
 from tests.identification.sensitivity.study import one_at_a_time
 

@@ -4,7 +4,6 @@ import json
 
 from epv_env.plant.parameters import Parameters
 from identification.report.page import Picture, write_page
-from identification.sensitivity.export import as_json
 from identification.sensitivity.global_indices import (
     ranges,
     screen,
@@ -12,7 +11,8 @@ from identification.sensitivity.global_indices import (
     total_error_model,
 )
 from identification.sensitivity.results import SensitivityStudy
-from identification.sensitivity.section import sensitivity_section
+from identification.sensitivity.sensitivity_export import as_json
+from identification.sensitivity.sensitivity_section import sensitivity_section
 from tests.identification.sensitivity.study import one_at_a_time
 from tests.identification.sensitivity.test_collinearity import found
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.error import relative_error
 from identification.recordings.recording import OUTPUTS, CampaignError
-from identification.validation.section import WHITE, validation_json, validation_section
+from identification.report_2003.output_error import relative_error
 from identification.validation.validate import validate
+from identification.validation.validation_section import WHITE, validation_json, validation_section
 from tests.identification.twins import TRUE, calibration, exact_problem, problem
 
 

@@ -1,0 +1,124 @@
+"""The calibration in the report: Tables 10 to 13 and Figures 10 to 13."""
+
+from typing import Any
+
+from epv_env.plant.parameters import table
+from identification.calibration.calibrate import Calibration
+from identification.calibration.multi_start import METHODS, reached_the_best
+from identification.replay.error_tables import error_table, errors_as_json, percent
+from identification.replay.response_figures import overlay
+from identification.replay.responses import total
+from identification.report.page import Picture, Section, Table, Text, Verdict
+
+TOLERANCE = 0.1
+"""Total error that the report accepts (sections 6.1 and 7)."""
+
+
+def calibration_section(calibration: Calibration) -> Section:
+    """Estimates of both methods, errors before and after, and what speaks against them."""
+    return Section(
+        title="Calibration (section 6.2)",
+        verdicts=[_verdict(calibration), *_doubts(calibration)],
+        blocks=[
+            _estimates(calibration),
+            Text(text=_offsets(calibration)),
+            _starts(calibration),
+            error_table(calibration.before, "Errors at the start's parameters (Table 11)."),
+            *(
+                error_table(calibration.after[method], f"Errors after {method} (Table 13).")
+                for method in METHODS
+            ),
+            *(
+                Picture(figure=overlay(answer), caption="Calibration: " + answer.recording.name)
+                for answer in calibration.after["least squares"][:8]
+            ),
+        ],
+    )
+
+
+def calibration_json(calibration: Calibration) -> dict[str, Any]:
+    """Estimates in SI units, errors in percent, every search, and the warnings."""
+    return {
+        "estimates": {
+            method: {s: calibration.parameters(method)[s] for s in calibration.problem.vector.symbols}
+            for method in METHODS
+        },
+        "start": {
+            s: calibration.problem.vector.reference[s] for s in calibration.problem.vector.symbols
+        },
+        "errors_before": errors_as_json(calibration.before),
+        "errors_after": {m: errors_as_json(calibration.after[m]) for m in METHODS},
+        "offsets_subtracted": {name: o.value for name, o in calibration.problem.offsets.items()},
+        "noise": dict(calibration.problem.noise),
+        "searches": {m: [fit.as_json() for fit in calibration.fits[m]] for m in METHODS},
+        "warnings": calibration.warnings,
+    }
+
+
+def _verdict(calibration: Calibration) -> Verdict:
+    error, before = total(calibration.after["Nelder-Mead"]), total(calibration.before)
+    rms = calibration.best("least squares").error
+    good = error < TOLERANCE
+    return Verdict(
+        status="good" if good else "bad",
+        text=f"The total error (eq. 21) falls from {percent(before)} to {percent(error)} %, "
+        f"{'below' if good else 'not below'} the report's limit of {100 * TOLERANCE:.0f} %; the "
+        f"residual of the least-squares fit is {rms:.3g} times the noise (1 is the floor).",
+    )
+
+
+def _doubts(calibration: Calibration) -> list[Verdict]:
+    return [Verdict(status="doubt", text=warning) for warning in calibration.warnings]
+
+
+def _estimates(calibration: Calibration) -> Table:
+    vector = calibration.problem.vector
+    rows = []
+    for symbol in vector.symbols:
+        row, low_high = table()[symbol], table()[symbol].domain or (0.0, 0.0)
+        values = [calibration.parameters(method)[symbol] for method in METHODS]
+        rows.append(
+            [
+                f"{symbol} ({row.meaning}) [{row.unit}]",
+                f"{vector.reference[symbol]:.7g}",
+                *(f"{value:.7g}" for value in values),
+                f"{low_high[0]:g} to {low_high[1]:g}",
+            ]
+        )
+    columns = ["Parameter", "start", *METHODS, "domain"]
+    return Table(columns=columns, rows=rows, caption="Estimates (Tables 10 and 12).")
+
+
+def _offsets(calibration: Calibration) -> str:
+    offsets = calibration.problem.offsets
+    if not offsets:
+        return (
+            "No record at rest shows the sensors' offsets: readings were taken as they are, so an error "
+            "of the supply's, the circuit's or the voltage's sensor goes into the estimates."
+        )
+    listed = ", ".join(f"{name} {offset.value:.4g}" for name, offset in offsets.items())
+    return f"Offsets at rest that were subtracted from the readings [A, V, Pa]: {listed}."
+
+
+def _starts(calibration: Calibration) -> Table:
+    scale = calibration.problem.vector.scale
+    rows = []
+    for method in METHODS:
+        fits = calibration.fits[method]
+        for fit, reached in zip(fits, reached_the_best(fits), strict=True):
+            rows.append(
+                [
+                    method,
+                    ", ".join(f"{value:.4g}" for value in fit.start * scale),
+                    f"{fit.error:.5g}",
+                    "yes" if reached else "no",
+                    str(fit.evaluations),
+                    f"{fit.seconds:.2f}",
+                ]
+            )
+    columns = ["Method", "start", "error at the end", "reaches the best", "evaluations", "time [s]"]
+    caption = (
+        f"Searches from several starts ({', '.join(calibration.problem.vector.symbols)}); error: eq. 21 "
+        "as a fraction for Nelder-Mead, rms in noise deviations for least squares."
+    )
+    return Table(columns=columns, rows=rows, caption=caption)

@@ -1,0 +1,156 @@
+"""The confidence stage in the report: Table 14, Figures 16 and 17, and the joint region."""
+
+from typing import Any
+
+import numpy as np
+
+from epv_env.plant.parameters import table
+from identification.confidence import confidence_figures as figures
+from identification.confidence.confidence import Confidence
+from identification.report.page import Picture, Section, Table, Text, Verdict
+
+FLAT = 1e-3
+"""Largest possible decrease of the total error, relative to it, at which a gradient counts as zero."""
+
+
+def confidence_section(confidence: Confidence) -> Section:
+    """Intervals of both kinds, the joint region, and the check of the minimum."""
+    return Section(
+        title="Confidence (section 6.3)",
+        verdicts=[_precision(confidence), _agreement(confidence), _minimum(confidence)],
+        blocks=[
+            _intervals(confidence),
+            _deviations(confidence),
+            _correlations(confidence),
+            Text(text=_gradient(confidence)),
+            Picture(
+                figure=figures.profiles(confidence),
+                caption="Model error over one parameter at a time (Figures 16 and 17).",
+            ),
+            Picture(
+                figure=figures.region(confidence),
+                caption="Joint 95 % region along pairs of parameters, relative to the estimate.",
+            ),
+        ],
+    )
+
+
+def confidence_json(confidence: Confidence) -> dict[str, Any]:
+    """Intervals and covariance in SI units."""
+    scale = confidence.problem.vector.scale
+    return {
+        "symbols": list(confidence.problem.vector.symbols),
+        "intervals95": {s: list(ends) for s, ends in confidence.intervals().items()},
+        "eq23": {s: list(ends) for s, ends in confidence.report_intervals().items()},
+        "covariance": (confidence.covariance.total * np.outer(scale, scale)).tolist(),
+        "chi_square": confidence.chi_square,
+        "lags": confidence.covariance.lags,
+        "methods_disagree_by": confidence.disagreement,
+        "gradient": confidence.minimum.gradient.tolist(),
+        "hessian_eigenvalues": confidence.minimum.eigenvalues.tolist(),
+    }
+
+
+def _precision(confidence: Confidence) -> Verdict:
+    relative = confidence.half_widths / confidence.estimate
+    worst = int(np.argmax(relative))
+    return Verdict(
+        status="good" if relative[worst] < 0.05 else "doubt",
+        text="95 % intervals, each parameter on its own: "
+        + ", ".join(
+            f"{symbol} ±{100 * width:.2g} %"
+            for symbol, width in zip(confidence.problem.vector.symbols, relative, strict=True)
+        )
+        + ". They hold the noise of outputs and inputs, not the errors of the other parameters.",
+    )
+
+
+def _agreement(confidence: Confidence) -> Verdict:
+    inside = confidence.disagreement <= confidence.chi_square
+    return Verdict(
+        status="good" if inside else "doubt",
+        text=f"The Nelder-Mead estimate lies {'inside' if inside else 'outside'} the joint 95 % region "
+        f"of the least-squares estimate (squared distance {confidence.disagreement:.3g}, limit "
+        f"{confidence.chi_square:.3g})"
+        + ("." if inside else ": the model lacks something that the two weigh differently."),
+    )
+
+
+def _minimum(confidence: Confidence) -> Verdict:
+    positive = bool(np.all(confidence.minimum.eigenvalues > 0))
+    flat = _decrease(confidence) < FLAT
+    return Verdict(
+        status="good" if positive and flat else "doubt",
+        text=f"At the Nelder-Mead estimate the gradient is {'zero' if flat else 'not zero'} and the "
+        f"Hessian {'positive definite' if positive else 'not positive definite'}: "
+        + ("a local minimum." if positive and flat else "not a proper minimum."),
+    )
+
+
+def _decrease(confidence: Confidence) -> float:
+    """Greatest decrease of the total error that its gradient promises, relative to it."""
+    minimum = confidence.minimum
+    steepest = float(minimum.gradient @ minimum.gradient)
+    return 0.5 * steepest / (float(np.min(np.abs(minimum.eigenvalues))) * confidence.report.error)
+
+
+def _gradient(confidence: Confidence) -> str:
+    gradient = ", ".join(f"{value:.2g}" for value in confidence.minimum.gradient)
+    eigenvalues = ", ".join(f"{value:.3g}" for value in confidence.minimum.eigenvalues)
+    return (
+        f"Gradient of the total error by the parameters relative to the start: {gradient}; it could "
+        f"lower the error by at most {100 * _decrease(confidence):.2g} % of itself. Eigenvalues of the "
+        f"Hessian: {eigenvalues}."
+    )
+
+
+def _intervals(confidence: Confidence) -> Table:
+    symbols = confidence.problem.vector.symbols
+    estimates = confidence.estimate * confidence.problem.vector.scale
+    rows = [
+        [
+            f"{symbol} [{table()[symbol].unit}]",
+            f"{estimate:.7g}",
+            *(f"{end:.7g}" for end in confidence.intervals()[symbol]),
+            *(f"{end:.7g}" for end in confidence.report_intervals()[symbol]),
+        ]
+        for symbol, estimate in zip(symbols, estimates, strict=True)
+    ]
+    columns = ["Parameter", "estimate", "low", "high", "eq. 23 low", "eq. 23 high"]
+    caption = (
+        "95 % intervals: of the least-squares estimate (sandwich covariance and noise of the inputs), "
+        "and eq. 23 as printed around the Nelder-Mead estimate (Table 14)."
+    )
+    return Table(columns=columns, rows=rows, caption=caption)
+
+
+def _deviations(confidence: Confidence) -> Table:
+    covariance = confidence.covariance
+    parts = [
+        np.sqrt(np.diag(covariance.independent)),
+        np.sqrt(np.diag(covariance.residual)),
+        np.std(confidence.bootstrap, axis=0),
+        np.sqrt(np.diag(covariance.inputs)),
+        np.sqrt(np.diag(covariance.total)),
+    ]
+    rows = [
+        [symbol, *(f"{100 * part[i] / confidence.estimate[i]:.4f}" for part in parts)]
+        for i, symbol in enumerate(confidence.problem.vector.symbols)
+    ]
+    columns = ["Parameter", "independent", "sandwich", "block bootstrap", "inputs", "total"]
+    caption = (
+        f"Standard deviations [% of the estimate]: as if residuals were independent; from the residuals "
+        f"as they are, over {covariance.lags} samples; by block bootstrap; from the noise of U and p1 "
+        "and of the offsets; sandwich and inputs together."
+    )
+    return Table(columns=columns, rows=rows, caption=caption)
+
+
+def _correlations(confidence: Confidence) -> Table:
+    symbols = confidence.problem.vector.symbols
+    deviation = np.sqrt(np.diag(confidence.covariance.total))
+    matrix = confidence.covariance.total / np.outer(deviation, deviation)
+    rows = [
+        [symbol, *(f"{value:.3f}" for value in row)] for symbol, row in zip(symbols, matrix, strict=True)
+    ]
+    return Table(columns=["", *symbols], rows=rows, caption="Correlation of the estimates.")

@@ -1,0 +1,1 @@
+"""Experiment design: which recording would tell rival hypotheses apart."""

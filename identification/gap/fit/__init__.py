@@ -1,0 +1,1 @@
+"""Joint fits of parameters and causes to recordings."""

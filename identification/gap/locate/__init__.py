@@ -1,0 +1,1 @@
+"""Fault localisation: which channel, regime and state equation the gap lies in."""

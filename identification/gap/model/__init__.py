@@ -1,0 +1,1 @@
+"""The grey-box protocol: how the diagnosis knows a plant."""

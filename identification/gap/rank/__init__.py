@@ -1,0 +1,1 @@
+"""Hypothesis ranking: screening, refits, evidence, probabilities and the verdict."""

@@ -1,0 +1,1 @@
+"""The diagnosis as HTML sections, figures, sentences and JSON."""

@@ -1,0 +1,1 @@
+"""The stages of an identification, run in order on one campaign."""

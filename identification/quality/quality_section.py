@@ -1,0 +1,116 @@
+"""Section 4 of the report for one recording: verdicts, Tables 2 to 4 and Figures 4 to 9."""
+
+import math
+from dataclasses import fields
+
+from identification.quality import published_noise as reported
+from identification.quality import quality_figures as figures
+from identification.quality.assess import Quality, sensor_offsets
+from identification.quality.dependence import white_band
+from identification.quality.statistics import Description
+from identification.quality.verdicts import CHECKS, findings, verdict, worst
+from identification.recordings.recording import CHANNELS, UNITS
+from identification.report.page import Picture, Section, Table, Text
+
+UNIT_COLUMNS = [f"{name} [{UNITS[name][0]}]" for name in CHANNELS]
+
+
+def quality_section(quality: Quality) -> Section:
+    """Everything that section 4 shows, beside the report's values."""
+    return Section(
+        title=f"Data quality: {quality.name} ({quality.samples} samples, section 4)",
+        verdicts=[verdict(quality, name) for name in CHANNELS],
+        blocks=[
+            _checks(quality),
+            Text(text=_state(quality)),
+            _trends(quality),
+            _statistics(quality),
+            _correlations(quality),
+            *_pictures(quality),
+        ],
+    )
+
+
+def _state(quality: Quality) -> str:
+    if quality.at_rest:
+        values = ", ".join(
+            f"{name} {offset.value:.3g}" for name, offset in sensor_offsets(quality).items()
+        )
+        return f"The record is at rest. A calibration may subtract these offsets [A, V, Pa]: {values}."
+    off = [name for name, channel in quality.channels.items() if not channel.at_rest]
+    return (
+        f"Not at rest or not steady: {', '.join(off)}. The limits are Table 1's accuracy about 0 A, 0 V "
+        "and p_env, and a tenth of it for a drift. A calibration subtracts no offsets."
+    )
+
+
+def _checks(quality: Quality) -> Table:
+    rows = []
+    for name in CHANNELS:
+        found = {finding.check: finding.status for finding in findings(quality, name)}
+        rows.append([name, worst(findings(quality, name)), *(found.get(check, "–") for check in CHECKS)])
+    return Table(columns=["Channel", "verdict", *CHECKS], rows=rows, caption="Status of every check.")
+
+
+def _trends(quality: Quality) -> Table:
+    trends = [quality.channels[name].trend for name in CHANNELS]
+    return Table(
+        columns=["Parameter", *UNIT_COLUMNS],
+        rows=[
+            ["factor [unit/s]", *(_estimate(trend.factor, trend.factor_error) for trend in trends)],
+            ["  the report's", *(f"{reported.FACTORS[name]:.6f}" for name in CHANNELS)],
+            ["offset [unit]", *(_estimate(trend.offset, trend.offset_error) for trend in trends)],
+            ["  the report's", *(f"{reported.OFFSETS[name]:.6f}" for name in CHANNELS)],
+        ],
+        caption="Signal offset and trend check (Table 2), ± one standard error.",
+    )
+
+
+def _estimate(value: float, error: float) -> str:
+    return f"{value:z.6f} ± {error:.6f}" if math.isfinite(error) else f"{value:z.6f}"
+
+
+def _statistics(quality: Quality) -> Table:
+    found = {name: channel.description for name, channel in quality.channels.items()}
+    rows = []
+    for field in fields(Description):
+        label = reported.NAMES[field.name]
+        rows.append([label, *(_cell(found[name], field.name) for name in CHANNELS)])
+        report = (_cell(reported.DESCRIPTIONS[name], field.name) for name in CHANNELS)
+        rows.append(["  the report's", *report])
+    return Table(
+        columns=["Parameter", *UNIT_COLUMNS],
+        rows=rows,
+        caption="Central, dispersion and distribution properties of the detrended signals (Table 3).",
+    )
+
+
+def _cell(description: Description, name: str) -> str:
+    value = getattr(description, name)
+    if not math.isfinite(value):
+        return "–"
+    return f"{value:.2f}" if name == "signal_to_noise" else f"{value:z.4f}"
+
+
+def _correlations(quality: Quality) -> Table:
+    rows = [
+        [
+            f"{first}, {second}",
+            f"{pair.correlation:.4f}",
+            f"{quality.adjusted[first, second]:.2g}",
+            f"{pair.peak:.4f}",
+            f"{1e3 * quality.period * pair.peak_lag:.3g}",
+            f"{reported.CORRELATIONS[first, second]:.4f}",
+        ]
+        for (first, second), pair in quality.pairs.items()
+    ]
+    columns = ["Pair", "correlation", "p, family-wise", "greatest", "at lag [ms]", "the report's"]
+    caption = (
+        f"Correlation of the detrended signals (Table 4). Independent white signals lie within "
+        f"±{white_band(quality.samples):.4f} in 95 % of cases."
+    )
+    return Table(columns=columns, rows=rows, caption=caption)
+
+
+def _pictures(quality: Quality) -> list[Picture]:
+    return [Picture(figure=draw(quality), caption=text) for draw, text in figures.CAPTIONS.items()]

@@ -1,0 +1,128 @@
+"""Campaigns as files: campaign.json and one CSV per recording (docs/data.md)."""
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epv_env.common.files import write_text
+from identification.recordings.checks import check_recording
+from identification.recordings.columns import CONSUMPTION, TIME, read_columns
+from identification.recordings.manifest import (
+    BAR,
+    FILE_NAME,
+    check_manifest,
+    manifest_content,
+    read_manifest,
+)
+from identification.recordings.recording import Campaign, CampaignError, Recording
+
+DECIMALS = {
+    TIME: 9, "I_A": 6, "U_V": 5, "p1_bar": 5, "p2_bar": 5, "p3_bar": 5, CONSUMPTION: 9
+}  # fmt: skip
+"""Decimals written: a hundredth of an ADC step or less, and any rate's times as uniform."""
+
+
+def read_campaign(folder: str | PathLike[str]) -> Campaign:
+    """The campaign in a folder, every rule of docs/data.md checked. Raises CampaignError."""
+    folder = Path(folder)
+    manifest = read_manifest(folder)
+    return Campaign(
+        name=manifest.name,
+        temperature=manifest.temperature,
+        pressure=manifest.pressure,
+        recordings=tuple(
+            _read_recording(path, role, manifest.pressure) for path, role in manifest.roles.items()
+        ),
+        folder=folder,
+    )
+
+
+def check_vacant(folder: Path) -> None:
+    """Raise CampaignError if the folder holds a campaign already."""
+    path = folder / FILE_NAME
+    if os.path.lexists(path):
+        raise CampaignError(f"{path} exists already: write to another folder, or remove that campaign")
+
+
+def write_campaign(campaign: Campaign, folder: str | PathLike[str]) -> None:
+    """Write a campaign that `read_campaign` takes; its JSON last, so that a part of one is none.
+
+    Each file is written whole or not at all, in place of one of the same name. Raises CampaignError,
+    before anything is written, if the folder holds a campaign already or a recording breaks a rule.
+    """
+    folder = Path(folder)
+    check_vacant(folder)
+    content = manifest_content(campaign)
+    check_manifest(folder, content)
+    for recording in campaign.recordings:
+        _check_writable(folder / f"{recording.name}.csv", recording, campaign.pressure)
+    for recording in campaign.recordings:
+        write_text(folder / f"{recording.name}.csv", _csv(_columns(recording)))
+    write_text(folder / FILE_NAME, json.dumps(content, indent=1) + "\n")
+
+
+def _read_recording(path: Path, role: str, ambient: float) -> Recording:
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise CampaignError(
+            f"{path} cannot be read ({error.strerror}): add the file, or take it out of {FILE_NAME}"
+        ) from None
+    columns = read_columns(str(path), content)
+    period = check_recording(str(path), columns, role=role, ambient_bar=ambient / BAR)
+    supply = [columns[name] for name in ("p1_bar", "p1a_bar", "p1b_bar") if name in columns]
+    return Recording(
+        name=path.stem,
+        role=role,
+        period=period,
+        I=columns["I_A"],
+        U=columns["U_V"],
+        p1=np.mean(supply, axis=0) * BAR,
+        p2=columns["p2_bar"] * BAR,
+        p3=columns["p3_bar"] * BAR,
+        sigma_S=columns.get(CONSUMPTION, np.zeros_like(columns["U_V"])),
+        sha256=hashlib.sha256(content).hexdigest(),
+    )
+
+
+def _columns(recording: Recording) -> dict[str, NDArray]:
+    """A recording's columns as they are written: units of the file, rounded."""
+    columns = {
+        TIME: recording.time,
+        "I_A": recording.I,
+        "U_V": recording.U,
+        "p1_bar": recording.p1 / BAR,
+        "p2_bar": recording.p2 / BAR,
+        "p3_bar": recording.p3 / BAR,
+    }
+    if np.any(recording.sigma_S):
+        columns[CONSUMPTION] = recording.sigma_S
+    return {name: np.round(values, DECIMALS[name]) for name, values in columns.items()}
+
+
+def _csv(columns: Mapping[str, NDArray]) -> str:
+    template = ",".join(f"%.{DECIMALS[name]}f" for name in columns)
+    rows = np.stack(list(columns.values()), axis=1)
+    lines = [",".join(columns), *(template % tuple(row) for row in rows.tolist())]
+    return "\n".join(lines) + "\n"
+
+
+def _check_writable(path: Path, recording: Recording, ambient: float) -> None:
+    if path.stem != recording.name:
+        raise CampaignError(
+            f"recording {recording.name!r} does not name a file: give it a name without folders"
+        )
+    columns = _columns(recording)
+    for name, values in columns.items():
+        if values.shape != (len(recording),) or not np.all(np.isfinite(values)):
+            raise CampaignError(
+                f"{path}: {name} has shape {values.shape} or a value that is not finite: give "
+                f"{len(recording)} finite samples"
+            )
+    check_recording(str(path), columns, role=recording.role, ambient_bar=ambient / BAR)

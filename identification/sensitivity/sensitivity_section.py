@@ -1,0 +1,134 @@
+"""Section 5 of the report for the HTML page: verdicts, Tables 8 and 9, collinearity, global indices."""
+
+import math
+
+from epv_env.plant.parameters import confidence_intervals, sensitive_symbols, table
+from identification.report.page import Picture, Section, Table, Text, Verdict
+from identification.sensitivity import sensitivity_figures as figures
+from identification.sensitivity.agreement import Agreement, agreement, percentages, printed_rows
+from identification.sensitivity.collinearity import CRITICAL, Sensitivities
+from identification.sensitivity.global_indices import Indices
+from identification.sensitivity.results import FIXED_STEP_STUDY, OneAtATime, SensitivityStudy
+from identification.sensitivity.study import STUDY
+
+REQUIRED = 36
+"""Figures of Tables 8 and 9 that must come back."""
+
+METHOD = (
+    "The report's rows of the armature most likely carry the scatter of its own simulation: with a "
+    "fixed step of 0.5 ms the plant's equations show it too, with exactly located stops they do not. a1 "
+    "is zero, so 10 % of it is no change: its row shows the ends of its domain, ±0.1 rad."
+)
+
+
+def sensitivity_section(study: SensitivityStudy) -> Section:
+    """Everything that section 5 shows, beside the report's values."""
+    rows = study.one_at_a_time
+    return Section(
+        title="Parametric sensitivity (section 5)",
+        verdicts=[
+            _reproduced("Fixed step", agreement(rows.fixed_step)),
+            _reproduced("Exact stops", agreement(rows.exact)),
+            *_separability(study.outputs),
+            _dominant(study.indices),
+        ],
+        blocks=[
+            Text(text=METHOD),
+            _rows(rows),
+            Picture(figure=figures.tornado(rows, printed_rows()), caption="Tables 8 and 9."),
+            _pairs(study.outputs),
+            Picture(
+                figure=figures.collinearity_map(study.outputs),
+                caption=f"Collinearity of pairs of parameters in p2, p3 and I of {study.outputs.where}, "
+                "weighted by the sensors' noise (Brun et al. 2001).",
+            ),
+            Picture(
+                figure=figures.global_bars(study.indices, study.screening),
+                caption="Global sensitivity of the total error, all parameters within ±5 % at once "
+                "(a1 within ±0.05 rad), with bootstrap 95 % intervals.",
+            ),
+        ],
+    )
+
+
+def _reproduced(method: str, met: Agreement) -> Verdict:
+    classes = (
+        f"classes differ for {', '.join(met.classes_differ)}"
+        if met.classes_differ
+        else "all classes agree"
+    )
+    good = met.reproduced >= REQUIRED and not met.classes_differ
+    return Verdict(
+        status="good" if good else "doubt",
+        text=f"{method}: {met.reproduced} of {met.figures} figures of Tables 8 and 9 within 10 % or 0.1 "
+        f"percentage points, {classes}, the farthest by a factor of {met.worst_factor:.2g}.",
+    )
+
+
+def _separability(found: Sensitivities) -> list[Verdict]:
+    four, sensitive = found.index(tuple(confidence_intervals())), found.index(sensitive_symbols())
+    pairs = found.inseparable_pairs()
+    return [
+        Verdict(
+            status="good" if four < CRITICAL else "bad",
+            text=f"The four calibrated parameters together have a collinearity index of {four:.1f}; "
+            f"below {CRITICAL:g} data can tell them apart.",
+        ),
+        Verdict(
+            status="good" if sensitive < CRITICAL else "note",
+            text=f"All {len(sensitive_symbols())} sensitive ones together: {_index(sensitive)}. "
+            f"{len(pairs)} pairs cannot be told apart, first "
+            f"{' and '.join(f'{a}, {b}' for a, b, _ in pairs[:2])}, which act by their ratio alone.",
+        ),
+    ]
+
+
+def _dominant(found: Indices) -> Verdict:
+    order = sorted(zip(found.total, found.symbols, strict=True), reverse=True)
+    names = ", ".join(f"{symbol} {value:.2f}" for value, symbol in order[:4])
+    return Verdict(status="note", text=f"Greatest total Sobol indices of the total error: {names}.")
+
+
+def _rows(study: OneAtATime) -> Table:
+    return Table(
+        columns=[
+            "Parameter",
+            "class",
+            "the report [%]",
+            "fixed step [%]",
+            "scatter [%]",
+            "exact stops [%]",
+        ],
+        rows=[_cells(study, symbol, printed) for symbol, printed in printed_rows().items()],
+        caption=f"Total error for −10 % / +10 % (Tables 8 and 9) at p1 = {STUDY.p1 / 1e5:g} bar, "
+        f"p2(0) = {STUDY.p2 / 1e5:g} bar, U = {STUDY.U_on:g} V; with the fixed step "
+        f"{FIXED_STEP_STUDY.U_on:g} V, its scatter over 18.5 to 19.3 V.",
+    )
+
+
+def _cells(study: OneAtATime, symbol: str, printed: tuple[float, float]) -> list[str]:
+    low, high = 100 * study.scatter[symbol].min(axis=0), 100 * study.scatter[symbol].max(axis=0)
+    return [
+        symbol,
+        "Sensitive" if table()[symbol].sensitive else "Not sensitive",
+        _pair(printed),
+        _pair(percentages(study.fixed_step[symbol])),
+        f"{low[0]:.3g}–{high[0]:.3g} / {low[1]:.3g}–{high[1]:.3g}",
+        _pair(percentages(study.exact[symbol])),
+    ]
+
+
+def _pair(values: tuple[float, float]) -> str:
+    return f"{values[0]:.3g} / {values[1]:.3g}"
+
+
+def _pairs(found: Sensitivities) -> Table:
+    return Table(
+        columns=["Pair", "collinearity index"],
+        rows=[[f"{a}, {b}", _index(index)] for a, b, index in found.inseparable_pairs()],
+        caption=f"Pairs above {CRITICAL:g}: a change of one can be made up for by the other.",
+    )
+
+
+def _index(value: float) -> str:
+    return f"{value:.3g}" if math.isfinite(value) else "infinite"

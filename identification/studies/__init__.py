@@ -1,0 +1,1 @@
+"""Studies about the methods themselves; the library imports none of them."""

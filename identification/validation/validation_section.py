@@ -1,0 +1,125 @@
+"""The validation in the report: Table 15, Figures 14 and 15, and the residuals."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from identification.calibration.calibration_section import TOLERANCE
+from identification.quality.dependence import white_band
+from identification.recordings.recording import OUTPUTS
+from identification.replay.error_tables import error_table, errors_as_json, percent
+from identification.replay.response_figures import errors_over_time, overlay
+from identification.report.page import Picture, Section, Table, Verdict
+from identification.validation.validate import Residual, Validation
+
+WHITE = 1e-4
+"""Probability of white noise below which a residual is called predictable."""
+
+FLOOR = 1.2
+"""Residual in noise deviations up to which next to nothing is left to explain."""
+
+
+def validation_section(validation: Validation) -> Section:
+    """The 10 % rule, the residuals, the responses."""
+    return Section(
+        title="Validation on held-out recordings (section 7)",
+        verdicts=[_rule(validation), _left(validation)],
+        blocks=[
+            error_table(validation.answers, "Result of the model validation (Table 15)."),
+            _residual_table(validation),
+            *(
+                Picture(figure=overlay(answer), caption="Validation: " + answer.recording.name)
+                for answer in validation.answers[:8]
+            ),
+            Picture(figure=errors_over_time(validation.answers[:8]), caption="Error over time."),
+            Picture(
+                figure=autocorrelations(validation),
+                caption="Autocorrelation of the residuals; the band holds 95 % of white noise.",
+            ),
+        ],
+    )
+
+
+def validation_json(validation: Validation) -> dict[str, Any]:
+    """Errors in percent; residuals in noise deviations."""
+    return {
+        "errors_percent": errors_as_json(validation.answers),
+        "residuals": [
+            {
+                "recording": r.recording,
+                "output": r.output,
+                "rms_noise_deviations": r.rms,
+                "white_noise_probability": r.whiteness.probability,
+                "greatest_autocorrelation": r.whiteness.peak,
+            }
+            for r in validation.residuals
+        ],
+    }
+
+
+def autocorrelations(validation: Validation) -> Figure:
+    """Autocorrelation of the residuals over the lag, a panel per output."""
+    figure = Figure(figsize=(9, 3.0), layout="constrained")
+    panels = figure.subplots(1, len(OUTPUTS), sharey=True)
+    samples = {a.recording.name: len(a.recording) for a in validation.answers}
+    periods = {a.recording.name: a.recording.period for a in validation.answers}
+    for residual in validation.residuals:
+        axes = panels[OUTPUTS.index(residual.output)]
+        correlation = residual.whiteness.autocorrelation[1:]
+        lags = 1e3 * periods[residual.recording] * np.arange(1, len(correlation) + 1)
+        axes.plot(lags, correlation, linewidth=0.8, label=residual.recording)
+    for axes, output in zip(panels, OUTPUTS, strict=True):
+        band = white_band(min(samples.values()))
+        axes.axhspan(-band, band, color="tab:orange", alpha=0.25, linewidth=0)
+        axes.set_title(output)
+        axes.set_xlabel("lag [ms]")
+        axes.grid(alpha=0.3)
+    panels[0].set_ylabel("autocorrelation")
+    panels[0].legend(fontsize="small")
+    return figure
+
+
+def _rule(validation: Validation) -> Verdict:
+    good = validation.worst < TOLERANCE
+    return Verdict(
+        status="good" if good else "bad",
+        text=f"The greatest partial error on held-out recordings is {percent(validation.worst)} %, "
+        f"{'below' if good else 'not below'} the report's limit of {100 * TOLERANCE:.0f} %.",
+    )
+
+
+def _left(validation: Validation) -> Verdict:
+    most = max(validation.residuals, key=lambda residual: residual.rms)
+    predictable = [r for r in validation.residuals if r.whiteness.probability < WHITE]
+    if most.rms <= FLOOR and not predictable:
+        text = (
+            f"The residuals are white and at most {most.rms:.3g} times the noise: "
+            "nothing is left to explain."
+        )
+        return Verdict(status="good", text=text)
+    named = ", ".join(sorted({residual.output for residual in predictable})) or most.output
+    text = (
+        f"The residuals reach {most.rms:.3g} times the noise ({most.output} in {most.recording}) and "
+        f"are predictable in {named}: the model lacks something there."
+    )
+    return Verdict(status="doubt", text=text)
+
+
+def _residual_table(validation: Validation) -> Table:
+    columns = ["Recording", "output", "rms / noise", "greatest autocorrelation", "p of white noise"]
+    return Table(
+        columns=columns,
+        rows=[_row(residual) for residual in validation.residuals],
+        caption="Residuals in noise deviations (1 is the floor), and whether they are white.",
+    )
+
+
+def _row(residual: Residual) -> list[str]:
+    return [
+        residual.recording,
+        residual.output,
+        f"{residual.rms:.3f}",
+        f"{residual.whiteness.peak:.3f}",
+        f"{residual.whiteness.probability:.2g}",
+    ]

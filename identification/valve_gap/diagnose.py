@@ -1,0 +1,138 @@
+"""From a campaign's folder to gap.json, report and a plant file with the cause."""
+
+import json
+import sys
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from time import perf_counter
+
+from scipy.stats import chi2
+
+from epv_env.common.files import write_text
+from epv_env.common.journal import Journal
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.plantfile import Plant, load_plant, save_plant
+from epv_env.plant.region import Region
+from identification.bench.programme_file import save_programmes
+from identification.gap.diagnosis import Diagnosis, diagnose, label
+from identification.gap.fit.fit_cache import Fits
+from identification.gap.rank.evidence import inflation
+from identification.gap.report.json_export import as_json, covariance, values
+from identification.gap.report.sections import sections
+from identification.recordings.campaign_files import read_campaign
+from identification.report.page import write_page
+from identification.valve_gap.programmes import FILE_NAME as PROGRAMME
+from identification.valve_gap.programmes import next_experiment
+from identification.valve_gap.valve import Valve
+
+GAP, REPORT, PLANT, JOURNAL = "gap.json", "report.html", "plant.json", "fits.jsonl"
+
+JOINT = 0.95
+"""Probability that the plant file's region holds."""
+
+STEPS = 18
+"""Of a diagnosis with pairs; without, two of them are left out."""
+
+
+def diagnose_campaign(
+    campaign: Path,
+    out: Path,
+    *,
+    plant: str | None = None,
+    without: Sequence[str] = (),
+    seed: int = 0,
+    report: bool = True,
+) -> Diagnosis:
+    """Diagnose a campaign; write gap.json, and unless `report` is False report, plan and plant file.
+
+    plant: plant file of the nominal parameters, None for Table 10. without: causes to leave out of the
+    catalogue. Finished fits are kept in `out` and taken up again. Raises CampaignError for recordings
+    that cannot be used, ValueError for an unknown cause or a plant file that is none.
+    """
+    began = perf_counter()
+    recorded = read_campaign(campaign)
+    nominal = load_plant(plant).parameters if plant else None
+    valve = Valve(recorded, nominal, without=without)
+    journal = Journal(out / JOURNAL, _subject(valve, without))
+    steps = Steps(began) if report else _silent
+    found = diagnose(valve, seed=seed, fits=Fits(valve, journal, steps))
+    text = _report(found, valve, recorded.name, out, steps) if report else ""
+    content = {**as_json(found, text), "seconds": perf_counter() - began}
+    write_text(out / GAP, json.dumps(content, indent=1, allow_nan=False) + "\n")
+    return found
+
+
+def _report(found: Diagnosis, valve: Valve, name: str, out: Path, steps: Callable[[str], None]) -> str:
+    """Write what people use of it; returns what to record next."""
+    steps("next experiment")
+    experiment = next_experiment(found.verdicts, valve)
+    (out / PROGRAMME).unlink(missing_ok=True)
+    if experiment.programme:
+        save_programmes([experiment.programme], out / PROGRAMME)
+    save_plant(refitted_plant(found, valve, name), out / PLANT)
+    steps("report")
+    title = f"Gap between model and recordings: {name}"
+    footer = f"Written by epv-valve {version('epv-valve')}. Figures and fields: docs/gap.md."
+    pages = sections(found, experiment.text)
+    write_page(out / REPORT, title=title, sections=pages, footer=footer)
+    return experiment.text
+
+
+def refitted_plant(found: Diagnosis, valve: Valve, name: str) -> Plant:
+    """The plant refitted together with the cause that the verdict names, else recalibrated.
+
+    Its region is where the recordings leave the four parameters and the sizes, jointly; autocorrelated
+    residuals widen it.
+    """
+    named = found.conclusion.ambiguity[:1]
+    best = named[0].found if named else found.verdicts.none
+    parameters = Parameters({**valve.base, **values(found, best)})
+    symbols = tuple(size.symbol for size in found.verdicts.fitter.sizes(best.point))
+    return Plant(
+        parameters=parameters,
+        region=Region(
+            centre=parameters,
+            symbols=symbols,
+            covariance=covariance(best) * inflation(found.verdicts.fitter, best.residuals),
+            chi_square=float(chi2.ppf(JOINT, len(symbols))),
+        ),
+        name=f"{name} with {label(best)}" if named else f"{name}, recalibrated",
+        provenance={
+            "method": "joint refit with the cause of the gap" if named else "recalibration",
+            "software": f"epv-valve {version('epv-valve')}",
+            "verdict": found.conclusion.verdict,
+            "recordings_sha256": {r.name: r.sha256 for r in valve.recordings},
+            "warnings": found.warnings,
+        },
+    )
+
+
+def _silent(step: str) -> None:
+    """Says nothing: many diagnoses run side by side."""
+
+
+class Steps:
+    """Says on stderr which step has begun, and about how long the rest will take."""
+
+    def __init__(self, began: float):
+        self.began = began
+        self.number = 0
+
+    def __call__(self, step: str) -> None:
+        elapsed = perf_counter() - self.began
+        left = (
+            f", about {elapsed * (STEPS - self.number) / self.number:.0f} s left" if self.number else ""
+        )
+        self.number += 1
+        print(f"[{self.number}] {step} ({elapsed:.0f} s{left})", file=sys.stderr)
+
+
+def _subject(valve: Valve, without: Sequence[str]) -> dict:
+    """What the fits depend on."""
+    return {
+        "software": version("epv-valve"),
+        "recordings": {r.name: [r.role, r.digest()] for r in valve.recordings},
+        "nominal": {size.symbol: size.off for size in valve.parameters},
+        "without": sorted(without),
+    }

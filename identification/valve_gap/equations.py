@@ -1,0 +1,75 @@
+"""The valve's state equations f1 to f7 (report eqs 5 to 12), and forcings on them."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epv_env.plant.equations import Inputs
+from epv_env.plant.readings import readings
+from epv_env.plant.simulate import Trajectory, energised, simulate
+from epv_env.plant.valves import Valves
+from identification.gap.model.grey_box import Equation
+from identification.recordings.recording import OUTPUTS
+from identification.replay.drive import Drive
+
+GRAM, MILLIGRAM = 1e-3, 1e-6
+
+EQUATIONS = (
+    Equation(name="f1", state="p2", component="output_chamber", unit="g/s", scale=GRAM, step=1e-5),
+    Equation(
+        name="f2", state="p3", component="control_chamber", unit="mg/s", scale=MILLIGRAM, step=1e-6
+    ),
+    Equation(name="f3", state="xPV", component="protection_valve", unit="m/s", step=0.0),
+    Equation(name="f4", state="vPV", component="protection_valve", unit="N", step=0.1),
+    Equation(name="f5", state="xMV", component="armature", unit="m/s", step=0.0),
+    Equation(name="f6", state="vMV", component="armature", unit="N", step=1e-3),
+    Equation(name="f7", state="I", component="solenoid", unit="V", step=1e-2),
+)
+"""f3 and f5 say x' = v: nothing can be missing there, and their step is 0."""
+
+FORCINGS = {
+    "f1": ("sigma_S", -1.0),
+    "f2": ("air_3", 1.0),
+    "f4": ("force_PV", 1.0),
+    "f6": ("force_MV", 1.0),
+    "f7": ("U", 1.0),
+}
+"""Input of the simulator by which each equation is forced, and its sign: drawn air lacks in p2."""
+
+
+def modelled(drive: Drive, p: Mapping[str, float]) -> Trajectory:
+    """The model on a recording's inputs; p: every parameter by symbol [SI]."""
+    initial = energised(p, p1=drive.p1_start, p2=drive.p2_start, U=drive.U_start)
+    return simulate(
+        p, initial=initial, U=drive.U, period=drive.period, sigma_S=drive.sigma_S, p1=drive.p1
+    )
+
+
+def forced_changes(drive: Drive, p: Mapping[str, float], equation: Equation, edges: NDArray) -> NDArray:
+    """`GreyBox.forced` on one recording; p: every parameter by symbol [SI]."""
+    m, steps = len(edges) - 1, len(drive.U) - 1
+    name, sign = FORCINGS[equation.name]
+    window = np.searchsorted(edges, np.arange(steps), side="right")[:, None] - 1
+    base = {
+        "U": drive.U[:-1, None],
+        "sigma_S": drive.sigma_S[:-1, None],
+        "p1_slope": np.diff(drive.p1)[:, None] / drive.period,
+        "refill": np.zeros((1, 1)),
+    }
+    acting = sign * equation.step * (window == np.arange(m))
+    forced = _simulated(drive, p, m, {**base, name: base.get(name, 0.0) + acting})
+    changes = np.zeros((len(OUTPUTS), steps + 1, m))
+    changes[:, 1:] = forced - _simulated(drive, p, 1, base)
+    return changes
+
+
+def _simulated(drive: Drive, p: Mapping[str, float], m: int, inputs: Mapping[str, NDArray]) -> NDArray:
+    """OUTPUTS from the second sample on, (3, samples - 1, m)."""
+    valves = Valves(m)
+    valves.set_parameters(np.arange(m), p)
+    initial = energised(p, p1=drive.p1_start, p2=drive.p2_start, U=drive.U_start)
+    for field, value in zip(valves.state, initial, strict=True):
+        field[:] = value
+    read = readings(valves.record(Inputs(**inputs), drive.period), p)
+    return np.stack([read[output] for output in OUTPUTS])

@@ -1,0 +1,207 @@
+"""The valve's next experiment: feasible pulse programmes, simulated for every rival beforehand."""
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.bench.programmes import BAR, Programme
+from identification.gap.design.experiment import Rivals, outlooks, rivals_of
+from identification.gap.design.information_gain import Outlook, odds
+from identification.gap.rank.ranking import Verdicts
+from identification.recordings.recording import Recording
+from identification.replay.drive import Drive
+from identification.replay.model import Replay
+from identification.report_2003.cases import Case
+from identification.valve_gap.valve import Valve, as_run
+
+CASES = (
+    Case(name="short pulses", openings=(0.02, 0.03, 0.04, 0.05, 0.06), duration=0.85, pause=0.1),
+    Case(name="quick pulses", openings=(0.09,) * 4, duration=0.7, pause=0.05),
+    Case(name="two openings", openings=(0.09, 0.12), duration=0.65),
+    Case(name="four openings", openings=(0.06, 0.09, 0.12, 0.075), duration=1.3, pause=0.2),
+    Case(name="long opening", openings=(0.4,), duration=0.9),
+    Case(name="opening and rest", openings=(0.2, 0.05), duration=1.5, pause=0.9),
+    Case(name="long hold", openings=(0.08,), duration=3.0),
+)
+"""From pulses too short to open the PV fully to a circuit that fills, with holds from 0.1 to 3 s."""
+
+CONDITIONS = (
+    (9.0, 4.5, 24.0),
+    (9.0, 7.0, 20.0),
+    (10.5, 5.5, 28.0),
+    (11.0, 8.0, 24.0),
+    (12.0, 6.5, 20.0),
+    (12.5, 4.5, 24.0),
+    (12.5, 8.0, 28.0),
+)
+"""Supply and circuit at the start [bar absolute], voltage of the energised coil [V]: the corners of what
+the bench can be set to (9 to 12.5 bar, 4.5 to 8 bar, 20 to 28 V), and some between."""
+
+CANDIDATES = tuple(
+    Programme(
+        name=f"next_{case.name.replace(' ', '_')}_{p1:g}_{p2:g}_{U_on:g}".replace(".", "p"),
+        role="calibration",
+        case=case,
+        p1=p1 * BAR,
+        p2=p2 * BAR,
+        U_on=U_on,
+    )
+    for case in CASES
+    for p1, p2, U_on in CONDITIONS
+)
+"""Every case under every condition."""
+
+SPLITS = 0.5
+"""An experiment splits rivals if it leaves at most this share of the doubt about the best of them."""
+
+SURE = 0.95
+"""Probability of the best rival above which no further experiment is needed."""
+
+
+FILE_NAME = "next.json"
+RUN = f"bench --programme {FILE_NAME}"
+"""Where the programme is kept, and how the bench runs it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Option:
+    """A programme and what it promises."""
+
+    programme: Programme
+    outlook: Outlook
+
+
+@dataclass(frozen=True, kw_only=True)
+class NextExperiment:
+    """What to record next, and why."""
+
+    programme: Programme | None
+    """None where no programme can be chosen."""
+    text: str
+    """One sentence for people."""
+    rivals: tuple[str, ...]
+    """Between which it decides, the most probable first."""
+    before: tuple[float, ...]
+    """Probabilities of the rivals now; sums to 1."""
+    after: tuple[float, ...]
+    """Expected probability of each rival after the experiment, if it is the right one."""
+    best: float
+    """Expected probability, after the experiment, of the rival that is then the most probable."""
+    splits: bool
+    """Whether the experiment is expected to tell the rivals apart."""
+    alternatives: tuple[Option, ...]
+    """All candidates, the most telling first; `programme` is the first one's."""
+
+
+def next_experiment(
+    verdicts: Verdicts, valve: Valve, programmes: Sequence[Programme] = CANDIDATES
+) -> NextExperiment:
+    """The programme after which the least doubt between the most probable hypotheses is expected."""
+    rivals = rivals_of(verdicts)
+    if verdicts.unknown > 0.5:
+        return _none_can_be_chosen(rivals)
+    found = outlooks(verdicts.fitter, planned(valve, programmes), rivals)
+    options = [Option(programme=p, outlook=o) for p, o in zip(programmes, found, strict=True)]
+    options.sort(key=lambda option: option.outlook.rank)
+    best = options[0]
+    splits = 1.0 - best.outlook.best <= SPLITS * (1.0 - rivals.probability[0])
+    return NextExperiment(
+        programme=best.programme,
+        text=sentence(best, rivals, splits),
+        rivals=rivals.names,
+        before=rivals.probability,
+        after=best.outlook.after,
+        best=best.outlook.best,
+        splits=splits,
+        alternatives=tuple(options),
+    )
+
+
+def planned(valve: Valve, programmes: Sequence[Programme]) -> Valve:
+    """The valve with programmes that have not been run as its recordings, at the campaign's rate.
+
+    Outputs are zero, as nothing is measured; the supply is constant, as every rival will be given the
+    recorded one.
+    """
+    plan = copy(valve)
+    period = valve.recordings[0].period
+    plan.recordings = tuple(_expected(programme, period) for programme in programmes)
+    plan.runs = tuple(as_run(recording) for recording in plan.recordings)
+    plan.replay = Replay(
+        [_drive(p, r) for p, r in zip(programmes, plan.recordings, strict=True)], valve.base
+    )
+    return plan
+
+
+def sentence(option: Option, rivals: Rivals, splits: bool) -> str:
+    """What to record, and the expected odds."""
+    names = _listed(rivals.names)
+    before = ":".join(f"{100 * p:.0f}" for p in rivals.probability)
+    after = odds(option.outlook.best)
+    record = described(option.programme)
+    if rivals.probability[0] > SURE:
+        return (
+            f"None is needed ({rivals.names[0]}: {odds(rivals.probability[0])}); {record} would tell "
+            f"{names} apart best ({RUN})"
+        )
+    if splits:
+        return f"Record {record}: expected to bring {before} between {names} to {after} ({RUN})"
+    return (
+        f"No feasible programme splits {names}: even the best, {record}, is expected to bring "
+        f"{before} to {after} only ({RUN})"
+    )
+
+
+def described(programme: Programme) -> str:
+    """A programme in words."""
+    case = programme.case
+    lengths = [round(1e3 * opening) for opening in case.openings]
+    openings = f"{len(lengths)} openings of {_listed([str(x) for x in lengths])} ms"
+    if len(lengths) == 1:
+        openings = f"one opening of {lengths[0]} ms"
+    pauses = f" {1e3 * case.pause:.0f} ms apart" if len(lengths) > 1 else ""
+    return (
+        f"{openings}{pauses} from {programme.p1 / BAR:g} bar supply into {programme.p2 / BAR:g} bar at "
+        f"{programme.U_on:g} V, {case.duration:g} s in all"
+    )
+
+
+def _listed(words: Sequence[str]) -> str:
+    """a, b and c."""
+    return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0]
+
+
+def _none_can_be_chosen(rivals: Rivals) -> NextExperiment:
+    return NextExperiment(
+        programme=None,
+        text=(
+            "No cause of the catalogue explains the recordings, so none can say which programme would "
+            "tell more: look at the shape of the missing term first"
+        ),
+        rivals=rivals.names,
+        before=rivals.probability,
+        after=rivals.probability,
+        best=rivals.probability[0],
+        splits=False,
+        alternatives=(),
+    )
+
+
+def _expected(programme: Programme, period: float) -> Recording:
+    """The recording of a programme as far as it is known before."""
+    U = programme.case.voltage(programme.U_on, 1.0 / period)
+    zero = np.zeros_like(U)
+    return Recording(
+        name=programme.name, role=programme.role, period=period, I=zero, U=U, p1=zero + programme.p1,
+        p2=zero + programme.p2, p3=zero, sigma_S=zero,
+    )  # fmt: skip
+
+
+def _drive(programme: Programme, recording: Recording) -> Drive:
+    """What the programme imposes on the model."""
+    return Drive(
+        period=recording.period, U=recording.U, p1=recording.p1, sigma_S=recording.sigma_S,
+        U_start=programme.U_on, p2_start=programme.p2,
+    )  # fmt: skip

@@ -1,0 +1,116 @@
+"""The valve behind the grey-box protocol: replayed recordings, and what may be wrong with the model."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epv_env.plant.parameters import Parameters
+from identification.calibration.problem import calibration_problem
+from identification.gap.model.grey_box import Channel, Equation, Nuisance, Run, Trace
+from identification.recordings.recording import OUTPUTS, UNITS, Campaign, Recording
+from identification.replay.drive import drive_of
+from identification.replay.misfit import measured_outputs
+from identification.replay.model import Replay
+from identification.valve_gap import causes
+from identification.valve_gap.equations import EQUATIONS, forced_changes, modelled
+from identification.valve_gap.noise import noise_of
+from identification.valve_gap.regimes import regimes, traces
+
+TOLERANCE = 3e-3
+"""Relative scatter of the parameters outside the four from unit to unit."""
+
+P2_START = Nuisance(symbol="p2_start", sd=500.0, step=1e3)
+P3_ZERO = Nuisance(symbol="p3_zero", sd=500.0, step=1e3)
+I_ZERO = Nuisance(symbol="I_zero", sd=4e-4, step=1e-3)
+"""Circuit pressure at the start, less the mean of the hold, and the zeros of that day's sensors."""
+
+
+class Valve:
+    """`GreyBox` for a campaign."""
+
+    def __init__(
+        self, campaign: Campaign, nominal: Parameters | None = None, without: Sequence[str] = ()
+    ):
+        """nominal: the parameters as given (None: Table 10). without: names of causes to leave out.
+
+        Raises ValueError for a cause that the catalogue does not have.
+        """
+        problem = calibration_problem(campaign, start=nominal)
+        self.base = problem.vector.reference
+        self.recordings = (*problem.calibration, *problem.validation)
+        self.channels = tuple(
+            Channel(
+                name=name,
+                unit=UNITS[name][0],
+                scale=UNITS[name][1],
+                noise=noise_of(self.recordings, name),
+            )
+            for name in OUTPUTS
+        )
+        self.runs = tuple(as_run(recording) for recording in self.recordings)
+        self.parameters = tuple(causes.calibrated(dict(self.base)))
+        self.causes = causes.catalogue(without)
+        self.tolerances = tuple(_tolerance(symbol, self.base) for symbol in causes.PARAMETER_COMPONENTS)
+        self.starts = (P2_START, P3_ZERO, I_ZERO)
+        self.equations = EQUATIONS
+        self.replay = Replay([drive_of(r, self.base) for r in self.recordings], self.base)
+
+    def outputs(self, values: Mapping[str, NDArray], runs: Sequence[int]) -> list[NDArray]:
+        """`GreyBox.outputs`."""
+        plant = {s: v for s, v in values.items() if s in self.base}
+        n = max(np.shape(v)[0] for v in values.values())
+        start = {s.symbol: np.zeros((n, len(self.runs))) for s in self.starts}
+        for symbol in start:
+            if symbol in values:
+                given = np.asarray(values[symbol])
+                start[symbol] = start[symbol] + (given[:, None] if given.ndim == 1 else given)
+        if "b_p2" in plant:
+            # The recorded start is what the biased sensor read.
+            start["p2_start"] = start["p2_start"] - np.asarray(plant["b_p2"])[:, None]
+        found = self.replay.outputs(plant, start["p2_start"], runs)
+        for run, output in zip(runs, found, strict=True):
+            for channel, symbol in (("p3", "p3_zero"), ("I", "I_zero")):
+                output[OUTPUTS.index(channel)] += start[symbol][:, run]
+        return found
+
+    def states(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, Trace]:
+        """`GreyBox.states`."""
+        return traces(modelled(self.replay.drives[run], self._one(values, run)))
+
+    def regimes(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, NDArray]:
+        """`GreyBox.regimes`."""
+        p = self._one(values, run)
+        return regimes(modelled(self.replay.drives[run], p), p, self.recordings[run].energised)
+
+    def forced(
+        self, values: Mapping[str, NDArray], equation: Equation, run: int, edges: NDArray
+    ) -> NDArray:
+        """`GreyBox.forced`."""
+        return forced_changes(self.replay.drives[run], self._one(values, run), equation, edges)
+
+    def _one(self, values: Mapping[str, NDArray], run: int) -> dict[str, float]:
+        """Plant parameters of the first candidate in a run."""
+        first = {s: v[0] for s, v in values.items() if s in self.base}
+        return {**self.base, **{s: float(v[run] if np.ndim(v) else v) for s, v in first.items()}}
+
+
+def as_run(recording: Recording) -> Run:
+    measured = measured_outputs(recording)
+    trusted = np.ones(measured.shape, dtype=bool)
+    switched = np.flatnonzero(np.diff(recording.energised)) + 1
+    # An eddy current makes the coil's current jump here: the sample may show either value.
+    trusted[OUTPUTS.index("I"), switched] = False
+    return Run(
+        name=recording.name,
+        held_out=recording.role == "validation",
+        time=recording.time,
+        measured=measured,
+        trusted=trusted,
+        inputs={"U": recording.U, "p1": recording.p1, "sigma_S": recording.sigma_S},
+    )
+
+
+def _tolerance(symbol: str, base: Parameters) -> Nuisance:
+    value = base[symbol]
+    return Nuisance(symbol=symbol, sd=TOLERANCE * value, centre=value, step=TOLERANCE * value)

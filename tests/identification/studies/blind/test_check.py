@@ -1,0 +1,109 @@
+"""A whole check with a diagnosis that takes no time: sealed first, each trial once, opened last."""
+
+import hashlib
+import json
+
+import pytest
+
+from identification.recordings.campaign_files import read_campaign
+from identification.studies.blind import trials
+from identification.studies.blind.bench import SUITE
+from identification.studies.blind.blind_study import blind_check
+from identification.studies.blind.commitments import LABEL, TRUTH, opened
+from identification.studies.blind.trials import (
+    COMMITMENTS,
+    generate_trial,
+    read_commitments,
+    trial_folder,
+)
+from tests.identification.studies.blind import stubs
+
+N, SEED = 2, 162
+"""Of which the first has no effect, and the second one that is struck."""
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    out = tmp_path_factory.mktemp("blind")
+    check(out)
+    return out
+
+
+def check(out, diagnosis=stubs.says_no_gap, seed=SEED):
+    return blind_check(out, trials=N, seed=seed, workers=1, diagnosis=diagnosis)
+
+
+def files(out):
+    return {path: path.stat().st_mtime_ns for path in out.glob("trials/*/**/*") if path.is_file()}
+
+
+def test_what_was_committed_to_is_the_hash_of_the_sealed_label(study):
+    committed = read_commitments(study / COMMITMENTS)
+    for number in range(N):
+        text = (trial_folder(study, number) / LABEL).read_bytes()
+        assert hashlib.sha256(text).hexdigest() == committed[number]
+        label, _ = opened(trial_folder(study, number), committed[number])
+        assert label["trial"] == number
+        assert len(label["salt"]) == 32
+
+
+def test_the_answers_are_committed_to_before_the_first_diagnosis(study):
+    first = min(path.stat().st_mtime_ns for path in study.glob("trials/*/diagnosis/seen.json"))
+    last = max(path.stat().st_mtime_ns for path in study.glob(f"trials/*/{LABEL}"))
+    assert last < first
+
+
+def test_a_diagnosis_is_told_of_a_campaign_and_nothing_else(study):
+    for number in range(N):
+        folder = trial_folder(study, number)
+        seen = json.loads((folder / "diagnosis" / "seen.json").read_text())
+        campaign = read_campaign(folder / "campaign")
+        assert seen["campaign"] == sorted(
+            ["campaign.json", *(f"{r.name}.csv" for r in campaign.recordings)]
+        )
+        assert (campaign.name, len(campaign.recordings)) == (f"trial-{number:04d}", len(SUITE))
+        assert seen["without"] == json.loads((folder / LABEL).read_text())["struck"]
+
+
+def test_a_rerun_repeats_nothing_and_scores_the_same(study):
+    before, results = files(study), (study / "results.json").read_text()
+    check(study, diagnosis=stubs.fails)
+    assert files(study) == before
+    assert (study / "results.json").read_text() == results
+    assert "Verdicts" in (study / "results.html").read_text()
+
+
+def test_a_missing_answer_is_asked_for_again_and_counts_as_failed(study, capfd):
+    answer = trial_folder(study, 0) / "diagnosis" / "gap.json"
+    kept = answer.read_text()
+    answer.unlink()
+    check(study, diagnosis=stubs.fails)
+    assert "it did not converge" in capfd.readouterr().err
+    content = json.loads((study / "results.json").read_text())
+    assert content["shares"]["failed"]["hits"] == 1
+    answer.write_text(kept)
+
+
+def test_a_trial_is_the_same_whoever_makes_it(study, tmp_path):
+    kind, causes = trials.plan(SEED, N)[1]
+    generate_trial(tmp_path, SEED, 1, kind, causes)
+    folder = trial_folder(study, 1)
+    for path in tmp_path.rglob("*"):
+        if path.is_file():
+            assert path.read_bytes() == (folder / path.relative_to(tmp_path)).read_bytes()
+
+
+def test_another_seed_is_refused(study):
+    with pytest.raises(ValueError, match=f"trials of seed {SEED}"):
+        check(study, seed=SEED + 1)
+
+
+@pytest.mark.parametrize("name", [LABEL, TRUTH])
+def test_a_tampered_answer_is_refused(study, name):
+    path = trial_folder(study, 1) / name
+    kept = path.read_bytes()
+    path.write_bytes(kept.replace(b'"kind"', b'"kinD"') if name == LABEL else kept + b" ")
+    with pytest.raises(ValueError, match=name):
+        check(study)
+    path.write_bytes(kept)
+    check(study)

@@ -1,0 +1,155 @@
+"""`gap CAMPAIGN`: its files, what it does with damaged recordings, and taking up an interrupted run."""
+
+import json
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+
+import epv_env  # noqa: F401 - registers EPValve-v0
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.plantfile import load_plant
+from identification.__main__ import main
+from identification.bench.campaign import measured_campaign, run_programme
+from identification.bench.programmes import DIAGNOSIS_SUITE
+from identification.recordings.campaign_files import write_campaign
+from identification.recordings.recording import Campaign, CampaignError, Recording
+from identification.valve_gap import diagnose as module
+from identification.valve_gap.diagnose import diagnose_campaign
+
+NAMES = ("test1", "low_supply", "validation")
+
+
+@cache
+def campaign(**effect: float) -> Campaign:
+    truth = Parameters.calibrated().replace(**effect)
+    programmes = [programme for programme in DIAGNOSIS_SUITE if programme.name in NAMES]
+    truths = [run_programme(truth, programme) for programme in programmes]
+    return measured_campaign(truths, truth, seed=3, offsets={})
+
+
+def damaged(change, **effect: float) -> Campaign:
+    """The campaign with every recording changed."""
+    whole = campaign(**effect)
+    return replace(whole, recordings=tuple(change(recording) for recording in whole.recordings))
+
+
+@pytest.fixture(scope="module")
+def diagnosed(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("gap")
+    write_campaign(campaign(G_eddy=4e-3), folder / "campaign")
+    assert main(["gap", str(folder / "campaign"), "--out", str(folder / "out")]) == 0
+    return folder
+
+
+def test_the_command_names_the_effect_and_writes_its_files(diagnosed):
+    found = json.loads((diagnosed / "out" / "gap.json").read_text())
+    assert found["format"] == "epv-gap/1"
+    assert found["verdict"] == "known"
+    assert found["ambiguity_set"] == [["eddy_current"]]
+    value, low, high = found["causes"][0]["magnitude"]["G_eddy_S"]
+    assert low < 4e-3 < high
+    assert value == pytest.approx(4e-3, rel=0.03)
+    assert found["gap"]["with_cause"] < 1.05 < found["gap"]["recalibrated"]
+    assert "<html" in (diagnosed / "out" / "report.html").read_text()
+
+
+def test_its_plant_file_goes_into_the_environment(diagnosed):
+    path = diagnosed / "out" / "plant.json"
+    assert load_plant(path).parameters["G_eddy"] == pytest.approx(4e-3, rel=0.03)
+    env = gymnasium.make("EPValve-v0", plant=str(path))
+    env.reset(seed=0)
+    observation, *_ = env.step(env.action_space.sample())
+    assert np.all(np.isfinite(observation))
+
+
+def test_the_plant_file_knows_how_sure_it_is(diagnosed):
+    """Its region spreads the four and the size together; the bench's true plant is not far off."""
+    region = load_plant(diagnosed / "out" / "plant.json").region
+    assert region.symbols == ("alphaMV", "alphaPV", "RML", "R", "G_eddy")
+    drawn = [region.draw(np.random.default_rng(seed)) for seed in range(50)]
+    spread = np.std([plant["G_eddy"] for plant in drawn]) / 4e-3
+    assert 0.02 < spread < 0.2
+    gymnasium.make("EPValve-v0", plant=str(diagnosed / "out" / "plant.json"), parameters="confidence")
+
+
+def test_finished_fits_are_taken_up_again(diagnosed, monkeypatch, tmp_path):
+    first = json.loads((diagnosed / "out" / "gap.json").read_text())
+
+    def never(*args, **options):
+        raise AssertionError("a kept fit was run again")
+
+    monkeypatch.setattr("identification.gap.fit.fitter.Fitter.fit", never)
+    diagnose_campaign(diagnosed / "campaign", diagnosed / "out", report=False)
+    again = json.loads((diagnosed / "out" / "gap.json").read_text())
+    for volatile in ("seconds", "next_experiment"):
+        del first[volatile], again[volatile]
+    assert again == first
+    with pytest.raises(AssertionError, match="kept fit"):
+        diagnose_campaign(diagnosed / "campaign", diagnosed / "out", without=["flow_force"])
+
+
+def test_without_its_effect_the_gap_is_unknown(diagnosed, tmp_path):
+    found = diagnose_campaign(diagnosed / "campaign", tmp_path, without=["eddy_current"], report=False)
+    assert found.conclusion.verdict in ("unknown", "no_gap")
+    assert not found.conclusion.ambiguity
+
+
+@pytest.mark.parametrize(
+    ("options", "rule"),
+    [
+        (["--without", "gremlins"], "no cause is named gremlins"),
+        (["--images", "x"], "--images belongs to --tables"),
+    ],
+)
+def test_wrong_options_are_refused(diagnosed, tmp_path, monkeypatch, options, rule):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ValueError, match=rule):
+        main(["gap", str(diagnosed / "campaign"), "--out", "out", *options])
+    assert not (tmp_path / "out" / "gap.json").exists()
+
+
+def test_nothing_held_out_is_refused(tmp_path):
+    fitted = damaged(lambda recording: replace(recording, role="calibration"))
+    write_campaign(fitted, tmp_path / "campaign")
+    with pytest.raises(ValueError, match="held out"):
+        diagnose_campaign(tmp_path / "campaign", tmp_path / "out", report=False)
+    assert not (tmp_path / "out" / "gap.json").exists()
+
+
+def noise_only(recording: Recording) -> Recording:
+    """The p2 sensor is loose: it shows its noise about one value."""
+    rng = np.random.default_rng(len(recording))
+    return replace(recording, p2=7e5 + 300.0 * rng.standard_normal(len(recording)))
+
+
+def in_milliamperes_of_another_range(recording: Recording) -> Recording:
+    """A current that was read off the wrong scale."""
+    return replace(recording, I=2.0 * recording.I)
+
+
+def cut_in_flight(recording: Recording) -> Recording:
+    """Recordings that end within their first opening."""
+    kept = slice(0, round(0.1 / recording.period))
+    names = ("I", "U", "p1", "p2", "p3", "sigma_S")
+    return replace(recording, **{name: getattr(recording, name)[kept] for name in names})
+
+
+@pytest.mark.parametrize("damage", [noise_only, in_milliamperes_of_another_range, cut_in_flight])
+def test_damaged_recordings_never_give_a_confident_cause(damage, tmp_path):
+    try:
+        write_campaign(damaged(damage), tmp_path / "campaign")
+        found = diagnose_campaign(tmp_path / "campaign", tmp_path / "out", report=False)
+    except CampaignError:
+        return  # refused, which is as good
+    sensor = {"current_sensor_gain"}  # a doubled current is just that
+    named = {name for cause in found.conclusion.ambiguity for name in cause.effects}
+    assert found.conclusion.verdict != "known" or named <= sensor
+
+
+def test_the_journal_is_of_these_recordings(diagnosed):
+    header = (diagnosed / "out" / module.JOURNAL).read_text().splitlines()[0]
+    assert {"nominal", "recordings", "software", "without"} == set(json.loads(header)["subject"])

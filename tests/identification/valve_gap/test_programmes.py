@@ -1,0 +1,121 @@
+"""The valve's next experiment: programmes that the bench can run, chosen between known rivals."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from epv_env.plant.parameters import Parameters
+from identification.bench.campaign import measured_campaign, run_programme
+from identification.bench.programme_file import load_programmes, save_programmes
+from identification.bench.programmes import BAR, DIAGNOSIS_SUITE, Programme
+from identification.gap.design.experiment import Rivals
+from identification.gap.rank.ranking import Verdicts, which
+from identification.report_2003.cases import Case
+from identification.valve_gap.programmes import (
+    CANDIDATES,
+    described,
+    next_experiment,
+    planned,
+    sentence,
+)
+from identification.valve_gap.valve import Valve
+
+CONFUSED = ("seat_leak", "circuit_leak")
+"""Both change a circuit that is shut; only where the supply is far above it do they part."""
+
+
+@cache
+def diagnosed() -> Verdicts:
+    """A leaking seat, recorded by one opening."""
+    truth = Parameters.calibrated().replace(A_PV=2e-8)
+    programmes = [p for p in DIAGNOSIS_SUITE if p.name in ("test1", "rest")]
+    valve = Valve(measured_campaign([run_programme(truth, p) for p in programmes], truth, seed=3))
+    valve.causes = tuple(cause for cause in valve.causes if cause.name in CONFUSED)
+    return which(valve)
+
+
+def valve() -> Valve:
+    plant = diagnosed().fitter.plant
+    assert isinstance(plant, Valve)
+    return plant
+
+
+def programme(name: str, p1: float, p2: float, *openings: float) -> Programme:
+    case = Case(name=name, openings=openings, duration=0.6)
+    return Programme(name=name, role="calibration", case=case, p1=p1 * BAR, p2=p2 * BAR, U_on=24.0)
+
+
+def test_the_candidates_are_programmes_of_the_bench(tmp_path):
+    assert 40 <= len(CANDIDATES) <= 60
+    save_programmes(CANDIDATES, tmp_path / "all.json")
+    read = load_programmes(tmp_path / "all.json")
+    assert [replace(p, case=replace(p.case, name="")) for p in read] == [
+        replace(p, case=replace(p.case, name="")) for p in CANDIDATES
+    ]
+    assert all(9 * BAR <= p.p1 <= 12.5 * BAR and 4.5 * BAR <= p.p2 <= 8 * BAR for p in CANDIDATES)
+    assert all(20 <= p.U_on <= 28 and p.case.duration <= 3.0 for p in CANDIDATES)
+
+
+def test_a_plan_predicts_what_the_bench_then_measures():
+    """The supply of the real bench falls a little; the plan's does not."""
+    chosen = programme("opening", 9.5, 5.0, 0.12)
+    plan = planned(valve(), [chosen])
+    truth = run_programme(Parameters.calibrated(), chosen, reservoir=np.inf)
+    values = {s: np.array([Parameters.calibrated()[s]]) for s in ("alphaMV", "alphaPV", "RML", "R")}
+    found = plan.outputs(values, [0])[0][:, :, 0]
+    expected = np.stack([truth.channels[name] for name in ("p2", "p3", "I")])
+    noise = np.array([channel.noise for channel in plan.channels])
+    assert np.all(np.sqrt(np.mean((found - expected) ** 2, axis=1)) < noise)
+
+
+def test_a_plan_leaves_the_campaign_alone():
+    before = valve()
+    runs = before.runs
+    planned(before, CANDIDATES[:2])
+    assert valve().runs is runs
+
+
+def test_the_telling_programme_is_chosen():
+    """Leaks need time and pressure to be seen."""
+    blink = programme("blink", 12.0, 8.0, 0.002)
+    quiet = replace(blink, case=replace(blink.case, duration=0.06))
+    telling = replace(blink, name="hold", p1=12.5 * BAR, p2=4.5 * BAR)
+    found = next_experiment(diagnosed(), valve(), [quiet, telling])
+    assert found.programme == telling
+    assert found.alternatives[1].programme == quiet
+    assert found.alternatives[0].outlook.doubt < found.alternatives[1].outlook.doubt
+    assert sum(found.before) == pytest.approx(1.0)
+    assert "12.5 bar supply into 4.5 bar" in found.text
+    assert next_experiment(diagnosed(), valve(), [quiet, telling]).text == found.text
+
+
+def test_what_nothing_explains_asks_for_no_programme():
+    found = next_experiment(replace(diagnosed(), unknown=0.9), valve(), CANDIDATES[:1])
+    assert found.programme is None
+    assert not found.splits
+    assert found.text.startswith("No cause of the catalogue explains")
+
+
+def test_the_sentence_tells_splitting_from_not_splitting():
+    points = tuple(candidate.point for candidate in diagnosed().candidates[:2])
+    rivals = Rivals(points=points, probability=(0.55, 0.45))
+    found = next_experiment(diagnosed(), valve(), [programme("opening", 9.0, 5.0, 0.4)])
+    (option,) = found.alternatives
+    sharp = replace(option, outlook=replace(option.outlook, best=0.98))
+    assert sentence(sharp, rivals, True).startswith(
+        "Record one opening of 400 ms from 9 bar supply into"
+    )
+    assert "expected to bring 55:45 between" in sentence(sharp, rivals, True)
+    assert "to 98:2 (bench --programme next.json)" in sentence(sharp, rivals, True)
+    assert sentence(option, rivals, False).startswith("No feasible programme splits")
+    sure = replace(rivals, probability=(0.999, 0.001))
+    assert sentence(sharp, sure, True).startswith("None is needed")
+
+
+def test_a_programme_in_words():
+    words = described(programme("two", 9.5, 5.0, 0.09, 0.12))
+    assert words == (
+        "2 openings of 90 and 120 ms 209 ms apart from 9.5 bar supply into 5 bar at 24 V, 0.6 s in all"
+    )

@@ -1,0 +1,88 @@
+"""The valve behind the protocol, and a diagnosis of bench recordings whose effect is known here."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from epv_env.plant.effects import CATALOGUE
+from epv_env.plant.parameters import Parameters
+from identification.bench.campaign import measured_campaign, run_programme
+from identification.bench.programmes import DIAGNOSIS_SUITE
+from identification.gap.rank.ranking import which
+from identification.recordings.recording import Campaign
+from identification.replay.responses import responses
+from identification.valve_gap.causes import COMPONENTS, effects, parameters
+from identification.valve_gap.valve import Valve
+
+NAMES = ("test1", "test4", "low_supply", "validation", "rest")
+"""The record at rest tells the sensors' offsets, which would pass for small gaps."""
+PROGRAMMES = [programme for programme in DIAGNOSIS_SUITE if programme.name in NAMES]
+
+
+@cache
+def campaign(**effect: float) -> Campaign:
+    truth = Parameters.calibrated().replace(**effect)
+    return measured_campaign([run_programme(truth, p) for p in PROGRAMMES], truth, seed=3)
+
+
+def test_every_effect_of_the_plant_is_a_cause_with_a_component():
+    assert {cause.name for cause in effects()} == set(CATALOGUE) == set(COMPONENTS)
+    for cause in effects() + parameters():
+        for size in cause.sizes:
+            assert size.low < size.high
+            assert size.trials, cause.label
+            assert all(size.low <= trial <= size.high for trial in size.trials), cause.label
+
+
+def test_outputs_are_the_replay_s():
+    valve = Valve(campaign())
+    plain = {"R": np.array([valve.base["R"]])}
+    for answer, output in zip(
+        responses(valve.recordings, valve.base), valve.outputs(plain, range(4)), strict=True
+    ):
+        np.testing.assert_array_equal(answer.model, output[:, :, 0])
+
+
+def test_numbers_of_one_run_leave_the_others_alone():
+    valve = Valve(campaign())
+    own = np.zeros((2, 4))
+    own[1, 2] = 10.0
+    values = {"R": np.full(2, valve.base["R"]), "theta_coil": own, "I_zero": np.array([0.0, 1e-3])}
+    for run, output in enumerate(valve.outputs(values, range(4))):
+        change = output[2, :, 1] - output[2, :, 0]
+        np.testing.assert_allclose(output[0, :5, 1], output[0, :5, 0])
+        if run == 2:
+            assert change[0] < -0.01
+        else:
+            np.testing.assert_allclose(change, 1e-3)
+
+
+def diagnosed(causes: tuple[str, ...], **effect: float):
+    valve = Valve(campaign(**effect))
+    valve.causes = tuple(cause for cause in valve.causes if cause.name in causes)
+    return which(valve)
+
+
+CANDIDATES = ("eddy_current", "flyback_voltage", "moving_control_volume", "parameter:cPV", "seat_leak")
+
+
+@pytest.mark.parametrize(
+    ("name", "symbol", "size"),
+    [("eddy_current", "G_eddy", 2e-3), ("moving_control_volume", "sV3", 0.5)],
+)
+def test_an_effect_of_the_bench_is_found(name, symbol, size):
+    found = diagnosed(CANDIDATES, **{symbol: size})
+    assert found.candidates[0].name == (name,)
+    assert found.probability[0] > 0.9
+    assert found.fitter.values(found.candidates[0].point)[symbol] == pytest.approx(size, rel=0.05)
+
+
+def test_a_struck_effect_is_unknown():
+    others = tuple(name for name in CANDIDATES if name != "eddy_current")
+    assert diagnosed(others, G_eddy=2e-3).unknown > 0.9
+
+
+def test_a_bench_without_an_effect_has_no_gap():
+    found = diagnosed(CANDIDATES)
+    assert found.no_cause > 0.8

@@ -1,0 +1,1 @@
+"""Running controllers on scenarios, and the figures of the control aims."""

@@ -1,0 +1,180 @@
+"""The control aims as figures, per episode and over many: C1 to C3 are defined here and nowhere else.
+
+C1  p2 stays within target ±500 mbar after the settling time: probability of leaving the band, worst
+    excursion, and the excursion that 99.9 % of the episodes do not exceed.
+C2  p2 breaks down little when air is drawn, and comes back soon: breakdown and recovery of every
+    consumption event (training/evaluation/consumption_events.py), largest shortfall of the episode.
+C3  the same figures on plants drawn from a region.
+Cost: switchings of the coil, air vented, coil energy.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import binomtest
+
+from epv_env.reward import BAND_BAR
+from training.evaluation.consumption_events import SHORTFALL_BAR, ConsumptionEvents
+from training.evaluation.statistics import mean_interval
+
+TAIL = 0.999
+"""Share of the episodes that the tail excursion bounds."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EpisodeMetrics:
+    """One entry per episode, arrays (n,). Pressures count after the settling time."""
+
+    stayed: NDArray
+    """C1: whether p2 never left target ±500 mbar."""
+    excursion_bar: NDArray
+    """C1: largest |p2 - target|, at any instant."""
+    breakdown_bar: NDArray
+    """C2: largest shortfall of p2 below the target."""
+    recovery_s: NDArray
+    """C2: longest time on end with p2 more than 250 mbar below the target."""
+    events: NDArray
+    """C2: number of consumption events."""
+    event_breakdown_bar: NDArray
+    """C2: breakdown of an event, mean over the episode's events; 0 without any."""
+    event_recovery_s: NDArray
+    """C2: recovery of an event, mean over the episode's events; 0 without any."""
+    longest_event_recovery_s: NDArray
+    """C2: longest recovery of an event."""
+    rms_bar: NDArray
+    """Root mean square of each period's largest deviation."""
+    switchings_per_s: NDArray
+    """Coil switchings per second, whole episode."""
+    vented_g_per_s: NDArray
+    """Air blown off per second, whole episode."""
+    coil_W: NDArray
+    """Electrical power of the coil, mean of the whole episode: the integral of U I over its time."""
+    episode_return: NDArray
+    """Sum of rewards."""
+
+    def __len__(self) -> int:
+        return len(self.stayed)
+
+    def first(self, n: int) -> "EpisodeMetrics":
+        """The first n episodes."""
+        return EpisodeMetrics(**{f.name: getattr(self, f.name)[:n] for f in fields(self)})
+
+    @classmethod
+    def joined(cls, parts: Sequence["EpisodeMetrics"]) -> "EpisodeMetrics":
+        """The episodes of all parts, one after another."""
+        return cls(
+            **{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)}
+        )
+
+
+class Meter:
+    """Accumulates the metrics of n episodes, period by period, in constant memory."""
+
+    def __init__(self, n: int, period: float, settling_time: float):
+        """period: control period [s]; settling_time: from when pressures count [s]."""
+        self._period = period
+        self._settling_time = settling_time
+        self._steps = 0
+        self._counted = 0
+        self._highest = np.full(n, -np.inf)
+        self._lowest = np.full(n, np.inf)
+        self._squares = np.zeros(n)
+        self._low_time = np.zeros(n)
+        self._longest_low = np.zeros(n)
+        self._switchings = np.zeros(n)
+        self._vented = np.zeros(n)
+        self._return = np.zeros(n)
+        self._failed = np.zeros(n, dtype=bool)
+        self._events = ConsumptionEvents(n, period)
+
+    def update(self, reward: NDArray, failed: NDArray, info: dict[str, NDArray]) -> None:
+        """Take in one period of every episode (epv_env.infos)."""
+        self._steps += 1
+        self._switchings += info["switchings"]
+        self._vented += info["vented_g"]
+        self._return += reward
+        over = self._failed.copy()  # what comes after a failure means nothing
+        self._failed |= failed
+        if self._steps * self._period <= self._settling_time:
+            return
+        self._counted += 1
+        deviation = np.where(over, 0.0, info["deviation_bar"])
+        self._highest = np.maximum(self._highest, deviation)
+        self._lowest = np.minimum(self._lowest, deviation)
+        self._squares += deviation**2
+        self._low_time = np.where(deviation < -SHORTFALL_BAR, self._low_time + self._period, 0.0)
+        self._longest_low = np.maximum(self._longest_low, self._low_time)
+        consumption = np.where(over, 0.0, info["consumption_g_per_s"])
+        self._events.update(consumption, np.maximum(-deviation, 0.0))
+
+    def result(self, coil_energy: NDArray | float = 0.0) -> EpisodeMetrics:
+        """The metrics so far. coil_energy: what each coil has taken since the start [J]."""
+        excursion = np.maximum(self._highest, -self._lowest)
+        time = self._steps * self._period
+        events = self._events.result()
+        return EpisodeMetrics(
+            stayed=(excursion <= BAND_BAR) & ~self._failed,
+            excursion_bar=excursion,
+            breakdown_bar=np.maximum(-self._lowest, 0.0),
+            recovery_s=self._longest_low,
+            events=events.count,
+            event_breakdown_bar=events.mean_breakdown,
+            event_recovery_s=events.mean_recovery,
+            longest_event_recovery_s=events.longest_recovery,
+            rms_bar=np.sqrt(self._squares / max(self._counted, 1)),
+            switchings_per_s=self._switchings / time,
+            vented_g_per_s=self._vented / time,
+            coil_W=np.broadcast_to(coil_energy, excursion.shape) / time,
+            episode_return=self._return,
+        )
+
+
+def left_interval(stayed: NDArray) -> tuple[float, float]:
+    """Exact 95 % interval (Clopper and Pearson 1934) of the probability of leaving the band.
+
+    Two-sided, so that its upper end is a 97.5 % bound: with no episode outside it needs 3688 episodes
+    to lie below 0.1 %.
+    """
+    left = len(stayed) - int(np.sum(stayed))
+    found = binomtest(left, len(stayed)).proportion_ci(0.95, "exact")
+    return float(found.low), float(found.high)
+
+
+def tail_excursion(excursion_bar: NDArray) -> float:
+    """Excursion that 99.9 % of the episodes do not exceed [bar]; of fewer than 1000 the worst."""
+    return float(np.quantile(excursion_bar, TAIL, method="inverted_cdf"))
+
+
+def over_events(m: EpisodeMetrics, mean: NDArray) -> float:
+    """Mean over all events of a figure of which `mean` (n,) holds the episodes' means."""
+    return float(np.sum(mean * m.events) / max(np.sum(m.events), 1))
+
+
+def summary(m: EpisodeMetrics) -> dict[str, float]:
+    """The aims over many episodes; intervals are 95 %, exact for shares, by bootstrap for means."""
+    left = left_interval(m.stayed)
+    breakdown = mean_interval(m.breakdown_bar)
+    return {
+        "episodes": len(m),
+        "C1_stayed": float(m.stayed.mean()),
+        "C1_stayed_low": 1.0 - left[1],
+        "C1_stayed_high": 1.0 - left[0],
+        "C1_worst_excursion_bar": float(m.excursion_bar.max()),
+        "C1_tail_excursion_bar": tail_excursion(m.excursion_bar),
+        "C2_largest_breakdown_bar": float(m.breakdown_bar.max()),
+        "C2_mean_breakdown_bar": float(m.breakdown_bar.mean()),
+        "C2_mean_breakdown_low_bar": breakdown[0],
+        "C2_mean_breakdown_high_bar": breakdown[1],
+        "C2_longest_recovery_s": float(m.recovery_s.max()),
+        "C2_events": int(m.events.sum()),
+        "C2_event_breakdown_bar": over_events(m, m.event_breakdown_bar),
+        "C2_event_recovery_s": over_events(m, m.event_recovery_s),
+        "C2_longest_event_recovery_s": float(m.longest_event_recovery_s.max()),
+        "rms_error_bar": float(np.sqrt(np.mean(m.rms_bar**2))),
+        "switchings_per_s": float(m.switchings_per_s.mean()),
+        "vented_g_per_s": float(m.vented_g_per_s.mean()),
+        "coil_W": float(m.coil_W.mean()),
+        "mean_return": float(m.episode_return.mean()),
+    }

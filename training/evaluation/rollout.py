@@ -1,0 +1,114 @@
+"""Running controllers on scenarios: the same seeds give every controller the same episodes."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+import epv_env  # noqa: F401 - registers the ids
+from controllers.base import Controller, Privileged
+from epv_env.infos import batch_info
+from epv_env.plant.supply import BAR
+from epv_env.vector_env import EPValvePWMVectorEnv, EPValveVectorEnv
+from training.evaluation.metrics import EpisodeMetrics, Meter
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trace:
+    """One episode in time, for figures; arrays (periods,)."""
+
+    time: NDArray
+    """End of each period [s]."""
+    p2_bar: NDArray
+    p3_bar: NDArray
+    target_bar: float
+    coil: NDArray
+    """Share of the period with the coil on."""
+    consumption_g_per_s: NDArray
+
+
+def make_env(controller: Controller, n: int, **options: Any) -> EPValveVectorEnv | EPValvePWMVectorEnv:
+    """The controller's environment, n valves, without autoreset or time limit."""
+    return gymnasium.make_vec(
+        controller.environment,
+        num_envs=n,
+        vectorization_mode="vector_entry_point",
+        autoreset_mode="Disabled",
+        max_episode_steps=None,
+        **options,
+    )  # type: ignore[return-value]
+
+
+def begin_episodes(
+    env: EPValveVectorEnv | EPValvePWMVectorEnv,
+    controller: Controller,
+    seeds: list[int],
+    each: dict[str, list[Any]] | None = None,
+) -> NDArray:
+    """Start an episode for each seed under the controller; returns the first observations.
+
+    each: options of the reset, lists with one value for each episode. A privileged controller gets to
+    see the task.
+    """
+    observation, _ = env.reset(seed=list(seeds), options=each)
+    controller.reset(len(seeds))
+    if isinstance(controller, Privileged):
+        controller.watch(env.task)
+    return observation
+
+
+def run_episodes(
+    controller: Controller,
+    *,
+    seeds: list[int],
+    duration: float,
+    options: dict[str, Any],
+    each: dict[str, list[Any]] | None = None,
+    trace_of: int | None = None,
+    progress: Callable[[float], None] = lambda share: None,
+) -> tuple[EpisodeMetrics, Trace | None]:
+    """Run one episode per seed.
+
+    duration: of each episode [s]. options: of the environment. each: options of its reset, lists with
+    one value for each episode (plants that are listed, not drawn). trace_of: index of an episode to
+    record. progress: called with the share done. An episode whose circuit empties counts as left (C1);
+    its valve runs on, since the batch runs as one.
+    """
+    env = make_env(controller, len(seeds), **options)
+    observation = begin_episodes(env, controller, seeds, each)
+    energy_before = env.task.valves.state.coil_energy.copy()
+    period = env.settings.control_period
+    steps = round(duration / period)
+    meter = Meter(len(seeds), period, env.settings.settling_time)
+    rows = []
+    for step in range(steps):
+        action = controller.act(observation)
+        result = env.task.step(*env.action.decode(action))
+        observation = result.observation
+        meter.update(result.reward, result.failed, batch_info(result))
+        if trace_of is not None:
+            state = env.task.valves.state
+            coil = env.action.decode(action)[1][trace_of]
+            rows.append(
+                (
+                    state.p2[trace_of] / BAR,
+                    state.p3[trace_of] / BAR,
+                    coil,
+                    result.consumption[trace_of] * 1e3,
+                )
+            )
+        if step % 50 == 0:
+            progress(step / steps)
+    progress(1.0)
+    metrics = meter.result(env.task.valves.state.coil_energy - energy_before)
+    if trace_of is None:
+        return metrics, None
+    columns = np.array(rows).T
+    trace = Trace(
+        time=np.arange(1, steps + 1) * period, p2_bar=columns[0], p3_bar=columns[1],
+        target_bar=float(env.task.target[trace_of]), coil=columns[2], consumption_g_per_s=columns[3],
+    )  # fmt: skip
+    return metrics, trace

@@ -1,0 +1,1 @@
+"""Learning policies: PPO, imitation, distillation with a memory."""

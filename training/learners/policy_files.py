@@ -1,0 +1,70 @@
+"""Writing a policy so that others can load it without running code: safetensors and a contract."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import torch
+from numpy.typing import NDArray
+from safetensors.numpy import save
+from stable_baselines3 import PPO
+
+from controllers.learned import CONTRACT_FILE, FORMAT, WEIGHTS_FILE, LearnedPolicy
+from epv_env.common.files import write_bytes, write_text
+from epv_env.observation import contract
+
+
+def greedy_policy(model: PPO, student: LearnedPolicy | None = None) -> LearnedPolicy:
+    """The model's actor as a controller. It shares the model's weights: training changes it.
+
+    student: the policy that the model went on from; what it remembers with, and its name, are kept.
+    Raises TypeError for a policy that is not a plain multilayer perceptron with tanh layers.
+    """
+    layers = [(_array(layer.weight), _array(layer.bias)) for layer in _linear_layers(model)]
+    return replace(student, layers=layers) if student else LearnedPolicy(layers=layers)
+
+
+def put_layers(model: PPO, policy: LearnedPolicy, sharpness: float) -> None:
+    """Make the policy's layers the model's actor, of the same shapes; its logits times `sharpness`."""
+    *hidden, (weight, bias) = policy.layers
+    layers = [*hidden, (sharpness * weight, sharpness * bias)]
+    for layer, (weight, bias) in zip(_linear_layers(model), layers, strict=True):
+        layer.load_state_dict({"weight": torch.as_tensor(weight), "bias": torch.as_tensor(bias)})
+
+
+def save_policy(
+    policy: LearnedPolicy, folder: Path, *, control_period: float, provenance: dict[str, Any]
+) -> None:
+    """Write a policy's weights and what its inputs and outputs mean."""
+    arrays = {}
+    for i, (weight, bias) in enumerate(policy.layers):
+        arrays[f"{i}.weight"], arrays[f"{i}.bias"] = weight, bias
+    memory = None
+    if policy.cell is not None:
+        arrays |= {f"memory.{name}": array for name, array in vars(policy.cell).items()}
+        memory = {"unit": "GRU", "cells": policy.cell.width}
+    content = {
+        "format": FORMAT,
+        "name": policy.name,
+        "environment": policy.environment,
+        "memory": memory,
+        "layers": len(policy.layers),
+        "activation": "tanh",
+        "action": "argmax of the logits: 0 = coil off, 1 = coil on",
+        "observation": contract(control_period),
+        "provenance": provenance,
+    }
+    write_bytes(folder / WEIGHTS_FILE, save(arrays))
+    write_text(folder / CONTRACT_FILE, json.dumps(content, indent=1) + "\n")
+
+
+def _linear_layers(model: PPO) -> list[torch.nn.Linear]:
+    hidden = list(model.policy.mlp_extractor.policy_net)
+    if any(not isinstance(m, (torch.nn.Linear, torch.nn.Tanh)) for m in hidden):
+        raise TypeError("only policies of linear and tanh layers can be written")
+    return [m for m in [*hidden, model.policy.action_net] if isinstance(m, torch.nn.Linear)]
+
+
+def _array(parameter: torch.Tensor) -> NDArray:
+    return parameter.detach().cpu().numpy()

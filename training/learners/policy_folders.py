@@ -1,0 +1,128 @@
+"""Learned policies, one folder each: trained if missing, side by side; loaded if they are there."""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from joblib import Parallel, delayed
+from tqdm import tqdm
+
+from controllers.base import Controller
+from controllers.learned import holds_policy, load_policy
+from epv_env.actions import OnOff
+from epv_env.plant.consumption import MIXED
+from epv_env.plant.plantfile import Plant
+from epv_env.reward import RewardWeights
+from training.evaluation.scenarios import TUNING_REGION
+
+RECURRENT_TIMESTEPS = 5_000_000
+"""PPO's steps for a policy with a memory."""
+
+IMITATION = 25_000_000
+"""Steps of PPO that take about as long as the imitation that comes before (distillation.py)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Training:
+    """PPO on the report's plant within ±10 %."""
+
+    folder: Path
+    """Where the policy lies, or will."""
+    timesteps: int
+    seed: int
+    weights: RewardWeights = field(default_factory=RewardWeights)
+    """Prices of the reward."""
+    recurrent: bool = False
+    """With a memory (distillation.py)."""
+    student: Path | None = None
+    """Folder of the one that a policy with a memory goes on from; None: it is trained, too."""
+    memoryless: Path | None = None
+    """Folder of the policy that gets the student's memory where switching is cheap; None: the same."""
+
+    @property
+    def finished(self) -> bool:
+        """Whether the policy is there."""
+        return holds_policy(self.folder)
+
+    @property
+    def cost(self) -> int:
+        """How long it takes, in steps of PPO."""
+        imitates = self.recurrent and self.student is None
+        return self.timesteps + (IMITATION if imitates else 0)
+
+    @property
+    def own_student(self) -> Path:
+        """Folder of the student that a training with a memory trains, if it is given none."""
+        from training.learners.distillation import (
+            STUDENT_FOLDER,  # torch takes seconds to import: only now
+        )
+
+        return self.folder / STUDENT_FOLDER
+
+    def run(self, *, quiet: bool = False) -> None:
+        """Train it. An interrupted training goes on."""
+        from training.learners.distillation import (  # torch takes seconds to import: only now
+            going_on,
+            train_recurrent,
+        )
+        from training.learners.policy_files import save_policy
+        from training.learners.ppo import Hyperparameters, train
+
+        task: dict[str, Any] = {
+            "plant": Plant.calibrated(), "scenario": MIXED, "parameters": TUNING_REGION,
+            "weights": self.weights, "timesteps": self.timesteps, "seed": self.seed, "device": "cpu",
+            "folder": self.folder, "resume": True, "quiet": quiet,
+        }  # fmt: skip
+        if self.recurrent:
+            policy, _ = train_recurrent(
+                going_on(self.weights), student=self.student, memoryless=self.memoryless, **task
+            )
+        else:
+            policy, _ = train(Hyperparameters(), **task)
+        prices = {"switching_price": self.weights.switching}
+        provenance = {"timesteps": self.timesteps, "seed": self.seed, **prices}
+        save_policy(policy, self.folder, control_period=OnOff.default_period, provenance=provenance)
+
+
+def train_missing(trainings: Sequence[Training], *, workers: int) -> None:
+    """Train what is not finished, in so many processes; a policy does not depend on how many."""
+    missing = [training for training in trainings if not training.finished]
+    if workers == 1 or len(missing) < 2:
+        for training in missing:
+            training.run()
+        return
+    # The longest first, so that none is left running alone at the end.
+    missing.sort(key=lambda training: -training.cost)
+    total = sum(training.cost for training in missing)
+    pool: Any = Parallel(n_jobs=workers, return_as="generator_unordered")
+    with tqdm(total=total, desc="training", unit="step", unit_scale=True, file=sys.stderr) as bar:
+        for cost in pool(delayed(_trained)(training) for training in missing):
+            bar.update(cost)
+
+
+def _trained(training: Training) -> int:
+    """Train without a word; returns the cost."""
+    training.run(quiet=True)
+    return training.cost
+
+
+def seed_folder(folder: Path, seed: int) -> Path:
+    """Where the policy of a training seed lies among those of a folder."""
+    return folder / f"seed-{seed}"
+
+
+def seed_trainings(
+    folder: Path, *, count: int, timesteps: int, recurrent: bool = False
+) -> list[Training]:
+    """One for each training seed 0, 1, ..."""
+    return [
+        Training(folder=seed_folder(folder, seed), timesteps=timesteps, seed=seed, recurrent=recurrent)
+        for seed in range(count)
+    ]
+
+
+def seed_policies(trainings: Sequence[Training]) -> dict[str, Controller]:
+    """The policies of finished trainings, by the name of their seed."""
+    return {f"seed {training.seed}": load_policy(training.folder) for training in trainings}

@@ -1,0 +1,176 @@
+"""The whole circle: train on the nominal plant, deploy on a bench, diagnose, retrain, deploy again.
+
+    python training/sim_to_real.py --out runs/circle
+
+The bench is a virtual one. Its valve has an effect that no other step is told of: training, simulation
+and diagnosis see what a user sees. What is finished in --out is kept, not done again (docs/circle.md).
+"""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from controllers.base import Controller
+from controllers.learned import holds_policy, load_policy
+from controllers.tuned import SEARCHING, tuned_controllers
+from epv_env.actions import OnOff
+from epv_env.common.command_line import (
+    check_not_negative,
+    check_positive,
+    fail_clearly,
+    parse_with_quick,
+    writable_folder,
+)
+from epv_env.common.files import write_text
+from epv_env.plant.plantfile import Plant, load_plant
+from epv_env.reward import RewardWeights
+from identification.__main__ import main as identification
+from identification.bench.programmes import SUITES
+from training.studies.results_folder import check_options, write_options
+from training.studies.sim_to_real.deployment import (
+    AFTER,
+    BEFORE,
+    DELIVERED,
+    PROMISED,
+    deployed,
+    read_episodes,
+)
+from training.studies.sim_to_real.report import report
+
+SCENARIO = "mixed"
+TRAINED_ON = "ten_percent"
+"""Region of plants around the simulated one that PPO trains on: no wider, so that a gap is felt."""
+
+SWITCHING_PRICE = 0.2
+"""Below the default: where switching is dear, so short a training has not learned to control yet."""
+
+SMALLER_STEPS: dict[str, Any] = {"num_envs": 128, "batch_size": 1024, "n_epochs": 4}
+"""Four times as many updates per environment step as train_ppo.py: learns in a quarter of the steps."""
+
+QUICK: dict[str, Any] = {"timesteps": 8192, "episodes": 8, "duration": 1.0, "suite": "report"}
+"""The defaults under --quick: everything is done, too short to learn anything."""
+
+WITHHELD, CAMPAIGN = "withheld/plant.json", "campaign"
+GAP, CORRECTED = "diagnosis/gap.json", "diagnosis/plant.json"
+EPISODES = "episodes.csv"
+
+
+def parse(arguments: list[str] | None) -> argparse.Namespace:
+    """The command line's options, checked."""
+    parser = argparse.ArgumentParser(
+        description="Train, deploy on a bench, diagnose, retrain and deploy again (docs/circle.md)."
+    )
+    parser.add_argument(
+        "--out", type=writable_folder, default=Path("runs/circle"), help="folder of results"
+    )
+    parser.add_argument(
+        "--effect", default="pressure_sensor_lag=0.02,0", metavar="NAME=SIZE",
+        help="what the bench's valve has and nobody is told (docs/effects.md)",
+    )  # fmt: skip
+    parser.add_argument("--seed", type=int, default=0, help="of both trainings, sensors, diagnosis")
+    parser.add_argument("--timesteps", type=int, default=1_200_000, help="steps of each training")
+    parser.add_argument("--episodes", type=int, default=256, help="episodes of each deployment")
+    parser.add_argument("--duration", type=float, default=6.0, help="length of one of them [s]")
+    parser.add_argument(
+        "--suite", choices=SUITES, default="diagnosis", help="recordings that the bench makes"
+    )
+    parser.add_argument(
+        "--images", type=writable_folder, default=None, help="another folder for circle.png"
+    )
+    chosen = parse_with_quick(parser, arguments, QUICK)
+    check_positive(parser, chosen, "timesteps", "episodes", "duration")
+    check_not_negative(parser, chosen, "seed")
+    return chosen
+
+
+def options(chosen: argparse.Namespace) -> dict[str, Any]:
+    """What the results depend on."""
+    return {name: v for name, v in vars(chosen).items() if name not in ("out", "images", "quick")}
+
+
+def record(chosen: argparse.Namespace) -> None:
+    """Build the bench's valve and record its campaign: the only step that is told the effect.
+
+    It comes first, so that an effect that cannot be used is refused before anything is trained.
+    """
+    if not (chosen.out / WITHHELD).exists():
+        identification([
+            "bench", "--suite", chosen.suite, "--effect", chosen.effect, "--seed", str(chosen.seed),
+            "--out", str(chosen.out / CAMPAIGN), "--truth", str(chosen.out / WITHHELD),
+        ])  # fmt: skip
+
+
+def diagnose(chosen: argparse.Namespace) -> dict[str, Any]:
+    """The diagnosis of the campaign, as gap.json has it; it gets nothing but the recordings."""
+    path = chosen.out / GAP  # written last, after the corrected plant
+    if not path.exists():
+        into = ["--out", str(path.parent), "--seed", str(chosen.seed)]
+        identification(["gap", str(chosen.out / CAMPAIGN), *into])
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def trained(folder: Path, plant: Plant, chosen: argparse.Namespace) -> Controller:
+    """PPO trained on plants around this one, or as it was trained before."""
+    if not holds_policy(folder):
+        from training.learners.policy_files import save_policy  # torch takes seconds to import: only now
+        from training.learners.ppo import Hyperparameters, train
+
+        policy, _ = train(
+            Hyperparameters(**SMALLER_STEPS), folder=folder, plant=plant, scenario=SCENARIO,
+            parameters=TRAINED_ON, weights=RewardWeights(switching=SWITCHING_PRICE),
+            timesteps=chosen.timesteps, seed=chosen.seed, device="cpu", resume=True,
+        )  # fmt: skip
+        provenance = {"plant": plant.name, "timesteps": chosen.timesteps, "seed": chosen.seed}
+        save_policy(policy, folder, control_period=OnOff.default_period, provenance=provenance)
+    return load_policy(folder)
+
+
+def stage(name: str, simulated: Plant, chosen: argparse.Namespace) -> pd.DataFrame:
+    """Train on the simulated plant, then deploy in simulation and on the bench's valve.
+
+    Returns the episodes of `deployed` with a column `stage`. The tuned controllers stay as they are.
+    """
+    folder = chosen.out / name
+    policy = trained(folder, simulated, chosen)
+    path = folder / EPISODES
+    if not path.exists():
+        plants = {PROMISED: simulated, DELIVERED: load_plant(chosen.out / WITHHELD)}
+        rivals = tuned_controllers(without=SEARCHING)
+        episodes = deployed(
+            [policy, *rivals], plants, scenario=SCENARIO, count=chosen.episodes,
+            duration=chosen.duration, what=f"deployment {name}",
+        )  # fmt: skip
+        write_text(path, episodes.to_csv(index=False))
+    return read_episodes(path).assign(stage=name)
+
+
+def say(step: str) -> None:
+    """Which step has begun, on stderr like its progress."""
+    print(f"[{step}]", file=sys.stderr)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Command line; returns the exit status."""
+    chosen = parse(arguments)
+    check_options(chosen.out, options(chosen), "circle")
+    say("1 of 4: the bench records its valve")
+    record(chosen)
+    write_options(chosen.out, options(chosen))
+    say("2 of 4: train on the nominal plant, deploy")
+    before = stage(BEFORE, load_plant(None), chosen)
+    say("3 of 4: diagnose the campaign")
+    found = diagnose(chosen)
+    say("4 of 4: train on the corrected plant, deploy")
+    after = stage(AFTER, load_plant(chosen.out / CORRECTED), chosen)
+    episodes = pd.concat([before, after], ignore_index=True)
+    print(report(episodes, found, withheld=chosen.effect, folder=chosen.out, images=chosen.images))
+    print(f"\nresults in {chosen.out}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(fail_clearly(main))

@@ -1,0 +1,1 @@
+"""Studies of controllers; learners and evaluation import none of them."""

@@ -1,0 +1,83 @@
+"""What a million episodes cost, on one machine and on a hundred, from the rates of this very sweep."""
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from training.studies.sweeps.plan import BATCH, Cell
+from training.studies.sweeps.run import Map, Outcome
+from training.studies.sweeps.tasks import Study
+
+MILLION = 1_000_000
+MACHINES = 100
+IDLE = 200
+"""Empty tasks that tell what handing one out takes."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Idle:
+    """A task that does nothing."""
+
+    name: str
+    episodes: int = 0
+
+    def run(self, study: Study) -> dict[str, Any]:
+        """Nothing."""
+        return {}
+
+
+def overhead(run: Map, study: Study) -> float:
+    """Time from one empty task to the next [s]: how fast tasks can be handed out, whatever they do."""
+    idle = [Idle(name=str(k)) for k in range(IDLE)]
+    for _ in run(idle, study):  # starts the workers: those without work stop after minutes
+        pass
+    began = time.perf_counter()
+    done = sum(1 for _ in run(idle, study))
+    return (time.perf_counter() - began) / done
+
+
+def episode_cpu(cells: Sequence[Cell], outcomes: Mapping[str, Outcome]) -> dict[str, float]:
+    """Core time of an episode by controller [s], over the sweep's largest batches."""
+    batches = [batch for cell in cells for batch in cell.batches]
+    largest = max((batch.episodes for batch in batches), default=0)
+    found: dict[str, list[tuple[float, int]]] = {}
+    for batch in batches:
+        if batch.episodes == largest:
+            cpu = outcomes[batch.name]["cpu_s"]
+            found.setdefault(batch.controller, []).append((cpu, batch.episodes))
+    return {
+        name: sum(cpu for cpu, _ in parts) / sum(n for _, n in parts) for name, parts in found.items()
+    }
+
+
+def million(cpu_s: float, overhead_s: float, *, cores: int, machines: int) -> float:
+    """Time of a million episodes [s]: each core computes its share, one scheduler hands all tasks out.
+
+    As if no task began before all were handed out: an upper bound of what handing out adds.
+    """
+    return MILLION * cpu_s / (cores * machines) + math.ceil(MILLION / BATCH) * overhead_s
+
+
+def cost(
+    cpu_s: Mapping[str, float], overhead_s: float, *, cores: int, where: str, duration: float
+) -> dict[str, Any]:
+    """Rates and what follows from them, ready for JSON. where: what handed the tasks out."""
+    return {
+        "episode_duration_s": duration,
+        "cores_of_a_machine": cores,
+        "tasks_handed_out_by": where,
+        "episodes_of_a_task": BATCH,
+        "overhead_of_a_task_s": overhead_s,
+        "controllers": {
+            name: {
+                "core_s_per_episode": cpu,
+                "million_on_one_machine_s": million(cpu, overhead_s, cores=cores, machines=1),
+                f"million_on_{MACHINES}_machines_s": million(
+                    cpu, overhead_s, cores=cores, machines=MACHINES
+                ),
+            }
+            for name, cpu in cpu_s.items()
+        },
+    }

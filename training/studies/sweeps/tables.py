@@ -1,0 +1,121 @@
+"""Tables of a sweep in Markdown: printed, and written into the generated parts of pages."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import pandas as pd
+
+from training.studies.page_parts import markdown
+from training.studies.sweeps.designs import ONE_AT_A_TIME
+
+MOST = 6
+"""Levels that are named for each controller and design."""
+
+FARTHEST = 4
+"""Parameters that are named for each worst case."""
+
+DOMAIN = ("least", "greatest", "top")
+"""Levels at the ends of a range, beyond what a sound valve has; they are counted apart."""
+
+
+def joint_table(points: pd.DataFrame) -> str:
+    """The regions and the Latin hypercube under each controller."""
+    rows = [
+        [
+            row["level"], row["controller"], f"{row['episodes']}", leaving(row),
+            f"{row['excursion_worst_bar']:.3f}", f"{row['excursion_tail_bar']:.3f}",
+            f"{row['breakdown_bar_greatest']:.3f}", f"{row['rms_bar_mean']:.3f}",
+            f"{row['switchings_per_s_mean']:.2f}",
+        ]
+        for _, row in points.iterrows()
+        if row["design"] in ("regions", "hypercube")
+    ]  # fmt: skip
+    headings = (
+        "plants", "controller", "episodes", "leave ±500 mbar", "worst excursion [bar]", "99.9 % [bar]",
+        "largest breakdown [bar]", "rms error [bar]", "switchings [1/s]",
+    )  # fmt: skip
+    return markdown(headings, rows)
+
+
+def leaving(row: Any) -> str:
+    """Share of episodes that leave the band, with its exact interval; a row of `point_table`."""
+    low, value, high = (100 * row[name] for name in ("left_low", "left", "left_high"))
+    return f"{value:.3g} % ({low:.2g} to {high:.2g})"
+
+
+def harm_table(points: pd.DataFrame) -> str:
+    """How many changes of one thing make more episodes leave, and which ones most.
+
+    A change hurts if its exact interval lies above that of the plant as it is.
+    """
+    rows = []
+    for controller in dict.fromkeys(points["controller"]):
+        mine = points.loc[points["controller"] == controller]
+        exact = mine.loc[mine["level"] == "exact", "left_high"]
+        bound = float(exact.iloc[0]) if len(exact) else 0.0
+        for design in ONE_AT_A_TIME:
+            tried: Any = mine.loc[mine["design"] == design]
+            for ends in (False, True):
+                some = tried.loc[tried["level"].isin(DOMAIN) == ends]
+                if len(some):
+                    what = f"{design}, ends of their ranges" if ends else design
+                    rows.append([controller, what, *_harm(some, bound)])
+    return markdown(("controller", "changed", "tried", "hurt", "most [% leave]"), rows)
+
+
+def _harm(tried: pd.DataFrame, bound: float) -> tuple[str, str, str]:
+    """Number of changes, of those that hurt, and the worst of them."""
+    hurt = tried.loc[tried["left_low"] > bound].sort_values("left", ascending=False, kind="stable")
+    named = [
+        f"{row['factor']} {row['level']} ({100 * row['left']:.3g})"
+        for _, row in hurt.head(MOST).iterrows()
+    ]
+    return f"{len(tried)}", f"{len(hurt)}", "; ".join(named) or "–"
+
+
+def worst_table(worst: Sequence[Mapping[str, Any]], nominal: Mapping[str, float]) -> str:
+    """What the searches found: excursion after each stage, consumption, and how far the plant is off."""
+    rows = []
+    for found in worst:
+        off = {s: 100 * (v / nominal[s] - 1) for s, v in found["parameters"].items()}
+        farthest = sorted(off, key=lambda symbol: -abs(off[symbol]))[:FARTHEST]
+        rows.append(
+            [
+                found["region"], found["controller"],
+                " → ".join(f"{bar:.3f}" for bar in found["stages_bar"].values()),
+                f"{found['scenario']}, {found['seed']}",
+                ", ".join(f"{symbol} {off[symbol]:+.2g} %" for symbol in farthest),
+                f"{found['episodes']}",
+            ]
+        )  # fmt: skip
+    headings = (
+        "region", "controller", "worst excursion after each stage [bar]", "scenario, seed",
+        "farthest off", "episodes searched",
+    )  # fmt: skip
+    return markdown(headings, rows)
+
+
+def cost_table(content: Mapping[str, Any], machines: int) -> str:
+    """What a million episodes cost, and from what that follows (cost.py)."""
+    rows = [
+        [
+            name, f"{1e3 * each['core_s_per_episode']:.1f} ms",
+            in_words(each["million_on_one_machine_s"]),
+            in_words(each[f"million_on_{machines}_machines_s"]),
+        ]
+        for name, each in content["controllers"].items()
+    ]  # fmt: skip
+    headings = ("controller", "a core's time for one", "a million on one machine", f"on {machines}")
+    return (
+        f"Episodes of {content['episode_duration_s']:g} s; machines like this one, "
+        f"{content['cores_of_a_machine']} cores each; {content['tasks_handed_out_by']} hands out a task "
+        f"of {content['episodes_of_a_task']} in {1e3 * content['overhead_of_a_task_s']:.2g} ms.\n\n"
+        + markdown(headings, rows)
+    )
+
+
+def in_words(seconds: float) -> str:
+    """A time in the unit that suits it."""
+    if seconds < 120:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"

@@ -1,0 +1,162 @@
+"""Worst-case search: the plant of a region and the consumption under which p2 strays farthest.
+
+Four stages, each a few large batches. A Latin hypercube of plants meets as many different episodes; the
+episodes that strayed farthest are then held, and differential evolution (Storn and Price 1997) moves the
+plant, first over the whole region, then close to the best one found; last, that plant meets as many new
+episodes as there were at first.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import differential_evolution
+
+from epv_env.plant.consumption import MIXED, SCENARIOS
+from epv_env.settings import as_region
+from training.studies.sweeps.space import Space
+from training.studies.sweeps.tasks import MICROBAR, Study
+
+NEAR = 0.05
+"""Half the width of the last search's box, as a share of the region's."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effort:
+    """How long to search."""
+
+    screened: int
+    """Plants, and episodes, of the first stage; episodes of the last one."""
+    generations: int
+    """Of plants over the whole region."""
+
+    @property
+    def held(self) -> int:
+        """Episodes that every plant of the middle stages meets."""
+        return max(2, self.screened // 64)
+
+    @property
+    def population(self) -> int:
+        """Plants of a generation."""
+        return max(8, self.screened // 32)
+
+    @property
+    def refinements(self) -> int:
+        """Generations close to the worst."""
+        return max(1, self.generations // 3)
+
+    @property
+    def episodes(self) -> int:
+        """Episodes of a search."""
+        bred = (self.generations + 1 + self.refinements + 1) * self.population * self.held
+        return 2 * self.screened + bred
+
+
+@dataclass
+class _Found:
+    """The worst episode so far."""
+
+    excursion_bar: float = -1.0
+    coordinates: NDArray = field(default_factory=lambda: np.zeros(0))
+    scenario: str = ""
+    seed: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Search:
+    """A task (tasks.py): one search for one controller over one region."""
+
+    name: str
+    controller: str
+    region: str
+    first_seed: int
+    """Of the episodes that are met; the next ones follow."""
+    seed: int
+    """Of the search itself."""
+    effort: Effort
+
+    @property
+    def episodes(self) -> int:
+        """Episodes of the search."""
+        return self.effort.episodes
+
+    def run(self, study: Study) -> dict[str, Any]:
+        """The worst plant, scenario and seed, its excursion, and the worst after each stage."""
+        return _Hunt(self, study).result()
+
+
+class _Hunt:
+    """A search under way."""
+
+    def __init__(self, search: Search, study: Study):
+        self.search, self.study, self.effort = search, study, search.effort
+        self.space = Space(region=as_region(search.region, study.plant))
+        self.worst = _Found()
+
+    def result(self) -> dict[str, Any]:
+        """Run all stages."""
+        effort, stages = self.effort, {}
+        first = self.space.latin_hypercube(effort.screened, self.search.seed)
+        strayed = self._meet(first, self._episodes(0))
+        stages["hypercube"] = self.worst.excursion_bar
+        farthest = np.argsort(-strayed, kind="stable")
+        held = [self._episodes(0)[i] for i in farthest[: effort.held]]
+        self._evolve(held, first[farthest[: effort.population]], 1.0, effort.generations)
+        stages["whole region"] = self.worst.excursion_bar
+        near = self.space.latin_hypercube(effort.population, self.search.seed + 1)
+        near[0] = 0.5  # the best itself, in the middle of its box
+        self._evolve(held, near, 2 * NEAR, effort.refinements)
+        stages["close to the worst"] = self.worst.excursion_bar
+        there = np.tile(self.worst.coordinates, (effort.screened, 1))
+        self._meet(there, self._episodes(effort.screened))
+        stages["new consumption"] = self.worst.excursion_bar
+        return {
+            "parameters": self.space.values(self.worst.coordinates[None])[0],
+            "scenario": self.worst.scenario,
+            "seed": self.worst.seed,
+            "excursion_bar": self.worst.excursion_bar,
+            "stages_bar": stages,
+            "episodes": self.search.episodes,
+        }
+
+    def _episodes(self, offset: int) -> list[tuple[str, int]]:
+        """Scenario and seed of a stage's episodes; the scenarios of a mixture take turns."""
+        names = list(SCENARIOS) if self.study.scenario == MIXED else [self.study.scenario]
+        seeds = range(offset, offset + self.effort.screened)
+        return [(names[i % len(names)], self.search.first_seed + i) for i in seeds]
+
+    def _evolve(
+        self, held: list[tuple[str, int]], population: NDArray, width: float, generations: int
+    ) -> None:
+        """Differential evolution of plants within a box of that width around the worst so far.
+
+        population: (plants, symbols) within that box, from 0 to 1. width 1 is the whole region.
+        """
+        corner = np.clip(self.worst.coordinates - width / 2, 0.0, 1.0 - width)
+
+        def mildness(inside: NDArray) -> NDArray:
+            """-worst excursion over the held episodes of plants (symbols, plants)."""
+            coordinates = np.repeat(corner + width * inside.T, len(held), axis=0)
+            return -self._meet(coordinates, held * inside.shape[1]).reshape(-1, len(held)).max(axis=1)
+
+        settings: Any = {"init": population, "updating": "deferred", "polish": False, "tol": 0.0}
+        differential_evolution(
+            mildness, [(0.0, 1.0)] * population.shape[1], maxiter=generations, rng=self.search.seed,
+            vectorized=True, **settings,
+        )  # fmt: skip
+
+    def _meet(self, coordinates: NDArray, episodes: list[tuple[str, int]]) -> NDArray:
+        """Excursions (episodes,) [bar]: plant k, at coordinates (episodes, symbols), in episode k."""
+        excursions = []
+        for begin in range(0, len(episodes), self.effort.screened):
+            part = slice(begin, begin + self.effort.screened)
+            scenarios, seeds = zip(*episodes[part], strict=True)
+            each = {"scenario": list(scenarios), "parameters": self.space.values(coordinates[part])}
+            metrics, _ = self.study.run(self.search.controller, list(seeds), {}, each)
+            excursions.append(metrics.excursion_bar)
+        found = np.round(np.concatenate(excursions), MICROBAR)
+        at = int(np.argmax(found))
+        if found[at] > self.worst.excursion_bar:
+            self.worst = _Found(float(found[at]), coordinates[at].copy(), *episodes[at])
+        return found
