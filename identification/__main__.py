@@ -8,7 +8,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from epv_env.common.command_line import fail_clearly, writable_folder
-from epv_env.plant.effects import CATALOGUE
+from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import load_plant, save_plant
 from identification.bench.programme_file import load_programmes

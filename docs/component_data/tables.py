@@ -5,7 +5,7 @@ import numpy as np
 from docs.component_data.chambers import LAWS, LONGEST_SETTLING, effective_area, orifice_rate
 from docs.component_data.findings import Findings
 from docs.component_data.friction import interval
-from epv_env.plant.effects import COPPER
+from epv_env.plant.effects.coil import COPPER
 from epv_env.plant.parameters import Parameters
 
 

@@ -9,29 +9,16 @@ import math
 from typing import NamedTuple
 
 from epv_env.plant.compiled import inlined, replacing
-from epv_env.plant.effects import (
-    SLIDING_SPEED_MV,
-    SLIDING_SPEED_PV,
-    chamber_rates,
-    coil_current,
-    discharge,
-    effective_seat_diameter,
-    flux_rate,
-    friction,
-    heated,
-    heating_rate,
-    lag_rate,
-    opened,
-    pipe_rate,
-    saturated_force,
-    saturation_level,
-    stribeck,
-    supply_drop_rate,
-)
+from epv_env.plant.constants import QUARTER_PI
+from epv_env.plant.effects.chambers import chamber_rates, pipe_rate
+from epv_env.plant.effects.coil import coil_current, flux_rate, heated, heating_rate
+from epv_env.plant.effects.flows import discharge, effective_seat_diameter, supply_drop_rate
+from epv_env.plant.effects.friction import SLIDING_SPEED_MV, SLIDING_SPEED_PV, friction, stribeck
+from epv_env.plant.effects.magnet import saturated_force, saturation_level
+from epv_env.plant.effects.measurement import lag_rate
+from epv_env.plant.effects.seats import opened
 from epv_env.plant.flow import mass_flux
 from epv_env.plant.values import Value
-
-QUARTER_PI = 0.7853981633974483
 
 
 class State(NamedTuple):
@@ -39,7 +26,7 @@ class State(NamedTuple):
 
     The report's seven states are p2 .. I. p1 is the input chamber's pressure, a disturbance in the
     report and here a state because a reservoir sags. The next four are running integrals, carried so
-    that mass and energy balances can be read off exactly. The last belong to effects (effects.py); but
+    that mass and energy balances can be read off exactly. The last belong to effects (effects/); but
     for I_coil they are departures from the nominal valve, and rest at zero without their effect.
     """
 

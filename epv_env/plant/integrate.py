@@ -15,7 +15,8 @@ import numba
 import numpy as np
 
 from epv_env.plant.compiled import FLAGS, inlined, replacing, source_digest
-from epv_env.plant.effects import coil_current, longest_step
+from epv_env.plant.effects.coil import coil_current
+from epv_env.plant.effects.step_limits import longest_step
 from epv_env.plant.equations import State, derivative
 from epv_env.plant.events import crossing, hermite, release, turning_point
 from epv_env.plant.lanes import (

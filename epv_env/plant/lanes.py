@@ -7,7 +7,7 @@ whole SIMD registers. The kernels work on one such table per block, the workspac
 import numpy as np
 
 from epv_env.plant.compiled import generated, inlined
-from epv_env.plant.effects import Effects
+from epv_env.plant.effects.registry import Effects
 from epv_env.plant.equations import Coefficients, Inputs, State
 
 LANES = 16

@@ -10,6 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from epv_env.plant.effects.record import Effect, Size
+from epv_env.plant.effects.registry import EFFECTS
+
 
 class ParameterError(ValueError):
     """A parameter is unknown, not a number, or outside the domain in which the model means anything."""
@@ -40,12 +43,21 @@ def _data() -> dict[str, Any]:
 
 @cache
 def table() -> Mapping[str, Parameter]:
-    """Every parameter by its symbol, in the order of the report."""
-    rows = (
+    """Every parameter by its symbol: those of the report in its order, then the sizes of effects."""
+    rows = [
         Parameter(**{**row, "domain": tuple(row["domain"]) if row["domain"] else None})
         for row in _data()["parameters"]
-    )
+    ]
+    rows += [_size_row(effect, size) for effect in EFFECTS for size in effect.sizes if size.domain]
     return MappingProxyType({row.symbol: row for row in rows})
+
+
+def _size_row(effect: Effect, size: Size) -> Parameter:
+    """The row of a number that sizes an effect; 0, which is off, is its value."""
+    return Parameter(
+        symbol=size.symbol, unit=size.unit, value=0.0, domain=size.domain, group="unmodelled",
+        sensitive=False, source=f"effect {effect.name}", meaning=size.meaning,
+    )  # fmt: skip
 
 
 def sensitive_symbols() -> tuple[str, ...]:

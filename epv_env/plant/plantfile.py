@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from epv_env.common.files import write_text
-from epv_env.plant.effects import CATALOGUE
+from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import ParameterError, Parameters
 from epv_env.plant.region import Region
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from epv_env.plant.effects import COPPER
+from epv_env.plant.effects.coil import COPPER
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.flow import CRITICAL_RATIO, LAMINAR_DROP, bracket_over_drop
 from epv_env.plant.integrate import DEFAULT_STEP

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from epv_env.plant import integrate
-from epv_env.plant.coefficients import coefficients, effect_sizes, has_effects
+from epv_env.plant.coefficients import coefficients
 from epv_env.plant.delay import delayed_inputs
+from epv_env.plant.effects.registry import effect_constants, has_effects
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.lanes import LANES, N_INPUT, N_STATE
 from epv_env.plant.parameters import Parameters
@@ -45,7 +46,7 @@ class Valves:
         lanes = -(-n // LANES) * LANES
         calibrated = Parameters.calibrated()
         self._coefficients = np.repeat(coefficients(calibrated), lanes, axis=1)
-        self._effects = np.repeat(effect_sizes(calibrated), lanes, axis=1)
+        self._effects = np.repeat(effect_constants(calibrated), lanes, axis=1)
         self._state = np.zeros((N_STATE, lanes))
         State(*self._state).p1[:] = State(*self._state).p2[:] = State(*self._state).p3[:] = 1e5
         self._inputs = np.zeros((N_INPUT, lanes))
@@ -88,7 +89,7 @@ class Valves:
     ) -> None:
         """Give the valves at the indices `where` (m,) the values p (scalars or arrays (m,))."""
         self._coefficients[:, where] = coefficients(p, reservoir_volume)
-        self._effects[:, where] = effect_sizes(p)
+        self._effects[:, where] = effect_constants(p)
         self._with_effects = has_effects(self._effects)
         self._delay[where] = p["t_delay"]
         self._acting_U[where] = np.nan

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
-from epv_env.plant.coefficients import coefficients, effect_sizes, has_effects
+from epv_env.plant.coefficients import coefficients
 from epv_env.plant.compiled import FLAGS
-from epv_env.plant.effects import coil_current
+from epv_env.plant.effects.coil import coil_current
+from epv_env.plant.effects.registry import effect_constants, has_effects
 from epv_env.plant.equations import Coefficients, Inputs, State, derivative
 from epv_env.plant.integrate import STICK_SPEED
 from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at, store_state
@@ -104,7 +105,7 @@ class Automaton:
 
     def __init__(self, schedule: Schedule, right_hand_side: RightHandSide | None, most: float):
         c = coefficients(schedule.parameters, schedule.reservoir_volume)
-        e = effect_sizes(schedule.parameters)
+        e = effect_constants(schedule.parameters)
         self.c, self.e = c, e
         self.right_hand_side = right_hand_side or COMPILED[bool(np.any(has_effects(e)))]
         self.u = np.zeros(len(Inputs._fields))

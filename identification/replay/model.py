@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from epv_env.plant.coefficients import effect_sizes, has_effects
+from epv_env.plant.effects.registry import effect_constants, has_effects
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.readings import readings
@@ -57,7 +57,7 @@ class Replay:
     def _with_effects(self, each: Mapping[str, NDArray], n: int) -> NDArray:
         """Which candidates have an effect in any recording, boolean (n,)."""
         largest = {s: v if v.ndim == 1 else np.max(np.abs(v), axis=1) for s, v in each.items() if s}
-        return np.broadcast_to(has_effects(effect_sizes({**self.base, **largest})), n)
+        return np.broadcast_to(has_effects(effect_constants({**self.base, **largest})), n)
 
     def _outputs(self, each: Mapping[str, NDArray], n: int, chosen: Sequence[int]) -> list[NDArray]:
         """`outputs` of candidates that one kernel can simulate; '' holds the shifts of p2."""

@@ -14,8 +14,9 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from epv_env.plant.coefficients import coefficients, effect_sizes
+from epv_env.plant.coefficients import coefficients
 from epv_env.plant.compiled import FLAGS, inlined, replacing, source_digest
+from epv_env.plant.effects.registry import effect_constants
 from epv_env.plant.equations import (
     Inputs,
     State,
@@ -135,7 +136,7 @@ def simulate_fixed_step(
     p: parameters by symbol, scalars or arrays (n,). U [V]: (samples,). period: the step [s]. Returns
     fields of shape (samples, n). Raises SimulationError.
     """
-    table, effects = coefficients(p), effect_sizes(p)
+    table, effects = coefficients(p), effect_constants(p)
     n = max(table.shape[1], effects.shape[1])
     state = np.array(np.broadcast_arrays(*initial, np.empty(n))[:-1], dtype=float)
     voltage = np.asarray(U, dtype=float)

@@ -2,41 +2,11 @@
 
 from collections.abc import Sequence
 
-from epv_env.plant.effects import CATALOGUE
+from epv_env.plant.effects import record as effect_record
+from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.parameters import table
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.gap.model.grey_box import Cause, Nuisance, Size
-
-COMPONENTS = {
-    "coil_heating": "solenoid",
-    "eddy_current": "solenoid",
-    "magnetic_saturation": "solenoid",
-    "flyback_voltage": "solenoid",
-    "driver_voltage_drop": "solenoid",
-    "magnetic_remanence": "armature",
-    "armature_friction": "armature",
-    "armature_bounce": "armature",
-    "armature_pressure_force": "armature",
-    "inlet_seat_leak": "control_chamber",
-    "exhaust_seat_leak": "control_chamber",
-    "control_chamber_heat": "control_chamber",
-    "moving_control_volume": "control_chamber",
-    "pressure_dependent_discharge": "protection_valve",
-    "critical_pressure_ratio": "flow",
-    "piston_friction": "protection_valve",
-    "flow_force": "protection_valve",
-    "local_gas_speed": "protection_valve",
-    "seat_leak": "output_chamber",
-    "circuit_leak": "output_chamber",
-    "output_chamber_heat": "output_chamber",
-    "output_pipe": "output_chamber",
-    "supply_restriction": "supply",
-    "pressure_sensor_lag": "sensor",
-    "pressure_sensor_bias": "sensor",
-    "current_sensor_gain": "sensor",
-    "command_delay": "timing",
-}
-"""Component in which each effect lies."""
 
 PARAMETER_COMPONENTS = {
     "cMV": "armature", "dMB": "solenoid", "mMV": "armature", "N": "solenoid", "xMV0": "armature",
@@ -47,53 +17,6 @@ PARAMETER_COMPONENTS = {
 }  # fmt: skip
 """Component of each parameter outside the four, all of Tables 6 and 7 but the cone model's."""
 
-TRIALS = {
-    "U_clamp": (0.7, 8.0, 40.0),
-    "U_drop": (0.7,),
-    "sMV": (4e3,),
-    "I_rem": (0.015,),
-    "F_MV": (0.3,),
-    "eMV": (0.4, 0.8),
-    "sFMV": (0.5,),
-    "A_in": (4e-9,),
-    "A_exh": (4e-9,),
-    "sV3": (0.6,),
-    "kalpha": (0.1, -0.1),
-    "dbcrit": (0.1,),
-    "F_PV": (4.0, 15.0),
-    "cflow": (0.3,),
-    "a1": (0.02, -0.02),
-    "a2": (1e-4,),
-    "A_PV": (2e-8,),
-    "A_circuit": (2e-8,),
-    "h_coil": (0.2,),
-    "G_eddy": (2e-3,),
-    "tau_3": (0.01, 0.1),
-    "tau_2": (0.05, 0.5),
-    "s_pipe": (0.4,),
-    "A_pipe": (2e-5,),
-    "z_supply": (2e4,),
-    "tau_p2": (0.005,),
-    "tau_p3": (0.005,),
-    "b_p2": (5e3,),
-    "b_p3": (5e3,),
-    "g_I": (0.02,),
-    "t_delay": (1e-3, 4e-3),
-}
-"""Sizes to begin a search from [SI]; a size that is not named stays off."""
-
-LEAST = {"tau_3": 5e-4, "tau_2": 5e-4, "tau_p2": 2e-4, "tau_p3": 2e-4, "s_pipe": 0.05, "A_pipe": 2e-6}
-"""Ends below which a size is not felt, or too stiff to be worth simulating."""
-
-VARIANTS = {
-    "pressure_sensor_lag": (("p2", ("tau_p2",)), ("p3", ("tau_p3",))),
-    "pressure_sensor_bias": (("p2", ("b_p2",)), ("p3", ("b_p3",))),
-    "piston_friction": (("", ("F_PV",)),),
-    "coil_heating": (("", ("h_coil",)),),
-    "local_gas_speed": (("a1", ("a1",)), ("a2", ("a2",))),
-}
-"""Effects that are fitted with some of their sizes at a time."""
-
 OFF_BY = (1.03, 0.97)
 """Factors on a parameter's value to begin a search from."""
 
@@ -102,9 +25,6 @@ FARTHEST_OFF = 0.1
 
 PARAMETER_PRIOR = 0.5
 """Prior probability of a parameter off its table value, relative to that of an effect."""
-
-WARM = Nuisance(symbol="theta_coil", sd=25.0, step=0.1)
-"""How warm the winding is when a recording begins [K]."""
 
 
 def catalogue(without: Sequence[str] = ()) -> tuple[Cause, ...]:
@@ -118,18 +38,18 @@ def catalogue(without: Sequence[str] = ()) -> tuple[Cause, ...]:
 
 
 def effects() -> list[Cause]:
-    """Causes that are effects of the catalogue."""
+    """Causes that are effects of the catalogue, a variant each."""
     return [
         Cause(
-            name=name,
+            name=effect.name,
             variant=variant,
-            component=COMPONENTS[name],
-            sizes=tuple(effect_size(symbol) for symbol in symbols),
-            local=(WARM,) if name == "coil_heating" else (),
-            prior=1.0 / len(VARIANTS.get(name, ("",))),
+            component=effect.component,
+            sizes=tuple(effect_size(size) for size in sizes),
+            local=tuple(_local(size) for size in effect.sizes if size.scatter is not None),
+            prior=1.0 / len(effect.fitted),
         )
-        for name in CATALOGUE
-        for variant, symbols in VARIANTS.get(name, (("", CATALOGUE[name]),))
+        for effect in EFFECTS
+        for variant, sizes in effect.fitted.items()
     ]
 
 
@@ -147,19 +67,23 @@ def parameters() -> list[Cause]:
     ]
 
 
-def effect_size(symbol: str) -> Size:
-    """The size of an effect, from its row of the parameter table."""
-    row = table()[symbol]
+def effect_size(size: effect_record.Size) -> Size:
+    """A size of an effect as the diagnosis fits it."""
+    row = table()[size.symbol]
     low, high = row.domain or (0.0, 0.0)
-    trials = TRIALS[symbol]
     return Size(
-        symbol=symbol,
+        symbol=size.symbol,
         unit=row.unit,
-        low=max(low, LEAST.get(symbol, low)),
+        low=max(low, low if size.least_fitted is None else size.least_fitted),
         high=high,
-        trials=trials,
-        scale=abs(trials[0]),
+        trials=size.trials,
+        scale=abs(size.trials[0]),
     )
+
+
+def _local(size: effect_record.Size) -> Nuisance:
+    """A size that every recording has its own of."""
+    return Nuisance(symbol=size.symbol, sd=size.scatter or 0.0, step=size.difference or 0.0)
 
 
 def parameter_size(symbol: str) -> Size:

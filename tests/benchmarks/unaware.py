@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from epv_env.plant.coefficients import coefficients, effect_sizes
+from epv_env.plant.coefficients import coefficients
+from epv_env.plant.effects.registry import effect_constants
 from epv_env.plant.equations import Inputs
 from identification.bench.automaton import COMPILED, X
 from identification.bench.schedule import Schedule
@@ -28,7 +29,7 @@ class GaveUpError(RuntimeError):
 
 
 def _right_hand_side(schedule: Schedule, u: NDArray, clip: str) -> Callable:
-    c, e = coefficients(schedule.parameters), effect_sizes(schedule.parameters)
+    c, e = coefficients(schedule.parameters), effect_constants(schedule.parameters)
     limits = dict(zip(X, (schedule.parameters[s] for s in ("xPVmax", "xMVmax")), strict=True))
     evaluations = 0
 

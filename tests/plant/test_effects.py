@@ -5,18 +5,13 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, simpson, solve_ivp
 
-from epv_env.plant.coefficients import coefficients, effect_sizes, has_effects
-from epv_env.plant.effects import (
-    CATALOGUE,
-    COOLING_TIME,
-    COPPER,
-    FILLING_TIME,
-    STRIBECK_SPEED,
-    Effects,
-    chamber_rates,
-    saturated_force,
-    stribeck,
-)
+from epv_env.plant.coefficients import coefficients
+from epv_env.plant.effects.chambers import chamber_rates
+from epv_env.plant.effects.coil import COOLING_TIME, COPPER
+from epv_env.plant.effects.flows import FILLING_TIME
+from epv_env.plant.effects.friction import STRIBECK_SPEED, stribeck
+from epv_env.plant.effects.magnet import saturated_force
+from epv_env.plant.effects.registry import CATALOGUE, Effects, effect_constants, has_effects
 from epv_env.plant.equations import (
     Coefficients,
     Inputs,
@@ -68,10 +63,10 @@ def test_an_effect_fades_with_its_size(name):
 
 
 def test_sizes_of_zero_are_no_effects():
-    assert not np.any(has_effects(effect_sizes(CALIBRATED)))
+    assert not np.any(has_effects(effect_constants(CALIBRATED)))
     for name in CATALOGUE:
         if name not in OUTSIDE:
-            assert np.all(has_effects(effect_sizes(sized(name, 0.1)))), name
+            assert np.all(has_effects(effect_constants(sized(name, 0.1)))), name
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
@@ -137,7 +132,7 @@ def test_a_saturating_magnet_with_remanence_conserves_energy():
 
     x, v, current, U = 2e-4, 0.4, 0.35, 24.0
     q = State(*np.zeros(len(State._fields)))._replace(p1=1e5, p2=1e5, p3=1e5, xMV=x, vMV=v, I=current)
-    c, e = Coefficients(*coefficients(p)[:, 0]), Effects(*effect_sizes(p)[:, 0])
+    c, e = Coefficients(*coefficients(p)[:, 0]), Effects(*effect_constants(p)[:, 0])
     rate, net = _magnet(q, Inputs(U, 0.0, 0.0, 0.0), c, e)
     force = net + p["cMV"] * (x + p["xMV0"]) + p["kMV"] * v
     i, d = current + p["I_rem"], 1e-6

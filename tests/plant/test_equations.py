@@ -4,8 +4,8 @@ import numba
 import numpy as np
 import pytest
 
-from epv_env.plant.coefficients import coefficients, effect_sizes
-from epv_env.plant.effects import Effects
+from epv_env.plant.coefficients import coefficients
+from epv_env.plant.effects.registry import Effects, effect_constants
 from epv_env.plant.equations import (
     Coefficients,
     Inputs,
@@ -51,7 +51,7 @@ def test_compiled_derivative_agrees_with_equations_typed_independently(p):
     state, inputs = random_states(1000)
     reservoir = 0.08
     expected = np.array([*(columns := numpy_rates(state, inputs, p, reservoir))[0], *columns[1:]])
-    c, e = coefficients(p, reservoir), effect_sizes(p)
+    c, e = coefficients(p, reservoir), effect_constants(p)
     right_hand_side = COMPILED[p is WITH_CONE]
     found = np.stack(
         [
@@ -67,13 +67,13 @@ def test_compiled_derivative_agrees_with_equations_typed_independently(p):
 def test_held_movers_have_no_rates():
     state, inputs = random_states(1)
     q, u = np.array(state)[:, 0], np.array(inputs)[:, 0]
-    held = COMPILED[False](q, u, coefficients(CALIBRATED), effect_sizes(CALIBRATED), 0.0, 0.0)
+    held = COMPILED[False](q, u, coefficients(CALIBRATED), effect_constants(CALIBRATED), 0.0, 0.0)
     np.testing.assert_array_equal(held[2:6], 0.0)
 
 
 def test_no_effects_make_the_extended_kernel_the_nominal_one():
     state, inputs = random_states(100, seed=1)
-    c, e = coefficients(CALIBRATED), effect_sizes(CALIBRATED)
+    c, e = coefficients(CALIBRATED), effect_constants(CALIBRATED)
     for q, u in zip(np.array(state).T.copy(), np.array(inputs).T.copy(), strict=True):
         nominal = COMPILED[False](q, u, c, e, 1.0, 1.0)
         extended = COMPILED[True](q, u, c, e, 1.0, 1.0)
@@ -116,7 +116,7 @@ def _magnet_powers(p, q, u, printed):
     else:
         reluctance = p["RML"] + (p["xMVmax"] - q.xMV) * gap_reluctance
         reluctance_rate = -q.vMV * gap_reluctance
-        c, e = Coefficients(*coefficients(p)[:, 0]), Effects(*effect_sizes(p)[:, 0])
+        c, e = Coefficients(*coefficients(p)[:, 0]), Effects(*effect_constants(p)[:, 0])
         current, net_force = _magnet(q, u, c, e)
         force = net_force + p["cMV"] * (q.xMV + p["xMV0"]) + p["kMV"] * q.vMV
     stored = p["N"] ** 2 * (  # of N^2 I^2 / (2 Rm)
@@ -150,7 +150,7 @@ def _piston_force(q, c, effects, extended):
 
 
 def _force(p, q, extended):
-    c, e = Coefficients(*coefficients(p)[:, 0]), Effects(*effect_sizes(p)[:, 0])
+    c, e = Coefficients(*coefficients(p)[:, 0]), Effects(*effect_constants(p)[:, 0])
     return _piston_force(q, c, e, extended)
 
 

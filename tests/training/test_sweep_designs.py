@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("pandas")
 from controllers.hysteresis import Hysteresis
-from epv_env.plant.effects import CATALOGUE
+from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import Parameters, sensitive_symbols, table
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import CALIBRATED_SYMBOLS, Region

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.plant.coefficients import coefficients, effect_sizes
+from epv_env.plant.coefficients import coefficients
+from epv_env.plant.effects.registry import effect_constants
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.readings import readings
@@ -122,7 +123,7 @@ def _currents(state: State, schedule: Schedule, time: NDArray, deviation: float)
     inputs = np.ascontiguousarray([field[segment] for field in schedule.inputs])
     p = schedule.parameters
     return terminal_currents(
-        np.ascontiguousarray(state), inputs, coefficients(p), effect_sizes(p), deviation
+        np.ascontiguousarray(state), inputs, coefficients(p), effect_constants(p), deviation
     )
 
 

@@ -7,19 +7,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from epv_env.plant.effects import CATALOGUE
+from epv_env.plant.effects.record import COMPONENTS
+from epv_env.plant.effects.registry import CATALOGUE
 from identification.studies.blind.commitments import NOTHING_LEFT
 from identification.studies.blind.score import ABSORBED, Scored, component_of
 from identification.studies.blind.summary import EDGES, Share, by_size, confusion
 from identification.studies.blind.truth import NONE, ONE, PARAMETER
-from identification.valve_gap.causes import COMPONENTS, PARAMETER_COMPONENTS
+from identification.valve_gap.causes import PARAMETER_COMPONENTS
 
 NO_GAP, UNKNOWN, A_PAIR, NOTHING = "no gap", "unknown", "two effects", "nothing"
 
 
 def components(trials: Sequence[Scored]) -> Figure:
     """Where one cause lies against where it is said to lie."""
-    names = list(dict.fromkeys([*COMPONENTS.values(), *PARAMETER_COMPONENTS.values()]))
+    names = list(COMPONENTS)
     pairs = [
         (_true(trial, component_of), NO_GAP if trial.verdict == "no_gap" else trial.component or UNKNOWN)
         for trial in _single(trials)

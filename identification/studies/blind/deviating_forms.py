@@ -42,7 +42,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.compiled import FLAGS, inlined, replacing, source_digest
-from epv_env.plant.effects import OFF_VOLTAGE, Effects, coil_current, heated
+from epv_env.plant.effects.coil import OFF_VOLTAGE, coil_current, heated
+from epv_env.plant.effects.registry import Effects
 from epv_env.plant.equations import (
     State,
     derivative,

@@ -4,10 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from epv_env.plant.effects.registry import effect as effect_record
 from epv_env.plant.parameters import Parameters
 from identification.studies.blind.noise_free_gap import NoiseFree, distance, held_out_gap
 from identification.studies.blind.truth import LEFT_OUT, NONE, PARAMETER
-from identification.valve_gap.causes import COMPONENTS, PARAMETER_COMPONENTS
+from identification.valve_gap.causes import PARAMETER_COMPONENTS
 
 VERDICTS = ("no_gap", "known", "ambiguous", "unknown", "failed")
 """Of gap.json, and what a diagnosis that gave none counts as."""
@@ -121,7 +122,7 @@ def component_of(effect: str) -> str:
     """Component in which a cause lies."""
     if effect.startswith(PARAMETER):
         return PARAMETER_COMPONENTS[effect.removeprefix(PARAMETER)]
-    return COMPONENTS[effect]
+    return effect_record(effect).component
 
 
 def true_shrink(answer: Mapping[str, Any] | None, truth: Sequence[NoiseFree]) -> Shrink | None:

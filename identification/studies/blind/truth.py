@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 from scipy.stats import truncnorm
 
-from epv_env.plant.effects import CATALOGUE
+from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.studies.blind.effect_draws import WARMEST, draw_parameter, draw_sizes

@@ -5,7 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 
-from epv_env.plant.effects import CATALOGUE, COPPER
+from epv_env.plant.effects.coil import COPPER
+from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import Parameter, Parameters, table
 from identification.studies.error_tables.bench_conditions import Conditions
 from identification.studies.error_tables.patterns import Valve

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.plant.effects import COPPER
+from epv_env.plant.effects.coil import COPPER
 from epv_env.plant.parameters import Parameters
 from identification.recordings.recording import OUTPUTS
 from identification.replay.model import Replay

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from epv_env.plant.consumption import SCENARIOS
-from epv_env.plant.effects import CATALOGUE
+from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import table
 from epv_env.plant.plantfile import Plant
 from epv_env.settings import as_region

@@ -4,49 +4,41 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from epv_env.plant.effects.record import Size
+from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.parameters import table
-from identification.studies.blind.effect_draws import RANGES, Range
 
 LEVELS = ("small", "typical", "top")
 
-COLD_OR_HOT = Range("theta_coil", 5.0, 50.0, either_sign=True)
-"""How far the winding is from ambient at the start [K]; the blind check draws only how fast it heats."""
-
-STRONGER_WHEN_SMALLER = ("A_pipe",)
-"""Sizes that go the other way; 0 would cut the consumers off: their top is the smallest ever drawn."""
-
 
 def effect_levels() -> Iterator[tuple[str, str, dict[str, float]]]:
-    """(effect, level, sizes by symbol [SI]) of every effect, alternative and sign, at LEVELS.
+    """(effect, level, sizes by symbol [SI]) of every effect, variant and sign, at LEVELS.
 
-    Small is the least and typical the (geometric) middle of what the blind check draws; top is the end
-    of the range in docs/effects.md, which may lie far beyond what a sound valve has.
+    Small is the least and typical the (geometric) middle of what sealed trials draw; top is the end of
+    the physical range, which may lie far beyond what a sound valve has.
     """
-    catalogue = {**RANGES, "coil_heating": (*RANGES["coil_heating"], (COLD_OR_HOT,))}
-    for effect, alternatives in catalogue.items():
-        for ranges in alternatives:
-            for sign in (1, -1) if ranges[0].either_sign else (1,):
-                name = _name(effect, ranges, sign, several=len(alternatives) > 1)
+    for effect in EFFECTS:
+        for sizes in effect.variants.values():
+            for sign in (1, -1) if sizes[0].either_sign else (1,):
+                name = _name(effect.name, sizes, sign, several=len(effect.variants) > 1)
                 for level in LEVELS:
-                    yield name, level, {each.symbol: _size(each, level, sign) for each in ranges}
+                    yield name, level, {size.symbol: _size(size, level, sign) for size in sizes}
 
 
-def _name(effect: str, ranges: tuple[Range, ...], sign: int, *, several: bool) -> str:
-    """The effect, with the symbol where alternatives differ in it, and the sign where it has two."""
-    symbol = f" {ranges[0].symbol}" if several else ""
-    ending = {1: " +", -1: " −"}[sign] if ranges[0].either_sign else ""
+def _name(effect: str, sizes: tuple[Size, ...], sign: int, *, several: bool) -> str:
+    """The effect, with the symbol where variants differ in it, and the sign where it has two."""
+    symbol = f" {sizes[0].symbol}" if several else ""
+    ending = {1: " +", -1: " −"}[sign] if sizes[0].either_sign else ""
     return f"{effect}{symbol}{ending}"
 
 
-def _size(drawn: Range, level: str, sign: int) -> float:
+def _size(size: Size, level: str, sign: int) -> float:
     """A size, with its sign [SI]."""
-    if drawn.symbol in STRONGER_WHEN_SMALLER:
-        return {"small": drawn.high, "typical": _middle(drawn), "top": drawn.low}[level]
-    ends = table()[drawn.symbol].domain or (0.0, 0.0)
+    low, high = size.drawn or size.swept or (0.0, 0.0)
+    middle = float(np.sqrt(low * high))
+    if size.stronger_when_smaller:
+        return {"small": high, "typical": middle, "top": low}[level]
+    least, greatest = table()[size.symbol].domain or (0.0, 0.0)
     if level == "top":
-        return ends[1] if sign > 0 else ends[0]
-    return sign * (drawn.low if level == "small" else _middle(drawn))
-
-
-def _middle(drawn: Range) -> float:
-    return float(np.sqrt(drawn.low * drawn.high))
+        return greatest if sign > 0 else least
+    return sign * (low if level == "small" else middle)

@@ -5,10 +5,10 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from epv_env.plant.effects import CATALOGUE
+from epv_env.plant.effects.registry import CATALOGUE
+from epv_env.plant.effects.registry import EFFECTS as RECORDS
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import CALIBRATED_SYMBOLS
-from identification.studies.blind.effect_draws import RANGES
 from identification.studies.blind.truth import (
     CALIBRATED_SPREAD,
     EFFECTS,
@@ -61,9 +61,10 @@ def test_pairs_are_two_effects():
 
 
 def test_every_effect_has_its_own_sizes():
-    assert set(RANGES) == set(CATALOGUE)
-    for effect, alternatives in RANGES.items():
-        assert {r.symbol for sizes in alternatives for r in sizes} <= set(CATALOGUE[effect])
+    assert {effect.name for effect in RECORDS if effect.drawn} == set(CATALOGUE)
+    for effect in RECORDS:
+        drawn = {size.symbol for sizes in effect.drawn for size in sizes}
+        assert drawn <= set(CATALOGUE[effect.name])
 
 
 @pytest.mark.parametrize("effect", EFFECTS)

@@ -3,18 +3,25 @@
 import numpy as np
 import pytest
 
-from epv_env.plant.coefficients import coefficients, effect_sizes
+from epv_env.plant.coefficients import coefficients
+from epv_env.plant.effects.registry import EFFECTS as RECORDS
+from epv_env.plant.effects.registry import effect, effect_constants
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.parameters import Parameters
 from identification.bench.automaton import COMPILED
 from identification.studies.blind.deviating_forms import right_hand_side, terminal_currents
-from identification.studies.blind.effect_draws import RANGES
 from identification.studies.blind.truth import EFFECTS
 
 BESIDE_THE_STATE = {"pressure_sensor_bias", "current_sensor_gain", "command_delay"}
 """Effects that act before or behind the equations of state (tests of the bench)."""
 
-SIZES = {r.symbol: r.high for sizes in RANGES.values() for each in sizes for r in each}
+
+def largest(record):
+    """The greatest drawn sizes of an effect by symbol."""
+    return {size.symbol: size.drawn[1] for sizes in record.drawn for size in sizes}
+
+
+SIZES = {symbol: size for record in RECORDS for symbol, size in largest(record).items()}
 
 
 def states(warm=0.0):
@@ -32,7 +39,7 @@ def states(warm=0.0):
 
 def rates(function, p, warm=0.0):
     """Rates and forces with the coil on and off, (states, rows)."""
-    c, e = coefficients(p), effect_sizes(p)
+    c, e = coefficients(p), effect_constants(p)
     return np.array(
         [
             function(np.array(q), np.array(Inputs(U, 0.0, 0.0, 0.0), float), c, e, 1.0, 1.0)
@@ -47,12 +54,12 @@ def currents(p, deviation):
     table = np.array([*states()]).T
     inputs = np.repeat(np.array(Inputs(18.9, 0.0, 0.0, 0.0), float)[:, None], table.shape[1], axis=1)
     return terminal_currents(
-        np.ascontiguousarray(table), inputs, coefficients(p), effect_sizes(p), deviation
+        np.ascontiguousarray(table), inputs, coefficients(p), effect_constants(p), deviation
     )
 
 
 def with_effect(name):
-    return Parameters.calibrated().replace(**{r.symbol: r.high for each in RANGES[name] for r in each})
+    return Parameters.calibrated().replace(**largest(effect(name)))
 
 
 def test_without_deviation_the_forms_are_the_plant_s():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from epv_env.plant.effects import CATALOGUE
+from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import Parameters, table
 from epv_env.plant.sensors import SENSORS
 from identification.report_2003.printed_values import printed_errors

@@ -1,0 +1,171 @@
+"""Effects on flows: discharge, choking, jet force, the cone model, the supply's pipe."""
+
+import math
+
+from epv_env.plant.compiled import inlined
+from epv_env.plant.effects.record import Constant, Effect, Size
+from epv_env.plant.flow import CRITICAL_RATIO, KAPPA
+
+FILLING_TIME = 2e-3
+"""Time constant with which the pressure before the valve follows the flow through its pipe [s]."""
+
+PRESSURE_DEPENDENT_DISCHARGE = Effect(
+    name="pressure_dependent_discharge",
+    component="protection_valve",
+    form="alphaPV (1 + k (1 − p2/p1))",
+    source="Perry 1949: sharp edges discharge 0.6 at small drops, 0.85 choked",
+    sizes=(
+        Size(
+            symbol="kalpha",
+            unit="1",
+            domain=(-0.5, 0.5),
+            meaning="relative rise of alphaPV from p2 = p1 to p2 = 0",
+            trials=(0.1, -0.1),
+            drawn=(0.04, 0.4),
+            either_sign=True,
+        ),
+    ),
+    constants=(
+        Constant(
+            name="discharge_slope",
+            meaning="relative rise of alphaPV with 1 - p2/p1 [-]",
+            value=lambda p: p["kalpha"],
+        ),
+    ),
+)
+
+CRITICAL_PRESSURE_RATIO = Effect(
+    name="critical_pressure_ratio",
+    component="flow",
+    form=(
+        "all orifices (but that of the output pipe) choke at b = 0.528 − d: the drop 1 − r counts by "
+        "(1 − 0.528)/(1 − b)"
+    ),
+    source="ISO 6358-1: b of 0.1–0.5 for real valves; within 3 % of its ellipse",
+    sizes=(
+        Size(
+            symbol="dbcrit",
+            unit="1",
+            domain=(0, 0.4),
+            meaning="how far the orifices' critical pressure ratio lies below 0.528",
+            trials=(0.1,),
+            drawn=(0.03, 0.3),
+        ),
+    ),
+    constants=(
+        Constant(
+            name="drop_deficit",
+            meaning="1 less the share of the pressure drop that counts towards choking [-]",
+            value=lambda p: p["dbcrit"] / (1 - CRITICAL_RATIO + p["dbcrit"]),
+        ),
+    ),
+)
+
+FLOW_FORCE = Effect(
+    name="flow_force",
+    component="protection_valve",
+    form="− c A_eff (p1 − p2), A_eff the seat's effective opening",
+    source="Merritt 1967: 2 cos 69° = 0.72",
+    sizes=(
+        Size(
+            symbol="cflow",
+            unit="1",
+            domain=(0, 1.5),
+            meaning="force of the PV jet per area and pressure drop",
+            trials=(0.3,),
+            drawn=(0.1, 1.0),
+        ),
+    ),
+    constants=(
+        Constant(
+            name="flow_force",
+            meaning="force of the PV jet per opened area and pressure drop [-]",
+            value=lambda p: p["cflow"],
+        ),
+    ),
+)
+
+LOCAL_GAS_SPEED = Effect(
+    name="local_gas_speed",
+    component="protection_valve",
+    form="the cone model of eqs 9 and 15: de = d2 − 2 xPV (a1 + a2 w)",
+    source="the report",
+    sizes=(
+        Size(
+            symbol="a1",
+            trials=(0.02, -0.02),
+            drawn=(5e-3, 5e-2),
+            either_sign=True,
+        ),
+        Size(
+            symbol="a2",
+            trials=(1e-4,),
+            drawn=(4e-5, 4e-4),
+        ),
+    ),
+    alternatives={"a1": ("a1",), "a2": ("a2",)},
+    constants=(
+        Constant(name="a1", meaning="cone model: constant angle [rad]", value=lambda p: p["a1"]),
+        Constant(
+            name="a2", meaning="cone model: angle per gas speed [rad s/m]", value=lambda p: p["a2"]
+        ),
+        Constant(
+            name="RT",
+            meaning="R T of the supply air, which turns a pressure ratio into a gas speed [J/kg]",
+            value=lambda p: p["R_gas"] * p["T_env"],
+            is_size=False,
+        ),
+    ),
+)
+
+SUPPLY_RESTRICTION = Effect(
+    name="supply_restriction",
+    component="supply",
+    form="the valve sees p1 less (z w)²/(2 ρ), ρ at what it sees, reached in 2 ms; z = √ζ/A",
+    source=(
+        "ζ w²/(2 ρ A²), loss coefficients of pipes and fittings; the 2 ms of filling only decouple flow "
+        "and pressure"
+    ),
+    sizes=(
+        Size(
+            symbol="z_supply",
+            unit="1/m^2",
+            domain=(0, 100000.0),
+            meaning="reciprocal of the effective area of the input pipe",
+            trials=(2e4,),
+            drawn=(5e3, 5e4),
+        ),
+    ),
+    constants=(
+        Constant(
+            name="supply_loss",
+            meaning="pressure lost before the valve, times p1 over the flow squared [Pa^2 s^2/kg^2]",
+            value=lambda p: 0.5 * (p["R_gas"] * p["T_env"]) * p["z_supply"] ** 2,
+        ),
+    ),
+)
+
+
+@inlined
+def effective_seat_diameter(xPV, p1, p2, d2, effects):
+    """Diameter on which p2 acts when the jet leaves the seat as a cone [m] (eqs 9, 15).
+
+    de = d2 - 2 xPV zeta, zeta = a1 + a2 w, with w the isentropic gas speed from p1 to p2 [m/s].
+    """
+    ratio = min(p2 / p1, 1.0)
+    heat_drop = 2.0 * KAPPA / (KAPPA - 1.0) * effects.RT * (1.0 - ratio ** ((KAPPA - 1.0) / KAPPA))
+    zeta = effects.a1 + effects.a2 * math.sqrt(heat_drop)
+    return d2 - 2.0 * xPV * zeta
+
+
+@inlined
+def discharge(p1, p2, effects):
+    """alphaPV relative to its value without a pressure drop [-] (Perry 1949: it rises with the drop)."""
+    return 1.0 + effects.discharge_slope * (1.0 - min(p2 / p1, 1.0))
+
+
+@inlined
+def supply_drop_rate(flow, p1, drop, effects):
+    """Rate of the pressure lost before the valve [Pa/s]; it follows zeta flow^2/(2 rho A^2)."""
+    steady = min(effects.supply_loss * flow * flow / p1, 0.5 * p1)
+    return (steady - drop) * (1.0 / FILLING_TIME)

@@ -1,0 +1,108 @@
+"""Effects of sensors and of the command's timing."""
+
+import numpy as np
+
+from epv_env.plant.compiled import inlined
+from epv_env.plant.effects.record import Constant, Effect, Size
+from epv_env.plant.effects.time_constants import rate
+
+
+def _lag_constants(number: int) -> tuple[Constant, ...]:
+    """Constants of a first-order sensor of p2 or p3."""
+    symbol = f"tau_p{number}"
+    return (
+        Constant(
+            name=f"lag_{number}_on",
+            meaning=f"1 where the sensor of p{number} lags, else 0 [-]",
+            value=lambda p: np.sign(rate(p[symbol])),
+        ),
+        Constant(
+            name=f"lag_{number}_rate",
+            meaning="reciprocal of its time constant [1/s]",
+            value=lambda p: rate(p[symbol]),
+        ),
+    )
+
+
+PRESSURE_SENSOR_LAG = Effect(
+    name="pressure_sensor_lag",
+    component="sensor",
+    form="τ dy/dt = p − y",
+    source="first-order sensor with its line",
+    sizes=tuple(
+        Size(
+            symbol=f"tau_{channel}",
+            unit="s",
+            domain=(0, 0.1),
+            meaning=f"time constant of the sensor of {channel}",
+            trials=(0.005,),
+            least_fitted=2e-4,
+            drawn=(1e-3, 2e-2),
+        )
+        for channel in ("p2", "p3")
+    ),
+    alternatives={"p2": ("tau_p2",), "p3": ("tau_p3",)},
+    constants=(*_lag_constants(2), *_lag_constants(3)),
+    fastest_rate=lambda p: np.maximum(rate(p["tau_p2"]), rate(p["tau_p3"])),
+)
+
+PRESSURE_SENSOR_BIAS = Effect(
+    name="pressure_sensor_bias",
+    component="sensor",
+    form="y = p + b",
+    source="Table 1: 1.6 % of 16 bar is 0.26 bar",
+    sizes=tuple(
+        Size(
+            symbol=f"b_{channel}",
+            unit="Pa",
+            domain=(-100000.0, 100000.0),
+            meaning=f"bias of the sensor of {channel}",
+            trials=(5e3,),
+            drawn=(2.5e3, 2.5e4),
+            either_sign=True,
+        )
+        for channel in ("p2", "p3")
+    ),
+    alternatives={"p2": ("b_p2",), "p3": ("b_p3",)},
+)
+
+CURRENT_SENSOR_GAIN = Effect(
+    name="current_sensor_gain",
+    component="sensor",
+    form="y = (1 + g) I",
+    source="scale error of shunt and amplifier; Table 1: 1 %",
+    sizes=(
+        Size(
+            symbol="g_I",
+            unit="1",
+            domain=(-0.2, 0.2),
+            meaning="scale error of the current sensor",
+            trials=(0.02,),
+            drawn=(5e-3, 0.1),
+            either_sign=True,
+        ),
+    ),
+)
+
+COMMAND_DELAY = Effect(
+    name="command_delay",
+    component="timing",
+    form="the coil sees U(t − t_delay)",
+    source="sampling, network and power stage",
+    sizes=(
+        Size(
+            symbol="t_delay",
+            unit="s",
+            domain=(0, 0.01),
+            meaning="time after which the coil follows the voltage",
+            trials=(1e-3, 4e-3),
+            drawn=(3e-4, 6e-3),
+        ),
+    ),
+)
+
+
+@inlined
+def lag_rate(lag, rate, on, per_time):
+    """Rate of a first-order sensor's reading less the pressure, which changes at `rate` [Pa/s]."""
+    return -per_time * lag - on * rate

@@ -1,0 +1,104 @@
+"""How long a step the integrator may take with effects that are steep or fast."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epv_env.plant.compiled import inlined
+from epv_env.plant.effects.coil import CLAMP_WIDTH, NO_CURRENT, OFF_VOLTAGE
+from epv_env.plant.effects.flows import FILLING_TIME
+from epv_env.plant.effects.friction import SLIDING_SPEED_MV, SLIDING_SPEED_PV
+from epv_env.plant.effects.magnet import inverse_inductance
+from epv_env.plant.effects.record import Constant, Effect
+
+STABLE = 1.0
+"""Longest step times fastest rate at which the integrator follows an effect well [-]."""
+
+FRICTION_STABLE = 0.7
+"""The same for friction near rest, where its rate falls steeply with speed [-]."""
+
+UNLIMITED = 1.0
+"""Longest step where no effect asks for a shorter one [s]."""
+
+STICKY_STEP = 3e-5
+"""Steps shorter than this are asked for by friction so great that a mover chatters as it is let go [s]:
+there they are kept while a stop holds it, too."""
+
+
+def step_limits(effects: tuple[Effect, ...]) -> tuple[Constant, ...]:
+    """The longest steps as further constants of the kernel."""
+
+    def steady_step(p: Mapping[str, NDArray]) -> NDArray:
+        fastest = np.full_like(p["s_pipe"], 1 / FILLING_TIME)
+        for effect in effects:
+            if effect.fastest_rate:
+                fastest = np.maximum(fastest, effect.fastest_rate(p))
+        return STABLE / fastest
+
+    return (
+        Constant(
+            name="steady_step",
+            meaning="longest step at which the integrator follows effects but clamp and friction [s]",
+            value=steady_step,
+            is_size=False,
+        ),
+        Constant(
+            name="clamp_step",
+            meaning="longest step at which it follows the current's decay against a clamp [s]",
+            value=lambda p: STABLE / np.maximum(_clamp_rate(p), STABLE / UNLIMITED),
+            is_size=False,
+        ),
+        Constant(
+            name="slow_step_PV",
+            meaning="longest step at which it follows the friction of a piston about to stop [s]",
+            value=lambda p: FRICTION_STABLE / np.maximum(_friction_rate_PV(p), STABLE / UNLIMITED),
+            is_size=False,
+        ),
+        Constant(
+            name="slow_step_MV",
+            meaning="the same of the armature [s]",
+            value=lambda p: FRICTION_STABLE / np.maximum(_friction_rate_MV(p), STABLE / UNLIMITED),
+            is_size=False,
+        ),
+    )
+
+
+def _clamp_rate(p: Mapping[str, NDArray]) -> NDArray:
+    """Rate of the current's decay against a clamp near zero current [1/s]."""
+    return p["U_clamp"] / CLAMP_WIDTH * inverse_inductance(p)
+
+
+def _friction_rate_PV(p: Mapping[str, NDArray]) -> NDArray:
+    """Rate at which friction stops the piston [1/s]."""
+    return p["F_PV"] * (1 + p["S_PV"]) / (p["mPV"] * SLIDING_SPEED_PV)
+
+
+def _friction_rate_MV(p: Mapping[str, NDArray]) -> NDArray:
+    """Rate at which friction stops the armature [1/s]."""
+    return p["F_MV"] / (p["mMV"] * SLIDING_SPEED_MV)
+
+
+@inlined
+def friction_step(slow_step, v, sliding_speed):
+    """Longest step for friction at a speed [s]: the slope of the curve of `friction` falls with it.
+
+    Half the speed stands for what a step may take from it; nor may friction turn a mover within one.
+    """
+    relative = abs(v) / sliding_speed
+    steeper = 1.0 + 0.25 * relative * relative
+    return slow_step * min(steeper * math.sqrt(steeper), 1.0 + 0.5 * relative)
+
+
+@inlined
+def longest_step(U, q, effects, free_PV, free_MV):
+    """Longest step that the effects allow at present [s]; friction asks for none while a stop holds."""
+    clamped = (U <= OFF_VOLTAGE) & (abs(q.I) > NO_CURRENT)
+    step = min(effects.steady_step, effects.clamp_step if clamped else effects.steady_step)
+    step_PV = friction_step(effects.slow_step_PV, q.vPV, SLIDING_SPEED_PV)
+    step_MV = friction_step(effects.slow_step_MV, q.vMV, SLIDING_SPEED_MV)
+    bound_PV = (free_PV > 0.0) | (effects.slow_step_PV < STICKY_STEP)
+    bound_MV = (free_MV > 0.0) | (effects.slow_step_MV < STICKY_STEP)
+    step = min(step, step_PV if bound_PV else step)
+    return min(step, step_MV if bound_MV else step)
