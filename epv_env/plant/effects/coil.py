@@ -58,6 +58,7 @@ COIL_HEATING = Effect(
             name="coil_start",
             meaning="how warm the winding is at the start [K]: it sets the state, not its rates",
             value=lambda p: p["theta_coil"],
+            in_equations=False,
         ),
     ),
 )

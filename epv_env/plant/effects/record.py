@@ -55,6 +55,8 @@ class Constant:
     """From the parameters by symbol, each of shape (n,) or (), to the constant of the same shape."""
     is_size: bool = True
     """Whether a value other than zero means that the effect acts."""
+    in_equations: bool = True
+    """Whether a compiled function reads it; else it only says that the effect acts."""
 
 
 @dataclass(frozen=True, kw_only=True)
