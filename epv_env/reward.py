@@ -68,7 +68,7 @@ def reward_terms(
     vented_kg: NDArray,
     failed: NDArray,
 ) -> RewardTerms:
-    """Reward terms of one control period.
+    """Reward terms of one control period; every array has the shape (n,).
 
     error_bar: p2 - target at its end; highest/lowest_error_bar: its extremes within the period [bar].
     switchings: coil switchings; vented_kg: air blown off [kg]; failed: whether the circuit is empty.

@@ -112,7 +112,7 @@ class LimitingTask:
         self._reading = {name: np.zeros(n) for name in MEASURED}
 
     def time(self) -> NDArray:
-        """Time since each episode's start [s]."""
+        """Time since each episode's start, (n,) [s]."""
         return self.steps * self.period
 
     def begin(

@@ -9,12 +9,15 @@ U_ROW = Inputs._fields.index("U")
 
 
 def delayed_inputs(table: NDArray, duration: NDArray, delay: NDArray) -> tuple[NDArray, NDArray]:
-    """Inputs whose voltage acts later: every period parts into what still sees the former voltage, and
-    the rest.
+    """Inputs whose voltage acts later: each period splits at the change.
 
-    table: [period, row of Inputs, lane]; duration: [period, lane] in s, the same for all periods of a
-    lane but where it is 0; delay: [lane] in s. The first voltage is taken to have acted before. Returns
-    both with twice the periods; every second one ends where a period of the original ends.
+    Args:
+        table: (periods, rows of Inputs, lanes) [SI].
+        duration: (periods, lanes) [s], the same for all periods of a lane but where it is 0.
+        delay: (lanes,) [s].
+
+    The first voltage is taken to have acted before. Returns both with twice the periods; every second
+    period ends where a period of the original ends.
     """
     longest = np.max(duration, axis=0)
     whole = np.floor(delay / np.where(longest > 0, longest, np.inf) + 1e-9).astype(int)

@@ -71,7 +71,7 @@ class Supply:
 
     @classmethod
     def recorded(cls, time_s: NDArray, pressure_bar: NDArray) -> "Supply":
-        """A measured p1 [bar absolute], linear between its samples."""
+        """A measured p1 [bar absolute] at times [s], both (samples,), linear between its samples."""
         time, pressure = np.asarray(time_s, float), np.asarray(pressure_bar, float) * BAR
         shaped = time.ndim == 1 and time.size > 0 and time.shape == pressure.shape
         if not shaped or not np.all(np.isfinite(time)) or np.any(np.diff(time) <= 0):
@@ -92,5 +92,8 @@ class Supply:
         return (np.interp(time + period, *self.recording) - np.interp(time, *self.recording)) / period
 
     def compressor_runs(self, p1: NDArray, ran: NDArray) -> NDArray:
-        """Whether the compressor runs now (two-point control with memory), boolean array."""
+        """Whether the compressor runs now, boolean (n,): two-point control with memory.
+
+        p1: (n,) [Pa]; ran: whether it ran before, boolean (n,).
+        """
         return (p1 < self.cut_in) | (ran & (p1 < self.cut_out))

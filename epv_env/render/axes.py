@@ -64,7 +64,7 @@ def draw_steps(canvas: Canvas, x: Array, axis: Axis, values: Array, colour: Colo
 
 
 def run_ends(values: Array) -> NDArray[np.intp]:
-    """Indices at which a run of equal values begins or ends: all that a drawing needs."""
+    """Indices (ends,) at which a run of equal values (samples,) begins or ends: all that is drawn."""
     changes = np.flatnonzero(np.diff(values))
     return np.unique(np.concatenate([[0], changes, changes + 1, [len(values) - 1]]))
 
