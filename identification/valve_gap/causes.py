@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from epv_env.plant.effects import CATALOGUE
 from epv_env.plant.parameters import table
 from epv_env.plant.region import CALIBRATED_SYMBOLS
-from identification.gap.model.grey_box import Cause, Nuisance, Size
+from identification.gap.model.cause import Cause
+from identification.gap.model.free_parameter import FreeParameter, NuisanceParameter
 
 COMPONENTS = {
     "coil_heating": "solenoid",
@@ -103,7 +104,7 @@ FARTHEST_OFF = 0.1
 PARAMETER_PRIOR = 0.5
 """Prior probability of a parameter off its table value, relative to that of an effect."""
 
-WARM = Nuisance(symbol="theta_coil", sd=25.0, step=0.1)
+WARM = NuisanceParameter(symbol="theta_coil", sd=25.0, step=0.1)
 """How warm the winding is when a recording begins [K]."""
 
 
@@ -124,8 +125,8 @@ def effects() -> list[Cause]:
             name=name,
             variant=variant,
             component=COMPONENTS[name],
-            sizes=tuple(effect_size(symbol) for symbol in symbols),
-            local=(WARM,) if name == "coil_heating" else (),
+            parameters=tuple(effect_size(symbol) for symbol in symbols),
+            run_parameters=(WARM,) if name == "coil_heating" else (),
             prior=1.0 / len(VARIANTS.get(name, ("",))),
         )
         for name in CATALOGUE
@@ -139,20 +140,20 @@ def parameters() -> list[Cause]:
         Cause(
             name=f"parameter:{symbol}",
             component=component,
-            sizes=(parameter_size(symbol),),
+            parameters=(parameter_size(symbol),),
             prior=PARAMETER_PRIOR,
-            exact=True,
+            exact_form=True,
         )
         for symbol, component in PARAMETER_COMPONENTS.items()
     ]
 
 
-def effect_size(symbol: str) -> Size:
+def effect_size(symbol: str) -> FreeParameter:
     """The size of an effect, from its row of the parameter table."""
     row = table()[symbol]
     low, high = row.domain or (0.0, 0.0)
     trials = TRIALS[symbol]
-    return Size(
+    return FreeParameter(
         symbol=symbol,
         unit=row.unit,
         low=max(low, LEAST.get(symbol, low)),
@@ -162,30 +163,30 @@ def effect_size(symbol: str) -> Size:
     )
 
 
-def parameter_size(symbol: str) -> Size:
+def parameter_size(symbol: str) -> FreeParameter:
     """A parameter that is not off by itself; its scale is its table value."""
     row = table()[symbol]
     low, high = row.domain or (row.value, row.value)
-    return Size(
+    return FreeParameter(
         symbol=symbol,
         unit=row.unit,
         low=max(low, row.value * (1 - FARTHEST_OFF)),
         high=min(high, row.value * (1 + FARTHEST_OFF)),
-        off=row.value,
+        nominal=row.value,
         trials=tuple(row.value * factor for factor in OFF_BY),
         scale=row.value,
     )
 
 
-def calibrated(start: dict[str, float]) -> list[Size]:
+def calibrated(start: dict[str, float]) -> list[FreeParameter]:
     """The four parameters that calibration fits, from `start`."""
     return [
-        Size(
+        FreeParameter(
             symbol=symbol,
             unit=table()[symbol].unit,
             low=min(table()[symbol].domain or (0.0,)),
             high=max(table()[symbol].domain or (0.0,)),
-            off=start[symbol],
+            nominal=start[symbol],
             scale=start[symbol],
         )
         for symbol in CALIBRATED_SYMBOLS

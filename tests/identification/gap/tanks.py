@@ -8,7 +8,8 @@ import numpy as np
 from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import recorded
 from identification.gap.diagnosis import Diagnosis, diagnose
-from identification.gap.model.grey_box import Cause, Size
+from identification.gap.model.cause import Cause
+from identification.gap.model.free_parameter import FreeParameter
 
 
 def leaking() -> Tank:
@@ -34,8 +35,10 @@ class Twins(Tank):
 
     def __init__(self):
         super().__init__(recorded({"c": 0.021, "leak": 4e-3}))
-        size = Size(symbol="seep", unit="1/s", low=0.0, high=0.05, trials=(1e-3,), scale=1e-3)
-        self.causes = (*self.causes, Cause(name="seep", component="tank", sizes=(size,)))
+        parameter = FreeParameter(
+            symbol="seep", unit="1/s", low=0.0, high=0.05, trials=(1e-3,), scale=1e-3
+        )
+        self.causes = (*self.causes, Cause(name="seep", component="tank", parameters=(parameter,)))
 
     def outputs(self, values, runs):
         """A seep is a leak."""
