@@ -14,14 +14,15 @@ class ReportSettings:
     """Judgement in what the report and gap.json show and say."""
 
     judged_runners_up: int = 3
-    """Number of single causes beyond the ambiguity set whose discrepancy reduction is measured as well."""
+    """Number of single causes beyond the ambiguity set whose discrepancy reduction is measured as
+    well."""
 
     listed_causes: int = 10
     """Most causes in gap.json; further ones have no noticeable probability."""
 
     systematic_form_error: float = 0.07
-    """Relative standard deviation of a cause's parameter by errors of its form that the recordings cannot
-    show [1]: an error that is the same everywhere looks like another value of the parameter."""
+    """Relative standard deviation of a cause's parameter by errors of its form that the recordings
+    cannot show [1]: an error that is the same everywhere looks like another value of the parameter."""
 
     bound_tolerance: float = 1e-6
     """Share of a range [1] within which a parameter is reported as lying at the end of its range."""

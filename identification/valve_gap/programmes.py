@@ -149,8 +149,8 @@ def sentence(option: Option, rivals: Rivals, splits: bool) -> str:
     record = described(option.programme)
     if rivals.probability[0] > SURE:
         return (
-            f"None is needed ({rivals.names[0]}: {odds_text(rivals.probability[0])}); {record} would tell "
-            f"{names} apart best ({RUN})"
+            f"None is needed ({rivals.names[0]}: {odds_text(rivals.probability[0])}); {record} would "
+            f"tell {names} apart best ({RUN})"
         )
     if splits:
         return f"Record {record}: expected to bring {before} between {names} to {after} ({RUN})"

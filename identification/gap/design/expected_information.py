@@ -1,10 +1,10 @@
 """Which experiment next: the one with the highest expected information about the rival hypotheses.
 
 A planned experiment is a run in which nothing has been measured yet (Bayesian experimental design:
-Chaloner and Verdinelli 1995). Each rival predicts a Gaussian around its best fit. Noise, the open part of
-the rival's parameters, and the run's own offsets give its width. So a difference that recalibration within
-the posterior absorbs tells no rivals apart. Nor does a difference within the error of the forms, which all
-rivals share: the experiment does not ask whether a form errs.
+Chaloner and Verdinelli 1995). Each rival predicts a Gaussian around its best fit. Noise, the open part
+of the rival's parameters, and the run's own offsets give its width. So a difference that recalibration
+within the posterior absorbs tells no rivals apart. Nor does a difference within the error of the forms,
+which all rivals share: the experiment does not ask whether a form errs.
 """
 
 from collections.abc import Sequence

@@ -64,9 +64,9 @@ def information_gain(
 
 
 def log_density(deviations: NDArray, factor: NDArray) -> NDArray:
-    """Log density of a Gaussian but for a constant, (draws,).
+    """Log density of a Gaussian but for a constant, (draws,) [nats].
 
-    deviations: from the mean, (draws, d). factor: Cholesky factor of the covariance, (d, d).
+    deviations: from the mean, (draws, d) [1]. factor: Cholesky factor of the covariance, (d, d) [1].
     """
     white = solve_triangular(factor, deviations.T, lower=True)
     return -0.5 * np.sum(white**2, axis=0) - np.sum(np.log(np.diag(factor)))
@@ -75,7 +75,7 @@ def log_density(deviations: NDArray, factor: NDArray) -> NDArray:
 def kullback_leibler_divergences(means: NDArray, factors: NDArray) -> NDArray:
     """Divergences of Gaussians, of each (row) from each other (column), (n, n) [nats].
 
-    means: (n, d). factors: Cholesky factors of the covariances, (n, d, d).
+    means: (n, d) [1]. factors: Cholesky factors of the covariances, (n, d, d) [1].
     """
     n, d = means.shape
     divergences = np.zeros((n, n))

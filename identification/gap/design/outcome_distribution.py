@@ -23,8 +23,8 @@ def outcome_distributions(
 ) -> tuple[NDArray, NDArray]:
     """Each rival's Gaussian of the outcome of one run.
 
-    The d coordinates hold all predictions and their derivatives. Noise, errors of form included, is white
-    and of unit variance in them; the first rival's mean is the origin.
+    The d coordinates hold all predictions and their derivatives. Noise, errors of form included, is
+    white and of unit variance in them; the first rival's mean is the origin.
 
     Args:
         runs: each rival's prediction, as a residual, and its derivatives.

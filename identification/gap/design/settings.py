@@ -10,8 +10,8 @@ class DesignSettings:
     most_rivals: int = 4
     """Most hypotheses between which an experiment is to decide; the cost grows with their square."""
 
-    rival_share: float = 0.99
-    """Share of the probability of all named hypotheses that the rivals hold [1], two rivals at least."""
+    probability_held_by_rivals: float = 0.99
+    """Share of the probability of all named hypotheses that the rivals hold [1]; at least two rivals."""
 
     least_variance: float = 1e-10
     """Variance of a direction of outcomes, relative to the widest one [1], below which the direction is

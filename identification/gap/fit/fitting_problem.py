@@ -67,7 +67,7 @@ class FittingProblem:
         return {**values, **run_values}
 
     def candidates(self, estimates: Sequence[Estimate]) -> dict[str, NDArray]:
-        """Values by symbol of n estimates side by side, (n,) or (n, runs) [SI], as `GreyBox` takes them."""
+        """Values by symbol of n estimates side by side, (n,) or (n, runs) [SI], for `GreyBox`."""
         n = len(estimates)
         columns: dict[str, NDArray] = {}
         for i, estimate in enumerate(estimates):

@@ -29,7 +29,8 @@ class Prediction:
     """Per run (channels, samples) [noise deviations]: measured - model, 0 at untrusted readings.
     Tolerances come from the fitted runs, run offsets from each run."""
     residuals_nominal_offsets: list[NDArray]
-    """The same with nominal run offsets: no offset can follow what the model lacks."""
+    """The same, (channels, samples) [noise deviations], with nominal run offsets: no offset can follow
+    what the model lacks."""
 
 
 def predict(problem: FittingProblem, estimate: Estimate) -> Prediction:
@@ -97,8 +98,8 @@ def _in_run_parameters(
 def percentage_errors(plant: GreyBox, outputs: Sequence[NDArray]) -> Mapping[str, float] | None:
     """The 2003 report's output error (eqs 19-21) on the held-out runs.
 
-    A channel's error is the root mean square of eq. 19 over the runs, so that the squares of the channels
-    add up to the square of eq. 21.
+    A channel's error is the root mean square of eq. 19 over the runs, so that the squares of the
+    channels add up to the square of eq. 21.
 
     Args:
         plant: the plant with its readings.

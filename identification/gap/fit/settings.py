@@ -37,19 +37,19 @@ class FitSettings:
     """Lower bound of the damping, relative to the diagonal [1]: rounding is no larger."""
 
     most_damping: float = 1e6
-    """Upper bound of the damping, relative to the diagonal [1]. A fit ends at a tenth of the bound, where
-    a step is too short to gain anything."""
+    """Upper bound of the damping, relative to the diagonal [1]. A fit ends at a tenth of the bound,
+    where a step is too short to gain anything."""
 
     converged_decrease: float = 0.3
     """Predicted decrease of chi-square [1] below which a fit has converged: less changes no odds."""
 
     converged_excess_share: float = 3e-3
-    """Predicted decrease below which a fit has converged, as a share of the excess, chi-square beyond one
-    per reading [1]: a cause that leaves a large residual need not be fitted to the last digit."""
+    """Predicted decrease below which a fit has converged, as a share of the excess, chi-square beyond
+    one per reading [1]: a cause that leaves a large residual need not be fitted to the last digit."""
 
     promised_decreases: float = 3.0
-    """Multiple of the predicted decrease [1] that a fit may still gain, before it is given up: steps of a
-    nonlinear model gain more than they predict at first."""
+    """Multiple of the predicted decrease [1] that a fit may still gain, before it is given up: steps of
+    a nonlinear model gain more than they predict at first."""
 
     hopeless_excess_ratio: float = 4.0
     """A fit is given up if its excess stays above this multiple of its best rival's excess [1]."""

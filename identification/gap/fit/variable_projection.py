@@ -110,7 +110,7 @@ def normal_equations(runs: Sequence[LinearisedRun], largest_deviation: float) ->
 def without_run_nuisances(
     run: LinearisedRun, tolerances: NDArray, largest_deviation: float
 ) -> tuple[NDArray, NDArray]:
-    """Residual of a run less what its own nuisance parameters explain, and the step to their best values.
+    """Residual of a run less what its nuisance parameters explain, and the step to their best values.
 
     A deviation beyond the bound is no nuisance: it stays in the residual.
 

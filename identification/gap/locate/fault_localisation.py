@@ -64,7 +64,7 @@ class Localisation:
     """Where the gap lies. `equation_probabilities` and `nothing_missing` sum to 1."""
 
     channel_gaps: Mapping[str, float]
-    """Root mean square of (model - measured)/noise on held-out runs, by channel; 1 is the noise floor."""
+    """Root mean square of (model - measured)/noise on held-out runs, by channel; 1 is the floor."""
     regime_gaps: list[RegimeGap]
     equation_probabilities: Mapping[str, float]
     """Probability that the missing physics lies there, by equation and fault of the readings."""

@@ -2,8 +2,8 @@
 
 A missing term is a function of one state or varies in time. Each assumption is a Gaussian process over
 the windows (Rasmussen and Williams 2006), whose evidence is averaged over a grid of amplitudes. Where a
-forcing leaves more than noise, the remaining mean square replaces the noise variance. So an equation that
-explains half of a large residual does not win by the size of the residual alone.
+forcing leaves more than noise, the remaining mean square replaces the noise variance. So an equation
+that explains half of a large residual does not win by the size of the residual alone.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ FREE, SLOW = "free", "slow"
 
 @dataclass(frozen=True, kw_only=True)
 class ProcessFit:
-    """A Gaussian process fitted to the forcing of one equation. Arrays are (windows,), in steps of it."""
+    """A Gaussian process fitted to the forcing of one equation."""
 
     form: QuadraticForm
     kind: str
@@ -33,13 +33,14 @@ class ProcessFit:
     explained: float
     """Share of chi-square that the forcing removes [1]."""
     forcing: NDArray
-    """Posterior mean of the forcing."""
+    """Posterior mean of the forcing, (windows,) [steps of the equation]."""
     sd: NDArray
-    """Its posterior standard deviation."""
+    """Its posterior standard deviation, (windows,) [steps of the equation]."""
     smooth: NDArray
-    """The smooth part of the forcing, without what single windows have of their own."""
+    """Posterior mean of its smooth part, without what single windows have of their own, (windows,)
+    [steps of the equation]."""
     smooth_sd: NDArray
-    """Its posterior standard deviation."""
+    """Posterior standard deviation of the smooth part, (windows,) [steps of the equation]."""
     smooth_explained: float
     """Share of chi-square that the smooth part removes alone [1]."""
 
@@ -119,14 +120,14 @@ def _fit(
     moment = axes.T @ subspace.moment
     # Where no reading tells of this forcing every strength is 0, and any amplitude will do.
     grid = np.logspace(*settings.amplitude_decades, settings.amplitudes)
-    amplitude = grid / (np.mean(strength) if np.any(strength) else 1.0)
-    shrunk = amplitude[:, None] / (1.0 + amplitude[:, None] * strength)
-    explained = (shrunk * strength) @ moment**2
+    amplitudes = grid / (np.mean(strength) if np.any(strength) else 1.0)
+    weights = amplitudes[:, None] / (1.0 + amplitudes[:, None] * strength)
+    explained = (weights * strength) @ moment**2
     noise = np.maximum(1.0, (design.chi_square - explained) / design.readings)
-    volume = np.sum(np.log1p(amplitude[:, None] * strength), axis=1)
+    volume = np.sum(np.log1p(amplitudes[:, None] * strength), axis=1)
     evidence = _log_evidences(design, explained, noise, volume)
     best = int(np.argmax(evidence))
-    weight, scale = shrunk[best], amplitude[best] * noise[best]
+    weight, scale = weights[best], amplitudes[best] * noise[best]
     smooth_root, root = smooth_root @ axes, root @ axes
     curve = smooth_root @ (weight * moment)
     form, variance = subspace.form, np.diag(smooth)

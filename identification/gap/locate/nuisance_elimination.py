@@ -60,7 +60,8 @@ class NuisanceElimination:
         """Quadratic form of forcings after the elimination.
 
         Args:
-            columns: changes of the outputs by each forcing, per run (values, forcings) [noise deviations].
+            columns: changes of the outputs by each forcing, per run (values, forcings) [noise
+                deviations].
             shared: True where all runs have the same forcings; else each run has its own.
 
         Returns:

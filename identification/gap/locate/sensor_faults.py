@@ -61,7 +61,10 @@ def reading_faults(
 
 
 def _sensor_forms(outputs: NDArray, channel: int, lags: Sequence[int]) -> NDArray:
-    """Gain error and lags of one channel of outputs (channels, samples) [SI], (channels, samples, forms)."""
+    """Changes by gain error and lags of one channel, (channels, samples, forms) [SI].
+
+    outputs: (channels, samples) [SI]. lags: [samples].
+    """
     changes = np.zeros((*outputs.shape, 1 + len(lags)))
     y = outputs[channel]
     changes[channel] = np.stack([y, *(_lag_change(y, lag) for lag in lags)], axis=1)

@@ -13,7 +13,7 @@ class LocalisationSettings:
     """Most windows of a run in which a forcing is constant: a window then lasts a few milliseconds."""
 
     uniform_share: float = 0.3
-    """Share of the windows that is spread uniformly in time [1]; the others follow the states' motion."""
+    """Share of the windows spread uniformly in time [1]; the others follow the states' motion."""
 
     samples: int = 8000
     """Most samples of the runs that are examined together, for time and memory; one run at least."""
@@ -46,8 +46,8 @@ class LocalisationSettings:
     """Variance by which single windows may depart from a smooth forcing, relative to the whole [1]."""
 
     identifiable_share: float = 1e-7
-    """Precision of a direction of forcings, relative to the most precise one [1], below which the direction
-    is left out: rounding is no information."""
+    """Precision of a direction of forcings, relative to the most precise one [1], below which the
+    direction is left out: rounding is no information."""
 
     rival_share: float = 0.5
     """Share of what the best equation explains [1], below which functions of states are not tried."""
@@ -58,20 +58,20 @@ class LocalisationSettings:
     # Probabilities
 
     prior_nothing: float = 0.9
-    """Probability before any data that nothing is missing: an equation is named on clear evidence only."""
+    """Probability before any data that nothing is missing: only clear evidence names an equation."""
 
     prior_reading: float = 0.3
     """Probability before any data of a fault of the readings, relative to that of an equation [1]."""
 
     evidence_doubt: float = 0.5
-    """Log evidences are divided by this number times the root of the largest one [1], since forms that are
-    nearly right err in proportion."""
+    """Log evidences are divided by this number times the root of the largest one [1], since forms that
+    are nearly right err in proportion."""
 
     # Regimes
 
     regime_block: float = 0.02
-    """Longest part of a regime that the bootstrap draws as one [s]: residuals are correlated over less."""
+    """Longest part of a regime that the bootstrap draws as one [s]: longer than residuals correlate."""
 
     fewest_parts: int = 5
-    """Fewest parts of a regime. With fewer on held-out runs all runs count; with fewer on all runs the gap
-    has no interval."""
+    """Fewest parts of a regime. With fewer on held-out runs all runs count; with fewer on all runs the
+    gap has no interval."""

@@ -67,11 +67,17 @@ class GreyBox(Protocol):
         ...
 
     def states(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, StateTrace]:
-        """States that a missing term may depend on, by name, simulated at the first candidate."""
+        """States that a missing term may depend on, by name.
+
+        values: by symbol, (n,) or (n, runs) [SI]; the first candidate counts. run: index of the run.
+        """
         ...
 
     def regimes(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, NDArray]:
-        """Samples in each regime of the model, boolean (samples,) by name; regimes may overlap."""
+        """Samples in each regime of the model, boolean (samples,) by name; regimes may overlap.
+
+        values: by symbol, (n,) or (n, runs) [SI]; the first candidate counts. run: index of the run.
+        """
         ...
 
     def forced(

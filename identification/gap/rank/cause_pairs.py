@@ -31,7 +31,7 @@ class ResidualScale:
     settings: RankingSettings
 
     def residual(self, evaluated: EvaluatedHypothesis) -> float:
-        """Sum of squares left by a hypothesis [1]: beyond noise, or what a generic misfit explains of it."""
+        """Sum of squares left by a hypothesis [1]: beyond noise, or explained by a generic misfit."""
         predictable = 2.0 * (evaluated.log_evidence_with_misfit - evaluated.log_evidence)
         return max(evaluated.excess - self.lowest_excess, predictable)
 

@@ -1,8 +1,8 @@
 """Evidence: how well a refitted hypothesis explains the recordings, its form possibly inexact.
 
-The true form of a cause never equals ours exactly. So a hypothesis may miss the recordings in every short
-segment by a share of the cause's effect there. The recordings determine the share, up to a tenth; a larger
-miss counts in full. The price of each fitted parameter is Laplace's (MacKay 1992).
+The true form of a cause never equals ours exactly. So a hypothesis may miss the recordings in every
+short segment by a share of the cause's effect there. The recordings determine the share, up to a tenth;
+a larger miss counts in full. The price of each fitted parameter is Laplace's (MacKay 1992).
 """
 
 from collections.abc import Sequence
@@ -129,7 +129,7 @@ def _squared_deviations(
 
 
 def _covariance(equations: NormalEquations, smallest_eigenvalue: float) -> NDArray:
-    """Of the scaled vector (k, k) [1], all else free; wide, but finite, where the recordings say nothing."""
+    """Covariance of the scaled vector (k, k) [1]; wide, but finite, where the recordings say nothing."""
     size = np.sqrt(np.diag(equations.hessian) + 1e-9)  # a parameter may have no effect at all
     values, vectors = np.linalg.eigh(equations.hessian / np.outer(size, size))
     return (vectors / np.maximum(values, smallest_eigenvalue)) @ vectors.T / np.outer(size, size)

@@ -17,7 +17,7 @@ from identification.gap.rank.settings import RankingSettings
 
 
 def segments(series: NDArray, period: float, duration: float) -> NDArray:
-    """A series (samples,) in segments (segments, samples of one), the last one padded with zeros.
+    """A series (samples,) of any unit in segments (segments, samples of one), the last one zero-padded.
 
     period: of sampling [s]. duration: of a segment [s].
     """
@@ -29,7 +29,10 @@ def segments(series: NDArray, period: float, duration: float) -> NDArray:
 
 
 def segment_columns(columns: NDArray, period: float, duration: float) -> NDArray:
-    """Columns (samples, n) in segments, (segments, samples of one, n)."""
+    """Columns (samples, n) of any unit in segments, (segments, samples of one, n).
+
+    period: of sampling [s]. duration: of a segment [s].
+    """
     return np.stack([segments(column, period, duration) for column in columns.T], axis=2)
 
 
@@ -109,8 +112,8 @@ def generic_misfit_log_evidence(
 ) -> float:
     """Log evidence of a generic misfit: in every segment of a channel a random offset.
 
-    Variance and duration of the offsets are fitted for each channel (type-II likelihood), at the price of
-    two fitted numbers.
+    Variance and duration of the offsets are fitted for each channel (type-II likelihood), at the price
+    of two fitted numbers.
 
     residuals: per run (channels, samples) [noise deviations].
     """

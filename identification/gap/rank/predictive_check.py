@@ -1,7 +1,8 @@
 """Posterior predictive check of a verdict on held-out recordings (Gelman et al. 2013, chapter 6).
 
-The evidence judges the residual by the form of the recordings that the fits have seen. The check compares
-the verdict with what a black box predicts of the best cause's residual on recordings never fitted to.
+The evidence judges the residual by the form of the recordings that the fits have seen. The check
+compares the verdict with what a black box predicts of the best cause's residual on recordings never
+fitted to.
 """
 
 from dataclasses import replace

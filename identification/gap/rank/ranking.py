@@ -155,17 +155,32 @@ def _weigh(
     most = settings.misfit_share * recalibrated.excess
     small = [each.excess <= most and not each.at_bound for each in hypotheses]
     total_prior = sum(cause.prior for cause in problem.plant.causes)
+    untempered = [_log_evidence(e, with_misfit=s) for e, s in zip(hypotheses, small, strict=True)]
     log_posteriors = [
-        temper * _log_evidence(each, with_misfit=s)
-        + (-np.inf if each.at_bound else _log_prior(each, total_prior, settings))
-        for each, s in zip(hypotheses, small, strict=True)
+        temper * log_evidence + (-np.inf if each.at_bound else _log_prior(each, total_prior, settings))
+        for each, log_evidence in zip(hypotheses, untempered, strict=True)
     ]
+    log_posteriors = limit_pair_odds(hypotheses, log_posteriors, scale)
     no_cause = temper * recalibrated.log_evidence + np.log(settings.prior_no_cause)
     large = [recalibrated, *(each for each, s in zip(hypotheses, small, strict=True) if not s)]
     with_misfit = max(each.log_evidence_with_misfit for each in large)
     unknown = temper * with_misfit + np.log(settings.prior_unknown)
-    log_posteriors = limit_pair_odds(hypotheses, log_posteriors, scale)
-    weights = softmax([*log_posteriors, no_cause, unknown])
+    return _ranking(
+        problem, recalibrated, hypotheses, log_posteriors, (no_cause, unknown), separability, settings
+    )
+
+
+def _ranking(
+    problem: FittingProblem,
+    recalibrated: EvaluatedHypothesis,
+    hypotheses: list[EvaluatedHypothesis],
+    log_posteriors: list[float],
+    others: tuple[float, float],
+    separability: Separability,
+    settings: RankingSettings,
+) -> Ranking:
+    """Normalised probabilities; others: log posteriors of no cause and of an unknown one."""
+    weights = softmax([*log_posteriors, *others])
     order = np.argsort(-np.array(log_posteriors), kind="stable")
     return Ranking(
         problem=problem,

@@ -1,4 +1,4 @@
-"""Separability: which causes a campaign could tell apart, from sensitivities alone, without residuals."""
+"""Separability: which causes a campaign could tell apart, from sensitivities alone."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

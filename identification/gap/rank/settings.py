@@ -24,14 +24,14 @@ class RankingSettings:
     """Correlation of signatures [1] above which the recordings hardly tell two causes apart."""
 
     detectable_signature: float = 3.0
-    """Length of a signature [noise deviations] below which the recordings do not show a cause at its usual
-    size: three standard deviations of its fitted size."""
+    """Length of a signature [noise deviations] below which the recordings do not show a cause at its
+    usual size: three standard deviations of its fitted size."""
 
     # Refinement of the finalists
 
     finalists: tuple[int, int] = (14, 5)
-    """Number of causes refined with nuisance slopes of their own, in the first and the second round; half
-    as many pairs. More change no verdict of the blind trials."""
+    """Number of causes refined with nuisance slopes of their own, in the first and the second round;
+    half as many pairs. More change no verdict of the blind trials."""
 
     finalist_lag: float = 250.0
     """Log evidence by which the best fit may lead a fit that is refined: nuisance slopes taken elsewhere
@@ -43,8 +43,8 @@ class RankingSettings:
     # Evidence
 
     form_errors: tuple[float, ...] = (0.0, 0.003, 0.01, 0.02, 0.05, 0.1)
-    """Relative standard deviations by which a cause's effect may differ from our form in one segment [1],
-    all equally likely before the data: from an exact form to a rough one."""
+    """Relative standard deviations by which a cause's effect may differ from our form in one segment
+    [1], all equally likely before the data: from an exact form to a rough one."""
 
     segment_duration: float = 5e-3
     """Time over which the error of a form is taken as constant [s]: about one transient of the valve."""
@@ -89,8 +89,8 @@ class RankingSettings:
     trials of seeds 2027 and 2028 (docs/gap.md)."""
 
     faint_cause_odds: float = 0.12
-    """Least odds of a pair that gains more than chance [1], from the same trials: beside a strong cause a
-    faint one gains little."""
+    """Least odds of a pair that gains more than chance [1], from the same trials: beside a strong cause
+    a faint one gains little."""
 
     chance_gain: float = 15.0
     """Such a gain in log evidence up to which a second cause is chance."""

@@ -1,8 +1,8 @@
 """The black-box ceiling: what of a residual can be predicted from inputs and model outputs at all.
 
 Ridge regression on random Fourier features of present and recent inputs and model outputs; no feature
-contains a reading that is to be predicted. The black box learns from the fitted runs and is judged on the
-others. Leaving out each of the learning runs in turn chooses the penalty of each channel.
+contains a reading that is to be predicted. The black box learns from the fitted runs and is judged on
+the others. Leaving out each of the learning runs in turn chooses the penalty of each channel.
 
 All penalties share one eigendecomposition of the Gram matrix per fold; scikit-learn's Ridge or RidgeCV
 with grouped folds would solve each of them anew and choose one penalty for all channels.

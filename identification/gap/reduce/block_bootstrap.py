@@ -1,9 +1,9 @@
 """Block bootstrap within runs: uncertainty by the stretches that happened to be recorded.
 
 Blocks of consecutive samples (Künsch 1989) keep what is correlated over less than a block together. Each
-run's blocks get random weights (Bayesian bootstrap of Rubin 1981: no weight is negative). The draws are a
-matrix of weights. A function of sums over samples needs its sums over blocks only, and models under the
-same weights are compared in pairs.
+run's blocks get random weights (Bayesian bootstrap of Rubin 1981: no weight is negative). The draws are
+a matrix of weights. A function of sums over samples needs its sums over blocks only, and models under
+the same weights are compared in pairs.
 """
 
 from collections.abc import Sequence
@@ -36,7 +36,10 @@ def block_starts(samples: int, period: float, settings: ReductionSettings) -> ND
 
 
 def block_sums(series: NDArray, period: float, settings: ReductionSettings) -> NDArray:
-    """Sums over the blocks of a run: series (..., samples) become sums (blocks, ...)."""
+    """Sums over the blocks of a run: series (..., samples) of any unit become sums (blocks, ...).
+
+    period: of sampling [s].
+    """
     starts = block_starts(series.shape[-1], period, settings)
     return np.moveaxis(np.add.reduceat(series, starts, axis=-1), -1, 0)
 
@@ -44,9 +47,9 @@ def block_sums(series: NDArray, period: float, settings: ReductionSettings) -> N
 def block_weights(blocks: Sequence[int], seed: int, settings: ReductionSettings) -> NDArray:
     """Weights of all runs' blocks, one run after the other, (1 + draws, blocks) [1].
 
-    The first row takes each block once: the estimate. The variance of a weight is 1, that of drawing with
-    replacement freed of its bias n/(n - 1), times the square of Student's quantile over the normal one:
-    few blocks determine their own scatter badly.
+    The first row takes each block once: the estimate. The variance of a weight is 1, that of drawing
+    with replacement freed of its bias n/(n - 1), times the square of Student's quantile over the normal
+    one: few blocks determine their own scatter badly.
 
     Args:
         blocks: number of blocks in each run, 2 or more.

@@ -1,16 +1,18 @@
 """Discrepancy reduction: the gap on held-out runs, nominal, recalibrated, with each cause, black box.
 
-Every model is treated alike: tolerances as the fitted runs determine them, each run with its own offsets,
-the same bootstrap draws. A run offset may follow what a model lacks. So the interval of a share also holds
-the share with nominal run offsets.
+Every model is treated alike: tolerances as the fitted runs determine them, each run with its own
+offsets, the same bootstrap draws. A run offset may follow what a model lacks. So the interval of a share
+also holds the share with nominal run offsets.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from numpy.typing import NDArray
+
 from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.fit.hypothesis import Estimate
-from identification.gap.fit.prediction import percentage_errors, predict
+from identification.gap.fit.prediction import Prediction, percentage_errors, predict
 from identification.gap.reduce.black_box import Learner, predict_residuals, ridge_learner
 from identification.gap.reduce.block_bootstrap import Interval
 from identification.gap.reduce.gaps import FLOOR, Gap, GapDraws
@@ -81,17 +83,8 @@ def measure_discrepancy_reduction(
         label: predict_residuals(plant, predictions[label], learner, seed, settings)
         for label in {RECALIBRATED, best}
     }
-    residuals = {label: prediction.residuals for label, prediction in predictions.items()}
-    boxed = {
-        _boxed(label): [y - p for y, p in zip(residuals[label], box, strict=True)]
-        for label, box in boxes.items()
-    }
-    nominal_offsets = {
-        _nominal_offsets(label): prediction.residuals_nominal_offsets
-        for label, prediction in predictions.items()
-    }
-    draws = GapDraws(plant, {**residuals, **boxed, **nominal_offsets}, seed, settings)
-    significance = p_value(plant, residuals[best], boxes[best], seed, settings)
+    draws = GapDraws(plant, _all_residuals(predictions, boxes), seed, settings)
+    significance = p_value(plant, predictions[best].residuals, boxes[best], seed, settings)
     ratios = zip(plant.channels, draws.noise[0], strict=True)
     return DiscrepancyReduction(
         gaps={
@@ -108,6 +101,25 @@ def measure_discrepancy_reduction(
         unexplained=_unexplained(draws, best, significance),
         noise_ratios={channel.name: float(ratio) for channel, ratio in ratios},
     )
+
+
+def _all_residuals(
+    predictions: Mapping[str, Prediction], boxes: Mapping[str, list[NDArray]]
+) -> dict[str, list[NDArray]]:
+    """Residuals of the models, with the black box on top, and with nominal run offsets, by label.
+
+    boxes: residuals that the black box predicts, per run (channels, samples) [noise deviations].
+    """
+    residuals = {label: prediction.residuals for label, prediction in predictions.items()}
+    boxed = {
+        _boxed(label): [y - p for y, p in zip(residuals[label], box, strict=True)]
+        for label, box in boxes.items()
+    }
+    nominal_offsets = {
+        _nominal_offsets(label): prediction.residuals_nominal_offsets
+        for label, prediction in predictions.items()
+    }
+    return {**residuals, **boxed, **nominal_offsets}
 
 
 def _boxed(label: str) -> str:

@@ -1,9 +1,9 @@
 """Noise floor: what noise alone leaves of the gap, from differences of consecutive residuals.
 
 The noise of a channel is estimated from few readings at rest, where a sensor may also be noisier than at
-the end of its range. An error of some percent would look like a gap, or hide one. A misfit hardly changes
-from one sample to the next; white noise does (Rice 1984). So the differences of the best model's residuals
-give the noise of the very readings that are judged.
+the end of its range. An error of some percent would look like a gap, or hide one. A misfit hardly
+changes from one sample to the next; white noise does (Rice 1984). So the differences of the best model's
+residuals give the noise of the very readings that are judged.
 """
 
 from collections.abc import Sequence
@@ -49,7 +49,8 @@ def noise_ratios(changes: NDArray, squares: NDArray, settings: ReductionSettings
     Where the noise is not white, the ratio is 1, but no more than all that is left.
 
     Args:
-        changes: mean squared differences of the best model's residuals, (draws, channels) [noise variances].
+        changes: mean squared differences of the best model's residuals, (draws, channels) [noise
+            variances].
         squares: mean squares of these residuals, (draws, channels) [noise variances].
         settings: when noise is white.
     """
@@ -74,10 +75,7 @@ def _jump_limit(changes: NDArray, settings: ReductionSettings) -> float:
 
     changes: (differences,) [noise deviations].
     """
-    if not len(changes):
-        median = 0.0
-    else:
-        median = float(np.median(np.abs(changes)))
+    median = float(np.median(np.abs(changes))) if len(changes) else 0.0
     limit = settings.jump_limit * MEDIAN_TO_SD * median
     for _ in range(settings.jump_iterations):
         kept = changes[np.abs(changes) <= limit]

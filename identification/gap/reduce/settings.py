@@ -22,12 +22,14 @@ class ReductionSettings:
     """Share of the draws within an interval, and probability within every interval of the report."""
 
     least_concentration: float = 0.05
-    """Lower bound of the Dirichlet parameter of the block weights [1]; below it one block has all weight."""
+    """Lower bound of the Dirichlet parameter of the block weights [1]; below it one block has all
+    weight."""
 
     # Noise floor
 
     jump_limit: float = 4.0
-    """Difference of consecutive residuals beyond which it is a jump of the misfit [standard deviations]."""
+    """Difference of consecutive residuals beyond which it is a jump of the misfit [standard
+    deviations]."""
 
     jump_iterations: int = 20
     """Most iterations until the limit of jumps no longer changes; five suffice."""
@@ -48,8 +50,8 @@ class ReductionSettings:
     valve's fastest transients."""
 
     history_lags: tuple[int, ...] = (1, 2, 4, 10, 20, 40, 100, 400)
-    """Lags at which the black box sees inputs and outputs [history units]: 0.5 to 20 ms for transients, to
-    200 ms for what they leave."""
+    """Lags at which the black box sees inputs and outputs [history units]: 0.5 to 20 ms for transients,
+    to 200 ms for what they leave."""
 
     random_features: int = 300
     """Number of random Fourier features: more predict no more of the blind trials' residuals."""
@@ -64,7 +66,8 @@ class ReductionSettings:
     """Bound of a standardised feature [standard deviations], for samples unlike all others."""
 
     penalty_decades: tuple[float, float] = (-3.0, 5.0)
-    """Decimal logarithms of the smallest and the largest ridge penalty [1]: from none to no prediction."""
+    """Decimal logarithms of the smallest and the largest ridge penalty [1]: from none to no
+    prediction."""
 
     penalties: int = 9
     """Number of penalties, one per decade."""

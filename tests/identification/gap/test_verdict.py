@@ -54,7 +54,9 @@ def localisation(**shares: float) -> Localisation:
     """Equations by component, one each."""
     forcings = [
         ForcingEstimate(
-            equation=StateEquation(name=f"d{component}", state="", component=component, unit="", step=1.0),
+            equation=StateEquation(
+                name=f"d{component}", state="", component=component, unit="", step=1.0
+            ),
             log_evidence=0.0, explained=0.0, windows=[], forcing=np.zeros(0), sd=np.zeros(0),
         )
         for component in shares
