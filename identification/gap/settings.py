@@ -14,11 +14,11 @@ class ReportSettings:
     """Judgement in what the report and gap.json show and say."""
 
     judged_runners_up: int = 3
-    """Number of single causes beyond the ambiguity set whose discrepancy reduction is measured as
-    well."""
+    """Number of single causes beyond the ambiguity set whose discrepancy reduction is measured too;
+    computing time and length of the tables."""
 
     listed_causes: int = 10
-    """Most causes in gap.json; further ones have no noticeable probability."""
+    """Most causes in gap.json; the others are the least probable."""
 
     systematic_form_error: float = 0.07
     """Relative standard deviation of a cause's parameter by errors of its form that the recordings

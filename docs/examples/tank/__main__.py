@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from docs.examples.tank.plant import Tank
-from docs.examples.tank.recordings import read_runs, recorded, write_runs
+from docs.examples.tank.recordings import read_runs, virtual_recordings, write_runs
 from epv_env.common.command_line import fail_clearly, writable_folder
 from epv_env.common.files import write_text
 from identification.gap.diagnosis import diagnose
@@ -31,7 +31,7 @@ def main() -> int:
     folder = chosen.recordings
     if folder is None:
         folder = chosen.out / "recordings"
-        write_runs(recorded(LEAKING, chosen.seed), folder)
+        write_runs(virtual_recordings(LEAKING, chosen.seed), folder)
     diagnosis = diagnose(Tank(read_runs(folder)), seed=chosen.seed)
     content = json.dumps(as_json(diagnosis), indent=1, allow_nan=False) + "\n"
     write_text(chosen.out / "gap.json", content)

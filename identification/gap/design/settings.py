@@ -8,7 +8,7 @@ class DesignSettings:
     """Judgement in the choice of the next experiment."""
 
     most_rivals: int = 4
-    """Most hypotheses between which an experiment is to decide; the cost grows with their square."""
+    """Most hypotheses between which an experiment is to decide; computing time."""
 
     probability_held_by_rivals: float = 0.99
     """Share of the probability of all named hypotheses that the rivals hold [1]; at least two rivals."""
@@ -19,4 +19,4 @@ class DesignSettings:
 
     outcomes: int = 1000
     """Number of simulated outcomes of each rival over which an experiment is averaged: expected
-    probabilities are then known to about 0.01."""
+    probabilities are then known to 0.02 or better."""

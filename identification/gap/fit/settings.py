@@ -20,12 +20,12 @@ class FitSettings:
     residual of a usable candidate, so that the fit moves away."""
 
     iterations: int = 12
-    """Most Gauss-Newton iterations; a fit that needs more is reported as not converged. Fits that matter
-    need 3 to 8."""
+    """Most Gauss-Newton iterations, for computing time. A fit that needs more is weighed as it is and
+    reported as not converged."""
 
     initial_damping: float = 1e-3
-    """Levenberg-Marquardt damping of the first step, relative to the diagonal [1]: nearly undamped,
-    since most starts are close to the optimum."""
+    """Levenberg-Marquardt damping of the first step, relative to the diagonal [1]: nearly none, as
+    starts are expected to be close."""
 
     damping_decrease: float = 0.2
     """Factor on the damping after a step that decreased chi-square [1] (Marquardt 1963)."""
@@ -34,7 +34,7 @@ class FitSettings:
     """Factor on the damping after a step that did not decrease chi-square [1] (Marquardt 1963)."""
 
     least_damping: float = 1e-9
-    """Lower bound of the damping, relative to the diagonal [1]: rounding is no larger."""
+    """Lower bound of the damping, relative to the diagonal [1]: practically none."""
 
     most_damping: float = 1e6
     """Upper bound of the damping, relative to the diagonal [1]. A fit ends at a tenth of the bound,
@@ -52,13 +52,14 @@ class FitSettings:
     a nonlinear model gain more than they predict at first."""
 
     hopeless_excess_ratio: float = 4.0
-    """A fit is given up if its excess stays above this multiple of its best rival's excess [1]."""
+    """A fit is given up if its excess stays above this multiple of its best rival's excess [1], for
+    computing time."""
 
     hopeless_excess_per_reading: float = 0.05
     """Excess per reading that the rule above adds [1]: noise is not known to the percent."""
 
     largest_deviation: float = 3.0
-    """Bound of a nuisance parameter [standard deviations from its centre]: a larger deviation is no
+    """Bound of a nuisance parameter [standard deviations from its centre]: a larger deviation is not a
     nuisance and stays in the residual."""
 
     prediction_iterations: int = 3

@@ -52,7 +52,7 @@ class NuisanceElimination:
         self._hessian[own, own] += precision
         self._gradient[place] += columns.T @ run.residual
         self._gradient[own] -= precision * run.run_values
-        return run.residual @ run.residual + precision @ run.run_values**2
+        return float(run.residual @ run.residual + precision @ run.run_values**2)
 
     def moment_and_precision(
         self, columns: Sequence[NDArray], *, shared: bool = False

@@ -10,7 +10,7 @@ class LocalisationSettings:
     # Windows and runs
 
     windows: int = 80
-    """Most windows of a run in which a forcing is constant: a window then lasts a few milliseconds."""
+    """Most windows of a run in which a forcing is constant; computing time."""
 
     uniform_share: float = 0.3
     """Share of the windows spread uniformly in time [1]; the others follow the states' motion."""
@@ -40,7 +40,7 @@ class LocalisationSettings:
     smooth terms of physics bend once or twice."""
 
     time_memory: float = 0.02
-    """Correlation time of a slow forcing, relative to the longest run [1]: a few windows."""
+    """Correlation time of a slow forcing, relative to the longest run [1]: one or two windows."""
 
     rough_variance: float = 1e-3
     """Variance by which single windows may depart from a smooth forcing, relative to the whole [1]."""
@@ -61,11 +61,12 @@ class LocalisationSettings:
     """Probability before any data that nothing is missing: only clear evidence names an equation."""
 
     prior_reading: float = 0.3
-    """Probability before any data of a fault of the readings, relative to that of an equation [1]."""
+    """Probability before any data of a fault of the readings, relative to that of an equation [1]:
+    sensors are checked more often than physics."""
 
     evidence_doubt: float = 0.5
-    """Log evidences are divided by this number times the root of the largest one [1], since forms that
-    are nearly right err in proportion."""
+    """Log evidences are divided by this number times the root of the largest one [1], since the assumed
+    forms of a forcing are not exact."""
 
     # Regimes
 

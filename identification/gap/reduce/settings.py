@@ -16,7 +16,8 @@ class ReductionSettings:
     """Length of the shortest block [samples], for plants with a long sampling period."""
 
     draws: int = 2000
-    """Number of bootstrap draws: the ends of a 90 % interval then vary by a few percent of its width."""
+    """Number of bootstrap draws: the ends of a 90 % interval then vary by about one percent of its
+    width."""
 
     interval_level: float = 0.9
     """Share of the draws within an interval, and probability within every interval of the report."""
@@ -32,7 +33,7 @@ class ReductionSettings:
     deviations]."""
 
     jump_iterations: int = 20
-    """Most iterations until the limit of jumps no longer changes; five suffice."""
+    """Most iterations of the limit of jumps, which usually settles earlier."""
 
     white_noise_tolerance: float = 0.1
     """Relative distance from the channel's noise up to which noise is taken for white [1]."""
@@ -46,15 +47,15 @@ class ReductionSettings:
     # Black box
 
     history_unit: float = 5e-4
-    """Unit of the lags below [s], the sampling period if that is longer: half a millisecond resolves the
-    valve's fastest transients."""
+    """Unit of the lags below [s], or the sampling period if that is longer: the valve's fastest
+    transients last about as long."""
 
     history_lags: tuple[int, ...] = (1, 2, 4, 10, 20, 40, 100, 400)
     """Lags at which the black box sees inputs and outputs [history units]: 0.5 to 20 ms for transients,
     to 200 ms for what they leave."""
 
     random_features: int = 300
-    """Number of random Fourier features: more predict no more of the blind trials' residuals."""
+    """Number of random Fourier features; computing time."""
 
     shortest_wave: float = 0.2
     """Shortest length of a random feature, in typical distances of two samples [1]."""
@@ -81,7 +82,7 @@ class ReductionSettings:
     """p-value below which a prediction is not chance."""
 
     least_gap_closed: float = 0.02
-    """Gap that a prediction must close to matter [noise deviations]: noise is not known better."""
+    """Gap that a prediction must close to matter [noise deviations]."""
 
     least_share_closed: float = 0.05
     """The same as a share of the explainable gap [1]; the larger of both holds."""

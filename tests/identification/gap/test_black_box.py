@@ -3,7 +3,7 @@
 import numpy as np
 
 from docs.examples.tank.plant import Tank
-from docs.examples.tank.recordings import recorded
+from docs.examples.tank.recordings import virtual_recordings
 from identification.gap.reduce.black_box import LearningRun, ridge_learner
 from identification.gap.reduce.predictability import p_value
 from identification.gap.reduce.settings import ReductionSettings
@@ -43,7 +43,7 @@ def test_one_run_is_enough_to_learn_from():
 
 
 def test_a_prediction_of_noise_is_as_good_as_chance_and_of_itself_is_not():
-    plant = Tank(recorded({}))
+    plant = Tank(virtual_recordings({}))
     rng = np.random.default_rng(4)
     residuals = [rng.standard_normal((1, 240)) for _ in plant.runs]
     chance = [

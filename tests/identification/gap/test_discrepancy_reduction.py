@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from docs.examples.tank.plant import Tank
-from docs.examples.tank.recordings import NOISE, recorded
+from docs.examples.tank.recordings import NOISE, virtual_recordings
 from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.fit.gauss_newton import fit
 from identification.gap.fit.hypothesis import Estimate, Hypothesis
@@ -31,11 +31,15 @@ def estimates(tank: Tank, causes: tuple[str, ...]) -> tuple[FittingProblem, dict
     return problem, {label: found[label] for label in ("nominal", "recalibrated", *causes)}
 
 
+def reduction(truth: dict[str, float], causes: tuple[str, ...], seed: int = 1) -> DiscrepancyReduction:
+    """Of a virtual tank."""
+    tank = Tank(virtual_recordings(truth))
+    return measure_discrepancy_reduction(*estimates(tank, causes), seed=seed)
+
+
 @cache
 def leaking(causes: tuple[str, ...] = ("leak", "lag")) -> DiscrepancyReduction:
-    return measure_discrepancy_reduction(
-        *estimates(Tank(recorded({"c": 0.021, "leak": 4e-3})), causes), seed=1
-    )
+    return reduction({"c": 0.021, "leak": 4e-3}, causes)
 
 
 def test_the_true_cause_closes_the_gap_and_another_does_not():
@@ -57,7 +61,9 @@ def test_without_the_true_cause_the_rest_is_predictable():
 
 
 def test_without_a_gap_nothing_is_told_of_its_shrinking():
-    found = measure_discrepancy_reduction(*estimates(Tank(recorded({"c": 0.021})), ("leak",)), seed=1)
+    found = measure_discrepancy_reduction(
+        *estimates(Tank(virtual_recordings({"c": 0.021})), ("leak",)), seed=1
+    )
     assert found.gaps["recalibrated"].overall.low < 1 < found.gaps["recalibrated"].overall.high
     assert found.shares_closed["leak"].high - found.shares_closed["leak"].low > 0.5
     assert found.unexplained.fraction == 0
@@ -65,7 +71,7 @@ def test_without_a_gap_nothing_is_told_of_its_shrinking():
 
 def test_the_gap_is_that_of_known_noise_and_misfit():
     """A misfit of a known size added to a perfect model's held-out readings."""
-    tank = Tank(recorded({"c": 0.021, "leak": 4e-3}, seed=3))
+    tank = Tank(virtual_recordings({"c": 0.021, "leak": 4e-3}, seed=3))
     problem, found = estimates(tank, ("leak",))
     tank.runs[2].measured[:] += 3 * NOISE * np.sqrt(2) * np.sin(tank.runs[2].time / 4)
     gap = measure_discrepancy_reduction(FittingProblem(tank, problem.slopes), found).gaps["leak"].overall
@@ -73,9 +79,9 @@ def test_the_gap_is_that_of_known_noise_and_misfit():
 
 
 def test_wrong_noise_of_a_channel_is_set_right():
-    tank = Tank(recorded({"c": 0.021, "leak": 4e-3}, seed=3))
+    tank = Tank(virtual_recordings({"c": 0.021, "leak": 4e-3}, seed=3))
     problem, found = estimates(tank, ("leak",))
-    other = Tank(recorded({"c": 0.021, "leak": 4e-3}, seed=3))
+    other = Tank(virtual_recordings({"c": 0.021, "leak": 4e-3}, seed=3))
     other.channels = (replace(tank.channels[0], noise=1.05 * NOISE),)
     gap = measure_discrepancy_reduction(problem, found).gaps["leak"].overall.value
     again = measure_discrepancy_reduction(*estimates(other, ("leak",))).gaps["leak"].overall.value
@@ -83,7 +89,7 @@ def test_wrong_noise_of_a_channel_is_set_right():
 
 
 def test_held_out_readings_move_no_model():
-    tank = Tank(recorded({"c": 0.021, "leak": 4e-3}))
+    tank = Tank(virtual_recordings({"c": 0.021, "leak": 4e-3}))
     problem, found = estimates(tank, ("leak",))
     before = predict(problem, found["leak"])
     tank.runs[2].measured[:] += 0.5
@@ -93,7 +99,7 @@ def test_held_out_readings_move_no_model():
 
 
 def test_percent_is_eq_19_and_none_where_a_mean_vanishes():
-    tank = Tank(recorded({}))
+    tank = Tank(virtual_recordings({}))
     scaled = [1.02 * run.measured for run in tank.runs]
     mean = np.mean(tank.runs[2].measured)
     rms = np.sqrt(np.mean(tank.runs[2].measured ** 2))
@@ -106,14 +112,16 @@ def test_percent_is_eq_19_and_none_where_a_mean_vanishes():
 
 def test_the_same_seed_gives_the_same_figures():
     one, other = (
-        measure_discrepancy_reduction(*estimates(Tank(recorded({"leak": 2e-3})), ("leak",)), seed=4)
+        measure_discrepancy_reduction(
+            *estimates(Tank(virtual_recordings({"leak": 2e-3})), ("leak",)), seed=4
+        )
         for _ in range(2)
     )
     assert one == other
 
 
 def test_without_a_held_out_run_there_is_nothing_to_judge_on():
-    tank = Tank(recorded({}))
+    tank = Tank(virtual_recordings({}))
     problem, found = estimates(tank, ())
     tank.runs = tank.runs[:2]
     with pytest.raises(ValueError, match="no run is held out"):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from docs.examples.tank.plant import Tank
-from docs.examples.tank.recordings import recorded
+from docs.examples.tank.recordings import virtual_recordings
 from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.fit.hypothesis import Estimate
 from identification.gap.locate.fault_localisation import Localisation, locate
@@ -35,7 +35,7 @@ LEAK = 2e-3
 
 @cache
 def recalibrated_tank(**truth: float) -> tuple[FittingProblem, Estimate, list]:
-    problem, estimate = recalibrate(Tank(recorded(truth)))
+    problem, estimate = recalibrate(Tank(virtual_recordings(truth)))
     return problem, estimate, evaluate(problem, [estimate], RankingSettings())[0].residuals
 
 

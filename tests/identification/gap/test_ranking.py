@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from docs.examples.tank.plant import Tank
-from docs.examples.tank.recordings import recorded
+from docs.examples.tank.recordings import virtual_recordings
 from identification.gap.fit.fit_cache import FitCache
 from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.fit.gauss_newton import fit
@@ -25,7 +25,7 @@ SETTINGS = RankingSettings()
 
 @pytest.mark.parametrize(("name", "size"), [("leak", 4e-3), ("lag", 4.0), ("evaporation", 8e-4)])
 def test_the_cause_that_made_the_recordings_is_found_with_its_size(name, size):
-    found = rank_hypotheses(Tank(recorded({"c": 0.021, name: size})))
+    found = rank_hypotheses(Tank(virtual_recordings({"c": 0.021, name: size})))
     best = found.hypotheses[0]
     assert best.labels == (name,)
     assert found.probabilities[0] > 0.7
@@ -38,14 +38,14 @@ def test_the_cause_that_made_the_recordings_is_found_with_its_size(name, size):
 
 @pytest.mark.parametrize("seed", range(5))
 def test_without_a_cause_recalibration_is_enough(seed):
-    found = rank_hypotheses(Tank(recorded({"c": 0.021}, seed=seed)))
+    found = rank_hypotheses(Tank(virtual_recordings({"c": 0.021}, seed=seed)))
     assert found.no_cause > 0.5
     assert found.no_cause + found.unknown + sum(found.probabilities) == pytest.approx(1.0)
 
 
 def test_what_the_catalogue_lacks_is_unknown():
     """An inflow that is not what was measured: no cause of the list makes steps of its own."""
-    tank = Tank(recorded({"c": 0.021}))
+    tank = Tank(virtual_recordings({"c": 0.021}))
     for run in tank.runs:
         run.measured[:] += 0.02 * np.sin(run.time / 3.0)
     found = rank_hypotheses(tank)
@@ -53,7 +53,7 @@ def test_what_the_catalogue_lacks_is_unknown():
 
 
 def test_two_causes_are_found_together():
-    found = rank_hypotheses(Tank(recorded({"leak": 4e-3, "lag": 5.0})))
+    found = rank_hypotheses(Tank(virtual_recordings({"leak": 4e-3, "lag": 5.0})))
     assert set(found.hypotheses[0].labels) == {"leak", "lag"}
     assert found.probabilities[0] > 0.9
 
@@ -70,7 +70,7 @@ def evaluated(
 
 @pytest.mark.parametrize(("lag", "likelier"), [(5.0, True), (0.0, False)])
 def test_the_odds_of_a_pair_against_its_stronger_member_are_limited_by_its_gain(lag, likelier):
-    problem, _ = recalibrate(Tank(recorded({"leak": 4e-3, "lag": lag})))
+    problem, _ = recalibrate(Tank(virtual_recordings({"leak": 4e-3, "lag": lag})))
     (_, leak), (_, both) = evaluated(problem, leak=3e-3), evaluated(problem, leak=3e-3, lag=2.0)
     lowest = min(leak.excess, both.excess, 0.0)
     scale = ResidualScale(lowest_excess=lowest, settings=SETTINGS)
@@ -81,7 +81,7 @@ def test_the_odds_of_a_pair_against_its_stronger_member_are_limited_by_its_gain(
 
 
 def test_a_cause_that_got_stuck_alone_is_fitted_again_from_where_the_best_pair_has_it():
-    problem, _ = recalibrate(Tank(recorded({"leak": 4e-3})))
+    problem, _ = recalibrate(Tank(virtual_recordings({"leak": 4e-3})))
     (stuck, fitted), (_, pair) = evaluated(problem, leak=1e-4), evaluated(problem, leak=3e-3, lag=1.0)
     cache = FitCache(problem.plant)
     refitted = refit_members_of_best_pair(problem, [stuck], [pair], cache, SETTINGS)
@@ -92,12 +92,12 @@ def test_a_cause_that_got_stuck_alone_is_fitted_again_from_where_the_best_pair_h
 
 
 def test_the_same_recordings_give_the_same_verdict():
-    one, other = (rank_hypotheses(Tank(recorded({"leak": 2e-3}))) for _ in range(2))
+    one, other = (rank_hypotheses(Tank(virtual_recordings({"leak": 2e-3}))) for _ in range(2))
     assert one.probabilities == other.probabilities
 
 
 def test_held_out_runs_are_not_fitted_to():
-    tank = Tank(recorded({"c": 0.021}))
+    tank = Tank(virtual_recordings({"c": 0.021}))
     problem, estimate = recalibrate(tank)
     tank.runs[2].measured[:] += 0.5
     _, again = recalibrate(tank)

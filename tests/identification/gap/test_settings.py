@@ -18,7 +18,7 @@ from identification.gap.rank.settings import RankingSettings
 from identification.gap.reduce.settings import ReductionSettings
 from identification.gap.report.json_export import as_json
 from identification.gap.settings import DiagnosisSettings, ReportSettings
-from tests.identification.gap.tanks import sound
+from tests.identification.gap.tanks import without_gap
 from tests.identification.gap.test_expected_information import Gauge, diagnosed, two
 
 FOLDER = Path(identification.gap.__file__).parent
@@ -106,7 +106,7 @@ def test_every_setting_is_used():
 @cache
 def content(settings: DiagnosisSettings) -> dict:
     """gap.json of a tank without a gap, whose probabilities lie between 0 and 1."""
-    return as_json(diagnose(sound(), settings=settings))
+    return as_json(diagnose(without_gap(), settings=settings))
 
 
 @pytest.mark.parametrize(
@@ -131,7 +131,7 @@ def test_a_changed_setting_changes_the_diagnosis(stage, changes):
 
 
 def test_equal_settings_give_the_same_diagnosis():
-    assert content(DiagnosisSettings()) == as_json(diagnose(sound()))
+    assert content(DiagnosisSettings()) == as_json(diagnose(without_gap()))
 
 
 def test_changed_settings_change_the_next_experiment():

@@ -74,7 +74,7 @@ CANDIDATES = ("eddy_current", "flyback_voltage", "moving_control_volume", "param
 def test_an_effect_of_the_bench_is_found(name, symbol, size):
     found = diagnosed(CANDIDATES, **{symbol: size})
     assert found.hypotheses[0].labels == (name,)
-    assert found.probability[0] > 0.9
+    assert found.probabilities[0] > 0.9
     assert found.problem.values(found.hypotheses[0].estimate)[symbol] == pytest.approx(size, rel=0.05)
 
 
