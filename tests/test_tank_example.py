@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from docs.examples.tank.plant import Tank
-from docs.examples.tank.recordings import HEADER, read_runs, recorded, write_runs
+from docs.examples.tank.recordings import HEADER, read_runs, virtual_recordings, write_runs
 from docs.examples.tank.simulator import AREA, START, levels, readings
 
 ROOT = Path(__file__).parents[1]
@@ -46,7 +46,7 @@ def test_a_lagging_sensor_is_63_percent_there_after_its_time_constant():
 
 
 def test_forcings_of_all_windows_make_that_of_the_whole_run():
-    plant = Tank(recorded({}))
+    plant = Tank(virtual_recordings({}))
     values = {"c": np.array([0.021])}
     whole, parts = (
         plant.forced(values, plant.equations[0], 0, np.array(edges))
@@ -58,7 +58,7 @@ def test_forcings_of_all_windows_make_that_of_the_whole_run():
 
 
 def test_recordings_come_back_from_their_files(tmp_path):
-    written = recorded({"leak": 2e-3}, seed=1)
+    written = virtual_recordings({"leak": 2e-3}, seed=1)
     write_runs(written, tmp_path)
     for one, other in zip(written, read_runs(tmp_path), strict=True):
         assert (one.name, one.held_out) == (other.name, other.held_out)

@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 
 from epv_env.common.command_line import writable_folder
-from identification.gap.report.sentences import verdict
+from identification.gap.report.verdict_sentences import verdict_sentence
 from identification.report.result_files import as_text
 from identification.studies.error_tables.error_table_study import real_bench
 from identification.valve_gap.diagnose import GAP, PLANT, REPORT, diagnose_campaign
@@ -44,5 +44,5 @@ def gap(chosen: argparse.Namespace) -> None:
         chosen.campaign, chosen.out, plant=chosen.plant, without=chosen.without, seed=chosen.seed
     )
     content = json.loads((chosen.out / GAP).read_text(encoding="utf-8"))
-    print(verdict(found, content["next_experiment"])[1])
+    print(verdict_sentence(found, content["next_experiment"])[1])
     print(f"written: {', '.join(str(chosen.out / name) for name in (REPORT, GAP, PLANT))}")

@@ -1,4 +1,4 @@
-"""Diagnosis of the gap between a grey-box model and recordings: where, which cause, how far it shrinks.
+"""Diagnosis of the gap between a grey-box model and recordings: where, which cause, how far reduced.
 
-Nothing here knows the valve: everything goes through the protocol of model.py.
+The diagnosis knows no particular plant: every access goes through the protocol of model/grey_box.py.
 """

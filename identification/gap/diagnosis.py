@@ -1,102 +1,154 @@
-"""The whole diagnosis of a grey-box plant: which cause, where, and how far the gap shrinks."""
+"""The whole diagnosis of a grey-box plant: which cause, where, and how far the gap is reduced."""
 
 from dataclasses import dataclass
 
-from identification.gap.fit.fit_cache import Fits
-from identification.gap.fit.fitter import Hypothesis, Point
-from identification.gap.locate.fault_localisation import Where, locate
+from identification.gap.fit.fit_cache import FitCache
+from identification.gap.fit.hypothesis import Estimate, Hypothesis
+from identification.gap.locate.fault_localisation import Localisation, locate
 from identification.gap.model.grey_box import GreyBox
-from identification.gap.rank.evidence import Assessed
-from identification.gap.rank.predictive_check import second_look
-from identification.gap.rank.ranking import Verdicts, which
-from identification.gap.rank.verdict import AMBIGUOUS, KNOWN, UNKNOWN, Conclusion, Ranked, conclude
-from identification.gap.reduce.discrepancy_reduction import NOMINAL, RECALIBRATED, Shrinkage, shrinkage
-
-RUNNERS_UP = 3
-"""Single causes beyond the ambiguity set whose shrinking is judged too."""
+from identification.gap.rank.evidence import EvaluatedHypothesis
+from identification.gap.rank.predictive_check import check_predictively
+from identification.gap.rank.ranking import Ranking, rank_hypotheses
+from identification.gap.rank.verdict import (
+    AMBIGUOUS,
+    KNOWN,
+    UNKNOWN,
+    Conclusion,
+    RankedCause,
+    conclude,
+)
+from identification.gap.reduce.discrepancy_reduction import (
+    NOMINAL,
+    RECALIBRATED,
+    DiscrepancyReduction,
+    measure_discrepancy_reduction,
+)
+from identification.gap.settings import DiagnosisSettings
 
 
 @dataclass(frozen=True, kw_only=True)
 class Diagnosis:
-    """Everything that one diagnosis found."""
+    """All results of one diagnosis."""
 
-    verdicts: Verdicts
+    ranking: Ranking
     conclusion: Conclusion
-    where: Where
-    """Of what recalibration leaves."""
-    left: Where | None
-    """Of what the best cause leaves, where that is to be explained; else None."""
-    shrinkage: Shrinkage
-    nominal: Point
-    judged: list[Ranked]
-    """Causes that `shrinkage` knows by their label."""
+    localisation: Localisation
+    """Where the gap lies that recalibration leaves."""
+    remaining: Localisation | None
+    """Where the gap lies that the best cause leaves; None unless the verdict is unknown."""
+    reduction: DiscrepancyReduction
+    nominal: Estimate
+    """The nominal model."""
+    judged: list[RankedCause]
+    """Causes whose discrepancy reduction was measured, the most probable first."""
     warnings: list[str]
+    """Fits that did not converge, in sentences."""
+    settings: DiagnosisSettings
 
     @property
-    def best(self) -> Ranked | None:
-        """The cause that the verdict names, or the one that comes closest; None where none is needed."""
+    def best(self) -> RankedCause | None:
+        """The cause that the verdict names, or the nearest one; None where none is needed."""
         named = self.conclusion.verdict in (KNOWN, AMBIGUOUS, UNKNOWN)
         return self.judged[0] if named and self.judged else None
 
 
-def label(found: Assessed) -> str:
+def hypothesis_label(hypothesis: EvaluatedHypothesis) -> str:
     """A hypothesis in one line."""
-    return " + ".join(found.name)
+    return " + ".join(hypothesis.labels)
 
 
-def diagnose(plant: GreyBox, *, seed: int = 0, fits: Fits | None = None) -> Diagnosis:
+def diagnose(
+    plant: GreyBox,
+    *,
+    settings: DiagnosisSettings | None = None,
+    seed: int = 0,
+    cache: FitCache | None = None,
+) -> Diagnosis:
     """Diagnose the plant's recordings.
 
-    seed: of the bootstrap. fits: runs and remembers the fits. Raises ValueError where no run is held
-    out.
+    Args:
+        plant: the model, its recordings and its catalogue of causes.
+        settings: judgement of every stage; None: the defaults.
+        seed: of the bootstrap, the black box and the permutations.
+        cache: runs the fits and may keep them; None keeps nothing.
+
+    Raises:
+        ValueError: where no run is held out.
     """
     if not any(run.held_out for run in plant.runs):
         raise ValueError(
             "no recording is held out: a gap is judged on recordings never fitted to; give one the role "
             "'validation'"
         )
-    fits = fits or Fits(plant)
-    verdicts = which(plant, fits)
-    fitter, none = verdicts.fitter, verdicts.none
-    fits.say("where")
-    where = locate(fitter, none.point, none.residuals, seed)
-    fits.say("how far it shrinks")
-    found = _judged(verdicts, where, seed)
-    reconsidered = second_look(verdicts, found.conclusion.verdict, found.shrinkage.unexplained)
-    return found if reconsidered is verdicts else _judged(reconsidered, where, seed)
+    settings, cache = settings or DiagnosisSettings(), cache or FitCache(plant)
+    ranking = rank_hypotheses(plant, cache, settings.ranking, settings.fit)
+    cache.announce("where")
+    localisation = _locate(ranking, ranking.recalibrated, seed, settings)
+    cache.announce("how far it shrinks")
+    diagnosis = _judge(ranking, localisation, seed, settings)
+    unexplained = diagnosis.reduction.unexplained
+    checked = check_predictively(ranking, diagnosis.conclusion.verdict, unexplained)
+    return diagnosis if checked is ranking else _judge(checked, localisation, seed, settings)
 
 
-def _judged(verdicts: Verdicts, where: Where, seed: int) -> Diagnosis:
-    """What probabilities amount to, and how far the causes that count close the gap."""
-    fitter, none = verdicts.fitter, verdicts.none
-    conclusion = conclude(verdicts, where)
-    first = max(len(conclusion.ambiguity), 1)
-    others = [cause for cause in conclusion.causes[first:] if len(cause.effects) == 1]
-    judged = [*conclusion.causes[:first], *others[:RUNNERS_UP]]
-    left = None
-    if conclusion.verdict == UNKNOWN and judged:
-        best = judged[0].found
-        left = locate(fitter, best.point, best.residuals, seed)
-    nominal = fitter.start(Hypothesis(causes=()), {})
-    points = {NOMINAL: nominal, RECALIBRATED: none.point}
-    points |= {label(cause.found): cause.found.point for cause in judged}
-    return Diagnosis(
-        verdicts=verdicts,
-        conclusion=conclusion,
-        where=where,
-        left=left,
-        shrinkage=shrinkage(fitter, points, seed=seed),
-        nominal=nominal,
-        judged=judged,
-        warnings=_warnings(none, judged),
+def _locate(
+    ranking: Ranking, hypothesis: EvaluatedHypothesis, seed: int, settings: DiagnosisSettings
+) -> Localisation:
+    """Where the gap lies that a hypothesis leaves."""
+    return locate(
+        ranking.problem,
+        hypothesis.estimate,
+        hypothesis.residuals,
+        seed,
+        settings.localisation,
+        settings.reduction,
     )
 
 
-def _warnings(none: Assessed, judged: list[Ranked]) -> list[str]:
-    """What did not go as it should."""
-    found = [] if none.converged else ["the recalibration did not converge: its gap may be too large"]
-    return found + [
-        f"the fit of {label(cause.found)} did not converge: its size and probability are in doubt"
+def _judge(
+    ranking: Ranking, localisation: Localisation, seed: int, settings: DiagnosisSettings
+) -> Diagnosis:
+    """The verdict on the probabilities, and how far the causes that count reduce the gap."""
+    problem, recalibrated = ranking.problem, ranking.recalibrated
+    conclusion = conclude(ranking, localisation)
+    judged = _judged_causes(conclusion, settings.report.judged_runners_up)
+    remaining = None
+    if conclusion.verdict == UNKNOWN and judged:
+        remaining = _locate(ranking, judged[0].hypothesis, seed, settings)
+    nominal = problem.start(Hypothesis(causes=()), {})
+    estimates = {NOMINAL: nominal, RECALIBRATED: recalibrated.estimate}
+    estimates |= {hypothesis_label(c.hypothesis): c.hypothesis.estimate for c in judged}
+    reduction = measure_discrepancy_reduction(problem, estimates, seed=seed, settings=settings.reduction)
+    return Diagnosis(
+        ranking=ranking,
+        conclusion=conclusion,
+        localisation=localisation,
+        remaining=remaining,
+        reduction=reduction,
+        nominal=nominal,
+        judged=judged,
+        warnings=_warnings(recalibrated, judged, settings.report.mentioned_probability),
+        settings=settings,
+    )
+
+
+def _judged_causes(conclusion: Conclusion, runners_up: int) -> list[RankedCause]:
+    """The ambiguity set, or the most probable cause, and the next single causes."""
+    first = max(len(conclusion.ambiguity_set), 1)
+    singles = [cause for cause in conclusion.causes[first:] if len(cause.effects) == 1]
+    return [*conclusion.causes[:first], *singles[:runners_up]]
+
+
+def _warnings(
+    recalibrated: EvaluatedHypothesis, judged: list[RankedCause], mentioned_probability: float
+) -> list[str]:
+    """Fits that did not converge, of causes with a noticeable probability."""
+    warnings = []
+    if not recalibrated.converged:
+        warnings.append("the recalibration did not converge: its gap may be too large")
+    return warnings + [
+        f"the fit of {hypothesis_label(cause.hypothesis)} did not converge: its size and its "
+        "probability are in doubt"
         for cause in judged
-        if not cause.found.converged and cause.probability > 0.01
+        if not cause.hypothesis.converged and cause.probability > mentioned_probability
     ]

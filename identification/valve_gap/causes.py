@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 
-from epv_env.plant.effects import record as effect_record
+from epv_env.plant.effects.record import Size
 from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.parameters import table
 from epv_env.plant.region import CALIBRATED_SYMBOLS
-from identification.gap.model.grey_box import Cause, Nuisance, Size
+from identification.gap.model.cause import Cause
+from identification.gap.model.free_parameter import FreeParameter, NuisanceParameter
 
 PARAMETER_COMPONENTS = {
     "cMV": "armature", "dMB": "solenoid", "mMV": "armature", "N": "solenoid", "xMV0": "armature",
@@ -44,8 +45,8 @@ def effects() -> list[Cause]:
             name=effect.name,
             variant=variant,
             component=effect.component,
-            sizes=tuple(effect_size(size) for size in sizes),
-            local=tuple(_local(size) for size in effect.sizes if size.scatter is not None),
+            parameters=tuple(effect_size(size) for size in sizes),
+            run_parameters=tuple(_run_parameter(size) for size in effect.sizes if size.scatter is not None),
             prior=1.0 / len(effect.fitted),
         )
         for effect in EFFECTS
@@ -67,11 +68,11 @@ def parameters() -> list[Cause]:
     ]
 
 
-def effect_size(size: effect_record.Size) -> Size:
+def effect_size(size: Size) -> FreeParameter:
     """A size of an effect as the diagnosis fits it."""
     row = table()[size.symbol]
     low, high = row.domain or (0.0, 0.0)
-    return Size(
+    return FreeParameter(
         symbol=size.symbol,
         unit=row.unit,
         low=max(low, low if size.least_fitted is None else size.least_fitted),
@@ -81,16 +82,16 @@ def effect_size(size: effect_record.Size) -> Size:
     )
 
 
-def _local(size: effect_record.Size) -> Nuisance:
+def _run_parameter(size: Size) -> NuisanceParameter:
     """A size that every recording has its own of."""
-    return Nuisance(symbol=size.symbol, sd=size.scatter or 0.0, step=size.difference or 0.0)
+    return NuisanceParameter(symbol=size.symbol, sd=size.scatter or 0.0, step=size.difference or 0.0)
 
 
-def parameter_size(symbol: str) -> Size:
+def parameter_size(symbol: str) -> FreeParameter:
     """A parameter that is not off by itself; its scale is its table value."""
     row = table()[symbol]
     low, high = row.domain or (row.value, row.value)
-    return Size(
+    return FreeParameter(
         symbol=symbol,
         unit=row.unit,
         low=max(low, row.value * (1 - FARTHEST_OFF)),
@@ -101,10 +102,10 @@ def parameter_size(symbol: str) -> Size:
     )
 
 
-def calibrated(start: dict[str, float]) -> list[Size]:
+def calibrated(start: dict[str, float]) -> list[FreeParameter]:
     """The four parameters that calibration fits, from `start`."""
     return [
-        Size(
+        FreeParameter(
             symbol=symbol,
             unit=table()[symbol].unit,
             low=min(table()[symbol].domain or (0.0,)),

@@ -15,10 +15,11 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from epv_env.plant.region import Region
 from identification.bench.programme_file import save_programmes
-from identification.gap.diagnosis import Diagnosis, diagnose, label
-from identification.gap.fit.fit_cache import Fits
-from identification.gap.rank.evidence import inflation
-from identification.gap.report.json_export import as_json, covariance, values
+from identification.gap.diagnosis import Diagnosis, diagnose, hypothesis_label
+from identification.gap.fit.fit_cache import FitCache
+from identification.gap.rank.misfit import variance_inflation
+from identification.gap.report.json_export import as_json
+from identification.gap.report.parameter_intervals import covariance_with_form_errors, fitted_values
 from identification.gap.report.sections import sections
 from identification.recordings.campaign_files import read_campaign
 from identification.report.page import write_page
@@ -56,7 +57,7 @@ def diagnose_campaign(
     valve = Valve(recorded, nominal, without=without)
     journal = Journal(out / JOURNAL, _subject(valve, without))
     steps = Steps(began) if report else _silent
-    found = diagnose(valve, seed=seed, fits=Fits(valve, journal, steps))
+    found = diagnose(valve, seed=seed, cache=FitCache(valve, journal, steps))
     text = _report(found, valve, recorded.name, out, steps) if report else ""
     content = {**as_json(found, text), "seconds": perf_counter() - began}
     write_text(out / GAP, json.dumps(content, indent=1, allow_nan=False) + "\n")
@@ -66,7 +67,7 @@ def diagnose_campaign(
 def _report(found: Diagnosis, valve: Valve, name: str, out: Path, steps: Callable[[str], None]) -> str:
     """Write what people use of it; returns what to record next."""
     steps("next experiment")
-    experiment = next_experiment(found.verdicts, valve)
+    experiment = next_experiment(found.ranking, valve, settings=found.settings.design)
     (out / PROGRAMME).unlink(missing_ok=True)
     if experiment.programme:
         save_programmes([experiment.programme], out / PROGRAMME)
@@ -85,19 +86,23 @@ def refitted_plant(found: Diagnosis, valve: Valve, name: str) -> Plant:
     Its region is where the recordings leave the four parameters and the sizes, jointly; autocorrelated
     residuals widen it.
     """
-    named = found.conclusion.ambiguity[:1]
-    best = named[0].found if named else found.verdicts.none
-    parameters = Parameters({**valve.base, **values(found, best)})
-    symbols = tuple(size.symbol for size in found.verdicts.fitter.sizes(best.point))
+    named = found.conclusion.ambiguity_set[:1]
+    best = named[0].hypothesis if named else found.ranking.recalibrated
+    parameters = Parameters({**valve.base, **fitted_values(found, best)})
+    problem = found.ranking.problem
+    symbols = tuple(p.symbol for p in problem.parameters(best.estimate))
+    duration = found.settings.ranking.segment_duration
+    inflation = variance_inflation(problem.plant, best.residuals, duration)
+    covariance = covariance_with_form_errors(best, found.settings.report.systematic_form_error)
     return Plant(
         parameters=parameters,
         region=Region(
             centre=parameters,
             symbols=symbols,
-            covariance=covariance(best) * inflation(found.verdicts.fitter, best.residuals),
+            covariance=covariance * inflation,
             chi_square=float(chi2.ppf(JOINT, len(symbols))),
         ),
-        name=f"{name} with {label(best)}" if named else f"{name}, recalibrated",
+        name=f"{name} with {hypothesis_label(best)}" if named else f"{name}, recalibrated",
         provenance={
             "method": "joint refit with the cause of the gap" if named else "recalibration",
             "software": f"epv-valve {version('epv-valve')}",
@@ -133,6 +138,6 @@ def _subject(valve: Valve, without: Sequence[str]) -> dict:
     return {
         "software": version("epv-valve"),
         "recordings": {r.name: [r.role, r.digest()] for r in valve.recordings},
-        "nominal": {size.symbol: size.off for size in valve.parameters},
+        "nominal": {p.symbol: p.nominal for p in valve.parameters},
         "without": sorted(without),
     }

@@ -9,22 +9,22 @@ from epv_env.plant.equations import Inputs
 from epv_env.plant.readings import readings
 from epv_env.plant.simulate import Trajectory, energised, simulate
 from epv_env.plant.valves import Valves
-from identification.gap.model.grey_box import Equation
+from identification.gap.model.state_equation import StateEquation
 from identification.recordings.recording import OUTPUTS
 from identification.replay.drive import Drive
 
 GRAM, MILLIGRAM = 1e-3, 1e-6
 
 EQUATIONS = (
-    Equation(name="f1", state="p2", component="output_chamber", unit="g/s", scale=GRAM, step=1e-5),
-    Equation(
+    StateEquation(name="f1", state="p2", component="output_chamber", unit="g/s", scale=GRAM, step=1e-5),
+    StateEquation(
         name="f2", state="p3", component="control_chamber", unit="mg/s", scale=MILLIGRAM, step=1e-6
     ),
-    Equation(name="f3", state="xPV", component="protection_valve", unit="m/s", step=0.0),
-    Equation(name="f4", state="vPV", component="protection_valve", unit="N", step=0.1),
-    Equation(name="f5", state="xMV", component="armature", unit="m/s", step=0.0),
-    Equation(name="f6", state="vMV", component="armature", unit="N", step=1e-3),
-    Equation(name="f7", state="I", component="solenoid", unit="V", step=1e-2),
+    StateEquation(name="f3", state="xPV", component="protection_valve", unit="m/s", step=0.0),
+    StateEquation(name="f4", state="vPV", component="protection_valve", unit="N", step=0.1),
+    StateEquation(name="f5", state="xMV", component="armature", unit="m/s", step=0.0),
+    StateEquation(name="f6", state="vMV", component="armature", unit="N", step=1e-3),
+    StateEquation(name="f7", state="I", component="solenoid", unit="V", step=1e-2),
 )
 """f3 and f5 say x' = v: nothing can be missing there, and their step is 0."""
 
@@ -46,7 +46,9 @@ def modelled(drive: Drive, p: Mapping[str, float]) -> Trajectory:
     )
 
 
-def forced_changes(drive: Drive, p: Mapping[str, float], equation: Equation, edges: NDArray) -> NDArray:
+def forced_changes(
+    drive: Drive, p: Mapping[str, float], equation: StateEquation, edges: NDArray
+) -> NDArray:
     """`GreyBox.forced` on one recording; p: every parameter by symbol [SI]."""
     m, steps = len(edges) - 1, len(drive.U) - 1
     name, sign = FORCINGS[equation.name]

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.bench.programmes import BAR, Programme
-from identification.gap.design.experiment import Rivals, outlooks, rivals_of
-from identification.gap.design.information_gain import Outlook, odds
-from identification.gap.rank.ranking import Verdicts
+from identification.gap.design.expected_information import expected_information
+from identification.gap.design.information_gain import InformationGain, odds_text
+from identification.gap.design.rivals import Rivals, select_rivals
+from identification.gap.design.settings import DesignSettings
+from identification.gap.rank.ranking import Ranking
 from identification.recordings.recording import Recording
 from identification.replay.drive import Drive
 from identification.replay.model import Replay
@@ -70,7 +72,7 @@ class Option:
     """A programme and what it promises."""
 
     programme: Programme
-    outlook: Outlook
+    information: InformationGain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,24 +98,28 @@ class NextExperiment:
 
 
 def next_experiment(
-    verdicts: Verdicts, valve: Valve, programmes: Sequence[Programme] = CANDIDATES
+    ranking: Ranking,
+    valve: Valve,
+    programmes: Sequence[Programme] = CANDIDATES,
+    settings: DesignSettings | None = None,
 ) -> NextExperiment:
     """The programme after which the least doubt between the most probable hypotheses is expected."""
-    rivals = rivals_of(verdicts)
-    if verdicts.unknown > 0.5:
+    rivals = select_rivals(ranking, settings)
+    if ranking.unknown > 0.5:
         return _none_can_be_chosen(rivals)
-    found = outlooks(verdicts.fitter, planned(valve, programmes), rivals)
-    options = [Option(programme=p, outlook=o) for p, o in zip(programmes, found, strict=True)]
-    options.sort(key=lambda option: option.outlook.rank)
+    plan = planned(valve, programmes)
+    found = expected_information(ranking.problem, plan, rivals, settings, ranking.settings)
+    options = [Option(programme=p, information=i) for p, i in zip(programmes, found, strict=True)]
+    options.sort(key=lambda option: option.information.sort_key)
     best = options[0]
-    splits = 1.0 - best.outlook.best <= SPLITS * (1.0 - rivals.probability[0])
+    splits = 1.0 - best.information.expected_best <= SPLITS * (1.0 - rivals.probability[0])
     return NextExperiment(
         programme=best.programme,
         text=sentence(best, rivals, splits),
         rivals=rivals.names,
         before=rivals.probability,
-        after=best.outlook.after,
-        best=best.outlook.best,
+        after=best.information.expected_probability,
+        best=best.information.expected_best,
         splits=splits,
         alternatives=tuple(options),
     )
@@ -139,12 +145,12 @@ def sentence(option: Option, rivals: Rivals, splits: bool) -> str:
     """What to record, and the expected odds."""
     names = _listed(rivals.names)
     before = ":".join(f"{100 * p:.0f}" for p in rivals.probability)
-    after = odds(option.outlook.best)
+    after = odds_text(option.information.expected_best)
     record = described(option.programme)
     if rivals.probability[0] > SURE:
         return (
-            f"None is needed ({rivals.names[0]}: {odds(rivals.probability[0])}); {record} would tell "
-            f"{names} apart best ({RUN})"
+            f"None is needed ({rivals.names[0]}: {odds_text(rivals.probability[0])}); {record} would "
+            f"tell {names} apart best ({RUN})"
         )
     if splits:
         return f"Record {record}: expected to bring {before} between {names} to {after} ({RUN})"

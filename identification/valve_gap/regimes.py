@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.simulate import Trajectory
-from identification.gap.model.grey_box import Trace
+from identification.gap.model.state_equation import StateTrace
 
 SETTLED = 0.02
 """A current closer than this to its end value, relative to the greatest, is past its transient."""
@@ -38,7 +38,7 @@ def regimes(answer: Trajectory, p: Mapping[str, float], energised: NDArray) -> d
     return {**moving, "shut": ~np.any(list(moving.values()), axis=0)}
 
 
-def traces(answer: Trajectory) -> dict[str, Trace]:
+def traces(answer: Trajectory) -> dict[str, StateTrace]:
     """States and the pressure differences that drive flows and forces."""
     q = answer.state
     found = {
@@ -54,7 +54,7 @@ def traces(answer: Trajectory) -> dict[str, Trace]:
         "U": ("V", 1.0, answer.U),
     }
     return {
-        name: Trace(unit=unit, scale=scale, values=np.asarray(values))
+        name: StateTrace(unit=unit, scale=scale, values=np.asarray(values))
         for name, (unit, scale, values) in found.items()
     }
 

@@ -7,7 +7,9 @@ from numpy.typing import NDArray
 
 from epv_env.plant.parameters import Parameters
 from identification.calibration.problem import calibration_problem
-from identification.gap.model.grey_box import Channel, Equation, Nuisance, Run, Trace
+from identification.gap.model.free_parameter import NuisanceParameter
+from identification.gap.model.recorded_run import Channel, Run
+from identification.gap.model.state_equation import StateEquation, StateTrace
 from identification.recordings.recording import OUTPUTS, UNITS, Campaign, Recording
 from identification.replay.drive import drive_of
 from identification.replay.misfit import measured_outputs
@@ -20,9 +22,9 @@ from identification.valve_gap.regimes import regimes, traces
 TOLERANCE = 3e-3
 """Relative scatter of the parameters outside the four from unit to unit."""
 
-P2_START = Nuisance(symbol="p2_start", sd=500.0, step=1e3)
-P3_ZERO = Nuisance(symbol="p3_zero", sd=500.0, step=1e3)
-I_ZERO = Nuisance(symbol="I_zero", sd=4e-4, step=1e-3)
+P2_START = NuisanceParameter(symbol="p2_start", sd=500.0, step=1e3)
+P3_ZERO = NuisanceParameter(symbol="p3_zero", sd=500.0, step=1e3)
+I_ZERO = NuisanceParameter(symbol="I_zero", sd=4e-4, step=1e-3)
 """Circuit pressure at the start, less the mean of the hold, and the zeros of that day's sensors."""
 
 
@@ -52,7 +54,7 @@ class Valve:
         self.parameters = tuple(causes.calibrated(dict(self.base)))
         self.causes = causes.catalogue(without)
         self.tolerances = tuple(_tolerance(symbol, self.base) for symbol in causes.PARAMETER_COMPONENTS)
-        self.starts = (P2_START, P3_ZERO, I_ZERO)
+        self.run_offsets = (P2_START, P3_ZERO, I_ZERO)
         self.equations = EQUATIONS
         self.replay = Replay([drive_of(r, self.base) for r in self.recordings], self.base)
 
@@ -60,7 +62,7 @@ class Valve:
         """`GreyBox.outputs`."""
         plant = {s: v for s, v in values.items() if s in self.base}
         n = max(np.shape(v)[0] for v in values.values())
-        start = {s.symbol: np.zeros((n, len(self.runs))) for s in self.starts}
+        start = {s.symbol: np.zeros((n, len(self.runs))) for s in self.run_offsets}
         for symbol in start:
             if symbol in values:
                 given = np.asarray(values[symbol])
@@ -74,7 +76,7 @@ class Valve:
                 output[OUTPUTS.index(channel)] += start[symbol][:, run]
         return found
 
-    def states(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, Trace]:
+    def states(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, StateTrace]:
         """`GreyBox.states`."""
         return traces(modelled(self.replay.drives[run], self._one(values, run)))
 
@@ -84,7 +86,7 @@ class Valve:
         return regimes(modelled(self.replay.drives[run], p), p, self.recordings[run].energised)
 
     def forced(
-        self, values: Mapping[str, NDArray], equation: Equation, run: int, edges: NDArray
+        self, values: Mapping[str, NDArray], equation: StateEquation, run: int, edges: NDArray
     ) -> NDArray:
         """`GreyBox.forced`."""
         return forced_changes(self.replay.drives[run], self._one(values, run), equation, edges)
@@ -111,6 +113,6 @@ def as_run(recording: Recording) -> Run:
     )
 
 
-def _tolerance(symbol: str, base: Parameters) -> Nuisance:
+def _tolerance(symbol: str, base: Parameters) -> NuisanceParameter:
     value = base[symbol]
-    return Nuisance(symbol=symbol, sd=TOLERANCE * value, centre=value, step=TOLERANCE * value)
+    return NuisanceParameter(symbol=symbol, sd=TOLERANCE * value, centre=value, step=TOLERANCE * value)

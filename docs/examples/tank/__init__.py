@@ -2,6 +2,6 @@
 
 python -m docs.examples.tank --out DIR, from the repository's root.
 
-simulator.py is what one has before any diagnosis, recordings.py reads files, plant.py brings both
-behind the protocol that the diagnosis knows.
+simulator.py is the model, recordings.py reads and writes files, and plant.py connects both to the
+diagnosis through the protocol `GreyBox`.
 """

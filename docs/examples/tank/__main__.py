@@ -6,14 +6,14 @@ import sys
 from pathlib import Path
 
 from docs.examples.tank.plant import Tank
-from docs.examples.tank.recordings import read_runs, recorded, write_runs
+from docs.examples.tank.recordings import read_runs, virtual_recordings, write_runs
 from epv_env.common.command_line import fail_clearly, writable_folder
 from epv_env.common.files import write_text
 from identification.gap.diagnosis import diagnose
 from identification.gap.report.json_export import as_json
-from identification.gap.report.localisation_figures import shape_figure
+from identification.gap.report.localisation_figures import missing_term_figure
 from identification.gap.report.sections import sections
-from identification.gap.report.sentences import verdict
+from identification.gap.report.verdict_sentences import verdict_sentence
 from identification.report.page import write_page
 
 LEAKING = {"c": 0.021, "leak": 4e-3}
@@ -31,16 +31,17 @@ def main() -> int:
     folder = chosen.recordings
     if folder is None:
         folder = chosen.out / "recordings"
-        write_runs(recorded(LEAKING, chosen.seed), folder)
-    found = diagnose(Tank(read_runs(folder)), seed=chosen.seed)
-    content = json.dumps(as_json(found), indent=1, allow_nan=False) + "\n"
+        write_runs(virtual_recordings(LEAKING, chosen.seed), folder)
+    diagnosis = diagnose(Tank(read_runs(folder)), seed=chosen.seed)
+    content = json.dumps(as_json(diagnosis), indent=1, allow_nan=False) + "\n"
     write_text(chosen.out / "gap.json", content)
     title = f"Gap between model and recordings: {folder}"
-    write_page(chosen.out / "report.html", title=title, sections=sections(found))
-    if chosen.images and found.where.shape:
+    write_page(chosen.out / "report.html", title=title, sections=sections(diagnosis))
+    term, level = diagnosis.localisation.missing_term, diagnosis.settings.reduction.interval_level
+    if chosen.images and term:
         chosen.images.mkdir(parents=True, exist_ok=True)
-        shape_figure(found.where.shape).savefig(chosen.images / "gap-tank.png", dpi=100)
-    print(verdict(found, "")[1])
+        missing_term_figure(term, level).savefig(chosen.images / "gap-tank.png", dpi=100)
+    print(verdict_sentence(diagnosis, "")[1])
     return 0
 
 

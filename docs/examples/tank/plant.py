@@ -7,7 +7,10 @@ from numpy.typing import NDArray
 
 from docs.examples.tank.recordings import NOISE
 from docs.examples.tank.simulator import NOMINAL, levels, readings
-from identification.gap.model.grey_box import Cause, Channel, Equation, Nuisance, Run, Size, Trace
+from identification.gap.model.cause import Cause
+from identification.gap.model.free_parameter import FreeParameter, NuisanceParameter
+from identification.gap.model.recorded_run import Channel, Run
+from identification.gap.model.state_equation import StateEquation, StateTrace
 
 
 class Tank:
@@ -17,7 +20,7 @@ class Tank:
         self.runs = tuple(runs)
         self.channels = (Channel(name="h", unit="mm", scale=1e-3, noise=NOISE),)
         self.parameters = (
-            Size(symbol="c", unit="m/s", low=0.001, high=0.1, off=NOMINAL["c"], scale=0.02),
+            FreeParameter(symbol="c", unit="m/s", low=0.001, high=0.1, nominal=NOMINAL["c"], scale=0.02),
         )
         self.causes = (
             _cause("leak", "tank", "1/s", trial=1e-3, high=0.05),
@@ -25,25 +28,25 @@ class Tank:
             _cause("evaporation", "tank", "m/s", trial=1e-4, high=1e-2),
         )
         self.tolerances = ()
-        self.starts = (
-            Nuisance(symbol="start", sd=2e-3, step=1e-3),
-            Nuisance(symbol="zero", sd=5e-4, step=1e-3),
+        self.run_offsets = (
+            NuisanceParameter(symbol="start", sd=2e-3, step=1e-3),
+            NuisanceParameter(symbol="zero", sd=5e-4, step=1e-3),
         )
         self.equations = (
-            Equation(name="f1", state="h", component="tank", unit="mm/s", scale=1e-3, step=1e-4),
+            StateEquation(name="f1", state="h", component="tank", unit="mm/s", scale=1e-3, step=1e-4),
         )
 
     def outputs(self, values: Mapping[str, NDArray], runs: Sequence[int]) -> list[NDArray]:
         """`GreyBox.outputs`."""
         return [self._read(values, r)[None] for r in runs]
 
-    def states(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, Trace]:
+    def states(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, StateTrace]:
         """`GreyBox.states`: the level and the inflow."""
         q, period = self._inflow(run)
         level = levels(values, q, period)[:, 0]
         return {
-            "h": Trace(unit="m", scale=1.0, values=level),
-            "q": Trace(unit="l/s", scale=1e-3, values=q),
+            "h": StateTrace(unit="m", scale=1.0, values=level),
+            "q": StateTrace(unit="l/s", scale=1e-3, values=q),
         }
 
     def regimes(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, NDArray]:
@@ -52,7 +55,7 @@ class Tank:
         return {"filling": rising, "draining": ~rising}
 
     def forced(
-        self, values: Mapping[str, NDArray], equation: Equation, run: int, edges: NDArray
+        self, values: Mapping[str, NDArray], equation: StateEquation, run: int, edges: NDArray
     ) -> NDArray:
         """`GreyBox.forced`."""
         samples = np.arange(len(self.runs[run].time))
@@ -71,6 +74,6 @@ class Tank:
 
 
 def _cause(name: str, component: str, unit: str, *, trial: float, high: float) -> Cause:
-    """A cause with one size of its own name that is 0 in the nominal model."""
-    size = Size(symbol=name, unit=unit, low=0.0, high=high, trials=(trial,), scale=trial)
-    return Cause(name=name, component=component, sizes=(size,))
+    """A cause with one parameter of the same name, which is 0 in the nominal model."""
+    parameter = FreeParameter(symbol=name, unit=unit, low=0.0, high=high, trials=(trial,), scale=trial)
+    return Cause(name=name, component=component, parameters=(parameter,))

@@ -8,22 +8,25 @@ from numpy.typing import NDArray
 
 from docs.examples.tank.simulator import levels, readings
 from epv_env.common.files import write_text
-from identification.gap.model.grey_box import Run
+from identification.gap.model.recorded_run import Run
 
 HEADER = "time_s,inflow_m3_per_s,level_m"
 
 HELD_OUT = "validation"
-"""Recordings whose names begin so are never fitted to."""
+"""Recordings whose names begin with this word are held out: no fit uses them."""
 
 NOISE = 2e-3
-"""Standard deviation of a reading [m]: from a record at rest."""
+"""Standard deviation of a reading [m], from a recording at rest."""
 
 PERIOD, SAMPLES, RUNS = 0.5, 240, 3
-"""Of the virtual tank: sampling [s], length and number of recordings."""
+"""Sampling period [s], samples per recording, and number of recordings of the virtual tank."""
 
 
-def recorded(truth: Mapping[str, float], seed: int = 0) -> list[Run]:
-    """Recordings of a virtual tank with these values by symbol [SI], under steps of the inflow."""
+def virtual_recordings(truth: Mapping[str, float], seed: int = 0) -> list[Run]:
+    """Recordings of a virtual tank under random steps of the inflow.
+
+    truth: values of the tank by symbol [SI]. seed: of the noise.
+    """
     steps, noise = np.random.default_rng(5), np.random.default_rng(seed)
     values = {symbol: np.array([value]) for symbol, value in truth.items()}
     found = []
@@ -36,7 +39,10 @@ def recorded(truth: Mapping[str, float], seed: int = 0) -> list[Run]:
 
 
 def as_run(name: str, period: float, inflow: NDArray, level: NDArray) -> Run:
-    """A recording as the diagnosis sees it; every reading counts."""
+    """A recording as the diagnosis sees it; every reading counts.
+
+    period: of sampling [s]. inflow: (samples,) [m^3/s]. level: readings, (samples,) [m].
+    """
     return Run(
         name=name,
         held_out=name.startswith(HELD_OUT),
@@ -48,7 +54,7 @@ def as_run(name: str, period: float, inflow: NDArray, level: NDArray) -> Run:
 
 
 def write_runs(runs: Sequence[Run], folder: Path) -> None:
-    """One CSV file for each recording."""
+    """Write one CSV file for each recording."""
     for run in runs:
         table = np.stack([run.time, run.inputs["q"], run.measured[0]], axis=1).tolist()
         lines = [HEADER, *(",".join(f"{cell:.7g}" for cell in row) for row in table)]
@@ -56,7 +62,7 @@ def write_runs(runs: Sequence[Run], folder: Path) -> None:
 
 
 def read_runs(folder: Path) -> list[Run]:
-    """All recordings of a folder, by name. Raises ValueError for what cannot be used."""
+    """All recordings of a folder, by name. Raises ValueError for a file that cannot be used."""
     paths = sorted(folder.glob("*.csv"))
     if not paths:
         raise ValueError(f"{folder} has no CSV files: give a folder of recordings")

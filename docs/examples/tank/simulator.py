@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 AREA = 0.5
-"""Of the tank [m^2]."""
+"""Cross-section of the tank [m^2]."""
 
 START = 0.5
 """Level at which recordings begin [m]."""
@@ -26,7 +26,7 @@ NOMINAL = {
 """Values by symbol."""
 
 SUBSTEPS = 4
-"""Of Euler's method in a sampling period."""
+"""Steps of Euler's method in a sampling period."""
 
 
 def levels(
@@ -51,7 +51,10 @@ def levels(
 
 
 def readings(values: Mapping[str, NDArray], level: NDArray, period: float) -> NDArray:
-    """What the sensor makes of levels (samples, n) [m]: it lags, and its zero is off."""
+    """Readings (samples, n) [m] of a sensor with a lag and a zero offset.
+
+    values: by symbol, (n,) [SI]. level: (samples, n) [m]. period: of sampling [s].
+    """
     p = {**NOMINAL, **values}
     follow = 1 - np.exp(-period / np.maximum(p["lag"], 1e-3))
     read = [level[0]]

@@ -1,4 +1,4 @@
-"""Finished fits, kept so that an interrupted diagnosis goes on where it was."""
+"""Cache of finished fits: an interrupted diagnosis continues where it stopped."""
 
 from collections.abc import Callable
 from typing import Any
@@ -6,51 +6,58 @@ from typing import Any
 import numpy as np
 
 from epv_env.common.journal import Journal
-from identification.gap.fit.fitter import Hypothesis, Point
+from identification.gap.fit.hypothesis import Estimate, Hypothesis
 from identification.gap.model.grey_box import GreyBox
 
 
-class Fits:
-    """Runs the steps of a diagnosis; those that a journal holds are not run again."""
+class FitCache:
+    """Runs the steps of a diagnosis; a step that the journal holds is not run again."""
 
     def __init__(
         self,
         plant: GreyBox,
         journal: Journal | None = None,
-        say: Callable[[str], None] = lambda step: None,
+        announce: Callable[[str], None] = lambda step: None,
     ):
-        """journal: None keeps nothing. say: told the name of every step that is begun."""
+        """Begin with the fits of a journal.
+
+        Args:
+            plant: the plant to whose causes the journal refers.
+            journal: finished fits; None keeps nothing.
+            announce: called with the name of every step before it begins.
+        """
         self.plant = plant
         self.journal = journal
-        self.say = say
+        self.announce = announce
 
-    def __call__(self, step: str, fit: Callable[[], list[Point]]) -> list[Point]:
-        """The points that `fit` returns, or returned in an earlier run."""
-        self.say(step)
+    def __call__(self, step: str, fit: Callable[[], list[Estimate]]) -> list[Estimate]:
+        """The estimates that `fit` returns, or returned in an earlier run under this step's name."""
+        self.announce(step)
         if self.journal is not None and step in self.journal:
-            return [self._point(entry) for entry in self.journal[step]]
-        points = fit()
+            return [self._estimate(entry) for entry in self.journal[step]]
+        estimates = fit()
         if self.journal is not None:
-            self.journal.add(step, [_entry(point) for point in points])
-        return points
+            self.journal.add(step, [_entry(estimate) for estimate in estimates])
+        return estimates
 
-    def _point(self, entry: dict[str, Any]) -> Point:
+    def _estimate(self, entry: dict[str, Any]) -> Estimate:
         causes = {cause.label: cause for cause in self.plant.causes}
         runs = len(self.plant.runs)
-        return Point(
+        return Estimate(
             hypothesis=Hypothesis(causes=tuple(causes[label] for label in entry["causes"])),
             vector=np.array(entry["vector"]),
-            local=np.array(entry["local"]).reshape(runs, -1),
+            run_values=np.array(entry["local"]).reshape(runs, -1),
             chi_square=entry["chi_square"],
             converged=entry["converged"],
         )
 
 
-def _entry(point: Point) -> dict[str, Any]:
+def _entry(estimate: Estimate) -> dict[str, Any]:
+    """An estimate as the journal keeps it; nuisance slopes are computed again."""
     return {
-        "causes": list(point.hypothesis.name),
-        "vector": point.vector.tolist(),
-        "local": point.local.tolist(),
-        "chi_square": point.chi_square,
-        "converged": point.converged,
+        "causes": list(estimate.hypothesis.labels),
+        "vector": estimate.vector.tolist(),
+        "local": estimate.run_values.tolist(),
+        "chi_square": estimate.chi_square,
+        "converged": estimate.converged,
     }

@@ -1,66 +1,116 @@
-"""What a fitted hypothesis predicts for every run, freed of what is no gap."""
+"""What a fitted hypothesis predicts for every run, nuisance parameters accounted for."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import trapezoid
 
-from identification.gap.fit.fitter import LOST, Fitter, Point
-from identification.gap.fit.variable_projection import Linear, freed, normal
-from identification.gap.model.grey_box import GreyBox, weighted
+from identification.gap.fit.fitting_problem import FittingProblem
+from identification.gap.fit.hypothesis import Estimate
+from identification.gap.fit.linearisation import linearised_run
+from identification.gap.fit.variable_projection import (
+    LinearisedRun,
+    normal_equations,
+    without_run_nuisances,
+)
+from identification.gap.model.grey_box import GreyBox, noise_weighted
 from identification.report_2003.output_error import partial_error, relative_error, total_error
-
-SETTLE = 3
-"""Gauss-Newton steps for the numbers that every run has its own of, where a cause has such numbers."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Prediction:
-    """A model's answer to the inputs of every run."""
+    """A model's response to the inputs of every run."""
 
     outputs: list[NDArray]
-    """Per run (channels, samples) [SI]: nominal starts and tolerances."""
+    """Per run (channels, samples) [SI], with nominal run offsets and tolerances."""
     residuals: list[NDArray]
-    """Per run (channels, samples): measured - model in noise deviations, 0 where readings do not count;
-    tolerances as the fitted runs have them, each run with its own start."""
-    as_recorded: list[NDArray]
-    """The same, but every run begins as it was recorded: no start follows what the model lacks."""
+    """Per run (channels, samples) [noise deviations]: measured - model, 0 at untrusted readings.
+    Tolerances come from the fitted runs, run offsets from each run."""
+    residuals_nominal_offsets: list[NDArray]
+    """The same, (channels, samples) [noise deviations], with nominal run offsets: no offset can follow
+    what the model lacks."""
 
 
-def predict(fitter: Fitter, point: Point) -> Prediction:
-    """Simulate all runs; held-out ones tell their own start and nothing else."""
-    plant = fitter.plant
-    local = point.local.copy()
-    own = local.shape[1]
-    for _ in range(SETTLE if own else 0):
-        runs = _linear(fitter, point, local)[1]
-        shared = normal([runs[r] for r in fitter.fitted]).shared
-        local = local + np.array([freed(run, shared)[1][:own] for run in runs])
-    outputs, runs = _linear(fitter, point, local)
-    shared = normal([runs[r] for r in fitter.fitted]).shared
-    shapes = [run.measured.shape for run in plant.runs]
+def predict(problem: FittingProblem, estimate: Estimate) -> Prediction:
+    """Simulate all runs; a held-out run determines its own nuisance parameters and nothing else."""
+    settings = problem.settings
+    count = len(estimate.hypothesis.run_parameters)
+    for _ in range(settings.prediction_iterations if count else 0):
+        runs = _in_run_parameters(problem, estimate)[1]
+        tolerances = _tolerances(problem, runs)
+        steps = [
+            without_run_nuisances(run, tolerances, settings.largest_deviation)[1][:count] for run in runs
+        ]
+        estimate = replace(estimate, run_values=estimate.run_values + np.array(steps))
+    outputs, runs = _in_run_parameters(problem, estimate)
+    tolerances = _tolerances(problem, runs)
+    shapes = [run.measured.shape for run in problem.plant.runs]
     return Prediction(
         outputs=outputs,
         residuals=[
-            freed(run, shared)[0].reshape(shape) for run, shape in zip(runs, shapes, strict=True)
+            without_run_nuisances(run, tolerances, settings.largest_deviation)[0].reshape(shape)
+            for run, shape in zip(runs, shapes, strict=True)
         ],
-        as_recorded=[
-            (run.residual - run.shared @ shared).reshape(shape)
+        residuals_nominal_offsets=[
+            (run.residual - run.tolerance_slopes @ tolerances).reshape(shape)
             for run, shape in zip(runs, shapes, strict=True)
         ],
     )
 
 
-def percent(plant: GreyBox, outputs: list[NDArray]) -> Mapping[str, float] | None:
-    """The report's error (eqs 19-21) on the held-out runs, by channel and 'overall' [%].
+def _tolerances(problem: FittingProblem, runs: Sequence[LinearisedRun]) -> NDArray:
+    """Tolerances (m,) [standard deviations] as the fitted runs determine them."""
+    fitted = [runs[r] for r in problem.fitted_runs]
+    return normal_equations(fitted, problem.settings.largest_deviation).tolerances
 
-    A channel's is the root mean square over the runs of eq. 19, so that the channels' squares add up to
-    the square of eq. 21. None where the time mean of a channel, by which eq. 19 divides, vanishes.
+
+def _in_run_parameters(
+    problem: FittingProblem, estimate: Estimate
+) -> tuple[list[NDArray], list[LinearisedRun]]:
+    """Outputs, per run (channels, samples) [SI], and the runs linearised in their nuisances alone."""
+    nuisances = estimate.hypothesis.run_parameters
+    n = 1 + len(nuisances)
+    values = problem.candidates([estimate] * n)
+    for j, nuisance in enumerate(nuisances):
+        values[nuisance.symbol] = np.tile(nuisance.centre + estimate.run_values[:, j], (n, 1))
+        values[nuisance.symbol][1 + j] += nuisance.step
+    steps = np.array([nuisance.step for nuisance in nuisances])
+    outputs = problem.plant.outputs(values, problem.all_runs)
+    runs = []
+    for r, output in enumerate(outputs):
+        flat = noise_weighted(problem.plant, r, output).reshape(-1, n)
+        runs.append(
+            linearised_run(
+                problem,
+                estimate,
+                r,
+                flat[:, 0],
+                slopes=np.zeros((len(flat), 0)),
+                run_slopes=np.nan_to_num(flat[:, 1:] - flat[:, :1]) / steps,
+                run_values=estimate.run_values[r],
+            )
+        )
+    return [output[..., 0] for output in outputs], runs
+
+
+def percentage_errors(plant: GreyBox, outputs: Sequence[NDArray]) -> Mapping[str, float] | None:
+    """The 2003 report's output error (eqs 19-21) on the held-out runs.
+
+    A channel's error is the root mean square of eq. 19 over the runs, so that the squares of the
+    channels add up to the square of eq. 21.
+
+    Args:
+        plant: the plant with its readings.
+        outputs: model outputs, per run (channels, samples) [SI].
+
+    Returns:
+        Errors by channel and 'overall' [%]; None where the time mean of a channel, by which eq. 19
+        divides, vanishes.
     """
     held_out = [(run, y) for run, y in zip(plant.runs, outputs, strict=True) if run.held_out]
-    if any(_centred(run.measured, run.time) for run, _ in held_out):
+    if any(_mean_vanishes(run.measured, run.time) for run, _ in held_out):
         return None
     errors = np.array(
         [
@@ -71,41 +121,14 @@ def percent(plant: GreyBox, outputs: list[NDArray]) -> Mapping[str, float] | Non
             for run, y in held_out
         ]
     )
-    found = {c.name: float(total_error(list(errors[:, i]))) for i, c in enumerate(plant.channels)}
+    by_channel = {
+        channel.name: float(total_error(list(errors[:, i]))) for i, channel in enumerate(plant.channels)
+    }
     overall = total_error([partial_error(list(run)) for run in errors])
-    return {name: 100 * error for name, error in {**found, "overall": float(overall)}.items()}
+    return {name: 100 * error for name, error in {**by_channel, "overall": float(overall)}.items()}
 
 
-def _centred(measured: NDArray, time: NDArray) -> bool:
-    """Whether the time mean of a channel is as good as zero."""
+def _mean_vanishes(measured: NDArray, time: NDArray) -> bool:
+    """Whether the time mean of a channel of readings (channels, samples) is zero but for rounding."""
     means = trapezoid(measured, time) / (time[-1] - time[0])
     return bool(np.any(np.abs(means) <= 1e-6 * np.max(np.abs(measured), axis=1)))
-
-
-def _linear(fitter: Fitter, point: Point, local: NDArray) -> tuple[list[NDArray], list[Linear]]:
-    """Outputs, and the runs linearised in their own numbers and the tolerances alone."""
-    nuisances, frame = point.hypothesis.local, fitter.frame_of(point)
-    n = 1 + len(nuisances)
-    values = fitter.columns([point] * n)
-    for j, nuisance in enumerate(nuisances):
-        values[nuisance.symbol] = np.tile(nuisance.centre + local[:, j], (n, 1))
-        values[nuisance.symbol][1 + j] += nuisance.step
-    outputs = fitter.plant.outputs(values, fitter.everything)
-    steps = np.array([nuisance.step for nuisance in nuisances])
-    runs = []
-    for r, output in enumerate(outputs):
-        flat = weighted(fitter.plant, r, output).reshape(-1, n)
-        starts = frame.starts[r]
-        known = fitter.plant.starts[: starts.shape[1]]
-        runs.append(
-            Linear(
-                residual=np.nan_to_num(fitter.target[r] - flat[:, 0], nan=LOST)
-                + frame.shared[r] @ frame.at,
-                slopes=np.zeros((len(flat), 0)),
-                local=np.column_stack([np.nan_to_num(flat[:, 1:] - flat[:, :1]) / steps, starts]),
-                local_value=np.concatenate([local[r], np.zeros(starts.shape[1])]),
-                local_sd=np.array([nuisance.sd for nuisance in (*nuisances, *known)]),
-                shared=frame.shared[r],
-            )
-        )
-    return [output[..., 0] for output in outputs], runs

@@ -1,4 +1,9 @@
-"""Normal equations of a fit whose nuisances are eliminated: per run its own, then the shared ones."""
+"""Variable projection: nuisance parameters are minimised over, each run's own first, then tolerances.
+
+The residuals are linear in the nuisance parameters, whose Gaussian priors add rows to the least-squares
+problem. Eliminating them from the normal equations leaves equations in the parameters of interest alone
+(Golub and Pereyra 1973; Schur complement).
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,144 +12,184 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-FARTHEST = 3.0
-"""Standard deviations by which a tolerance, or a run's own number, may differ from its centre."""
-
 
 @dataclass(frozen=True, kw_only=True)
-class Linear:
-    """A hypothesis linearised in one run; everything in noise deviations, trusted samples or 0."""
+class LinearisedRun:
+    """A hypothesis linearised in one run; values are weighted readings, 0 where they do not count.
+
+    k parameters, l nuisance parameters of the run, m tolerances.
+    """
 
     residual: NDArray
-    """measured - model, (values,)."""
+    """measured - model, (values,) [noise deviations]."""
     slopes: NDArray
-    """Derivatives of the model by the scaled vector, (values, k)."""
-    local: NDArray
-    """Derivatives by the run's own numbers, (values, l)."""
-    local_value: NDArray
-    """Their present values less their centres, (l,)."""
-    local_sd: NDArray
-    """Their standard deviations, (l,)."""
-    shared: NDArray
-    """Derivatives by the tolerances, each divided by its standard deviation, (values, m)."""
+    """Derivatives of the model by the scaled vector, (values, k) [noise deviations]."""
+    run_slopes: NDArray
+    """Derivatives by the run's nuisance parameters: run parameters of causes, then run offsets,
+    (values, l) [noise deviations/SI]."""
+    run_values: NDArray
+    """Present values of these, less their centres, (l,) [SI]."""
+    run_sd: NDArray
+    """Standard deviations of these, (l,) [SI]."""
+    tolerance_slopes: NDArray
+    """Derivatives by the tolerances, (values, m) [noise deviations/standard deviation]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Normal:
-    """Least squares in steps d of the vector and tolerances x; the runs' own numbers are minimised over.
+class NormalEquations:
+    """Least squares in steps d of the vector; nuisance parameters are minimised over.
 
-    For Gaussian tolerances: 0.5 d' hessian d - gradient d + 0.5 least over d.
+    For unbounded tolerances the sum of squares is d' hessian d - 2 gradient d + least.
     """
 
     gram: NDArray
-    """Of the residual, slopes and shared, with the priors of the last, (1 + k + m, 1 + k + m)."""
+    """Gram matrix of residual, slopes and tolerance slopes, with the priors of the tolerances,
+    (1 + k + m, 1 + k + m) [1]."""
     hessian: NDArray
+    """Gauss-Newton Hessian of half the sum of squares, (k, k) [1]."""
     gradient: NDArray
+    """Its negative gradient at no step, (k,) [1]."""
     least: float
-    """Sum of squares at no step, with tolerances of any size."""
+    """Sum of squares at no step, with unbounded tolerances [1]."""
     chi_square: float
-    """The same with tolerances within FARTHEST."""
-    shared: NDArray
-    """These tolerances, in standard deviations, (m,)."""
+    """Sum of squares at no step, with bounded tolerances [1]."""
+    tolerances: NDArray
+    """The tolerances that minimise `chi_square`, (m,) [standard deviations]."""
+    largest_deviation: float
+    """Bound of the tolerances [standard deviations]."""
 
     def step(self, low: NDArray, high: NDArray, damping: float) -> tuple[NDArray, float]:
-        """Best step between low and high (k,) with tolerances within FARTHEST, and what it gains.
+        """Best bounded step and the decrease of chi-square that it promises.
 
-        damping: of Levenberg and Marquardt, relative to the diagonal.
+        Args:
+            low: lower bounds of the step, (k,) [1].
+            high: upper bounds of the step, (k,) [1].
+            damping: of Levenberg and Marquardt, relative to the diagonal [1].
+
+        Returns:
+            The step (k,) [1], with tolerances within their bounds, and the predicted decrease [1].
         """
-        k, m = len(low), len(self.shared)
+        k, m = len(low), len(self.tolerances)
         matrix = self.gram[1:, 1:].copy()
         damped = np.arange(k)
         matrix[damped, damped] *= 1.0 + damping
         matrix[damped, damped] += 1e-9
-        farthest = np.full(m, FARTHEST)
-        ends = np.concatenate([low, -farthest]), np.concatenate([high, farthest])
-        best = _within(matrix, self.gram[1:, 0], *ends)
-        left = _left(self.gram, best)
-        return best[:k], self.chi_square - left
+        bound = np.full(m, self.largest_deviation)
+        ends = np.concatenate([low, -bound]), np.concatenate([high, bound])
+        best = _bounded_minimiser(matrix, self.gram[1:, 0], *ends)
+        return best[:k], self.chi_square - _sum_of_squares(self.gram, best)
 
 
-def normal(runs: Sequence[Linear]) -> Normal:
-    """Sum over runs; numbers that are no parameters are minimised over, with their priors."""
-    k, m = runs[0].slopes.shape[1], runs[0].shared.shape[1]
-    gram = np.sum([_reduced(run) for run in runs], axis=0)
-    # order: residual, slopes, shared
-    shared = np.arange(1 + k, 1 + k + m)
-    gram[shared, shared] += 1.0
-    free = _eliminated(gram, shared, np.arange(1 + k))
-    farthest = np.full(m, FARTHEST)
-    own = gram[np.ix_(shared, shared)]
-    x = _within(own, gram[shared, 0], -farthest, farthest)
-    return Normal(
+def normal_equations(runs: Sequence[LinearisedRun], largest_deviation: float) -> NormalEquations:
+    """Normal equations of several runs together.
+
+    Args:
+        runs: the same hypothesis linearised in each of them.
+        largest_deviation: bound of the tolerances [standard deviations].
+    """
+    k, m = runs[0].slopes.shape[1], runs[0].tolerance_slopes.shape[1]
+    gram = np.sum([_gram_without_run_nuisances(run) for run in runs], axis=0)
+    # Columns: residual, slopes, tolerance slopes.
+    tolerances = np.arange(1 + k, 1 + k + m)
+    gram[tolerances, tolerances] += 1.0
+    free = _eliminated(gram, tolerances, np.arange(1 + k))
+    bound = np.full(m, largest_deviation)
+    own = gram[np.ix_(tolerances, tolerances)]
+    best = _bounded_minimiser(own, gram[tolerances, 0], -bound, bound)
+    return NormalEquations(
         gram=gram,
         hessian=free[1:, 1:],
         gradient=free[1:, 0],
         least=float(free[0, 0]),
-        chi_square=_left(gram, np.concatenate([np.zeros(k), x])),
-        shared=x,
+        chi_square=_sum_of_squares(gram, np.concatenate([np.zeros(k), best])),
+        tolerances=best,
+        largest_deviation=largest_deviation,
     )
 
 
-def _left(gram: NDArray, numbers: NDArray) -> float:
+def without_run_nuisances(
+    run: LinearisedRun, tolerances: NDArray, largest_deviation: float
+) -> tuple[NDArray, NDArray]:
+    """Residual of a run less what its nuisance parameters explain, and the step to their best values.
+
+    A deviation beyond the bound is no nuisance: it stays in the residual.
+
+    Args:
+        run: the linearised run.
+        tolerances: given tolerances, (m,) [standard deviations].
+        largest_deviation: bound of the run's nuisance parameters [standard deviations].
+
+    Returns:
+        Residual (values,) [noise deviations] and step of the nuisance parameters (l,) [SI].
+    """
+    residual = run.residual - run.tolerance_slopes @ tolerances
+    if not run.run_slopes.size:
+        return residual, np.zeros(0)
+    gram = run.run_slopes.T @ run.run_slopes
+    moment = run.run_slopes.T @ residual + gram @ run.run_values
+    bound = largest_deviation * run.run_sd
+    value = _bounded_minimiser(gram + np.diag(1.0 / run.run_sd**2), moment, -bound, bound)
+    step = value - run.run_values
+    return residual - run.run_slopes @ step, step
+
+
+def tolerances_as_slopes(run: LinearisedRun) -> LinearisedRun:
+    """The run with its tolerances appended to the parameters, (values, k + m), and none left."""
+    return LinearisedRun(
+        residual=run.residual,
+        slopes=np.column_stack([run.slopes, run.tolerance_slopes]),
+        run_slopes=run.run_slopes,
+        run_values=run.run_values,
+        run_sd=run.run_sd,
+        tolerance_slopes=np.zeros((len(run.residual), 0)),
+    )
+
+
+def _sum_of_squares(gram: NDArray, numbers: NDArray) -> float:
     """Sum of squares after the numbers have taken their share of the residual in row 0."""
     return float(gram[0, 0] - 2 * numbers @ gram[1:, 0] + numbers @ gram[1:, 1:] @ numbers)
 
 
-def _within(matrix: NDArray, right: NDArray, low: NDArray, high: NDArray) -> NDArray:
-    """Minimiser of 0.5 x' matrix x - right x between low and high (bounded least squares)."""
-    if not len(right):
+def _bounded_minimiser(matrix: NDArray, moment: NDArray, low: NDArray, high: NDArray) -> NDArray:
+    """Minimiser (n,) of 0.5 x' matrix x - moment x between low and high (bounded least squares)."""
+    if not len(moment):
         return np.zeros(0)
     scale = 1.0 / np.sqrt(np.diag(matrix))
     try:
         root = np.linalg.cholesky(matrix * np.outer(scale, scale)).T
-    except np.linalg.LinAlgError:  # slopes that are the same but for rounding
+    except np.linalg.LinAlgError:  # columns that are equal but for rounding
         eigenvalues, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
         root = np.sqrt(np.maximum(eigenvalues, 1e-14))[:, None] * vectors.T
-    aim = np.linalg.solve(root.T, right * scale)
+    target = np.linalg.solve(root.T, moment * scale)
     widest = np.maximum(high - low, np.finfo(float).tiny)
-    found = lsq_linear(root, aim, (low / scale, (low + widest) / scale), method="bvls")
-    return np.clip(found.x * scale, low, high)
+    solution = lsq_linear(root, target, (low / scale, (low + widest) / scale), method="bvls")
+    return np.clip(solution.x * scale, low, high)
 
 
-def _moved(gram: NDArray, which: NDArray, by: NDArray) -> NDArray:
-    """Gram matrix whose residual, in row 0, has these columns times `by` taken away."""
-    moved = gram.copy()
-    moved[0] -= by @ gram[which]
-    moved[:, 0] -= moved[:, which] @ by
-    return moved
+def _shifted(gram: NDArray, columns: NDArray, amounts: NDArray) -> NDArray:
+    """Gram matrix after these columns times `amounts` are subtracted from the residual in row 0."""
+    shifted = gram.copy()
+    shifted[0] -= amounts @ gram[columns]
+    shifted[:, 0] -= shifted[:, columns] @ amounts
+    return shifted
 
 
-def _eliminated(gram: NDArray, which: NDArray, kept: NDArray) -> NDArray:
+def _eliminated(gram: NDArray, columns: NDArray, kept: NDArray) -> NDArray:
     """Gram matrix of the kept columns after minimising over the others (Schur complement)."""
-    cross = gram[np.ix_(which, kept)]
-    return gram[np.ix_(kept, kept)] - cross.T @ np.linalg.solve(gram[np.ix_(which, which)], cross)
+    cross = gram[np.ix_(columns, kept)]
+    own = gram[np.ix_(columns, columns)]
+    return gram[np.ix_(kept, kept)] - cross.T @ np.linalg.solve(own, cross)
 
 
-def _reduced(run: Linear) -> NDArray:
-    """Gram matrix of residual, slopes and shared after the run's own numbers are minimised over."""
-    columns = np.column_stack([run.residual, run.slopes, run.shared, run.local])
+def _gram_without_run_nuisances(run: LinearisedRun) -> NDArray:
+    """Gram matrix of residual, slopes and tolerance slopes, the run's own nuisances minimised over."""
+    columns = np.column_stack([run.residual, run.slopes, run.tolerance_slopes, run.run_slopes])
     gram = columns.T @ columns
-    count, own = len(gram) - len(run.local_sd), len(run.local_sd)
+    own, count = len(run.run_sd), len(gram) - len(run.run_sd)
     if not own:
         return gram
-    local = np.arange(count, count + own)
-    # The numbers themselves, from their centres, stand in the place of steps from where they are.
-    gram = _moved(gram, local, -run.local_value)
-    gram[local, local] += 1.0 / run.local_sd**2
-    return _eliminated(gram, local, np.arange(count))
-
-
-def freed(run: Linear, shared: NDArray) -> tuple[NDArray, NDArray]:
-    """Residual (values,) at given tolerances, less what the run's own explain; their step.
-
-    What would need a number beyond FARTHEST is no nuisance and stays in the residual.
-    """
-    residual = run.residual - run.shared @ shared
-    if not run.local.size:
-        return residual, np.zeros(0)
-    own = run.local.T @ run.local
-    pull = run.local.T @ residual + own @ run.local_value
-    farthest = FARTHEST * run.local_sd
-    value = _within(own + np.diag(1.0 / run.local_sd**2), pull, -farthest, farthest)
-    step = value - run.local_value
-    return residual - run.local @ step, step
+    nuisances = np.arange(count, count + own)
+    # Unknowns become the nuisances' distances from their centres instead of steps from present values.
+    gram = _shifted(gram, nuisances, -run.run_values)
+    gram[nuisances, nuisances] += 1.0 / run.run_sd**2
+    return _eliminated(gram, nuisances, np.arange(count))

@@ -1,9 +1,9 @@
-"""How a forcing may vary from window to window, and what speaks for it: Gaussian processes, evidence.
+"""Gaussian processes of the forcing: how it may vary from window to window, and their evidence.
 
-A missing term is either a function of one state, or a course of its own in time. Each guess is a
-Gaussian process over the windows; its amplitude is integrated over (a logarithmic grid). Where a forcing
-leaves more than noise, what it leaves stands in for the noise: an equation that explains half of a large
-misfit does not win by the size of the misfit alone.
+A missing term is a function of one state or varies in time. Each assumption is a Gaussian process over
+the windows (Rasmussen and Williams 2006), whose evidence is averaged over a grid of amplitudes. Where a
+forcing leaves more than noise, the remaining mean square replaces the noise variance. So an equation
+that explains half of a large residual does not win by the size of the residual alone.
 """
 
 from collections.abc import Sequence
@@ -13,136 +13,148 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from identification.gap.locate.forcing import Material, Needed, Window
-
-AMPLITUDES = np.logspace(-3, 9, 37)
-"""Variances of a forcing, relative to what the readings tell of it on the average."""
-
-LENGTH = 0.2
-"""Over which a function of a state varies, relative to the state's range."""
-
-ROUGH = 1e-3
-"""Variance, relative to the whole, by which single windows may depart from a smooth course."""
-
-MEMORY = 0.02
-"""Over which a slow course in time varies, relative to the longest run's duration."""
-
-TOLD = 1e-7
-"""Share of the best-told direction's precision below which a direction of forcings is left out."""
-
-RIVAL = 0.5
-"""Equations that explain less than this share of what the best one does are not looked at closely."""
+from identification.gap.locate.forcing import LocalisationDesign, QuadraticForm
+from identification.gap.locate.settings import LocalisationSettings
+from identification.gap.locate.windows import Window
 
 FREE, SLOW = "free", "slow"
-"""Courses in time: each window on its own, or like its neighbours; other courses bear a state's name."""
+"""Processes in time: independent windows, or neighbours alike. Other processes bear a state's name."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Course:
-    """One guess of how the forcing varies, with the forcing that it estimates."""
+class ProcessFit:
+    """A Gaussian process fitted to the forcing of one equation."""
 
-    needed: Needed
+    form: QuadraticForm
     kind: str
-    """FREE, SLOW, or the state whose function it is."""
+    """FREE, SLOW, or the name of the state whose function the forcing is."""
     log_evidence: float
-    """Relative to no forcing."""
+    """Natural logarithm, relative to no forcing."""
     explained: float
-    """Share of chi-square that the forcing takes away."""
+    """Share of chi-square that the forcing removes [1]."""
     forcing: NDArray
-    """Estimate in each window, in steps of the equation, (windows,)."""
+    """Posterior mean of the forcing, (windows,) [steps of the equation]."""
     sd: NDArray
+    """Its posterior standard deviation, (windows,) [steps of the equation]."""
     smooth: NDArray
-    """The same without what single windows have of their own."""
+    """Posterior mean of its smooth part, without what single windows have of their own, (windows,)
+    [steps of the equation]."""
     smooth_sd: NDArray
+    """Posterior standard deviation of the smooth part, (windows,) [steps of the equation]."""
     smooth_explained: float
-    """As `explained`, by that part alone."""
+    """Share of chi-square that the smooth part removes alone [1]."""
 
 
-def courses(forms: Sequence[Needed], material: Material) -> list[list[Course]]:
-    """Every guess for each equation, its likeliest first.
+def fit_processes(
+    forms: Sequence[QuadraticForm], design: LocalisationDesign, settings: LocalisationSettings
+) -> list[list[ProcessFit]]:
+    """Every process for each equation, by falling evidence.
 
     Functions of states are tried only for equations that explain about as much as the best one.
     """
-    told = [_Told(form) for form in forms]
-    found = [
-        [_course(each, material, kind) for kind in ((FREE, SLOW) if form.windows else (FREE,))]
-        for form, each in zip(forms, told, strict=True)
+    subspaces = [IdentifiableSubspace(form, settings.identifiable_share) for form in forms]
+    fits = [
+        [_fit(own, design, kind, settings) for kind in ((FREE, SLOW) if own.form.windows else (FREE,))]
+        for own in subspaces
     ]
-    enough = RIVAL * max(mine[0].explained for mine in found)
-    for form, each, mine in zip(forms, told, found, strict=True):
-        if form.windows and mine[0].explained >= enough:
-            mine += [_course(each, material, state) for state in material.units]
-        mine.sort(key=lambda course: -course.log_evidence)
-    return found
+    enough = settings.rival_share * max(own_fits[0].explained for own_fits in fits)
+    for subspace, own_fits in zip(subspaces, fits, strict=True):
+        if subspace.form.windows and own_fits[0].explained >= enough:
+            own_fits += [_fit(subspace, design, state, settings) for state in design.units]
+        own_fits.sort(key=lambda fit: -fit.log_evidence)
+    return fits
 
 
-def averaged(found: Sequence[Course]) -> float:
-    """Log evidence of an equation whose courses are equally likely beforehand."""
-    return float(logsumexp([course.log_evidence for course in found]) - np.log(len(found)))
+def average_log_evidence(fits: Sequence[ProcessFit]) -> float:
+    """Log evidence of an equation whose processes are equally likely before the data."""
+    return float(logsumexp([fit.log_evidence for fit in fits]) - np.log(len(fits)))
 
 
-class _Told:
-    """An equation's forcings in the directions that the readings tell: precision = root root'."""
+class IdentifiableSubspace:
+    """The d directions of an equation's forcings that the readings determine."""
 
-    def __init__(self, form: Needed):
+    def __init__(self, form: QuadraticForm, least_share: float):
+        """Keep the directions with at least this share of the highest precision [1]."""
         precision, axes = np.linalg.eigh(form.precision)
-        kept = precision > TOLD * max(precision[-1], np.finfo(float).tiny)
+        kept = precision > least_share * max(precision[-1], np.finfo(float).tiny)
         self.form = form
         self.root = axes[:, kept] * np.sqrt(precision[kept])
-        self.pull = (axes[:, kept].T @ form.pull) / np.sqrt(precision[kept])
+        """Square root of the precision, precision = root root', (windows, d)."""
+        self.moment = (axes[:, kept].T @ form.moment) / np.sqrt(precision[kept])
+        """Moment of the whitened directions, (d,)."""
 
 
-def _covariance(form: Needed, kind: str) -> tuple[NDArray, float]:
-    """Covariance of the smooth part between windows, and variance of each window's own part."""
-    m, windows = len(form.pull), form.windows
+def _covariance(form: QuadraticForm, kind: str, settings: LocalisationSettings) -> tuple[NDArray, float]:
+    """Prior covariance of the smooth part (windows, windows), and variance of each window's own part."""
+    count, windows = len(form.moment), form.windows
     if kind == FREE:
-        return np.zeros((m, m)), 1.0
+        return np.zeros((count, count)), 1.0
     if kind == SLOW:
-        return _slow(windows), ROUGH
+        return _slow_covariance(windows, settings.time_memory), settings.rough_variance
     x = np.array([window.states[kind] for window in windows])
-    distance = (x[:, None] - x) / (LENGTH * max(float(np.ptp(x)), np.finfo(float).tiny))
-    return np.exp(-0.5 * distance**2), ROUGH
+    length = settings.state_length * max(float(np.ptp(x)), np.finfo(float).tiny)
+    distance = (x[:, None] - x) / length
+    return np.exp(-0.5 * distance**2), settings.rough_variance
 
 
-def _slow(windows: Sequence[Window]) -> NDArray:
+def _slow_covariance(windows: Sequence[Window], time_memory: float) -> NDArray:
+    """Exponential covariance in time within each run, (windows, windows) [1]."""
     run = np.array([window.run for window in windows])
     time = np.array([0.5 * (window.begin + window.end) for window in windows])
-    memory = MEMORY * max(window.end for window in windows)
+    memory = time_memory * max(window.end for window in windows)
     return np.where(run[:, None] == run, np.exp(-np.abs(time[:, None] - time) / memory), 0.0)
 
 
-def _course(told: _Told, material: Material, kind: str) -> Course:
-    """Evidence over the amplitudes, and the forcing at the likeliest of them."""
-    smooth, own = _covariance(told.form, kind)
-    part = smooth @ told.root
-    full = part + own * told.root
-    strength, axes = np.linalg.eigh(told.root.T @ full)
+def _fit(
+    subspace: IdentifiableSubspace,
+    design: LocalisationDesign,
+    kind: str,
+    settings: LocalisationSettings,
+) -> ProcessFit:
+    """Evidence averaged over the amplitudes, and the forcing at the most likely amplitude."""
+    smooth, own = _covariance(subspace.form, kind, settings)
+    smooth_root = smooth @ subspace.root
+    root = smooth_root + own * subspace.root
+    strength, axes = np.linalg.eigh(subspace.root.T @ root)
     strength = np.maximum(strength, 0.0)
-    pull = axes.T @ told.pull
-    # Where no reading tells of this forcing there is no strength, and any amplitude will do.
-    amplitude = AMPLITUDES / (np.mean(strength) if np.any(strength) else 1.0)
-    shrunk = amplitude[:, None] / (1.0 + amplitude[:, None] * strength)
-    explained = (shrunk * strength) @ pull**2
-    n, chi_square = material.count, material.chi_square
-    noise = np.maximum(1.0, (chi_square - explained) / n)
-    before = max(1.0, chi_square / n)
-    evidence = 0.5 * (
-        chi_square / before - (chi_square - explained) / noise - n * np.log(noise / before)
-        - np.sum(np.log1p(amplitude[:, None] * strength), axis=1)
-    )  # fmt: skip
+    moment = axes.T @ subspace.moment
+    # Where no reading tells of this forcing every strength is 0, and any amplitude will do.
+    grid = np.logspace(*settings.amplitude_decades, settings.amplitudes)
+    amplitudes = grid / (np.mean(strength) if np.any(strength) else 1.0)
+    weights = amplitudes[:, None] / (1.0 + amplitudes[:, None] * strength)
+    explained = (weights * strength) @ moment**2
+    noise = np.maximum(1.0, (design.chi_square - explained) / design.readings)
+    volume = np.sum(np.log1p(amplitudes[:, None] * strength), axis=1)
+    evidence = _log_evidences(design, explained, noise, volume)
     best = int(np.argmax(evidence))
-    weight, scale = shrunk[best], amplitude[best] * noise[best]
-    part, full = part @ axes, full @ axes
-    curve = part @ (weight * pull)
-    form = told.form
-    return Course(
-        needed=form,
+    weight, scale = weights[best], amplitudes[best] * noise[best]
+    smooth_root, root = smooth_root @ axes, root @ axes
+    curve = smooth_root @ (weight * moment)
+    form, variance = subspace.form, np.diag(smooth)
+    smooth_explained = (2 * form.moment - form.precision @ curve) @ curve / design.chi_square
+    return ProcessFit(
+        form=form,
         kind=kind,
         log_evidence=float(logsumexp(evidence) - np.log(len(evidence))),
-        explained=float(explained[best] / chi_square),
-        forcing=full @ (weight * pull),
-        sd=np.sqrt(scale * np.maximum(np.diag(smooth) + own - full**2 @ weight, 0.0)),
+        explained=float(explained[best] / design.chi_square),
+        forcing=root @ (weight * moment),
+        sd=np.sqrt(scale * np.maximum(variance + own - root**2 @ weight, 0.0)),
         smooth=curve,
-        smooth_sd=np.sqrt(scale * np.maximum(np.diag(smooth) - part**2 @ weight, 0.0)),
-        smooth_explained=float((2 * form.pull - form.precision @ curve) @ curve / chi_square),
+        smooth_sd=np.sqrt(scale * np.maximum(variance - smooth_root**2 @ weight, 0.0)),
+        smooth_explained=float(smooth_explained),
+    )
+
+
+def _log_evidences(
+    design: LocalisationDesign, explained: NDArray, noise: NDArray, volume: NDArray
+) -> NDArray:
+    """Log evidence at each amplitude, relative to no forcing, (amplitudes,).
+
+    explained: decrease of chi-square. noise: variance of what is left, at least 1. volume: log
+    determinant of the prior's widening.
+    """
+    n, chi_square = design.readings, design.chi_square
+    before = max(1.0, chi_square / n)
+    return 0.5 * (
+        chi_square / before - (chi_square - explained) / noise - n * np.log(noise / before) - volume
     )

@@ -1,7 +1,7 @@
-"""Faults of the readings as further places of a gap: no state equation, but what the outputs become.
+"""Faults of the readings: sensors and a clock as further places of a gap, beside the state equations.
 
-A sensor that reads too much or too late, and a clock that is late in every channel: differences of the
-model's own outputs, linear in the sizes of a few forms that together come near any of them.
+A sensor may read too much or too late, and a clock may be late in all channels. Each fault is a sum of
+a few forms, differences of the model's own outputs, that together come near any fault of its kind.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,82 +11,105 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from identification.gap.model.grey_box import Equation, GreyBox, weighted
-
-LAGS = (1, 3, 10, 30)
-"""Time constants, in samples, whose first-order lags stand for any."""
-
-DELAYS = (1, 2, 4, 8, 16)
-"""Delays, in samples, that stand for any."""
+from identification.gap.locate.settings import LocalisationSettings
+from identification.gap.model.grey_box import GreyBox, noise_weighted
+from identification.gap.model.state_equation import StateEquation
 
 TIMING = "timing"
-"""Name of the place where all channels come late together."""
+"""Name of the place where all channels are late together."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fault:
+class ReadingFault:
     """One fault of the readings."""
 
-    place: Equation
+    place: StateEquation
     """Its name and component, as if it were an equation."""
     changes: list[NDArray]
-    """What each form changes, per run (values, forms), in noise deviations."""
-    signed: NDArray
-    """Which forms may have either sign, boolean (forms,)."""
+    """Change of the outputs by each form, per run (values, forms) [noise deviations]."""
+    either_sign: NDArray
+    """Forms that may have either sign, boolean (forms,); others are positive."""
 
 
-def faults(plant: GreyBox, values: Mapping[str, NDArray], runs: Sequence[int]) -> list[Fault]:
-    """Every fault that is possible."""
+def reading_faults(
+    plant: GreyBox,
+    values: Mapping[str, NDArray],
+    runs: Sequence[int],
+    settings: LocalisationSettings,
+) -> list[ReadingFault]:
+    """A fault of every sensor, and one of the clock.
+
+    Args:
+        plant: the model and its recordings.
+        values: one candidate's values by symbol, (1,) or (1, runs) [SI].
+        runs: indices of the runs.
+        settings: lags and delays of the forms.
+    """
     outputs = [np.nan_to_num(block[:, :, 0]) for block in plant.outputs(values, runs)]
-    found = []
-    for c, channel in enumerate(plant.channels):
-        changes = [np.zeros((*y.shape, 1 + len(LAGS))) for y in outputs]
-        for change, y in zip(changes, outputs, strict=True):
-            change[c] = np.stack([y[c], *(_lagging(y[c], lag) for lag in LAGS)], axis=1)
-        name = f"reading {channel.name}"
-        signed = np.arange(1 + len(LAGS)) == 0
-        found.append(Fault(place=_place(name, "sensor"), changes=changes, signed=signed))
-    late = [np.stack([_late(y, delay) for delay in DELAYS], axis=2) for y in outputs]
-    signed = np.zeros(len(DELAYS), dtype=bool)
-    found.append(Fault(place=_place(TIMING, "timing"), changes=late, signed=signed))
-    return [replace(fault, changes=_flat(plant, runs, fault.changes)) for fault in found]
+    faults = [
+        ReadingFault(
+            place=_place(f"reading {channel.name}", "sensor"),
+            changes=[_sensor_forms(y, c, settings.lags) for y in outputs],
+            either_sign=np.arange(1 + len(settings.lags)) == 0,
+        )
+        for c, channel in enumerate(plant.channels)
+    ]
+    late = [np.stack([_delay_change(y, d) for d in settings.delays], axis=2) for y in outputs]
+    either_sign = np.zeros(len(settings.delays), dtype=bool)
+    clock = ReadingFault(place=_place(TIMING, "timing"), changes=late, either_sign=either_sign)
+    return [replace(fault, changes=_weighted(plant, runs, fault.changes)) for fault in (*faults, clock)]
 
 
-def _flat(plant: GreyBox, runs: Sequence[int], changes: Sequence[NDArray]) -> list[NDArray]:
+def _sensor_forms(outputs: NDArray, channel: int, lags: Sequence[int]) -> NDArray:
+    """Changes by gain error and lags of one channel, (channels, samples, forms) [SI].
+
+    outputs: (channels, samples) [SI]. lags: [samples].
+    """
+    changes = np.zeros((*outputs.shape, 1 + len(lags)))
+    y = outputs[channel]
+    changes[channel] = np.stack([y, *(_lag_change(y, lag) for lag in lags)], axis=1)
+    return changes
+
+
+def _weighted(plant: GreyBox, runs: Sequence[int], changes: Sequence[NDArray]) -> list[NDArray]:
+    """Changes (channels, samples, forms) [SI] as (values, forms) [noise deviations], run by run."""
     return [
-        weighted(plant, r, change).reshape(-1, change.shape[-1])
+        noise_weighted(plant, r, change).reshape(-1, change.shape[-1])
         for r, change in zip(runs, changes, strict=True)
     ]
 
 
-def physical(pull: NDArray, precision: NDArray, signed: NDArray) -> NDArray:
-    """Which forms a fault may have, boolean (forms,): a sensor may lag but not lead.
+def physical_forms(moment: NDArray, precision: NDArray, either_sign: NDArray) -> NDArray:
+    """Forms that a fault may have, boolean (forms,): a sensor may lag but not lead.
 
-    signed: which forms may have either sign. Forms that would take a size below zero are struck, the
-    most negative one first.
+    Forms whose size would be negative are struck, the most negative one first.
+
+    Args:
+        moment: (forms,) [1].
+        precision: (forms, forms) [1].
+        either_sign: forms that may have either sign, boolean (forms,).
     """
-    kept = np.ones(len(pull), dtype=bool)
+    kept = np.ones(len(moment), dtype=bool)
     while np.any(kept):
-        sizes = np.where(
-            signed[kept], np.inf, np.linalg.lstsq(precision[np.ix_(kept, kept)], pull[kept])[0]
-        )
+        best = np.linalg.lstsq(precision[np.ix_(kept, kept)], moment[kept])[0]
+        sizes = np.where(either_sign[kept], np.inf, best)
         if np.min(sizes) >= 0:
             break
         kept[np.flatnonzero(kept)[np.argmin(sizes)]] = False
     return kept
 
 
-def _place(name: str, component: str) -> Equation:
-    return Equation(name=name, state="", component=component, unit="", step=1.0)
+def _place(name: str, component: str) -> StateEquation:
+    return StateEquation(name=name, state="", component=component, unit="", step=1.0)
 
 
-def _lagging(y: NDArray, lag: float) -> NDArray:
-    """What a first-order lag of `lag` samples takes from a series (samples,)."""
+def _lag_change(y: NDArray, lag: float) -> NDArray:
+    """Change of a series (samples,) by a first-order lag of `lag` samples."""
     keep = np.exp(-1.0 / lag)
     return np.asarray(lfilter([1.0 - keep], [1.0, -keep], y - y[0])) + y[0] - y
 
 
-def _late(y: NDArray, delay: int) -> NDArray:
-    """What a delay of `delay` samples changes in series (channels, samples)."""
+def _delay_change(y: NDArray, delay: int) -> NDArray:
+    """Change of series (channels, samples) by a delay of `delay` samples."""
     held = np.repeat(y[:, :1], delay, axis=1)
     return np.concatenate([held, y[:, :-delay]], axis=1) - y

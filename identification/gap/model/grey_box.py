@@ -1,188 +1,104 @@
 """The protocol by which the diagnosis knows a plant: channels, parameters, causes, a simulator."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-
-@dataclass(frozen=True, kw_only=True)
-class Channel:
-    """One measured output."""
-
-    name: str
-    unit: str
-    """In which people read it."""
-    scale: float
-    """Size of that unit in SI."""
-    noise: float
-    """Standard deviation of the readings about the true value [SI], from the recordings themselves."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Run:
-    """One recording as the diagnosis sees it."""
-
-    name: str
-    held_out: bool
-    """Never fitted to: the gap and its shrinking are judged on these runs."""
-    time: NDArray
-    """(samples,) [s]."""
-    measured: NDArray
-    """(channels, samples) [SI]."""
-    trusted: NDArray
-    """Which readings count, boolean (channels, samples): not those of the instant of a switching."""
-    inputs: Mapping[str, NDArray]
-    """What acts on the plant, (samples,) by name [SI], for figures and the black box."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Size:
-    """A number that may be fitted: a parameter of the model, or what sizes a cause."""
-
-    symbol: str
-    unit: str
-    low: float
-    high: float
-    """Ends of the physical range [SI]."""
-    off: float = 0.0
-    """Value in the nominal model."""
-    trials: tuple[float, ...] = ()
-    """Values from which a search for a cause's size begins; () for a parameter: from `off`."""
-    scale: float = 1.0
-    """Usual size, by which an optimiser sees it divided."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Nuisance:
-    """What no recording tells exactly and is no gap either: known up to a standard deviation."""
-
-    symbol: str
-    sd: float
-    """Standard deviation about `centre` [SI]."""
-    centre: float = 0.0
-    step: float
-    """Change for a finite difference [SI]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Cause:
-    """One way in which the nominal model may be wrong."""
-
-    name: str
-    """As in the catalogue; several variants of a cause share it."""
-    component: str
-    sizes: tuple[Size, ...]
-    local: tuple[Nuisance, ...] = ()
-    """Numbers of the cause that every run has its own of."""
-    prior: float = 1.0
-    """Probability before any data, relative to the other causes."""
-    variant: str = ""
-    exact: bool = False
-    """Its form is not in doubt: a number of the model that is off."""
-
-    @property
-    def label(self) -> str:
-        """Name and variant."""
-        return f"{self.name} ({self.variant})" if self.variant else self.name
-
-
-@dataclass(frozen=True, kw_only=True)
-class Equation:
-    """One state equation, to which a forcing may be added where physics is missing."""
-
-    name: str
-    state: str
-    """Whose rate it gives, as in `GreyBox.states`."""
-    component: str
-    unit: str
-    """Of the forcing, as people read it."""
-    scale: float = 1.0
-    """Size of that unit in SI."""
-    step: float
-    """Forcing for a finite difference [SI]; 0 for an identity such as x' = v, which lacks nothing."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Trace:
-    """A state of the model, or what follows from its states and inputs, over a run."""
-
-    unit: str
-    """In which people read it."""
-    scale: float
-    """Size of that unit in SI."""
-    values: NDArray
-    """(samples,) [SI]."""
+from identification.gap.model.cause import Cause
+from identification.gap.model.free_parameter import FreeParameter, NuisanceParameter
+from identification.gap.model.recorded_run import Channel, Run
+from identification.gap.model.state_equation import StateEquation, StateTrace
 
 
 class GreyBox(Protocol):
-    """A plant with recordings. Values are SI; n candidates are simulated side by side."""
+    """A plant with recordings. Values are SI; n candidates are simulated side by side.
+
+    Candidate values are a mapping from symbol to an array: (n,), or (n, runs) for a parameter that takes
+    a separate value in every run. A symbol that is left out has its nominal value.
+    """
 
     @property
     def channels(self) -> Sequence[Channel]:
-        """Measured outputs, in the order of every array of outputs."""
+        """Measured outputs, in the order of the first axis of every output array."""
         ...
 
     @property
     def runs(self) -> Sequence[Run]:
-        """Recordings."""
+        """Recordings; at least one of them is held out."""
         ...
 
     @property
-    def parameters(self) -> Sequence[Size]:
-        """What calibration fits; `off` is where it starts."""
+    def parameters(self) -> Sequence[FreeParameter]:
+        """Calibrated parameters; calibration begins at their nominal values."""
         ...
 
     @property
     def causes(self) -> Sequence[Cause]:
-        """What may be wrong with the model."""
+        """Catalogue of what may be wrong with the model."""
         ...
 
     @property
-    def tolerances(self) -> Sequence[Nuisance]:
-        """Other parameters, with the scatter of a unit that is as drawn; the same in every run."""
+    def tolerances(self) -> Sequence[NuisanceParameter]:
+        """Other parameters with their scatter from unit to unit; the same in every run."""
         ...
 
     @property
-    def starts(self) -> Sequence[Nuisance]:
-        """What every run has its own of: state at the start, zero of a sensor on that day."""
+    def run_offsets(self) -> Sequence[NuisanceParameter]:
+        """Nuisance parameters with a value per run: initial states, zeros of that day's sensors."""
         ...
 
     def outputs(self, values: Mapping[str, NDArray], runs: Sequence[int]) -> list[NDArray]:
-        """Model outputs for each of the runs (indices), (channels, samples, n); NaN where it fails.
+        """Simulate the runs with the given indices.
 
-        values: by symbol, (n,), or (n, runs) for what every run has its own of; a symbol that is left
-        out has its nominal value.
+        Args:
+            values: candidate values by symbol, (n,) or (n, runs) [SI].
+            runs: indices into `self.runs`.
+
+        Returns:
+            Model outputs of each of these runs, (channels, samples, n) [SI]; NaN where it fails.
         """
         ...
 
     @property
-    def equations(self) -> Sequence[Equation]:
+    def equations(self) -> Sequence[StateEquation]:
         """The model's state equations."""
         ...
 
-    def states(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, Trace]:
-        """What a missing term may depend on, from the model at one candidate's values, by name."""
+    def states(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, StateTrace]:
+        """States that a missing term may depend on, by name.
+
+        values: by symbol, (n,) or (n, runs) [SI]; the first candidate counts. run: index of the run.
+        """
         ...
 
     def regimes(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, NDArray]:
-        """In which regime the model is, boolean (samples,) by name; regimes may overlap."""
+        """Samples in each regime of the model, boolean (samples,) by name; regimes may overlap.
+
+        values: by symbol, (n,) or (n, runs) [SI]; the first candidate counts. run: index of the run.
+        """
         ...
 
     def forced(
-        self, values: Mapping[str, NDArray], equation: Equation, run: int, edges: NDArray
+        self, values: Mapping[str, NDArray], equation: StateEquation, run: int, edges: NDArray
     ) -> NDArray:
-        """Change of the outputs by the equation's step as a forcing, (channels, samples, windows).
+        """Change of the outputs under a forcing of the equation's step, window by window.
 
-        edges: first samples of the windows in which each acts alone, and the end, (windows + 1,).
+        Args:
+            values: values of one candidate by symbol, (1,) or (1, runs) [SI].
+            equation: the equation to which the forcing is added.
+            run: index into `self.runs`.
+            edges: first sample of each window, and the end of the last one, (windows + 1,).
+
+        Returns:
+            Change of the outputs, (channels, samples, windows) [SI].
         """
         ...
 
 
-def weighted(plant: GreyBox, run: int, values: NDArray) -> NDArray:
-    """Values (channels, samples, ...) in noise deviations, 0 where readings are not trusted."""
+def noise_weighted(plant: GreyBox, run: int, values: NDArray) -> NDArray:
+    """Values (channels, samples, ...) [SI] in noise standard deviations, 0 at untrusted readings."""
     noise = np.array([channel.noise for channel in plant.channels])
     mask = plant.runs[run].trusted / noise[:, None]
     return values * mask.reshape(*mask.shape, *[1] * (values.ndim - 2))

@@ -1,156 +1,181 @@
-"""Two causes at once: which partners are tried, and how likely a second cause is beside an erring form.
+"""Pairs of causes: which partners are tried, and how likely a second cause is beside an error of form.
 
-Where the form of a cause errs, any second one helps, and evidence that counts every stretch apart is
-soon sure of it, since such errors persist. So no pair is surer against its better half than experience
-allows: the blind trials of seeds 2027 and 2028, opened for it (docs/gap.md).
+Where the form of a cause errs, any second cause improves the fit. Evidence that treats every segment as
+independent soon becomes certain of the second cause, since errors of form persist. So the odds of a pair
+against its stronger member are limited by experience from the blind trials of seeds 2027 and 2028
+(docs/gap.md).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.gap.fit.fit_cache import Fits
-from identification.gap.fit.fitter import Fitter, Hypothesis, Point
-from identification.gap.rank.evidence import Assessed, assess
-from identification.gap.rank.refit import ranked, refitted, without_twins
-from identification.gap.rank.screening import screen, signatures
-
-PARTNERS, FEW = 8, 4
-"""Causes that are tried beside each of the best two, where one cause leaves too much; beside the best,
-where it does not."""
-
-WORTH = 200.0
-"""Sum of squares, beyond noise or predictable, up to which what a cause leaves is not too much."""
-
-CERTAIN = 10.0
-"""Log evidence of a cause against none from which a second one is sought at all."""
-
-EVEN = 7.5e-3
-"""Log evidence per reading that a pair gains on its better half, both beside a misfit without a name, at
-which a second cause is as likely as an error of form; the odds go with its square."""
-
-CHANCE, FAINT = 15.0, 0.12
-"""Such a gain up to which a second cause is chance, and the least odds of one that gains more: beside a
-strong cause a faint one gains little."""
-
-NEVER = 1e-6
-"""Odds of chance."""
-
-CLOSED = 0.6
-"""Share of what its better half leaves that a pair may leave at most to vouch for that half: what both
-fail to explain may have no name."""
-
-RIVAL = 3.0
-"""Times what the best cause leaves, up to which a pair is also sought beside the second best."""
+from identification.gap.fit.fit_cache import FitCache
+from identification.gap.fit.fitting_problem import FittingProblem
+from identification.gap.fit.gauss_newton import fit
+from identification.gap.fit.hypothesis import Estimate, Hypothesis
+from identification.gap.fit.linearisation import linearise
+from identification.gap.rank.evidence import EvaluatedHypothesis, evaluate
+from identification.gap.rank.refinement import best_fit_of_each, by_log_evidence, refit_with_causes
+from identification.gap.rank.screening import screen_causes, simulate_signatures
+from identification.gap.rank.settings import RankingSettings
 
 
-def pairs(
-    fitter: Fitter,
-    none: Assessed,
-    singles: list[Assessed],
-    begun: Mapping[tuple[str, ...], Point],
-    floor: float,
-    fits: Fits,
-) -> list[Assessed]:
-    """Pairs that may explain what the best causes leave; beside a cause that is CERTAIN alone.
+@dataclass(frozen=True, kw_only=True)
+class ResidualScale:
+    """How large a residual a hypothesis leaves, above that of the best hypothesis."""
 
-    begun: where each cause was before its nuisances followed what it lacks; from there a partner is seen
-    best. floor: as of `_left`.
+    lowest_excess: float
+    """Excess chi-square of the best hypothesis where the noise is known too large (below 0), else 0."""
+    settings: RankingSettings
+
+    def residual(self, evaluated: EvaluatedHypothesis) -> float:
+        """Sum of squares left by a hypothesis [1]: beyond noise, or explained by a generic misfit."""
+        predictable = 2.0 * (evaluated.log_evidence_with_misfit - evaluated.log_evidence)
+        return max(evaluated.excess - self.lowest_excess, predictable)
+
+    def is_large(self, evaluated: EvaluatedHypothesis) -> bool:
+        """Whether a hypothesis leaves a large residual."""
+        return self.residual(evaluated) > self.settings.large_residual
+
+
+def fit_pairs(
+    problem: FittingProblem,
+    recalibrated: EvaluatedHypothesis,
+    singles: list[EvaluatedHypothesis],
+    first_fits: Mapping[tuple[str, ...], Estimate],
+    scale: ResidualScale,
+    cache: FitCache,
+) -> list[EvaluatedHypothesis]:
+    """Pairs that may explain the residuals of the best causes.
+
+    Args:
+        problem: readings and settings of the fits.
+        recalibrated: the model without a cause.
+        singles: single causes by falling log evidence.
+        first_fits: estimate of each cause before its refinement, by labels. Refined nuisance parameters
+            follow what the cause lacks; from the first fit a partner is seen better.
+        scale: of the residuals.
+        cache: runs the fits.
     """
-    if not singles or singles[0].log_evidence - none.log_evidence < CERTAIN:
+    settings = scale.settings
+    gain = singles[0].log_evidence - recalibrated.log_evidence if singles else -np.inf
+    if gain < settings.least_single_gain:
         return []
-    count, most = (PARTNERS, 2) if leaves_much(singles[0], floor) else (FEW, 1)
-    enough = RIVAL * _left(singles[0], floor)
-    bases = [single for single in singles[:most] if _left(single, floor) <= enough]
+    large = scale.is_large(singles[0])
+    partners = settings.partners if large else settings.partners_of_small_residual
+    most = settings.second_base_ratio * scale.residual(singles[0])
+    bases = [each for each in singles[: 2 if large else 1] if scale.residual(each) <= most]
     return [
         pair
         for base in bases
-        for pair in assess(fitter, _partners(fitter, begun[base.name], count, fits))
+        for pair in evaluate(
+            problem, _fit_partners(problem, first_fits[base.labels], partners, cache), settings
+        )
     ]
 
 
-def doubted(found: Sequence[Assessed], scores: Sequence[float], floor: float) -> list[float]:
-    """Log probabilities, but for a constant, in which no pair is surer of itself than its odds allow.
+def _fit_partners(
+    problem: FittingProblem, base: Estimate, count: int, cache: FitCache
+) -> list[Estimate]:
+    """Fits of the causes that may act beside those of the base."""
+    own = base.hypothesis.causes[0].name
+    others = [cause for cause in problem.plant.causes if cause.name != own]
 
-    A pair that closes what its better half leaves vouches for this half: it is raised to the pair's
-    odds. Otherwise all pairs with this half are lowered to them. floor: as of `_left`.
+    def refit() -> list[Estimate]:
+        signatures = simulate_signatures(problem, base, others)
+        base_runs = linearise(problem, [base], problem.fitted_runs)[0]
+        bound = problem.settings.largest_deviation
+        return refit_with_causes(problem, base, screen_causes(base_runs, signatures, bound)[:count])
+
+    return cache(f"pairs with {' and '.join(base.hypothesis.labels)}", refit)
+
+
+def refit_members_of_best_pair(
+    problem: FittingProblem,
+    singles: list[EvaluatedHypothesis],
+    pairs: Sequence[EvaluatedHypothesis],
+    cache: FitCache,
+    settings: RankingSettings,
+) -> list[EvaluatedHypothesis]:
+    """Singles, with the members of the best pair also fitted from their values in the pair.
+
+    Far from its true value a single cause may get stuck where a pair does not.
+
+    Args:
+        problem: readings and settings of the fits.
+        singles: single causes.
+        pairs: at least one, by falling log evidence.
+        cache: runs the fits.
+        settings: of the evidence.
     """
-    changed = list(scores)
-    mine: dict[int, list[int]] = {}
-    for i, one in enumerate(found):
-        half = _better_half(one, found) if len(one.name) > 1 else None
-        if half is not None:
-            mine.setdefault(half, []).append(i)
-    for half, with_half in mine.items():
-        best = max(with_half, key=lambda pair: scores[pair])
-        surplus = scores[best] - _log_odds(found[best], found[half]) - scores[half]
-        if surplus <= 0:
-            continue
-        closed = _left(found[best], floor) <= CLOSED * _left(found[half], floor)
-        if closed and leaves_much(found[half], floor):
-            changed[half] += surplus
-        else:
-            for pair in with_half:
-                changed[pair] -= surplus
-    return changed
-
-
-def _better_half(pair: Assessed, found: Sequence[Assessed]) -> int | None:
-    """Place of the half that does better alone; None if neither does within its range."""
-    halves = [
-        i
-        for i, one in enumerate(found)
-        if len(one.name) == 1 and one.name[0] in pair.name and not one.at_end
-    ]
-    return max(halves, key=lambda half: found[half].log_evidence, default=None)
-
-
-def _log_odds(pair: Assessed, half: Assessed) -> float:
-    """How much likelier a second cause is than an error of the first one's form."""
-    gain = pair.with_leftover - half.with_leftover
-    even = EVEN * sum(np.count_nonzero(residual) for residual in pair.residuals)
-    return float(np.log((gain / even) ** 2 + FAINT if gain > CHANCE else NEVER))
-
-
-def with_halves(
-    fitter: Fitter, singles: list[Assessed], found: Sequence[Assessed], fits: Fits
-) -> list[Assessed]:
-    """Singles, of which those in the best pair have also been fitted from where they stand there.
-
-    Far from its size a cause may get stuck, and a pair find the way round. found: pairs, at least
-    one, the most probable first.
-    """
-    pair, base = found[0].point, fitter.values(found[0].point)
+    pair, values = pairs[0].estimate, problem.values(pairs[0].estimate)
     starts = [
-        replace(fitter.start(Hypothesis(causes=(cause,)), base), frame=pair.frame)
+        replace(problem.start(Hypothesis(causes=(cause,)), values), slopes=pair.slopes)
         for cause in pair.hypothesis.causes
     ]
-    alone = fits("halves of the best pair", lambda: fitter.fit(starts))
-    framed = [replace(point, frame=pair.frame) for point in alone]  # a journal keeps no frames
-    return ranked(without_twins([*singles, *assess(fitter, framed)]))
+    fitted = cache("halves of the best pair", lambda: fit(problem, starts))
+    # A journal keeps no slopes.
+    alone = [replace(estimate, slopes=pair.slopes) for estimate in fitted]
+    return by_log_evidence(best_fit_of_each([*singles, *evaluate(problem, alone, settings)]))
 
 
-def leaves_much(found: Assessed, floor: float) -> bool:
-    """Whether a hypothesis leaves more than it is WORTH. floor: as of `_left`."""
-    return _left(found, floor) > WORTH
+def limit_pair_odds(
+    evaluated: Sequence[EvaluatedHypothesis], log_posteriors: Sequence[float], scale: ResidualScale
+) -> list[float]:
+    """Log posteriors, but for a constant, in which the odds of a pair against its member are limited.
 
+    If a pair removes enough of the residual that its stronger member leaves, we raise that member's odds
+    to the pair's. Otherwise we lower all pairs with that member to the limit.
 
-def _partners(fitter: Fitter, base: Point, count: int, fits: Fits) -> list[Point]:
-    """Fits of pairs: what may act beside the causes of the base."""
-    own = base.hypothesis.causes[0].name
-    others = [cause for cause in fitter.plant.causes if cause.name != own]
-
-    def refit() -> list[Point]:
-        promising = screen(fitter, base, signatures(fitter, base, others))[:count]
-        return refitted(fitter, base, promising)
-
-    return fits(f"pairs with {' and '.join(base.hypothesis.name)}", refit)
-
-
-def _left(found: Assessed, floor: float) -> float:
-    """Sum of squares that a hypothesis leaves: beyond the floor, or what is predictable of it.
-
-    floor: where the noise is known too large, what the best hypothesis leaves.
+    Args:
+        evaluated: single causes and pairs.
+        log_posteriors: of these, but for a constant.
+        scale: of the residuals.
     """
-    return max(found.excess - floor, 2.0 * (found.with_leftover - found.log_evidence))
+    limited = list(log_posteriors)
+    pairs_of: dict[int, list[int]] = {}
+    for i, each in enumerate(evaluated):
+        member = _stronger_member(each, evaluated) if len(each.labels) > 1 else None
+        if member is not None:
+            pairs_of.setdefault(member, []).append(i)
+    for member, pairs in pairs_of.items():
+        best = max(pairs, key=lambda pair: log_posteriors[pair])
+        limit = _log_odds_limit(evaluated[best], evaluated[member], scale.settings)
+        surplus = log_posteriors[best] - limit - log_posteriors[member]
+        if surplus <= 0:
+            continue
+        if scale.is_large(evaluated[member]) and _explains(evaluated[best], evaluated[member], scale):
+            limited[member] += surplus
+        else:
+            for pair in pairs:
+                limited[pair] -= surplus
+    return limited
+
+
+def _explains(pair: EvaluatedHypothesis, member: EvaluatedHypothesis, scale: ResidualScale) -> bool:
+    """Whether a pair removes enough of its member's residual to confirm the member."""
+    return scale.residual(pair) <= scale.settings.explained_pair_share * scale.residual(member)
+
+
+def _stronger_member(pair: EvaluatedHypothesis, evaluated: Sequence[EvaluatedHypothesis]) -> int | None:
+    """Index of the member with more evidence alone; None if neither has any within its range."""
+    members = [
+        i
+        for i, each in enumerate(evaluated)
+        if len(each.labels) == 1 and each.labels[0] in pair.labels and not each.at_bound
+    ]
+    return max(members, key=lambda i: evaluated[i].log_evidence, default=None)
+
+
+def _log_odds_limit(
+    pair: EvaluatedHypothesis, member: EvaluatedHypothesis, settings: RankingSettings
+) -> float:
+    """Log of how much likelier a second cause is than an error of the first cause's form."""
+    gain = pair.log_evidence_with_misfit - member.log_evidence_with_misfit
+    if gain <= settings.chance_gain:
+        return float(np.log(settings.chance_odds))
+    readings = sum(np.count_nonzero(residual) for residual in pair.residuals)
+    even = settings.even_odds_gain * readings
+    return float(np.log((gain / even) ** 2 + settings.faint_cause_odds))

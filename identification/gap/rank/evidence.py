@@ -1,8 +1,8 @@
-"""How well a refitted hypothesis explains the recordings: evidence that expects imperfect forms.
+"""Evidence: how well a refitted hypothesis explains the recordings, its form possibly inexact.
 
-A cause's true form is never quite ours. So a hypothesis may miss the recordings, in every short stretch
-on its own, by a share of what the cause does there: a Gaussian allowance, integrated out in closed form.
-How large that share is the recordings say, up to a tenth; what is left beyond it counts in full.
+The true form of a cause never equals ours exactly. So a hypothesis may miss the recordings in every
+short segment by a share of the cause's effect there. The recordings determine the share, up to a tenth;
+a larger miss counts in full. The price of each fitted parameter is Laplace's (MacKay 1992).
 """
 
 from collections.abc import Sequence
@@ -12,205 +12,145 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from identification.gap.fit.fitter import Fitter, Point
-from identification.gap.fit.variable_projection import Linear, Normal, freed, normal
-
-FORM_ERRORS = (0.0, 0.003, 0.01, 0.02, 0.05, 0.1)
-"""Relative standard deviations of a cause's effect, in a stretch, from what our form gives; beforehand
-each is as likely as the next."""
-
-STRETCH = 5e-3
-"""Time over which a form's error is taken to be constant [s]."""
-
-GENERIC_STRETCHES = (1.5e-3, STRETCH, 20e-3)
-"""Times over which a misfit without a name may be constant [s]."""
-
-AT_END = 1e-4
-"""Share of its range within which a size counts as lying at its end."""
-
-SINGULAR = 1e-12
-"""Eigenvalue of a correlation matrix below which it is rounding."""
-
-GENERIC = np.logspace(-4, 3, 29)
-"""Variances, in noise variances, that a misfit without a name may have in a stretch."""
+from identification.gap.fit.fitting_problem import FittingProblem
+from identification.gap.fit.hypothesis import Estimate
+from identification.gap.fit.linearisation import linearise
+from identification.gap.fit.variable_projection import (
+    LinearisedRun,
+    NormalEquations,
+    normal_equations,
+    without_run_nuisances,
+)
+from identification.gap.rank.misfit import (
+    cause_effects,
+    form_error_misfits,
+    generic_misfit_log_evidence,
+)
+from identification.gap.rank.settings import RankingSettings
 
 
 @dataclass(frozen=True, kw_only=True)
-class Assessed:
-    """A refitted hypothesis and what speaks for it."""
+class EvaluatedHypothesis:
+    """A refitted hypothesis with its residuals and its evidence."""
 
-    point: Point
+    estimate: Estimate
     residuals: list[NDArray]
-    """Per run (channels, samples), freed of nuisances; 0 where readings are not trusted."""
+    """Per run (channels, samples) [noise deviations], nuisance parameters accounted for; 0 at untrusted
+    readings."""
     log_evidence: float
-    with_leftover: float
-    """Log evidence of the hypothesis beside a misfit without a name."""
+    """With errors of form; natural logarithm, but for a constant of the recordings."""
+    log_evidence_with_misfit: float
+    """The same with a generic misfit instead of errors of form."""
     tolerances: NDArray
-    """What the fitted runs say of them, in standard deviations from their centres, (m,)."""
+    """Tolerances that the fitted runs determine, (m,) [standard deviations from the centres]."""
     covariance: NDArray
-    """Of the calibrated parameters and the sizes, all else free, (k, k) [SI]."""
-    converged: bool
+    """Of calibrated parameters and parameters of causes, all else free, (k, k) [SI]."""
+    at_bound: bool
+    """Whether a parameter of a cause lies at a bound: the recordings ask for what cannot be."""
+
+    @property
+    def converged(self) -> bool:
+        """Whether the fit has converged."""
+        return self.estimate.converged
 
     @property
     def excess(self) -> float:
-        """Sum of squares beyond that of noise."""
+        """Sum of squares beyond that of noise [1]."""
         return sum(float(np.sum(r**2) - np.count_nonzero(r)) for r in self.residuals)
 
     @property
-    def at_end(self) -> bool:
-        """Whether a size lies at an end of its physical range: the data ask for what cannot be."""
-        sizes = self.point.hypothesis.sizes
-        for size, scaled in zip(sizes, self.point.vector[self.point.first_size :], strict=True):
-            low, high = sorted((size.low, size.high))
-            value, margin = scaled * size.scale, AT_END * (high - low)
-            if min(value - low, high - value) < margin and abs(value - size.off) > margin:
-                return True
-        return False
-
-    @property
-    def name(self) -> tuple[str, ...]:
-        """The causes' labels."""
-        return self.point.hypothesis.name
+    def labels(self) -> tuple[str, ...]:
+        """Labels of the causes."""
+        return self.estimate.hypothesis.labels
 
 
-def assess(fitter: Fitter, points: Sequence[Point]) -> list[Assessed]:
-    """Evidence of each fitted point on all runs; its vector has seen the calibration runs only.
+def evaluate(
+    problem: FittingProblem, estimates: Sequence[Estimate], settings: RankingSettings
+) -> list[EvaluatedHypothesis]:
+    """Evidence of each estimate on all runs.
 
-    Tolerances and starts, which are nuisances with priors, adapt to the held-out runs as well.
+    The vector has seen the fitted runs only; nuisance parameters, which have priors, adapt to every run.
     """
-    if not points:
+    if not estimates:
         return []
-    linear = fitter.linearise(points, fitter.everything)
-    return [_assessed(fitter, point, runs) for point, runs in zip(points, linear, strict=True)]
+    linearised = linearise(problem, estimates, problem.all_runs)
+    return [
+        evaluate_linearised(problem, estimate, runs, settings)
+        for estimate, runs in zip(estimates, linearised, strict=True)
+    ]
 
 
-def _assessed(fitter: Fitter, point: Point, runs: Sequence[Linear]) -> Assessed:
-    shared = normal(runs).shared
-    residuals, steps = zip(*(freed(run, shared) for run in runs), strict=True)
-    strain = float(shared @ shared) + sum(
-        float(np.sum(((run.local_value + step) / run.local_sd) ** 2))
-        for run, step in zip(runs, steps, strict=True)
-    )
+def evaluate_linearised(
+    problem: FittingProblem,
+    estimate: Estimate,
+    runs: Sequence[LinearisedRun],
+    settings: RankingSettings,
+) -> EvaluatedHypothesis:
+    """Evidence of an estimate from all runs, linearised."""
+    bound = problem.settings.largest_deviation
+    tolerances = normal_equations(runs, bound).tolerances
+    freed = [without_run_nuisances(run, tolerances, bound) for run in runs]
     misfits = np.sum(
         [
-            _misfits(fitter, r, residual, _effects(point, run))
-            for r, (residual, run) in enumerate(zip(residuals, runs, strict=True))
+            form_error_misfits(problem.plant, r, residual, cause_effects(estimate, run), settings)
+            for r, ((residual, _), run) in enumerate(zip(freed, runs, strict=True))
         ],
         axis=0,
     )
-    fitted = normal([runs[r] for r in fitter.fitted])
-    covariance = _covariance(fitted)
-    scales = [size.scale for size in fitter.sizes(point)]
-    shaped = [
+    residuals = [
         residual.reshape(run.measured.shape)
-        for residual, run in zip(residuals, fitter.plant.runs, strict=True)
+        for (residual, _), run in zip(freed, problem.plant.runs, strict=True)
     ]
-    price = _occam(point, np.sqrt(np.diag(covariance))) + 0.5 * strain
-    return Assessed(
-        point=point,
-        residuals=shaped,
+    fitted = normal_equations([runs[r] for r in problem.fitted_runs], bound)
+    covariance = _covariance(fitted, settings.smallest_eigenvalue)
+    scales = [parameter.scale for parameter in problem.parameters(estimate)]
+    deviations = _squared_deviations(runs, [step for _, step in freed], tolerances)
+    price = _occam_price(estimate, np.sqrt(np.diag(covariance))) + 0.5 * deviations
+    generic = generic_misfit_log_evidence(problem.plant, residuals, settings)
+    return EvaluatedHypothesis(
+        estimate=estimate,
+        residuals=residuals,
         log_evidence=float(logsumexp(-0.5 * misfits) - np.log(len(misfits))) - price,
-        with_leftover=generic_log_evidence(fitter, shaped) - price,
-        tolerances=fitted.shared,
+        log_evidence_with_misfit=generic - price,
+        tolerances=fitted.tolerances,
         covariance=covariance * np.outer(scales, scales),
-        converged=point.converged,
+        at_bound=_at_bound(estimate, settings.bound_margin),
     )
 
 
-def generic_log_evidence(fitter: Fitter, residuals: Sequence[NDArray]) -> float:
-    """Evidence of a misfit without a name: in every stretch of a channel an offset of its own.
-
-    Its variance and the stretch are fitted for each channel (type-II likelihood, at the price of the
-    fitted numbers).
-    """
-    total = 0.0
-    for channel in range(len(residuals[0])):
-        series = [residual[channel] for residual in residuals]
-        squares = sum(float(np.sum(np.square(part))) for part in series)
-        gains = [_generic_gain(fitter, series, stretch) for stretch in GENERIC_STRETCHES]
-        total += -0.5 * (squares - max(gains)) - np.log(len(GENERIC_STRETCHES))
-    return total
+def _squared_deviations(
+    runs: Sequence[LinearisedRun], steps: Sequence[NDArray], tolerances: NDArray
+) -> float:
+    """Squared deviations of all nuisance parameters from their centres [1]."""
+    return float(tolerances @ tolerances) + sum(
+        float(np.sum(((run.run_values + step) / run.run_sd) ** 2))
+        for run, step in zip(runs, steps, strict=True)
+    )
 
 
-def _generic_gain(fitter: Fitter, series: Sequence[NDArray], stretch: float) -> float:
-    """By how much offsets of the best variance lower -2 log likelihood, less the price of a number."""
-    parts = [
-        stretches(part, run.time[1], stretch)
-        for part, run in zip(series, fitter.plant.runs, strict=True)
-    ]
-    s = np.concatenate([np.sum(part, axis=1) for part in parts])
-    n = np.concatenate([np.sum(part != 0, axis=1) for part in parts])
-    gains = [np.sum(v * s**2 / (1 + v * n) - np.log1p(v * n)) for v in GENERIC]
-    return float(max(gains)) - np.log(len(s))
-
-
-def inflation(fitter: Fitter, residuals: Sequence[NDArray]) -> float:
-    """Variance of sums over stretches relative to that of white residuals, at least 1."""
-    parts = [
-        stretches(channel, run.time[1])
-        for residual, run in zip(residuals, fitter.plant.runs, strict=True)
-        for channel in residual
-    ]
-    together = sum(float(np.sum(np.sum(part, axis=1) ** 2)) for part in parts)
-    apart = sum(float(np.sum(part**2)) for part in parts)
-    return max(1.0, together / apart)
-
-
-def stretches(series: NDArray, period: float, stretch: float = STRETCH) -> NDArray:
-    """A series cut into stretches (stretches, samples), the last one filled with zeros."""
-    length = max(1, round(stretch / period))
-    count = -(-len(series) // length)
-    padded = np.zeros(count * length)
-    padded[: len(series)] = series
-    return padded.reshape(count, length)
-
-
-def _effects(point: Point, run: Linear) -> NDArray:
-    """What each cause of uncertain form changes, linear in its sizes, (values, causes)."""
-    causes = point.hypothesis.causes
-    column = point.first_size
-    own, found = 0, []
-    for cause in causes:
-        at, mine = slice(column, column + len(cause.sizes)), slice(own, own + len(cause.local))
-        column, own = at.stop, mine.stop
-        acting = point.vector[at] - np.array([size.off / size.scale for size in cause.sizes])
-        change = run.slopes[:, at] @ acting + run.local[:, mine] @ run.local_value[mine]
-        if not cause.exact:
-            found.append(change)
-    return np.stack(found, axis=1) if found else np.zeros((len(run.residual), 0))
-
-
-def _misfits(fitter: Fitter, r: int, residual: NDArray, effects: NDArray) -> NDArray:
-    """-2 log likelihood of one run but for a constant, for each of FORM_ERRORS; causes err apart."""
-    run = fitter.plant.runs[r]
-    shape = run.measured.shape
-    total = np.full(len(FORM_ERRORS), float(residual @ residual))
-    if not effects.shape[1]:
-        return total
-    for channel, changes in zip(
-        residual.reshape(shape), effects.reshape(*shape, effects.shape[1]), strict=True
-    ):
-        r_b = stretches(channel, run.time[1])
-        u_b = np.stack([stretches(change, run.time[1]) for change in changes.T], axis=2)
-        squares = np.einsum("bsi,bsj->bij", u_b, u_b)
-        along = np.einsum("bsi,bs->bi", u_b, r_b)
-        for k, error in enumerate(FORM_ERRORS):
-            gram = np.eye(u_b.shape[2]) + error**2 * squares
-            allowed = error**2 * np.linalg.solve(gram, along[..., None])[..., 0]
-            total[k] += np.sum(np.linalg.slogdet(gram)[1]) - np.sum(along * allowed)
-    return total
-
-
-def _covariance(equations: Normal) -> NDArray:
-    """Of the scaled vector, all else free; wide, but finite, where the recordings say nothing."""
-    size = np.sqrt(np.diag(equations.hessian) + 1e-9)  # a number may do nothing at all
+def _covariance(equations: NormalEquations, smallest_eigenvalue: float) -> NDArray:
+    """Covariance of the scaled vector (k, k) [1]; wide, but finite, where the recordings say nothing."""
+    size = np.sqrt(np.diag(equations.hessian) + 1e-9)  # a parameter may have no effect at all
     values, vectors = np.linalg.eigh(equations.hessian / np.outer(size, size))
-    return (vectors / np.maximum(values, SINGULAR)) @ vectors.T / np.outer(size, size)
+    return (vectors / np.maximum(values, smallest_eigenvalue)) @ vectors.T / np.outer(size, size)
 
 
-def _occam(point: Point, sd: NDArray) -> float:
-    """What a fitted size costs: its range over what the data leave of it (Laplace)."""
-    sizes = point.hypothesis.sizes
-    widths = np.array([abs(size.high - size.low) / size.scale for size in sizes])
-    left = np.minimum(np.sqrt(2 * np.pi) * sd[len(sd) - len(sizes) :], widths)
+def _occam_price(estimate: Estimate, sd: NDArray) -> float:
+    """Log of each cause parameter's range over the part that the data leave (Laplace), never negative.
+
+    sd: standard deviations of the scaled vector, (k,) [1].
+    """
+    parameters = estimate.hypothesis.parameters
+    widths = np.array([abs(p.high - p.low) / p.scale for p in parameters])
+    left = np.minimum(np.sqrt(2 * np.pi) * sd[len(sd) - len(parameters) :], widths)
     return float(np.sum(np.log(widths / left)))
+
+
+def _at_bound(estimate: Estimate, margin_share: float) -> bool:
+    """Whether a cause's parameter lies at an end of its range and is not merely nominal there."""
+    for p, scaled in zip(estimate.hypothesis.parameters, estimate.cause_vector, strict=True):
+        low, high = sorted((p.low, p.high))
+        value, margin = scaled * p.scale, margin_share * (high - low)
+        if min(value - low, high - value) < margin and abs(value - p.nominal) > margin:
+            return True
+    return False

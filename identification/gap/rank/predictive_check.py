@@ -1,39 +1,41 @@
-"""A second look at a verdict: what a black box still predicts of what the first cause leaves.
+"""Posterior predictive check of a verdict on held-out recordings (Gelman et al. 2013, chapter 6).
 
-`unknown` means that the best cause leaves a residual which is still predictable. Evidence judges that by
-the forms of the recordings it has seen; here it is held against recordings never fitted to.
+The evidence judges the residual by the form of the recordings that the fits have seen. The check
+compares the verdict with what a black box predicts of the best cause's residual on recordings never
+fitted to.
 """
 
 from dataclasses import replace
 
 from scipy.special import softmax
 
-from identification.gap.rank.ranking import Verdicts
+from identification.gap.rank.ranking import Ranking
 from identification.gap.rank.verdict import AMBIGUOUS, KNOWN, UNKNOWN
 from identification.gap.reduce.discrepancy_reduction import Unexplained
 
-NEAR = 0.12
-"""Share of the explainable gap that a cause may leave and still be near the floor."""
 
-NOTHING = 0.5
-"""p-value of the black box's prediction from which it finds nothing."""
+def check_predictively(ranking: Ranking, verdict: str, unexplained: Unexplained) -> Ranking:
+    """The ranking, changed where the residual of the best cause contradicts the verdict.
 
-DOUBTED, TRUSTED = 0.9, 0.3
-"""Probability of unknown where a named cause leaves too much that is predictable; where a cause that was
-not named leaves little, and nothing predictable."""
+    Args:
+        ranking: the probabilities that led to the verdict.
+        verdict: KNOWN, AMBIGUOUS, UNKNOWN or NO_GAP of `rank.verdict`.
+        unexplained: what the best cause leaves on held-out runs.
+
+    Returns:
+        The same object where nothing contradicts the verdict.
+    """
+    settings = ranking.settings
+    near_floor = unexplained.fraction <= settings.near_floor_share
+    if verdict in (KNOWN, AMBIGUOUS) and unexplained.still_predictable and not near_floor:
+        return _with_unknown(ranking, settings.contradicted_unknown)
+    unpredictable = unexplained.p_value >= settings.unpredictable_p_value
+    if verdict == UNKNOWN and near_floor and unpredictable and ranking.hypotheses:
+        return _with_unknown(ranking, settings.confirmed_unknown)
+    return ranking
 
 
-def second_look(verdicts: Verdicts, verdict: str, left: Unexplained) -> Verdicts:
-    """The probabilities, changed where what the first cause leaves contradicts the verdict."""
-    near = left.fraction <= NEAR
-    if verdict in (KNOWN, AMBIGUOUS) and left.still_predictable and not near:
-        return _with_unknown(verdicts, DOUBTED)
-    if verdict == UNKNOWN and near and left.p_value >= NOTHING and verdicts.candidates:
-        return _with_unknown(verdicts, TRUSTED)
-    return verdicts
-
-
-def _with_unknown(verdicts: Verdicts, unknown: float) -> Verdicts:
-    """The verdicts with another probability of unknown; causes share the rest as they did."""
-    causes = (1.0 - unknown - verdicts.no_cause) * softmax(verdicts.scores)
-    return replace(verdicts, unknown=unknown, probability=causes.tolist())
+def _with_unknown(ranking: Ranking, unknown: float) -> Ranking:
+    """The ranking with another probability of unknown; causes share the rest in proportion."""
+    causes = (1.0 - unknown - ranking.no_cause) * softmax(ranking.log_posteriors)
+    return replace(ranking, unknown=unknown, probabilities=causes.tolist())

@@ -1,4 +1,4 @@
-"""Which cause: screening, joint refits of singles and pairs, probabilities."""
+"""Ranking of hypotheses: screening, joint refits of single causes and pairs, probabilities."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,130 +6,205 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import softmax
 
-from identification.gap.fit.fit_cache import Fits
-from identification.gap.fit.fitter import Fitter
+from identification.gap.fit.fit_cache import FitCache
+from identification.gap.fit.fitting_problem import FittingProblem
+from identification.gap.fit.linearisation import linearise
+from identification.gap.fit.settings import FitSettings
 from identification.gap.model.grey_box import GreyBox
-from identification.gap.rank.cause_pairs import doubted, leaves_much, pairs, with_halves
-from identification.gap.rank.evidence import Assessed, assess, inflation
-from identification.gap.rank.refit import fitted_on, ranked, recalibrated, refitted, without_twins
-from identification.gap.rank.screening import Screened, screen, signatures
-from identification.gap.rank.separability import Separability, separability
-
-SINGLES = 20
-"""Causes that are refitted, the most promising ones."""
-
-FINALISTS = (14, 5)
-"""Causes that are fitted on with nuisances linearised where each of them stands: so many, then fewer.
-Half as many pairs."""
-
-NEAR = 250.0
-"""Log evidence by which the best fit may lead one that is fitted on, or half of what the best gains on
-the recalibrated model, if that is more."""
-
-ALIKE = 0.8
-"""Correlation with a finalist's signature above which a cause that was screened out is refitted."""
-
-LEFTOVER = 0.025
-"""Share of the recalibrated model's squared misfit that a cause may leave and still be called the cause:
-an error of its form of some 16 % in amplitude."""
-
-PRIOR = {"none": 0.4, "single": 0.4, "pair": 0.1, "unknown": 0.1}
-"""Probabilities before any data."""
+from identification.gap.rank.cause_pairs import (
+    ResidualScale,
+    fit_pairs,
+    limit_pair_odds,
+    refit_members_of_best_pair,
+)
+from identification.gap.rank.evidence import EvaluatedHypothesis, evaluate, evaluate_linearised
+from identification.gap.rank.misfit import variance_inflation
+from identification.gap.rank.refinement import (
+    best_fit_of_each,
+    by_log_evidence,
+    recalibrate,
+    refine,
+    refit_with_causes,
+)
+from identification.gap.rank.screening import ScreenedCause, screen_causes, simulate_signatures
+from identification.gap.rank.separability import Separability, assess_separability
+from identification.gap.rank.settings import RankingSettings
 
 
 @dataclass(frozen=True, kw_only=True)
-class Verdicts:
+class Ranking:
     """Every hypothesis that was refitted, and the probability of each."""
 
-    fitter: Fitter
-    none: Assessed
-    candidates: list[Assessed]
-    """Causes and pairs, the most probable first."""
-    scores: list[float]
-    """Log probability of `candidates`, but for a constant."""
-    probability: list[float]
-    """Of `candidates`."""
+    problem: FittingProblem
+    recalibrated: EvaluatedHypothesis
+    """The model without a cause."""
+    hypotheses: list[EvaluatedHypothesis]
+    """Single causes and pairs, the most probable first."""
+    log_posteriors: list[float]
+    """Log probabilities of `hypotheses`, but for a constant."""
+    probabilities: list[float]
+    """Probabilities of `hypotheses`; with the two following they sum to 1."""
     no_cause: float
+    """Probability that no cause acts."""
     unknown: float
+    """Probability that something outside the catalogue acts."""
     separability: Separability
-    """What could be told apart, whatever the residual."""
+    """What the recordings could tell apart, whatever the residual."""
+    settings: RankingSettings
 
 
-def which(plant: GreyBox, fits: Fits | None = None) -> Verdicts:
-    """Refit what is worth it and weigh it; a fit that does not converge is weighed as it is.
+def rank_hypotheses(
+    plant: GreyBox,
+    cache: FitCache | None = None,
+    settings: RankingSettings | None = None,
+    fit_settings: FitSettings | None = None,
+) -> Ranking:
+    """Refit the promising hypotheses and weigh them; a fit that does not converge is weighed as it is.
 
-    fits: runs the steps, and may remember them from an interrupted run.
+    Args:
+        plant: the model, its recordings and its catalogue of causes.
+        cache: runs the fits; None keeps nothing.
+        settings: judgement of the ranking; None: the defaults.
+        fit_settings: judgement of the fits; None: the defaults.
     """
-    fits = fits or Fits(plant)
-    fitter, base = recalibrated(plant, fits)
-    found = signatures(fitter, base, plant.causes)
-    separable = separability(fitter, base, found)
-    promising = screen(fitter, base, found)
-    first = fits("single causes", lambda: refitted(fitter, base, promising[:SINGLES]))
-    singles = ranked(assess(fitter, first))
-    like = _alike(singles[: FINALISTS[1]], promising[SINGLES:], separable)
-    if like:
-        more = fits("causes like the best", lambda: refitted(fitter, base, like))
-        singles = ranked([*singles, *assess(fitter, more)])
-    none = fitted_on(fitter, assess(fitter, [base]), (1, 1), "recalibration", fits)[0]
-    begun = {single.name: single.point for single in singles}
-    margin = max(NEAR, 0.5 * (singles[0].log_evidence - none.log_evidence)) if singles else NEAR
-    singles = fitted_on(fitter, singles, FINALISTS, "causes", fits, margin)
-    floor = min(0.0, *(found.excess for found in (none, *singles)))
-    both = without_twins(pairs(fitter, none, singles, begun, floor, fits))
-    both = fitted_on(fitter, ranked(both), [n // 2 for n in FINALISTS], "pairs", fits, margin)
-    if both and leaves_much(singles[0], floor):
-        singles = fitted_on(fitter, with_halves(fitter, singles, both, fits), (1,), "halves", fits)
-    both = [pair for pair in both if not pair.at_end]
-    return _weighed(fitter, none, [*singles, *both], floor, separable)
+    settings, cache = settings or RankingSettings(), cache or FitCache(plant)
+    problem, base = recalibrate(plant, cache, fit_settings)
+    runs = linearise(problem, [base], problem.all_runs)[0]
+    base_runs = [runs[r] for r in problem.fitted_runs]
+    signatures = simulate_signatures(problem, base, plant.causes)
+    bound = problem.settings.largest_deviation
+    separability = assess_separability(base_runs, signatures, bound, settings)
+    screened = screen_causes(base_runs, signatures, bound)
+    first = cache(
+        "single causes",
+        lambda: refit_with_causes(problem, base, screened[: settings.refitted_causes]),
+    )
+    singles = by_log_evidence(evaluate(problem, first, settings))
+    best = singles[: settings.finalists[1]]
+    alike = _alike(best, screened[settings.refitted_causes :], separability, settings)
+    if alike:
+        more = cache("causes like the best", lambda: refit_with_causes(problem, base, alike))
+        singles = by_log_evidence([*singles, *evaluate(problem, more, settings)])
+    recalibrated = evaluate_linearised(problem, base, runs, settings)
+    return _rank_refined(problem, recalibrated, singles, separability, cache, settings)
 
 
 def _alike(
-    best: Sequence[Assessed], others: Sequence[Screened], separable: Separability
-) -> list[Screened]:
-    """Causes that were screened out, though what they change looks like what one of the best does."""
-    labels = [label for found in best for label in separable.like(found.name[0], ALIKE)]
+    best: Sequence[EvaluatedHypothesis],
+    others: Sequence[ScreenedCause],
+    separability: Separability,
+    settings: RankingSettings,
+) -> list[ScreenedCause]:
+    """Causes that were screened out, though their signature resembles that of one of the best."""
+    least = settings.alike_correlation
+    labels = [label for each in best for label in separability.alike(each.labels[0], least)]
     return [screened for screened in others if screened.cause.label in labels]
 
 
-def _weighed(
-    fitter: Fitter,
-    none: Assessed,
-    candidates: list[Assessed],
-    floor: float,
-    separable: Separability,
-) -> Verdicts:
-    """Probabilities of all hypotheses."""
-    causes = sum(cause.prior for cause in fitter.plant.causes)
-    best = max([none, *candidates], key=lambda found: found.log_evidence)
-    temper = 1.0 / inflation(fitter, best.residuals)
-    small = [found.excess <= LEFTOVER * none.excess and not found.at_end for found in candidates]
-    scores = [
-        temper * (max(found.log_evidence, found.with_leftover) if s else found.log_evidence)
-        + (-np.inf if found.at_end else _log_prior(found, causes))
-        for found, s in zip(candidates, small, strict=True)
+def _rank_refined(
+    problem: FittingProblem,
+    recalibrated: EvaluatedHypothesis,
+    singles: list[EvaluatedHypothesis],
+    separability: Separability,
+    cache: FitCache,
+    settings: RankingSettings,
+) -> Ranking:
+    """Refine the finalists, add pairs, and weigh all of them."""
+    recalibrated = refine(problem, [recalibrated], (1, 1), "recalibration", cache, settings)[0]
+    first_fits = {single.labels: single.estimate for single in singles}
+    lag = _largest_lag(recalibrated, singles, settings)
+    singles = refine(problem, singles, settings.finalists, "causes", cache, settings, lag)
+    scale = ResidualScale(
+        lowest_excess=min(0.0, *(each.excess for each in (recalibrated, *singles))), settings=settings
+    )
+    found = fit_pairs(problem, recalibrated, singles, first_fits, scale, cache)
+    counts = [count // 2 for count in settings.finalists]
+    pairs = by_log_evidence(best_fit_of_each(found))
+    pairs = refine(problem, pairs, counts, "pairs", cache, settings, lag)
+    if pairs and scale.is_large(singles[0]):
+        members = refit_members_of_best_pair(problem, singles, pairs, cache, settings)
+        singles = refine(problem, members, (1,), "halves", cache, settings)
+    pairs = [pair for pair in pairs if not pair.at_bound]
+    return _weigh(problem, recalibrated, [*singles, *pairs], scale, separability)
+
+
+def _largest_lag(
+    recalibrated: EvaluatedHypothesis,
+    singles: Sequence[EvaluatedHypothesis],
+    settings: RankingSettings,
+) -> float:
+    """Log evidence by which the best hypothesis may lead one that is refined."""
+    if not singles:
+        return settings.finalist_lag
+    gain = singles[0].log_evidence - recalibrated.log_evidence
+    return max(settings.finalist_lag, settings.finalist_lag_share * gain)
+
+
+def _weigh(
+    problem: FittingProblem,
+    recalibrated: EvaluatedHypothesis,
+    hypotheses: list[EvaluatedHypothesis],
+    scale: ResidualScale,
+    separability: Separability,
+) -> Ranking:
+    """Probabilities of all hypotheses, of no cause and of an unknown one."""
+    settings = scale.settings
+    best = max([recalibrated, *hypotheses], key=lambda each: each.log_evidence)
+    inflation = variance_inflation(problem.plant, best.residuals, settings.segment_duration)
+    temper = 1.0 / inflation  # correlated samples count less (Miller and Dunson 2019)
+    most = settings.misfit_share * recalibrated.excess
+    small = [each.excess <= most and not each.at_bound for each in hypotheses]
+    total_prior = sum(cause.prior for cause in problem.plant.causes)
+    untempered = [_log_evidence(e, with_misfit=s) for e, s in zip(hypotheses, small, strict=True)]
+    log_posteriors = [
+        temper * log_evidence + (-np.inf if each.at_bound else _log_prior(each, total_prior, settings))
+        for each, log_evidence in zip(hypotheses, untempered, strict=True)
     ]
-    no_cause = temper * none.log_evidence + np.log(PRIOR["none"])
-    large = [none, *(found for found, s in zip(candidates, small, strict=True) if not s)]
-    unknown = temper * max(found.with_leftover for found in large) + np.log(PRIOR["unknown"])
-    scores = doubted(candidates, scores, floor)
-    weights = softmax([*scores, no_cause, unknown])
-    order = np.argsort(-np.array(scores), kind="stable")
-    return Verdicts(
-        fitter=fitter,
-        none=none,
-        candidates=[candidates[i] for i in order],
-        scores=[scores[i] for i in order],
-        probability=weights[order].tolist(),
-        no_cause=float(weights[-2]),
-        unknown=float(weights[-1]),
-        separability=separable,
+    log_posteriors = limit_pair_odds(hypotheses, log_posteriors, scale)
+    no_cause = temper * recalibrated.log_evidence + np.log(settings.prior_no_cause)
+    large = [recalibrated, *(each for each, s in zip(hypotheses, small, strict=True) if not s)]
+    with_misfit = max(each.log_evidence_with_misfit for each in large)
+    unknown = temper * with_misfit + np.log(settings.prior_unknown)
+    return _ranking(
+        problem, recalibrated, hypotheses, log_posteriors, (no_cause, unknown), separability, settings
     )
 
 
-def _log_prior(found: Assessed, total: float) -> float:
+def _ranking(
+    problem: FittingProblem,
+    recalibrated: EvaluatedHypothesis,
+    hypotheses: list[EvaluatedHypothesis],
+    log_posteriors: list[float],
+    others: tuple[float, float],
+    separability: Separability,
+    settings: RankingSettings,
+) -> Ranking:
+    """Normalised probabilities; others: log posteriors of no cause and of an unknown one."""
+    weights = softmax([*log_posteriors, *others])
+    order = np.argsort(-np.array(log_posteriors), kind="stable")
+    return Ranking(
+        problem=problem,
+        recalibrated=recalibrated,
+        hypotheses=[hypotheses[i] for i in order],
+        log_posteriors=[log_posteriors[i] for i in order],
+        probabilities=weights[order].tolist(),
+        no_cause=float(weights[-2]),
+        unknown=float(weights[-1]),
+        separability=separability,
+        settings=settings,
+    )
+
+
+def _log_evidence(evaluated: EvaluatedHypothesis, *, with_misfit: bool) -> float:
+    """Log evidence; with_misfit: a generic misfit beside the hypothesis is allowed."""
+    if with_misfit:
+        return max(evaluated.log_evidence, evaluated.log_evidence_with_misfit)
+    return evaluated.log_evidence
+
+
+def _log_prior(evaluated: EvaluatedHypothesis, total_prior: float, settings: RankingSettings) -> float:
     """Log probability of a cause or pair before any data."""
-    shares = [cause.prior / total for cause in found.point.hypothesis.causes]
+    shares = [cause.prior / total_prior for cause in evaluated.estimate.hypothesis.causes]
     if len(shares) == 1:
-        return float(np.log(PRIOR["single"] * shares[0]))
-    return float(np.log(PRIOR["pair"] * 2 * np.prod(shares)))
+        return float(np.log(settings.prior_single * shares[0]))
+    return float(np.log(settings.prior_pair * 2 * np.prod(shares)))

@@ -1,4 +1,4 @@
-"""Which causes are worth a refit: each one's signature against the residual, linearised once."""
+"""Screening: which causes are worth a refit, from the signature of each, linearised once."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -6,99 +6,123 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.fit.fitter import Fitter, Hypothesis, Point
-from identification.gap.fit.variable_projection import Linear, normal
-from identification.gap.model.grey_box import Cause
+from identification.gap.fit.fitting_problem import FittingProblem
+from identification.gap.fit.hypothesis import Estimate, Hypothesis
+from identification.gap.fit.variable_projection import (
+    LinearisedRun,
+    NormalEquations,
+    normal_equations,
+)
+from identification.gap.model.cause import Cause
 
 
 @dataclass(frozen=True, kw_only=True)
-class Screened:
-    """A cause at one trial size, and what it promises beside other causes."""
+class ScreenedCause:
+    """A cause at its most promising trial values."""
 
     cause: Cause
-    sizes: tuple[float, ...]
-    """Predicted sizes, within their ranges [SI]."""
+    values: tuple[float, ...]
+    """Predicted values of the cause's parameters, within their ranges [SI]."""
     chi_square: float
-    """Predicted."""
+    """Predicted sum of squares on the fitted runs [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Signature:
-    """What a cause at one trial size changes beside a base point."""
+class CauseSignature:
+    """Change of the outputs by a cause at one of its trial values, beside a base estimate."""
 
     cause: Cause
-    point: Point
-    """The base point with the cause."""
+    estimate: Estimate
+    """The base estimate with the cause."""
     changes: list[NDArray]
-    """Of the weighted outputs, per fitted run."""
+    """Per fitted run, (values,) [noise deviations]."""
 
 
-def trial_points(fitter: Fitter, base: Point, causes: Sequence[Cause]) -> list[tuple[Cause, Point]]:
-    """The base point with each cause added at each of its trial sizes."""
-    found = []
-    values = fitter.values(base)
+def trial_estimates(
+    problem: FittingProblem, base: Estimate, causes: Sequence[Cause]
+) -> list[tuple[Cause, Estimate]]:
+    """The base estimate with each cause added at each of its trial values."""
+    trials = []
+    values = problem.values(base)
     for cause in causes:
         joint = Hypothesis(causes=(*base.hypothesis.causes, cause))
-        for trial in range(max(len(size.trials) for size in cause.sizes)):
-            at = {s.symbol: s.trials[min(trial, len(s.trials) - 1)] for s in cause.sizes}
-            found.append((cause, fitter.start(joint, {**values, **at})))
-    return found
+        for trial in range(max(len(p.trials) for p in cause.parameters)):
+            at = {p.symbol: p.trials[min(trial, len(p.trials) - 1)] for p in cause.parameters}
+            trials.append((cause, problem.start(joint, {**values, **at})))
+    return trials
 
 
-def signatures(fitter: Fitter, base: Point, causes: Sequence[Cause]) -> list[Signature]:
-    """What every cause changes at each of its trial sizes, all simulated side by side."""
-    trials = trial_points(fitter, base, causes)
-    outputs = fitter.residuals([base, *(point for _, point in trials)], fitter.fitted)
+def simulate_signatures(
+    problem: FittingProblem, base: Estimate, causes: Sequence[Cause]
+) -> list[CauseSignature]:
+    """Signatures of every cause at each of its trial values, all simulated side by side."""
+    trials = trial_estimates(problem, base, causes)
+    residuals = problem.residuals([base, *(estimate for _, estimate in trials)], problem.fitted_runs)
     return [
-        Signature(cause=cause, point=point, changes=[block[:, 0] - block[:, 1 + k] for block in outputs])
-        for k, (cause, point) in enumerate(trials)
+        CauseSignature(
+            cause=cause,
+            estimate=estimate,
+            changes=[block[:, 0] - block[:, 1 + k] for block in residuals],
+        )
+        for k, (cause, estimate) in enumerate(trials)
     ]
 
 
-def screen(fitter: Fitter, base: Point, found: Sequence[Signature]) -> list[Screened]:
-    """Every cause's best trial beside the base's own causes, the most promising first.
+def screen_causes(
+    base_runs: Sequence[LinearisedRun],
+    signatures: Sequence[CauseSignature],
+    largest_deviation: float,
+) -> list[ScreenedCause]:
+    """The best trial of every cause beside the base estimate, the most promising cause first.
 
-    The change that a cause makes at a trial size is taken to grow in proportion to its size, and to turn
-    round with its sign; with the calibrated parameters and all nuisances it is fitted to the base's
-    residual.
+    The signature is taken as proportional to the cause's parameters, with either sign. It is fitted to
+    the residual of the base together with the calibrated parameters and all nuisance parameters.
+
+    Args:
+        base_runs: the base estimate linearised in the fitted runs.
+        signatures: from `simulate_signatures` beside the same base.
+        largest_deviation: bound of nuisance parameters [standard deviations].
     """
-    own = fitter.linearise([base], fitter.fitted)[0]
-    best: dict[str, Screened] = {}
-    for signature in found:
-        promise = _promise(own, signature.cause, signature.point, signature.changes)
+    best: dict[str, ScreenedCause] = {}
+    for signature in signatures:
+        screened = _screened(base_runs, signature, largest_deviation)
         label = signature.cause.label
-        if label not in best or promise.chi_square < best[label].chi_square:
-            best[label] = promise
+        if label not in best or screened.chi_square < best[label].chi_square:
+            best[label] = screened
     return sorted(best.values(), key=lambda screened: screened.chi_square)
 
 
-def _promise(
-    own: Sequence[Linear], cause: Cause, point: Point, signature: Sequence[NDArray]
-) -> Screened:
-    with_cause = [
+def _screened(
+    base_runs: Sequence[LinearisedRun], signature: CauseSignature, largest_deviation: float
+) -> ScreenedCause:
+    """One signature fitted to the base's residual."""
+    runs = [
         replace(run, slopes=np.column_stack([run.slopes, change]))
-        for run, change in zip(own, signature, strict=True)
+        for run, change in zip(base_runs, signature.changes, strict=True)
     ]
-    found = normal(with_cause)
-    sizes = cause.sizes
-    trial = point.vector[len(point.vector) - len(sizes) :] * [size.scale for size in sizes]
-    off = np.array([size.off for size in sizes])
-    ends = np.array([(size.low - o, size.high - o) for size, o in zip(sizes, off, strict=True)])
-    shares = ends / (trial - off)[:, None]
+    equations = normal_equations(runs, largest_deviation)
+    parameters, vector = signature.cause.parameters, signature.estimate.vector
+    trial = vector[len(vector) - len(parameters) :] * [p.scale for p in parameters]
+    nominal = np.array([p.nominal for p in parameters])
+    ends = np.array([(p.low - n, p.high - n) for p, n in zip(parameters, nominal, strict=True)])
+    shares = ends / (trial - nominal)[:, None]
     low, high = np.max(np.min(shares, axis=1)), np.min(np.max(shares, axis=1))
-    a, chi_square = _bounded(found.hessian, found.gradient, found.least, low, high)
-    return Screened(cause=cause, sizes=tuple((off + a * (trial - off)).tolist()), chi_square=chi_square)
+    share, chi_square = _bounded_last_step(equations, low, high)
+    values = tuple((nominal + share * (trial - nominal)).tolist())
+    return ScreenedCause(cause=signature.cause, values=values, chi_square=chi_square)
 
 
-def _bounded(
-    hessian: NDArray, gradient: NDArray, chi_square: float, low: float, high: float
-) -> tuple[float, float]:
-    """The last number of the least-squares step, held in a range, and the chi-square it leaves."""
+def _bounded_last_step(equations: NormalEquations, low: float, high: float) -> tuple[float, float]:
+    """Least-squares step of the last number between low and high [1], and the chi-square that it leaves.
+
+    All other numbers of the vector are free.
+    """
+    hessian, gradient = equations.hessian, equations.gradient
     k = len(gradient) - 1
     others = hessian[:k, :k] + 1e-9 * np.eye(k)
-    inverse = np.linalg.solve(others, np.column_stack([gradient[:k], hessian[:k, k]]))
-    curvature = hessian[k, k] - hessian[k, :k] @ inverse[:, 1]
-    pull = gradient[k] - hessian[k, :k] @ inverse[:, 0]
-    a = float(np.clip(pull / max(curvature, 1e-12), low, high))
-    left = chi_square - gradient[:k] @ inverse[:, 0] - 2 * a * pull + a * a * curvature
-    return a, float(left)
+    solved = np.linalg.solve(others, np.column_stack([gradient[:k], hessian[:k, k]]))
+    curvature = hessian[k, k] - hessian[k, :k] @ solved[:, 1]
+    slope = gradient[k] - hessian[k, :k] @ solved[:, 0]
+    step = float(np.clip(slope / max(curvature, 1e-12), low, high))
+    left = equations.least - gradient[:k] @ solved[:, 0] - 2 * step * slope + step * step * curvature
+    return step, float(left)

@@ -1,4 +1,4 @@
-"""Which causes a campaign could tell apart, from the sensitivities alone: no residual is looked at."""
+"""Separability: which causes a campaign could tell apart, from sensitivities alone."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -6,38 +6,37 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.fit.fitter import Fitter, Point
-from identification.gap.fit.variable_projection import normal
-from identification.gap.rank.screening import Signature
-
-TWINS = 0.98
-"""Correlation of two causes' signatures above which recordings hardly tell them apart."""
-
-FELT = 3.0
-"""Signature in noise deviations below which a cause at its usual size is not felt."""
+from identification.gap.fit.variable_projection import LinearisedRun, normal_equations
+from identification.gap.rank.screening import CauseSignature
+from identification.gap.rank.settings import RankingSettings
 
 
 @dataclass(frozen=True, kw_only=True)
 class Separability:
-    """Signatures of causes after recalibration, starts and the scatter of units have had their share."""
+    """Signatures of n causes, less what calibrated and nuisance parameters absorb of them."""
 
     labels: tuple[str, ...]
-    felt: NDArray
-    """Length of each signature at the cause's usual size, in noise deviations, (n,)."""
+    """Labels of the causes, (n,)."""
+    signature_norms: NDArray
+    """Length of each signature at the cause's first trial value, (n,) [noise deviations]."""
     correlation: NDArray
-    """Of the signatures, (n, n): near 1 or -1 for causes that look alike."""
+    """Correlations of the signatures, (n, n) [1]: near 1 or -1 for causes that look alike."""
+    settings: RankingSettings
+    """Thresholds of detection and of likeness."""
 
     @property
     def absorbed(self) -> tuple[str, ...]:
         """Causes that recalibration hides."""
-        return tuple(label for label, felt in zip(self.labels, self.felt, strict=True) if felt < FELT)
+        least = self.settings.detectable_signature
+        pairs = zip(self.labels, self.signature_norms, strict=True)
+        return tuple(label for label, norm in pairs if norm < least)
 
     def twins(self, label: str) -> tuple[str, ...]:
-        """Causes that the campaign hardly tells from one, the most alike first."""
-        return self.like(label, TWINS)
+        """Causes that the campaign hardly tells from one cause, the most alike first."""
+        return self.alike(label, self.settings.twin_correlation)
 
-    def like(self, label: str, least: float) -> tuple[str, ...]:
-        """Causes that are felt, and correlate with one by more than `least`; the most alike first."""
+    def alike(self, label: str, least_correlation: float) -> tuple[str, ...]:
+        """Detectable causes with a higher absolute correlation with one cause, the most alike first."""
         if label not in self.labels:
             return ()
         row = np.abs(self.correlation[self.labels.index(label)])
@@ -45,24 +44,42 @@ class Separability:
         return tuple(
             self.labels[i]
             for i in order
-            if row[i] > least and self.labels[i] != label and self.felt[i] >= FELT
+            if row[i] > least_correlation
+            and self.labels[i] != label
+            and self.signature_norms[i] >= self.settings.detectable_signature
         )
 
 
-def separability(fitter: Fitter, base: Point, signatures: Sequence[Signature]) -> Separability:
-    """Of each cause's first trial size, at the base point, on the fitted runs."""
-    first: dict[str, Signature] = {}
+def assess_separability(
+    base_runs: Sequence[LinearisedRun],
+    signatures: Sequence[CauseSignature],
+    largest_deviation: float,
+    settings: RankingSettings,
+) -> Separability:
+    """Separability of the causes at their first trial values.
+
+    Args:
+        base_runs: the base estimate linearised in the fitted runs.
+        signatures: from `simulate_signatures` beside the same base.
+        largest_deviation: bound of nuisance parameters [standard deviations].
+        settings: thresholds that the result keeps.
+    """
+    first: dict[str, CauseSignature] = {}
     for signature in signatures:
         first.setdefault(signature.cause.label, signature)
-    own = fitter.linearise([base], fitter.fitted)[0]
-    both = [
+    runs = [
         replace(run, slopes=np.column_stack([run.slopes, *(s.changes[r] for s in first.values())]))
-        for r, run in enumerate(own)
+        for r, run in enumerate(base_runs)
     ]
-    hessian = normal(both).hessian
-    k = len(base.vector)
+    hessian = normal_equations(runs, largest_deviation).hessian
+    k = base_runs[0].slopes.shape[1]
     cross = hessian[:k, k:]
     gram = hessian[k:, k:] - cross.T @ np.linalg.solve(hessian[:k, :k] + 1e-9 * np.eye(k), cross)
-    felt = np.sqrt(np.maximum(np.diag(gram), 0.0))
-    size = np.maximum(felt, np.sqrt(np.finfo(float).tiny))
-    return Separability(labels=tuple(first), felt=felt, correlation=gram / np.outer(size, size))
+    norms = np.sqrt(np.maximum(np.diag(gram), 0.0))
+    divisors = np.maximum(norms, np.sqrt(np.finfo(float).tiny))
+    return Separability(
+        labels=tuple(first),
+        signature_norms=norms,
+        correlation=gram / np.outer(divisors, divisors),
+        settings=settings,
+    )

@@ -1,119 +1,121 @@
-"""The verdict: what the probabilities amount to, and which causes belong together in doubt."""
+"""The verdict: what the probabilities amount to, and which causes the recordings cannot tell apart."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from identification.gap.locate.fault_localisation import Where
-from identification.gap.rank.evidence import Assessed
-from identification.gap.rank.ranking import Verdicts
+from identification.gap.locate.fault_localisation import Localisation
+from identification.gap.rank.evidence import EvaluatedHypothesis
+from identification.gap.rank.ranking import Ranking
 
 NO_GAP, KNOWN, AMBIGUOUS, UNKNOWN = "no_gap", "known", "ambiguous", "unknown"
-
-DOUBT = 0.001
-"""Probability of no cause above which none is named: a false alarm costs more than a faint cause."""
-
-HELD = 0.9
-"""Share of the probability that an ambiguity set holds."""
+"""Verdicts as gap.json has them."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ranked:
-    """A cause, or several that act together, whatever the variant."""
+class RankedCause:
+    """A cause, or several that act together, with all variants taken together."""
 
     effects: tuple[str, ...]
     """Names as in the catalogue."""
     probability: float
-    found: Assessed
-    """Its most probable variant."""
+    """Sum over the variants."""
+    hypothesis: EvaluatedHypothesis
+    """The most probable variant."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Conclusion:
-    """What a diagnosis says about the cause."""
+    """What a diagnosis concludes about the cause."""
 
     verdict: str
     """NO_GAP, KNOWN, AMBIGUOUS or UNKNOWN."""
-    causes: list[Ranked]
-    """The most probable first."""
-    ambiguity: list[Ranked]
-    """The fewest causes that hold HELD of what all causes have; none where no cause is named."""
-    component: dict[str, float]
-    """Probability that a component is at fault; a pair may have two."""
+    causes: list[RankedCause]
+    """All causes, the most probable first."""
+    ambiguity_set: list[RankedCause]
+    """The fewest causes that hold the required share of the probability of all causes; empty where no
+    cause is named."""
+    component_probabilities: dict[str, float]
+    """Probability that a component is at fault, by component; a pair may have two components."""
 
 
-def conclude(verdicts: Verdicts, where: Where) -> Conclusion:
-    """The verdict on probabilities, and the components they point at."""
-    causes = ranked(verdicts)
-    verdict = _verdict(verdicts)
-    ambiguity = smallest(causes, HELD) if verdict == KNOWN else []
-    if len(ambiguity) > 1:
+def conclude(ranking: Ranking, localisation: Localisation) -> Conclusion:
+    """The verdict on the probabilities, and the components that they point at."""
+    causes = causes_by_name(ranking)
+    verdict = _verdict(ranking)
+    share = ranking.settings.ambiguity_share
+    ambiguity_set = smallest_set(causes, share) if verdict == KNOWN else []
+    if len(ambiguity_set) > 1:
         verdict = AMBIGUOUS
     return Conclusion(
         verdict=verdict,
         causes=causes,
-        ambiguity=ambiguity,
-        component=components(verdicts, where),
+        ambiguity_set=ambiguity_set,
+        component_probabilities=component_probabilities(ranking, localisation),
     )
 
 
-def ranked(verdicts: Verdicts) -> list[Ranked]:
-    """Candidates by the names of their causes, the most probable first."""
-    best: dict[frozenset[str], Assessed] = {}
+def causes_by_name(ranking: Ranking) -> list[RankedCause]:
+    """Hypotheses grouped by the names of their causes, the most probable first."""
+    best: dict[frozenset[str], EvaluatedHypothesis] = {}
     total: dict[frozenset[str], float] = {}
-    for found, probability in zip(verdicts.candidates, verdicts.probability, strict=True):
-        names = frozenset(cause.name for cause in found.point.hypothesis.causes)
-        best.setdefault(names, found)
+    for hypothesis, probability in zip(ranking.hypotheses, ranking.probabilities, strict=True):
+        names = frozenset(_names(hypothesis))
+        best.setdefault(names, hypothesis)
         total[names] = total.get(names, 0.0) + probability
     causes = [
-        Ranked(
-            effects=tuple(dict.fromkeys(cause.name for cause in found.point.hypothesis.causes)),
+        RankedCause(
+            effects=tuple(dict.fromkeys(_names(hypothesis))),
             probability=total[names],
-            found=found,
+            hypothesis=hypothesis,
         )
-        for names, found in best.items()
+        for names, hypothesis in best.items()
     ]
     return sorted(causes, key=lambda cause: -cause.probability)
 
 
-def smallest(causes: Sequence[Ranked], held: float) -> list[Ranked]:
-    """The fewest causes that hold a share of what all of them have, the most probable first."""
+def _names(hypothesis: EvaluatedHypothesis) -> list[str]:
+    return [cause.name for cause in hypothesis.estimate.hypothesis.causes]
+
+
+def smallest_set(causes: Sequence[RankedCause], share: float) -> list[RankedCause]:
+    """The fewest causes that hold a share [1] of the probability of all, the most probable first."""
     whole = sum(cause.probability for cause in causes)
-    found, share = [], 0.0
+    chosen, held = [], 0.0
     for cause in causes:
-        if share >= held * whole:
+        if held >= share * whole:
             break
-        found.append(cause)
-        share += cause.probability
-    return found
+        chosen.append(cause)
+        held += cause.probability
+    return chosen
 
 
-def components(verdicts: Verdicts, where: Where) -> dict[str, float]:
-    """Probability that each component is at fault.
+def component_probabilities(ranking: Ranking, localisation: Localisation) -> dict[str, float]:
+    """Probability that each component is at fault, the highest first.
 
-    A named cause lies in its component; where no name fits, the equations say where something is
-    missing.
+    A named cause lies in its component. For an unknown cause the fault localisation decides.
     """
-    plant = verdicts.fitter.plant
-    found = {cause.component: 0.0 for cause in plant.causes}
-    for candidate, probability in zip(verdicts.candidates, verdicts.probability, strict=True):
-        for component in {cause.component for cause in candidate.point.hypothesis.causes}:
-            found[component] += probability
-    for component, share in _located(where).items():
-        found[component] = found.get(component, 0.0) + verdicts.unknown * share
-    return dict(sorted(found.items(), key=lambda pair: -pair[1]))
+    total = {cause.component: 0.0 for cause in ranking.problem.plant.causes}
+    for hypothesis, probability in zip(ranking.hypotheses, ranking.probabilities, strict=True):
+        for component in {c.component for c in hypothesis.estimate.hypothesis.causes}:
+            total[component] += probability
+    for component, share in _localised_shares(localisation).items():
+        total[component] = total.get(component, 0.0) + ranking.unknown * share
+    return dict(sorted(total.items(), key=lambda pair: -pair[1]))
 
 
-def _located(where: Where) -> Mapping[str, float]:
-    """Shares of the components by the equations alone."""
+def _localised_shares(localisation: Localisation) -> Mapping[str, float]:
+    """Shares of the components by the fault localisation; they sum to 1."""
     shares: dict[str, float] = {}
-    for forcing in where.forcings:
-        component = forcing.equation.component
-        shares[component] = shares.get(component, 0.0) + where.equation[forcing.equation.name]
+    for forcing in localisation.forcings:
+        equation = forcing.equation
+        probability = localisation.equation_probabilities[equation.name]
+        shares[equation.component] = shares.get(equation.component, 0.0) + probability
     whole = sum(shares.values())
     return {component: share / whole for component, share in shares.items()} if whole > 0 else {}
 
 
-def _verdict(verdicts: Verdicts) -> str:
-    if verdicts.no_cause > DOUBT:
+def _verdict(ranking: Ranking) -> str:
+    """NO_GAP, KNOWN or UNKNOWN by the probabilities."""
+    if ranking.no_cause > ranking.settings.no_cause_doubt:
         return NO_GAP
-    return UNKNOWN if verdicts.unknown > sum(verdicts.probability) else KNOWN
+    return UNKNOWN if ranking.unknown > sum(ranking.probabilities) else KNOWN

@@ -1,4 +1,4 @@
-"""Gaps of models on held-out runs with intervals, all under the same draws of blocks."""
+"""Gaps of models on held-out runs with intervals, all under the same bootstrap draws."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,88 +8,112 @@ from numpy.typing import NDArray
 
 from identification.gap.model.grey_box import GreyBox
 from identification.gap.reduce.block_bootstrap import (
-    LEVEL,
     Interval,
     block_starts,
     block_sums,
     block_weights,
     interval,
 )
-from identification.gap.reduce.noise_floor import differences, noise_draws
+from identification.gap.reduce.noise_floor import noise_ratios, squared_differences
+from identification.gap.reduce.settings import ReductionSettings
 
 FLOOR = 1.0
-"""What noise alone leaves of a gap."""
-
-SHARES = np.linspace(0.0, 1.0, 1001)
-"""Shares of the explainable gap that are held against the data."""
+"""Gap that noise alone leaves [noise deviations]; a definition."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Gap:
-    """A model against the held-out runs."""
+    """The distance of a model from the held-out runs."""
 
     overall: Interval
-    """rms of (model - measured)/noise; 1.0 is the floor."""
+    """Root mean square of (model - measured)/noise over all channels; 1.0 is the floor."""
     channels: Mapping[str, Interval]
+    """The same by channel."""
     percent: Mapping[str, float] | None = None
-    """Eqs 19-21 by channel and 'overall' [%]; None for a black box and where a mean vanishes."""
+    """Errors of the 2003 report (eqs 19-21) by channel and 'overall' [%]; None for a black box and where
+    a mean vanishes."""
 
 
-class Draws:
-    """Gaps of models by draw of blocks; row 0 is the estimate."""
+class GapDraws:
+    """Gaps of several models by bootstrap draw; row 0 of every array is the estimate."""
 
-    def __init__(self, plant: GreyBox, residuals: Mapping[str, Sequence[NDArray]], seed: int):
-        """residuals: by model, per run (channels, samples), in the channels' noise deviations."""
+    def __init__(
+        self,
+        plant: GreyBox,
+        residuals: Mapping[str, Sequence[NDArray]],
+        seed: int,
+        settings: ReductionSettings,
+    ):
+        """Sum squares over blocks of the held-out runs.
+
+        Args:
+            plant: the plant with its recordings.
+            residuals: by model, per run (channels, samples) [noise deviations].
+            seed: of the bootstrap.
+            settings: of the bootstrap and the noise floor.
+        """
         self.plant = plant
-        runs = [run for run in plant.runs if run.held_out]
-        self.weights = block_weights([len(block_starts(len(r.time), r.time[1])) for r in runs], seed)
-        self.readings = self._sums([run.trusted for run in plant.runs])
-        squares = {label: self._sums([np.square(y) for y in each]) for label, each in residuals.items()}
-        finest = min(squares, key=lambda label: np.sum(squares[label][0]))
-        changes, number = [self._sums(each) for each in differences(plant, residuals[finest])]
-        self.noise = noise_draws(changes / number, squares[finest] / self.readings)
-        """Noise deviation by draw and channel, relative to the channel's."""
-        self.squares = {label: each / self.noise**2 for label, each in squares.items()}
+        self.settings = settings
+        held_out = [run for run in plant.runs if run.held_out]
+        blocks = [len(block_starts(len(run.time), run.time[1], settings)) for run in held_out]
+        self._weights = block_weights(blocks, seed, settings)
+        self._readings = self._sums([run.trusted for run in plant.runs])
+        squares = {label: self._sums([np.square(y) for y in own]) for label, own in residuals.items()}
+        best = min(squares, key=lambda label: np.sum(squares[label][0]))
+        differences = squared_differences(plant, residuals[best], settings)
+        changes, count = [self._sums(own) for own in differences]
+        self.noise = noise_ratios(changes / count, squares[best] / self._readings, settings)
+        """Noise deviation relative to the channel's, (1 + draws, channels) [1]."""
+        self._squares = {label: own / self.noise**2 for label, own in squares.items()}
 
     def overall(self, label: str) -> NDArray:
-        """A model's gap over all channels, by draw."""
-        return np.sqrt(self.squares[label].sum(axis=1) / self.readings.sum(axis=1))
+        """Gap of a model over all channels, (1 + draws,) [noise deviations]."""
+        return np.sqrt(self._squares[label].sum(axis=1) / self._readings.sum(axis=1))
 
     def gap(self, label: str, percent: Mapping[str, float] | None = None) -> Gap:
-        """A model's gap, overall and by channel, with intervals."""
-        by_channel = np.sqrt(self.squares[label] / self.readings)
-        names = [channel.name for channel in self.plant.channels]
+        """Gap of a model, overall and by channel, with intervals; percent: kept with the result [%]."""
+        by_channel = np.sqrt(self._squares[label] / self._readings)
+        names, level = [c.name for c in self.plant.channels], self.settings.interval_level
         return Gap(
-            overall=interval(self.overall(label)),
-            channels={n: interval(y) for n, y in zip(names, by_channel.T, strict=True)},
+            overall=interval(self.overall(label), level),
+            channels={n: interval(y, level) for n, y in zip(names, by_channel.T, strict=True)},
             percent=percent,
         )
 
-    def share(self, base: str, label: str, *also: tuple[str, str]) -> Interval:
+    def share_closed(self, base: str, label: str, *variants: tuple[str, str]) -> Interval:
         """Share of the base's gap above the floor that a model closes, Fieller's interval in 0 to 1.
 
-        A share f is kept unless nearly all draws have the part that is closed on one side of
-        f (base - floor); so every share is kept where there may be nothing to close. Ends are rounded
-        outwards. also: other pairs of base and model that judge the same; the interval holds theirs too.
+        The interval holds a share f unless nearly all draws have the closed part on one side of
+        f (base - floor). So every share is held where there may be nothing to close. Ends are rounded
+        outwards.
+
+        Args:
+            base: label of the model whose gap is to be closed.
+            label: label of the model that closes it.
+            variants: other pairs of base and model, whose intervals the result holds as well.
         """
-        every = [self._share(*pair) for pair in ((base, label), *also)]
+        every = [self._share_closed(*pair) for pair in ((base, label), *variants)]
         return Interval(
             value=every[0].value,
-            low=min(found.low for found in every),
-            high=max(found.high for found in every),
+            low=min(share.low for share in every),
+            high=max(share.high for share in every),
         )
 
-    def _share(self, base: str, label: str) -> Interval:
+    def _share_closed(self, base: str, label: str) -> Interval:
+        grid = np.linspace(0.0, 1.0, self.settings.share_steps + 1)
         whole, closed = self.overall(base) - FLOOR, self.overall(base) - self.overall(label)
         value = float(np.clip(closed[0] / whole[0], 0, 1)) if whole[0] > 0 else 0.0
-        less = np.mean(closed[1:, None] < SHARES * whole[1:, None], axis=0)
-        tail = 0.5 - LEVEL / 2
-        kept = [value, *SHARES[(less >= tail) & (less <= 1 - tail)]]
-        low, high = np.clip([min(kept) - SHARES[1], max(kept) + SHARES[1]], 0, 1)
+        below = np.mean(closed[1:, None] < grid * whole[1:, None], axis=0)
+        tail = 0.5 - self.settings.interval_level / 2
+        kept = [value, *grid[(below >= tail) & (below <= 1 - tail)]]
+        low, high = np.clip([min(kept) - grid[1], max(kept) + grid[1]], 0, 1)
         return Interval(value=value, low=float(low), high=float(high))
 
     def _sums(self, series: Sequence[NDArray]) -> NDArray:
-        """Sums over the held-out runs by draw, (draws, channels)."""
-        pairs = zip(series, self.plant.runs, strict=True)
-        blocks = [block_sums(np.asarray(y, float), run.time[1]) for y, run in pairs if run.held_out]
-        return self.weights @ np.concatenate(blocks)
+        """Sums of series, per run (channels, samples), over the held-out runs, (1 + draws, channels)."""
+        blocks = [
+            block_sums(np.asarray(y, float), run.time[1], self.settings)
+            for y, run in zip(series, self.plant.runs, strict=True)
+            if run.held_out
+        ]
+        return self._weights @ np.concatenate(blocks)

@@ -1,4 +1,4 @@
-"""Whether what a black box predicts of held-out residuals is more than chance."""
+"""Permutation test: whether a black box's prediction of held-out residuals is more than chance."""
 
 from collections.abc import Sequence
 
@@ -7,34 +7,49 @@ from numpy.typing import NDArray
 
 from identification.gap.model.grey_box import GreyBox
 from identification.gap.reduce.block_bootstrap import block_starts
-
-PERMUTATIONS = 1999
+from identification.gap.reduce.settings import ReductionSettings
 
 
 def p_value(
-    plant: GreyBox, residuals: Sequence[NDArray], predicted: Sequence[NDArray], seed: int
+    plant: GreyBox,
+    residuals: Sequence[NDArray],
+    predicted: Sequence[NDArray],
+    seed: int,
+    settings: ReductionSettings,
 ) -> float:
     """Probability that blocks of the residual in random order agree as well with the prediction.
 
-    Both per run (channels, samples). Whole blocks move, within their run and all channels together, so
-    that correlations in time and between channels stay. 1 where nothing is predicted.
+    Whole blocks move, within their run and all channels together. So correlations in time and between
+    channels stay.
+
+    Args:
+        plant: the plant with its recordings; its held-out runs count.
+        residuals: per run (channels, samples) [noise deviations].
+        predicted: per run (channels, samples) [noise deviations].
+        seed: of the permutations.
+        settings: number of permutations and length of blocks.
+
+    Returns:
+        1 where nothing is predicted.
     """
     rng = np.random.default_rng(seed)
-    agreement = np.zeros(PERMUTATIONS + 1)
+    count = settings.permutations
+    agreement = np.zeros(count + 1)
     for run, residual, prediction in zip(plant.runs, residuals, predicted, strict=True):
         if not run.held_out:
             continue
-        products = _blocks(prediction, run.time[1]) @ _blocks(residual, run.time[1]).T
+        blocks = [_blocks(series, run.time[1], settings) for series in (prediction, residual)]
+        products = blocks[0] @ blocks[1].T
         order = np.arange(len(products))
         agreement[0] += np.trace(products)
-        agreement[1:] += [products[order, rng.permutation(order)].sum() for _ in range(PERMUTATIONS)]
+        agreement[1:] += [products[order, rng.permutation(order)].sum() for _ in range(count)]
     if not any(np.any(prediction) for prediction in predicted):
         return 1.0
     return float(np.mean(agreement >= agreement[0]))
 
 
-def _blocks(series: NDArray, period: float) -> NDArray:
-    """(channels, samples) as (blocks, channels x length), all as long as the shortest."""
-    starts = block_starts(series.shape[1], period)
+def _blocks(series: NDArray, period: float, settings: ReductionSettings) -> NDArray:
+    """Series (channels, samples) as (blocks, channels x length), all as long as the shortest block."""
+    starts = block_starts(series.shape[1], period, settings)
     length = starts[1] if len(starts) > 1 else series.shape[1]
     return np.stack([series[:, start : start + length].ravel() for start in starts])

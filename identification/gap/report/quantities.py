@@ -1,4 +1,4 @@
-"""Numbers as people read them: with prefixed units, probabilities and gaps with their intervals."""
+"""Numbers in reports: with prefixed units, probabilities, and gaps with their intervals."""
 
 import re
 
@@ -6,7 +6,7 @@ from identification.gap.reduce.block_bootstrap import Interval
 
 PREFIXES = {"M": 1e6, "k": 1e3, "": 1.0, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
 POWER_PREFIXES = {"": 1.0, "d": 1e-1, "c": 1e-2, "m": 1e-3, "u": 1e-6}
-"""Prefixes of units, and of units that are squared or cubed."""
+"""Prefixes of units, and of units with a power of two or three."""
 
 PREFIXED = frozenset(
     ("A", "C", "F", "H", "Hz", "J", "K", "N", "Ohm", "Pa", "S", "T", "V", "W", "g", "m", "rad", "s")
@@ -16,26 +16,26 @@ PREFIXED = frozenset(
 
 def quantity(value: float, unit: str) -> str:
     """A value [SI] with its unit and a prefix: 2.4 mS, 0.02 mm^2."""
-    name, scale = readable(unit, value)
-    return f"{short(value / scale)} {name}".strip()
+    name, scale = readable_unit(unit, value)
+    return f"{three_digits(value / scale)} {name}".strip()
 
 
-def interval(value: float, low: float, high: float, unit: str) -> str:
-    """A value [SI] between the ends of its interval, with its unit."""
-    name, scale = readable(unit, value)
-    numbers = [short(number / scale) for number in (value, low, high)]
+def quantity_with_interval(value: float, low: float, high: float, unit: str) -> str:
+    """A value [SI] and the ends of its interval [SI], with one unit."""
+    name, scale = readable_unit(unit, value)
+    numbers = [three_digits(number / scale) for number in (value, low, high)]
     return f"{numbers[0]} ({numbers[1]} to {numbers[2]}) {name}".strip()
 
 
-def short(number: float) -> str:
-    """A number to three digits, without an exponent where it can do without."""
+def three_digits(number: float) -> str:
+    """A number to three significant digits, without an exponent where none is needed."""
     if 1e-3 <= abs(number) < 999.5:
         return f"{number:#.3g}".rstrip(".")
     return f"{number:.0f}" if 999.5 <= abs(number) < 1e6 else f"{number:.3g}"
 
 
-def readable(unit: str, size: float) -> tuple[str, float]:
-    """The unit with a prefix in which numbers of a size [SI] are short, and its size in SI.
+def readable_unit(unit: str, size: float) -> tuple[str, float]:
+    """The unit with the prefix that suits numbers of a size [SI], and the size of that unit in SI.
 
     A unit that takes no prefix stays as it is; '1' is no unit.
     """
@@ -52,23 +52,23 @@ def readable(unit: str, size: float) -> tuple[str, float]:
     return unit, 1.0
 
 
-def chance(probability: float) -> str:
-    """A probability in percent that is never quite 0 or 100."""
+def probability_text(probability: float) -> str:
+    """A probability in percent, bounded by < 1 % and > 99 %."""
     if probability > 0.99:
         return "> 99 %"
     return "< 1 %" if probability < 0.01 else f"{100 * probability:.0f} %"
 
 
-def share(found: Interval) -> str:
-    """A share and its interval in percent."""
-    return f"{100 * found.value:.0f} % ({100 * found.low:.0f} to {100 * found.high:.0f} %)"
+def share_text(share: Interval) -> str:
+    """A share [1] and its interval in percent."""
+    return f"{100 * share.value:.0f} % ({100 * share.low:.0f} to {100 * share.high:.0f} %)"
 
 
-def gap(value: float) -> str:
-    """A gap in noise deviations: small ones to the hundredth."""
+def gap_text(value: float) -> str:
+    """A gap [noise deviations], to the hundredth below ten."""
     return f"{value:.2f}" if value < 9.995 else f"{value:.1f}"
 
 
-def spread(found: Interval) -> str:
-    """A gap and its interval."""
-    return f"{gap(found.value)} ({gap(found.low)} to {gap(found.high)})"
+def gap_with_interval(gap: Interval) -> str:
+    """A gap and its interval [noise deviations]."""
+    return f"{gap_text(gap.value)} ({gap_text(gap.low)} to {gap_text(gap.high)})"

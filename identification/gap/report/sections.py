@@ -1,44 +1,32 @@
-"""What a diagnosis found, for the HTML page."""
+"""The report of a diagnosis as sections of the HTML page."""
 
 import numpy as np
 
-from identification.gap.diagnosis import Diagnosis, label
-from identification.gap.locate.fault_localisation import Where
-from identification.gap.locate.forcing import candidate
-from identification.gap.rank.evidence import Assessed
+from identification.gap.diagnosis import Diagnosis, hypothesis_label
+from identification.gap.locate.fault_localisation import Localisation
+from identification.gap.rank.evidence import EvaluatedHypothesis
 from identification.gap.rank.verdict import AMBIGUOUS, KNOWN, NO_GAP
-from identification.gap.report import localisation_figures as where_figures
-from identification.gap.report import ranking_figures as which_figures
-from identification.gap.report import reduction_figures as shrink_figures
-from identification.gap.report import sentences
-from identification.gap.report import tables as section_tables
-from identification.report.page import Block, Picture, Section, Text, Verdict
-
-READING = (
-    "The gap is the root mean square of (model - measured)/noise on recordings that were never fitted "
-    "to: 1 is noise alone. Nominal, recalibrated, with cause: the model as given, with its calibrated "
-    "parameters refitted, and with these and the cause refitted together. Intervals hold 90 %."
+from identification.gap.report import (
+    localisation_figures,
+    ranking_figures,
+    reduction_figures,
+    sentences,
+    tables,
 )
-
-TELLING = 0.2
-"""Share of the missing term that a state must tell for the term to be drawn over it."""
+from identification.gap.report.verdict_sentences import verdict_sentence
+from identification.report.page import Block, Picture, Section, Text, Verdict
 
 
 def sections(diagnosis: Diagnosis, next_experiment: str = "") -> list[Section]:
-    """The whole report: verdict, where, which, how far it shrinks, next experiment, warnings.
+    """The whole report: verdict, localisation, ranking, reduction, next experiment, warnings.
 
     next_experiment: a sentence or two; empty where none was sought.
     """
-    status, text = sentences.verdict(diagnosis, next_experiment)
     found = [
-        Section(
-            title="Verdict",
-            verdicts=[Verdict(status=status, text=text)],
-            blocks=[Text(text=READING)],
-        ),
-        _where(diagnosis),
-        _which(diagnosis),
-        _shrink(diagnosis),
+        _verdict(diagnosis, next_experiment),
+        _localisation(diagnosis),
+        _ranking(diagnosis),
+        _reduction(diagnosis),
     ]
     if next_experiment:
         plan = Verdict(status="note", text=next_experiment)
@@ -46,118 +34,157 @@ def sections(diagnosis: Diagnosis, next_experiment: str = "") -> list[Section]:
     return [*found, _warnings(diagnosis)]
 
 
-def _where(diagnosis: Diagnosis) -> Section:
-    where = diagnosis.where
-    blocks: list[Block] = [
-        Picture(
-            figure=where_figures.heat_map(where.regimes),
-            caption="What recalibration leaves, by channel and regime; regimes may overlap.",
-        ),
-        _residual(diagnosis, diagnosis.verdicts.none, "What recalibration leaves over time"),
-        Picture(
-            figure=which_figures.places(diagnosis),
-            caption="Left: which equation or reading lacks something, from the residual alone, whatever "
-            "the catalogue. Right: components, as the named causes and the equations have them.",
-        ),
-    ]
-    verdicts = [Verdict(status="note", text=sentences.located(diagnosis))]
-    if where.shape:
-        blocks += _missing(diagnosis, where, "recalibration")
-    if diagnosis.left and diagnosis.left.shape:
-        verdicts.append(Verdict(status="note", text=sentences.beside(diagnosis, diagnosis.left)))
-        blocks += _missing(diagnosis, diagnosis.left, "even the nearest cause")
-    return Section(title="Where the gap lies", verdicts=verdicts, blocks=blocks)
-
-
-def _missing(diagnosis: Diagnosis, where: Where, model: str) -> list[Block]:
-    """The missing term over time, and over a state where one tells it."""
-    likeliest = max(where.forcings, key=lambda forcing: where.equation[forcing.equation.name])
-    found: list[Block] = [
-        Picture(
-            figure=where_figures.forcing_figure(diagnosis.verdicts.fitter.plant, likeliest),
-            caption=f"What {model} leaves out: the least that {likeliest.equation.name} needs to meet "
-            "the recordings.",
-        )
-    ]
-    if where.shape and where.shape.explained >= TELLING:
-        picture = where_figures.shape_figure(where.shape)
-        found.append(Picture(figure=picture, caption="Its shape, over the state that tells it best."))
-    return found
-
-
-def _residual(diagnosis: Diagnosis, found: Assessed, what: str) -> Picture:
-    """Of the held-out run that recalibration misses most."""
-    fitter, before = diagnosis.verdicts.fitter, diagnosis.verdicts.none.residuals
-    held_out = [r for r, run in enumerate(fitter.plant.runs) if run.held_out]
-    run = max(held_out, key=lambda r: np.mean(before[r] ** 2))
-    masks = fitter.plant.regimes(candidate(fitter, found.point), run)
-    return Picture(
-        figure=where_figures.residual_figure(fitter.plant, run, found.residuals[run], masks),
-        caption=f"{what}, on the held-out recording that recalibration misses most. Grey: where 90 % of "
-        "the noise lies.",
+def _verdict(diagnosis: Diagnosis, next_experiment: str) -> Section:
+    status, text = verdict_sentence(diagnosis, next_experiment)
+    explanation = (
+        "The gap is the root mean square of (model - measured)/noise on recordings that were never "
+        "fitted to: 1 is noise alone. The nominal model has the parameters as given. The recalibrated "
+        "model has its calibrated parameters refitted. With a cause, both are refitted together. "
+        f"Intervals hold {_level(diagnosis)}."
+    )
+    return Section(
+        title="Verdict",
+        verdicts=[Verdict(status=status, text=text)],
+        blocks=[Text(text=explanation)],
     )
 
 
-def _which(diagnosis: Diagnosis) -> Section:
-    ambiguity = diagnosis.conclusion.ambiguity
-    verdicts = [Verdict(status="note", text=sentences.hidden(diagnosis))]
-    if ambiguity:
-        names = ", ".join(label(cause.found) for cause in ambiguity)
-        text = f"The fewest causes that hold 90 % of the probability of all causes: {names}."
-        verdicts.insert(0, Verdict(status="good" if len(ambiguity) == 1 else "doubt", text=text))
+def _localisation(diagnosis: Diagnosis) -> Section:
+    localisation = diagnosis.localisation
+    largest = diagnosis.settings.report.heat_map_range
     blocks: list[Block] = [
         Picture(
-            figure=which_figures.ranking(diagnosis),
+            figure=localisation_figures.heat_map(localisation.regime_gaps, largest),
+            caption="Gap after recalibration, by channel and regime; regimes may overlap.",
+        ),
+        _residual(diagnosis, diagnosis.ranking.recalibrated, "Residual after recalibration"),
+        Picture(
+            figure=ranking_figures.location_figure(diagnosis),
+            caption="Left: the equation or reading in which something is missing, from the residual "
+            "alone, whatever the catalogue. Right: the component at fault, from the named causes and "
+            "the equations.",
+        ),
+    ]
+    verdicts = [Verdict(status="note", text=sentences.location_sentence(diagnosis))]
+    if localisation.missing_term:
+        blocks += _missing_term(diagnosis, localisation, "The recalibrated model")
+    remaining = diagnosis.remaining
+    if remaining and remaining.missing_term:
+        text = sentences.remaining_sentence(diagnosis, remaining)
+        verdicts.append(Verdict(status="note", text=text))
+        blocks += _missing_term(diagnosis, remaining, "The model with the nearest cause")
+    return Section(title="Where the gap lies", verdicts=verdicts, blocks=blocks)
+
+
+def _missing_term(diagnosis: Diagnosis, localisation: Localisation, model: str) -> list[Block]:
+    """The missing term over time, and over a state where one explains it."""
+    forcing, level = localisation.likeliest, diagnosis.settings.reduction.interval_level
+    plant = diagnosis.ranking.problem.plant
+    blocks: list[Block] = [
+        Picture(
+            figure=localisation_figures.forcing_figure(plant, forcing, level),
+            caption=f"{model} lacks this term in {forcing.equation.name}: the forcing with which it "
+            "meets the recordings.",
+        )
+    ]
+    term, least = localisation.missing_term, diagnosis.settings.report.drawn_term_share
+    if term and term.explained >= least:
+        picture = localisation_figures.missing_term_figure(term, level)
+        caption = "The missing term over the state that explains it best."
+        blocks.append(Picture(figure=picture, caption=caption))
+    return blocks
+
+
+def _residual(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis, name: str) -> Picture:
+    """Residual of the held-out run that recalibration misses most."""
+    problem = diagnosis.ranking.problem
+    recalibrated = diagnosis.ranking.recalibrated.residuals
+    held_out = [r for r, run in enumerate(problem.plant.runs) if run.held_out]
+    run = max(held_out, key=lambda r: np.mean(recalibrated[r] ** 2))
+    masks = problem.plant.regimes(problem.candidate(hypothesis.estimate), run)
+    level = diagnosis.settings.reduction.interval_level
+    return Picture(
+        figure=localisation_figures.residual_figure(
+            problem.plant, run, hypothesis.residuals[run], masks, level
+        ),
+        caption=f"{name}, on the held-out recording that recalibration misses most. Grey: where "
+        f"{_level(diagnosis)} of the noise lies.",
+    )
+
+
+def _ranking(diagnosis: Diagnosis) -> Section:
+    ambiguity_set = diagnosis.conclusion.ambiguity_set
+    verdicts = [Verdict(status="note", text=sentences.hidden_causes_sentence(diagnosis))]
+    if ambiguity_set:
+        names = ", ".join(hypothesis_label(cause.hypothesis) for cause in ambiguity_set)
+        share = _percent(diagnosis.ranking.settings.ambiguity_share)
+        text = f"The fewest causes that hold {share} of the probability of all causes: {names}."
+        status = "good" if len(ambiguity_set) == 1 else "doubt"
+        verdicts.insert(0, Verdict(status=status, text=text))
+    blocks: list[Block] = [
+        Picture(
+            figure=ranking_figures.ranking_figure(diagnosis),
             caption="Probability of each hypothesis; blue: the ambiguity set.",
         )
     ]
     if diagnosis.judged:
         blocks += [
-            section_tables.ranking(diagnosis),
+            tables.ranking_table(diagnosis),
             Picture(
-                figure=which_figures.sizes(diagnosis.judged),
-                caption="Fitted sizes with 90 % intervals in their physical range.",
+                figure=ranking_figures.size_figure(diagnosis),
+                caption=f"Fitted sizes with {_level(diagnosis)} intervals in their physical range.",
             ),
         ]
     return Section(title="Which cause it is", verdicts=verdicts, blocks=blocks)
 
 
-def _shrink(diagnosis: Diagnosis) -> Section:
+def _reduction(diagnosis: Diagnosis) -> Section:
+    reduction = diagnosis.reduction
     blocks: list[Block] = [
         Picture(
-            figure=shrink_figures.gaps(diagnosis.shrinkage),
-            caption="Gap of every model on held-out recordings with 90 % intervals; red: noise alone.",
+            figure=reduction_figures.gap_figure(reduction),
+            caption="Gap of every model on held-out recordings with "
+            f"{_level(diagnosis)} intervals; red: noise alone.",
         )
     ]
-    if diagnosis.shrinkage.shrink and diagnosis.conclusion.verdict != NO_GAP:
+    if reduction.shares_closed and diagnosis.conclusion.verdict != NO_GAP:
         blocks.append(
             Picture(
-                figure=shrink_figures.shares(diagnosis.shrinkage),
-                caption="What each cause closes of the gap above noise that recalibration leaves.",
+                figure=reduction_figures.share_figure(reduction),
+                caption="Share that each cause closes of the gap between recalibration and noise.",
             )
         )
-    blocks.append(section_tables.gaps(diagnosis))
+    blocks.append(tables.gap_table(diagnosis))
     if diagnosis.best and diagnosis.conclusion.verdict in (KNOWN, AMBIGUOUS):
-        name = label(diagnosis.best.found)
-        blocks.append(_residual(diagnosis, diagnosis.best.found, f"What is left with {name}"))
+        best = diagnosis.best.hypothesis
+        blocks.append(_residual(diagnosis, best, f"Residual with {hypothesis_label(best)}"))
     blocks += [
         Picture(
-            figure=which_figures.moves(diagnosis),
-            caption="How the calibrated parameters moved: they take up part of what the model lacks.",
+            figure=ranking_figures.parameter_change_figure(diagnosis),
+            caption="Changes of the calibrated parameters: they absorb part of what the model lacks.",
         ),
-        section_tables.parameters(diagnosis),
+        tables.parameter_table(diagnosis),
     ]
     return Section(
         title="How far the gap shrinks",
-        verdicts=[Verdict(status="note", text=sentences.shrunk(diagnosis))],
+        verdicts=[Verdict(status="note", text=sentences.reduction_sentence(diagnosis))],
         blocks=blocks,
     )
 
 
 def _warnings(diagnosis: Diagnosis) -> Section:
-    found = [*diagnosis.warnings, *sentences.ends(diagnosis)]
-    verdicts = [Verdict(status="doubt", text=f"{text}.") for text in found]
+    texts = [*diagnosis.warnings, *sentences.parameters_at_bounds(diagnosis)]
+    verdicts = [Verdict(status="doubt", text=f"{text}.") for text in texts]
     if not verdicts:
-        text = "Every fit that counts has converged, and no number of it is at an end of its range."
+        text = "Every relevant fit has converged, and no fitted parameter is at an end of its range."
         verdicts = [Verdict(status="good", text=text)]
     return Section(title="Warnings", verdicts=verdicts, blocks=[])
+
+
+def _level(diagnosis: Diagnosis) -> str:
+    """Probability within the intervals."""
+    return _percent(diagnosis.settings.reduction.interval_level)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:g} %"

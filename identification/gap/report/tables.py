@@ -1,36 +1,43 @@
 """Tables of a diagnosis for the HTML page."""
 
-from identification.gap.diagnosis import Diagnosis, label
+from identification.gap.diagnosis import Diagnosis, hypothesis_label
 from identification.gap.reduce.gaps import FLOOR, Gap
 from identification.gap.report import sentences
-from identification.gap.report.quantities import chance, gap, quantity, spread
+from identification.gap.report.quantities import (
+    gap_text,
+    gap_with_interval,
+    probability_text,
+    quantity,
+)
 from identification.report.page import Table
 
 
-def ranking(diagnosis: Diagnosis) -> Table:
-    """Causes with their sizes, what each closes and what it looks like."""
+def ranking_table(diagnosis: Diagnosis) -> Table:
+    """Judged causes with their sizes, the share that each closes, and look-alikes."""
     return Table(
         columns=["Cause", "component", "probability", "size (90 %)", "closes", "looks like"],
         rows=[
             [
-                label(cause.found),
-                ", ".join(dict.fromkeys(c.component for c in cause.found.point.hypothesis.causes)),
-                chance(cause.probability),
-                "; ".join(sentences.fitted(cause)),
-                sentences.closed(diagnosis, cause),
-                sentences.alike(diagnosis, cause),
+                hypothesis_label(cause.hypothesis),
+                ", ".join(
+                    dict.fromkeys(c.component for c in cause.hypothesis.estimate.hypothesis.causes)
+                ),
+                probability_text(cause.probability),
+                "; ".join(sentences.sizes_with_intervals(diagnosis, cause)),
+                sentences.share_closed(diagnosis, cause),
+                sentences.look_alikes(diagnosis, cause),
             ]
             for cause in diagnosis.judged
         ],
-        caption="'Looks like': what these recordings hardly tell from it, with the correlation of what "
-        "both would change; from the model's sensitivities, before any residual is looked at.",
+        caption="'Looks like': causes that these recordings hardly tell apart from this one, with the "
+        "correlation of both effects; from the model's sensitivities alone, whatever the residual.",
     )
 
 
-def gaps(diagnosis: Diagnosis) -> Table:
-    """In noise units and in the report's percent."""
-    models = {**diagnosis.shrinkage.gaps, "black box": diagnosis.shrinkage.black_box_floor}
-    channels = list(diagnosis.shrinkage.noise)
+def gap_table(diagnosis: Diagnosis) -> Table:
+    """Gap of every model in noise deviations and in the 2003 report's percent."""
+    models = {**diagnosis.reduction.gaps, "black box": diagnosis.reduction.black_box}
+    channels = list(diagnosis.reduction.noise_ratios)
     columns = ["overall", *channels]
     return Table(
         columns=["Model", *(f"{c} [noise]" for c in columns), *(f"{c} [%]" for c in columns)],
@@ -39,30 +46,37 @@ def gaps(diagnosis: Diagnosis) -> Table:
             for name, model in models.items()
         ],
         caption=f"Left: noise deviations, {FLOOR:g} is noise alone. Right: the report's error "
-        "(eqs 19-21), every run begun at its nominal state.",
+        "(eqs 19-21), every run with nominal offsets.",
     )
 
 
 def _noise_units(model: Gap, channels: list[str]) -> list[str]:
-    return [spread(model.overall), *(gap(model.channels[channel].value) for channel in channels)]
+    return [
+        gap_with_interval(model.overall),
+        *(gap_text(model.channels[channel].value) for channel in channels),
+    ]
 
 
 def _percent(model: Gap, columns: list[str]) -> list[str]:
     return [f"{model.percent[column]:.2f}" if model.percent else "-" for column in columns]
 
 
-def parameters(diagnosis: Diagnosis) -> Table:
+def parameter_table(diagnosis: Diagnosis) -> Table:
     """Calibrated parameters of each model."""
-    fitter = diagnosis.verdicts.fitter
-    points = {"nominal": diagnosis.nominal, "recalibrated": diagnosis.verdicts.none.point}
+    problem = diagnosis.ranking.problem
+    estimates = {
+        "nominal": diagnosis.nominal,
+        "recalibrated": diagnosis.ranking.recalibrated.estimate,
+    }
     if diagnosis.best:
-        points[f"with {label(diagnosis.best.found)}"] = diagnosis.best.found.point
-    values = [fitter.values(point) for point in points.values()]
+        best = diagnosis.best.hypothesis
+        estimates[f"with {hypothesis_label(best)}"] = best.estimate
+    values = [problem.values(estimate) for estimate in estimates.values()]
     return Table(
-        columns=["Parameter", *points],
+        columns=["Parameter", *estimates],
         rows=[
-            [size.symbol, *(quantity(found[size.symbol], size.unit) for found in values)]
-            for size in fitter.plant.parameters
+            [p.symbol, *(quantity(own[p.symbol], p.unit) for own in values)]
+            for p in problem.plant.parameters
         ],
         caption="Calibrated parameters.",
     )

@@ -1,4 +1,4 @@
-"""Diagnoses of tanks, one of each verdict, for the tests of what is made of them."""
+"""Diagnoses of tanks, one for each verdict."""
 
 from collections.abc import Callable
 from functools import cache
@@ -6,24 +6,25 @@ from functools import cache
 import numpy as np
 
 from docs.examples.tank.plant import Tank
-from docs.examples.tank.recordings import recorded
+from docs.examples.tank.recordings import virtual_recordings
 from identification.gap.diagnosis import Diagnosis, diagnose
-from identification.gap.model.grey_box import Cause, Size
+from identification.gap.model.cause import Cause
+from identification.gap.model.free_parameter import FreeParameter
 
 
 def leaking() -> Tank:
     """A cause of the catalogue."""
-    return Tank(recorded({"c": 0.021, "leak": 4e-3}))
+    return Tank(virtual_recordings({"c": 0.021, "leak": 4e-3}))
 
 
-def sound() -> Tank:
+def without_gap() -> Tank:
     """Nothing that recalibration does not set right."""
-    return Tank(recorded({"c": 0.021}))
+    return Tank(virtual_recordings({"c": 0.021}))
 
 
-def haunted() -> Tank:
+def disturbed() -> Tank:
     """A disturbance that no cause of the catalogue makes."""
-    tank = sound()
+    tank = without_gap()
     for run in tank.runs:
         run.measured[:] += 0.02 * np.sin(run.time / 3.0)
     return tank
@@ -33,9 +34,11 @@ class Twins(Tank):
     """A leaking tank whose catalogue has the leak under two names."""
 
     def __init__(self):
-        super().__init__(recorded({"c": 0.021, "leak": 4e-3}))
-        size = Size(symbol="seep", unit="1/s", low=0.0, high=0.05, trials=(1e-3,), scale=1e-3)
-        self.causes = (*self.causes, Cause(name="seep", component="tank", sizes=(size,)))
+        super().__init__(virtual_recordings({"c": 0.021, "leak": 4e-3}))
+        parameter = FreeParameter(
+            symbol="seep", unit="1/s", low=0.0, high=0.05, trials=(1e-3,), scale=1e-3
+        )
+        self.causes = (*self.causes, Cause(name="seep", component="tank", parameters=(parameter,)))
 
     def outputs(self, values, runs):
         """A seep is a leak."""
@@ -45,8 +48,8 @@ class Twins(Tank):
 
 TANKS: dict[str, Callable[[], Tank]] = {
     "known": leaking,
-    "no_gap": sound,
-    "unknown": haunted,
+    "no_gap": without_gap,
+    "unknown": disturbed,
     "ambiguous": Twins,
 }
 

@@ -3,22 +3,26 @@
 import numpy as np
 
 from docs.examples.tank.plant import Tank
-from docs.examples.tank.recordings import recorded
-from identification.gap.reduce.black_box import Task, ridge
+from docs.examples.tank.recordings import virtual_recordings
+from identification.gap.reduce.black_box import LearningRun, ridge_learner
 from identification.gap.reduce.predictability import p_value
+from identification.gap.reduce.settings import ReductionSettings
+
+SETTINGS = ReductionSettings()
+ridge = ridge_learner(SETTINGS)
 
 
-def task(seed: int, wave: float) -> Task:
+def task(seed: int, wave: float) -> LearningRun:
     rng = np.random.default_rng(seed)
     features = rng.standard_normal((400, 4))
     told = wave * np.sin(features[:, 0]) * features[:, 1]
-    return Task(features=features, target=(told + rng.standard_normal(400))[None])
+    return LearningRun(features=features, target=(told + rng.standard_normal(400))[None])
 
 
 def left(wave: float) -> tuple[float, float]:
     """Mean square of an unseen run, and what is left of it."""
     unseen = task(9, wave)
-    predicted = ridge([task(seed, wave) for seed in range(4)], [unseen.features], seed=0)[0]
+    predicted = ridge([task(seed, wave) for seed in range(4)], [unseen.features], 0)[0]
     return float(np.mean(unseen.target**2)), float(np.mean((unseen.target - predicted) ** 2))
 
 
@@ -34,15 +38,18 @@ def test_noise_is_left_alone():
 
 def test_one_run_is_enough_to_learn_from():
     unseen = task(9, 5.0)
-    predicted = ridge([task(0, 5.0)], [unseen.features], seed=0)[0]
+    predicted = ridge([task(0, 5.0)], [unseen.features], 0)[0]
     assert np.mean((unseen.target - predicted) ** 2) < 0.7 * np.mean(unseen.target**2)
 
 
 def test_a_prediction_of_noise_is_as_good_as_chance_and_of_itself_is_not():
-    plant = Tank(recorded({}))
+    plant = Tank(virtual_recordings({}))
     rng = np.random.default_rng(4)
     residuals = [rng.standard_normal((1, 240)) for _ in plant.runs]
-    chance = [p_value(plant, residuals, [rng.standard_normal((1, 240))] * 3, s) for s in range(60)]
+    chance = [
+        p_value(plant, residuals, [rng.standard_normal((1, 240))] * 3, seed, SETTINGS)
+        for seed in range(60)
+    ]
     assert 0.35 < np.mean(chance) < 0.65
-    assert p_value(plant, residuals, residuals, 0) < 0.002
-    assert p_value(plant, residuals, [np.zeros((1, 240))] * 3, 0) == 1.0
+    assert p_value(plant, residuals, residuals, 0, SETTINGS) < 0.002
+    assert p_value(plant, residuals, [np.zeros((1, 240))] * 3, 0, SETTINGS) == 1.0

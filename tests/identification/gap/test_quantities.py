@@ -4,13 +4,13 @@ import pytest
 
 from identification.gap.reduce.block_bootstrap import Interval
 from identification.gap.report.quantities import (
-    chance,
-    interval,
+    gap_with_interval,
+    probability_text,
     quantity,
-    readable,
-    share,
-    short,
-    spread,
+    quantity_with_interval,
+    readable_unit,
+    share_text,
+    three_digits,
 )
 
 
@@ -34,7 +34,7 @@ def test_a_prefix_scales_its_unit_and_the_unit_s_power(value, unit, text):
 @pytest.mark.parametrize("unit", ["s", "m^2", "m^3", "N s/m", "1", "kg"])
 @pytest.mark.parametrize("size", [3e-9, 2e-4, 0.7, 12.0, 4.5e3])
 def test_the_scale_is_that_of_the_name(unit, size):
-    name, scale = readable(unit, size)
+    name, scale = readable_unit(unit, size)
     prefix = name.removesuffix(unit)
     power = int(unit[2]) if "^" in unit else 1
     factor = {"": 1, "M": 1e6, "k": 1e3, "d": 0.1, "c": 0.01, "m": 1e-3, "u": 1e-6, "n": 1e-9}[prefix]
@@ -43,20 +43,20 @@ def test_the_scale_is_that_of_the_name(unit, size):
 
 @pytest.mark.parametrize("number", [0.00123456, 0.72, 9.999, 10.0, 123.4, 1500.3, 98765.0, 3e-7, 2e8])
 def test_three_digits_are_kept(number):
-    assert float(short(number)) == pytest.approx(number, rel=5e-3)
-    assert "e" not in short(number) or not 1e-3 <= number < 1e6
+    assert float(three_digits(number)) == pytest.approx(number, rel=5e-3)
+    assert "e" not in three_digits(number) or not 1e-3 <= number < 1e6
 
 
 def test_an_interval_has_one_unit():
-    assert interval(2e-3, 9e-4, 3.1e-3, "s") == "2.00 (0.900 to 3.10) ms"
+    assert quantity_with_interval(2e-3, 9e-4, 3.1e-3, "s") == "2.00 (0.900 to 3.10) ms"
 
 
 def test_nothing_is_certain_in_words():
-    assert chance(1.0) == "> 99 %"
-    assert chance(0.0) == "< 1 %"
-    assert chance(0.534) == "53 %"
+    assert probability_text(1.0) == "> 99 %"
+    assert probability_text(0.0) == "< 1 %"
+    assert probability_text(0.534) == "53 %"
 
 
 def test_shares_and_gaps():
-    assert share(Interval(value=0.99, low=0.97, high=1.0)) == "99 % (97 to 100 %)"
-    assert spread(Interval(value=1.004, low=0.99, high=12.34)) == "1.00 (0.99 to 12.3)"
+    assert share_text(Interval(value=0.99, low=0.97, high=1.0)) == "99 % (97 to 100 %)"
+    assert gap_with_interval(Interval(value=1.004, low=0.99, high=12.34)) == "1.00 (0.99 to 12.3)"

@@ -6,67 +6,78 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from identification.gap.fit.fitter import Hypothesis
-from identification.gap.locate.fault_localisation import Forcing, Where
-from identification.gap.model.grey_box import Cause, Equation
-from identification.gap.rank.evidence import Assessed
-from identification.gap.rank.ranking import Verdicts
+from identification.gap.fit.hypothesis import Hypothesis
+from identification.gap.locate.fault_localisation import ForcingEstimate, Localisation
+from identification.gap.model.cause import Cause
+from identification.gap.model.state_equation import StateEquation
+from identification.gap.rank.evidence import EvaluatedHypothesis
+from identification.gap.rank.ranking import Ranking
 from identification.gap.rank.verdict import (
     AMBIGUOUS,
     KNOWN,
     NO_GAP,
     UNKNOWN,
-    Ranked,
-    components,
+    RankedCause,
+    causes_by_name,
+    component_probabilities,
     conclude,
-    ranked,
-    smallest,
+    smallest_set,
 )
 from tests.identification.gap.tanks import diagnosed
 
-LEAK = Cause(name="leak", component="tank", sizes=())
-STEAM = Cause(name="evaporation", component="tank", sizes=())
-LAG = Cause(name="lag", component="sensor", sizes=())
-FAST, SLOW = (Cause(name="lag", component="sensor", sizes=(), variant=v) for v in ("fast", "slow"))
+LEAK = Cause(name="leak", component="tank", parameters=())
+STEAM = Cause(name="evaporation", component="tank", parameters=())
+LAG = Cause(name="lag", component="sensor", parameters=())
+FAST, SLOW = (Cause(name="lag", component="sensor", parameters=(), variant=v) for v in ("fast", "slow"))
 
 
 SOUND = diagnosed("no_gap")
 
 
-def assessed(*causes: Cause) -> Assessed:
-    none = SOUND.verdicts.none
-    point = replace(none.point, hypothesis=Hypothesis(causes=causes))
-    return replace(none, point=point, log_evidence=0.0, with_leftover=0.0)
+def evaluated(*causes: Cause) -> EvaluatedHypothesis:
+    recalibrated = SOUND.ranking.recalibrated
+    estimate = replace(recalibrated.estimate, hypothesis=Hypothesis(causes=causes))
+    return replace(recalibrated, estimate=estimate, log_evidence=0.0, log_evidence_with_misfit=0.0)
 
 
-def verdicts(found: list[tuple[tuple[Cause, ...], float]], no_cause=0.0, unknown=0.0) -> Verdicts:
+def ranking(found: list[tuple[tuple[Cause, ...], float]], no_cause=0.0, unknown=0.0) -> Ranking:
     return replace(
-        SOUND.verdicts,
-        candidates=[assessed(*causes) for causes, _ in found],
-        probability=[probability for _, probability in found],
+        SOUND.ranking,
+        hypotheses=[evaluated(*causes) for causes, _ in found],
+        probabilities=[probability for _, probability in found],
         no_cause=no_cause,
         unknown=unknown,
     )
 
 
-def where(**shares: float) -> Where:
+def localisation(**shares: float) -> Localisation:
     """Equations by component, one each."""
     forcings = [
-        Forcing(
-            equation=Equation(name=f"d{component}", state="", component=component, unit="", step=1.0),
+        ForcingEstimate(
+            equation=StateEquation(
+                name=f"d{component}", state="", component=component, unit="", step=1.0
+            ),
             log_evidence=0.0, explained=0.0, windows=[], forcing=np.zeros(0), sd=np.zeros(0),
         )
         for component in shares
     ]  # fmt: skip
-    equation = {f"d{component}": share for component, share in shares.items()}
-    return replace(SOUND.where, equation=equation, none=1.0 - sum(shares.values()), forcings=forcings)
+    equations = {f"d{component}": share for component, share in shares.items()}
+    return replace(
+        SOUND.localisation,
+        equation_probabilities=equations,
+        nothing_missing=1.0 - sum(shares.values()),
+        forcings=forcings,
+    )
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_no_smaller_set_holds_as_much(seed):
     share = np.sort(np.random.default_rng(seed).dirichlet(np.full(6, 0.7)))[::-1] * 0.8
-    causes = [Ranked(effects=(str(i),), probability=p, found=assessed()) for i, p in enumerate(share)]
-    found = smallest(causes, 0.9)
+    causes = [
+        RankedCause(effects=(str(i),), probability=p, hypothesis=evaluated())
+        for i, p in enumerate(share)
+    ]
+    found = smallest_set(causes, 0.9)
     assert sum(cause.probability for cause in found) >= 0.9 * 0.8 - 1e-12
     for fewer in combinations(share, len(found) - 1):
         assert sum(fewer) < 0.9 * 0.8
@@ -74,24 +85,24 @@ def test_no_smaller_set_holds_as_much(seed):
 
 
 def test_variants_of_a_cause_count_together_and_the_likelier_stands_for_them():
-    found = ranked(verdicts([((LEAK,), 0.4), ((FAST,), 0.35), ((SLOW,), 0.25)]))
+    found = causes_by_name(ranking([((LEAK,), 0.4), ((FAST,), 0.35), ((SLOW,), 0.25)]))
     assert [(cause.effects, cause.probability) for cause in found] == [
         (("lag",), pytest.approx(0.6)),
         (("leak",), 0.4),
     ]
-    assert found[0].found.name == ("lag (fast)",)
+    assert found[0].hypothesis.labels == ("lag (fast)",)
 
 
 def test_a_pair_is_the_same_either_way_round():
-    found = ranked(verdicts([((LEAK, FAST), 0.5), ((SLOW, LEAK), 0.3)]))
+    found = causes_by_name(ranking([((LEAK, FAST), 0.5), ((SLOW, LEAK), 0.3)]))
     assert [set(cause.effects) for cause in found] == [{"leak", "lag"}]
     assert found[0].probability == pytest.approx(0.8)
 
 
 def test_single_causes_and_the_unknown_share_out_all_probability():
-    found = components(
-        verdicts([((LEAK,), 0.4), ((STEAM,), 0.1), ((LAG,), 0.2)], unknown=0.3),
-        where(tank=0.6, pipe=0.2),
+    found = component_probabilities(
+        ranking([((LEAK,), 0.4), ((STEAM,), 0.1), ((LAG,), 0.2)], unknown=0.3),
+        localisation(tank=0.6, pipe=0.2),
     )
     assert found == {
         "tank": pytest.approx(0.5 + 0.3 * 0.75),
@@ -103,7 +114,9 @@ def test_single_causes_and_the_unknown_share_out_all_probability():
 
 
 def test_a_pair_points_at_each_of_its_components_once():
-    found = components(verdicts([((LEAK, LAG), 0.6), ((LEAK, STEAM), 0.4)]), where(tank=1.0))
+    found = component_probabilities(
+        ranking([((LEAK, LAG), 0.6), ((LEAK, STEAM), 0.4)]), localisation(tank=1.0)
+    )
     assert found == {"tank": pytest.approx(1.0), "sensor": pytest.approx(0.6)}
 
 
@@ -118,6 +131,6 @@ def test_a_pair_points_at_each_of_its_components_once():
     ],
 )
 def test_verdicts(found, no_cause, unknown, verdict, names):
-    conclusion = conclude(verdicts(found, no_cause, unknown), where(tank=1.0))
+    conclusion = conclude(ranking(found, no_cause, unknown), localisation(tank=1.0))
     assert conclusion.verdict == verdict
-    assert [cause.effects for cause in conclusion.ambiguity] == names
+    assert [cause.effects for cause in conclusion.ambiguity_set] == names

@@ -82,7 +82,7 @@ def test_finished_fits_are_taken_up_again(diagnosed, monkeypatch, tmp_path):
     def never(*args, **options):
         raise AssertionError("a kept fit was run again")
 
-    monkeypatch.setattr("identification.gap.fit.fitter.Fitter.fit", never)
+    monkeypatch.setattr("identification.gap.fit.gauss_newton.linearise", never)
     diagnose_campaign(diagnosed / "campaign", diagnosed / "out", report=False)
     again = json.loads((diagnosed / "out" / "gap.json").read_text())
     for volatile in ("seconds", "next_experiment"):
@@ -95,7 +95,7 @@ def test_finished_fits_are_taken_up_again(diagnosed, monkeypatch, tmp_path):
 def test_without_its_effect_the_gap_is_unknown(diagnosed, tmp_path):
     found = diagnose_campaign(diagnosed / "campaign", tmp_path, without=["eddy_current"], report=False)
     assert found.conclusion.verdict in ("unknown", "no_gap")
-    assert not found.conclusion.ambiguity
+    assert not found.conclusion.ambiguity_set
 
 
 @pytest.mark.parametrize(
@@ -146,7 +146,7 @@ def test_damaged_recordings_never_give_a_confident_cause(damage, tmp_path):
     except CampaignError:
         return  # refused, which is as good
     sensor = {"current_sensor_gain"}  # a doubled current is just that
-    named = {name for cause in found.conclusion.ambiguity for name in cause.effects}
+    named = {name for cause in found.conclusion.ambiguity_set for name in cause.effects}
     assert found.conclusion.verdict != "known" or named <= sensor
 
 

@@ -10,8 +10,8 @@ from epv_env.plant.parameters import Parameters
 from identification.bench.campaign import measured_campaign, run_programme
 from identification.bench.programme_file import load_programmes, save_programmes
 from identification.bench.programmes import BAR, DIAGNOSIS_SUITE, Programme
-from identification.gap.design.experiment import Rivals
-from identification.gap.rank.ranking import Verdicts, which
+from identification.gap.design.rivals import Rivals
+from identification.gap.rank.ranking import Ranking, rank_hypotheses
 from identification.report_2003.cases import Case
 from identification.valve_gap.programmes import (
     CANDIDATES,
@@ -27,17 +27,17 @@ CONFUSED = ("seat_leak", "circuit_leak")
 
 
 @cache
-def diagnosed() -> Verdicts:
+def diagnosed() -> Ranking:
     """A leaking seat, recorded by one opening."""
     truth = Parameters.calibrated().replace(A_PV=2e-8)
     programmes = [p for p in DIAGNOSIS_SUITE if p.name in ("test1", "rest")]
     valve = Valve(measured_campaign([run_programme(truth, p) for p in programmes], truth, seed=3))
     valve.causes = tuple(cause for cause in valve.causes if cause.name in CONFUSED)
-    return which(valve)
+    return rank_hypotheses(valve)
 
 
 def valve() -> Valve:
-    plant = diagnosed().fitter.plant
+    plant = diagnosed().problem.plant
     assert isinstance(plant, Valve)
     return plant
 
@@ -85,7 +85,10 @@ def test_the_telling_programme_is_chosen():
     found = next_experiment(diagnosed(), valve(), [quiet, telling])
     assert found.programme == telling
     assert found.alternatives[1].programme == quiet
-    assert found.alternatives[0].outlook.doubt < found.alternatives[1].outlook.doubt
+    assert (
+        found.alternatives[0].information.expected_entropy
+        < found.alternatives[1].information.expected_entropy
+    )
     assert sum(found.before) == pytest.approx(1.0)
     assert "12.5 bar supply into 4.5 bar" in found.text
     assert next_experiment(diagnosed(), valve(), [quiet, telling]).text == found.text
@@ -99,11 +102,11 @@ def test_what_nothing_explains_asks_for_no_programme():
 
 
 def test_the_sentence_tells_splitting_from_not_splitting():
-    points = tuple(candidate.point for candidate in diagnosed().candidates[:2])
-    rivals = Rivals(points=points, probability=(0.55, 0.45))
+    estimates = tuple(each.estimate for each in diagnosed().hypotheses[:2])
+    rivals = Rivals(estimates=estimates, probability=(0.55, 0.45))
     found = next_experiment(diagnosed(), valve(), [programme("opening", 9.0, 5.0, 0.4)])
     (option,) = found.alternatives
-    sharp = replace(option, outlook=replace(option.outlook, best=0.98))
+    sharp = replace(option, information=replace(option.information, expected_best=0.98))
     assert sentence(sharp, rivals, True).startswith(
         "Record one opening of 400 ms from 9 bar supply into"
     )

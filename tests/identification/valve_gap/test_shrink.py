@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identification.calibration.problem import calibration_problem
-from identification.gap.fit.prediction import percent
+from identification.gap.fit.prediction import percentage_errors
 from identification.replay.responses import total
 from identification.validation.validate import validate
 from identification.valve_gap.valve import Valve
@@ -15,7 +15,7 @@ def test_percent_is_the_validation_stage_s():
     valve = Valve(campaign())
     nominal = {"R": np.array([valve.base["R"]])}
     outputs = [y[..., 0] for y in valve.outputs(nominal, range(len(valve.runs)))]
-    found = percent(valve, outputs)
+    found = percentage_errors(valve, outputs)
     answers = validate(calibration_problem(campaign()), valve.base).answers
     assert found is not None
     assert found["overall"] == pytest.approx(100 * total(answers), rel=1e-9)

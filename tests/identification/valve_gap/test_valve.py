@@ -9,7 +9,7 @@ from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import Parameters
 from identification.bench.campaign import measured_campaign, run_programme
 from identification.bench.programmes import DIAGNOSIS_SUITE
-from identification.gap.rank.ranking import which
+from identification.gap.rank.ranking import rank_hypotheses
 from identification.recordings.recording import Campaign
 from identification.replay.responses import responses
 from identification.valve_gap.causes import effects, parameters
@@ -29,7 +29,7 @@ def campaign(**effect: float) -> Campaign:
 def test_every_effect_of_the_plant_is_a_cause_with_a_component():
     assert {cause.name for cause in effects()} == set(CATALOGUE)
     for cause in effects() + parameters():
-        for size in cause.sizes:
+        for size in cause.parameters:
             assert size.low < size.high
             assert size.trials, cause.label
             assert all(size.low <= trial <= size.high for trial in size.trials), cause.label
@@ -61,7 +61,7 @@ def test_numbers_of_one_run_leave_the_others_alone():
 def diagnosed(causes: tuple[str, ...], **effect: float):
     valve = Valve(campaign(**effect))
     valve.causes = tuple(cause for cause in valve.causes if cause.name in causes)
-    return which(valve)
+    return rank_hypotheses(valve)
 
 
 CANDIDATES = ("eddy_current", "flyback_voltage", "moving_control_volume", "parameter:cPV", "seat_leak")
@@ -73,9 +73,9 @@ CANDIDATES = ("eddy_current", "flyback_voltage", "moving_control_volume", "param
 )
 def test_an_effect_of_the_bench_is_found(name, symbol, size):
     found = diagnosed(CANDIDATES, **{symbol: size})
-    assert found.candidates[0].name == (name,)
-    assert found.probability[0] > 0.9
-    assert found.fitter.values(found.candidates[0].point)[symbol] == pytest.approx(size, rel=0.05)
+    assert found.hypotheses[0].labels == (name,)
+    assert found.probabilities[0] > 0.9
+    assert found.problem.values(found.hypotheses[0].estimate)[symbol] == pytest.approx(size, rel=0.05)
 
 
 def test_a_struck_effect_is_unknown():

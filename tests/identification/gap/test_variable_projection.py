@@ -6,18 +6,24 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from identification.gap.fit.variable_projection import FARTHEST, Linear, freed, normal
+from identification.gap.fit.settings import FitSettings
+from identification.gap.fit.variable_projection import (
+    LinearisedRun,
+    normal_equations,
+    without_run_nuisances,
+)
 
+FARTHEST = FitSettings().largest_deviation
 RNG = np.random.default_rng(2)
 SD = np.array([0.3, 2.0])
 
 
 def runs(count=3):
     return [
-        Linear(
+        LinearisedRun(
             residual=RNG.normal(size=40), slopes=RNG.normal(size=(40, 2)),
-            local=RNG.normal(size=(40, 2)), local_value=RNG.normal(size=2), local_sd=SD,
-            shared=RNG.normal(size=(40, 3)),
+            run_slopes=RNG.normal(size=(40, 2)), run_values=RNG.normal(size=2), run_sd=SD,
+            tolerance_slopes=RNG.normal(size=(40, 3)),
         )
         for _ in range(count)
     ]  # fmt: skip
@@ -28,13 +34,13 @@ def one_problem(given):
     blocks, right = [], []
     for r, run in enumerate(given):
         own = np.zeros((40, 2 * len(given)))
-        own[:, 2 * r : 2 * r + 2] = run.local
-        blocks.append(np.hstack([run.slopes, run.shared, own]))
+        own[:, 2 * r : 2 * r + 2] = run.run_slopes
+        blocks.append(np.hstack([run.slopes, run.tolerance_slopes, own]))
         right.append(run.residual)
         prior = np.zeros((2, 5 + 2 * len(given)))
         prior[:, 5 + 2 * r : 7 + 2 * r] = np.diag(1 / SD)
         blocks.append(prior)
-        right.append(-run.local_value / SD)
+        right.append(-run.run_values / SD)
     blocks.append(np.hstack([np.zeros((3, 2)), np.eye(3), np.zeros((3, 2 * len(given)))]))
     right.append(np.zeros(3))
     return np.vstack(blocks), np.concatenate(right)
@@ -42,7 +48,7 @@ def one_problem(given):
 
 def test_the_reduced_equations_have_the_whole_problem_s_solution():
     given = runs()
-    found = normal(given)
+    found = normal_equations(given, FARTHEST)
     matrix, right = one_problem(given)
     solution, squares, *_ = np.linalg.lstsq(matrix, right, rcond=None)
     step = np.linalg.solve(found.hessian, found.gradient)
@@ -51,23 +57,23 @@ def test_the_reduced_equations_have_the_whole_problem_s_solution():
     assert left == pytest.approx(squares[0], rel=1e-9)
 
 
-def test_freed_residuals_are_what_the_whole_problem_leaves():
+def test_residuals_without_nuisances_are_what_the_whole_problem_leaves():
     given = runs()
-    at_rest = [Linear(**{**run.__dict__, "slopes": np.zeros((40, 2))}) for run in given]
-    found = normal(at_rest)
+    at_rest = [replace(run, slopes=np.zeros((40, 2))) for run in given]
+    found = normal_equations(at_rest, FARTHEST)
     matrix, right = one_problem(given)
     solution = np.linalg.lstsq(matrix[:, 2:], right, rcond=None)[0]
-    np.testing.assert_allclose(found.shared, solution[:3], rtol=1e-9)
+    np.testing.assert_allclose(found.tolerances, solution[:3], rtol=1e-9)
     for r, run in enumerate(given):
-        residual, step = freed(run, found.shared)
+        residual, step = without_run_nuisances(run, found.tolerances, FARTHEST)
         np.testing.assert_allclose(step, solution[3 + 2 * r : 5 + 2 * r], rtol=1e-9)
-        expected = run.residual - run.shared @ solution[:3] - run.local @ step
+        expected = run.residual - run.tolerance_slopes @ solution[:3] - run.run_slopes @ step
         np.testing.assert_allclose(residual, expected, rtol=1e-9)
 
 
 def test_a_bounded_step_is_that_of_the_whole_bounded_problem():
     given = [replace(run, residual=200.0 * run.residual) for run in runs()]
-    found = normal(given)
+    found = normal_equations(given, FARTHEST)
     matrix, right = one_problem(given)
     ends = np.full(matrix.shape[1], np.inf)
     ends[:2], ends[2:5] = (0.05, 0.5), FARTHEST
@@ -80,6 +86,6 @@ def test_a_bounded_step_is_that_of_the_whole_bounded_problem():
 
 
 def test_a_number_of_a_run_stays_within_its_bounds():
-    run = replace(runs(1)[0], local_value=np.zeros(2), local_sd=np.array([1e-3, 2.0]))
-    _, step = freed(run, np.zeros(3))
+    run = replace(runs(1)[0], run_values=np.zeros(2), run_sd=np.array([1e-3, 2.0]))
+    _, step = without_run_nuisances(run, np.zeros(3), FARTHEST)
     assert abs(step[0]) <= FARTHEST * 1e-3

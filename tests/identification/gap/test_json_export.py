@@ -6,7 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.report.json_export import as_json, location, magnitudes, unit_name
+from identification.gap.report.json_export import (
+    as_json,
+    magnitudes,
+    remaining_location,
+    unit_name,
+)
 from tests.identification.gap.tanks import TANKS, diagnosed
 
 KEYS = {
@@ -44,8 +49,8 @@ def test_probabilities_fall_and_sum_to_one(verdict):
 
 def test_a_regime_too_rare_for_an_interval_is_written_all_the_same():
     found = diagnosed("known")
-    rare = [replace(gap, low=0.0, high=np.inf) for gap in found.where.regimes]
-    content = as_json(replace(found, where=replace(found.where, regimes=rare)))
+    rare = [replace(gap, low=0.0, high=np.inf) for gap in found.localisation.regime_gaps]
+    content = as_json(replace(found, localisation=replace(found.localisation, regime_gaps=rare)))
     assert json.loads(json.dumps(content, allow_nan=False))["where"]["regimes"][0]["high"] is None
 
 
@@ -80,22 +85,25 @@ def test_without_a_gap_the_recalibrated_model_stays_in_force():
 
 
 def test_what_is_left_is_located_only_where_something_is():
-    assert location(diagnosed("known")) is None
+    assert remaining_location(diagnosed("known")) is None
     unknown = diagnosed("unknown")
-    place = location(unknown)
+    place = remaining_location(unknown)
     assert place is not None
     component, equation = place.split(": ")
-    assert unknown.left is not None
-    assert component in {forcing.equation.component for forcing in unknown.left.forcings}
-    assert unknown.left.equation[equation] == max(unknown.left.equation.values())
+    assert unknown.remaining is not None
+    probabilities = unknown.remaining.equation_probabilities
+    assert component in {forcing.equation.component for forcing in unknown.remaining.forcings}
+    assert probabilities[equation] == max(probabilities.values())
 
 
 def test_an_interval_stays_within_the_physical_range():
-    found = diagnosed("known").conclusion.causes[0].found
-    wide = replace(found, covariance=np.eye(len(found.point.vector)))
-    size = wide.point.hypothesis.sizes[0]
-    ((_, low, high),) = magnitudes(wide).values()
-    assert (low, high) == (size.low, size.high)
+    found = diagnosed("known")
+    cause = found.conclusion.causes[0]
+    covariance = np.eye(len(cause.hypothesis.estimate.vector))
+    wide = replace(cause, hypothesis=replace(cause.hypothesis, covariance=covariance))
+    parameter = cause.hypothesis.estimate.hypothesis.parameters[0]
+    ((_, low, high),) = magnitudes(found, wide).values()
+    assert (low, high) == (parameter.low, parameter.high)
 
 
 @pytest.mark.parametrize(

@@ -11,11 +11,16 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
 from identification.gap.diagnosis import Diagnosis
-from identification.gap.report import ranking_figures as which_figures
+from identification.gap.report import ranking_figures
 from identification.gap.report.json_export import as_json
 from identification.gap.report.quantities import quantity
 from identification.gap.report.sections import sections
-from identification.gap.report.sentences import alike, ends, hidden, verdict
+from identification.gap.report.sentences import (
+    hidden_causes_sentence,
+    look_alikes,
+    parameters_at_bounds,
+)
+from identification.gap.report.verdict_sentences import verdict_sentence
 from identification.report.page import Picture, Section, Table, write_page
 from tests.identification.gap.tanks import TANKS, diagnosed
 
@@ -65,7 +70,7 @@ def test_without_a_next_experiment_there_is_no_such_part():
 
 
 def test_a_known_cause_is_named_with_its_size_and_what_it_closes():
-    status, text = verdict(diagnosed("known"), NEXT)
+    status, text = verdict_sentence(diagnosed("known"), NEXT)
     cause = as_json(diagnosed("known"))["causes"][0]
     assert status == "good"
     assert text.startswith("leak explains the gap (> 99 %): adding it with leak = 0.00")
@@ -74,7 +79,7 @@ def test_a_known_cause_is_named_with_its_size_and_what_it_closes():
 
 
 def test_no_gap_says_so_and_what_to_do():
-    status, text = verdict(diagnosed("no_gap"), NEXT)
+    status, text = verdict_sentence(diagnosed("no_gap"), NEXT)
     assert status == "good"
     assert text.startswith("There is no gap beyond noise after recalibration")
     assert "add nothing" in text
@@ -82,16 +87,19 @@ def test_no_gap_says_so_and_what_to_do():
 
 def test_an_unknown_cause_is_sent_to_the_place_and_the_shape():
     found = diagnosed("unknown")
-    status, text = verdict(found, NEXT)
+    status, text = verdict_sentence(found, NEXT)
     assert status == "bad"
     assert text.startswith("Nothing in the catalogue explains the gap (> 99 %)")
-    component = max(found.conclusion.component, key=found.conclusion.component.__getitem__)
+    component = max(
+        found.conclusion.component_probabilities,
+        key=found.conclusion.component_probabilities.__getitem__,
+    )
     assert f"missing, most likely in {component}" in text
-    assert found.where.shape is None or "see its shape" in text
+    assert found.localisation.missing_term is None or "see its shape" in text
 
 
 def test_rivals_are_named_together_with_what_would_decide():
-    status, text = verdict(diagnosed("ambiguous"), NEXT)
+    status, text = verdict_sentence(diagnosed("ambiguous"), NEXT)
     assert status == "doubt"
     assert re.match(r"leak \(50 %\) or seep \(50 %\) explains the gap", text)
     assert "cannot tell which" in text
@@ -100,27 +108,27 @@ def test_rivals_are_named_together_with_what_would_decide():
 
 def test_what_rivals_share_is_said_once():
     found = diagnosed("ambiguous")
-    leak, seep = found.conclusion.ambiguity
-    lag = next(c for c in found.verdicts.fitter.plant.causes if c.name == "lag")
+    leak, seep = found.conclusion.ambiguity_set
+    lag = next(c for c in found.ranking.problem.plant.causes if c.name == "lag")
 
     def beside(ranked):
-        point = ranked.found.point
-        causes = (lag, *point.hypothesis.causes)
-        point = replace(point, hypothesis=replace(point.hypothesis, causes=causes))
-        return replace(ranked, found=replace(ranked.found, point=point))
+        estimate = ranked.hypothesis.estimate
+        causes = (lag, *estimate.hypothesis.causes)
+        estimate = replace(estimate, hypothesis=replace(estimate.hypothesis, causes=causes))
+        return replace(ranked, hypothesis=replace(ranked.hypothesis, estimate=estimate))
 
     def said(*rivals):
-        return verdict(
+        return verdict_sentence(
             replace(
                 found,
-                conclusion=replace(found.conclusion, ambiguity=list(rivals)),
-                shrinkage=replace(found.shrinkage, shrink=known),
+                conclusion=replace(found.conclusion, ambiguity_set=list(rivals)),
+                reduction=replace(found.reduction, shares_closed=known),
             ),
             "",
         )[1]
 
-    shrink = found.shrinkage.shrink
-    known = dict(shrink) | {f"lag + {name}": share for name, share in shrink.items()}
+    shares = found.reduction.shares_closed
+    known = dict(shares) | {f"lag + {name}": share for name, share in shares.items()}
     both = said(beside(leak), beside(seep))
     assert both.startswith("lag together with leak (")
     assert "cannot tell which" in both
@@ -131,35 +139,36 @@ def test_what_rivals_share_is_said_once():
 
 def test_twins_are_announced_beside_their_correlation():
     found = diagnosed("ambiguous")
-    named = {cause.effects[0]: alike(found, cause) for cause in found.judged}
+    named = {cause.effects[0]: look_alikes(found, cause) for cause in found.judged}
     assert named["leak"] == "seep (1.000)"
     assert named["seep"] == "leak (1.000)"
     assert named["lag"] == "-"
-    assert alike(diagnosed("known"), diagnosed("known").judged[0]) == "-"
+    assert look_alikes(diagnosed("known"), diagnosed("known").judged[0]) == "-"
 
 
 def test_causes_that_recalibration_hides_are_announced():
     found = diagnosed("known")
-    separability = found.verdicts.separability
+    separability = found.ranking.separability
 
-    def with_felt(felt):
-        of = dict.fromkeys(separability.labels, 100.0) | felt
-        other = replace(separability, felt=np.array([of[name] for name in separability.labels]))
-        return replace(found, verdicts=replace(found.verdicts, separability=other))
+    def with_norms(norms):
+        of = dict.fromkeys(separability.labels, 100.0) | norms
+        array = np.array([of[label] for label in separability.labels])
+        other = replace(separability, signature_norms=array)
+        return replace(found, ranking=replace(found.ranking, separability=other))
 
-    assert "every cause of the catalogue would show" in hidden(with_felt({}))
-    assert "would not show lag: recalibration" in hidden(with_felt({"lag": 1.0}))
+    assert "every cause of the catalogue would show" in hidden_causes_sentence(with_norms({}))
+    assert "would not show lag: recalibration" in hidden_causes_sentence(with_norms({"lag": 1.0}))
 
 
 def test_a_likely_cause_that_is_not_named_is_told_with_the_reason():
     found = diagnosed("no_gap")
     first, *others = found.conclusion.causes
     causes = [replace(first, probability=0.7), *others]
-    status, text = verdict(
+    status, text = verdict_sentence(
         replace(
             found,
             conclusion=replace(found.conclusion, causes=causes),
-            verdicts=replace(found.verdicts, no_cause=0.3),
+            ranking=replace(found.ranking, no_cause=0.3),
         ),
         "",
     )
@@ -171,49 +180,53 @@ def test_a_likely_cause_that_is_not_named_is_told_with_the_reason():
 def at_end(found: Diagnosis) -> Diagnosis:
     """The diagnosis with the leak as large as can be."""
     best, *others = found.judged
-    size = best.found.point.hypothesis.sizes[0]
-    vector = np.array([*best.found.point.vector[:-1], size.high / size.scale])
-    point = replace(best.found.point, vector=vector)
-    return replace(found, judged=[replace(best, found=replace(best.found, point=point)), *others])
+    estimate = best.hypothesis.estimate
+    leak = estimate.hypothesis.parameters[0]
+    vector = np.array([*estimate.vector[:-1], leak.high / leak.scale])
+    changed = replace(best.hypothesis, estimate=replace(estimate, vector=vector))
+    return replace(found, judged=[replace(best, hypothesis=changed), *others])
 
 
 def test_a_size_at_an_end_of_its_range_is_a_warning():
     found = diagnosed("known")
-    assert ends(found) == []
-    assert ends(at_end(found)) == ["leak: leak is at an end of its physical range (0.0500 1/s)"]
+    assert parameters_at_bounds(found) == []
+    assert parameters_at_bounds(at_end(found)) == [
+        "leak: leak is at an end of its physical range (0.0500 1/s)"
+    ]
     assert sections(at_end(found))[-1].verdicts[0].status == "doubt"
     assert sections(found)[-1].verdicts[0].status == "good"
 
 
 def test_a_warning_puts_the_verdict_in_doubt():
     found = replace(diagnosed("known"), warnings=["the recalibration did not converge"])
-    assert verdict(found, "")[0] == "doubt"
+    assert verdict_sentence(found, "")[0] == "doubt"
     assert "the recalibration did not converge." in texts([sections(found)[-1]])
 
 
 def test_the_ranking_shows_every_hypothesis_and_marks_the_ambiguity_set():
     found = diagnosed("ambiguous")
-    (axes,) = which_figures.ranking(found).axes
+    (axes,) = ranking_figures.ranking_figure(found).axes
     assert sum(widths(axes)) == pytest.approx(1.0, abs=1e-6)
-    named = [bar.get_facecolor() for bar in axes.patches[: len(found.conclusion.ambiguity)]]
+    named = [bar.get_facecolor() for bar in axes.patches[: len(found.conclusion.ambiguity_set)]]
     assert len(set(named)) == 1
     assert axes.patches[len(named)].get_facecolor() not in named
 
 
 def test_places_sum_to_one_with_nothing_missing():
-    left, right = which_figures.places(diagnosed("known")).axes
+    left, right = ranking_figures.location_figure(diagnosed("known")).axes
     assert sum(widths(left)) == pytest.approx(1.0)
     assert sum(widths(right)) == pytest.approx(1.0)
 
 
 def test_sizes_lie_within_their_range():
     found = diagnosed("known")
-    (axes,) = which_figures.sizes(found.judged).axes
-    size = found.judged[0].found.point.hypothesis.sizes[0]
-    value = found.verdicts.fitter.values(found.judged[0].found.point)[size.symbol]
+    (axes,) = ranking_figures.size_figure(found).axes
+    estimate = found.judged[0].hypothesis.estimate
+    leak = estimate.hypothesis.parameters[0]
+    value = found.ranking.problem.values(estimate)[leak.symbol]
     dots = [line for line in axes.lines if line.get_marker() == "o"]
     assert len(dots) == 1, "faint causes are not drawn beside a probable one"
-    assert dots[0].get_xdata() == pytest.approx((value - size.low) / (size.high - size.low))
+    assert dots[0].get_xdata() == pytest.approx((value - leak.low) / (leak.high - leak.low))
 
 
 def test_tables_hold_the_figures_of_the_file():

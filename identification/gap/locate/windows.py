@@ -1,0 +1,80 @@
+"""Windows of the runs in which a forcing is constant."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.gap.fit.fitting_problem import FittingProblem
+from identification.gap.locate.settings import LocalisationSettings
+from identification.gap.model.state_equation import StateTrace
+
+
+@dataclass(frozen=True, kw_only=True)
+class Window:
+    """A stretch of a run in which a forcing is constant."""
+
+    run: int
+    """Index of the run."""
+    begin: float
+    """Start of the window [s]."""
+    end: float
+    """End of the window [s]."""
+    states: Mapping[str, float]
+    """Means of the states over the window, by name [SI]."""
+
+
+def most_misfitting_runs(
+    problem: FittingProblem, residuals: Sequence[NDArray], samples: int
+) -> list[int]:
+    """Indices of the runs with the largest mean square residual, up to a number of samples together.
+
+    residuals: per run (channels, samples) [noise deviations].
+    """
+    lengths = np.array([len(run.time) for run in problem.plant.runs])
+    misfit = np.array([np.sum(residual**2) for residual in residuals]) / lengths
+    first, *others = np.argsort(-misfit, kind="stable").tolist()
+    chosen, left = [first], samples - lengths[first]
+    for run in others:
+        if lengths[run] <= left:
+            chosen.append(run)
+            left -= lengths[run]
+    return sorted(chosen)
+
+
+def window_edges(
+    time: NDArray, traces: Mapping[str, StateTrace], settings: LocalisationSettings
+) -> NDArray:
+    """First sample of each window and the end of the last one, dense where states move, (windows + 1,).
+
+    time: (samples,) [s]. traces: states of the run by name. No window is empty.
+    """
+    changes = [np.abs(np.diff(trace.values)) for trace in traces.values()]
+    motion = [change / np.sum(change) for change in changes if np.any(change)]
+    uniform = np.full(len(time) - 1, 1.0 / (len(time) - 1))
+    share = settings.uniform_share
+    density = share * uniform + (1 - share) * np.mean([*motion, uniform], axis=0)
+    progress = np.concatenate([[0.0], np.cumsum(density)]) / np.sum(density)
+    ends = np.searchsorted(progress, np.linspace(0.0, 1.0, settings.windows + 1)[1:-1])
+    return np.unique([0, *ends, len(time) - 1])
+
+
+def windows_of(
+    run: int, time: NDArray, edges: NDArray, traces: Mapping[str, StateTrace]
+) -> list[Window]:
+    """The windows between edges (windows + 1,) of a run with sampling instants (samples,) [s]."""
+    lengths = np.diff(edges)
+    means = {
+        name: np.add.reduceat(trace.values[: edges[-1]], edges[:-1]) / lengths
+        for name, trace in traces.items()
+    }
+    return [
+        Window(
+            run=run,
+            begin=float(time[edges[j]]),
+            end=float(time[edges[j + 1]]),
+            states={name: float(mean[j]) for name, mean in means.items()},
+        )
+        for j in range(len(lengths))
+    ]

@@ -1,0 +1,36 @@
+"""What was measured: channels with their noise, and the runs that were recorded."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Channel:
+    """One measured output."""
+
+    name: str
+    unit: str
+    """Unit in which reports show the channel."""
+    scale: float
+    """Size of that unit in SI."""
+    noise: float
+    """Standard deviation of the readings about the true value [SI], estimated from the recordings."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """One recording as the diagnosis sees it."""
+
+    name: str
+    held_out: bool
+    """No fit uses a held-out run: the gap and its reduction are judged on these runs."""
+    time: NDArray
+    """Sampling instants, uniform from 0, (samples,) [s]."""
+    measured: NDArray
+    """Readings, (channels, samples) [SI]."""
+    trusted: NDArray
+    """Readings that count, boolean, (channels, samples); a reading at a switching instant does not."""
+    inputs: Mapping[str, NDArray]
+    """Signals that act on the plant, by name, (samples,) [SI], for figures and the black box."""

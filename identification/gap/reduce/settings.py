@@ -1,0 +1,88 @@
+"""Settings of the discrepancy reduction on held-out recordings."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReductionSettings:
+    """Judgement in gaps, their intervals, the noise floor and the black box."""
+
+    # Block bootstrap
+
+    block_duration: float = 0.03
+    """Length of a bootstrap block [s]: longer than the valve's transients."""
+
+    least_block_samples: int = 20
+    """Length of the shortest block [samples], for plants with a long sampling period."""
+
+    draws: int = 2000
+    """Number of bootstrap draws: the ends of a 90 % interval then vary by about one percent of its
+    width."""
+
+    interval_level: float = 0.9
+    """Share of the draws within an interval, and probability within every interval of the report."""
+
+    least_concentration: float = 0.05
+    """Lower bound of the Dirichlet parameter of the block weights [1]; below it one block has all
+    weight."""
+
+    # Noise floor
+
+    jump_limit: float = 4.0
+    """Difference of consecutive residuals beyond which it is a jump of the misfit [standard
+    deviations]."""
+
+    jump_iterations: int = 20
+    """Most iterations of the limit of jumps, which usually settles earlier."""
+
+    white_noise_tolerance: float = 0.1
+    """Relative distance from the channel's noise up to which noise is taken for white [1]."""
+
+    white_noise_deviations: float = 3.0
+    """The same in standard deviations of the estimate, where the readings tell less."""
+
+    share_steps: int = 1000
+    """Number of steps between 0 and 1 in which the interval of a share is searched."""
+
+    # Black box
+
+    history_unit: float = 5e-4
+    """Unit of the lags below [s], or the sampling period if that is longer: the valve's fastest
+    transients last about as long."""
+
+    history_lags: tuple[int, ...] = (1, 2, 4, 10, 20, 40, 100, 400)
+    """Lags at which the black box sees inputs and outputs [history units]: 0.5 to 20 ms for transients,
+    to 200 ms for what they leave."""
+
+    random_features: int = 300
+    """Number of random Fourier features; computing time."""
+
+    shortest_wave: float = 0.2
+    """Shortest length of a random feature, in typical distances of two samples [1]."""
+
+    longest_wave: float = 3.0
+    """Longest length of a random feature, in typical distances of two samples [1]."""
+
+    feature_limit: float = 10.0
+    """Bound of a standardised feature [standard deviations], for samples unlike all others."""
+
+    penalty_decades: tuple[float, float] = (-3.0, 5.0)
+    """Decimal logarithms of the smallest and the largest ridge penalty [1]: from none to no
+    prediction."""
+
+    penalties: int = 9
+    """Number of penalties, one per decade."""
+
+    # Predictability
+
+    permutations: int = 1999
+    """Number of random orders of blocks behind a p-value, which is then at least 0.0005."""
+
+    significance: float = 0.01
+    """p-value below which a prediction is not chance."""
+
+    least_gap_closed: float = 0.02
+    """Gap that a prediction must close to matter [noise deviations]."""
+
+    least_share_closed: float = 0.05
+    """The same as a share of the explainable gap [1]; the larger of both holds."""

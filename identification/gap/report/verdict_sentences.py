@@ -1,0 +1,113 @@
+"""The verdict of a diagnosis in sentences that a project leader can act on."""
+
+from identification.gap.diagnosis import Diagnosis, hypothesis_label
+from identification.gap.rank.verdict import AMBIGUOUS, KNOWN, NO_GAP
+from identification.gap.reduce.discrepancy_reduction import NOMINAL, RECALIBRATED
+from identification.gap.reduce.gaps import FLOOR
+from identification.gap.report.quantities import gap_text, gap_with_interval, probability_text
+from identification.gap.report.sentences import component_at_fault, share_closed, sizes_text
+
+
+def verdict_sentence(diagnosis: Diagnosis, next_experiment: str) -> tuple[str, str]:
+    """Status for the page ('good', 'doubt' or 'bad'), and the verdict in a few sentences.
+
+    next_experiment: a sentence for an ambiguous verdict; empty where none was sought.
+    """
+    conclusion, no_warning = diagnosis.conclusion, not diagnosis.warnings
+    if conclusion.verdict == NO_GAP:
+        likely = diagnosis.ranking.no_cause > diagnosis.settings.report.likely_probability
+        return ("good" if likely and no_warning else "doubt"), _no_gap(diagnosis)
+    if conclusion.verdict == KNOWN:
+        complete = not diagnosis.reduction.unexplained.still_predictable
+        return ("good" if complete and no_warning else "doubt"), _known(diagnosis)
+    if conclusion.verdict == AMBIGUOUS:
+        return "doubt", f"{_ambiguous(diagnosis)} {_with_full_stop(next_experiment)}".strip()
+    return "bad", _unknown(diagnosis)
+
+
+def _known(diagnosis: Diagnosis) -> str:
+    best = diagnosis.conclusion.ambiguity_set[0]
+    single = len(best.effects) == 1
+    explain, them = ("explains", "it") if single else ("together explain", "them")
+    return (
+        f"{' and '.join(best.hypothesis.labels)} {explain} the gap "
+        f"({probability_text(best.probability)}): adding {them} with {sizes_text(diagnosis, best)} "
+        f"closes {share_closed(diagnosis, best)} of the gap on recordings never fitted to; "
+        f"{_remainder(diagnosis)}."
+    )
+
+
+def _remainder(diagnosis: Diagnosis) -> str:
+    unexplained = diagnosis.reduction.unexplained
+    if not unexplained.still_predictable:
+        return "nothing predictable is left"
+    return (
+        f"{100 * unexplained.fraction:.0f} % of the gap is left and still predictable, so something "
+        "smaller is missing too"
+    )
+
+
+def _ambiguous(diagnosis: Diagnosis) -> str:
+    rivals = diagnosis.conclusion.ambiguity_set
+    labels = [cause.hypothesis.labels for cause in rivals]
+    common = [label for label in labels[0] if all(label in others for others in labels)]
+    rests = [" + ".join(label for label in own if label not in common) for own in labels]
+    names = " or ".join(
+        f"{rest or 'nothing else'} ({probability_text(cause.probability)})"
+        for rest, cause in zip(rests, rivals, strict=True)
+    )
+    together = f"{' and '.join(common)} together with " if common else ""
+    shares = " or ".join(dict.fromkeys(share_closed(diagnosis, cause) for cause in rivals))
+    doubt = "which" if all(rests) else "whether another cause acts or the form of the first one errs"
+    return (
+        f"{together}{names} explains the gap and closes {shares} of it; these recordings cannot tell "
+        f"{doubt}."
+    )
+
+
+def _no_gap(diagnosis: Diagnosis) -> str:
+    gaps, settings = diagnosis.reduction.gaps, diagnosis.settings
+    recalibrated = gaps[RECALIBRATED].overall
+    text = (
+        "There is no gap beyond noise after recalibration"
+        if recalibrated.low <= FLOOR + settings.reduction.least_gap_closed
+        else "Recalibration leaves a small gap of which no cause can be named"
+    )
+    text += (
+        f": on recordings never fitted to, the gap is {gap_with_interval(recalibrated)} noise "
+        f"deviations, and {gap_text(gaps[NOMINAL].overall.value)} before. Use the recalibrated "
+        "parameters and add nothing."
+    )
+    likely = diagnosis.ranking.no_cause > settings.report.likely_probability
+    return text if likely else f"{text} {_possible_cause(diagnosis)}"
+
+
+def _possible_cause(diagnosis: Diagnosis) -> str:
+    """The cause that may act all the same, and why the verdict does not name it."""
+    ranking = diagnosis.ranking
+    probabilities = {
+        hypothesis_label(cause.hypothesis): cause.probability for cause in diagnosis.conclusion.causes
+    }
+    probabilities["something outside the catalogue"] = ranking.unknown
+    name = max(probabilities, key=probabilities.__getitem__)
+    return (
+        f"In doubt: {name} may act ({probability_text(probabilities[name])}), but that no cause acts "
+        f"({probability_text(ranking.no_cause)}) cannot be ruled out."
+    )
+
+
+def _unknown(diagnosis: Diagnosis) -> str:
+    text = (
+        f"Nothing in the catalogue explains the gap ({probability_text(diagnosis.ranking.unknown)}): "
+        f"something is missing, most likely in {component_at_fault(diagnosis)}"
+        f"{', see its shape' if diagnosis.localisation.missing_term else ''}."
+    )
+    if not diagnosis.best:
+        return text
+    name = hypothesis_label(diagnosis.best.hypothesis)
+    share = share_closed(diagnosis, diagnosis.best)
+    return f"{text} The nearest cause, {name}, closes only {share} of the gap: do not add it."
+
+
+def _with_full_stop(text: str) -> str:
+    return text if not text or text.endswith(".") else f"{text}."

@@ -1,0 +1,136 @@
+"""How far the gap is reduced: on the tank, whose noise and true cause are known."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from docs.examples.tank.plant import Tank
+from docs.examples.tank.recordings import NOISE, virtual_recordings
+from identification.gap.fit.fitting_problem import FittingProblem
+from identification.gap.fit.gauss_newton import fit
+from identification.gap.fit.hypothesis import Estimate, Hypothesis
+from identification.gap.fit.prediction import percentage_errors, predict
+from identification.gap.rank.refinement import recalibrate
+from identification.gap.reduce.discrepancy_reduction import (
+    DiscrepancyReduction,
+    measure_discrepancy_reduction,
+)
+from identification.gap.report.reduction_figures import gap_figure, share_figure
+
+
+def estimates(tank: Tank, causes: tuple[str, ...]) -> tuple[FittingProblem, dict[str, Estimate]]:
+    problem, base = recalibrate(tank)
+    found = {"nominal": problem.start(Hypothesis(causes=()), {}), "recalibrated": base}
+    for cause in tank.causes:
+        if cause.name in causes:
+            trial = {cause.name: cause.parameters[0].trials[0]}
+            start = problem.start(Hypothesis(causes=(cause,)), {**problem.values(base), **trial})
+            found[cause.name] = fit(problem, [start])[0]
+    return problem, {label: found[label] for label in ("nominal", "recalibrated", *causes)}
+
+
+def reduction(truth: dict[str, float], causes: tuple[str, ...], seed: int = 1) -> DiscrepancyReduction:
+    """Of a virtual tank."""
+    tank = Tank(virtual_recordings(truth))
+    return measure_discrepancy_reduction(*estimates(tank, causes), seed=seed)
+
+
+@cache
+def leaking(causes: tuple[str, ...] = ("leak", "lag")) -> DiscrepancyReduction:
+    return reduction({"c": 0.021, "leak": 4e-3}, causes)
+
+
+def test_the_true_cause_closes_the_gap_and_another_does_not():
+    found = leaking()
+    assert found.gaps["nominal"].overall.value > found.gaps["recalibrated"].overall.value > 2
+    assert found.gaps["leak"].overall.low < 1 < found.gaps["leak"].overall.high
+    assert found.shares_closed["leak"].high == 1.0
+    assert found.shares_closed["leak"].low > 0.9
+    assert found.shares_closed["lag"].high < 0.1
+    assert found.unexplained.fraction < 0.05
+    assert not found.unexplained.still_predictable
+
+
+def test_without_the_true_cause_the_rest_is_predictable():
+    found = leaking(("lag",))
+    assert found.unexplained.fraction > 0.9
+    assert found.unexplained.still_predictable
+    assert found.black_box.overall.value < found.gaps["recalibrated"].overall.value
+
+
+def test_without_a_gap_nothing_is_told_of_its_shrinking():
+    found = measure_discrepancy_reduction(
+        *estimates(Tank(virtual_recordings({"c": 0.021})), ("leak",)), seed=1
+    )
+    assert found.gaps["recalibrated"].overall.low < 1 < found.gaps["recalibrated"].overall.high
+    assert found.shares_closed["leak"].high - found.shares_closed["leak"].low > 0.5
+    assert found.unexplained.fraction == 0
+
+
+def test_the_gap_is_that_of_known_noise_and_misfit():
+    """A misfit of a known size added to a perfect model's held-out readings."""
+    tank = Tank(virtual_recordings({"c": 0.021, "leak": 4e-3}, seed=3))
+    problem, found = estimates(tank, ("leak",))
+    tank.runs[2].measured[:] += 3 * NOISE * np.sqrt(2) * np.sin(tank.runs[2].time / 4)
+    gap = measure_discrepancy_reduction(FittingProblem(tank, problem.slopes), found).gaps["leak"].overall
+    assert gap.value == pytest.approx(np.sqrt(1 + 9), rel=0.12)
+
+
+def test_wrong_noise_of_a_channel_is_set_right():
+    tank = Tank(virtual_recordings({"c": 0.021, "leak": 4e-3}, seed=3))
+    problem, found = estimates(tank, ("leak",))
+    other = Tank(virtual_recordings({"c": 0.021, "leak": 4e-3}, seed=3))
+    other.channels = (replace(tank.channels[0], noise=1.05 * NOISE),)
+    gap = measure_discrepancy_reduction(problem, found).gaps["leak"].overall.value
+    again = measure_discrepancy_reduction(*estimates(other, ("leak",))).gaps["leak"].overall.value
+    assert again == pytest.approx(gap, rel=0.01)
+
+
+def test_held_out_readings_move_no_model():
+    tank = Tank(virtual_recordings({"c": 0.021, "leak": 4e-3}))
+    problem, found = estimates(tank, ("leak",))
+    before = predict(problem, found["leak"])
+    tank.runs[2].measured[:] += 0.5
+    after = predict(FittingProblem(tank, problem.slopes), found["leak"])
+    np.testing.assert_array_equal(before.outputs[2], after.outputs[2])
+    np.testing.assert_array_equal(before.residuals[0], after.residuals[0])
+
+
+def test_percent_is_eq_19_and_none_where_a_mean_vanishes():
+    tank = Tank(virtual_recordings({}))
+    scaled = [1.02 * run.measured for run in tank.runs]
+    mean = np.mean(tank.runs[2].measured)
+    rms = np.sqrt(np.mean(tank.runs[2].measured ** 2))
+    found = percentage_errors(tank, scaled)
+    assert found is not None
+    assert found["overall"] == found["h"] == pytest.approx(2 * rms / mean, rel=0.01)
+    tank.runs[2].measured[:] = np.sin(2 * np.pi * np.arange(240) / 239)
+    assert percentage_errors(tank, scaled) is None
+
+
+def test_the_same_seed_gives_the_same_figures():
+    one, other = (
+        measure_discrepancy_reduction(
+            *estimates(Tank(virtual_recordings({"leak": 2e-3})), ("leak",)), seed=4
+        )
+        for _ in range(2)
+    )
+    assert one == other
+
+
+def test_without_a_held_out_run_there_is_nothing_to_judge_on():
+    tank = Tank(virtual_recordings({}))
+    problem, found = estimates(tank, ())
+    tank.runs = tank.runs[:2]
+    with pytest.raises(ValueError, match="no run is held out"):
+        measure_discrepancy_reduction(problem, found)
+
+
+def test_figures_show_every_model():
+    found = leaking()
+    axes = gap_figure(found).axes
+    assert [one.get_title() for one in axes] == ["overall", "h"]
+    assert [t.get_text() for t in axes[0].get_yticklabels()] == [*found.gaps, "black box"]
+    assert len(share_figure(found).axes[0].patches) == len(found.shares_closed)

@@ -1,0 +1,164 @@
+"""Where the gap of a tank lies: regimes, the equation that lacks something, and its shape."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from docs.examples.tank.plant import Tank
+from docs.examples.tank.recordings import virtual_recordings
+from identification.gap.fit.fitting_problem import FittingProblem
+from identification.gap.fit.hypothesis import Estimate
+from identification.gap.locate.fault_localisation import Localisation, locate
+from identification.gap.locate.forcing import quadratic_forms
+from identification.gap.locate.forcing_processes import fit_processes
+from identification.gap.locate.regime_gaps import RegimeGap, regime_gaps
+from identification.gap.locate.settings import LocalisationSettings
+from identification.gap.locate.windows import window_edges
+from identification.gap.model.state_equation import StateTrace
+from identification.gap.rank.evidence import evaluate
+from identification.gap.rank.refinement import recalibrate
+from identification.gap.rank.settings import RankingSettings
+from identification.gap.reduce.settings import ReductionSettings
+from identification.gap.report.localisation_figures import (
+    forcing_figure,
+    heat_map,
+    missing_term_figure,
+    residual_figure,
+)
+
+SETTINGS, BOOTSTRAP = LocalisationSettings(), ReductionSettings()
+
+LEAK = 2e-3
+"""Of the tank [1/s]."""
+
+
+@cache
+def recalibrated_tank(**truth: float) -> tuple[FittingProblem, Estimate, list]:
+    problem, estimate = recalibrate(Tank(virtual_recordings(truth)))
+    return problem, estimate, evaluate(problem, [estimate], RankingSettings())[0].residuals
+
+
+@cache
+def located(**truth: float) -> Localisation:
+    return locate(*recalibrated_tank(**truth), seed=4)
+
+
+def test_a_lack_in_the_state_equation_is_found_there():
+    found = located(leak=LEAK)
+    assert found.equation_probabilities["f1"] > 0.99
+    assert found.forcings[0].equation.name == "f1"
+    assert found.forcings[0].explained > 0.5
+
+
+def test_a_lag_of_the_sensor_is_no_lack_of_an_equation():
+    found = located(lag=5.0)
+    assert found.equation_probabilities["reading h"] > 0.9
+    assert found.missing_term is None
+
+
+def test_without_a_gap_nothing_is_missing():
+    found = located()
+    assert found.nothing_missing > 0.8
+    assert sum(found.equation_probabilities.values()) == pytest.approx(1 - found.nothing_missing)
+    assert found.missing_term is None
+
+
+def test_probabilities_sum_to_one_and_the_same_seed_tells_the_same():
+    found = located(leak=LEAK)
+    assert sum(found.equation_probabilities.values()) + found.nothing_missing == pytest.approx(1)
+    again = locate(*recalibrated_tank(leak=LEAK), seed=4)
+    assert again.regime_gaps == found.regime_gaps
+    assert again.equation_probabilities == found.equation_probabilities
+
+
+def test_the_shape_is_that_of_the_missing_term():
+    """What a leak does beyond what the outlet's coefficient absorbs, over the level."""
+    problem, estimate, _ = recalibrated_tank(leak=LEAK)
+    shape = located(leak=LEAK).missing_term
+    assert shape is not None
+    assert shape.state == "h"
+    assert shape.explained > 0.8
+    c = problem.values(estimate)["c"]
+    missing = -1e3 * (LEAK * shape.x - (c - 0.02) * np.sqrt(shape.x))
+    inner = slice(len(shape.x) // 10, -len(shape.x) // 10)
+    error = (shape.y - missing)[inner] / np.maximum(shape.sd[inner], 1e-3)
+    assert np.sqrt(np.mean(error**2)) < 3
+
+
+def test_a_forcing_is_recovered_but_for_noise_and_what_calibration_absorbs():
+    """Readings are changed by a known forcing: what its estimate misses lies within the noise."""
+    problem, estimate, _ = recalibrated_tank()
+    plant, values = problem.plant, problem.candidate(estimate)
+    equation = plant.equations[0]
+    edges = window_edges(plant.runs[0].time, plant.states(values, 0), SETTINGS)
+    truth = 20.0 * np.sin(np.linspace(0, 6, len(edges) - 1))
+    change = plant.forced(values, equation, 0, edges) @ truth
+    altered = FittingProblem(plant, problem.slopes)
+    shift = (change / plant.channels[0].noise).ravel()
+    altered.measured = [problem.measured[0] + shift, *problem.measured[1:]]
+    design, forms = quadratic_forms(altered, estimate, [0], SETTINGS)
+    fit = fit_processes(forms, design, SETTINGS)[0][0]
+    error = fit.forcing - truth
+    assert error @ forms[0].precision @ error < len(truth)
+    assert truth @ forms[0].precision @ truth > 20 * len(truth)
+
+
+def gaps_of(problem: FittingProblem, masks: list, residuals: list, seed: int) -> list[RegimeGap]:
+    return regime_gaps(problem.plant, masks, residuals, seed, SETTINGS, BOOTSTRAP)
+
+
+def test_windows_are_dense_where_states_move():
+    time = np.arange(1000) * 0.1
+    moving = StateTrace(unit="m", scale=1.0, values=np.clip((time - 50.0) / 5.0, 0.0, 1.0))
+    edges = window_edges(time, {"x": moving}, SETTINGS)
+    assert edges[0] == 0
+    assert edges[-1] == len(time) - 1
+    assert np.all(np.diff(edges) > 0)
+    inside = np.sum((time[edges] >= 50) & (time[edges] <= 55))
+    assert inside > 0.25 * len(edges)
+
+
+def test_regime_gaps_are_root_mean_squares_with_intervals_that_hold_them():
+    problem, estimate, residuals = recalibrated_tank(leak=LEAK)
+    plant, values = problem.plant, problem.candidate(estimate)
+    masks = [plant.regimes(values, r) for r in problem.all_runs]
+    found = {gap.regime: gap for gap in gaps_of(problem, masks, residuals, seed=1)}
+    assert set(found) == {"filling", "draining"}
+    for regime, gap in found.items():
+        own = residuals[2][0][masks[2][regime]]
+        assert gap.gap == pytest.approx(np.sqrt(np.mean(own**2)))
+        assert 0 < gap.low < gap.gap < gap.high < np.inf
+
+
+def test_a_regime_that_is_met_too_seldom_has_no_sure_gap():
+    problem, _, residuals = recalibrated_tank()
+    once = [{"once": np.arange(240) == (7 if r == 0 else -1)} for r in problem.all_runs]
+    (gap,) = gaps_of(problem, once, residuals, seed=1)
+    assert (gap.low, gap.high, gap.held_out) == (0.0, np.inf, False)
+
+
+def test_intervals_cover_the_truth_of_white_noise():
+    problem, _, residuals = recalibrated_tank()
+    rng = np.random.default_rng(8)
+    masks = [{"all": np.ones(240, dtype=bool)} for _ in problem.all_runs]
+    hits = 0
+    for trial in range(60):
+        white = [rng.standard_normal(residual.shape) for residual in residuals]
+        (gap,) = gaps_of(problem, masks, white, seed=trial)
+        hits += gap.low <= 1.0 <= gap.high
+    assert 47 <= hits < 60  # 90 % of 60, and three standard deviations
+
+
+def test_every_picture_is_drawn():
+    problem, estimate, residuals = recalibrated_tank(leak=LEAK)
+    found, plant = located(leak=LEAK), problem.plant
+    masks = plant.regimes(problem.candidate(estimate), 2)
+    assert found.missing_term is not None
+    for figure in (
+        heat_map(found.regime_gaps, 10.0),
+        residual_figure(plant, 2, residuals[2], masks, 0.9),
+        missing_term_figure(found.missing_term, 0.9),
+        forcing_figure(plant, found.forcings[0], 0.9),
+    ):
+        figure.canvas.draw()
