@@ -19,7 +19,7 @@ from identification.confidence import confidence_figures as figures
 from identification.pipeline.stages import Identification
 from identification.replay.response_figures import overlay
 from identification.studies.coverage.coverage import coverage_study
-from identification.studies.coverage.coverage_figure import distances
+from identification.studies.coverage.coverage_figure import distance_quantiles
 
 
 def drawn(coverage: Path, campaigns: int) -> dict[str, Figure]:
@@ -31,7 +31,7 @@ def drawn(coverage: Path, campaigns: int) -> dict[str, Figure]:
         return {
             "calibration.png": overlay(identification.calibration.after[METHODS[0]][0]),
             "region.png": figures.region(identification.confidence),
-            "coverage.png": distances(study),
+            "coverage.png": distance_quantiles(study),
         }
 
 

@@ -48,7 +48,8 @@ def _permeability() -> FigureCheck:
         printed=f"{PRINTED_PERMEABILITY:.4g}",
         recomputed=f"{true:.4g}",
         status=HOLDS if math.isclose(PRINTED_PERMEABILITY, true) else ERRATUM,
-        remark=f"10^7 for 1e-7: the printed value is {PRINTED_PERMEABILITY / true:.0e} times the constant",
+        remark="10^7 for 1e-7: the printed value is "
+        f"{PRINTED_PERMEABILITY / true:.0e} times the constant",
     )
 
 
