@@ -23,8 +23,8 @@ METHOD = (
     "Each cause is put into the plant at many sizes within its physical range. The nominal model's four "
     "parameters are recalibrated on tests 1 to 4 by the total error (eq. 21). The errors of all five "
     "tests with the sensors' noise are compared with Tables 13 and 15. A typical factor of 1.2 means "
-    "that predicted errors are off by 20 % on average (root mean square of logarithms). Test conditions that "
-    "the report does not print are drawn; intervals hold 80 % of the draws. Ranges of sizes: "
+    "that predicted errors are off by 20 % on average (root mean square of logarithms). Test conditions "
+    "that the report does not print are drawn; intervals hold 80 % of the draws. Ranges of sizes: "
     "docs/effects.md."
 )
 INFERENCE = (
@@ -180,8 +180,8 @@ def _pairs_section(results: ErrorTableResults) -> Section:
                 status="note",
                 text=f"How sure: of {reliability.tables} made-up tables of two known causes, as "
                 "scattered as the printed one, the true cause of the current's errors was among the "
-                f"two most probable in {100 * reliability.current_cause_first:.0f} % and within the 90 % set "
-                f"in {100 * reliability.current_cause_in_set:.0f} %; that of the pressures' errors "
+                f"two most probable in {100 * reliability.current_cause_first:.0f} % and within the "
+                f"90 % set in {100 * reliability.current_cause_in_set:.0f} %; that of the pressures' errors "
                 f"within it in {100 * reliability.pressure_cause_in_set:.0f} %.",
             ),
         ],
