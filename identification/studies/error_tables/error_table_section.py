@@ -181,8 +181,8 @@ def _pairs_section(results: ErrorTableResults) -> Section:
                 text=f"How sure: of {reliability.tables} made-up tables of two known causes, as "
                 "scattered as the printed one, the true cause of the current's errors was among the "
                 f"two most probable in {100 * reliability.current_cause_first:.0f} % and within the "
-                f"90 % set in {100 * reliability.current_cause_in_set:.0f} %; that of the pressures' errors "
-                f"within it in {100 * reliability.pressure_cause_in_set:.0f} %.",
+                f"90 % set in {100 * reliability.current_cause_in_set:.0f} %; that of the pressures' "
+                f"errors within it in {100 * reliability.pressure_cause_in_set:.0f} %.",
             ),
         ],
         blocks=[Text(text=INFERENCE), _pairs_table(results.pairs)],

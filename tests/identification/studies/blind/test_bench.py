@@ -133,12 +133,8 @@ def test_a_parameter_that_is_off_is_beyond_what_units_scatter():
     """4 % more preload: neither the four nor any unit of the nominal design follows that."""
     unit = trial().unit
     off = replace(trial(), sizes={"xPV0": 1.04 * unit["xPV0"]})
-    assert (
-        explainable_gap(replace(off, kind=ONE_CAUSE), noise_free_recordings(true_recordings(off, 0)))[
-            "explainable"
-        ]
-        > 1.5
-    )
+    true = noise_free_recordings(true_recordings(off, 0))
+    assert explainable_gap(replace(off, kind=ONE_CAUSE), true)["explainable"] > 1.5
 
 
 def test_more_turns_are_hardly_told_from_a_shorter_magnetic_circuit_but_well_from_a_stiffer_spring():
