@@ -1,6 +1,6 @@
 """A proportion of counted cases with its exact confidence interval."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -19,14 +19,15 @@ class Proportion:
     """All cases [-]."""
 
     @classmethod
-    def count(cls, cases: Sequence[Case], has_property: Callable[[Case], bool] = bool) -> "Proportion":
+    def count(cls, cases: Iterable[Case], has_property: Callable[[Case], bool] = bool) -> "Proportion":
         """The proportion of the cases that have a property.
 
         Args:
-            cases: any sequence; an array has shape (cases,).
+            cases: of any kind; an array has shape (cases,).
             has_property: of one case; without it the cases are themselves true or false.
         """
-        return cls(hits=sum(bool(has_property(case)) for case in cases), of=len(cases))
+        properties = [bool(has_property(case)) for case in cases]
+        return cls(hits=sum(properties), of=len(properties))
 
     @property
     def value(self) -> float | None:
