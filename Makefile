@@ -98,10 +98,10 @@ circle: $(VENV)/.installed ## train, deploy on a bench, diagnose, retrain, deplo
 	$(PY) training/sim_to_real.py --out runs/circle --images docs/images $(ARGS)
 
 pictures: $(VENV)/.installed ## draw the figures of docs/identification.md
-	$(PY) docs/pictures.py --out docs/images --coverage runs/coverage $(ARGS)
+	$(PY) docs/scripts/identification_figures.py --out docs/images --coverage runs/coverage $(ARGS)
 
 gif: $(VENV)/.installed ## film the valve for the README
-	SDL_VIDEODRIVER=dummy $(PY) docs/film.py --out docs/images/valve.gif $(ARGS)
+	SDL_VIDEODRIVER=dummy $(PY) docs/scripts/film.py --out docs/images/valve.gif $(ARGS)
 
 lint: $(VENV)/.installed ## check format, style and types
 	$(PY) -m ruff format --check .

@@ -1,4 +1,4 @@
-"""The fits of docs/component_data recover what is known, and its page gives what they find."""
+"""The fits of docs/scripts/component_data recover what is known, and its page gives what they find."""
 
 import subprocess
 import sys
@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from docs.component_data import chambers, findings, friction, solenoids
+from docs.scripts.component_data import chambers, friction, solenoids
+from docs.scripts.component_data.component_results import component_results
 
 ROOT = Path(__file__).parents[1]
 MEASURED = ROOT.parent / "shared/measured"
@@ -43,7 +44,7 @@ def test_a_run_without_a_whole_loop_is_refused():
 
 def test_a_line_over_pressure_covers_its_truth():
     bars = np.array([1.0, 3.0, 5.0, 7.0])
-    found = friction.line(bars, 4 + 0.6 * bars + np.array([0.1, -0.1, -0.1, 0.1]))
+    found = friction.friction_line(bars, 4 + 0.6 * bars + np.array([0.1, -0.1, -0.1, 0.1]))
     assert found.slope == pytest.approx(0.6, abs=found.slope_half)
     assert found.constant == pytest.approx(4.0, abs=found.constant_half)
     assert 0 < found.slope_half < 0.2
@@ -55,7 +56,7 @@ def test_a_line_over_pressure_covers_its_truth():
 def test_the_laws_of_a_leak_are_told_apart(law, sizes):
     time = np.arange(0, 60, 0.3)
     rate = chambers.LAWS[law][0]
-    clean = chambers.decay_over(time, 8.5e5, lambda p: rate(p, *sizes))
+    clean = chambers.pressure_decay(time, 8.5e5, lambda p: rate(p, *sizes))
     noisy = clean + np.random.default_rng(0).normal(0, 300, len(time))
     fits = {name: chambers.fitted_decay(time, noisy, name) for name in chambers.LAWS}
     assert fits[law].sizes == pytest.approx(sizes, rel=0.03)
@@ -65,7 +66,9 @@ def test_the_laws_of_a_leak_are_told_apart(law, sizes):
 
 
 def test_choked_decay_is_exponential_in_the_absolute_pressure():
-    pressure = chambers.decay_over(np.array([0.0, 1, 2]), 8e5, lambda p: chambers.orifice_rate(p, 2e-4))
+    pressure = chambers.pressure_decay(
+        np.array([0.0, 1, 2]), 8e5, lambda p: chambers.orifice_rate(p, 2e-4)
+    )
     assert pressure[1] / pressure[0] == pytest.approx(pressure[2] / pressure[1], rel=1e-4)
 
 
@@ -76,18 +79,22 @@ def test_a_settling_is_found_beside_a_leak():
 
 
 def test_a_shorted_turn_is_recovered_and_diffusion_is_not_taken_for_one():
-    turn = solenoids.shorted_turn(solenoids.FREQUENCIES, 0.13, 250.0, 4e-3)
-    found = solenoids.fitted_inductor(solenoids.FREQUENCIES, turn, solenoids.shorted_turn, 400.0)
+    turn = solenoids.shorted_turn_inductance(solenoids.FREQUENCIES, 0.13, 250.0, 4e-3)
+    found = solenoids.fitted_inductor(
+        solenoids.FREQUENCIES, turn, solenoids.shorted_turn_inductance, 400.0
+    )
     assert (found.inductance, found.eddy, found.leakage) == pytest.approx((0.13, 250.0, 4e-3), rel=1e-3)
-    other = solenoids.diffusion(solenoids.FREQUENCIES, 0.13, 3e-3, 1e-4)
-    taken = solenoids.fitted_inductor(solenoids.FREQUENCIES, other, solenoids.shorted_turn, 400.0)
+    other = solenoids.diffusion_inductance(solenoids.FREQUENCIES, 0.13, 3e-3, 1e-4)
+    taken = solenoids.fitted_inductor(
+        solenoids.FREQUENCIES, other, solenoids.shorted_turn_inductance, 400.0
+    )
     assert taken.worst > 0.3
 
 
 def test_a_folder_without_data_is_one_sentence(tmp_path):
     pytest.importorskip("matplotlib")
     folders = ("--data", tmp_path / "none", "--out", tmp_path / "out")
-    command = (sys.executable, "-m", "docs.component_data", *folders)
+    command = (sys.executable, "-m", "docs.scripts.component_data", *folders)
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
@@ -127,11 +134,15 @@ def test_a_file_that_is_no_record_is_named(tmp_path, record, content):
 def test_inductances_follow_one_shorted_turn():
     """These eight figures stand in the script: no folder is needed."""
     for name, measured in solenoids.INDUCTANCES.items():
-        turn = solenoids.fitted_inductor(solenoids.FREQUENCIES, measured, solenoids.shorted_turn, 250.0)
+        turn = solenoids.fitted_inductor(
+            solenoids.FREQUENCIES, measured, solenoids.shorted_turn_inductance, 250.0
+        )
         assert turn.worst < 0.04, name
         assert 220 < turn.eddy < 280
         assert (
-            solenoids.fitted_inductor(solenoids.FREQUENCIES, measured, solenoids.diffusion, 1e-3).worst
+            solenoids.fitted_inductor(
+                solenoids.FREQUENCIES, measured, solenoids.diffusion_inductance, 1e-3
+            ).worst
             > 0.5
         )
 
@@ -140,7 +151,7 @@ def test_inductances_follow_one_shorted_turn():
 def found():
     if not MEASURED.is_dir():
         pytest.skip("no measured component data beside this repository (../shared/measured)")
-    return findings.found_in(MEASURED)
+    return component_results(MEASURED)
 
 
 def test_friction_rises_with_pressure(found):
@@ -164,7 +175,7 @@ def test_break_away_follows_a_rest_and_no_reversal(found):
 
 
 def test_leaks_of_prints_lie_between_laminar_and_orifice(found):
-    for chamber in chambers.LEAKY:
+    for chamber in chambers.LEAKY_CHAMBERS:
         rms = {law: found.decays[chamber, law].rms for law in chambers.LAWS}
         assert rms["porous"] < 0.02e5
         assert min(rms["orifice"], rms["laminar"]) > 5 * rms["porous"]
@@ -177,7 +188,7 @@ def test_currents_fall_faster_than_copper_at_the_case_temperature(found):
 
 def test_the_picture_is_drawn(found):
     pytest.importorskip("matplotlib")
-    from docs.component_data.figure import drawn
+    from docs.scripts.component_data.component_figure import component_figure
 
-    assert len(drawn(found).axes) == 3
+    assert len(component_figure(found).axes) == 3
     assert (ROOT / "docs/images/component-data.png").exists()

@@ -59,14 +59,16 @@ def test_links_lead_somewhere(page):
 
 def test_the_film_in_its_shortest_form(tmp_path):
     out = tmp_path / "valve.gif"
-    done = run(sys.executable, ROOT / "docs/film.py", "--seconds", "0.05", "--out", out, cwd=tmp_path)
+    script = ROOT / "docs/scripts/film.py"
+    done = run(sys.executable, script, "--seconds", "0.05", "--out", out, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert out.read_bytes()[:3] == b"GIF"
 
 
 def test_the_pictures_of_the_identification_in_their_shortest_form(tmp_path):
     options = ("--coverage", tmp_path / "coverage", "--campaigns", "2")
-    done = run(sys.executable, ROOT / "docs/pictures.py", "--out", tmp_path, *options, cwd=tmp_path)
+    script = ROOT / "docs/scripts/identification_figures.py"
+    done = run(sys.executable, script, "--out", tmp_path, *options, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     names = {path.name for path in tmp_path.glob("*.png")}
     assert names == {"calibration.png", "region.png", "coverage.png"}

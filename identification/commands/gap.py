@@ -7,7 +7,7 @@ from pathlib import Path
 from epv_env.common.command_line import writable_folder
 from identification.gap.report.verdict_sentences import verdict_sentence
 from identification.report.result_files import as_text
-from identification.studies.error_tables.error_table_study import real_bench
+from identification.studies.error_tables.error_table_study import error_table_study
 from identification.valve_gap.diagnose import GAP, PLANT, REPORT, diagnose_campaign
 
 
@@ -34,7 +34,7 @@ def gap(chosen: argparse.Namespace) -> None:
     if chosen.tables:
         if chosen.plant or chosen.without:
             raise ValueError("--plant and --without belong to a campaign: leave them out with --tables")
-        sections = real_bench(chosen.out, seed=chosen.seed, images=chosen.images)
+        sections = error_table_study(chosen.out, seed=chosen.seed, images=chosen.images)
         print(as_text(sections))
         print(f"\nwritten: {chosen.out}/tables.json and tables.html")
         return

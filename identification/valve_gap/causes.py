@@ -46,7 +46,7 @@ def effects() -> list[Cause]:
             variant=variant,
             component=effect.component,
             parameters=tuple(effect_size(size) for size in sizes),
-            run_parameters=tuple(_run_parameter(size) for size in effect.sizes if size.scatter is not None),
+            run_parameters=tuple(_run_parameter(size) for size in effect.sizes if size.scatter),
             prior=1.0 / len(effect.fitted),
         )
         for effect in EFFECTS
@@ -60,9 +60,9 @@ def parameters() -> list[Cause]:
         Cause(
             name=f"parameter:{symbol}",
             component=component,
-            sizes=(parameter_size(symbol),),
+            parameters=(parameter_size(symbol),),
             prior=PARAMETER_PRIOR,
-            exact=True,
+            exact_form=True,
         )
         for symbol, component in PARAMETER_COMPONENTS.items()
     ]
@@ -96,7 +96,7 @@ def parameter_size(symbol: str) -> FreeParameter:
         unit=row.unit,
         low=max(low, row.value * (1 - FARTHEST_OFF)),
         high=min(high, row.value * (1 + FARTHEST_OFF)),
-        off=row.value,
+        nominal=row.value,
         trials=tuple(row.value * factor for factor in OFF_BY),
         scale=row.value,
     )
@@ -110,7 +110,7 @@ def calibrated(start: dict[str, float]) -> list[FreeParameter]:
             unit=table()[symbol].unit,
             low=min(table()[symbol].domain or (0.0,)),
             high=max(table()[symbol].domain or (0.0,)),
-            off=start[symbol],
+            nominal=start[symbol],
             scale=start[symbol],
         )
         for symbol in CALIBRATED_SYMBOLS

@@ -4,7 +4,7 @@ python -m tests.benchmarks [--quick] [--json PATH]
 """
 
 from tests.benchmarks import identification, plant
-from tests.benchmarks.commandline import run
+from tests.benchmarks.command_line import run
 
 if __name__ == "__main__":
     run(__doc__, plant.benchmark, identification.benchmark)

@@ -1,9 +1,9 @@
-"""Speed and memory of the identification, beside SciPy's solver and beside the project's bars.
+"""Speed and memory of the identification, compared with SciPy's solver and the acceptance criteria.
 
     python -m tests.benchmarks.identification [--quick] [--json PATH]
 
-The campaigns are the virtual bench's. A bar is the most that a figure may be on one core or two;
-figures taken while other processes want the cores prove nothing.
+The campaigns are the virtual bench's. A criterion is the largest accepted figure on one core or two.
+Figures measured while other processes use the cores prove nothing.
 """
 
 from dataclasses import replace
@@ -21,27 +21,27 @@ from identification.calibration.problem import Problem, calibration_problem
 from identification.recordings.campaign_files import write_campaign
 from identification.recordings.recording import Campaign
 from identification.studies.coverage.coverage import CAMPAIGNS
-from tests.benchmarks.commandline import run
+from tests.benchmarks.command_line import run
+from tests.benchmarks.fresh_processes import identification_process
 from tests.benchmarks.measure import CPU, Row, Table, durations
-from tests.benchmarks.processes import identification_process
 from tests.benchmarks.scipy_replay import RTOL, scipy_misfit
 
 TRUE = Parameters.calibrated()
-MANY = 100
+LARGE_CAMPAIGN = 100
 """Calibration recordings of the large campaign."""
-AILING = TRUE.replace(A_PV=1e-7, G_eddy=2e-3)
-"""A valve with two effects, so that a diagnosis has to seek pairs."""
-BARS = {
+VALVE_WITH_EFFECTS = TRUE.replace(A_PV=1e-7, G_eddy=2e-3)
+"""A valve with two effects, so that a diagnosis has to search pairs."""
+ACCEPTANCE_CRITERIA = {
     "evaluation": 10.0, "search": 5.0, "run": 60.0, "coverage": 300.0, "diagnosis": 60.0,
     "memory": 2048.0,
 }  # fmt: skip
-"""ms, s, s, s, s, MiB."""
+"""Largest accepted medians [ms, s, s, s, s, MiB]."""
 
 
 def benchmark(table: Table, quick: bool) -> None:
     """All sections."""
     truths = [run_programme(TRUE, programme) for programme in REPORT_SUITE]
-    # As the command line does: threads of the linear algebra would wait for each other.
+    # The command line does the same: threads of the linear algebra would wait for each other.
     with threadpool_limits(1):
         fits(table, calibration_problem(measured_campaign(truths, TRUE, seed=0)), quick)
     with TemporaryDirectory() as folder:
@@ -59,12 +59,15 @@ def fits(table: Table, problem: Problem, quick: bool) -> None:
     start = problem.vector.of(problem.vector.reference)
     seconds = durations(lambda: misfit.error(start), 10 * repetitions)
     one = table.add(
-        "one evaluation of the total error", "ms", [1e3 * s for s in seconds], bar=BARS["evaluation"]
+        "one evaluation of the total error",
+        "ms",
+        [1e3 * s for s in seconds],
+        limit=ACCEPTANCE_CRITERIA["evaluation"],
     )
     simplex = nelder_mead(misfit, start)
     search = table.add(
         "Nelder-Mead to convergence", "s", durations(lambda: nelder_mead(misfit, start), repetitions),
-        bar=BARS["search"], note=outcome(simplex),
+        limit=ACCEPTANCE_CRITERIA["search"], note=outcome(simplex),
     )  # fmt: skip
     gauss = weighted_least_squares(squares, start)
     seconds = durations(lambda: weighted_least_squares(squares, start), repetitions)
@@ -116,7 +119,9 @@ def whole_run(table: Table, folder: Path, repetitions: int, *, warm: bool) -> No
         for i in range(repetitions + warm)
     ][warm:]
     seconds = [process.seconds for process in found]
-    table.add("run: the report's campaign", "s", seconds, bar=BARS["run"], note=found[-1].note)
+    table.add(
+        "run: the report's campaign", "s", seconds, limit=ACCEPTANCE_CRITERIA["run"], note=found[-1].note
+    )
     table.add("  its memory at most", "MiB", [p.peak for p in found])
 
 
@@ -131,7 +136,7 @@ def coverage(table: Table, folder: Path, quick: bool) -> None:
         total = coverage_seconds(folder, CAMPAIGNS)
         each, note = total / CAMPAIGNS, ""
     name = f"coverage: {CAMPAIGNS} campaigns, all cores"
-    table.add(name, "s", total, bar=BARS["coverage"], note=note)
+    table.add(name, "s", total, limit=ACCEPTANCE_CRITERIA["coverage"], note=note)
     table.add("  one campaign", "s", each)
 
 
@@ -142,43 +147,45 @@ def coverage_seconds(folder: Path, campaigns: int) -> float:
 
 
 def many_recordings(table: Table, folder: Path, truths: list[Truth], quick: bool) -> None:
-    """A campaign of MANY recordings; quick: no more than its calibration from one start."""
+    """A campaign of LARGE_CAMPAIGN recordings; quick: no more than its calibration from one start."""
     campaign = folder / "many"
     write_campaign(large_campaign(truths), campaign)
     command = ("calibrate", "--starts", 1) if quick else ("run",)
     found = identification_process(command[0], campaign, "--out", folder / "large", *command[1:])
-    name = f"{' '.join(map(str, command))}: {MANY} recordings"
+    name = f"{' '.join(map(str, command))}: {LARGE_CAMPAIGN} recordings"
     table.add(name, "s", found.seconds, note=found.note)
-    table.add("  its memory at most", "MiB", found.peak, bar=BARS["memory"])
+    table.add("  its memory at most", "MiB", found.peak, limit=ACCEPTANCE_CRITERIA["memory"])
 
 
 def large_campaign(truths: list[Truth]) -> Campaign:
     """The report's four tests measured again and again, each time with noise of their own."""
     tests = [truth for truth in truths if truth.programme.role == "calibration"]
     others = [truth for truth in truths if truth.programme.role != "calibration"]
-    copies = [renamed(tests[i % len(tests)], f"{i + 1:03d}") for i in range(MANY)]
-    return measured_campaign([*copies, *others], TRUE, seed=0, name=f"{MANY} recordings")
+    copies = [renamed(tests[i % len(tests)], f"{i + 1:03d}") for i in range(LARGE_CAMPAIGN)]
+    return measured_campaign([*copies, *others], TRUE, seed=0, name=f"{LARGE_CAMPAIGN} recordings")
 
 
 def diagnoses(table: Table, folder: Path, quick: bool) -> None:
     """`gap` with two effects at work, and how its time grows with the recordings."""
     table.section("diagnosis of the gap: two effects, whole catalogue; ratio: to the nine recordings")
     suite = [p for p in DIAGNOSIS_SUITE if p.name not in ("rest", "high_voltage")]
-    truths = [run_programme(AILING, programme) for programme in suite]
+    truths = [run_programme(VALVE_WITH_EFFECTS, programme) for programme in suite]
     fitted = [truth for truth in truths if truth.programme.role == "calibration"]
     nine = 0.0
     for copies in (0, 1) if quick else (0, 1, 3):
         more = [renamed(t, f"{t.programme.name}_{c}") for c in range(copies) for t in fitted]
         campaign = folder / f"ailing{copies}"
-        write_campaign(measured_campaign([*truths, *more], AILING, seed=0, offsets={}), campaign)
+        write_campaign(
+            measured_campaign([*truths, *more], VALVE_WITH_EFFECTS, seed=0, offsets={}), campaign
+        )
         found = identification_process("gap", campaign, "--out", folder / f"gap{copies}")
         count = len(truths) + len(more)
         nine = nine or found.seconds
         table.add(
             f"gap: {count} recordings", "s", found.seconds, ratio=found.seconds / nine,
-            bar=None if copies else BARS["diagnosis"], note=found.note,
+            limit=None if copies else ACCEPTANCE_CRITERIA["diagnosis"], note=found.note,
         )  # fmt: skip
-        table.add("  its memory at most", "MiB", found.peak, bar=BARS["memory"])
+        table.add("  its memory at most", "MiB", found.peak, limit=ACCEPTANCE_CRITERIA["memory"])
 
 
 def renamed(truth: Truth, name: str) -> Truth:

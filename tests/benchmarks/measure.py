@@ -17,8 +17,8 @@ class Row:
     """One per repetition."""
     ratio: float | None = None
     """Against the row that the section compares with."""
-    bar: float | None = None
-    """The most that the median may be."""
+    limit: float | None = None
+    """Acceptance criterion: the largest accepted median, in the row's unit."""
     note: str = ""
 
     @property
@@ -28,14 +28,16 @@ class Row:
 
     @property
     def verdict(self) -> str:
-        """What the bar says of it; empty without a bar."""
-        if self.bar is None:
+        """Whether the median meets the acceptance criterion; empty without one."""
+        if self.limit is None:
             return ""
-        return "met" if self.median <= self.bar else "MISSED"
+        return "met" if self.median <= self.limit else "MISSED"
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return {**asdict(self), "median": self.median, "verdict": self.verdict}
+        """JSON-ready; the field `bar` is the acceptance criterion."""
+        fields = asdict(self)
+        fields["bar"] = fields.pop("limit")
+        return {**fields, "median": self.median, "verdict": self.verdict}
 
 
 @dataclass
@@ -50,13 +52,13 @@ class Table:
         print(f"\n{title}", flush=True)
 
     def add(self, name: str, unit: str, values: list[float] | float, **more: Any) -> Row:
-        """Record and print one row. more: ratio, bar, note."""
+        """Record and print one row. more: ratio, limit, note of the row."""
         row = Row(name=name, unit=unit, values=values if isinstance(values, list) else [values], **more)
         list(self.sections.values())[-1].append(row)
         spread = f"{min(row.values):.4g}..{max(row.values):.4g}" if len(row.values) > 1 else ""
         ratio = "" if row.ratio is None else f"x {row.ratio:.4g}"
-        bar = "" if row.bar is None else f"bar {row.bar:g} {unit} {row.verdict}"
-        words = "; ".join(filter(None, (bar, row.note)))
+        limit = "" if row.limit is None else f"at most {row.limit:g} {unit} {row.verdict}"
+        words = "; ".join(filter(None, (limit, row.note)))
         line = f"  {name:<58} {row.median:>11.5g} {unit:<10} {spread:<22} {ratio:<11} {words}"
         print(line.rstrip(), flush=True)
         return row
@@ -69,22 +71,22 @@ class Table:
 Clock = Callable[[], float]
 
 WALL: Clock = time.perf_counter
-"""What a user waits for; longer when other processes want the cores too."""
+"""Wall time [s]: longer when other processes use the cores too."""
 CPU: Clock = time.process_time
-"""What this process was given: comparable on a busy machine, but the sum over threads."""
+"""CPU time of this process, summed over its threads [s]: comparable on a busy machine."""
 
 
 def durations(function: Callable[[], object], repetitions: int, clock: Clock = CPU) -> list[float]:
-    """Time of each call [s], after one call that is not counted."""
+    """Time of each call [s]; one more call before them is not counted."""
     function()
-    found = []
+    seconds = []
     for _ in range(repetitions):
         start = clock()
         function()
-        found.append(clock() - start)
-    return found
+        seconds.append(clock() - start)
+    return seconds
 
 
 def rates(amount: float, seconds: list[float]) -> list[float]:
-    """amount per second for each duration."""
+    """Amount per second for each duration [s]."""
     return [amount / each for each in seconds]

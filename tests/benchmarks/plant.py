@@ -12,12 +12,12 @@ from epv_env.plant.integrate import DEFAULT_STEP
 from epv_env.plant.valves import available_cores
 from identification.bench.automaton import simulate_reference
 from tests.benchmarks import startup, workloads
-from tests.benchmarks.commandline import run
+from tests.benchmarks.command_line import run
+from tests.benchmarks.eventless_integrators import CLIPS, final_p2
 from tests.benchmarks.measure import WALL, Row, Table, durations, rates
-from tests.benchmarks.naive import run_naive
 from tests.benchmarks.operations import count_operations
 from tests.benchmarks.roofline import floating_point_rates, operation_rates
-from tests.benchmarks.unaware import CLIPS, final_p2
+from tests.benchmarks.scalar_rk4 import run_scalar_rk4
 from tests.benchmarks.workloads import PERIOD
 from tests.reference.numpy_rhs import numpy_right_hand_side
 from tests.reference.schedule import plant_states, report_tests
@@ -70,7 +70,7 @@ def kernel(table: Table, repetitions: int, periods: int, batch: Row) -> None:
     table.add("share of a step in which the divider is busy", "%", 100 * divider * rate.median)
 
 
-def one_valve(table: Table, repetitions: int, duration: float, batch: Row) -> None:
+def single_valve(table: Table, repetitions: int, duration: float, batch: Row) -> None:
     """The alternatives, one valve at a time."""
     table.section("one valve under the same switching; ratio: the batch on one thread is faster by")
     schedule = workloads.one_valve(duration)
@@ -85,7 +85,7 @@ def one_valve(table: Table, repetitions: int, duration: float, batch: Row) -> No
 
     numpy_rhs = numpy_right_hand_side(schedule.parameters)
     row("this plant, a batch of one", lambda: plant_states(schedule, end).p2[0])
-    row("compiled scalar RK4, 50 us, two powers per flow", lambda: run_naive(schedule)[0])
+    row("compiled scalar RK4, 50 us, two powers per flow", lambda: run_scalar_rk4(schedule)[0])
     for rtol in (1e-6, 1e-9):
         row(
             f"SciPy LSODA with events, compiled right-hand side, {rtol:g}",
@@ -99,14 +99,14 @@ def one_valve(table: Table, repetitions: int, duration: float, batch: Row) -> No
 
 
 def without_events(table: Table) -> None:
-    """What library integrators make of test 4 when nobody tells them about the stops."""
+    """Results of library integrators for test 4 without events at the stops."""
     table.section("test 4 without stop events (wrong on purpose)")
     schedule = report_tests(workloads.CALIBRATED)["test4"]
     end = [schedule.duration]
     true = table.add(TRUE_FINAL, "bar", simulate_reference(schedule, end, rtol=1e-11).state.p2[0] / 1e5)
     found = {
         "this plant at its default step": (plant_states(schedule, end).p2[0], ""),
-        "compiled scalar RK4, 50 us, clamped": (run_naive(schedule)[0], ""),
+        "compiled scalar RK4, 50 us, clamped": (run_scalar_rk4(schedule)[0], ""),
     }
     for clip in CLIPS:
         for method in ("LSODA", "Radau", "RK45"):
@@ -116,8 +116,8 @@ def without_events(table: Table) -> None:
         table.add(name, "bar", p2 / 1e5, note=note)
 
 
-def starting(table: Table, repetitions: int) -> None:
-    """What a user waits for."""
+def start_up(table: Table, repetitions: int) -> None:
+    """Time until the first result in a fresh process."""
     table.section("a fresh process, disk caches warm")
     for name, code in (
         ("import epv_env", startup.IMPORT),
@@ -131,9 +131,9 @@ def benchmark(table: Table, quick: bool) -> None:
     repetitions, periods, duration = (3, 20, 0.5) if quick else (9, 200, 2.0)
     batch = batched(table, repetitions, periods)
     kernel(table, repetitions, periods, batch)
-    one_valve(table, repetitions, duration, batch)
+    single_valve(table, repetitions, duration, batch)
     without_events(table)
-    starting(table, repetitions)
+    start_up(table, repetitions)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What this machine's arithmetic units can do, measured by small vectorised loops."""
+"""Peak rates of this machine's arithmetic units, measured by small vectorised loops."""
 
 from collections.abc import Callable
 
@@ -9,7 +9,9 @@ from epv_env.plant.compiled import FLAGS
 from tests.benchmarks.measure import durations, rates
 
 VALUES = 256
+"""Independent values in a loop."""
 CHAINS, LENGTH = 8, 16
+"""Independent chains of operations per value, and operations per chain."""
 
 
 def _loop(operation: str) -> Callable:

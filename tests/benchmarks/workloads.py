@@ -1,4 +1,4 @@
-"""What the benchmark simulates: valves switched at random, as a learning controller would."""
+"""Workloads of the benchmarks: valves switched at random, as an untrained policy switches them."""
 
 import numpy as np
 
@@ -9,9 +9,11 @@ from epv_env.plant.valves import Valves
 from identification.bench.schedule import Schedule, scheduled
 
 PERIOD = 5e-3
+"""Time between decisions [s]."""
 SWITCHING = 0.15
 """Probability that a valve is switched at a decision."""
 P1, P2, U_ON = 12.0e5, 7.0e5, 24.0
+"""Supply and circuit pressure at the start [Pa], voltage of the energised coil [V]."""
 CALIBRATED = Parameters.calibrated()
 
 

@@ -1,1 +1,1 @@
-"""The blind check: campaigns whose cause is drawn and sealed, diagnosed unseen, then scored."""
+"""The blind check: causes are drawn and committed to, the campaigns diagnosed blind, then scored."""

@@ -17,121 +17,145 @@ from identification.bench.schedule import Schedule, scheduled
 from identification.recordings.recording import Campaign
 from identification.report_2003.cases import RATE
 from identification.studies.blind.deviating_forms import right_hand_side, terminal_currents
+from identification.studies.blind.settings import DEFAULTS, BlindSettings
 from identification.studies.blind.truth import Trial
 
-LEFT_OUT = ("rest", "high_voltage")
-"""A record at rest would take away a constant sensor bias, which is one of the effects to be found."""
-
-SUPPLY_VOLTAGE = 24.0
-"""Of the coil in every recording [V]: a drop of the driver's can hide behind the resistance."""
-
-SUITE = tuple(
-    replace(programme, U_on=SUPPLY_VOLTAGE)
-    for programme in DIAGNOSIS_SUITE
-    if programme.name not in LEFT_OUT
-)
-"""Nine recordings, two of them held out."""
-
-ZEROED: dict[str, float] = {}
-"""Offsets of the bench's own sensors: zeroed before the session, as the bias is an effect."""
-
-SOLVERS = (("LSODA", 1e-6), ("LSODA", 1e-8), ("Radau", 1e-6), ("Radau", 1e-8))
-"""SciPy's methods and relative tolerances, tried in turn: LSODA's interpolant may lose an event."""
-
-MOST_EVALUATIONS = 3e5
-"""Of one recording; a mover that chatters between sticking and slipping would have no end of them."""
-
-WARMING = 3.0
-"""Recordings after which a winding is within 1/e of its warmest."""
+NO_OFFSETS: dict[str, float] = {}
+"""Offsets of the bench's own sensors. They are zeroed before the session, as a bias is an effect."""
 
 
-def true_recordings(trial: Trial, seed: int) -> list[Truth]:
-    """The noise-free course of every recording. Raises RuntimeError if no solver gets through.
+def blind_suite(settings: BlindSettings = DEFAULTS) -> tuple[Programme, ...]:
+    """The programmes of a campaign: nine recordings, two of them held out."""
+    return tuple(
+        replace(programme, U_on=settings.supply_voltage)
+        for programme in DIAGNOSIS_SUITE
+        if programme.name not in settings.omitted_programmes
+    )
 
-    seed: of the winding's temperatures and of the jitter of delays.
+
+def true_recordings(trial: Trial, seed: int, settings: BlindSettings = DEFAULTS) -> list[Truth]:
+    """The noise-free course of every recording.
+
+    Args:
+        trial: the truth.
+        seed: of the winding's temperatures and of the jitter of delays.
+        settings: of the bench.
+
+    Raises:
+        RuntimeError: no solver follows the valve.
     """
     return [
         run_programme(
-            trial.parameters.replace(theta_coil=_winding(trial, index, seed)),
+            trial.parameters.replace(theta_coil=_start_temperature(trial, index, seed, settings)),
             programme,
-            deviation=trial.deviation,
+            form_deviation=trial.form_deviation,
             rng=np.random.default_rng([seed, trial.number, index, 2]),
+            settings=settings,
         )
-        for index, programme in enumerate(SUITE)
+        for index, programme in enumerate(blind_suite(settings))
     ]
 
 
 def blind_campaign(truths: list[Truth], trial: Trial, seed: int) -> Campaign:
-    """What the bench's sensors make of them; its name says no more than the trial's number."""
+    """The readings of the bench's sensors; the campaign's name holds the trial's number only."""
     noise = int(np.random.SeedSequence([seed, trial.number, 0, 3]).generate_state(1)[0])
     name = f"trial-{trial.number:04d}"
-    return measured_campaign(truths, trial.unit, seed=noise, name=name, offsets=ZEROED)
+    return measured_campaign(truths, trial.unit, seed=noise, name=name, offsets=NO_OFFSETS)
 
 
 def run_programme(
-    parameters: Parameters, programme: Programme, *, deviation: float, rng: np.random.Generator
+    parameters: Parameters,
+    programme: Programme,
+    *,
+    form_deviation: float,
+    rng: np.random.Generator,
+    settings: BlindSettings = DEFAULTS,
 ) -> Truth:
-    """One recording of a valve whose effects deviate in form; at 0 they have the plant's."""
+    """One recording of a valve whose effects deviate in form; at deviation 0 the forms are the plant's.
+
+    Args:
+        parameters: the valve.
+        programme: inputs and start.
+        form_deviation: relative deviation of the forms [-].
+        rng: of the jitter of delays.
+        settings: the solvers.
+
+    Raises:
+        RuntimeError: no solver follows the valve.
+    """
     U = programme.case.voltage(programme.U_on, RATE)
     time = np.arange(len(U)) / RATE
     start = initial_state(parameters, programme)
     schedule = scheduled(parameters, start, time, U=U[:-1], reservoir_volume=RESERVOIR)
-    schedule = _delayed(schedule, parameters["t_delay"], deviation, rng)
-    state = _solved(schedule, time, deviation)
+    schedule = _delayed(schedule, parameters["t_delay"], form_deviation, rng)
+    state = _simulated(schedule, time, form_deviation, settings)
     return Truth(
         programme=programme,
         period=1.0 / RATE,
-        channels={"U": U, **_read(state, parameters, deviation)},
+        channels={"U": U, **_sensed(state, parameters, form_deviation)},
     )
 
 
-def _winding(trial: Trial, index: int, seed: int) -> float:
-    """How warm the winding is when a recording begins [K]: warmer through the session, not evenly."""
-    if trial.warmest == 0:
+def _start_temperature(trial: Trial, index: int, seed: int, settings: BlindSettings) -> float:
+    """Winding temperature above ambient when a recording begins [K]; rises unevenly in the session."""
+    if trial.winding_temperature_rise == 0:
         return 0.0
-    uneven = np.random.default_rng([seed, trial.number, index, 4]).uniform(0.8, 1.2)
-    return float(trial.warmest * uneven * (1.0 - np.exp(-(index + 1) / WARMING)))
+    rng = np.random.default_rng([seed, trial.number, index, 4])
+    uneven = rng.uniform(*settings.warming_range)
+    warmed = 1.0 - np.exp(-(index + 1) / settings.warm_up_recordings)
+    return float(trial.winding_temperature_rise * uneven * warmed)
 
 
-def _delayed(schedule: Schedule, delay: float, deviation: float, rng: np.random.Generator) -> Schedule:
-    """Every switching later by a delay of its own."""
+def _delayed(
+    schedule: Schedule, delay: float, form_deviation: float, rng: np.random.Generator
+) -> Schedule:
+    """The schedule with every switching later by a delay of its own. delay: their mean [s]."""
     inner = schedule.borders[1:-1]
     if delay == 0 or len(inner) == 0:
         return schedule
-    later = inner + delay * (1.0 + deviation * rng.uniform(-1.0, 1.0, len(inner)))
+    later = inner + delay * (1.0 + form_deviation * rng.uniform(-1.0, 1.0, len(inner)))
     end = schedule.duration
     return replace(schedule, borders=np.concatenate([[0.0], np.minimum(later, end), [end]]))
 
 
-def _solved(schedule: Schedule, time: NDArray, deviation: float) -> State:
+def _simulated(
+    schedule: Schedule, time: NDArray, form_deviation: float, settings: BlindSettings
+) -> State:
+    """States at the times [s], (samples,), by the first solver that succeeds."""
     failures = []
-    for method, rtol in SOLVERS:
+    for method, rtol in settings.solvers:
         try:
             state = simulate_reference(
-                schedule, time, method=method, rtol=rtol, right_hand_side=right_hand_side(deviation),
-                most_evaluations=MOST_EVALUATIONS,
-            ).state  # fmt: skip
-            return state._replace(I_coil=_currents(state, schedule, time, deviation))
+                schedule,
+                time,
+                method=method,
+                rtol=rtol,
+                right_hand_side=right_hand_side(form_deviation),
+                most_evaluations=settings.solver_evaluations,
+            ).state
+            return state._replace(I_coil=_terminal_currents(state, schedule, time, form_deviation))
         except (ValueError, RuntimeError) as error:
             failures.append(f"{method} at {rtol:g}: {error}")
     raise RuntimeError(f"no solver followed the bench's valve: {'; '.join(failures)}")
 
 
-def _currents(state: State, schedule: Schedule, time: NDArray, deviation: float) -> NDArray:
-    """Current at the terminals [A], (samples,), as the deviating forms have it."""
+def _terminal_currents(
+    state: State, schedule: Schedule, time: NDArray, form_deviation: float
+) -> NDArray:
+    """Current at the terminals [A], (samples,), with the deviating forms. time: [s], (samples,)."""
     segment = np.searchsorted(schedule.borders[1:-1], time, side="left")
     inputs = np.ascontiguousarray([field[segment] for field in schedule.inputs])
     p = schedule.parameters
     return terminal_currents(
-        np.ascontiguousarray(state), inputs, coefficients(p), effect_constants(p), deviation
+        np.ascontiguousarray(state), inputs, coefficients(p), effect_constants(p), form_deviation
     )
 
 
-def _read(state: State, p: Parameters, deviation: float) -> dict[str, NDArray]:
-    """What the sensors are given to read; biases grow with the pressure, the gain with the current."""
+def _sensed(state: State, p: Parameters, form_deviation: float) -> dict[str, NDArray]:
+    """Sensor inputs by channel [SI], (samples,): biases grow with pressure, the gain with current."""
     sensors = {
-        "b_p2": p["b_p2"] * (1.0 + deviation * (state.p2 / 8e5 - 1.0)),
-        "b_p3": p["b_p3"] * (1.0 + deviation * (state.p3 / 8e5 - 1.0)),
-        "g_I": p["g_I"] * (1.0 + deviation * (np.abs(state.I_coil) / 0.4 - 1.0)),
+        "b_p2": p["b_p2"] * (1.0 + form_deviation * (state.p2 / 8e5 - 1.0)),
+        "b_p3": p["b_p3"] * (1.0 + form_deviation * (state.p3 / 8e5 - 1.0)),
+        "g_I": p["g_I"] * (1.0 + form_deviation * (np.abs(state.I_coil) / 0.4 - 1.0)),
     }
     return readings(state, sensors)

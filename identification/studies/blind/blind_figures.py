@@ -9,47 +9,59 @@ from numpy.typing import NDArray
 
 from epv_env.plant.effects.record import COMPONENTS
 from epv_env.plant.effects.registry import CATALOGUE
-from identification.studies.blind.commitments import NOTHING_LEFT
-from identification.studies.blind.score import ABSORBED, Scored, component_of
-from identification.studies.blind.summary import EDGES, Share, by_size, confusion
-from identification.studies.blind.truth import NONE, ONE, PARAMETER
+from identification.studies.blind.kinds import ABSORBED, NOMINAL, ONE_CAUSE, PARAMETER
+from identification.studies.blind.score import TrialScore, component_of
+from identification.studies.blind.settings import DEFAULTS, BlindSettings
+from identification.studies.blind.summary import confusion_matrix, detection_by_gap
+from identification.studies.proportion import Proportion
 from identification.valve_gap.causes import PARAMETER_COMPONENTS
 
-NO_GAP, UNKNOWN, A_PAIR, NOTHING = "no gap", "unknown", "two effects", "nothing"
+NO_GAP, UNKNOWN, TWO_NAMED, NO_TRUE_CAUSE = "no gap", "unknown", "two effects", "nothing"
+"""Labels of rows and columns that are no cause."""
 
 
-def components(trials: Sequence[Scored]) -> Figure:
-    """Where one cause lies against where it is said to lie."""
+def component_figure(trials: Sequence[TrialScore]) -> Figure:
+    """True against diagnosed component, for trials with at most one cause."""
     names = list(COMPONENTS)
     pairs = [
-        (_true(trial, component_of), NO_GAP if trial.verdict == "no_gap" else trial.component or UNKNOWN)
-        for trial in _single(trials)
+        (
+            _true_label(trial, component_of),
+            NO_GAP if trial.verdict == "no_gap" else trial.component or UNKNOWN,
+        )
+        for trial in _with_one_cause_at_most(trials)
     ]
-    counts = confusion(pairs, [NOTHING, *names], [NO_GAP, *names, UNKNOWN])
-    return _matrix(counts, [NOTHING, *names], [NO_GAP, *names, UNKNOWN], size=(7.5, 6.5))
+    rows, columns = [NO_TRUE_CAUSE, *names], [NO_GAP, *names, UNKNOWN]
+    return _matrix_figure(confusion_matrix(pairs, rows, columns), rows, columns, size=(7.5, 6.5))
 
 
-def causes(trials: Sequence[Scored]) -> Figure:
-    """One true cause against the first that is named."""
+def cause_figure(trials: Sequence[TrialScore]) -> Figure:
+    """True cause against the first that is named, for trials with at most one cause."""
     names = [*CATALOGUE, *(PARAMETER + symbol for symbol in PARAMETER_COMPONENTS)]
-    pairs = [(_true(trial, str), _said(trial)) for trial in _single(trials)]
-    counts = confusion(pairs, [NOTHING, *names], [NO_GAP, *names, A_PAIR, UNKNOWN])
-    return _matrix(counts, [NOTHING, *names], [NO_GAP, *names, A_PAIR, UNKNOWN], size=(13, 12))
+    pairs = [
+        (_true_label(trial, str), _diagnosed_label(trial)) for trial in _with_one_cause_at_most(trials)
+    ]
+    rows, columns = [NO_TRUE_CAUSE, *names], [NO_GAP, *names, TWO_NAMED, UNKNOWN]
+    return _matrix_figure(confusion_matrix(pairs, rows, columns), rows, columns, size=(13, 12))
 
 
-def detection(trials: Sequence[Scored]) -> Figure:
-    """How large the explainable gap must be to be found, and to be put down to the right cause."""
+def detection_figure(trials: Sequence[TrialScore], settings: BlindSettings = DEFAULTS) -> Figure:
+    """Proportions of detected gaps and of correct causes, over the explainable gap."""
     figure = Figure(figsize=(8, 4), layout="constrained")
     axes = figure.add_subplot()
-    bins = [found for found in by_size(trials) if found.detected.of]
-    at = np.sqrt([found.low * found.high for found in bins])
-    _shares(axes, 0.96 * at, [found.detected for found in bins], "a gap is found")
-    _shares(axes, 1.04 * at, [found.first_right for found in bins], "first cause right")
+    bins = [bin_ for bin_ in detection_by_gap(trials, settings) if bin_.detected.of]
+    middle = np.sqrt([bin_.low * bin_.high for bin_ in bins])
+    _draw_proportions(axes, 0.96 * middle, [bin_.detected for bin_ in bins], "a gap is found")
+    _draw_proportions(
+        axes, 1.04 * middle, [bin_.first_cause_correct for bin_ in bins], "first cause right"
+    )
     axes.axvline(
-        NOTHING_LEFT - 1.0, color="black", linestyle=":", label="counts as something to explain"
+        settings.explainable_threshold - 1.0,
+        color="black",
+        linestyle=":",
+        label="counts as something to explain",
     )
     axes.set_xscale("log")
-    axes.set_xlim(EDGES[0], EDGES[-1])
+    axes.set_xlim(settings.gap_bins[0], settings.gap_bins[-1])
     axes.set_xlabel("explainable gap above the floor of 1 (noise-free)")
     axes.set_ylabel("share of trials")
     axes.set_ylim(-0.03, 1.03)
@@ -58,39 +70,48 @@ def detection(trials: Sequence[Scored]) -> Figure:
     return figure
 
 
-def _shares(axes: Axes, at: NDArray, shares: Sequence[Share], name: str) -> None:
-    middle = np.array([share.hits / share.of for share in shares])
-    ends = np.array([share.interval for share in shares]).reshape(-1, 2)
+FIGURES: dict[str, Callable[[Sequence[TrialScore]], Figure]] = {
+    "blind-detection": detection_figure,
+    "blind-components": component_figure,
+    "blind-causes": cause_figure,
+}
+"""Figures for documents by file name."""
+
+
+def _draw_proportions(axes: Axes, gaps: NDArray, proportions: Sequence[Proportion], name: str) -> None:
+    """Proportions with their intervals at these gaps [-], (bins,)."""
+    middle = np.array([found.hits / found.of for found in proportions])
+    ends = np.array([found.interval for found in proportions]).reshape(-1, 2)
     errors = np.maximum([middle - ends[:, 0], ends[:, 1] - middle], 0.0)
-    axes.errorbar(at, middle, errors, fmt="o-", capsize=3, label=name)
+    axes.errorbar(gaps, middle, errors, fmt="o-", capsize=3, label=name)
 
 
-def _single(trials: Sequence[Scored]) -> list[Scored]:
-    """Trials with one cause to name, or none."""
+def _with_one_cause_at_most(trials: Sequence[TrialScore]) -> list[TrialScore]:
+    """Diagnosed trials with one cause to name, or none."""
     return [
         trial
         for trial in trials
         if trial.verdict != "failed"
-        and (trial.kind in (NONE, ONE) or (trial.kind == ABSORBED and len(trial.effects) == 1))
+        and (trial.kind in (NOMINAL, ONE_CAUSE) or (trial.kind == ABSORBED and len(trial.causes) == 1))
     ]
 
 
-def _true(trial: Scored, name: Callable[[str], str]) -> str:
-    return name(trial.effects[0]) if trial.effects else NOTHING
+def _true_label(trial: TrialScore, name: Callable[[str], str]) -> str:
+    return name(trial.causes[0]) if trial.causes else NO_TRUE_CAUSE
 
 
-def _said(trial: Scored) -> str:
+def _diagnosed_label(trial: TrialScore) -> str:
     if trial.verdict == "no_gap":
         return NO_GAP
-    if not trial.first:
+    if not trial.first_cause:
         return UNKNOWN
-    return trial.first[0] if len(trial.first) == 1 else A_PAIR
+    return trial.first_cause[0] if len(trial.first_cause) == 1 else TWO_NAMED
 
 
-def _matrix(
+def _matrix_figure(
     counts: NDArray, rows: Sequence[str], columns: Sequence[str], *, size: tuple[float, float]
 ) -> Figure:
-    """Rows of shares with their counts; rows and columns without a trial are left out."""
+    """Counts (rows, columns) coloured by their share of the row; without empty rows and columns."""
     keep_rows = np.flatnonzero(counts.sum(axis=1)).tolist()
     keep_columns = np.flatnonzero(counts.sum(axis=0)).tolist()
     shown = counts[np.ix_(keep_rows, keep_columns)]

@@ -1,146 +1,152 @@
-"""What a blind check found, for the report and as numbers."""
+"""The results of a blind check, for the report and as numbers."""
 
 from collections.abc import Sequence
 from typing import Any
 
 from identification.report.page import Picture, Section, Table, Text, Verdict
-from identification.studies.blind import blind_figures as figures
-from identification.studies.blind.commitments import NOTHING_LEFT
-from identification.studies.blind.score import VERDICTS, Scored, row_of
+from identification.studies.blind.acceptance import ACCEPTANCE_CRITERIA, AcceptanceCriterion
+from identification.studies.blind.blind_figures import (
+    cause_figure,
+    component_figure,
+    detection_figure,
+)
+from identification.studies.blind.kinds import KIND_TITLES
+from identification.studies.blind.score import VERDICTS, TrialScore
+from identification.studies.blind.settings import DEFAULTS, BlindSettings
 from identification.studies.blind.summary import (
-    BARS,
-    KINDS,
-    Bar,
-    Share,
-    by_size,
+    detection_by_gap,
+    is_well_judged,
     means,
-    shares,
-    values,
+    named_values,
+    proportions,
     verdict_matrix,
 )
+from identification.studies.proportion import Proportion
 
-HOW = (
-    "Each truth was drawn and sealed, and its hash given away, before another process that had the "
-    "campaign alone diagnosed it. The bench's forms of the effects, its solver and its steps differ "
-    f"from the fitted ones. A trial whose noise-free gap falls below {NOTHING_LEFT:g} when the four "
-    "parameters are recalibrated and the others give way within their scatter has nothing to explain: "
-    "no_gap is right there. A cause is right if it names all of the truth that is above that, and "
-    "nothing that is untrue."
+METHOD = (
+    "Each truth was drawn, and its hash was published, before another process that had the campaign "
+    "alone diagnosed it. The bench's forms of the effects, its solver and its steps differ from the "
+    "fitted ones. A trial has nothing to explain if its noise-free gap falls below {threshold:g} when "
+    "the four parameters are recalibrated and the others vary within their scatter: no_gap is correct "
+    "there. A cause is correct if it names all of the truth that exceeds this threshold, and nothing "
+    "that is untrue."
 )
 
 
-def blind_section(trials: Sequence[Scored]) -> Section:
-    """Verdicts against the bars, the matrix of verdicts, confusion, detection."""
-    found = values(trials)
+def blind_section(trials: Sequence[TrialScore], settings: BlindSettings = DEFAULTS) -> Section:
+    """Acceptance criteria, the matrix of verdicts, confusion and detection."""
+    values = named_values(trials, settings)
     return Section(
         title=f"Blind check over {len(trials)} trials",
-        verdicts=[_held(bar, found[bar.name]) for bar in BARS],
+        verdicts=[
+            _criterion_verdict(criterion, values[criterion.name]) for criterion in ACCEPTANCE_CRITERIA
+        ],
         blocks=[
-            Text(text=HOW),
-            _matrix(trials),
-            _numbers(trials),
+            Text(text=METHOD.format(threshold=settings.explainable_threshold)),
+            _verdict_table(trials),
+            _value_table(trials, settings),
             Picture(
-                figure=figures.detection(trials),
-                caption="Detection against what there is to explain; bars: exact 95 % intervals.",
+                figure=detection_figure(trials, settings),
+                caption="Detection against the explainable gap; error bars: exact 95 % intervals.",
             ),
-            Picture(figure=figures.components(trials), caption="Components of single causes."),
-            Picture(figure=figures.causes(trials), caption="Single causes, and the first one named."),
-            _missed(trials),
+            Picture(figure=component_figure(trials), caption="Components of single causes."),
+            Picture(figure=cause_figure(trials), caption="Single causes, and the first one named."),
+            _misjudged_table(trials),
         ],
     )
 
 
-def blind_json(trials: Sequence[Scored], *, seed: int) -> dict[str, Any]:
-    """Everything that was counted, and each trial."""
-    found = values(trials)
+def blind_json(
+    trials: Sequence[TrialScore], *, seed: int, settings: BlindSettings = DEFAULTS
+) -> dict[str, Any]:
+    """Everything that was counted, and each trial: the content of results.json."""
+    values = named_values(trials, settings)
+    verdicts = zip(KIND_TITLES, verdict_matrix(trials).tolist(), strict=True)
     return {
         "seed": seed,
         "trials": len(trials),
-        "bars": {bar.name: bar.met(found[bar.name]) for bar in BARS},
-        "shares": {name: share.as_json() for name, share in shares(trials).items()},
+        "bars": {
+            criterion.name: criterion.is_met(values[criterion.name]) for criterion in ACCEPTANCE_CRITERIA
+        },
+        "shares": {name: found.as_json() for name, found in proportions(trials, settings).items()},
         "means": means(trials),
-        "verdicts": dict(
-            zip(
-                KINDS,
-                (dict(zip(VERDICTS, row, strict=True)) for row in verdict_matrix(trials).tolist()),
-                strict=True,
-            )
-        ),
+        "verdicts": {kind: dict(zip(VERDICTS, counts, strict=True)) for kind, counts in verdicts},
         "detection": [
             {
                 "low": bin_.low,
                 "high": bin_.high,
                 "detected": bin_.detected.as_json(),
-                "first_right": bin_.first_right.as_json(),
+                "first_right": bin_.first_cause_correct.as_json(),
             }
-            for bin_ in by_size(trials)
+            for bin_ in detection_by_gap(trials, settings)
         ],
-        "each": [_trial(trial) for trial in trials],
+        "each": [_trial_json(trial) for trial in trials],
     }
 
 
-def _held(bar: Bar, value: float | None) -> Verdict:
-    met = bar.met(value)
-    asked = f"at least {bar.least:g}" if bar.most == float("inf") else f"at most {bar.most:g}"
-    if bar.least > 0 and bar.most < float("inf"):
-        asked = f"{bar.least:g} to {bar.most:g}"
+def _criterion_verdict(criterion: AcceptanceCriterion, value: float | None) -> Verdict:
+    met = criterion.is_met(value)
     text = "not measured" if value is None else f"{value:.3g}"
     status = "note" if met is None else "good" if met else "bad"
-    return Verdict(status=status, text=f"{bar.name}: {text} (asked: {asked})")
+    return Verdict(status=status, text=f"{criterion.name}: {text} (asked: {criterion.requirement})")
 
 
-def _matrix(trials: Sequence[Scored]) -> Table:
+def _verdict_table(trials: Sequence[TrialScore]) -> Table:
     rows = [
-        [row_of(kind), *(str(count) for count in counts)]
-        for kind, counts in zip(KINDS, verdict_matrix(trials).tolist(), strict=True)
+        [title, *(str(count) for count in counts)]
+        for title, counts in zip(KIND_TITLES.values(), verdict_matrix(trials).tolist(), strict=True)
     ]
     return Table(columns=["Truth", *VERDICTS], rows=rows, caption="Verdicts.")
 
 
-def _numbers(trials: Sequence[Scored]) -> Table:
-    rows = [[name, *_cells(share)] for name, share in shares(trials).items()]
+def _value_table(trials: Sequence[TrialScore], settings: BlindSettings) -> Table:
+    rows = [[name, *_cells(found)] for name, found in proportions(trials, settings).items()]
     rows += [[n, "-" if v is None else f"{v:.3g}", "", ""] for n, v in means(trials).items()]
     caption = "Shares with exact 95 % intervals (Clopper-Pearson), and means."
     return Table(columns=["", "value", "95 % interval", "trials"], rows=rows, caption=caption)
 
 
-def _cells(share: Share) -> list[str]:
-    low, high = share.interval
-    value = "-" if share.value is None else f"{share.value:.3f}"
-    return [value, f"{low:.3f} to {high:.3f}", f"{share.hits} of {share.of}"]
+def _cells(proportion: Proportion) -> list[str]:
+    low, high = proportion.interval
+    value = "-" if proportion.value is None else f"{proportion.value:.3f}"
+    return [value, f"{low:.3f} to {high:.3f}", f"{proportion.hits} of {proportion.of}"]
 
 
-def _missed(trials: Sequence[Scored]) -> Table:
+def _misjudged_table(trials: Sequence[TrialScore]) -> Table:
     rows = [
         [
             f"{trial.number:04d}",
-            row_of(trial.kind),
-            " + ".join(trial.effects) or "-",
-            f"{trial.explainable:.3f}",
+            KIND_TITLES[trial.kind],
+            " + ".join(trial.causes) or "-",
+            f"{trial.explainable_gap:.3f}",
             trial.verdict,
-            " + ".join(trial.first) or "-",
+            " + ".join(trial.first_cause) or "-",
             f"{trial.probability:.2f}",
         ]
         for trial in trials
-        if not well_judged(trial)
+        if not is_well_judged(trial)
     ]
     columns = ["Trial", "kind", "truth", "explainable", "verdict", "first cause", "p(truth)"]
     return Table(columns=columns, rows=rows, caption="Trials that were judged wrong.")
 
 
-def well_judged(trial: Scored) -> bool:
-    """Whether the verdict is the right one, with the truth first where there is one to name."""
-    if trial.kind in ("none", "absorbed"):
-        return trial.verdict == "no_gap"
-    if trial.kind == "left_out":
-        return trial.verdict == "unknown"
-    return trial.first_right
-
-
-def _trial(trial: Scored) -> dict[str, Any]:
-    shrink = trial.shrink
+def _trial_json(trial: TrialScore) -> dict[str, Any]:
+    reduction = trial.gap_reduction
     return {
-        **{name: value for name, value in vars(trial).items() if name not in ("magnitudes", "shrink")},
-        "magnitudes": [vars(magnitude) for magnitude in trial.magnitudes],
-        "shrink": vars(shrink) if shrink else None,
+        "number": trial.number,
+        "kind": trial.kind,
+        "effects": trial.causes,
+        "verdict": trial.verdict,
+        "first": trial.first_cause,
+        "first_right": trial.first_cause_correct,
+        "in_set": trial.truth_in_set,
+        "set_size": trial.set_size,
+        "probability": trial.probability,
+        "component": trial.component,
+        "component_right": trial.component_correct,
+        "rival": trial.rival_distance,
+        "explainable": trial.explainable_gap,
+        "seconds": trial.seconds,
+        "magnitudes": [vars(estimate) for estimate in trial.size_estimates],
+        "shrink": vars(reduction) if reduction else None,
     }

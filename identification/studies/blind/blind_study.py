@@ -1,32 +1,32 @@
-"""The whole blind check: draw and seal, commit, diagnose, and only then open and score."""
+"""The whole blind check: draw, commit, diagnose, and only then open the commitments and score."""
 
 from pathlib import Path
 
 from epv_env.common.progress import progress
 from identification.report.page import Section
 from identification.report.result_files import write_results
-from identification.studies.blind import blind_figures as figures
+from identification.studies.blind.blind_figures import FIGURES
 from identification.studies.blind.blind_section import blind_json, blind_section
-from identification.studies.blind.commitments import opened
-from identification.studies.blind.score import Scored, rival_distance, scored, true_shrink
+from identification.studies.blind.commitments import open_commitment
+from identification.studies.blind.score import (
+    TrialScore,
+    rival_distance,
+    score_trial,
+    true_gap_reduction,
+)
+from identification.studies.blind.settings import DEFAULTS, BlindSettings
 from identification.studies.blind.trials import (
-    Diagnosis,
-    answer_of,
-    check_study,
+    DiagnosisFunction,
+    check_seed,
     commit,
     diagnose,
     generate,
+    read_diagnosis,
     trial_folder,
 )
 
 RESULTS = "results"
-
-PICTURES = {
-    "blind-detection": figures.detection,
-    "blind-components": figures.components,
-    "blind-causes": figures.causes,
-}
-"""Drawn for `images`."""
+"""Name of both result files."""
 
 
 def blind_check(
@@ -35,36 +35,44 @@ def blind_check(
     trials: int,
     seed: int,
     workers: int,
-    diagnosis: Diagnosis,
+    diagnosis: DiagnosisFunction,
     images: Path | None = None,
+    settings: BlindSettings = DEFAULTS,
 ) -> Section:
-    """Run what is missing of a blind check, write results.json and results.html, return the section.
+    """Run the missing parts of a blind check, write results.json and results.html, return the section.
 
-    images: folder for the pictures alone, for documents. diagnosis: a function of a module, for it is
-    sent to other processes by name. Raises ValueError if the folder holds trials of another seed, or a
-    sealed answer was changed.
+    Args:
+        out: folder of the trials and results.
+        trials: number of trials.
+        seed: of truths and noise.
+        workers: processes.
+        diagnosis: a function of a module, as other processes import it by name.
+        images: folder for the pictures alone, for documents; None: no pictures.
+        settings: of the check.
+
+    Raises:
+        ValueError: the folder holds trials of another seed, or a committed truth was changed.
     """
-    check_study(out, seed)
-    generate(out, trials=trials, seed=seed, workers=workers)
+    check_seed(out, seed)
+    generate(out, trials=trials, seed=seed, workers=workers, settings=settings)
     committed = commit(out, trials)
     diagnose(out, trials=trials, workers=workers, diagnosis=diagnosis)
-    found = [
-        _opened_and_scored(out, number, digest)
+    scores = [
+        _opened_and_scored(out, number, digest, settings)
         for number, digest in progress(committed.items(), what="blind: scores", total=trials)
     ]
-    section = blind_section(found)
+    section = blind_section(scores, settings)
     if images:
-        for name, draw in PICTURES.items():
-            draw(found).savefig(images / f"{name}.png", dpi=100)
-    write_results(
-        out, RESULTS, title=section.title, sections=[section], content=blind_json(found, seed=seed)
-    )
+        for name, draw in FIGURES.items():
+            draw(scores).savefig(images / f"{name}.png", dpi=100)
+    content = blind_json(scores, seed=seed, settings=settings)
+    write_results(out, RESULTS, title=section.title, sections=[section], content=content)
     return section
 
 
-def _opened_and_scored(out: Path, number: int, committed: str) -> Scored:
+def _opened_and_scored(out: Path, number: int, committed: str, settings: BlindSettings) -> TrialScore:
     folder = trial_folder(out, number)
-    answer = answer_of(folder)
-    label, truth = opened(folder, committed)
-    rival = rival_distance(label, answer, truth)
-    return scored(label, answer, true_shrink(answer, truth), rival)
+    diagnosis = read_diagnosis(folder)
+    label, truth = open_commitment(folder, committed)
+    distance = rival_distance(label, diagnosis, truth, settings)
+    return score_trial(label, diagnosis, true_gap_reduction(diagnosis, truth, settings), distance)

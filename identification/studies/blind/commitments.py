@@ -1,4 +1,4 @@
-"""Sealed answers: labels with a salt, whose hashes are given away before anybody diagnoses."""
+"""Commitments to the truth: salted labels whose hashes are published before the first diagnosis."""
 
 import hashlib
 import io
@@ -12,98 +12,121 @@ import numpy as np
 from epv_env.common.files import write_bytes, write_text
 from identification.bench.campaign import Truth
 from identification.recordings.recording import OUTPUTS
-from identification.studies.blind.noise_free_gap import NoiseFree, held_out_gap, recalibrated
-from identification.studies.blind.truth import NONE, PAIR, Trial
+from identification.studies.blind.kinds import NOMINAL, TWO_EFFECTS
+from identification.studies.blind.noise_free_gap import (
+    NoiseFreeRecording,
+    held_out_gap,
+    recalibrated_parameters,
+)
+from identification.studies.blind.settings import DEFAULTS, BlindSettings
+from identification.studies.blind.truth import Trial
 
 FORMAT = "epv-blind/1"
-LABEL, TRUTH = "sealed.json", "truth.npz"
-SALT_BYTES = 16
-
-NOTHING_LEFT = 1.02
-"""Noise-free gap after recalibration below which nothing is left to explain, and `no_gap` is right."""
+LABEL_FILE, RECORDINGS_FILE = "sealed.json", "truth.npz"
+MODEL_CHANNELS = ("U", "p1", *OUTPUTS)
+"""Channels that a comparison with the model needs."""
 
 
-def noise_free(truths: Sequence[Truth]) -> list[NoiseFree]:
-    """The bench's truth as the models are held against it; a record at rest tells nothing here."""
+def noise_free_recordings(truths: Sequence[Truth]) -> list[NoiseFreeRecording]:
+    """The bench's truth, with which the models are compared; without the record at rest."""
     return [
-        NoiseFree(
+        NoiseFreeRecording(
             name=truth.programme.name,
             held_out=truth.programme.role == "validation",
             period=truth.period,
-            channels={name: truth.channels[name] for name in ("U", "p1", *OUTPUTS)},
+            channels={name: truth.channels[name] for name in MODEL_CHANNELS},
         )
         for truth in truths
         if truth.programme.role != "quality"
     ]
 
 
-def explainable(trial: Trial, recordings: Sequence[NoiseFree]) -> dict[str, float]:
-    """Noise-free gap after recalibration: of the four alone, and with the others within their scatter.
+def explainable_gap(
+    trial: Trial, recordings: Sequence[NoiseFreeRecording], settings: BlindSettings = DEFAULTS
+) -> dict[str, float]:
+    """Noise-free gaps after recalibration [-], by name.
 
-    The second is what the trial's effects leave that no unit of the nominal design explains; without
-    an effect it is 1.
+    `recalibrated`: with the four parameters fitted. `explainable`: with all parameters fitted within
+    their scatter. The trial's causes leave this gap, and no unit of the nominal design explains it; the
+    gap is 1 without a cause.
     """
-    found = {"recalibrated": held_out_gap(recordings, _values(recordings, scattered=False))}
-    left = 1.0
-    if trial.kind != NONE:
-        left = held_out_gap(recordings, _values(recordings, scattered=True))
-    return {**found, "explainable": left}
+    gaps = {"recalibrated": _fitted_gap(recordings, with_scatter=False, settings=settings)}
+    if trial.kind == NOMINAL:
+        return {**gaps, "explainable": 1.0}
+    return {**gaps, "explainable": _fitted_gap(recordings, with_scatter=True, settings=settings)}
 
 
-def label(
-    trial: Trial, gap: Mapping[str, float], own: Mapping[str, float], *, truth: bytes, seed: int
+def truth_label(
+    trial: Trial,
+    gap: Mapping[str, float],
+    single_gaps: Mapping[str, float],
+    *,
+    recordings: bytes,
+    seed: int,
+    settings: BlindSettings = DEFAULTS,
 ) -> dict[str, Any]:
-    """What is sealed, JSON-ready. own: explainable gap of each effect of a pair alone."""
-    visible = list(trial.effects) if gap["explainable"] >= NOTHING_LEFT else []
-    if trial.kind == PAIR and visible:
-        visible = [effect for effect in visible if own[effect] >= NOTHING_LEFT] or visible
-    salt = np.random.default_rng([seed, trial.number, 0, 5]).bytes(SALT_BYTES).hex()
+    """The content of sealed.json, JSON-ready.
+
+    Args:
+        trial: the truth.
+        gap: of `explainable_gap` [-].
+        single_gaps: explainable gap of each effect of a pair alone [-].
+        recordings: the content of truth.npz.
+        seed: of the salt.
+        settings: the gap from which a cause is visible.
+    """
+    salt = np.random.default_rng([seed, trial.number, 0, 5]).bytes(settings.salt_bytes).hex()
     return {
         "format": FORMAT,
         "trial": trial.number,
         "kind": trial.kind,
-        "effects": list(trial.effects),
-        "visible": visible,
-        "struck": list(trial.struck),
+        "effects": list(trial.causes),
+        "visible": _visible_causes(trial, gap, single_gaps, settings.explainable_threshold),
+        "struck": list(trial.excluded),
         "sizes": trial.sizes,
-        "deviation": trial.deviation,
-        "warmest_K": trial.warmest,
+        "deviation": trial.form_deviation,
+        "warmest_K": trial.winding_temperature_rise,
         "parameters": dict(trial.parameters),
         "gap": dict(gap),
-        "gap_alone": dict(own),
-        "truth_sha256": hashlib.sha256(truth).hexdigest(),
+        "gap_alone": dict(single_gaps),
+        "truth_sha256": hashlib.sha256(recordings).hexdigest(),
         "salt": salt,
     }
 
 
-def write_sealed(folder: Path, content: Mapping[str, Any], truth: bytes) -> None:
+def write_truth(folder: Path, label: Mapping[str, Any], recordings: bytes) -> None:
     """Write the label and the noise-free held-out recordings of one trial."""
-    write_bytes(folder / TRUTH, truth)
-    write_text(folder / LABEL, json.dumps(content, indent=1, allow_nan=False) + "\n")
+    write_bytes(folder / RECORDINGS_FILE, recordings)
+    write_text(folder / LABEL_FILE, json.dumps(label, indent=1, allow_nan=False) + "\n")
 
 
 def commitment(folder: Path) -> str:
-    """SHA-256 of a trial's label."""
-    return hashlib.sha256((folder / LABEL).read_bytes()).hexdigest()
+    """SHA-256 of a trial's label, hexadecimal."""
+    return hashlib.sha256((folder / LABEL_FILE).read_bytes()).hexdigest()
 
 
-def opened(folder: Path, committed: str) -> tuple[dict[str, Any], list[NoiseFree]]:
-    """A label and the noise-free held-out recordings. Raises ValueError if either was changed."""
+def open_commitment(folder: Path, committed: str) -> tuple[dict[str, Any], list[NoiseFreeRecording]]:
+    """A label and the noise-free held-out recordings.
+
+    Raises:
+        ValueError: the label differs from what `committed` says, or the recordings from what the label
+            says.
+    """
     if commitment(folder) != committed:
         raise ValueError(
-            f"{folder / LABEL} is not what was committed to before the diagnosis (SHA-256 "
-            f"{committed[:12]}..): put the sealed file back, or run the trial anew in another folder"
+            f"{folder / LABEL_FILE} is not what was committed to before the diagnosis (SHA-256 "
+            f"{committed[:12]}..): put the committed file back, or run the trial anew in another folder"
         )
-    content = json.loads((folder / LABEL).read_text(encoding="utf-8"))
-    truth = (folder / TRUTH).read_bytes()
-    if hashlib.sha256(truth).hexdigest() != content["truth_sha256"]:
+    label = json.loads((folder / LABEL_FILE).read_text(encoding="utf-8"))
+    recordings = (folder / RECORDINGS_FILE).read_bytes()
+    if hashlib.sha256(recordings).hexdigest() != label["truth_sha256"]:
         raise ValueError(
-            f"{folder / TRUTH} is not what its label names: put it back, or run the trial anew"
+            f"{folder / RECORDINGS_FILE} is not what its label names: put it back, or run the trial anew"
         )
-    return content, unpacked(truth)
+    return label, unpacked_recordings(recordings)
 
 
-def packed(recordings: Sequence[NoiseFree]) -> bytes:
+def packed_recordings(recordings: Sequence[NoiseFreeRecording]) -> bytes:
     """The held-out recordings as the bytes of an npz file."""
     stream = io.BytesIO()
     arrays = {"period": np.array([r.period for r in recordings[:1]])}
@@ -114,20 +137,35 @@ def packed(recordings: Sequence[NoiseFree]) -> bytes:
     return stream.getvalue()
 
 
-def unpacked(content: bytes) -> list[NoiseFree]:
-    """What `packed` packed."""
+def unpacked_recordings(content: bytes) -> list[NoiseFreeRecording]:
+    """The recordings that `packed_recordings` packed."""
     with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
         names = list(dict.fromkeys(key.split(".")[0] for key in arrays if "." in key))
         return [
-            NoiseFree(
+            NoiseFreeRecording(
                 name=name,
                 held_out=True,
                 period=float(arrays["period"][0]),
-                channels={channel: arrays[f"{name}.{channel}"] for channel in ("U", "p1", *OUTPUTS)},
+                channels={channel: arrays[f"{name}.{channel}"] for channel in MODEL_CHANNELS},
             )
             for name in names
         ]
 
 
-def _values(recordings: Sequence[NoiseFree], *, scattered: bool) -> dict[str, float]:
-    return dict(recalibrated(recordings, scattered=scattered))
+def _fitted_gap(
+    recordings: Sequence[NoiseFreeRecording], *, with_scatter: bool, settings: BlindSettings
+) -> float:
+    fitted = recalibrated_parameters(recordings, with_scatter=with_scatter, settings=settings)
+    return held_out_gap(recordings, dict(fitted), settings)
+
+
+def _visible_causes(
+    trial: Trial, gap: Mapping[str, float], single_gaps: Mapping[str, float], threshold: float
+) -> list[str]:
+    """Causes that leave a gap above the threshold; both of a pair that only together leave one."""
+    if gap["explainable"] < threshold:
+        return []
+    causes = list(trial.causes)
+    if trial.kind != TWO_EFFECTS:
+        return causes
+    return [effect for effect in causes if single_gaps[effect] >= threshold] or causes

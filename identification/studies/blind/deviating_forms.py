@@ -1,7 +1,7 @@
 """The bench's own forms of the effects: each deviates from the fitted form by a share `d` of itself.
 
-A diagnosis that fits the very forms by which the data were made would grade its own handwriting. Here
-each size depends on the state as it well may in a real valve; at d = 0 the plant's form is left.
+If the data were made with the forms that the diagnosis fits, the check would be too easy. Here each size
+depends on the state as it may in a real valve; at d = 0 the forms are the plant's.
 
 | Effect | Form here, relative to that of docs/effects.md | Why |
 |---|---|---|
@@ -41,6 +41,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.common.units import BAR
 from epv_env.plant.compiled import FLAGS, inlined, replacing, source_digest
 from epv_env.plant.effects.coil import OFF_VOLTAGE, coil_current, heated
 from epv_env.plant.effects.registry import Effects
@@ -55,15 +56,13 @@ from epv_env.plant.equations import (
 from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at, store_state
 from identification.bench.automaton import RightHandSide
 
-BAR = 1e5
-
-FILM = 20e-6
+FILM_THICKNESS = 20e-6
 """Thickness of the air film that an armature squeezes out as it lands [m]."""
 
 FILM_SPEED = 0.1
 """Speed that the film takes from a bouncing armature on each way through it, at d eMV = 1 [m/s]."""
 
-IRON_TIME = 1.0
+IRON_TIME_CONSTANT = 1.0
 """Time constant with which the winding's heat flows into the iron, at d = 1 [s]."""
 
 _with_electric = replacing(
@@ -82,7 +81,7 @@ _with_rates = replacing(State, "vMV", "coil_heat")
 
 
 @inlined
-def _electric(q, u, c, e, d):
+def _solenoid_sizes(q, u, c, e, d):
     """Sizes of the solenoid's and the armature's effects."""
     closed = 2.0 * q.xMV / c.xMVmax - 1.0
     level = e.saturation * abs(q.I) * reluctance_inverse(q, c)
@@ -101,7 +100,7 @@ def _electric(q, u, c, e, d):
 
 
 @inlined
-def _gas(q, c, e, d):
+def _gas_sizes(q, c, e, d):
     """Sizes of the effects of flows and chambers."""
     opened = 2.0 * q.xPV / c.xPVmax - 1.0
     through = abs(flow_PV(q, c, e, True))
@@ -125,7 +124,7 @@ def _gas(q, c, e, d):
 
 
 @inlined
-def _piston(q, c, e, d):
+def _piston_sizes(q, c, e, d):
     """Sizes of the effects of the piston, its seat and the pressure sensors."""
     opened = 2.0 * q.xPV / c.xPVmax - 1.0
     lip = (q.p3 - c.p_env) / (6.0 * BAR) - 1.0
@@ -142,18 +141,22 @@ def _piston(q, c, e, d):
 
 
 @inlined
-def deviating(q, u, c, e, d):
-    """Effects with sizes as this state has them; d: share of the deviation."""
+def deviating_sizes(q, u, c, e, d):
+    """The sizes of the effects at a state.
+
+    q: state. u: inputs. c: coefficients. e: sizes of the fitted forms. d: relative deviation of the
+    forms [-].
+    """
     at_valve = _with_supply(q, q.p1 - q.supply_drop)
-    return _piston(at_valve, c, _gas(at_valve, c, _electric(q, u, c, e, d), d), d)
+    return _piston_sizes(at_valve, c, _gas_sizes(at_valve, c, _solenoid_sizes(q, u, c, e, d), d), d)
 
 
 @inlined
-def _film(q, c):
+def _film_rate(q, c):
     """Rate at which the squeezed film slows a bouncing armature, relative to its speed [1/s]."""
-    low = math.exp(-max(q.xMV, 0.0) / FILM)
-    high = math.exp(-max(c.xMVmax - q.xMV, 0.0) / FILM)
-    return c.eMV * FILM_SPEED / FILM * (low + high)
+    low = math.exp(-max(q.xMV, 0.0) / FILM_THICKNESS)
+    high = math.exp(-max(c.xMVmax - q.xMV, 0.0) / FILM_THICKNESS)
+    return c.eMV * FILM_SPEED / FILM_THICKNESS * (low + high)
 
 
 _DIGEST = source_digest()
@@ -166,10 +169,10 @@ def _rates_and_forces(y, u, c, e, free_PV, free_MV, d):
         return out
     q, inputs = state_at(y.reshape(-1, 1), 0, 0), inputs_at(u.reshape(-1, 1), 0, 0)
     valve = coefficients_at(c, 0, 0)
-    sizes = deviating(q, inputs, valve, effects_at(e, 0, 0), d)
+    sizes = deviating_sizes(q, inputs, valve, effects_at(e, 0, 0), d)
     rates, force_PV, force_MV = derivative(q, inputs, valve, sizes, free_PV, free_MV, True)
-    slowed = rates.vMV - d * _film(q, valve) * q.vMV * free_MV
-    cooled = rates.coil_heat - d * q.coil_heat / IRON_TIME
+    slowed = rates.vMV - d * _film_rate(q, valve) * q.vMV * free_MV
+    cooled = rates.coil_heat - d * q.coil_heat / IRON_TIME_CONSTANT
     store_state(out.reshape(-1, 1), 0, 0, _with_rates(rates, slowed, cooled))
     out[-2], out[-1] = force_PV, force_MV
     return out
@@ -183,25 +186,30 @@ def _terminal_currents(states, u, c, e, d):
     valve, sizes = coefficients_at(c, 0, 0), effects_at(e, 0, 0)
     for k in range(out.size):
         q, inputs = state_at(states, 0, k), inputs_at(u, 0, k)
-        now = deviating(q, inputs, valve, sizes, d)
+        now = deviating_sizes(q, inputs, valve, sizes, d)
         out[k] = coil_current(inputs.U, q.I, valve.R, q.coil_heat, now)
     return out
 
 
-def right_hand_side(deviation: float) -> RightHandSide:
-    """The plant with effects whose forms deviate by this share, for `simulate_reference`."""
+def right_hand_side(form_deviation: float) -> RightHandSide:
+    """The plant with effects whose forms deviate by this share [-], for `simulate_reference`."""
 
     def rates_and_forces(y, u, c, e, free_PV, free_MV):
-        return _rates_and_forces(y, u, c, e, free_PV, free_MV, deviation)
+        return _rates_and_forces(y, u, c, e, free_PV, free_MV, form_deviation)
 
     return rates_and_forces
 
 
 def terminal_currents(
-    states: NDArray, inputs: NDArray, c: NDArray, e: NDArray, deviation: float
+    states: NDArray, inputs: NDArray, c: NDArray, e: NDArray, form_deviation: float
 ) -> NDArray:
     """Currents at the coil's terminals [A], (samples,), where eddy currents deviate as well.
 
-    states: [row of State, sample]. inputs: [row of Inputs, sample]. c, e: tables of one valve.
+    Args:
+        states: fields of State [SI], (fields, samples).
+        inputs: fields of Inputs [SI], (fields, samples).
+        c: coefficients of one valve, as `coefficients` gives them.
+        e: sizes of its effects, as `effect_constants` gives them.
+        form_deviation: relative deviation of the forms [-].
     """
-    return _terminal_currents(states, inputs, c, e, deviation)
+    return _terminal_currents(states, inputs, c, e, form_deviation)

@@ -1,7 +1,7 @@
 """What there is to explain: how far a model stays from the truth without its noise.
 
-The gap is that of docs/gap.md, with the noise-free outputs in the place of the readings: the root of
-1 + the mean square of (model - truth)/noise over the held-out recordings. So 1 is the floor.
+The gap is that of docs/gap.md with the noise-free outputs instead of the readings: the root of 1 + the
+mean square of (model - truth)/noise over the held-out recordings. Its floor is 1.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,33 +18,22 @@ from identification.recordings.recording import OUTPUTS, UNITS
 from identification.replay.drive import Drive
 from identification.replay.model import Replay
 from identification.replay.vector import Vector
-from identification.studies.blind.truth import FARTHEST, SCATTER
+from identification.studies.blind.settings import DEFAULTS, BlindSettings
 from identification.valve_gap.causes import PARAMETER_COMPONENTS
-
-STEP = 1e-4
-"""Relative change of a parameter for a finite difference."""
-
-PRECISION = 1e-4
-"""Relative change of the sum of squares, or of the parameters, at which a fit has converged."""
-
-MOST_STEPS = 20
-
-LARGER = 3.0
-"""How many times larger than where the search begins a size may be."""
-
-LOST = 1e3
-"""Residual of samples that a model does not reach [noise deviations]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class NoiseFree:
-    """One recording without noise; arrays (samples,), SI units."""
+class NoiseFreeRecording:
+    """One recording without noise."""
 
     name: str
+    """Of its programme."""
     held_out: bool
+    """Whether no fit uses the recording."""
     period: float
+    """Of the samples [s]."""
     channels: Mapping[str, NDArray]
-    """U, p1 and OUTPUTS."""
+    """U, p1 and OUTPUTS [SI], (samples,)."""
 
     @property
     def drive(self) -> Drive:
@@ -60,128 +49,169 @@ class NoiseFree:
         )
 
 
-class Outputs:
-    """The model beside noise-free recordings."""
+class NoiseFreeComparison:
+    """The model compared with noise-free recordings."""
 
-    def __init__(self, recordings: Sequence[NoiseFree], base: Parameters):
-        """base: every parameter that a call does not give."""
+    def __init__(
+        self,
+        recordings: Sequence[NoiseFreeRecording],
+        base: Parameters,
+        settings: BlindSettings = DEFAULTS,
+    ):
+        """base: parameters that a call of `residuals` does not give."""
         self.replay = Replay([recording.drive for recording in recordings], base)
         self.true = [np.stack([r.channels[name] for name in OUTPUTS]) for r in recordings]
         self.weights = [_weights(recording) for recording in recordings]
         self.bias = base["b_p2"]  # the circuit starts at what its sensor reads, less the bias
+        self.lost_residual = settings.lost_residual
 
     def residuals(self, values: Mapping[str, NDArray]) -> list[NDArray]:
-        """(model - truth)/noise per recording, (3 samples, n), for n candidates by symbol."""
-        found = self.replay.outputs(values, p2_shift=-self.bias)
+        """(model - truth)/noise of n candidates per recording [-], (3 samples, n).
+
+        values: of the candidates by symbol [SI], (n,) each.
+        """
+        outputs = self.replay.outputs(values, p2_shift=-self.bias)
         return [
-            np.nan_to_num((model - true[:, :, None]) * weights[:, :, None], nan=LOST).reshape(
-                true.size, -1
-            )
-            for model, true, weights in zip(found, self.true, self.weights, strict=True)
+            np.nan_to_num(
+                (model - true[:, :, None]) * weights[:, :, None], nan=self.lost_residual
+            ).reshape(true.size, -1)
+            for model, true, weights in zip(outputs, self.true, self.weights, strict=True)
         ]
 
 
-def noise(channel: str) -> float:
+def noise_deviation(channel: str) -> float:
     """Standard deviation of a reading: the sensor's noise and its rounding [SI]."""
     sensor = SENSORS[channel]
     return float(np.hypot(sensor.noise, sensor.resolution / np.sqrt(12))) * UNITS[channel][1]
 
 
-def recalibrated(recordings: Sequence[NoiseFree], *, scattered: bool) -> Parameters:
-    """The four parameters, as well as they can follow the calibration recordings' truth.
+def recalibrated_parameters(
+    recordings: Sequence[NoiseFreeRecording],
+    *,
+    with_scatter: bool,
+    settings: BlindSettings = DEFAULTS,
+) -> Parameters:
+    """The four parameters, fitted to the calibration recordings' truth.
 
-    scattered: whether the others may give way, as far as they scatter from unit to unit.
+    with_scatter: fit the other parameters too, within their scatter from unit to unit.
     """
-    others = tuple(PARAMETER_COMPONENTS) if scattered else ()
+    others = tuple(PARAMETER_COMPONENTS) if with_scatter else ()
     vector = Vector(CALIBRATED_SYMBOLS + others, Parameters.calibrated())
-    outputs = Outputs([r for r in recordings if not r.held_out], vector.reference)
-    return vector.parameters(_nearest(outputs, vector, _bounds(vector)))
+    fitted = [recording for recording in recordings if not recording.held_out]
+    comparison = NoiseFreeComparison(fitted, vector.reference, settings)
+    return vector.parameters(_best_fit(comparison, vector, _bounds(vector, settings), settings))
 
 
-def distance(recordings: Sequence[NoiseFree], sizes: Mapping[str, float]) -> float:
-    """How far the nearest plant with these effects stays from the truth, in noise deviations.
+def hypothesis_distance(
+    recordings: Sequence[NoiseFreeRecording],
+    sizes: Mapping[str, float],
+    settings: BlindSettings = DEFAULTS,
+) -> float:
+    """Distance of the nearest plant with these effects from the truth [noise deviations].
 
-    The root of the sum of squares over all samples of all recordings: two hypotheses d apart are told
-    from each other rightly by at most a share normal_cdf(d/2) of whatever tests (Neyman and Pearson), so
-    below 1 in less than 70 % of the cases. The four parameters and the sizes are free, the others give
-    way as far as they scatter. sizes: by symbol, where the search begins.
+    The root of the sum of squares over all samples of all recordings. Whatever the test, two hypotheses
+    at distance d are separated correctly with a probability of at most normal_cdf(d/2) (Neyman and
+    Pearson 1933): below 70 % for d below 1. The fit varies the four parameters and the sizes freely, and
+    the other parameters within their scatter.
+
+    sizes: of the effects by symbol [SI], where the search begins.
     """
     others = tuple(symbol for symbol in PARAMETER_COMPONENTS if symbol not in sizes)
     symbols = CALIBRATED_SYMBOLS + others + tuple(sizes)
     vector = Vector(symbols, Parameters.calibrated().replace(**sizes))
-    bounds = _bounds(vector)
-    own = np.array([symbol in sizes for symbol in symbols])
-    outputs = Outputs(recordings, vector.reference)
-    z = _nearest(outputs, vector, np.where(own, [[0.0], [LARGER]], bounds), free=own)
-    squares = [np.sum(part**2) for part in outputs.residuals(vector.values(z[None]))]
+    free = np.array([symbol in sizes for symbol in symbols])
+    size_bounds = [[0.0], [settings.largest_size_ratio]]
+    bounds = np.where(free, size_bounds, _bounds(vector, settings))
+    comparison = NoiseFreeComparison(recordings, vector.reference, settings)
+    z = _best_fit(comparison, vector, bounds, settings, free=free)
+    squares = [np.sum(part**2) for part in comparison.residuals(vector.values(z[None]))]
     return float(np.sqrt(sum(squares)))
 
 
-def _nearest(outputs: Outputs, vector: Vector, bounds: NDArray, free: NDArray | bool = False) -> NDArray:
-    """The scaled vector (k,) that follows the truth best, within bounds (2, k).
+def held_out_gap(
+    recordings: Sequence[NoiseFreeRecording],
+    values: Mapping[str, float],
+    settings: BlindSettings = DEFAULTS,
+) -> float:
+    """Gap of a model on the held-out recordings [-], at least 1.
 
-    What scatters from unit to unit is held by its prior, unless it is `free` (k,).
-    """
-    scatters = np.array([symbol in PARAMETER_COMPONENTS for symbol in vector.symbols])
-    prior = np.where(scatters & ~np.asarray(free), 1.0 / SCATTER, 0.0)
+    A winding that heats starts each recording at the temperature that fits best.
 
-    def residuals(z: NDArray) -> NDArray:
-        """Of candidates (n, k): data and prior, (residuals, n)."""
-        return np.vstack([*outputs.residuals(vector.values(z)), ((z - 1.0) * prior).T])
-
-    def derivatives(z: NDArray) -> NDArray:
-        changed = residuals(np.vstack([z, z + STEP * np.eye(len(z))]))
-        return (changed[:, 1:] - changed[:, :1]) / STEP
-
-    found = least_squares(
-        lambda z: residuals(z[None])[:, 0],
-        np.ones(len(vector.symbols)),
-        jac=derivatives,  # type: ignore[arg-type]
-        bounds=bounds,  # type: ignore[arg-type]
-        xtol=PRECISION,
-        ftol=PRECISION,
-        max_nfev=MOST_STEPS,
-    )
-    return found.x
-
-
-def held_out_gap(recordings: Sequence[NoiseFree], values: Mapping[str, float]) -> float:
-    """Gap of a model on the held-out recordings; values: its parameters that are not Table 12's.
-
-    A winding that heats is as warm at the start of each as fits it best.
+    values: parameters that differ from Table 12 by symbol [SI].
     """
     squares, count = 0.0, 0
     for recording in recordings:
         if recording.held_out:
-            outputs = Outputs([recording], Parameters.calibrated().replace(**values))
-            warmth = _warmth(outputs) if values.get("h_coil") else values.get("theta_coil", 0.0)
-            residual = outputs.residuals({"theta_coil": np.array([warmth])})[0]
+            base = Parameters.calibrated().replace(**values)
+            comparison = NoiseFreeComparison([recording], base, settings)
+            heats = bool(values.get("h_coil"))
+            theta = _best_temperature(comparison, settings) if heats else values.get("theta_coil", 0.0)
+            residual = comparison.residuals({"theta_coil": np.array([theta])})[0]
             squares += float(np.sum(residual**2))
             count += residual.size
     return float(np.sqrt(1.0 + squares / count))
 
 
-def _bounds(vector: Vector) -> NDArray:
-    """The four within their domains, the others as far as a unit's scatter goes; scaled, (2, k)."""
+def _best_fit(
+    comparison: NoiseFreeComparison,
+    vector: Vector,
+    bounds: NDArray,
+    settings: BlindSettings,
+    free: NDArray | bool = False,
+) -> NDArray:
+    """The scaled vector that follows the truth best [-], (k,), within bounds (2, k).
+
+    Parameters that scatter from unit to unit have that scatter as prior, unless they are `free` (k,).
+    """
+    prior = np.where(_scatters(vector) & ~np.asarray(free), 1.0 / settings.unit_scatter, 0.0)
+    step = settings.difference_step
+
+    def residuals(z: NDArray) -> NDArray:
+        """Of n candidates (n, k): data and prior [-], (residuals, n)."""
+        return np.vstack([*comparison.residuals(vector.values(z)), ((z - 1.0) * prior).T])
+
+    def derivatives(z: NDArray) -> NDArray:
+        changed = residuals(np.vstack([z, z + step * np.eye(len(z))]))
+        return (changed[:, 1:] - changed[:, :1]) / step
+
+    return least_squares(
+        lambda z: residuals(z[None])[:, 0],
+        np.ones(len(vector.symbols)),
+        jac=derivatives,  # type: ignore[arg-type]
+        bounds=bounds,  # type: ignore[arg-type]
+        xtol=settings.fit_tolerance,
+        ftol=settings.fit_tolerance,
+        max_nfev=settings.fit_evaluations,
+    ).x
+
+
+def _scatters(vector: Vector) -> NDArray:
+    """Whether each parameter scatters from unit to unit, boolean (k,)."""
+    return np.array([symbol in PARAMETER_COMPONENTS for symbol in vector.symbols])
+
+
+def _bounds(vector: Vector, settings: BlindSettings) -> NDArray:
+    """The four within their ranges, the others within a unit's scatter; scaled [-], (2, k)."""
     low, high = vector.bounds.T
-    scatters = np.array([symbol in PARAMETER_COMPONENTS for symbol in vector.symbols])
-    reach = FARTHEST * SCATTER
+    scatters, reach = _scatters(vector), settings.scatter_reach
     return np.array([np.where(scatters, 1.0 - reach, low), np.where(scatters, 1.0 + reach, high)])
 
 
-def _warmth(outputs: Outputs) -> float:
-    low, high = table()["theta_coil"].domain or (0.0, 0.0)
-    found = minimize_scalar(
-        lambda theta: float(np.sum(outputs.residuals({"theta_coil": np.array([theta])})[0] ** 2)),
-        bounds=(low, high),
-        method="bounded",
-        options={"xatol": 0.01},
-    )
+def _best_temperature(comparison: NoiseFreeComparison, settings: BlindSettings) -> float:
+    """Winding temperature above ambient at the start that fits best [K]."""
+
+    def cost(theta: float) -> float:
+        return float(np.sum(comparison.residuals({"theta_coil": np.array([theta])})[0] ** 2))
+
+    bounds = table()["theta_coil"].domain or (0.0, 0.0)
+    options = {"xatol": settings.temperature_tolerance}
+    found = minimize_scalar(cost, bounds=bounds, method="bounded", options=options)
     return float(found.x)  # type: ignore[attr-defined]
 
 
-def _weights(recording: NoiseFree) -> NDArray:
-    """1/noise, (3, samples); 0 for the current at a switching, which may jump there."""
-    weights = np.repeat([[1.0 / noise(name)] for name in OUTPUTS], len(recording.channels["U"]), axis=1)
+def _weights(recording: NoiseFreeRecording) -> NDArray:
+    """1/noise [1/SI], (3, samples); 0 for the current at a switching, where it may jump."""
+    samples = len(recording.channels["U"])
+    weights = np.repeat([[1.0 / noise_deviation(name)] for name in OUTPUTS], samples, axis=1)
     weights[OUTPUTS.index("I"), np.flatnonzero(np.diff(recording.channels["U"])) + 1] = 0.0
     return weights

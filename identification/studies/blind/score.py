@@ -1,198 +1,231 @@
-"""One opened answer against its label: what was right. Pure functions of both files' contents."""
+"""One diagnosis scored against its label: what is correct. Functions of both files' contents."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from epv_env.plant.effects.registry import effect as effect_record
+from epv_env.plant.effects.registry import effect
 from epv_env.plant.parameters import Parameters
-from identification.studies.blind.noise_free_gap import NoiseFree, distance, held_out_gap
-from identification.studies.blind.truth import LEFT_OUT, NONE, PARAMETER
+from identification.studies.blind.kinds import ABSORBED, NOMINAL, PARAMETER
+from identification.studies.blind.noise_free_gap import (
+    NoiseFreeRecording,
+    held_out_gap,
+    hypothesis_distance,
+)
+from identification.studies.blind.settings import DEFAULTS, BlindSettings
 from identification.valve_gap.causes import PARAMETER_COMPONENTS
 
 VERDICTS = ("no_gap", "known", "ambiguous", "unknown", "failed")
-"""Of gap.json, and what a diagnosis that gave none counts as."""
+"""Verdicts of gap.json, and `failed` for a diagnosis that gave none."""
 
-ABSORBED = "absorbed"
-"""Kind of a trial whose effects recalibration follows, so that `no_gap` is the right verdict."""
-
-LEAST_GAP = 0.02
-"""Gap above the floor below which shares of it say nothing."""
+NAMING_VERDICTS = ("known", "ambiguous")
+"""Verdicts that name a cause."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Magnitude:
-    """One size as diagnosed, of a cause that is right."""
+class SizeEstimate:
+    """One diagnosed size of a correct cause."""
 
     symbol: str
+    """Of the parameter that holds the size."""
     error: float
-    """|diagnosed - true| over |true - what the nominal model has| [-]."""
+    """|diagnosed - true| over |true - value of the nominal model| [-]."""
     inside: bool
     """Whether the diagnosed interval holds the true size."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shrink:
-    """The share of the gap that the diagnosed cause closes."""
+class GapReduction:
+    """The share of the gap that the diagnosed cause removes."""
 
     true: float
-    """By replay of the reported parameters on the noise-free held-out recordings."""
+    """By replay of the reported parameters on the noise-free held-out recordings [-]."""
     low: float
+    """Lower end of the diagnosed interval [-]."""
     high: float
+    """Upper end of the diagnosed interval [-]."""
 
     @property
     def inside(self) -> bool:
-        """Whether the diagnosed interval holds it."""
+        """Whether the diagnosed interval holds the true share."""
         return self.low <= self.true <= self.high
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scored:
-    """One trial."""
+class TrialScore:
+    """One trial's truth, diagnosis and score."""
 
     number: int
+    """Of the trial."""
     kind: str
     """As drawn, or ABSORBED."""
-    effects: tuple[str, ...]
+    causes: tuple[str, ...]
+    """The true causes."""
     verdict: str
-    first: tuple[str, ...]
-    """The first cause; () where none is named."""
-    first_right: bool
-    in_set: bool
+    """One of VERDICTS."""
+    first_cause: tuple[str, ...]
+    """Effects of the most probable cause; () where none is named."""
+    first_cause_correct: bool
+    """Whether a cause is named and the most probable one is correct."""
+    truth_in_set: bool
+    """Whether the ambiguity set holds a correct cause."""
     set_size: int
+    """Causes in the ambiguity set [-]; 0 where no cause is named."""
     probability: float
-    """On causes that are right."""
+    """Sum over the correct causes [-]."""
     component: str
-    """The likeliest; '' where none is named."""
-    component_right: bool
-    rival: float | None
-    """Distance of the nearest rival that is in the set with the truth (`rival_distance`)."""
-    explainable: float
-    """Noise-free gap that no unit of the nominal design explains."""
-    magnitudes: tuple[Magnitude, ...]
-    shrink: Shrink | None
+    """The most probable component; '' where none is named."""
+    component_correct: bool
+    """Whether a visible cause lies in this component."""
+    rival_distance: float | None
+    """Of `rival_distance` [noise deviations]."""
+    explainable_gap: float
+    """Noise-free gap that no unit of the nominal design explains [-]."""
+    size_estimates: tuple[SizeEstimate, ...]
+    """Sizes of the correct cause, where a cause is named."""
+    gap_reduction: GapReduction | None
+    """Of `true_gap_reduction`."""
     seconds: float | None
+    """Time of the diagnosis [s]; None where there is none."""
 
 
-def scored(
+def score_trial(
     label: Mapping[str, Any],
-    answer: Mapping[str, Any] | None,
-    shrink: Shrink | None,
-    rival: float | None = None,
-) -> Scored:
-    """A label against its answer (docs/gap.md; None: there is none)."""
-    said = answer or {"verdict": "failed"}
+    diagnosis: Mapping[str, Any] | None,
+    gap_reduction: GapReduction | None,
+    distance: float | None = None,
+) -> TrialScore:
+    """The score of one trial.
+
+    Args:
+        label: content of sealed.json.
+        diagnosis: content of gap.json (docs/gap.md); None: there is no diagnosis.
+        gap_reduction: of `true_gap_reduction`.
+        distance: of `rival_distance` [noise deviations].
+    """
+    said = diagnosis or {"verdict": "failed"}
     causes = said.get("causes", [])
-    named = said["verdict"] in ("known", "ambiguous")
-    right = [cause for cause in causes if is_right(label, cause["effects"])]
-    components = said.get("where", {}).get("component", {})
-    component = max(components, key=components.get) if any(components.values()) else ""
+    named = said["verdict"] in NAMING_VERDICTS
+    correct = [cause for cause in causes if is_correct(label, cause["effects"])]
+    component = _most_probable_component(said)
     kind = label["kind"]
-    chosen = said.get("ambiguity_set", []) if named else []
-    return Scored(
+    ambiguity_set = said.get("ambiguity_set", []) if named else []
+    return TrialScore(
         number=label["trial"],
-        kind=kind if kind == NONE or label["visible"] else ABSORBED,
-        effects=tuple(label["effects"]),
+        kind=kind if kind == NOMINAL or label["visible"] else ABSORBED,
+        causes=tuple(label["effects"]),
         verdict=said["verdict"],
-        first=tuple(causes[0]["effects"]) if named and causes else (),
-        first_right=named and bool(causes) and is_right(label, causes[0]["effects"]),
-        in_set=any(is_right(label, effects) for effects in chosen),
-        set_size=len(chosen),
-        probability=sum(cause["probability"] for cause in right),
+        first_cause=tuple(causes[0]["effects"]) if named and causes else (),
+        first_cause_correct=named and bool(causes) and is_correct(label, causes[0]["effects"]),
+        truth_in_set=any(is_correct(label, effects) for effects in ambiguity_set),
+        set_size=len(ambiguity_set),
+        probability=sum(cause["probability"] for cause in correct),
         component=component,
-        component_right=component in {component_of(effect) for effect in label["visible"]},
-        rival=rival,
-        explainable=label["gap"]["explainable"],
-        magnitudes=tuple(_magnitudes(label, right[0])) if right and named else (),
-        shrink=shrink,
+        component_correct=component in {component_of(cause) for cause in label["visible"]},
+        rival_distance=distance,
+        explainable_gap=label["gap"]["explainable"],
+        size_estimates=tuple(_size_estimates(label, correct[0])) if correct and named else (),
+        gap_reduction=gap_reduction,
         seconds=said.get("seconds"),
     )
 
 
-def is_right(label: Mapping[str, Any], effects: Sequence[str]) -> bool:
-    """Whether a cause names all that can be seen of the truth, and nothing that is not true.
+def is_correct(label: Mapping[str, Any], effects: Sequence[str]) -> bool:
+    """Whether a cause names all visible causes of the truth, and nothing that is untrue.
 
-    An effect of a pair that recalibration follows may be named or not. Order does not matter.
+    A cause may name or omit an effect of a pair that recalibration absorbs. The order does not matter.
     """
     visible, true = set(label["visible"]), set(label["effects"])
     return bool(visible) and visible <= set(effects) <= true
 
 
-def component_of(effect: str) -> str:
+def component_of(cause: str) -> str:
     """Component in which a cause lies."""
-    if effect.startswith(PARAMETER):
-        return PARAMETER_COMPONENTS[effect.removeprefix(PARAMETER)]
-    return effect_record(effect).component
+    if cause.startswith(PARAMETER):
+        return PARAMETER_COMPONENTS[cause.removeprefix(PARAMETER)]
+    return effect(cause).component
 
 
-def true_shrink(answer: Mapping[str, Any] | None, truth: Sequence[NoiseFree]) -> Shrink | None:
-    """What the first cause closes of the gap that recalibration leaves, on noise-free held-out data.
+def true_gap_reduction(
+    diagnosis: Mapping[str, Any] | None,
+    truth: Sequence[NoiseFreeRecording],
+    settings: BlindSettings = DEFAULTS,
+) -> GapReduction | None:
+    """Share of the recalibrated gap that the first cause removes, on noise-free held-out recordings.
 
     Both gaps are those of the reported parameters, replayed. None where no cause is named with an
-    interval, or where recalibration leaves nothing to close.
+    interval, or where recalibration leaves too small a gap.
     """
-    if answer is None or answer["verdict"] not in ("known", "ambiguous") or not answer["causes"]:
+    if diagnosis is None or diagnosis["verdict"] not in NAMING_VERDICTS or not diagnosis["causes"]:
         return None
-    said = answer["causes"][0].get("shrink") or {}
-    parameters = answer.get("parameters", {})
+    cause = diagnosis["causes"][0]
+    said, parameters = cause.get("shrink") or {}, diagnosis.get("parameters", {})
     if said.get("low") is None or said.get("high") is None or not parameters.get("with_cause"):
         return None
-    before = held_out_gap(truth, _known(parameters["recalibrated"]))
-    if before - 1.0 < LEAST_GAP:
+    before = held_out_gap(truth, _plant_values(parameters["recalibrated"]), settings)
+    if before - 1.0 < settings.smallest_gap:
         return None
-    sizes = {symbol: value[0] for symbol, value in _sizes(answer["causes"][0]).items()}
-    after = held_out_gap(truth, _known({**sizes, **parameters["with_cause"]}))
-    return Shrink(true=(before - after) / (before - 1.0), low=said["low"], high=said["high"])
+    with_cause = {**_estimated_sizes(cause), **parameters["with_cause"]}
+    after = held_out_gap(truth, _plant_values(with_cause), settings)
+    return GapReduction(true=(before - after) / (before - 1.0), low=said["low"], high=said["high"])
 
 
 def rival_distance(
-    label: Mapping[str, Any], answer: Mapping[str, Any] | None, truth: Sequence[NoiseFree]
+    label: Mapping[str, Any],
+    diagnosis: Mapping[str, Any] | None,
+    truth: Sequence[NoiseFreeRecording],
+    settings: BlindSettings = DEFAULTS,
 ) -> float | None:
-    """How near to the noise-free truth a cause comes that stands in the ambiguity set beside it.
+    """Distance of the nearest wrong cause in the truth's ambiguity set [noise deviations].
 
-    Of the nearest, in noise deviations (noise_free.distance). A cause that holds all of the truth is no
-    rival: it comes as near as the truth by leaving the rest at nothing. None where the truth has none.
+    A cause that holds all of the truth is no rival: with its other effects at zero it equals the truth.
+    None where the set does not hold the truth, or has no rival.
     """
-    if answer is None or answer["verdict"] != "ambiguous":
+    if diagnosis is None or diagnosis["verdict"] != "ambiguous":
         return None
-    members = [cause for cause in answer["causes"] if cause["effects"] in answer["ambiguity_set"]]
-    if not any(is_right(label, cause["effects"]) for cause in members):
+    ambiguity_set = diagnosis["ambiguity_set"]
+    members = [cause for cause in diagnosis["causes"] if cause["effects"] in ambiguity_set]
+    if not any(is_correct(label, cause["effects"]) for cause in members):
         return None
     rivals = [cause for cause in members if not set(label["visible"]) <= set(cause["effects"])]
-    starts = [{symbol: value[0] for symbol, value in _sizes(cause).items()} for cause in rivals]
-    return min((distance(truth, start) for start in starts if all(start.values())), default=None)
+    starts = [_estimated_sizes(cause) for cause in rivals]
+    distances = (hypothesis_distance(truth, start, settings) for start in starts if all(start.values()))
+    return min(distances, default=None)
 
 
-def row_of(kind: str) -> str:
-    """What a kind of trial is called."""
-    return {
-        NONE: "no effect", ABSORBED: "absorbed by the four", "one": "one cause", "pair": "two effects",
-        LEFT_OUT: "effect struck from the catalogue",
-    }[kind]  # fmt: skip
+def _most_probable_component(diagnosis: Mapping[str, Any]) -> str:
+    components = diagnosis.get("where", {}).get("component", {})
+    return max(components, key=components.get) if any(components.values()) else ""
 
 
-def _magnitudes(label: Mapping[str, Any], cause: Mapping[str, Any]) -> list[Magnitude]:
-    found = []
+def _size_estimates(label: Mapping[str, Any], cause: Mapping[str, Any]) -> list[SizeEstimate]:
+    estimates = []
     nominal = Parameters.calibrated()
-    for symbol, (value, low, high) in _sizes(cause).items():
+    for symbol, (value, low, high) in _size_intervals(cause).items():
         if symbol in label["sizes"]:
             true = label["sizes"][symbol]
             error = abs(value - true) / abs(true - nominal[symbol])
-            found.append(Magnitude(symbol=symbol, error=error, inside=low <= true <= high))
-    return found
+            inside = low <= true <= high
+            estimates.append(SizeEstimate(symbol=symbol, error=error, inside=inside))
+    return estimates
 
 
-def _sizes(cause: Mapping[str, Any]) -> dict[str, Any]:
-    """Magnitudes of a cause by symbol; gap.json names them symbol_unit."""
+def _estimated_sizes(cause: Mapping[str, Any]) -> dict[str, float]:
+    """Estimated sizes of a cause by symbol [SI]."""
+    return {symbol: interval[0] for symbol, interval in _size_intervals(cause).items()}
+
+
+def _size_intervals(cause: Mapping[str, Any]) -> dict[str, Any]:
+    """Estimate, low and high end of each size of a cause by symbol; gap.json has symbol_unit."""
     symbols = sorted(Parameters.calibrated(), key=len)
-    found = {}
+    intervals = {}
     for name, interval in cause.get("magnitude", {}).items():
-        fitting = [symbol for symbol in symbols if f"{name}_".startswith(f"{symbol}_")]
-        if fitting:
-            found[fitting[-1]] = interval
-    return found
+        matching = [symbol for symbol in symbols if f"{name}_".startswith(f"{symbol}_")]
+        if matching:
+            intervals[matching[-1]] = interval
+    return intervals
 
 
-def _known(values: Mapping[str, Any]) -> dict[str, float]:
-    """Values of the plant's own parameters; a report may hold more."""
+def _plant_values(values: Mapping[str, Any]) -> dict[str, float]:
+    """Values of the plant's own parameters [SI]; a diagnosis may report more."""
     return {symbol: float(values[symbol]) for symbol in Parameters.calibrated() if symbol in values}

@@ -1,10 +1,10 @@
-"""The stages of a blind check in a folder: draw and seal, commit, diagnose. Each trial once.
+"""The stages of a blind check in a folder: draw, commit, diagnose. Each trial runs once.
 
-trials/NNNN/campaign/    all that a diagnosing process is told of, with ...
-trials/NNNN/request.json ... the causes struck from its catalogue
-trials/NNNN/sealed.json, truth.npz   the answer
-trials/NNNN/diagnosis/gap.json       what it said
-commitments.sha256       hashes of the sealed answers, written before the first diagnosis
+trials/NNNN/campaign/    the campaign: all that the diagnosis gets, with ...
+trials/NNNN/request.json ... the causes excluded from its catalogue
+trials/NNNN/sealed.json, truth.npz   the truth
+trials/NNNN/diagnosis/gap.json       the diagnosis
+commitments.sha256       hashes of the truths, written before the first diagnosis
 """
 
 import json
@@ -19,100 +19,110 @@ from threadpoolctl import threadpool_limits
 
 from epv_env.common.files import write_text
 from epv_env.common.progress import progress
+from identification.bench.campaign import Truth
 from identification.recordings.campaign_files import write_campaign
 from identification.recordings.manifest import FILE_NAME
 from identification.studies.blind.bench import blind_campaign, true_recordings
 from identification.studies.blind.commitments import (
-    LABEL,
+    LABEL_FILE,
     commitment,
-    explainable,
-    label,
-    noise_free,
-    packed,
-    write_sealed,
+    explainable_gap,
+    noise_free_recordings,
+    packed_recordings,
+    truth_label,
+    write_truth,
 )
-from identification.studies.blind.truth import PAIR, Trial, draw_trial, plan
+from identification.studies.blind.kinds import TWO_EFFECTS
+from identification.studies.blind.settings import DEFAULTS, BlindSettings
+from identification.studies.blind.truth import Trial, draw_trial, trial_plan
 
-COMMITMENTS, STUDY, REQUEST, ANSWER = "commitments.sha256", "blind.json", "request.json", "gap.json"
+COMMITMENTS_FILE, STUDY_FILE, REQUEST_FILE, DIAGNOSIS_FILE = (
+    "commitments.sha256", "blind.json", "request.json", "gap.json",
+)  # fmt: skip
 
 
-ATTEMPTS = 5
-
-
-class Diagnosis(Protocol):
+class DiagnosisFunction(Protocol):
     """What a trial asks of a diagnosis: read the campaign, write `out`/gap.json."""
 
     def __call__(
         self, campaign: Path, out: Path, *, without: Sequence[str] = (), report: bool = False
-    ) -> object: ...
+    ) -> object:
+        """Diagnose a campaign with a catalogue that lacks the causes `without`."""
+        ...
 
 
 def trial_folder(out: Path, number: int) -> Path:
-    """Where a trial lies."""
+    """Folder of a trial."""
     return out / "trials" / f"{number:04d}"
 
 
-def check_study(out: Path, seed: int) -> None:
-    """A folder holds trials of one seed. Raises ValueError for another."""
-    path = out / STUDY
+def check_seed(out: Path, seed: int) -> None:
+    """Note the seed of a folder. Raises ValueError if the folder holds trials of another seed."""
+    path = out / STUDY_FILE
     if path.exists():
-        found = json.loads(path.read_text(encoding="utf-8"))["seed"]
-        if found != seed:
+        earlier = json.loads(path.read_text(encoding="utf-8"))["seed"]
+        if earlier != seed:
             raise ValueError(
-                f"{out} holds trials of seed {found}: give --seed {found}, or another --out"
+                f"{out} holds trials of seed {earlier}: give --seed {earlier}, or another --out"
             )
     write_text(path, json.dumps({"seed": seed}) + "\n")
 
 
-def generate(out: Path, *, trials: int, seed: int, workers: int) -> None:
-    """Draw, record and seal every trial that is not there yet."""
+def generate(
+    out: Path, *, trials: int, seed: int, workers: int, settings: BlindSettings = DEFAULTS
+) -> None:
+    """Draw and record every trial that is missing, and write its truth."""
     jobs = [
-        (trial_folder(out, number), seed, number, kind, causes)
-        for number, (kind, causes) in enumerate(plan(seed, trials))
+        (trial_folder(out, number), seed, number, kind, causes, settings)
+        for number, (kind, causes) in enumerate(trial_plan(seed, trials, settings))
         if not (trial_folder(out, number) / "campaign" / FILE_NAME).exists()
     ]
-    for _ in in_processes(generate_trial, jobs, workers=workers, what="blind: campaigns"):
+    for _ in run_in_processes(generate_trial, jobs, workers=workers, label="blind: campaigns"):
         pass
 
 
-def generate_trial(folder: Path, seed: int, number: int, kind: str, causes: Sequence[str]) -> None:
-    """One trial; its campaign.json comes last, so that a part of a trial is none.
+def generate_trial(
+    folder: Path,
+    seed: int,
+    number: int,
+    kind: str,
+    causes: Sequence[str],
+    settings: BlindSettings = DEFAULTS,
+) -> None:
+    """Write one trial. campaign.json comes last, so an interrupted trial counts as missing.
 
-    Raises RuntimeError if no solver follows any of ATTEMPTS valves with these causes.
+    Raises:
+        RuntimeError: no solver follows any of the valves drawn with these causes.
     """
-    for attempt in range(ATTEMPTS):
-        trial = draw_trial(seed, number, kind, causes, attempt)
-        try:
-            truths = true_recordings(trial, seed)
-            alone = _alone(trial, seed)
-            break
-        except RuntimeError as error:
-            print(f"trial {number}: drawn anew, as {error}", file=sys.stderr, flush=True)
-    else:
-        raise RuntimeError(f"trial {number}: no solver follows a valve with {' and '.join(causes)}")
-    recordings = noise_free(truths)
-    truth = packed(recordings)
-    content = label(trial, explainable(trial, recordings), alone, truth=truth, seed=seed)
-    write_sealed(folder, content, truth)
-    write_text(folder / REQUEST, json.dumps({"without": list(trial.struck)}) + "\n")
+    trial, truths, single_gaps = _drawn_and_recorded(seed, number, kind, causes, settings)
+    recordings = noise_free_recordings(truths)
+    content = packed_recordings(recordings)
+    gap = explainable_gap(trial, recordings, settings)
+    label = truth_label(trial, gap, single_gaps, recordings=content, seed=seed, settings=settings)
+    write_truth(folder, label, content)
+    write_text(folder / REQUEST_FILE, json.dumps({"without": list(trial.excluded)}) + "\n")
     write_campaign(blind_campaign(truths, trial, seed), folder / "campaign")
 
 
 def commit(out: Path, trials: int) -> dict[int, str]:
-    """Hash every label, keep the list, print it. Raises ValueError if a label has changed since."""
-    path = out / COMMITMENTS
+    """Hash every label, write and print the hashes, and return them by trial.
+
+    Raises:
+        ValueError: a label has changed since an earlier commitment.
+    """
+    path = out / COMMITMENTS_FILE
     earlier = read_commitments(path)
-    found = {number: commitment(trial_folder(out, number)) for number in range(trials)}
-    changed = [n for n, digest in found.items() if earlier.get(n, digest) != digest]
+    hashes = {number: commitment(trial_folder(out, number)) for number in range(trials)}
+    changed = [n for n, digest in hashes.items() if earlier.get(n, digest) != digest]
     if changed:
         raise ValueError(
-            f"{trial_folder(out, changed[0]) / LABEL} is not what {path} commits to: put the sealed "
-            "file back, or start in another folder"
+            f"{trial_folder(out, changed[0]) / LABEL_FILE} is not what {path} commits to: put the "
+            "committed file back, or start in another folder"
         )
-    text = "".join(f"{digest}  {n:04d}\n" for n, digest in sorted({**earlier, **found}.items()))
+    text = "".join(f"{digest}  {n:04d}\n" for n, digest in sorted({**earlier, **hashes}.items()))
     write_text(path, text)
     print(f"{text}committed: {path}", flush=True)
-    return found
+    return hashes
 
 
 def read_commitments(path: Path) -> dict[int, str]:
@@ -122,23 +132,23 @@ def read_commitments(path: Path) -> dict[int, str]:
     return {int(number): digest for digest, number in pairs}
 
 
-def diagnose(out: Path, *, trials: int, workers: int, diagnosis: Diagnosis) -> None:
-    """Have every trial diagnosed that has no answer yet, by processes that get its campaign only."""
+def diagnose(out: Path, *, trials: int, workers: int, diagnosis: DiagnosisFunction) -> None:
+    """Diagnose every trial that has no diagnosis yet, in processes that get the campaign only."""
     folders = [trial_folder(out, number) for number in range(trials)]
     jobs = [
-        (diagnosis, folder / "campaign", folder / "diagnosis", _without(folder))
+        (diagnosis, folder / "campaign", folder / "diagnosis", _excluded_causes(folder))
         for folder in folders
-        if not (folder / "diagnosis" / ANSWER).exists()
+        if not (folder / "diagnosis" / DIAGNOSIS_FILE).exists()
     ]
-    for failure in in_processes(diagnose_trial, jobs, workers=workers, what="blind: diagnoses"):
+    for failure in run_in_processes(diagnose_trial, jobs, workers=workers, label="blind: diagnoses"):
         if failure:
             print(failure, file=sys.stderr, flush=True)
 
 
 def diagnose_trial(
-    diagnosis: Diagnosis, campaign: Path, out: Path, without: Sequence[str]
+    diagnosis: DiagnosisFunction, campaign: Path, out: Path, without: Sequence[str]
 ) -> str | None:
-    """One diagnosis. Returns what went wrong, if anything: without an answer the trial is missed."""
+    """Run one diagnosis. Returns a message if the diagnosis fails: the trial then has none."""
     try:
         diagnosis(campaign, out, without=without, report=False)
     except Exception as error:  # one failure must not end the study; it is shown and scored
@@ -146,16 +156,19 @@ def diagnose_trial(
     return None
 
 
-def answer_of(folder: Path) -> dict[str, Any] | None:
-    """A trial's gap.json; None without one."""
-    path = folder / "diagnosis" / ANSWER
+def read_diagnosis(folder: Path) -> dict[str, Any] | None:
+    """Content of a trial's gap.json; None without one."""
+    path = folder / "diagnosis" / DIAGNOSIS_FILE
     return json.loads(path.read_text(encoding="utf-8")) if path.exists() else None
 
 
-def in_processes(
-    function: Callable[..., Any], jobs: Sequence[tuple], *, workers: int, what: str
+def run_in_processes(
+    function: Callable[..., Any], jobs: Sequence[tuple], *, workers: int, label: str
 ) -> Iterator[Any]:
-    """Results of a function for each of the jobs, in the order in which they come."""
+    """Results of a function for the arguments of each job, in the order of completion.
+
+    label: of the progress display.
+    """
     if not jobs:
         return
     pool = ProcessPoolExecutor(
@@ -163,22 +176,37 @@ def in_processes(
     )
     try:
         futures = [pool.submit(function, *job) for job in jobs]
-        for future in progress(as_completed(futures), what=what, total=len(jobs)):
+        for future in progress(as_completed(futures), what=label, total=len(jobs)):
             yield future.result()
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _alone(trial: Trial, seed: int) -> dict[str, float]:
-    """Explainable gap of each effect of a pair without the other."""
-    if trial.kind != PAIR:
+def _drawn_and_recorded(
+    seed: int, number: int, kind: str, causes: Sequence[str], settings: BlindSettings
+) -> tuple[Trial, list[Truth], dict[str, float]]:
+    """A trial that a solver follows, its recordings, and the gaps of a pair's single effects [-]."""
+    for attempt in range(settings.attempts):
+        trial = draw_trial(seed, number, kind, causes, attempt, settings)
+        try:
+            truths = true_recordings(trial, seed, settings)
+            return trial, truths, _single_gaps(trial, seed, settings)
+        except RuntimeError as error:
+            print(f"trial {number}: drawn anew, as {error}", file=sys.stderr, flush=True)
+    raise RuntimeError(f"trial {number}: no solver follows a valve with {' and '.join(causes)}")
+
+
+def _single_gaps(trial: Trial, seed: int, settings: BlindSettings) -> dict[str, float]:
+    """Explainable gap of each effect of a pair without the other [-]; empty for other kinds."""
+    if trial.kind != TWO_EFFECTS:
         return {}
-    found = {}
-    for effect in trial.effects:
+    gaps = {}
+    for effect in trial.causes:
         single = trial.with_only(effect)
-        found[effect] = explainable(single, noise_free(true_recordings(single, seed)))["explainable"]
-    return found
+        recordings = noise_free_recordings(true_recordings(single, seed, settings))
+        gaps[effect] = explainable_gap(single, recordings, settings)["explainable"]
+    return gaps
 
 
-def _without(folder: Path) -> tuple[str, ...]:
-    return tuple(json.loads((folder / REQUEST).read_text(encoding="utf-8"))["without"])
+def _excluded_causes(folder: Path) -> tuple[str, ...]:
+    return tuple(json.loads((folder / REQUEST_FILE).read_text(encoding="utf-8"))["without"])

@@ -1,4 +1,4 @@
-"""What is true in a trial: the valve as built, what ails it, and how its effects differ in form."""
+"""The truth of a trial: the valve as built, the causes of its gap, and how their forms deviate."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,96 +12,103 @@ from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.studies.blind.effect_draws import WARMEST, draw_parameter, draw_sizes
+from identification.studies.blind.kinds import (
+    EXCLUDED_EFFECT,
+    NOMINAL,
+    ONE_CAUSE,
+    PARAMETER,
+    TWO_EFFECTS,
+)
+from identification.studies.blind.settings import DEFAULTS, BlindSettings
 from identification.valve_gap.causes import PARAMETER_COMPONENTS
 
-NONE, ONE, PAIR, LEFT_OUT = "none", "one", "pair", "left_out"
-
-KINDS = (NONE,) * 10 + (ONE,) * 25 + (PAIR,) * 6 + (LEFT_OUT,) * 9
-"""Kinds of every fifty trials: nothing, one cause, two effects, one effect that is struck out."""
-
-PARAMETER = "parameter:"
-
 EFFECTS = tuple(CATALOGUE)
-SINGLES = EFFECTS * 3 + tuple(PARAMETER + symbol for symbol in PARAMETER_COMPONENTS)
-"""Causes of trials with one: a parameter that is off comes up a third as often as an effect."""
-
-CALIBRATED_SPREAD = 0.06
-"""The four calibrated parameters lie within this share of Table 12's values, uniformly."""
-
-SCATTER = 2e-3
-"""Relative standard deviation of every other parameter from unit to unit, ..."""
-
-FARTHEST = 2.0
-"""... which lies no farther off than so many of them: what is built is inspected."""
-
-DEVIATION = (0.03, 0.15)
-"""How far an effect's form is from the fitted one, as a share of the effect (variants.py)."""
 
 Card = TypeVar("Card")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Trial:
-    """One trial's truth. SI units."""
+    """One trial's truth."""
 
     number: int
+    """Of the trial, from 0."""
     kind: str
-    effects: tuple[str, ...]
+    """As drawn (kinds.py)."""
+    causes: tuple[str, ...]
     """Names as in gap.json: effects of the catalogue, or `parameter:<symbol>`."""
     sizes: dict[str, float]
-    """By symbol; of a parameter that is off, its value."""
+    """Sizes of the effects, and values of the parameters that are off, by symbol [SI]."""
     unit: Parameters
-    """The valve as built, without what ails it."""
-    deviation: float
-    """Share by which the forms of the effects differ from the fitted ones; 0 without effects."""
-    warmest: float = 0.0
-    """How warm the winding becomes over the session, where it heats [K]."""
+    """The valve as built, without the causes."""
+    form_deviation: float
+    """Deviation of the effects' forms from the fitted ones [-]; 0 without effects."""
+    winding_temperature_rise: float = 0.0
+    """Rise of the winding's temperature over the session, where the winding heats [K]."""
 
     @property
     def parameters(self) -> Parameters:
-        """The valve with what ails it."""
+        """The valve with the causes."""
         return self.unit.replace(**self.sizes)
 
     @property
-    def struck(self) -> tuple[str, ...]:
-        """What the diagnosis must do without."""
-        return self.effects if self.kind == LEFT_OUT else ()
+    def excluded(self) -> tuple[str, ...]:
+        """Causes that the diagnosis must do without."""
+        return self.causes if self.kind == EXCLUDED_EFFECT else ()
 
     def with_only(self, effect: str) -> "Trial":
         """The same valve with one of its two effects."""
         sizes = {symbol: self.sizes[symbol] for symbol in CATALOGUE[effect] if symbol in self.sizes}
         return Trial(
-            number=self.number, kind=ONE, effects=(effect,), sizes=sizes, unit=self.unit,
-            deviation=self.deviation, warmest=self.warmest if "h_coil" in sizes else 0.0,
-        )  # fmt: skip
+            number=self.number,
+            kind=ONE_CAUSE,
+            causes=(effect,),
+            sizes=sizes,
+            unit=self.unit,
+            form_deviation=self.form_deviation,
+            winding_temperature_rise=self.winding_temperature_rise if "h_coil" in sizes else 0.0,
+        )
 
 
-def plan(seed: int, trials: int) -> list[tuple[str, tuple[str, ...]]]:
-    """Kind and causes of the first trials; more of them leave these as they are.
+def trial_plan(
+    seed: int, trials: int, settings: BlindSettings = DEFAULTS
+) -> list[tuple[str, tuple[str, ...]]]:
+    """Kind and causes of the first trials of a seed; a longer plan begins with the same trials.
 
     Each deck is dealt out before it is shuffled anew, so every effect comes up equally often.
     """
-    kinds, single, left_out, pair = (
-        _dealt(deck, np.random.default_rng([seed, index, 1]))
-        for index, deck in enumerate((KINDS, SINGLES, EFFECTS, EFFECTS))
+    kind_deck = [kind for kind, count in settings.kind_counts for _ in range(count)]
+    parameters = tuple(PARAMETER + symbol for symbol in PARAMETER_COMPONENTS)
+    decks = (kind_deck, EFFECTS * settings.effect_copies + parameters, EFFECTS, EFFECTS)
+    kinds, single, excluded, pair = (
+        _dealt(deck, np.random.default_rng([seed, index, 1])) for index, deck in enumerate(decks)
     )
-    found = []
+    plan: list[tuple[str, tuple[str, ...]]] = []
     for kind in islice(kinds, trials):
-        if kind == PAIR:
+        if kind == TWO_EFFECTS:
             first = next(pair)
-            second = next(effect for effect in pair if effect != first)
-            found.append((kind, (first, second)))
-        elif kind == NONE:
-            found.append((kind, ()))
+            plan.append((kind, (first, next(effect for effect in pair if effect != first))))
+        elif kind == NOMINAL:
+            plan.append((kind, ()))
         else:
-            found.append((kind, (next(single if kind == ONE else left_out),)))
-    return found
+            plan.append((kind, (next(single if kind == ONE_CAUSE else excluded),)))
+    return plan
 
 
-def draw_trial(seed: int, number: int, kind: str, causes: Sequence[str], attempt: int = 0) -> Trial:
-    """The truth of one trial of a plan; attempt: sizes and unit anew, where no solver followed."""
+def draw_trial(
+    seed: int,
+    number: int,
+    kind: str,
+    causes: Sequence[str],
+    attempt: int = 0,
+    settings: BlindSettings = DEFAULTS,
+) -> Trial:
+    """The truth of one trial of a plan.
+
+    attempt: draws other sizes and another unit, for a trial whose valve no solver could follow.
+    """
     rng = np.random.default_rng([seed, number, *([attempt] if attempt else [])])
-    unit = draw_unit(rng)
+    unit = draw_unit(rng, settings)
     sizes: dict[str, float] = {}
     for cause in causes:
         symbol = cause.removeprefix(PARAMETER)
@@ -109,25 +116,31 @@ def draw_trial(seed: int, number: int, kind: str, causes: Sequence[str], attempt
             sizes |= draw_sizes(cause, rng)
         else:
             sizes[symbol] = draw_parameter(Parameters.calibrated()[symbol], rng)
-    deviation, warmest = rng.uniform(*DEVIATION), np.exp(rng.uniform(*np.log(WARMEST)))
+    deviation = rng.uniform(*settings.form_deviation)
+    temperature_rise = np.exp(rng.uniform(*np.log(WARMEST)))
     return Trial(
         number=number,
         kind=kind,
-        effects=tuple(causes),
+        causes=tuple(causes),
         sizes=sizes,
         unit=unit,
-        deviation=float(deviation) if set(causes) & set(CATALOGUE) else 0.0,
-        warmest=float(warmest) if "h_coil" in sizes else 0.0,
+        form_deviation=float(deviation) if set(causes) & set(CATALOGUE) else 0.0,
+        winding_temperature_rise=float(temperature_rise) if "h_coil" in sizes else 0.0,
     )
 
 
-def draw_unit(rng: np.random.Generator) -> Parameters:
-    """A valve as built."""
-    centre = Parameters.calibrated()
-    four = 1.0 + rng.uniform(-CALIBRATED_SPREAD, CALIBRATED_SPREAD, len(CALIBRATED_SYMBOLS))
-    others = truncnorm.rvs(-FARTHEST, FARTHEST, size=len(PARAMETER_COMPONENTS), random_state=rng)
+def draw_unit(rng: np.random.Generator, settings: BlindSettings = DEFAULTS) -> Parameters:
+    """A valve as built: the four calibrated parameters and all others scatter."""
+    centre, spread, limit = (
+        Parameters.calibrated(),
+        settings.calibrated_spread,
+        settings.unit_scatter_limit,
+    )
+    four = 1.0 + rng.uniform(-spread, spread, len(CALIBRATED_SYMBOLS))
+    others = truncnorm.rvs(-limit, limit, size=len(PARAMETER_COMPONENTS), random_state=rng)
     factors = dict(zip(CALIBRATED_SYMBOLS, four, strict=True))
-    factors |= dict(zip(PARAMETER_COMPONENTS, 1.0 + SCATTER * np.asarray(others), strict=True))
+    scattered = 1.0 + settings.unit_scatter * np.asarray(others)
+    factors |= dict(zip(PARAMETER_COMPONENTS, scattered, strict=True))
     return centre.replace(**{s: float(centre[s] * factor) for s, factor in factors.items()})
 
 

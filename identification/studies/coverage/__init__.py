@@ -1,1 +1,1 @@
-"""How often confidence intervals hold the truth, over twin campaigns."""
+"""How often confidence intervals hold the truth, over campaigns of a virtual bench."""

@@ -7,8 +7,8 @@ from scipy.stats import chi2
 from identification.studies.coverage.coverage import Coverage
 
 
-def distances(coverage: Coverage) -> Figure:
-    """Distances of the truth from the estimates against the chi-square law they should follow."""
+def distance_quantiles(coverage: Coverage) -> Figure:
+    """Squared distances of the truth against the quantiles of the chi-square law they should follow."""
     figure = Figure(figsize=(5.5, 4.5), layout="constrained")
     axes = figure.subplots()
     count = len(coverage.distance)

@@ -20,6 +20,7 @@ from identification.report_2003.cases import (
     VOLTAGE,
     Case,
 )
+from identification.studies.error_tables.settings import DEFAULTS, ErrorTableSettings
 
 CASES = (*CALIBRATION_CASES, VALIDATION_CASE)
 """Tests 1 to 4, to which the four parameters are fitted, and the validation test."""
@@ -28,47 +29,23 @@ N_FITTED = len(CALIBRATION_CASES)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Uncertainty:
-    """Half widths about the fitted values: of all tests together, and of each test beside that."""
-
-    together: float
-    each: float
-
-    def draw(self, rng: np.random.Generator, n: int) -> NDArray:
-        """Departures of n tests, (n,)."""
-        return rng.uniform(-self.together, self.together) + rng.uniform(-self.each, self.each, n)
-
-
-VOLTAGES = Uncertainty(together=1.0, each=0.15)
-"""U_on [V]: the supply is set once, the coil's share drifts with its temperature."""
-SUPPLIES = Uncertainty(together=0.4e5, each=0.1e5)
-"""p1 [Pa]."""
-CIRCUITS = Uncertainty(together=0.4e5, each=0.3e5)
-"""p2 at the start [Pa]: every test leaves more air in the circuit than it found."""
-FIRSTS = Uncertainty(together=0.02, each=0.005)
-"""Start of the first deactivation [s]; the records begin in steady state."""
-PAUSES = Uncertainty(together=0.04, each=0.0)
-"""From the end of a deactivation to the start of the next [s]; of the validation test, a half of it."""
-DURATIONS = Uncertainty(together=0.03, each=0.0)
-"""Of tests 1 to 4 [s]: the axes of Figures 10 to 13 end between 0.6 and 0.7 s, and 1.0 and 1.1 s."""
-TEMPERATURES = Uncertainty(together=0.0, each=1.0)
-"""Relative departure of each test's winding temperature, for a coil that is not always equally warm."""
-
-
-@dataclass(frozen=True, kw_only=True)
 class Conditions:
-    """Conditions of the five tests, in the order of CASES; arrays (5,), SI units."""
+    """Conditions of the five tests, in the order of CASES."""
 
     cases: tuple[Case, ...]
+    """Switching times of each test."""
     U_on: NDArray
+    """Voltage of the energised coil [V], (5,)."""
     p1: NDArray
+    """Supply pressure [Pa], (5,)."""
     p2: NDArray
-    warmth: NDArray
-    """Departure of the winding's temperature from its mean over tests 1 to 4, within ±1 or so."""
+    """Circuit pressure at the start [Pa], (5,)."""
+    winding_deviation: NDArray
+    """Winding temperature less its mean over tests 1 to 4 [-], within ±1 or so, (5,)."""
 
     @property
     def drives(self) -> list[Drive]:
-        """What the five tests impose on the model."""
+        """Inputs and starts that the five tests impose on the model."""
         return [
             _drive(case, *values)
             for case, *values in zip(self.cases, self.U_on, self.p1, self.p2, strict=True)
@@ -79,27 +56,38 @@ def fitted_conditions() -> Conditions:
     """The conditions that fit Tables 8 and 9; the winding grows warmer from test to test."""
     n = len(CASES)
     return Conditions(
-        cases=CASES, U_on=np.full(n, VOLTAGE), p1=np.full(n, SUPPLY), p2=np.full(n, CIRCUIT),
-        warmth=_centred(np.linspace(-1.0, 1.0, n)),
-    )  # fmt: skip
-
-
-def drawn_conditions(rng: np.random.Generator) -> Conditions:
-    """Conditions drawn from the ranges above."""
-    n = len(CASES)
-    return Conditions(
-        U_on=VOLTAGE + VOLTAGES.draw(rng, n),
-        p1=SUPPLY + SUPPLIES.draw(rng, n),
-        p2=CIRCUIT + CIRCUITS.draw(rng, n),
-        cases=_drawn_cases(rng),
-        warmth=_centred(TEMPERATURES.draw(rng, n)),
+        cases=CASES,
+        U_on=np.full(n, VOLTAGE),
+        p1=np.full(n, SUPPLY),
+        p2=np.full(n, CIRCUIT),
+        winding_deviation=_centred(np.linspace(-1.0, 1.0, n)),
     )
 
 
-def _drawn_cases(rng: np.random.Generator) -> tuple[Case, ...]:
+def drawn_conditions(rng: np.random.Generator, settings: ErrorTableSettings = DEFAULTS) -> Conditions:
+    """Conditions drawn about the fitted ones."""
     n = len(CASES)
-    first, pause, duration = FIRSTS.draw(rng, n), PAUSES.draw(rng, n), DURATIONS.draw(rng, n)
-    pause[-1] *= 0.5  # three pulses must fit into 0.75 s
+    return Conditions(
+        U_on=VOLTAGE + settings.voltage.draw(rng, n),
+        p1=SUPPLY + settings.supply_pressure.draw(rng, n),
+        p2=CIRCUIT + settings.circuit_pressure.draw(rng, n),
+        cases=_drawn_cases(rng, settings),
+        winding_deviation=_centred(settings.winding_temperature.draw(rng, n)),
+    )
+
+
+def drawn_condition_sets(n: int, seed: int, settings: ErrorTableSettings = DEFAULTS) -> list[Conditions]:
+    """The conditions that fit Tables 8 and 9, and n - 1 sets drawn about them."""
+    streams = np.random.default_rng(seed).spawn(n - 1)
+    return [fitted_conditions(), *(drawn_conditions(rng, settings) for rng in streams)]
+
+
+def _drawn_cases(rng: np.random.Generator, settings: ErrorTableSettings) -> tuple[Case, ...]:
+    n = len(CASES)
+    first = settings.first_deactivation.draw(rng, n)
+    pause = settings.pause.draw(rng, n)
+    duration = settings.duration.draw(rng, n)
+    pause[-1] *= settings.validation_pause_share
     duration[-1] = 0.0  # printed
     return tuple(
         replace(case, first=case.first + a, pause=case.pause + b, duration=case.duration + c)
@@ -107,14 +95,18 @@ def _drawn_cases(rng: np.random.Generator) -> tuple[Case, ...]:
     )
 
 
-def _centred(warmth: NDArray) -> NDArray:
+def _centred(deviation: NDArray) -> NDArray:
     """Less the mean of the fitted tests, which R absorbs."""
-    return warmth - np.mean(warmth[:N_FITTED])
+    return deviation - np.mean(deviation[:N_FITTED])
 
 
 def _drive(case: Case, U_on: float, p1: float, p2: float) -> Drive:
     U = case.voltage(U_on, RATE)
     return Drive(
-        period=1.0 / RATE, U=U, p1=np.full(len(U), p1), sigma_S=np.zeros(len(U)), U_start=U_on,
+        period=1.0 / RATE,
+        U=U,
+        p1=np.full(len(U), p1),
+        sigma_S=np.zeros(len(U)),
+        U_start=U_on,
         p2_start=p2,
-    )  # fmt: skip
+    )

@@ -7,87 +7,85 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.common.progress import progress
-from identification.studies.error_tables.bench_conditions import (
-    Conditions,
-    drawn_conditions,
-    fitted_conditions,
-)
+from identification.studies.error_tables.bench_conditions import Conditions
 from identification.studies.error_tables.candidates import Candidate
-from identification.studies.error_tables.patterns import predicted
-
-MOST_ERROR = 1e4
-"""Stands for the error of a valve that cannot be integrated [%]."""
+from identification.studies.error_tables.error_prediction import predicted_errors
+from identification.studies.error_tables.settings import DEFAULTS, ErrorTableSettings
 
 
 @dataclass(frozen=True, kw_only=True)
-class Library:
-    """Predicted Tables 11, 13 and 15 of n candidates under D conditions."""
+class PredictedTables:
+    """Predicted Tables 11, 13 and 15 of n candidates of C causes under D sets of conditions."""
 
     candidates: list[Candidate]
-    """Those of a cause stand together."""
+    """The n candidates; those of a cause stand together."""
     conditions: list[Conditions]
-    after: NDArray
-    """Errors [%], (D, n, tests, outputs)."""
-    before: NDArray
-    """Table 11 [%], (D, n, 4, outputs)."""
+    """The D sets of conditions."""
+    calibrated: NDArray
+    """Tables 13 and 15 [%], (D, n, 5 tests, 3 outputs)."""
+    initial: NDArray
+    """Table 11 [%], (D, n, 4 tests, 3 outputs)."""
 
     @property
     def causes(self) -> list[str]:
-        """Names, each once, in order."""
+        """The C causes, each once, in order."""
         return list(dict.fromkeys(candidate.cause for candidate in self.candidates))
 
     @property
     def starts(self) -> NDArray:
-        """Where each cause's candidates begin, (C,)."""
+        """Index of each cause's first candidate, (C,)."""
         names = [candidate.cause for candidate in self.candidates]
         return np.array([names.index(cause) for cause in self.causes])
 
 
-def drawn(n_draws: int, seed: int) -> list[Conditions]:
-    """The conditions that fit Tables 8 and 9, and n - 1 drawn about them."""
-    streams = np.random.default_rng(seed).spawn(n_draws - 1)
-    return [fitted_conditions(), *(drawn_conditions(rng) for rng in streams)]
-
-
-def simulated(candidates: Sequence[Candidate], conditions: Sequence[Conditions], what: str) -> Library:
-    """Simulate every candidate under all conditions, and fit the model to each."""
-    found = [
-        predicted(one, [candidate.valve(one) for candidate in candidates])
-        for one in progress(conditions, what=what)
+def simulated_tables(
+    candidates: Sequence[Candidate],
+    conditions: Sequence[Conditions],
+    label: str,
+    settings: ErrorTableSettings = DEFAULTS,
+) -> PredictedTables:
+    """Simulate every candidate under all conditions, and fit the model to each. label: of progress."""
+    predictions = [
+        predicted_errors(one, [candidate.valve(one) for candidate in candidates], settings)
+        for one in progress(conditions, what=label)
     ]
-    return Library(
+    limit = settings.error_limit
+    return PredictedTables(
         candidates=list(candidates),
         conditions=list(conditions),
-        after=np.minimum([one.after for one in found], MOST_ERROR),
-        before=np.minimum([one.before for one in found], MOST_ERROR),
+        calibrated=np.minimum([one.calibrated for one in predictions], limit),
+        initial=np.minimum([one.initial for one in predictions], limit),
     )
 
 
-def refined(library: Library) -> Library:
-    """With a size between each two of one parameter; its errors are their geometric means."""
+def refined_tables(tables: PredictedTables) -> PredictedTables:
+    """The tables with a size added between each two of one parameter.
+
+    The errors of an added size are the geometric means of its neighbours' errors.
+    """
     candidates: list[Candidate] = []
     columns: list[tuple[int, int]] = []
-    for i, candidate in enumerate(library.candidates):
-        between = library.candidates[i - 1].halfway(candidate) if i else None
+    for i, candidate in enumerate(tables.candidates):
+        between = tables.candidates[i - 1].halfway(candidate) if i else None
         if between is not None:
             candidates.append(between)
             columns.append((i - 1, i))
         candidates.append(candidate)
         columns.append((i, i))
     near, far = np.array(columns).T
-    return Library(
+    return PredictedTables(
         candidates=candidates,
-        conditions=library.conditions,
-        after=np.sqrt(library.after[:, near] * library.after[:, far]),
-        before=np.sqrt(library.before[:, near] * library.before[:, far]),
+        conditions=tables.conditions,
+        calibrated=np.sqrt(tables.calibrated[:, near] * tables.calibrated[:, far]),
+        initial=np.sqrt(tables.initial[:, near] * tables.initial[:, far]),
     )
 
 
-def only(library: Library, keep: NDArray) -> Library:
-    """Some of the candidates, by index; every cause that is left keeps its place."""
-    return Library(
-        candidates=[library.candidates[i] for i in keep],
-        conditions=library.conditions,
-        after=library.after[:, keep],
-        before=library.before[:, keep],
+def selected_tables(tables: PredictedTables, keep: NDArray) -> PredictedTables:
+    """The tables of some candidates. keep: indices in increasing order, (m,)."""
+    return PredictedTables(
+        candidates=[tables.candidates[i] for i in keep],
+        conditions=tables.conditions,
+        calibrated=tables.calibrated[:, keep],
+        initial=tables.initial[:, keep],
     )

@@ -1,1 +1,1 @@
-"""The report's tables computed again, and what its printed figures say when they are checked."""
+"""The report's tables computed again, and the errata among its printed figures."""

@@ -14,7 +14,7 @@ from identification.replay.responses import Response, responses, total
 from identification.report.page import Section, Table, Text, Verdict
 from identification.report_2003.printed_values import printed_errors, printed_total
 
-LIMITS = (
+LIMITS_OF_REPRODUCTION = (
     "The measured data behind Tables 11, 13 and 15 was never published. The virtual bench obeys the "
     "model, so calibration takes its errors down to the sensors' noise; the report's 6.6 % (mostly of "
     "the current) cannot come back: it is what the real valve did and the model does not. Table 14's "
@@ -28,10 +28,10 @@ def bench_section(identification: Identification) -> Section:
     rows = _error_rows(identification)
     return Section(
         title="Tables 10 to 15 on a virtual bench with Table 12 as truth",
-        verdicts=[_recovered(identification)],
+        verdicts=[_truth_recovered(identification)],
         blocks=[
-            Text(text=LIMITS),
-            _estimates(identification),
+            Text(text=LIMITS_OF_REPRODUCTION),
+            _estimates_table(identification),
             Table(
                 columns=[
                     "Table", "case", *(f"eps_{output} [%]" for output in OUTPUTS), "eps_partial [%]",
@@ -57,19 +57,19 @@ def bench_json(identification: Identification) -> dict[str, Any]:
             "eq23": {s: list(ends) for s, ends in confidence.report_intervals().items()},
             "covering": {s: list(ends) for s, ends in confidence.intervals().items()},
         },
-        "table15": errors_as_json(_validated(identification)),
+        "table15": errors_as_json(_validation_responses(identification)),
     }
 
 
-def _validated(identification: Identification) -> list[Response]:
+def _validation_responses(identification: Identification) -> list[Response]:
     parameters = identification.calibration.parameters("Nelder-Mead")
     return responses(identification.problem.validation, parameters)
 
 
-def _recovered(identification: Identification) -> Verdict:
+def _truth_recovered(identification: Identification) -> Verdict:
     confidence, vector = identification.confidence, identification.problem.vector
-    apart = confidence.estimate - vector.of(Parameters.calibrated())
-    distance = float(apart @ np.linalg.solve(confidence.covariance.total, apart))
+    deviation = confidence.estimate - vector.of(Parameters.calibrated())
+    distance = float(deviation @ np.linalg.solve(confidence.covariance.total, deviation))
     inside = distance <= confidence.chi_square
     return Verdict(
         status="good" if inside else "doubt",
@@ -79,7 +79,7 @@ def _recovered(identification: Identification) -> Verdict:
     )
 
 
-def _estimates(identification: Identification) -> Table:
+def _estimates_table(identification: Identification) -> Table:
     calibration, confidence = identification.calibration, identification.confidence
     truth, start = Parameters.calibrated(), Parameters.initial_guess()
     rows = [
@@ -88,9 +88,9 @@ def _estimates(identification: Identification) -> Table:
             f"{start[symbol]:.7g}",
             f"{truth[symbol]:.7g}",
             *(f"{calibration.parameters(method)[symbol]:.7g}" for method in METHODS),
-            _width(confidence_intervals()[symbol], truth[symbol]),
-            _width(confidence.report_intervals()[symbol], truth[symbol]),
-            _width(confidence.intervals()[symbol], truth[symbol]),
+            _relative_width(confidence_intervals()[symbol], truth[symbol]),
+            _relative_width(confidence.report_intervals()[symbol], truth[symbol]),
+            _relative_width(confidence.intervals()[symbol], truth[symbol]),
         ]
         for symbol in identification.problem.vector.symbols
     ]
@@ -103,20 +103,20 @@ def _estimates(identification: Identification) -> Table:
     )
 
 
-def _width(interval: tuple[float, float], value: float) -> str:
+def _relative_width(interval: tuple[float, float], value: float) -> str:
     return f"{100 * (interval[1] - interval[0]) / value:.3g}"
 
 
 def _error_rows(identification: Identification) -> list[list[str]]:
     calibration = identification.calibration
     return [
-        *_rows("11", calibration.before),
-        *_rows("13", calibration.after["Nelder-Mead"]),
-        *_rows("15", _validated(identification)),
+        *_table_rows("11", calibration.before),
+        *_table_rows("13", calibration.after["Nelder-Mead"]),
+        *_table_rows("15", _validation_responses(identification)),
     ]
 
 
-def _rows(number: str, answers: Sequence[Response]) -> list[list[str]]:
+def _table_rows(number: str, answers: Sequence[Response]) -> list[list[str]]:
     printed: Mapping[str, Any] = printed_errors(int(number))
     rows = []
     for answer, (case, errors) in zip(answers, printed.items(), strict=True):

@@ -7,19 +7,28 @@ from epv_env.plant.sensors import SENSORS
 from identification.quality.published_noise import DESCRIPTIONS, OFFSETS, SAMPLES
 from identification.recordings.recording import CHANNELS, UNITS
 from identification.report_2003.printed_values import correlation_matrix
-from identification.studies.reproduction.finding import DOUBT, HOLDS, SLIP, Finding
+from identification.studies.reproduction.figure_check import (
+    CHECK_DEFAULTS,
+    DOUBT,
+    ERRATUM,
+    HOLDS,
+    CheckSettings,
+    FigureCheck,
+)
 
-HALF_DIGIT = 5e-5
-"""Table 3 prints standard deviations and ranges to four decimals."""
+PRINTED_HALF_DIGIT = 5e-5
+"""Half the last digit of Table 3's standard deviations and ranges, which have four decimals [A, V or
+bar]."""
 
-PRINTED_DURATION, PRINTED_RATE, GREATEST_RATE = 5.0, 2000.0, 2100.0
-"""Of the quality record [s, Hz] and of the card [Hz] (sections 3 and 4)."""
+PRINTED_DURATION, PRINTED_RATE, HIGHEST_CARD_RATE = 5.0, 2000.0, 2100.0
+"""Duration [s] and rate [Hz] of the quality record, and highest rate of the acquisition
+card [Hz] (sections 3 and 4)."""
 
-CLAIMED_SNR = 62.0
-"""'over 62 dB in all cases' (section 4.1)."""
+CLAIMED_SIGNAL_TO_NOISE = 62.0
+"""'over 62 dB in all cases' (section 4.1) [dB]."""
 
 
-def noise_findings() -> list[Finding]:
+def noise_checks(settings: CheckSettings = CHECK_DEFAULTS) -> list[FigureCheck]:
     """All checks of sections 3 and 4."""
     return [
         _samples(),
@@ -27,80 +36,85 @@ def noise_findings() -> list[Finding]:
         _claimed_signal_to_noise(),
         *(_outlier_factor(name) for name in CHANNELS),
         *(_interquartile_range(name) for name in CHANNELS),
-        *(_median(name) for name in CHANNELS),
-        _kurtosis(),
-        _skewness(),
-        _range_of_the_sensors(),
+        *(_median(name, settings) for name in CHANNELS),
+        _kurtosis(settings),
+        _skewness(settings),
+        _sensor_range(),
         _symmetry(),
-        _correlations(),
+        _correlations(settings),
     ]
 
 
 def signal_to_noise(name: str, deviation: float) -> float:
-    """Eq. 17 with Table 1's greatest value [dB]; deviation in A, V or bar."""
+    """Signal-to-noise ratio by eq. 17 with Table 1's greatest value [dB].
+
+    name: channel. deviation: standard deviation of its noise [A, V or bar].
+    """
     return float(20 * np.log10(SENSORS[name].high / deviation))
 
 
-def _samples() -> Finding:
+def _samples() -> FigureCheck:
     count = PRINTED_DURATION * PRINTED_RATE
-    fits = count == SAMPLES and PRINTED_RATE <= GREATEST_RATE
-    return Finding(
+    fits = count == SAMPLES and PRINTED_RATE <= HIGHEST_CARD_RATE
+    return FigureCheck(
         where="Section 4, samples of the quality record",
         printed=f"{SAMPLES}",
         recomputed=f"{count:g}",
-        status=HOLDS if fits else SLIP,
+        status=HOLDS if fits else ERRATUM,
         remark="5 s at 2000 Hz, which the card allows (1 to 2100 Hz)",
     )
 
 
-def _signal_to_noise(name: str) -> Finding:
+def _signal_to_noise(name: str) -> FigureCheck:
     """Printed SNR against what any standard deviation that rounds to the printed one can give."""
     deviation, printed = DESCRIPTIONS[name].standard_deviation, DESCRIPTIONS[name].signal_to_noise
-    low, high = (signal_to_noise(name, deviation + change) for change in (HALF_DIGIT, -HALF_DIGIT))
+    low, high = (
+        signal_to_noise(name, deviation + change) for change in (PRINTED_HALF_DIGIT, -PRINTED_HALF_DIGIT)
+    )
     unit, greatest = UNITS[name][0], deviation * 10 ** (printed / 20)
-    return Finding(
+    return FigureCheck(
         where=f"Table 3, SNR of {name} [dB]",
         printed=f"{printed:.3f}",
         recomputed=f"{low:.3f} to {high:.3f}",
-        status=HOLDS if low <= printed <= high else SLIP,
+        status=HOLDS if low <= printed <= high else ERRATUM,
         remark=f"eq. 17 with Table 1's greatest value, {SENSORS[name].high:g} {unit}; the printed SNR "
         f"would take {greatest:.3g} {unit}",
     )
 
 
-def _claimed_signal_to_noise() -> Finding:
+def _claimed_signal_to_noise() -> FigureCheck:
     found = {name: signal_to_noise(name, DESCRIPTIONS[name].standard_deviation) for name in CHANNELS}
     least = min(found, key=lambda name: found[name])
-    return Finding(
+    return FigureCheck(
         where="Section 4.1, SNR 'over 62 dB in all cases' [dB]",
-        printed=f"over {CLAIMED_SNR:g}",
+        printed=f"over {CLAIMED_SIGNAL_TO_NOISE:g}",
         recomputed=f"{found[least]:.2f} ({least})",
-        status=HOLDS if found[least] > CLAIMED_SNR else SLIP,
+        status=HOLDS if found[least] > CLAIMED_SIGNAL_TO_NOISE else ERRATUM,
         remark="eq. 17 with the printed standard deviations",
     )
 
 
-def _outlier_factor(name: str) -> Finding:
+def _outlier_factor(name: str) -> FigureCheck:
     """The farthest sample lies between half the range and the range from the mean."""
     row = DESCRIPTIONS[name]
     farthest = row.outlier_factor * row.standard_deviation
-    slack = row.outlier_factor * HALF_DIGIT + HALF_DIGIT
-    return Finding(
+    slack = row.outlier_factor * PRINTED_HALF_DIGIT + PRINTED_HALF_DIGIT
+    return FigureCheck(
         where=f"Table 3, outlier factor of {name}",
         printed=f"{row.outlier_factor:.4f}",
         recomputed=f"{row.range / 2 / row.standard_deviation:.2f} to "
         f"{row.range / row.standard_deviation:.2f}",
-        status=HOLDS if row.range / 2 - slack <= farthest <= row.range + slack else SLIP,
+        status=HOLDS if row.range / 2 - slack <= farthest <= row.range + slack else ERRATUM,
         remark="eq. 18: half the range or more, over the standard deviation",
     )
 
 
-def _interquartile_range(name: str) -> Finding:
+def _interquartile_range(name: str) -> FigureCheck:
     """For normal noise 1.349 standard deviations, within one step of the converter."""
     row = DESCRIPTIONS[name]
     normal = float(2 * stats.norm.ppf(0.75)) * row.standard_deviation
     within = abs(normal - row.interquartile_range) <= SENSORS[name].resolution
-    return Finding(
+    return FigureCheck(
         where=f"Table 3, interquartile range of {name} [{UNITS[name][0]}]",
         printed=f"{row.interquartile_range:.4f}",
         recomputed=f"{normal:.4f}",
@@ -109,46 +123,52 @@ def _interquartile_range(name: str) -> Finding:
     )
 
 
-def _median(name: str) -> Finding:
-    """Of detrended, symmetric, rounded noise: within half a step of zero, and three standard errors."""
+def _median(name: str, settings: CheckSettings) -> FigureCheck:
+    """Of detrended, symmetric, rounded noise: within half a step and some standard errors of zero."""
     row = DESCRIPTIONS[name]
     error = np.sqrt(np.pi / 2 / SAMPLES) * row.standard_deviation
-    half = SENSORS[name].resolution / 2 + 3 * float(error)
-    return Finding(
+    half = SENSORS[name].resolution / 2 + settings.standard_errors * float(error)
+    return FigureCheck(
         where=f"Table 3, median of {name} [{UNITS[name][0]}]",
         printed=f"{row.median:.4f}",
         recomputed=f"within ±{half:.4f}",
-        status=HOLDS if abs(row.median) <= half + HALF_DIGIT else DOUBT,
+        status=HOLDS if abs(row.median) <= half + PRINTED_HALF_DIGIT else DOUBT,
         remark=f"half a step of the converter at mean zero and skewness {row.skewness:g}; the printed "
         f"median is {abs(row.median) / row.standard_deviation:.2f} standard deviations off",
     )
 
 
-def _kurtosis() -> Finding:
+def _kurtosis(settings: CheckSettings) -> FigureCheck:
     excess = {name: DESCRIPTIONS[name].kurtosis - 3 for name in CHANNELS}
-    return _beyond("kurtosis", excess, np.sqrt(24 / SAMPLES))
+    return _beyond_normal("kurtosis", excess, np.sqrt(24 / SAMPLES), settings)
 
 
-def _skewness() -> Finding:
+def _skewness(settings: CheckSettings) -> FigureCheck:
     excess = {name: DESCRIPTIONS[name].skewness for name in CHANNELS}
-    return _beyond("skewness", excess, np.sqrt(6 / SAMPLES))
+    return _beyond_normal("skewness", excess, np.sqrt(6 / SAMPLES), settings)
 
 
-def _beyond(quantity: str, excess: dict[str, float], error: float) -> Finding:
-    """Excess over the normal value by channel; error: its standard error for normal noise."""
-    far = {name: value / error for name, value in excess.items() if abs(value) > 3 * error}
-    return Finding(
+def _beyond_normal(
+    quantity: str, excess: dict[str, float], standard_error: float, settings: CheckSettings
+) -> FigureCheck:
+    """Excess over normal noise's value by channel [-], against its standard error for normal noise."""
+    limit = settings.standard_errors
+    far = {
+        n: value / standard_error for n, value in excess.items() if abs(value) > limit * standard_error
+    }
+    return FigureCheck(
         where=f"Table 3, {quantity} 'close to' that of normal noise",
         printed="all channels",
         recomputed=", ".join(f"{name} {value:+.1f}" for name, value in far.items()) or "none",
         status=DOUBT if far else HOLDS,
-        remark=f"deviations of more than 3 standard errors, in standard errors ({error:.3f} each)",
+        remark=f"deviations of more than {limit:g} standard errors, in standard errors "
+        f"({standard_error:.3f} each)",
     )
 
 
-def _range_of_the_sensors() -> Finding:
+def _sensor_range() -> FigureCheck:
     outside = [name for name in CHANNELS if OFFSETS[name] < SENSORS[name].low]
-    return Finding(
+    return FigureCheck(
         where="Table 2 against Table 1, pressures at rest [bar]",
         printed=", ".join(f"{name} {OFFSETS[name]:.4f}" for name in outside) or "inside",
         recomputed=f"at least {SENSORS['p2'].low:g}",
@@ -157,26 +177,26 @@ def _range_of_the_sensors() -> Finding:
     )
 
 
-def _symmetry() -> Finding:
+def _symmetry() -> FigureCheck:
     matrix = np.array(correlation_matrix())
     symmetric = bool(np.all(matrix == matrix.T)) and bool(np.all(np.diag(matrix) == 1))
-    return Finding(
+    return FigureCheck(
         where="Table 4, symmetry and unit diagonal",
         printed="symmetric",
         recomputed="symmetric" if symmetric else "not symmetric",
-        status=HOLDS if symmetric else SLIP,
+        status=HOLDS if symmetric else ERRATUM,
     )
 
 
-def _correlations() -> Finding:
+def _correlations(settings: CheckSettings) -> FigureCheck:
     matrix = np.array(correlation_matrix())
-    band = float(stats.norm.ppf(0.975) / np.sqrt(SAMPLES))
+    band = float(stats.norm.ppf(0.5 + settings.confidence / 2) / np.sqrt(SAMPLES))
     pairs = [(i, j) for i in range(len(CHANNELS)) for j in range(i) if abs(matrix[i, j]) > band]
-    return Finding(
+    return FigureCheck(
         where="Table 4, 'shows non-correlated data'",
         printed="no pair correlated",
         recomputed=f"{len(pairs)} of 10 pairs beyond ±{band:.4f}: "
         + ", ".join(f"{CHANNELS[j]}-{CHANNELS[i]} {matrix[i, j]:+.4f}" for i, j in pairs),
-        status=SLIP if len(pairs) > 1 else HOLDS,
+        status=ERRATUM if len(pairs) > 1 else HOLDS,
         remark=f"95 % band of independent white signals of {SAMPLES} samples; 1 in 20 may lie outside",
     )

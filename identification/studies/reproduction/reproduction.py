@@ -10,47 +10,35 @@ from identification.pipeline.stages import Identification
 from identification.quality.assess import assess
 from identification.quality.quality_export import as_json as quality_json
 from identification.quality.quality_section import quality_section
-from identification.report.page import Section, Verdict
+from identification.report.page import Section
 from identification.report.result_files import write_results
 from identification.sensitivity.agreement import sensitivity_tables
 from identification.sensitivity.results import run_study
 from identification.sensitivity.sensitivity_section import sensitivity_section
-from identification.studies.reproduction import errata as slips
 from identification.studies.reproduction.bench_tables import bench_json, bench_section
+from identification.studies.reproduction.errata import errata_json, errata_section
 
 
 def reproduce(out: Path, *, seed: int = 0) -> list[Section]:
-    """Compute every table, write both files, and return the sections.
+    """Compute every table, write both files into `out`, and return the sections.
 
     Tables 8 and 9 need no bench; 2 to 4 and 10 to 15 come from a virtual one with Table 12 as truth.
     """
     study = run_study()
     campaign = run_bench(REPORT_SUITE, Parameters.calibrated(), seed=seed)
     identification = Identification(campaign, out / "reproduce.jsonl", seed=seed)
-    rest = assess(campaign.of("quality")[0], campaign.pressure)
+    quality = assess(campaign.of("quality")[0], campaign.pressure)
     content: dict[str, Any] = {
         **sensitivity_tables(study.one_at_a_time),
-        "virtual_bench": {"tables2to4": quality_json(rest), **bench_json(identification)},
-        "slips": slips.as_json(),
+        "virtual_bench": {"tables2to4": quality_json(quality), **bench_json(identification)},
+        "slips": errata_json(),
     }
     sections = [
         sensitivity_section(study),
         bench_section(identification),
-        quality_section(rest),
-        _slips_section(),
+        quality_section(quality),
+        errata_section(),
     ]
     title = "The report SCL-001/2003 beside its reproduction"
     write_results(out, "reproduce", title=title, sections=sections, content=content)
     return sections
-
-
-def _slips_section() -> Section:
-    found = slips.slips()
-    text = f"{len(found)} printed figures contradict others: " + "; ".join(
-        f"{slip.where}: printed {slip.printed}, recomputed {slip.recomputed}" for slip in found
-    )
-    return Section(
-        title="Arithmetic of the report",
-        verdicts=[Verdict(status="note", text=text + ".")],
-        blocks=[slips.findings_table()],
-    )

@@ -1,4 +1,4 @@
-"""Diagnoses that take no time; other processes import them from here."""
+"""Stubs of diagnoses; other processes import them from this module."""
 
 import json
 from pathlib import Path

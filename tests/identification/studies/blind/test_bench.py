@@ -1,4 +1,4 @@
-"""The blind check's recordings and what a model without noise leaves of them."""
+"""The blind check's recordings, and the gaps of models against the noise-free truth."""
 
 from dataclasses import replace
 from functools import cache
@@ -9,27 +9,38 @@ import pytest
 from epv_env.plant.parameters import Parameters
 from identification.bench import campaign as bench
 from identification.recordings.recording import OUTPUTS
-from identification.studies.blind.bench import SUITE, run_programme, true_recordings
-from identification.studies.blind.commitments import explainable, noise_free, packed, unpacked
-from identification.studies.blind.noise_free_gap import distance, held_out_gap, recalibrated
-from identification.studies.blind.score import true_shrink
-from identification.studies.blind.truth import NONE, ONE, Trial, draw_trial
+from identification.studies.blind.bench import blind_suite, run_programme, true_recordings
+from identification.studies.blind.commitments import (
+    explainable_gap,
+    noise_free_recordings,
+    packed_recordings,
+    unpacked_recordings,
+)
+from identification.studies.blind.kinds import NOMINAL, ONE_CAUSE
+from identification.studies.blind.noise_free_gap import (
+    held_out_gap,
+    hypothesis_distance,
+    recalibrated_parameters,
+)
+from identification.studies.blind.score import true_gap_reduction
+from identification.studies.blind.truth import Trial, draw_trial
 
+SUITE = blind_suite()
 SHORT = next(programme for programme in SUITE if programme.name == "test1")
 
 
 @cache
 def recordings(effect=""):
-    return noise_free(true_recordings(trial(effect), 0))
+    return noise_free_recordings(true_recordings(trial(effect), 0))
 
 
 def trial(effect="") -> Trial:
-    return draw_trial(7, 0, ONE if effect else NONE, [effect] if effect else [])
+    return draw_trial(7, 0, ONE_CAUSE if effect else NOMINAL, [effect] if effect else [])
 
 
 def run(effect, deviation):
     rng = np.random.default_rng(0)
-    return run_programme(trial(effect).parameters, SHORT, deviation=deviation, rng=rng).channels
+    return run_programme(trial(effect).parameters, SHORT, form_deviation=deviation, rng=rng).channels
 
 
 def test_the_suite_is_nine_recordings_of_a_valve_at_work_of_which_two_are_held_out():
@@ -41,7 +52,7 @@ def test_the_suite_is_nine_recordings_of_a_valve_at_work_of_which_two_are_held_o
 def test_without_an_effect_the_bench_is_the_nominal_plant():
     unit = trial().unit
     nominal = bench.run_programme(unit, SHORT).channels
-    found = run_programme(unit, SHORT, deviation=0.0, rng=np.random.default_rng(0)).channels
+    found = run_programme(unit, SHORT, form_deviation=0.0, rng=np.random.default_rng(0)).channels
     for name, least in (("p1", 50.0), ("p2", 50.0), ("p3", 50.0), ("I", 5e-5)):
         np.testing.assert_allclose(found[name], nominal[name], atol=least)
 
@@ -74,37 +85,37 @@ def heating():
     return true_recordings(trial("coil_heating"), 0)
 
 
-def test_the_truth_s_own_parameters_leave_nothing():
+def test_the_true_parameters_leave_no_gap():
     assert held_out_gap(recordings(), trial().parameters) == pytest.approx(1.0, abs=1e-3)
 
 
 def test_a_unit_of_the_nominal_design_leaves_nothing_to_explain():
-    fitted = recalibrated(recordings(), scattered=True)
+    fitted = recalibrated_parameters(recordings(), with_scatter=True)
     assert held_out_gap(recordings(), fitted) == pytest.approx(1.0, abs=2e-3)
-    four = held_out_gap(recordings(), recalibrated(recordings(), scattered=False))
+    four = held_out_gap(recordings(), recalibrated_parameters(recordings(), with_scatter=False))
     assert four > held_out_gap(recordings(), fitted)
 
 
 def test_an_effect_leaves_something():
-    assert explainable(trial("flow_force"), recordings("flow_force"))["explainable"] > 1.05
+    assert explainable_gap(trial("flow_force"), recordings("flow_force"))["explainable"] > 1.05
 
 
 def test_more_of_the_winding_s_warmth_is_found_per_recording():
     """The model with the true heating closes a gap that it leaves where the start is held cold."""
-    true = noise_free(heating())
+    true = noise_free_recordings(heating())
     p = trial("coil_heating").parameters
     assert held_out_gap(true, p) < 1.5 < held_out_gap(true, p.replace(h_coil=0.0))
 
 
 def test_what_is_packed_comes_back_and_is_what_is_held_out():
-    found = unpacked(packed(recordings()))
+    found = unpacked_recordings(packed_recordings(recordings()))
     held_out = [recording for recording in recordings() if recording.held_out]
     assert [r.name for r in found] == [r.name for r in held_out]
     for one, other in zip(found, held_out, strict=True):
         assert one.period == other.period
         for name in ("U", "p1", *OUTPUTS):
             np.testing.assert_array_equal(one.channels[name], other.channels[name])
-    assert packed(recordings()) == packed(recordings())
+    assert packed_recordings(recordings()) == packed_recordings(recordings())
 
 
 def test_half_the_noise_is_twice_the_gap():
@@ -122,7 +133,8 @@ def test_a_parameter_that_is_off_is_beyond_what_units_scatter():
     """4 % more preload: neither the four nor any unit of the nominal design follows that."""
     unit = trial().unit
     off = replace(trial(), sizes={"xPV0": 1.04 * unit["xPV0"]})
-    assert explainable(replace(off, kind=ONE), noise_free(true_recordings(off, 0)))["explainable"] > 1.5
+    true = noise_free_recordings(true_recordings(off, 0))
+    assert explainable_gap(replace(off, kind=ONE_CAUSE), true)["explainable"] > 1.5
 
 
 def test_more_turns_are_hardly_told_from_a_shorter_magnetic_circuit_but_well_from_a_stiffer_spring():
@@ -130,14 +142,16 @@ def test_more_turns_are_hardly_told_from_a_shorter_magnetic_circuit_but_well_fro
     truth = recordings("parameter:N")
     turns, nominal = trial("parameter:N").sizes["N"], Parameters.calibrated()
     off = turns / nominal["N"]
-    own, twin = (distance(truth, start) for start in ({"N": turns}, {"dMB": nominal["dMB"] / off}))
+    own, twin = (
+        hypothesis_distance(truth, start) for start in ({"N": turns}, {"dMB": nominal["dMB"] / off})
+    )
     assert max(own, twin) < 1.0
-    assert distance(truth, {"cMV": 1.05 * nominal["cMV"]}) > 10.0
+    assert hypothesis_distance(truth, {"cMV": 1.05 * nominal["cMV"]}) > 10.0
 
 
 def test_a_biased_start_of_the_circuit_is_read_with_its_bias():
     biased = replace(trial(), sizes={"b_p2": 1e4})
-    true = noise_free(true_recordings(biased, 0))
+    true = noise_free_recordings(true_recordings(biased, 0))
     assert held_out_gap(true, biased.parameters) == pytest.approx(1.0, abs=2e-3)
     assert held_out_gap(true, biased.unit) > 1.5
 
@@ -152,16 +166,18 @@ def answer(**parameters):
     }
 
 
-def test_the_true_shrink_is_that_of_the_reported_parameters():
+def test_the_true_gap_reduction_is_that_of_the_reported_parameters():
     """The truth closes nearly all that its deviating form leaves open; recalibration closes nothing."""
     true = recordings("flow_force")
-    four = dict(recalibrated(true, scattered=False))
-    full = true_shrink(answer(recalibrated=four, with_cause=dict(trial("flow_force").parameters)), true)
-    none = true_shrink(answer(recalibrated=four, with_cause=four), true)
+    four = dict(recalibrated_parameters(true, with_scatter=False))
+    full = true_gap_reduction(
+        answer(recalibrated=four, with_cause=dict(trial("flow_force").parameters)), true
+    )
+    none = true_gap_reduction(answer(recalibrated=four, with_cause=four), true)
     assert full is not None
     assert none is not None
     assert 0.9 < full.true <= 1.0
     assert full.inside
     assert none.true == pytest.approx(0.0)
     assert not none.inside
-    assert true_shrink({"verdict": "no_gap", "causes": []}, true) is None
+    assert true_gap_reduction({"verdict": "no_gap", "causes": []}, true) is None

@@ -1,4 +1,4 @@
-"""A whole check with a diagnosis that takes no time: sealed first, each trial once, opened last."""
+"""A whole check with a stub as diagnosis: commitments first, each trial once, opened last."""
 
 import hashlib
 import json
@@ -7,11 +7,11 @@ import pytest
 
 from identification.recordings.campaign_files import read_campaign
 from identification.studies.blind import trials
-from identification.studies.blind.bench import SUITE
+from identification.studies.blind.bench import blind_suite
 from identification.studies.blind.blind_study import blind_check
-from identification.studies.blind.commitments import LABEL, TRUTH, opened
+from identification.studies.blind.commitments import LABEL_FILE, RECORDINGS_FILE, open_commitment
 from identification.studies.blind.trials import (
-    COMMITMENTS,
+    COMMITMENTS_FILE,
     generate_trial,
     read_commitments,
     trial_folder,
@@ -19,7 +19,7 @@ from identification.studies.blind.trials import (
 from tests.identification.studies.blind import stubs
 
 N, SEED = 2, 162
-"""Of which the first has no effect, and the second one that is struck."""
+"""The first trial has no effect, the second one an effect that the diagnosis lacks."""
 
 
 @pytest.fixture(scope="module")
@@ -37,23 +37,23 @@ def files(out):
     return {path: path.stat().st_mtime_ns for path in out.glob("trials/*/**/*") if path.is_file()}
 
 
-def test_what_was_committed_to_is_the_hash_of_the_sealed_label(study):
-    committed = read_commitments(study / COMMITMENTS)
+def test_the_commitment_is_the_hash_of_the_label(study):
+    committed = read_commitments(study / COMMITMENTS_FILE)
     for number in range(N):
-        text = (trial_folder(study, number) / LABEL).read_bytes()
+        text = (trial_folder(study, number) / LABEL_FILE).read_bytes()
         assert hashlib.sha256(text).hexdigest() == committed[number]
-        label, _ = opened(trial_folder(study, number), committed[number])
+        label, _ = open_commitment(trial_folder(study, number), committed[number])
         assert label["trial"] == number
         assert len(label["salt"]) == 32
 
 
-def test_the_answers_are_committed_to_before_the_first_diagnosis(study):
+def test_the_truths_are_committed_to_before_the_first_diagnosis(study):
     first = min(path.stat().st_mtime_ns for path in study.glob("trials/*/diagnosis/seen.json"))
-    last = max(path.stat().st_mtime_ns for path in study.glob(f"trials/*/{LABEL}"))
+    last = max(path.stat().st_mtime_ns for path in study.glob(f"trials/*/{LABEL_FILE}"))
     assert last < first
 
 
-def test_a_diagnosis_is_told_of_a_campaign_and_nothing_else(study):
+def test_a_diagnosis_gets_a_campaign_and_nothing_else(study):
     for number in range(N):
         folder = trial_folder(study, number)
         seen = json.loads((folder / "diagnosis" / "seen.json").read_text())
@@ -61,8 +61,8 @@ def test_a_diagnosis_is_told_of_a_campaign_and_nothing_else(study):
         assert seen["campaign"] == sorted(
             ["campaign.json", *(f"{r.name}.csv" for r in campaign.recordings)]
         )
-        assert (campaign.name, len(campaign.recordings)) == (f"trial-{number:04d}", len(SUITE))
-        assert seen["without"] == json.loads((folder / LABEL).read_text())["struck"]
+        assert (campaign.name, len(campaign.recordings)) == (f"trial-{number:04d}", len(blind_suite()))
+        assert seen["without"] == json.loads((folder / LABEL_FILE).read_text())["struck"]
 
 
 def test_a_rerun_repeats_nothing_and_scores_the_same(study):
@@ -73,7 +73,7 @@ def test_a_rerun_repeats_nothing_and_scores_the_same(study):
     assert "Verdicts" in (study / "results.html").read_text()
 
 
-def test_a_missing_answer_is_asked_for_again_and_counts_as_failed(study, capfd):
+def test_a_missing_diagnosis_is_repeated_and_counts_as_failed(study, capfd):
     answer = trial_folder(study, 0) / "diagnosis" / "gap.json"
     kept = answer.read_text()
     answer.unlink()
@@ -85,7 +85,7 @@ def test_a_missing_answer_is_asked_for_again_and_counts_as_failed(study, capfd):
 
 
 def test_a_trial_is_the_same_whoever_makes_it(study, tmp_path):
-    kind, causes = trials.plan(SEED, N)[1]
+    kind, causes = trials.trial_plan(SEED, N)[1]
     generate_trial(tmp_path, SEED, 1, kind, causes)
     folder = trial_folder(study, 1)
     for path in tmp_path.rglob("*"):
@@ -98,11 +98,11 @@ def test_another_seed_is_refused(study):
         check(study, seed=SEED + 1)
 
 
-@pytest.mark.parametrize("name", [LABEL, TRUTH])
-def test_a_tampered_answer_is_refused(study, name):
+@pytest.mark.parametrize("name", [LABEL_FILE, RECORDINGS_FILE])
+def test_a_changed_truth_is_refused(study, name):
     path = trial_folder(study, 1) / name
     kept = path.read_bytes()
-    path.write_bytes(kept.replace(b'"kind"', b'"kinD"') if name == LABEL else kept + b" ")
+    path.write_bytes(kept.replace(b'"kind"', b'"kinD"') if name == LABEL_FILE else kept + b" ")
     with pytest.raises(ValueError, match=name):
         check(study)
     path.write_bytes(kept)

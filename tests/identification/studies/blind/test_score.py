@@ -4,9 +4,18 @@ import json
 
 import pytest
 
-from identification.studies.blind.blind_section import blind_json, blind_section, well_judged
-from identification.studies.blind.score import ABSORBED, Shrink, is_right, rival_distance, scored
-from identification.studies.blind.summary import BARS, Share, by_size, means, shares, verdict_matrix
+from identification.studies.blind.acceptance import ACCEPTANCE_CRITERIA
+from identification.studies.blind.blind_section import blind_json, blind_section
+from identification.studies.blind.kinds import ABSORBED
+from identification.studies.blind.score import GapReduction, is_correct, rival_distance, score_trial
+from identification.studies.blind.summary import (
+    detection_by_gap,
+    is_well_judged,
+    means,
+    proportions,
+    verdict_matrix,
+)
+from identification.studies.proportion import Proportion
 
 
 def label(kind="one", effects=("eddy_current",), visible=None, explainable=2.0, sizes=None, trial=0):
@@ -38,31 +47,31 @@ EDDY = (["eddy_current"], 0.9, {"G_eddy_S": [2.2e-3, 1.9e-3, 2.5e-3]})
 CLAMP = (["flyback_voltage"], 0.08, {"U_clamp_V": [1.0, 0.5, 1.5]})
 
 
-def score(label, answer, shrink=None, rival=None):
-    return scored(label, answer, shrink, rival)
+def score(label, answer, reduction=None, rival=None):
+    return score_trial(label, answer, reduction, rival)
 
 
 def test_the_right_cause():
     found = score(label(sizes={"G_eddy": 2e-3}), answer("known", EDDY, CLAMP))
-    assert (found.first_right, found.in_set, found.set_size, found.component_right) == (True,) * 2 + (
-        1,
-        True,
-    )
+    assert all((found.first_cause_correct, found.truth_in_set, found.component_correct))
+    assert found.set_size == 1
     assert found.probability == 0.9
-    assert found.magnitudes[0].error == pytest.approx(0.1)
-    assert found.magnitudes[0].inside
-    assert well_judged(found)
+    assert found.size_estimates[0].error == pytest.approx(0.1)
+    assert found.size_estimates[0].inside
+    assert is_well_judged(found)
 
 
 def test_the_wrong_cause():
     found = score(label(effects=["seat_leak"]), answer("known", EDDY))
-    assert not any((found.first_right, found.in_set, found.component_right, well_judged(found)))
-    assert (found.probability, found.magnitudes) == (0, ())
+    assert not any(
+        (found.first_cause_correct, found.truth_in_set, found.component_correct, is_well_judged(found))
+    )
+    assert (found.probability, found.size_estimates) == (0, ())
 
 
 def test_a_truth_that_is_second_in_the_set():
     found = score(label(effects=["flyback_voltage"]), answer("ambiguous", EDDY, CLAMP, named=2))
-    assert (found.first_right, found.in_set, found.set_size) == (False, True, 2)
+    assert (found.first_cause_correct, found.truth_in_set, found.set_size) == (False, True, 2)
 
 
 def test_a_tie_that_no_test_could_decide_is_counted_apart():
@@ -71,9 +80,9 @@ def test_a_tie_that_no_test_could_decide_is_counted_apart():
     tied = answer("ambiguous", EDDY, CLAMP, named=2)
     found = [score(second, tied, rival=0.4), score(first, tied, rival=0.4)]
     found += [score(second, tied, rival=5.0), score(first, answer("known", EDDY))]
-    counted = shares(found)
-    assert counted["first cause right"] == Share(hits=2, of=4)
-    assert counted["first cause right, where data can tell"] == Share(hits=1, of=2)
+    counted = proportions(found)
+    assert counted["first cause right"] == Proportion(hits=2, of=4)
+    assert counted["first cause right, where data can tell"] == Proportion(hits=1, of=2)
 
 
 def test_only_a_cause_that_lacks_some_of_the_truth_is_its_rival():
@@ -87,38 +96,40 @@ def test_only_a_cause_that_lacks_some_of_the_truth_is_its_rival():
 
 def test_the_order_of_a_pair_does_not_matter_and_a_hidden_effect_need_not_be_named():
     pair = label("pair", ["seat_leak", "coil_heating"])
-    assert is_right(pair, ["coil_heating", "seat_leak"])
-    assert not is_right(pair, ["seat_leak"])
+    assert is_correct(pair, ["coil_heating", "seat_leak"])
+    assert not is_correct(pair, ["seat_leak"])
     hidden = label("pair", ["seat_leak", "coil_heating"], visible=["seat_leak"])
-    assert is_right(hidden, ["seat_leak"])
-    assert is_right(hidden, ["coil_heating", "seat_leak"])
-    assert not is_right(hidden, ["coil_heating"])
-    assert not is_right(hidden, ["seat_leak", "flow_force"])
+    assert is_correct(hidden, ["seat_leak"])
+    assert is_correct(hidden, ["coil_heating", "seat_leak"])
+    assert not is_correct(hidden, ["coil_heating"])
+    assert not is_correct(hidden, ["seat_leak", "flow_force"])
 
 
 def test_a_parameter_s_error_is_relative_to_how_far_it_is_off():
     cause = (["parameter:d1"], 0.9, {"d1_m": [0.01845, 0.0184, 0.0185]})
     found = score(label(effects=["parameter:d1"], sizes={"d1": 0.0185}), answer("known", cause))
-    assert found.magnitudes[0].error == pytest.approx(0.1)
+    assert found.size_estimates[0].error == pytest.approx(0.1)
 
 
 def test_without_effect_any_verdict_but_no_gap_is_a_false_alarm():
     said = ["no_gap", "no_gap", "known", "ambiguous", "unknown"]
     found = [score(NOTHING, answer(verdict, EDDY)) for verdict in said]
-    assert shares(found)["false alarms without an effect"] == Share(hits=3, of=5)
+    assert proportions(found)["false alarms without an effect"] == Proportion(hits=3, of=5)
 
 
 def test_what_the_four_absorb_is_counted_apart():
     hidden = label(visible=[], explainable=1.001)
     found = [score(hidden, answer(v, EDDY)) for v in ("no_gap", "known")]
     assert [trial.kind for trial in found] == [ABSORBED] * 2
-    counted = shares(found)
-    assert counted["no gap where the four absorb it"] == Share(hits=1, of=2)
-    assert counted["false cause where the four absorb it"] == Share(hits=0, of=2)  # it was the truth
+    counted = proportions(found)
+    assert counted["no gap where the four absorb it"] == Proportion(hits=1, of=2)
+    assert counted["false cause where the four absorb it"] == Proportion(
+        hits=0, of=2
+    )  # it was the truth
     assert counted["first cause right"].of == 0
 
 
-def test_unknown_is_right_where_the_effect_is_struck():
+def test_unknown_is_correct_where_the_effect_is_excluded():
     struck = label("left_out", ["flow_force"])
     found = [
         score(struck, answer("unknown", EDDY, component="protection_valve")),
@@ -126,16 +137,19 @@ def test_unknown_is_right_where_the_effect_is_struck():
         score(struck, answer("no_gap", component="")),
         score(struck, None),
     ]
-    counted = shares(found)
-    assert counted["unknown where the effect is struck"] == Share(hits=1, of=4)
-    assert counted["component right where the effect is struck"] == Share(hits=1, of=4)
-    assert counted["detected"] == Share(hits=2, of=4)
-    assert counted["failed"] == Share(hits=1, of=4)
+    counted = proportions(found)
+    assert counted["unknown where the effect is struck"] == Proportion(hits=1, of=4)
+    assert counted["component right where the effect is struck"] == Proportion(hits=1, of=4)
+    assert counted["detected"] == Proportion(hits=2, of=4)
+    assert counted["failed"] == Proportion(hits=1, of=4)
 
 
 def study():
-    """Ten trials: nine single causes right and one missed, with intervals of shrink."""
-    inside, outside = Shrink(true=0.95, low=0.9, high=1.0), Shrink(true=0.5, low=0.9, high=1.0)
+    """Ten trials: nine single causes right and one missed, with intervals of the gap reduction."""
+    inside, outside = (
+        GapReduction(true=0.95, low=0.9, high=1.0),
+        GapReduction(true=0.5, low=0.9, high=1.0),
+    )
     right = [
         score(label(trial=i, sizes={"G_eddy": 2e-3}), answer("known", EDDY), inside) for i in range(8)
     ]
@@ -144,39 +158,39 @@ def study():
 
 
 def test_shares_and_means_of_a_study():
-    counted, mean = shares(study()), means(study())
-    assert counted["first cause right"] == counted["detected"] == Share(hits=9, of=10)
-    assert counted["size inside its interval"] == Share(hits=8, of=9)
-    assert counted["shrink inside its 90 % interval"] == Share(hits=8, of=9)
+    counted, mean = proportions(study()), means(study())
+    assert counted["first cause right"] == counted["detected"] == Proportion(hits=9, of=10)
+    assert counted["size inside its interval"] == Proportion(hits=8, of=9)
+    assert counted["shrink inside its 90 % interval"] == Proportion(hits=8, of=9)
     assert mean["mean probability on the truth"] == pytest.approx(0.81)
     assert mean["mean size of the ambiguity set"] == 1.0
     assert mean["median relative error of a size"] == pytest.approx(0.1)
     assert verdict_matrix(study()).sum() == 10
 
 
-def test_bars_are_met_or_not():
+def test_acceptance_criteria_are_met_or_not():
     found = blind_json(study(), seed=0)["bars"]
     assert found["first cause right"] is True
     assert found["truth in the ambiguity set"] is False
     assert found["false alarms without an effect"] is None
-    assert set(found) == {bar.name for bar in BARS}
+    assert set(found) == {criterion.name for criterion in ACCEPTANCE_CRITERIA}
 
 
-def test_detection_is_told_by_size():
-    bins = {bin_.low: bin_ for bin_ in by_size(study()) if bin_.detected.of}
-    assert bins[0.03].detected == Share(hits=0, of=1)
-    assert bins[1.0].first_right == Share(hits=9, of=9)
+def test_detection_is_counted_by_size_of_the_gap():
+    bins = {bin_.low: bin_ for bin_ in detection_by_gap(study()) if bin_.detected.of}
+    assert bins[0.03].detected == Proportion(hits=0, of=1)
+    assert bins[1.0].first_cause_correct == Proportion(hits=9, of=9)
 
 
 def test_intervals_are_exact():
     """No hit in n: the upper end is 1 - 0.025^(1/n)."""
-    low, high = Share(hits=0, of=60).interval
+    low, high = Proportion(hits=0, of=60).interval
     assert (low, high) == pytest.approx((0.0, 1 - 0.025 ** (1 / 60)))
-    assert Share(hits=0, of=0).value is None
+    assert Proportion(hits=0, of=0).value is None
 
 
 def test_a_study_is_written_down():
     trials = [*study(), score(NOTHING, answer("no_gap", component="")), score(label(), None)]
     section = blind_section(trials)
-    assert len(section.verdicts) == len(BARS)
+    assert len(section.verdicts) == len(ACCEPTANCE_CRITERIA)
     json.dumps(blind_json(trials, seed=0), allow_nan=False)

@@ -1,4 +1,4 @@
-"""What is drawn: reproducible, every effect as often, within its physical range."""
+"""The drawn truths: reproducible, every effect as often, within its physical range."""
 
 from collections import Counter
 
@@ -9,47 +9,47 @@ from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.effects.registry import EFFECTS as RECORDS
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import CALIBRATED_SYMBOLS
+from identification.studies.blind.kinds import EXCLUDED_EFFECT, NOMINAL, ONE_CAUSE, TWO_EFFECTS
+from identification.studies.blind.settings import DEFAULTS
 from identification.studies.blind.truth import (
-    CALIBRATED_SPREAD,
     EFFECTS,
-    FARTHEST,
-    LEFT_OUT,
-    NONE,
-    ONE,
-    PAIR,
-    SCATTER,
     draw_trial,
     draw_unit,
-    plan,
+    trial_plan,
 )
 from identification.valve_gap.causes import PARAMETER_COMPONENTS
 
 
 def causes_of(kind, trials=300):
-    return Counter(cause for k, causes in plan(0, trials) if k == kind for cause in causes)
+    return Counter(cause for k, causes in trial_plan(0, trials) if k == kind for cause in causes)
 
 
 def test_the_same_seed_draws_the_same_truth_and_another_another():
-    assert plan(3, 100) == plan(3, 100) != plan(4, 100)
-    first, again, other = (draw_trial(seed, 5, ONE, ["flow_force"]) for seed in (3, 3, 4))
+    assert trial_plan(3, 100) == trial_plan(3, 100) != trial_plan(4, 100)
+    first, again, other = (draw_trial(seed, 5, ONE_CAUSE, ["flow_force"]) for seed in (3, 3, 4))
     assert first == again
     assert first.sizes != other.sizes
 
 
 def test_more_trials_leave_the_first_as_they_are():
-    assert plan(3, 300)[:70] == plan(3, 70)
+    assert trial_plan(3, 300)[:70] == trial_plan(3, 70)
 
 
 def test_kinds_come_in_the_shares_that_are_asked_for():
-    assert Counter(kind for kind, _ in plan(0, 300)) == {NONE: 60, ONE: 150, PAIR: 36, LEFT_OUT: 54}
+    assert Counter(kind for kind, _ in trial_plan(0, 300)) == {
+        NOMINAL: 60,
+        ONE_CAUSE: 150,
+        TWO_EFFECTS: 36,
+        EXCLUDED_EFFECT: 54,
+    }
 
 
-def test_every_effect_is_struck_equally_often():
-    assert causes_of(LEFT_OUT) == dict.fromkeys(EFFECTS, 2)
+def test_every_effect_is_excluded_equally_often():
+    assert causes_of(EXCLUDED_EFFECT) == dict.fromkeys(EFFECTS, 2)
 
 
 def test_every_effect_comes_up_alone_and_thrice_as_often_as_a_parameter():
-    found = causes_of(ONE, trials=198)  # 99 trials with one cause: the deck once through
+    found = causes_of(ONE_CAUSE, trials=198)  # 99 trials with one cause: the deck once through
     assert {effect: found[effect] for effect in EFFECTS} == dict.fromkeys(EFFECTS, 3)
     assert {s: found[f"parameter:{s}"] for s in PARAMETER_COMPONENTS} == dict.fromkeys(
         PARAMETER_COMPONENTS, 1
@@ -57,7 +57,7 @@ def test_every_effect_comes_up_alone_and_thrice_as_often_as_a_parameter():
 
 
 def test_pairs_are_two_effects():
-    assert all(len(set(causes)) == 2 for kind, causes in plan(1, 400) if kind == PAIR)
+    assert all(len(set(causes)) == 2 for kind, causes in trial_plan(1, 400) if kind == TWO_EFFECTS)
 
 
 def test_every_effect_has_its_own_sizes():
@@ -70,40 +70,45 @@ def test_every_effect_has_its_own_sizes():
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_sizes_are_those_of_the_effect_and_in_its_domain(effect):
     for number in range(20):
-        trial = draw_trial(0, number, ONE, [effect])
+        trial = draw_trial(0, number, ONE_CAUSE, [effect])
         assert set(trial.sizes) <= set(CATALOGUE[effect])
         assert {
             s: trial.parameters[s] for s in trial.sizes
         } == trial.sizes  # in the domain, or it raises
-        assert trial.deviation > 0
+        assert trial.form_deviation > 0
 
 
 def test_a_parameter_that_is_off_is_off_by_more_than_scatter():
     for number in range(20):
-        trial = draw_trial(0, number, ONE, ["parameter:d1"])
+        trial = draw_trial(0, number, ONE_CAUSE, ["parameter:d1"])
         off = trial.parameters["d1"] / Parameters.calibrated()["d1"] - 1
-        assert 2 * FARTHEST * SCATTER < abs(off) <= 0.05
-        assert trial.deviation == 0
+        assert 2 * DEFAULTS.scatter_reach < abs(off) <= 0.05
+        assert trial.form_deviation == 0
 
 
 def test_units_scatter_within_what_is_said():
     centre = Parameters.calibrated()
     units = [draw_unit(np.random.default_rng(seed)) for seed in range(200)]
-    for symbols, most in ((CALIBRATED_SYMBOLS, CALIBRATED_SPREAD), (PARAMETER_COMPONENTS, 2 * SCATTER)):
+    for symbols, most in (
+        (CALIBRATED_SYMBOLS, DEFAULTS.calibrated_spread),
+        (PARAMETER_COMPONENTS, 2 * DEFAULTS.unit_scatter),
+    ):
         off = np.array([[unit[s] / centre[s] - 1 for s in symbols] for unit in units])
         assert np.max(np.abs(off)) <= most * (1 + 1e-12)
         assert np.max(np.abs(np.mean(off, axis=0))) < 0.25 * most
     assert all(unit[s] == centre[s] for s in ("F_PV", "T_env", "kappa") for unit in units)
 
 
-def test_only_the_effect_that_is_left_out_is_struck():
-    assert draw_trial(0, 1, LEFT_OUT, ["seat_leak"]).struck == ("seat_leak",)
-    assert draw_trial(0, 1, ONE, ["seat_leak"]).struck == ()
+def test_only_an_effect_outside_the_catalogue_is_excluded():
+    assert draw_trial(0, 1, EXCLUDED_EFFECT, ["seat_leak"]).excluded == ("seat_leak",)
+    assert draw_trial(0, 1, ONE_CAUSE, ["seat_leak"]).excluded == ()
 
 
 def test_half_of_a_pair_is_the_same_valve_with_that_effect():
-    trial = draw_trial(0, 1, PAIR, ["seat_leak", "coil_heating"])
+    trial = draw_trial(0, 1, TWO_EFFECTS, ["seat_leak", "coil_heating"])
     half = trial.with_only("seat_leak")
     assert half.sizes == {"A_PV": trial.sizes["A_PV"]}
     assert half.unit is trial.unit
-    assert (half.warmest, trial.with_only("coil_heating").warmest) == (0.0, trial.warmest)
+    heating = trial.with_only("coil_heating")
+    assert half.winding_temperature_rise == 0.0
+    assert heating.winding_temperature_rise == trial.winding_temperature_rise

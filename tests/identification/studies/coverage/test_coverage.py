@@ -8,16 +8,17 @@ import pytest
 from scipy.stats import beta
 
 from identification.studies.coverage import coverage
-from identification.studies.coverage.coverage import Coverage, coverage_study, share
+from identification.studies.coverage.coverage import Coverage, coverage_study
 from identification.studies.coverage.coverage_section import coverage_json, coverage_section
+from identification.studies.proportion import Proportion
 
-LEGEND = ("distance", "independent", "disagreement", "inside", "report_inside", "report_joint")
+ARRAYS = ("distance", "independent", "disagreement", "inside", "report_inside", "report_joint")
 
 
 class InProcess:
-    """Stands in for a pool of processes."""
+    """Replaces the pool of processes."""
 
-    asked: list[int] = []  # noqa: RUF012 - shared on purpose: what all pools were asked for
+    asked: list[int] = []  # noqa: RUF012 - shared on purpose: the campaigns of all pools
 
     def __init__(self, workers, context, initializer, initargs):
         initializer(*initargs)
@@ -44,7 +45,7 @@ def asked(monkeypatch):
 
 
 def assert_same(one, other, campaigns):
-    for name in LEGEND:
+    for name in ARRAYS:
         np.testing.assert_array_equal(getattr(one, name)[:campaigns], getattr(other, name)[:campaigns])
 
 
@@ -66,8 +67,9 @@ def study(distance, symbols=("alphaMV", "alphaPV", "RML", "R")):
 @pytest.mark.parametrize(("hits", "count"), [(190, 200), (3, 4), (0, 10), (10, 10)])
 def test_shares_have_clopper_and_pearson_s_interval(hits, count):
     """Quantiles of beta distributions; 0 and 1 at the ends."""
-    found, low, high = share(np.arange(count) < hits)
-    assert found == hits / count
+    proportion = Proportion.count(np.arange(count) < hits)
+    low, high = proportion.interval
+    assert proportion.value == hits / count
     assert low == pytest.approx(beta.ppf(0.025, hits, count - hits + 1) if hits else 0.0)
     assert high == pytest.approx(beta.ppf(0.975, hits + 1, count - hits) if hits < count else 1.0)
 
@@ -114,7 +116,7 @@ def test_distances_that_follow_chi_square_are_covered():
 
 
 def test_a_region_that_is_half_as_large_is_noticed():
-    """Which is what the share under independence says of it, too."""
+    """The share under independence is even smaller."""
     rng = np.random.default_rng(0)
     small = study(2 * rng.chisquare(4, 400))
     assert coverage_section(small).verdicts[0].status == "bad"

@@ -9,26 +9,28 @@ from epv_env.plant.sensors import SENSORS
 from identification.report_2003.printed_values import printed_errors
 from identification.studies.error_tables.bench_conditions import drawn_conditions, fitted_conditions
 from identification.studies.error_tables.candidates import Candidate, candidates
-from identification.studies.error_tables.current_errors import residual, winding
-from identification.studies.error_tables.patterns import (
-    Valve,
+from identification.studies.error_tables.current_errors import current_residual, winding_contribution
+from identification.studies.error_tables.error_prediction import (
+    HypotheticalValve,
     lagged,
-    predicted,
-    printed_after,
-    printed_before,
+    predicted_errors,
+    printed_calibrated_errors,
+    printed_initial_errors,
 )
 
 CONDITIONS = fitted_conditions()
 
 
-def valve(**changes: float) -> Valve:
+def valve(**changes: float) -> HypotheticalValve:
     return Candidate(cause="", changes=changes).valve(CONDITIONS)
 
 
 def test_the_printed_tables_are_those_of_the_data_file():
-    assert printed_after()[0] == pytest.approx([2.6982, 1.6465, 6.6536])
-    assert printed_after()[4, 2] == printed_errors(15)["Validation"]["I"]
-    assert printed_before()[3].tolist() == [printed_errors(11)["Test4"][o] for o in ("p2", "p3", "I")]
+    assert printed_calibrated_errors()[0] == pytest.approx([2.6982, 1.6465, 6.6536])
+    assert printed_calibrated_errors()[4, 2] == printed_errors(15)["Validation"]["I"]
+    assert printed_initial_errors()[3].tolist() == [
+        printed_errors(11)["Test4"][o] for o in ("p2", "p3", "I")
+    ]
 
 
 def test_every_effect_and_every_parameter_outside_the_four_is_a_candidate():
@@ -40,8 +42,8 @@ def test_every_effect_and_every_parameter_outside_the_four_is_a_candidate():
 
 
 def test_without_a_cause_only_the_noise_of_the_sensors_is_left():
-    found = predicted(CONDITIONS, [valve()]).after[0]
-    mean = residual(CONDITIONS).mean
+    found = predicted_errors(CONDITIONS, [valve()]).calibrated[0]
+    mean = current_residual(CONDITIONS).mean
     assert found[:, 2] == pytest.approx(100 * SENSORS["I"].noise / mean, rel=1e-2)
     assert np.all(found[:, :2] < 0.15)
 
@@ -49,13 +51,13 @@ def test_without_a_cause_only_the_noise_of_the_sensors_is_left():
 def test_what_the_four_parameters_can_express_leaves_no_gap():
     nominal = Parameters.calibrated()
     off = valve(R=1.05 * nominal["R"], alphaMV=0.9 * nominal["alphaMV"], V2=1.1 * nominal["V2"])
-    found = predicted(CONDITIONS, [off, valve()])
-    assert found.after[0] == pytest.approx(found.after[1], rel=0.15)
+    found = predicted_errors(CONDITIONS, [off, valve()])
+    assert found.calibrated[0] == pytest.approx(found.calibrated[1], rel=0.15)
     assert found.z[0] == pytest.approx([0.9, 1 / 1.1, 1.0, 1.05], rel=5e-3)
 
 
 def test_a_delayed_coil_is_felt_in_the_current_most():
-    found = predicted(CONDITIONS, [valve(t_delay=2e-3)]).after[0]
+    found = predicted_errors(CONDITIONS, [valve(t_delay=2e-3)]).calibrated[0]
     assert np.all(found[:, 2] > 2 * found[:, :2].max(axis=1))
 
 
@@ -68,10 +70,10 @@ def test_the_current_s_filter_answers_a_slow_ramp_with_its_time_constant():
 
 def test_tables_11_and_13_together_show_which_winding_was_warm():
     """A twin: a delay in every switching, and windings that differ by up to 10 K."""
-    twin = Candidate(cause="", changes={"t_delay": 2e-3}, warmth=10.0).valve(CONDITIONS)
-    found = predicted(CONDITIONS, [twin])
-    shown = winding([CONDITIONS], found.before[0], found.after[0]).warmth[0]
-    assert shown == pytest.approx(10.0 * CONDITIONS.warmth[:4], abs=1.5)
+    twin = Candidate(cause="", changes={"t_delay": 2e-3}, winding_deviation=10.0).valve(CONDITIONS)
+    found = predicted_errors(CONDITIONS, [twin])
+    shown = winding_contribution([CONDITIONS], found.initial[0], found.calibrated[0]).temperature[0]
+    assert shown == pytest.approx(10.0 * CONDITIONS.winding_deviation[:4], abs=1.5)
 
 
 def test_the_same_seed_draws_the_same_conditions():

@@ -1,6 +1,6 @@
 """Draw the figures of docs/identification.md from a virtual bench.
 
-python docs/pictures.py --out docs/images --coverage runs/coverage
+python docs/scripts/identification_figures.py --out docs/images --coverage runs/coverage
 """
 
 import argparse
@@ -15,23 +15,26 @@ from epv_env.plant.parameters import Parameters
 from identification.bench.programmes import REPORT_SUITE
 from identification.bench.session import run_bench
 from identification.calibration.multi_start import METHODS
-from identification.confidence import confidence_figures as figures
+from identification.confidence import confidence_figures
 from identification.pipeline.stages import Identification
 from identification.replay.response_figures import overlay
 from identification.studies.coverage.coverage import coverage_study
-from identification.studies.coverage.coverage_figure import distances
+from identification.studies.coverage.coverage_figure import distance_quantiles
 
 
-def drawn(coverage: Path, campaigns: int) -> dict[str, Figure]:
-    """Figures by file name; the coverage study's journal lies in the folder `coverage`."""
+def identification_figures(coverage: Path, campaigns: int) -> dict[str, Figure]:
+    """Figures by file name.
+
+    coverage: folder of the coverage study's journal. campaigns: number of campaigns of the study.
+    """
     campaign = run_bench(REPORT_SUITE, Parameters.calibrated(), seed=0)
     with TemporaryDirectory() as folder:
         identification = Identification(campaign, Path(folder) / "searches.jsonl", starts=1)
         study = coverage_study(journal=coverage / "coverage.jsonl", campaigns=campaigns)
         return {
             "calibration.png": overlay(identification.calibration.after[METHODS[0]][0]),
-            "region.png": figures.region(identification.confidence),
-            "coverage.png": distances(study),
+            "region.png": confidence_figures.region(identification.confidence),
+            "coverage.png": distance_quantiles(study),
         }
 
 
@@ -44,9 +47,9 @@ def main() -> int:
     )
     parser.add_argument("--campaigns", type=int, default=200, help="of the coverage study")
     chosen = parser.parse_args()
-    found = drawn(chosen.coverage, chosen.campaigns)
+    figures_by_name = identification_figures(chosen.coverage, chosen.campaigns)
     chosen.out.mkdir(parents=True, exist_ok=True)
-    for name, figure in found.items():
+    for name, figure in figures_by_name.items():
         figure.savefig(chosen.out / name, dpi=100, bbox_inches="tight")
     return 0
 

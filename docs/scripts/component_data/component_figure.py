@@ -4,19 +4,24 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from docs.component_data.chambers import AMBIENT
-from docs.component_data.findings import Findings
-from docs.component_data.friction import PRESSURES, SEALS
-from docs.component_data.solenoids import FREQUENCIES, INDUCTANCES, diffusion, shorted_turn
+from docs.scripts.component_data.chambers import AMBIENT
+from docs.scripts.component_data.component_results import ComponentResults
+from docs.scripts.component_data.friction import GAUGE_PRESSURES, SEAL_BORES
+from docs.scripts.component_data.solenoids import (
+    FREQUENCIES,
+    INDUCTANCES,
+    diffusion_inductance,
+    shorted_turn_inductance,
+)
 
 
-def draw_friction(axes: Axes, found: Findings) -> None:
+def draw_friction(axes: Axes, results: ComponentResults) -> None:
     """Friction over pressure; open marks: break-away from rest."""
-    bars = np.array(PRESSURES)
-    for number, seal in enumerate(SEALS):
-        loops = [found.loops[seal, bar] for bar in PRESSURES]
+    bars = np.array(GAUGE_PRESSURES)
+    for number, seal in enumerate(SEAL_BORES):
+        loops = [results.loops[seal, bar] for bar in GAUGE_PRESSURES]
         means = np.array([loop.mean for loop in loops])
-        colour, fit = f"C{number}", found.lines[seal]
+        colour, fit = f"C{number}", results.lines[seal]
         axes.plot(
             bars, means, "o", color=colour, label=seal.replace("257", "").replace("Circle", "round")
         )
@@ -32,17 +37,17 @@ def draw_friction(axes: Axes, found: Findings) -> None:
     axes.legend(fontsize=8, loc="upper left")
 
 
-def draw_chambers(axes: Axes, found: Findings) -> None:
-    """Decay of the leaky chambers with the fitted laws."""
+def draw_chambers(axes: Axes, results: ComponentResults) -> None:
+    """FittedDecay of the leaky chambers with the fitted laws."""
     styles = {"orifice": ":", "laminar": "--", "porous": "-"}
-    for number, (chamber, (time, pressure)) in enumerate(found.records.items()):
+    for number, (chamber, (time, pressure)) in enumerate(results.records.items()):
         layer = chamber.removeprefix("Ultimaker_0")
         axes.plot(
             time[::12], (pressure[::12] - AMBIENT) * 1e-5, ".", ms=4, color=f"C{number}", alpha=0.5
         )
         axes.plot([], [], ".", color=f"C{number}", label=f"print, layers of 0.{layer} mm")
         for law, style in styles.items():
-            fitted = (found.decays[chamber, law].pressure - AMBIENT) * 1e-5
+            fitted = (results.decays[chamber, law].pressure - AMBIENT) * 1e-5
             axes.plot(time, fitted, style, color="0.15", lw=1.1, label=law if number == 0 else None)
     axes.set(
         xlabel="time [s]", ylabel="gauge pressure [bar]", yscale="log", xlim=(0, 120), ylim=(0.02, 12)
@@ -51,13 +56,15 @@ def draw_chambers(axes: Axes, found: Findings) -> None:
     axes.legend(fontsize=8)
 
 
-def draw_inductances(axes: Axes, found: Findings) -> None:
+def draw_inductances(axes: Axes, results: ComponentResults) -> None:
     """Inductance over frequency with both models."""
     frequency = np.geomspace(50, 2e5, 200)
     for number, (name, measured) in enumerate(INDUCTANCES.items()):
-        turn, other = found.turns[name], found.diffusions[name]
-        fits = (shorted_turn(frequency, turn.inductance, turn.eddy, turn.leakage),
-                diffusion(frequency, other.inductance, other.eddy, other.leakage))  # fmt: skip
+        turn, other = results.shorted_turns[name], results.diffusions[name]
+        fits = (
+            shorted_turn_inductance(frequency, turn.inductance, turn.eddy, turn.leakage),
+            diffusion_inductance(frequency, other.inductance, other.eddy, other.leakage),
+        )
         label = f"{name}: {turn.eddy:.0f} ohm"
         axes.plot(FREQUENCIES, 1e3 * measured, "o", color=f"C{number}", label=label)
         axes.plot(frequency, 1e3 * fits[0], color=f"C{number}", lw=1.2)
@@ -69,13 +76,13 @@ def draw_inductances(axes: Axes, found: Findings) -> None:
     axes.legend(fontsize=8)
 
 
-def drawn(found: Findings) -> Figure:
+def component_figure(results: ComponentResults) -> Figure:
     """The page's figure."""
     figure = Figure(figsize=(13, 4), layout="constrained")
     seals, chambers, coils = figure.subplots(1, 3)
-    draw_friction(seals, found)
-    draw_chambers(chambers, found)
-    draw_inductances(coils, found)
+    draw_friction(seals, results)
+    draw_chambers(chambers, results)
+    draw_inductances(coils, results)
     for axes in (seals, chambers, coils):
         axes.grid(alpha=0.3)
     return figure

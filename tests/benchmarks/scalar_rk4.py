@@ -1,4 +1,4 @@
-"""The peer: a compiled scalar simulator as one would write it in an afternoon.
+"""For comparison: a compiled scalar Runge-Kutta simulator without any refinement.
 
 Classical Runge-Kutta at 50 us, both powers of eq. 13 in every flow, movers put back on their stops
 after each step. Same equations, same compiler.
@@ -79,8 +79,8 @@ def _run(y, U, sigma_S, p1, duration, step, p, xPVmax, xMVmax):
                 y[x], y[x + 1] = limit, min(y[x + 1], 0.0)
 
 
-def run_naive(schedule: Schedule, step: float = STEP) -> NDArray:
-    """The seven states at the end of a schedule at constant supply pressure."""
+def run_scalar_rk4(schedule: Schedule, step: float = STEP) -> NDArray:
+    """The seven states at the end of a schedule at constant supply pressure [SI], (7,). step: [s]."""
     values = schedule.parameters
     p = tuple(float(values[symbol]) for symbol in SYMBOLS)
     y = np.array(schedule.initial[:7], dtype=float)

@@ -1,4 +1,4 @@
-"""Library integrators used without stop events, as one would in a hurry. They are wrong."""
+"""Library integrators without events at the stops. Their results are wrong."""
 
 import warnings
 from collections.abc import Callable
@@ -55,9 +55,9 @@ def _right_hand_side(schedule: Schedule, u: NDArray, clip: str) -> Callable:
 
 
 def final_p2(schedule: Schedule, method: str, clip: str) -> tuple[float, str]:
-    """p2 at the end [Pa] and, if there is none (nan), the reason.
+    """p2 at the end [Pa], and the reason if there is none (nan).
 
-    Kindly, the run is split where inputs change.
+    The integration starts anew where inputs change, which helps the integrator.
     """
     u = np.zeros(len(Inputs._fields))
     rates = _right_hand_side(schedule, u, clip)

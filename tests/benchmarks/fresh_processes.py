@@ -1,4 +1,4 @@
-"""What a command of the identification takes as a fresh process: time and memory."""
+"""Time and memory of a command of the identification in a fresh process."""
 
 import json
 import subprocess
@@ -16,15 +16,15 @@ used = resource.getrusage(resource.RUSAGE_CHILDREN)
 cpu, peak = used.ru_utime + used.ru_stime, used.ru_maxrss / 1024
 print(json.dumps({"seconds": seconds, "cpu": cpu, "peak": peak}))
 """
-"""A process begins with the peak memory of the one that starts it: hence a small one between."""
+"""Starts the command. A process inherits the peak memory of its parent, so the parent is small."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Process:
-    """What a process took."""
+    """Time and memory of a process."""
 
     seconds: float
-    """From its start to its end."""
+    """Wall time [s]."""
     cpu: float
     """Time that the cores spent on it, its children included [s]."""
     peak: float
@@ -32,7 +32,7 @@ class Process:
 
     @property
     def note(self) -> str:
-        """What is less disturbed by other processes on the machine."""
+        """CPU time, which other processes on the machine disturb less."""
         return f"{self.cpu:.3g} s on the cores"
 
 

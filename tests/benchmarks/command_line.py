@@ -1,4 +1,4 @@
-"""What the benchmarks share as programs: options, the machine they run on, one table."""
+"""Command line of the benchmarks: options, the machine, one table."""
 
 import argparse
 import json
@@ -52,7 +52,7 @@ def this_machine() -> dict[str, object]:
 
 
 def processor() -> str:
-    """Name of the processor, where the system tells."""
+    """Name of the processor, if the system gives one."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

@@ -7,25 +7,25 @@ from pathlib import Path
 import numpy as np
 from scipy import integrate, optimize
 
-from docs.component_data.files import Array, columns
+from docs.scripts.component_data.column_files import Array, columns
+from docs.scripts.component_data.settings import DEFAULTS, ComponentSettings
+from epv_env.common.units import BAR
 from epv_env.plant.flow import mass_flux
 
-LEAKY = ("Ultimaker_015", "Ultimaker_020")
-TIGHT = ("Aluminium", "Formlabs", "Prusa", "Ultimaker_006", "Ultimaker_010")
+LEAKY_CHAMBERS = ("Ultimaker_015", "Ultimaker_020")
+TIGHT_CHAMBERS = ("Aluminium", "Formlabs", "Prusa", "Ultimaker_006", "Ultimaker_010")
 AMBIENT = 1.01325e5
-"""Pressure outside, which nobody recorded [Pa]."""
-ZERO = 3.4e3
+"""Pressure outside [Pa]; the authors did not record it."""
+SENSOR_ZERO = 3.4e3
 """Reading of the chambers' sensor at no pressure [Pa]: where the record of the leakiest one ends."""
-LONGEST_SETTLING = 60.0
-"""Beyond this a record of 145 s cannot tell settling from leaking [s]."""
-RT = 287.05 * 293.15
+GAS_CONSTANT_TIMES_TEMPERATURE = 287.05 * 293.15
 """R T of the air at 20 degrees [J/kg]."""
 
 
 def orifice_rate(pressure: Array, area: float) -> Array:
     """Fall of the pressure [Pa/s] through an orifice of effective area over volume [1/m]."""
-    flux = [mass_flux(p, AMBIENT, RT**-0.5) for p in pressure]
-    return area * RT * np.array(flux)
+    flux = [mass_flux(p, AMBIENT, GAS_CONSTANT_TIMES_TEMPERATURE**-0.5) for p in pressure]
+    return area * GAS_CONSTANT_TIMES_TEMPERATURE * np.array(flux)
 
 
 def laminar_rate(pressure: Array, conductance: float) -> Array:
@@ -48,7 +48,7 @@ LAWS: dict[str, tuple[Callable[..., Array], tuple[float, ...]]] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Decay:
+class FittedDecay:
     """A law fitted to a chamber's pressure."""
 
     sizes: tuple[float, ...]
@@ -59,32 +59,34 @@ class Decay:
     """The fitted pressure [Pa]."""
 
 
-def decay_over(time: Array, start: float, rate: Callable[[Array], Array]) -> Array:
+def pressure_decay(time: Array, start: float, rate: Callable[[Array], Array]) -> Array:
     """Pressure [Pa] from a start: the equation separates, dt = -dp/rate, so no integrator is needed."""
     grid = AMBIENT + (start - AMBIENT) * np.geomspace(1, 1e-4, 600)
     elapsed = -integrate.cumulative_trapezoid(1 / rate(grid), grid, initial=0)
     return np.interp(time, elapsed, grid)
 
 
-def fitted_decay(time: Array, pressure: Array, law: str) -> Decay:
+def fitted_decay(time: Array, pressure: Array, law: str) -> FittedDecay:
     """Fit a law from the first reading on (absolute pressure)."""
     rate, guess = LAWS[law]
 
     def at(logs: Array) -> Array:
         *sizes, start = np.exp(logs)
-        return decay_over(time, start, lambda p: rate(p, *sizes))
+        return pressure_decay(time, start, lambda p: rate(p, *sizes))
 
     begin = np.log([*guess, pressure[0]])
-    fit = optimize.least_squares(lambda logs: (at(logs) - pressure) / 1e5, begin)
-    rms = 1e5 * float(np.sqrt(np.mean(fit.fun**2)))
-    return Decay(sizes=tuple(np.exp(fit.x[:-1]).tolist()), rms=rms, pressure=at(fit.x))
+    fit = optimize.least_squares(lambda logs: (at(logs) - pressure) / BAR, begin)
+    rms = BAR * float(np.sqrt(np.mean(fit.fun**2)))
+    return FittedDecay(sizes=tuple(np.exp(fit.x[:-1]).tolist()), rms=rms, pressure=at(fit.x))
 
 
-def read_chamber(data: Path, chamber: str) -> tuple[Array, Array]:
-    """Time [s] and absolute pressure [Pa]."""
+def read_chamber(
+    data: Path, chamber: str, settings: ComponentSettings = DEFAULTS
+) -> tuple[Array, Array]:
+    """Time [s] and absolute pressure [Pa] of a chamber, (samples,) each, from its file."""
     path = data / "chambers" / f"{chamber}.csv"
-    time, gauge = columns(path, (0, 2), delimiter=";", convert=plain_number)
-    return time * 1e-3, gauge * 1e5 - ZERO + AMBIENT
+    time, gauge = columns(path, (0, 2), delimiter=";", convert=plain_number, settings=settings)
+    return time * 1e-3, gauge * BAR - SENSOR_ZERO + AMBIENT
 
 
 def plain_number(text: str) -> float:
@@ -92,29 +94,47 @@ def plain_number(text: str) -> float:
     return float(text.replace(".", "", max(text.count(".") - 1, 0)))
 
 
-def released(time: Array, pressure: Array) -> tuple[Array, Array]:
-    """A leaky chamber's record from the moment its supply is shut."""
-    first = int(np.argmax(pressure < pressure[:20].mean() - 0.03e5))
+def after_release(
+    time: Array, pressure: Array, settings: ComponentSettings = DEFAULTS
+) -> tuple[Array, Array]:
+    """A leaky chamber's record from the moment its supply is shut: time [s] and pressure [Pa].
+
+    time: [s], (samples,). pressure: absolute [Pa], (samples,).
+    """
+    filled = pressure[: settings.filled_samples].mean()
+    first = int(np.argmax(pressure < filled - settings.release_drop))
     return time[first:] - time[first], pressure[first:]
 
 
-def fall(time: Array, pressure: Array, start: float, end: float) -> float:
-    """Mean fall of a tight chamber's pressure over a span of time, over the pressure [1/s]."""
+def relative_decay_rate(time: Array, pressure: Array, start: float, end: float) -> float:
+    """Mean rate of decay of a tight chamber's pressure, relative to the pressure [1/s].
+
+    Args:
+        time: [s], (samples,).
+        pressure: absolute [Pa], (samples,).
+        start, end: the span of time [s].
+    """
     inside = (time >= start) & (time < end)
     return float(-np.polyfit(time[inside], pressure[inside], 1)[0] / pressure[inside].mean())
 
 
-def settling(time: Array, pressure: Array) -> tuple[float, float]:
-    """Size [Pa] and time constant [s] of what settles after filling, beside a steady fall."""
+def settling(
+    time: Array, pressure: Array, settings: ComponentSettings = DEFAULTS
+) -> tuple[float, float]:
+    """Size [Pa] and time constant [s] of the settling after filling, beside a steady decay.
 
-    def rest(lag: float) -> tuple[float, float]:
+    time: [s], (samples,). pressure: absolute [Pa], (samples,).
+    """
+
+    def fitted(lag: float) -> tuple[float, float]:
+        """Size [Pa], and sum of squares [Pa^2], at this time constant [s]."""
         terms = np.column_stack([np.ones_like(time), time, np.exp(-time / lag)])
-        found, left = np.linalg.lstsq(terms, pressure, rcond=None)[:2]
-        return float(found[2]), float(left[0])
+        coefficients, squares = np.linalg.lstsq(terms, pressure, rcond=None)[:2]
+        return float(coefficients[2]), float(squares[0])
 
-    lags = np.geomspace(1, LONGEST_SETTLING, 80).tolist()
-    best = min(lags, key=lambda lag: rest(lag)[1])
-    return rest(best)[0], best
+    lags = np.geomspace(*settings.settling_times, settings.settling_points).tolist()
+    best = min(lags, key=lambda lag: fitted(lag)[1])
+    return fitted(best)[0], best
 
 
 def effective_area(rate: Callable[..., Array], sizes: tuple[float, ...], pressure: float) -> float:

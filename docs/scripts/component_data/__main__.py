@@ -1,12 +1,12 @@
-"""Compute, print and draw what docs/component-data.md says."""
+"""Compute, print and draw the results of docs/component-data.md."""
 
 import argparse
 import sys
 from pathlib import Path
 
-from docs.component_data.figure import drawn
-from docs.component_data.findings import found_in
-from docs.component_data.tables import chamber_table, friction_table, solenoid_table
+from docs.scripts.component_data.component_figure import component_figure
+from docs.scripts.component_data.component_results import component_results
+from docs.scripts.component_data.text_tables import chamber_table, friction_table, solenoid_table
 from epv_env.common.command_line import fail_clearly, writable_folder
 
 
@@ -16,10 +16,12 @@ def main() -> int:
     parser.add_argument("--data", type=Path, required=True, help="folder of the measured data")
     parser.add_argument("--out", type=writable_folder, required=True, help="folder of the picture")
     chosen = parser.parse_args()
-    found = found_in(chosen.data)
-    print("\n".join([*friction_table(found), "", *chamber_table(found), "", *solenoid_table(found)]))
+    results = component_results(chosen.data)
+    print(
+        "\n".join([*friction_table(results), "", *chamber_table(results), "", *solenoid_table(results)])
+    )
     chosen.out.mkdir(parents=True, exist_ok=True)
-    drawn(found).savefig(chosen.out / "component-data.png", dpi=100, bbox_inches="tight")
+    component_figure(results).savefig(chosen.out / "component-data.png", dpi=100, bbox_inches="tight")
     return 0
 
 

@@ -1,6 +1,0 @@
-"""Forms and sizes of effects against public measurements of components (docs/component-data.md).
-
-python -m docs.component_data --data FOLDER --out docs/images, from the repository's root.
-
-FOLDER holds friction/, chambers/ and solenoids/ as that page lists them; nothing of it is kept here.
-"""

@@ -1,0 +1,1 @@
+"""Scripts that make figures, films and tables of the documentation."""
