@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from controllers.base import Controller
 from controllers.learned import LearnedPolicy
-from training.deploy.compiled_export import CODE, VARIANTS, CompiledPolicy, build, float_logits
+from training.deploy.compiled_export import CODE, VARIANT_NAMES, CompiledPolicy, build, float_logits
 from training.deploy.double_precision import in_double, logits_along
-from training.deploy.quantise import ExportError
+from training.deploy.quantisation import ExportError
 from training.deploy.visited_states import PLANTS, SCENARIO, VisitedStates
 from training.evaluation.rollout import run_episodes
 
@@ -72,7 +72,7 @@ def closed_loop(
     progress: Callable[[float], None],
 ) -> dict[str, dict[str, float]]:
     """Figures of the policy and of each compiled variant on the same episodes, by controller's name."""
-    compiled = (CompiledPolicy(code=code, variant=name, cells=policy.cells) for name in VARIANTS)
+    compiled = (CompiledPolicy(code=code, variant=name, cells=policy.cells) for name in VARIANT_NAMES)
     contenders = [policy, *compiled]
     found = {}
     for k, controller in enumerate(contenders):

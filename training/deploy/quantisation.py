@@ -18,19 +18,18 @@ from numpy.typing import NDArray
 from controllers.learned import GatedUnit, LearnedPolicy
 from epv_env.observation import LAYOUT
 from training.deploy.double_precision import in_double, memory_along
+from training.deploy.settings import SETTINGS, ExportSettings
 
-FULL = 2**15 - 1
+SIGNAL_ONE = 2**15 - 1
 """What stands for an entry's reach, and for 1 in the activations."""
-ONE = 2**16
+SUM_ONE = 2**16
 """What stands for 1 in the sums that tanh is taken of, and in the logits."""
-GATE = 2**15
-"""What stands for 1 in the gates of a recurrent unit; FULL * GATE does in its cells."""
-WIDEST_INPUT = 2**31 // (2**7 * 2**15)
+GATE_ONE = 2**15
+"""What stands for 1 in the gates of a recurrent unit; SIGNAL_ONE * GATE_ONE does in its cells."""
+MOST_ROW_INPUTS = 2**31 // (2**7 * 2**15)
 """Inputs of a row, at most: its sum must fit 32 bits."""
-LARGEST_SUM = 2**30
+LARGEST_EXACT_SUM = 2**30
 """What the exact weights' sums may reach; as much again is left for their rounding."""
-HEADROOM = 2.0
-"""How much farther than on the visited states an entry of the observation may go."""
 
 UNITS = {"bar": ("Pa", 1e5), "A": ("uA", 1e6), "s": ("us", 1e6), "1": ("1/1000", 1e3)}
 """Unit of each whole number by the observation's unit, and how many of it make one."""
@@ -42,7 +41,7 @@ class ExportError(ValueError):
 
 @dataclass(frozen=True, kw_only=True)
 class FixedLayer:
-    """row j of a layer: (weight[j] · signal) · factor[j] / 2^shift + bias[j], ONE standing for 1."""
+    """Row j of a layer: (weight[j] · signal) · factor[j] / 2^shift + bias[j], SUM_ONE standing for 1."""
 
     weight: NDArray
     """(outputs, inputs) int8"""
@@ -72,9 +71,9 @@ class FixedInput:
 class FixedUnit:
     """A gated recurrent unit: rows of the reset gate, the update gate and the candidate, m each."""
 
-    new: FixedLayer
+    of_observation: FixedLayer
     """Of the observation."""
-    old: FixedLayer
+    of_cells: FixedLayer
     """Of the cells, rounded to int16."""
 
 
@@ -86,17 +85,19 @@ class FixedPolicy:
     cell: FixedUnit | None
     layers: list[FixedLayer]
     tangent: NDArray
-    """(257,) int16: tanh of multiples of 1/32, FULL standing for 1"""
+    """(257,) int16: tanh of multiples of 1/32, SIGNAL_ONE standing for 1"""
 
 
-def quantise(policy: LearnedPolicy, observations: NDArray) -> FixedPolicy:
+def quantise(
+    policy: LearnedPolicy, observations: NDArray, *, settings: ExportSettings = SETTINGS
+) -> FixedPolicy:
     """A policy in integers, calibrated on visited observations (episodes, periods, entries).
 
     Raises ExportError if its sums could leave 32 bits.
     """
     precise = in_double(policy)
     exact = observations.reshape(-1, observations.shape[-1]).astype(np.float64)
-    inputs = _inputs(exact)
+    inputs = _inputs(exact, settings.input_headroom)
     reach = inputs.amplitude
     signal = np.clip(_rounded(exact / reach), -1, 1)
     cell = None
@@ -110,27 +111,28 @@ def quantise(policy: LearnedPolicy, observations: NDArray) -> FixedPolicy:
     layers = []
     for number, (weight, bias) in enumerate(precise.layers):
         wanted = exact @ weight.T + bias
-        layer, found = _layer(weight * reach, wanted, signal, f"layer {number}", LARGEST_SUM)
+        layer, found = _layer(weight * reach, wanted, signal, f"layer {number}", LARGEST_EXACT_SUM)
         layers.append(layer)
         exact, signal, reach = np.tanh(wanted), _rounded(np.tanh(found)), 1.0
-    tangent = np.rint(FULL * np.tanh(np.arange(257) / 32)).astype(np.int16)
+    tangent = np.rint(SIGNAL_ONE * np.tanh(np.arange(257) / 32)).astype(np.int16)
     return FixedPolicy(inputs=inputs, cell=cell, layers=layers, tangent=tangent)
 
 
 def _rounded(signal: NDArray) -> NDArray:
     """What int16 keeps of a signal."""
-    return np.rint(signal * FULL) / FULL
+    return np.rint(signal * SIGNAL_ONE) / SIGNAL_ONE
 
 
-def _inputs(observations: NDArray) -> FixedInput:
+def _inputs(observations: NDArray, headroom: float) -> FixedInput:
+    """How entries of observations (n, entries) become int16; headroom: beyond the farthest seen [1]."""
     limit = np.array([quantity.limit for quantity in LAYOUT])
     seen = np.abs(observations).max(axis=0)
-    amplitude = np.minimum(np.where(seen > 0, HEADROOM * seen, limit), limit)
+    amplitude = np.minimum(np.where(seen > 0, headroom * seen, limit), limit)
     units = np.array([UNITS[quantity.unit][1] for quantity in LAYOUT])
     scale = np.array([quantity.scale for quantity in LAYOUT])
     centre = np.rint(units * np.array([quantity.centre for quantity in LAYOUT]))
     reach = np.maximum(np.rint(amplitude * scale * units), 1.0)
-    factor, shift = _factors(FULL / reach)
+    factor, shift = _factors(SIGNAL_ONE / reach)
     return FixedInput(
         centre=centre.astype(np.int32), reach=reach.astype(np.int32), factor=factor, shift=shift,
         amplitude=reach / (scale * units),
@@ -146,10 +148,10 @@ def _unit(
     """
     new_wanted = observations @ unit.weight_input.T + unit.bias_input
     old_wanted = memory @ unit.weight_memory.T + unit.bias_memory
-    largest = LARGEST_SUM // 2  # a gate adds the two
+    largest = LARGEST_EXACT_SUM // 2  # a gate adds the two
     new, _ = _layer(unit.weight_input * reach, new_wanted, signal, "the recurrent unit", largest)
     old, _ = _layer(unit.weight_memory, old_wanted, _rounded(memory), "the recurrent unit", largest)
-    return FixedUnit(new=new, old=old)
+    return FixedUnit(of_observation=new, of_cells=old)
 
 
 def _layer(
@@ -160,18 +162,18 @@ def _layer(
     step = np.where(largest > 0, largest / 127, 1.0)
     rounded = np.rint(weight / step[:, None])
     sums = signal @ (rounded * step[:, None]).T
-    bias = np.rint((wanted - sums).mean(axis=0) * ONE)
-    reached = np.abs(weight).sum(axis=1) * ONE + np.abs(bias)
-    if weight.shape[1] > WIDEST_INPUT or np.any(reached > largest_sum):
+    bias = np.rint((wanted - sums).mean(axis=0) * SUM_ONE)
+    reached = np.abs(weight).sum(axis=1) * SUM_ONE + np.abs(bias)
+    if weight.shape[1] > MOST_ROW_INPUTS or np.any(reached > largest_sum):
         raise ExportError(
             f"{place} of the policy is too wide or too steep for sums of 32 bits: train one with "
-            f"at most {WIDEST_INPUT} inputs to a layer and smaller weights"
+            f"at most {MOST_ROW_INPUTS} inputs to a layer and smaller weights"
         )
-    factor, shift = _factors(step * ONE / FULL)
+    factor, shift = _factors(step * SUM_ONE / SIGNAL_ONE)
     layer = FixedLayer(
         weight=rounded.astype(np.int8), factor=factor, shift=shift, bias=bias.astype(np.int32)
     )
-    return layer, sums + bias / ONE
+    return layer, sums + bias / SUM_ONE
 
 
 def _factors(ratios: NDArray) -> tuple[NDArray, int]:

@@ -3,10 +3,10 @@
 from typing import Any
 
 from epv_env.observation import HISTORY, LAYOUT, LONGEST_WAIT, P2_LAGS, P3_LAGS, contract
+from training.deploy.c_arrays import named_fixed_layers, named_layers
+from training.deploy.c_sources import Export
 from training.deploy.compiled_export import memory_type
-from training.deploy.quantise import FULL, GATE, ONE, UNITS
-from training.deploy.sources import Export
-from training.deploy.tables import named_fixed_layers, named_layers
+from training.deploy.quantisation import GATE_ONE, SIGNAL_ONE, SUM_ONE, UNITS
 
 FORMAT = "epv-deployment/1"
 
@@ -77,7 +77,8 @@ def _fixed(export: Export) -> dict[str, Any]:
         "readings": {"pressure": "Pa absolute", "current": "uA"},
         "memory": "epv_fixed_memory: zeros at the start, then what the last period left",
         "arithmetic": "weights int8, a scale for each row; observation, activations int16; sums int32",
-        "one": {"activations": FULL, "logits": ONE} | ({"cells": FULL * GATE} if cells else {}),
+        "one": {"activations": SIGNAL_ONE, "logits": SUM_ONE}
+        | ({"cells": SIGNAL_ONE * GATE_ONE} if cells else {}),
         "observation": [
             {"name": q.name, "unit": UNITS[q.unit][0], "centre": int(centre), "reach": int(reach)}
             for q, centre, reach in zip(LAYOUT, inputs.centre, inputs.reach, strict=True)

@@ -10,42 +10,22 @@ import numpy as np
 
 from controllers.learned import LearnedPolicy
 from epv_env.observation import HISTORY, LAYOUT, LONGEST_WAIT, P2_LAGS, P3_LAGS
-from training.deploy.quantise import FixedPolicy
-from training.deploy.tables import fixed_tables, float_tables, listed, literal
+from training.deploy.c_arrays import fixed_tables, float_tables, listed, literal
+from training.deploy.c_variants import FIXED, FLOAT, VARIANTS, Variant
+from training.deploy.quantisation import FixedPolicy
+from training.deploy.settings import SETTINGS, ExportSettings
 
 TEMPLATES = Path(__file__).parent / "templates"
 TITLE = "Pressure limiting by an electro-pneumatic protection valve: a trained policy."
-OBSERVATION_TOLERANCE = 2e-5
-"""How far the C code's observation may lie from Python's, which is made of readings in double precision:
-single precision's 5e-7 bar at 8 bar, over the least scale, 0.1 bar, and rounded several times."""
 
-MARGIN_ROOM = 8
-"""Another compiler may contract or reorder sums, so that it rounds otherwise, but not much worse."""
-
-FLOAT_VALUES = {
-    "p2_error": "now->p2 - now->target",
+READINGS = {
     "target": "now->target",
     "p1": "now->p1",
     "p3": "now->p3",
     "I": "now->current",
-    "action": "(float)now->coil",
     "since_switching": "since",
 }
-"""Each entry of the observation in C, in its unit, but for the changes."""
-
-FIXED_VALUES = FLOAT_VALUES | {
-    "p2_error": "(int64_t)now->p2 - now->target",
-    "action": "now->coil ? 1000 : 0",
-}
-"""The same in the units of epv_fixed."""
-
-SIGNALS = {"float": "float", "fixed": "int16_t"}
-"""What the layers take in."""
-CELLS = {
-    "float": "    float cell[{}]; /* of the gated recurrent unit */\n",
-    "fixed": "    int32_t cell[{}]; /* of the gated recurrent unit, 32767 * 32768 stands for 1 */\n",
-}
-"""The member of the memory that a policy without cells lacks: C99 has no array of none."""
+"""Entries of the observation in C that both variants write alike, each in its unit."""
 
 CHANGES = {
     f"{name}_change_{lag}": f"change(m->{name}, m->newest, {lag})"
@@ -73,7 +53,20 @@ class Export:
 
 def sources(export: Export) -> dict[str, str]:
     """The text of each C file of the policy by its name."""
-    common = {
+    numbers = {FLOAT: _float_numbers(export.policy, export.period), FIXED: _fixed_numbers(export.fixed)}
+    common = _common(export)
+    filled = {}
+    for variant in VARIANTS:
+        values = common | variant.template_fields(export.policy.cells) | numbers[variant]
+        values |= _functions(variant, export.policy.cells, values)
+        for suffix in ("h", "c"):
+            filled[f"epv_{variant.name}.{suffix}"] = _fill(f"epv_policy.{suffix}", values)
+    return filled
+
+
+def _common(export: Export) -> dict[str, object]:
+    """What both variants state alike."""
+    return {
         "title": TITLE,
         "source": f"Weights with SHA-256 {export.weights_sha256}.",
         "inputs": len(LAYOUT),
@@ -84,37 +77,32 @@ def sources(export: Export) -> dict[str, str]:
         "cells": export.policy.cells,
         "longest_wait": ceil(LONGEST_WAIT / export.period - 1e-9),
     }
-    filled = {}
-    for variant, numbers in (
-        ("float", _float_numbers(export.policy, export.period)),
-        ("fixed", _fixed_numbers(export.fixed)),
-    ):
-        parts = _parts(variant, export.policy.cells, numbers)
-        for suffix in ("h", "c"):
-            name = f"epv_{variant}.{suffix}"
-            filled[name] = _fill(name, common | numbers | parts)
-    return filled
 
 
-def _parts(variant: str, cells: int, numbers: dict[str, str]) -> dict[str, str]:
-    """What the variants share, and what only a policy with cells has."""
-    names = {"variant": variant, "capital": variant.upper(), "signal": SIGNALS[variant]}
-    return {
-        "remember": _fill("remember.c", names),
-        "cell_member": CELLS[variant].format(cells) if cells else "",
-        "see": _fill(f"cells_{variant}.c" if cells else "cells_none.c", names | numbers),
+def _functions(variant: Variant, cells: int, values: Mapping[str, object]) -> dict[str, str]:
+    """The variant's own functions: its arithmetic and, if the policy has cells, theirs."""
+    functions = {"arithmetic": _fill(f"arithmetic_{variant.name}.c", values), "values": _values(variant)}
+    if cells == 0:
+        forgets = "(void)m; /* this policy remembers nothing but readings */"
+        return functions | {"cell_functions": "", "next_cells": forgets}
+    arithmetic = {"cell_arithmetic": _fill(f"cells_{variant.name}.c", values)}
+    return functions | {
+        "cell_functions": _fill("cells.c", {**values, **arithmetic}),
+        "next_cells": f"next_cells(m, observation, seen + EPV_{variant.name.upper()}_INPUTS);",
     }
 
 
-def checks(states: int, *, rounding: float) -> dict[str, str]:
+def checks(states: int, *, rounding: float, settings: ExportSettings = SETTINGS) -> dict[str, str]:
     """The text of the programs that test and time the code on so many states, by file name.
 
-    rounding: how far the float code's logits lie from exact ones here; MARGIN_ROOM times it is allowed.
+    rounding: how far the float code's logits lie from exact ones here [1]; settings.margin_factor times
+    it is allowed.
     """
+    allowed = settings.margin_factor * max(rounding, settings.least_rounding)
     numbers = {
         "states": states,
-        "observation_tolerance": f"{OBSERVATION_TOLERANCE:g}",
-        "margin_tolerance": f"{MARGIN_ROOM * max(rounding, 1e-6):g}",
+        "observation_tolerance": f"{settings.observation_tolerance:g}",
+        "margin_tolerance": f"{allowed:g}",
     }
     return {name: _fill(name, numbers) for name in ("states.h", "parity.c", "bench.c")}
 
@@ -130,7 +118,6 @@ def _float_numbers(policy: LearnedPolicy, period: float) -> dict[str, str]:
         "limit": listed(np.array([quantity.limit for quantity in LAYOUT])),
         "period": literal(period),
         "longest": literal(LONGEST_WAIT),
-        "values": _values(FLOAT_VALUES),
     }
 
 
@@ -142,11 +129,10 @@ def _fixed_numbers(fixed: FixedPolicy) -> dict[str, str]:
         "factor": listed(fixed.inputs.factor),
         "factor_shift": str(fixed.inputs.shift),
         "tangent": listed(fixed.tangent),
-        "values": _values(FIXED_VALUES),
     }
 
 
-def _values(expressions: dict[str, str]) -> str:
+def _values(variant: Variant) -> str:
     """Assignments to value[] in the order of the layout; a KeyError says that an entry is new."""
-    known = expressions | CHANGES
+    known = {"p2_error": variant.p2_error, "action": variant.action} | READINGS | CHANGES
     return "\n".join(f"    value[{i}] = {known[quantity.name]};" for i, quantity in enumerate(LAYOUT))

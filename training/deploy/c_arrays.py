@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.learned import LearnedPolicy
-from training.deploy.quantise import FixedLayer, FixedPolicy
+from training.deploy.quantisation import FixedLayer, FixedPolicy
 
 
 def listed(values: NDArray) -> str:
@@ -36,7 +36,11 @@ def named_layers(policy: LearnedPolicy) -> dict[str, tuple[NDArray, NDArray]]:
 def named_fixed_layers(fixed: FixedPolicy) -> dict[str, FixedLayer]:
     """The same in integers."""
     layers = {str(k): layer for k, layer in enumerate(fixed.layers)}
-    return layers if fixed.cell is None else layers | {"NEW": fixed.cell.new, "OLD": fixed.cell.old}
+    return (
+        layers
+        if fixed.cell is None
+        else layers | {"NEW": fixed.cell.of_observation, "OLD": fixed.cell.of_cells}
+    )
 
 
 def float_tables(policy: LearnedPolicy) -> dict[str, str]:
