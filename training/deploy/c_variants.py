@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Variant:
-    """Types, units and words that fill the templates of a variant; the arithmetic has files of its own."""
+    """What fills the templates of a variant: types, units, words; not its arithmetic."""
 
     name: str
     """`float` or `fixed`: part of every public name in C."""
@@ -18,7 +18,7 @@ class Variant:
     sum: str
     """C type of a layer's sum, and of a logit."""
     cell_member: str
-    """Member of the memory that holds the cells; C99 has no array of none, so that it may be left out."""
+    """Member of the memory for the cells; a policy without cells has none: C99 has no empty array."""
     pressure_unit: str
     current_unit: str
     p2_error: str
@@ -34,11 +34,9 @@ class Variant:
 
     def template_fields(self, cells: int) -> dict[str, str]:
         """What the templates call these fields. cells: of the policy's recurrent unit, or 0."""
-        fields = {
-            name: text for name, text in asdict(self).items() if name not in ("name", "cell_member")
-        }
         member = self.cell_member.format(cells) if cells else ""
-        return fields | {"variant": self.name, "capital": self.name.upper(), "cell_member": member}
+        names = {"variant": self.name, "capital": self.name.upper(), "cell_member": member}
+        return asdict(self) | names
 
 
 FLOAT = Variant(
@@ -74,16 +72,17 @@ FIXED = Variant(
     p2_error="(int64_t)now->p2 - now->target",
     action="now->coil ? 1000 : 0",
     arithmetic_in_words=(
-        "The policy in integers alone, from the readings to the decision: for units without floating point."
+        "The policy in integers alone, from the readings to the decision: for units without "
+        "floating point."
     ),
     same_everywhere=" The same decisions on every machine.",
     numbers_in_words=(
         "Observations and activations: int16_t, 32767 stands for the reach of an entry or for 1.\n"
-        " * Weights: int8_t, one scale for each row. Sums: int32_t, they cannot overflow (the export checks "
-        "it).\n * What tanh is taken of, and the logits: int32_t, 65536 stands for 1."
+        " * Weights: int8_t, one scale for each row. Sums: int32_t, they cannot overflow (the export\n"
+        " * checks it). What tanh is taken of, and the logits: int32_t, 65536 stands for 1."
     ),
     observation_in_words=(
-        "32767 stands for the reach of an entry; beyond its reach an entry saturates."
+        "32767 stands for the reach of an entry (contract.json); beyond its reach an entry saturates."
     ),
     logit_scale=", 65536 stands for 1",
     tie_in_words="",
