@@ -28,15 +28,15 @@ from epv_env.plant.consumption import check_scenario
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.valves import available_cores
 from training.evaluation.seeds import CALIBRATION_SEED, SWEEP_SEED
-from training.studies.page_parts import check_pages
+from training.studies.episode_tasks import Study
+from training.studies.generated_pages import check_pages
+from training.studies.named_controllers import DEFAULT, named_controllers
+from training.studies.parallel_run import run_tasks, task_runner
 from training.studies.results_folder import check_options, write_options
-from training.studies.sweeps.controllers import DEFAULT, named_controllers
-from training.studies.sweeps.cost import cost, episode_cpu, overhead
-from training.studies.sweeps.designs import DESIGNS
-from training.studies.sweeps.plan import Size, cells, chosen_points, searches
-from training.studies.sweeps.report import PARTS, report
-from training.studies.sweeps.run import run_tasks, workplace
-from training.studies.sweeps.tasks import Study
+from training.studies.sweeps.computing_cost import cost, episode_cpu, overhead
+from training.studies.sweeps.episode_plan import Size, cells, chosen_points, searches
+from training.studies.sweeps.experiment_designs import DESIGNS
+from training.studies.sweeps.sweep_report import PARTS, report
 from training.studies.sweeps.worst_case_search import Effort
 
 JOURNAL, COST = "finished.jsonl", "cost.json"
@@ -136,20 +136,22 @@ def main(arguments: list[str] | None = None) -> int:
         controllers=controllers, plant=plant, scenario=chosen.scenario, duration=chosen.duration
     )
     planned = cells(points, list(controllers), size, chosen.seed)
-    hunts = searches(plant, list(controllers), size, chosen.seed) if "worst" in chosen.designs else []
-    tasks = [*hunts, *(batch for cell in planned for batch in cell.batches)]
+    planned_searches = (
+        searches(plant, list(controllers), size, chosen.seed) if "worst" in chosen.designs else []
+    )
+    tasks = [*planned_searches, *(batch for cell in planned for batch in cell.batches)]
     cores = available_cores()
-    with workplace(chosen.workers or cores, chosen.cluster) as run:
+    with task_runner(chosen.workers or cores, chosen.cluster) as run:
         outcomes = run_tasks(tasks, study, Journal(chosen.out / JOURNAL, config), run, what="sweep")
         handing_out = overhead(run, study)
-    spent = cost(
+    cost_estimate = cost(
         episode_cpu(planned, outcomes), handing_out, cores=cores, duration=chosen.duration,
         where="Dask" if chosen.cluster else "joblib",
     )  # fmt: skip
-    write_text(chosen.out / COST, json.dumps(spent, indent=1) + "\n")
+    write_text(chosen.out / COST, json.dumps(cost_estimate, indent=1) + "\n")
     print(
         report(
-            chosen.out, config, planned, hunts, outcomes, study, spent,
+            chosen.out, config, planned, planned_searches, outcomes, study, cost_estimate,
             images=chosen.images, pages=chosen.pages,
         )
     )  # fmt: skip

@@ -29,7 +29,7 @@ from epv_env.plant.plantfile import load_plant
 from epv_env.reward import REFERENCE_PERIOD
 from training.evaluation.rollout import begin_episodes, make_env
 from training.evaluation.seeds import TIMING_SEED
-from training.studies.sweeps.controllers import named_controllers
+from training.studies.named_controllers import named_controllers
 
 WARM_UP = 50
 """Decisions that are not counted: the first ones compile and fill caches."""

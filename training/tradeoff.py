@@ -28,7 +28,7 @@ from epv_env.plant.valves import available_cores
 from epv_env.reward import RewardWeights
 from training.evaluation.scenarios import TUNING_REGION
 from training.learners.policy_folders import RECURRENT_TIMESTEPS, Training, seed_trainings, train_missing
-from training.studies.comparison.plan import Contender
+from training.studies.comparison.contenders import Contender
 from training.tune import tune
 
 FOLDER = "price-{:g}"

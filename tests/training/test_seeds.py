@@ -12,9 +12,9 @@ from training import compare, export, sweep
 from training.evaluation import seeds
 from training.learners.distillation import Distillation
 from training.learners.ppo import Hyperparameters
-from training.studies.comparison.blocks import plan
-from training.studies.comparison.plan import TUNING, Contender, Sizes
-from training.studies.sweeps.plan import Size, cells, chosen_points, searches
+from training.studies.comparison.contenders import TUNING, Contender, Sizes
+from training.studies.comparison.episode_blocks import plan
+from training.studies.sweeps.episode_plan import Size, cells, chosen_points, searches
 from training.studies.sweeps.worst_case_search import Effort
 
 pytestmark = pytest.mark.training

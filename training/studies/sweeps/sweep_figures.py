@@ -39,7 +39,7 @@ def draw(points: pd.DataFrame, ranks: pd.DataFrame, folder: Path) -> None:
 
 
 def _axes(rows: int) -> tuple[Any, Axes, Axes]:
-    """A figure with a panel for the leaving probability and one for the excursion."""
+    """A figure with a panel for the violation rate and one for the excursion."""
     figure, (left, right) = plt.subplots(
         1, 2, figsize=(11, 1.4 + 0.3 * rows), sharey=True, layout="constrained"
     )
@@ -59,7 +59,7 @@ def _axes(rows: int) -> tuple[Any, Axes, Axes]:
 def _dots(
     left: Axes, right: Axes, y: Any, rows: pd.DataFrame, marker: str, colour: str, **style: Any
 ) -> None:
-    """Leaving probability with its interval, and the excursion from median to worst."""
+    """Violation rate with its interval, and the excursion from median to worst."""
     share, low, high = (100 * rows[name] for name in ("left", "left_low", "left_high"))
     worst = np.minimum(rows["excursion_worst_bar"], WIDEST_BAR)
     bars = {"lw": 0.8, "alpha": 0.5 * style.get("alpha", 1.0), "color": colour}
@@ -115,7 +115,7 @@ def conditions(points: pd.DataFrame, path: Path) -> None:
 
 
 def effects(points: pd.DataFrame, path: Path) -> None:
-    """Worst excursion as colour, leaving probability as number, effect by size, for each controller."""
+    """Worst excursion as colour, violation rate as number, effect by size, for each controller."""
     table = points.loc[points["design"] == "effects"]
     controllers = list(dict.fromkeys(table["controller"]))
     names, levels = list(dict.fromkeys(table["factor"])), list(dict.fromkeys(table["level"]))

@@ -15,8 +15,8 @@ from scipy.optimize import differential_evolution
 
 from epv_env.plant.consumption import MIXED, SCENARIOS
 from epv_env.settings import as_region
-from training.studies.sweeps.space import Space
-from training.studies.sweeps.tasks import MICROBAR, Study
+from training.studies.episode_tasks import EXCURSION_DECIMALS, Study
+from training.studies.sweeps.parameter_space import Space
 
 NEAR = 0.05
 """Half the width of the last search's box, as a share of the region's."""
@@ -54,7 +54,7 @@ class Effort:
 
 
 @dataclass
-class _Found:
+class _WorstEpisode:
     """The worst episode so far."""
 
     excursion_bar: float = -1.0
@@ -83,22 +83,22 @@ class Search:
 
     def run(self, study: Study) -> dict[str, Any]:
         """The worst plant, scenario and seed, its excursion, and the worst after each stage."""
-        return _Hunt(self, study).result()
+        return _RunningSearch(self, study).result()
 
 
-class _Hunt:
+class _RunningSearch:
     """A search under way."""
 
     def __init__(self, search: Search, study: Study):
         self.search, self.study, self.effort = search, study, search.effort
         self.space = Space(region=as_region(search.region, study.plant))
-        self.worst = _Found()
+        self.worst = _WorstEpisode()
 
     def result(self) -> dict[str, Any]:
         """Run all stages."""
         effort, stages = self.effort, {}
         first = self.space.latin_hypercube(effort.screened, self.search.seed)
-        strayed = self._meet(first, self._episodes(0))
+        strayed = self._excursions(first, self._episodes(0))
         stages["hypercube"] = self.worst.excursion_bar
         farthest = np.argsort(-strayed, kind="stable")
         held = [self._episodes(0)[i] for i in farthest[: effort.held]]
@@ -109,7 +109,7 @@ class _Hunt:
         self._evolve(held, near, 2 * NEAR, effort.refinements)
         stages["close to the worst"] = self.worst.excursion_bar
         there = np.tile(self.worst.coordinates, (effort.screened, 1))
-        self._meet(there, self._episodes(effort.screened))
+        self._excursions(there, self._episodes(effort.screened))
         stages["new consumption"] = self.worst.excursion_bar
         return {
             "parameters": self.space.values(self.worst.coordinates[None])[0],
@@ -135,18 +135,20 @@ class _Hunt:
         """
         corner = np.clip(self.worst.coordinates - width / 2, 0.0, 1.0 - width)
 
-        def mildness(inside: NDArray) -> NDArray:
+        def negative_excursion(inside: NDArray) -> NDArray:
             """-worst excursion over the held episodes of plants (symbols, plants)."""
             coordinates = np.repeat(corner + width * inside.T, len(held), axis=0)
-            return -self._meet(coordinates, held * inside.shape[1]).reshape(-1, len(held)).max(axis=1)
+            return (
+                -self._excursions(coordinates, held * inside.shape[1]).reshape(-1, len(held)).max(axis=1)
+            )
 
         settings: Any = {"init": population, "updating": "deferred", "polish": False, "tol": 0.0}
         differential_evolution(
-            mildness, [(0.0, 1.0)] * population.shape[1], maxiter=generations, rng=self.search.seed,
+            negative_excursion, [(0.0, 1.0)] * population.shape[1], maxiter=generations, rng=self.search.seed,
             vectorized=True, **settings,
         )  # fmt: skip
 
-    def _meet(self, coordinates: NDArray, episodes: list[tuple[str, int]]) -> NDArray:
+    def _excursions(self, coordinates: NDArray, episodes: list[tuple[str, int]]) -> NDArray:
         """Excursions (episodes,) [bar]: plant k, at coordinates (episodes, symbols), in episode k."""
         excursions = []
         for begin in range(0, len(episodes), self.effort.screened):
@@ -155,8 +157,8 @@ class _Hunt:
             each = {"scenario": list(scenarios), "parameters": self.space.values(coordinates[part])}
             metrics, _ = self.study.run(self.search.controller, list(seeds), {}, each)
             excursions.append(metrics.excursion_bar)
-        found = np.round(np.concatenate(excursions), MICROBAR)
+        found = np.round(np.concatenate(excursions), EXCURSION_DECIMALS)
         at = int(np.argmax(found))
         if found[at] > self.worst.excursion_bar:
-            self.worst = _Found(float(found[at]), coordinates[at].copy(), *episodes[at])
+            self.worst = _WorstEpisode(float(found[at]), coordinates[at].copy(), *episodes[at])
         return found

@@ -1,4 +1,4 @@
-"""Promised against delivered: no gap without an effect, a gap with one, and the circle closes it."""
+"""Simulated against measured: no gap without an effect, a gap with one, and the loop closes it."""
 
 import json
 import math
@@ -14,19 +14,25 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant, save_plant
 from epv_env.plant.region import Region
 from training.sim_to_real import main
-from training.studies.sim_to_real.aims import FIGURES, GAPS, as_markdown, figures, gaps
 from training.studies.sim_to_real.deployment import (
     AFTER,
     AROUND,
     BEFORE,
-    DELIVERED,
     ITSELF,
-    PROMISED,
+    MEASURED,
+    SIMULATED,
     deployed,
     read_episodes,
 )
-from training.studies.sim_to_real.figure import circle_figure
-from training.studies.sim_to_real.report import said
+from training.studies.sim_to_real.performance_figure import performance_figure
+from training.studies.sim_to_real.performance_tables import (
+    FIGURES,
+    GAPS,
+    as_markdown,
+    gap_table,
+    performance_table,
+)
+from training.studies.sim_to_real.sim_to_real_report import diagnosis_text
 
 pytestmark = pytest.mark.training
 
@@ -39,8 +45,8 @@ def plant(**effects):
 
 
 def episodes(stage, **effects):
-    """Promised by the nominal plant, delivered by one with the effects."""
-    plants = {PROMISED: plant(), DELIVERED: plant(**effects)}
+    """Simulated on the nominal plant, measured on one with the effects."""
+    plants = {SIMULATED: plant(), MEASURED: plant(**effects)}
     found = deployed(
         [CONTROLLER], plants, scenario="steps", count=12, duration=2.0, what="test"
     )  # fmt: skip
@@ -52,22 +58,22 @@ def late():
     return episodes(BEFORE, t_delay=0.008)
 
 
-def test_a_bench_without_an_effect_delivers_exactly_what_was_promised():
-    found = gaps(episodes(BEFORE))
+def test_a_bench_without_an_effect_measures_exactly_what_was_simulated():
+    found = gap_table(episodes(BEFORE))
     assert len(found) == 1
     assert all(found.loc[0, name] == 0.0 for name in GAPS)
 
 
-def test_a_late_coil_delivers_larger_excursions_than_promised(late):
-    found = gaps(late).loc[0]
+def test_a_late_coil_gives_larger_excursions_than_simulated(late):
+    found = gap_table(late).loc[0]
     for name in ("C1_excursion", "C3_excursion"):
         assert found[f"{name}_low_bar"] > 0.05
         assert found[f"{name}_low_bar"] < found[f"{name}_bar"] < found[f"{name}_high_bar"]
 
 
 def test_c1_and_c2_are_judged_on_the_valve_itself_and_c3_around_it(late):
-    found = figures(late).set_index("place")
-    for place in (PROMISED, DELIVERED):
+    found = performance_table(late).set_index("place")
+    for place in (SIMULATED, MEASURED):
         of = {s: late[(late["place"] == place) & (late["plants"] == s)] for s in (ITSELF, AROUND)}
         assert found.loc[place, "C1_stayed"] == of[ITSELF]["stayed"].mean()
         assert found.loc[place, "C3_stayed"] == of[AROUND]["stayed"].mean()
@@ -77,14 +83,14 @@ def test_c1_and_c2_are_judged_on_the_valve_itself_and_c3_around_it(late):
 
 def test_the_table_names_every_figure_and_the_picture_has_every_aim(late):
     both = pd.concat([late, late.assign(stage=AFTER)])
-    aims = figures(both)
-    text = as_markdown(aims, gaps(both))
+    aims = performance_table(both)
+    text = as_markdown(aims, gap_table(both))
     assert all(heading in text for _, _, heading in FIGURES.values())
-    labels = " ".join(axes.get_ylabel() for axes in circle_figure(aims).axes)
+    labels = " ".join(axes.get_ylabel() for axes in performance_figure(aims).axes)
     assert all(aim in labels for aim in ("C1", "C2", "C3"))
 
 
-def circle(out, *more):
+def run_loop(out, *more):
     return main(["--quick", "--episodes", "4", "--out", str(out), *more])
 
 
@@ -100,20 +106,20 @@ FOUND = {
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
-    """A short circle whose diagnosis is there already, and right."""
-    out = tmp_path_factory.mktemp("circle")
+    """A short loop whose diagnosis is there already, and right."""
+    out = tmp_path_factory.mktemp("sim-to-real")
     (out / "diagnosis").mkdir()
     (out / "diagnosis" / "gap.json").write_text(json.dumps(FOUND))
     save_plant(plant(t_delay=0.008), out / "diagnosis" / "plant.json")
-    assert circle(out, "--effect", "command_delay=0.008") == 0
+    assert run_loop(out, "--effect", "command_delay=0.008") == 0
     return out
 
 
-def test_retraining_on_the_true_plant_leaves_nothing_between_promised_and_delivered(finished):
-    rows = json.loads((finished / "circle.json").read_text())["gaps"]
-    promise = {(row["controller"], row["stage"]): row["C1_excursion_bar"] for row in rows}
-    assert promise["hysteresis, extrapolating", BEFORE] > 0.05
-    assert all(promise[name, stage] == 0.0 for name, stage in promise if stage == AFTER)
+def test_retraining_on_the_true_plant_leaves_nothing_between_simulated_and_measured(finished):
+    rows = json.loads((finished / "sim-to-real.json").read_text())["gaps"]
+    gap = {(row["controller"], row["stage"]): row["C1_excursion_bar"] for row in rows}
+    assert gap["hysteresis, extrapolating", BEFORE] > 0.05
+    assert all(gap[name, stage] == 0.0 for name, stage in gap if stage == AFTER)
 
 
 def test_what_is_finished_is_kept(finished):
@@ -126,18 +132,20 @@ def test_what_is_finished_is_kept(finished):
 
     before = times()
     assert len(before) == 6
-    assert circle(finished, "--effect", "command_delay=0.008") == 0
+    assert run_loop(finished, "--effect", "command_delay=0.008") == 0
     assert times() == before
 
 
 def test_a_plant_without_a_named_cause_is_said_to_be_recalibrated_only():
-    assert "command_delay" in said(FOUND, "an effect")
-    assert said({**FOUND, "ambiguity_set": []}, "an effect").endswith("recalibrated only.")
+    assert "command_delay" in diagnosis_text(FOUND, "an effect")
+    assert diagnosis_text({**FOUND, "ambiguity_set": []}, "an effect").endswith("recalibrated only.")
 
 
 def test_another_effect_in_the_same_folder_is_refused(finished):
-    with pytest.raises(ValueError, match=r"holds a circle with effect command_delay=.*, not seat_leak"):
-        circle(finished, "--effect", "seat_leak=1e-7")
+    with pytest.raises(
+        ValueError, match=r"holds a sim-to-real run with effect command_delay=.*, not seat_leak"
+    ):
+        run_loop(finished, "--effect", "seat_leak=1e-7")
 
 
 def test_a_folder_whose_options_are_damaged_is_refused(tmp_path):
@@ -158,17 +166,17 @@ def test_episodes_are_read_back_but_not_those_of_another_version(late, tmp_path)
 
 def test_an_unknown_effect_is_refused_before_anything_is_written(tmp_path):
     with pytest.raises(ValueError, match="unknown effect"):
-        circle(tmp_path, "--effect", "gremlins=3")
+        run_loop(tmp_path, "--effect", "gremlins=3")
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.slow
-def test_the_diagnosis_finds_what_was_withheld_and_mends_the_promise(tmp_path):
-    assert circle(tmp_path, "--effect", "command_delay=0.006") == 0
-    content = json.loads((tmp_path / "circle.json").read_text())
+def test_the_diagnosis_finds_what_was_withheld_and_closes_the_gap(tmp_path):
+    assert run_loop(tmp_path, "--effect", "command_delay=0.006") == 0
+    content = json.loads((tmp_path / "sim-to-real.json").read_text())
     assert content["diagnosis"]["ambiguity_set"] == [["command_delay"]]
     found = content["diagnosis"]["causes"][0]["magnitude"]["t_delay_s"][0]
     assert math.isclose(found, 0.006, rel_tol=0.01)
-    promise = {(row["controller"], row["stage"]): row["C1_excursion_bar"] for row in content["gaps"]}
+    gap = {(row["controller"], row["stage"]): row["C1_excursion_bar"] for row in content["gaps"]}
     name = "hysteresis, extrapolating"
-    assert abs(promise[name, AFTER]) < 0.1 * abs(promise[name, BEFORE])
+    assert abs(gap[name, AFTER]) < 0.1 * abs(gap[name, BEFORE])

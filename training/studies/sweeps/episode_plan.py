@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 from epv_env.plant.plantfile import Plant
 from training.evaluation.seeds import SWEEP_SEED
-from training.studies.sweeps.designs import ONE_AT_A_TIME, Point, hypercube, regions
-from training.studies.sweeps.tasks import Batch
+from training.studies.episode_tasks import Batch
+from training.studies.sweeps.experiment_designs import ONE_AT_A_TIME, Point, hypercube, regions
 from training.studies.sweeps.worst_case_search import Effort, Search
 
-BATCH = 512
+TASK_EPISODES = 512
 """Most episodes of a task: more gain little, and a killed sweep loses what its tasks had begun."""
 
 SEARCHED = ("confidence", "sensitive_ten_percent")
@@ -28,7 +28,7 @@ class Size:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cell:
+class SweepCell:
     """A point under one controller."""
 
     point: Point
@@ -58,10 +58,10 @@ def chosen_points(
     return points
 
 
-def cells(points: Sequence[Point], controllers: Sequence[str], size: Size, seed: int) -> list[Cell]:
+def cells(points: Sequence[Point], controllers: Sequence[str], size: Size, seed: int) -> list[SweepCell]:
     """Every point under every controller, on the same seeds."""
     return [
-        Cell(point=point, controller=name, batches=_batches(point, name, size, seed))
+        SweepCell(point=point, controller=name, batches=_batches(point, name, size, seed))
         for point in points
         for name in controllers
     ]
@@ -75,11 +75,11 @@ def _batches(point: Point, controller: str, size: Size, seed: int) -> list[Batch
             name=f"{point.design}/{point.factor}/{point.level}/{controller}/{begin}",
             controller=controller,
             first_seed=SWEEP_SEED + seed + begin,
-            episodes=min(BATCH, episodes - begin),
+            episodes=min(TASK_EPISODES, episodes - begin),
             options=point.options,
-            parameters=point.parameters[begin : begin + BATCH] if point.parameters else None,
+            parameters=point.parameters[begin : begin + TASK_EPISODES] if point.parameters else None,
         )
-        for begin in range(0, episodes, BATCH)
+        for begin in range(0, episodes, TASK_EPISODES)
     ]
 
 

@@ -11,7 +11,7 @@ from epv_env.plant.plantfile import Plant
 from epv_env.settings import as_region
 from identification.sensitivity.one_at_a_time import changed_values
 from training.studies.sweeps.effect_levels import effect_levels
-from training.studies.sweeps.space import Space
+from training.studies.sweeps.parameter_space import Space
 
 JOINT = ("exact", "confidence", "ten_percent", "sensitive_ten_percent")
 """Regions from which every episode draws a plant of its own."""

@@ -1,4 +1,4 @@
-"""Promised against delivered: the figures of C1 to C3, and by how much the simulation was wrong."""
+"""Simulated against measured: the figures of C1 to C3, and by how much the simulation was wrong."""
 
 from typing import Any
 
@@ -6,8 +6,15 @@ import pandas as pd
 
 from training.evaluation.metrics import summary
 from training.evaluation.statistics import mean_interval
-from training.studies.page_parts import markdown
-from training.studies.sim_to_real.deployment import AROUND, DELIVERED, ITSELF, PROMISED, metrics_of
+from training.studies.generated_pages import markdown
+from training.studies.sim_to_real.deployment import (
+    AROUND,
+    ITSELF,
+    MEASURED,
+    PLACE_NAMES,
+    SIMULATED,
+    metrics_of,
+)
 
 KEYS = ["controller", "stage", "place"]
 
@@ -32,33 +39,33 @@ GAPS = {
 ENDS = ("low", "high")
 
 
-def end_of(name: str, end: str) -> str:
+def interval_column(name: str, end: str) -> str:
     """Name of an end of a figure's interval, as `summary` writes it: the unit comes last."""
     stem = name.removesuffix("_bar")
     return f"{stem}_{end}{name[len(stem) :]}"
 
 
-def figures(episodes: pd.DataFrame) -> pd.DataFrame:
+def performance_table(episodes: pd.DataFrame) -> pd.DataFrame:
     """The figures of C1 to C3 with their 95 % intervals (`summary`).
 
     episodes: rows of `deployed` with their stage. Returns a row per controller, stage and place:
-    the figures, and the ends of their intervals (`end_of`) where they have one.
+    the figures, and the ends of their intervals (`interval_column`) where they have one.
     """
     rows = []
     for _, group in episodes.groupby(KEYS, sort=False):
-        of = {plants: summary(metrics_of(part)) for plants, part in group.groupby("plants")}
+        summaries = {plants: summary(metrics_of(part)) for plants, part in group.groupby("plants")}
         row: dict[str, Any] = {key: group[key].iloc[0] for key in KEYS}
         for name, (plants, source, _) in FIGURES.items():
-            row[name] = of[plants][source]
+            row[name] = summaries[plants][source]
             for end in ENDS:
-                if end_of(source, end) in of[plants]:
-                    row[end_of(name, end)] = of[plants][end_of(source, end)]
+                if interval_column(source, end) in summaries[plants]:
+                    row[interval_column(name, end)] = summaries[plants][interval_column(source, end)]
         rows.append(row)
     return _by_controller(rows)
 
 
-def gaps(episodes: pd.DataFrame) -> pd.DataFrame:
-    """Delivered minus promised, episode by episode under the same random numbers, on average [bar].
+def gap_table(episodes: pd.DataFrame) -> pd.DataFrame:
+    """Measured minus simulated, episode by episode under the same random numbers, on average [bar].
 
     Returns a row per controller and stage; 95 % intervals by bootstrap over the episodes.
     """
@@ -68,29 +75,33 @@ def gaps(episodes: pd.DataFrame) -> pd.DataFrame:
         for name, (plants, field, _) in GAPS.items():
             part = group.loc[group["plants"] == plants]
             table = part.pivot(index="episode", columns="place", values=field)
-            difference = (table[DELIVERED] - table[PROMISED]).to_numpy()
+            difference = (table[MEASURED] - table[SIMULATED]).to_numpy()
             row[name] = float(difference.mean())
-            row |= dict(zip(_ends(name), mean_interval(difference), strict=True))
+            row |= dict(zip(_interval_columns(name), mean_interval(difference), strict=True))
         rows.append(row)
     return _by_controller(rows)
 
 
 def as_markdown(aims: pd.DataFrame, differences: pd.DataFrame) -> str:
-    """Both tables as they are printed and stand in docs/circle.md."""
-    shown = aims.loc[:, [*KEYS, *FIGURES]]
+    """Both tables as they are printed and stand in docs/results/sim-to-real.md.
+
+    aims: rows of `performance_table`; differences: rows of `gap_table`.
+    """
+    shown = aims.loc[:, [*KEYS, *FIGURES]].assign(place=aims["place"].map(PLACE_NAMES))
     for name in ("C1_stayed", "C3_stayed"):
         shown[name] = [
             f"{value:.1%} ({low:.1%} to {high:.1%})"
-            for value, low, high in aims.loc[:, [name, *_ends(name)]].to_numpy()
+            for value, low, high in aims.loc[:, [name, *_interval_columns(name)]].to_numpy()
         ]
     headings = {name: heading for name, (_, _, heading) in FIGURES.items()}
-    apart = differences.loc[:, KEYS[:2]]
+    gaps = differences.loc[:, KEYS[:2]]
     for name, (_, _, heading) in GAPS.items():
-        apart[f"{heading} [mbar]"] = [
+        columns = [name, *_interval_columns(name)]
+        gaps[f"{heading} [mbar]"] = [
             f"{value:+.0f} ({low:+.0f} to {high:+.0f})"
-            for value, low, high in (1e3 * differences.loc[:, [name, *_ends(name)]]).to_numpy()
+            for value, low, high in (1e3 * differences.loc[:, columns]).to_numpy()
         ]
-    return f"{_table(shown.rename(columns=headings))}\n\n{_table(apart)}"
+    return f"{_table(shown.rename(columns=headings))}\n\n{_table(gaps)}"
 
 
 def _by_controller(rows: list[dict[str, Any]]) -> pd.DataFrame:
@@ -99,8 +110,8 @@ def _by_controller(rows: list[dict[str, Any]]) -> pd.DataFrame:
     return pd.DataFrame(sorted(rows, key=lambda row: order.index(row["controller"])))
 
 
-def _ends(name: str) -> list[str]:
-    return [end_of(name, end) for end in ENDS]
+def _interval_columns(name: str) -> list[str]:
+    return [interval_column(name, end) for end in ENDS]
 
 
 def _table(rows: pd.DataFrame) -> str:

@@ -7,13 +7,18 @@ from typing import Any
 
 from epv_env.common.files import write_text
 from training.evaluation.rollout import Trace
-from training.studies.page_parts import fill
-from training.studies.sweeps.cost import MACHINES
-from training.studies.sweeps.plan import Cell
-from training.studies.sweeps.results import hypercube_table, point_table
-from training.studies.sweeps.run import Outcome
-from training.studies.sweeps.tables import cost_table, harm_table, joint_table, worst_table
-from training.studies.sweeps.tasks import Study
+from training.studies.episode_tasks import Study
+from training.studies.generated_pages import fill
+from training.studies.parallel_run import Outcome
+from training.studies.sweeps.computing_cost import MACHINES
+from training.studies.sweeps.episode_plan import SweepCell
+from training.studies.sweeps.markdown_tables import (
+    cost_table,
+    harmful_changes_table,
+    joint_table,
+    worst_table,
+)
+from training.studies.sweeps.result_tables import point_table, rank_correlation_table
 from training.studies.sweeps.worst_case_search import Search
 
 FORMAT = "epv-sweep/1"
@@ -25,21 +30,21 @@ PARTS = ("joint", "one at a time", "worst", "cost")
 def report(
     folder: Path,
     config: dict[str, Any],
-    cells: Sequence[Cell],
+    cells: Sequence[SweepCell],
     searches: Sequence[Search],
     outcomes: Mapping[str, Outcome],
     study: Study,
-    spent: Mapping[str, Any],
+    cost_estimate: Mapping[str, Any],
     *,
     images: Path | None = None,
     pages: Sequence[Path] = (),
 ) -> str:
     """Write tables, results.json and figures into the folder; returns the tables to print.
 
-    spent: `cost.cost`. images: another folder for the figures, for documents. pages: Markdown
+    cost_estimate: `cost.cost`. images: another folder for the figures, for documents. pages: Markdown
     files whose generated PARTS are written.
     """
-    points, ranks = point_table(cells, outcomes), hypercube_table(cells, outcomes)
+    points, ranks = point_table(cells, outcomes), rank_correlation_table(cells, outcomes)
     worst = [
         {"controller": each.controller, "region": each.region, **outcomes[each.name]["result"]}
         for each in searches
@@ -65,9 +70,9 @@ def report(
             plots.worst_episodes(worst, traces, study.plant.parameters, place / "robustness-worst.png")
     texts = {
         "joint": joint_table(points),
-        "one at a time": harm_table(points),
+        "one at a time": harmful_changes_table(points),
         "worst": worst_table(worst, study.plant.parameters),
-        "cost": cost_table(spent, MACHINES),
+        "cost": cost_table(cost_estimate, MACHINES),
     }
     for page in pages:
         fill(page, texts)

@@ -8,9 +8,10 @@ import pandas as pd
 from controllers.tuned import load_search, load_tunings
 from training.evaluation.controller_table import PLANTS
 from training.evaluation.scenarios import EVALUATION, NAMED
-from training.studies.comparison.acceptance_criteria import Bar
-from training.studies.comparison.scores import FRONT, SCORES, Contest, records
-from training.studies.page_parts import markdown
+from training.studies.comparison.acceptance_criteria import Criterion
+from training.studies.comparison.score_tables import FRONT, SCORES, ComparisonResults
+from training.studies.generated_pages import markdown
+from training.studies.result_files import records
 
 FIGURES = {
     "C1 worst [bar]": "C1_worst_excursion_bar",
@@ -27,19 +28,21 @@ FIGURES = {
 
 
 def results_table(table: pd.DataFrame) -> str:
-    """The main table: rows of `scores.figures`."""
-    headings = ["plants", "controller", "episodes", "C1 left the band (95 % interval)", *FIGURES]
+    """The main table: rows of `score_tables.figures`."""
+    headings = ["plants", "controller", "episodes", "C1 violation rate (95 % interval)", *FIGURES]
     rows, last = [], ""
     for row in records(table):
         figures = [" / ".join(f"{row[k]:.3f}" for k in keys.split("/")) for keys in FIGURES.values()]
         plants = row["plants"] if row["plants"] != last else ""
         last = row["plants"]
-        rows.append([plants, row["controller"], str(row["episodes"]), left(row), *figures])
+        rows.append(
+            [plants, row["controller"], str(row["episodes"]), violation_rate_text(row), *figures]
+        )
     return markdown(headings, rows)
 
 
-def left(row: dict[str, float]) -> str:
-    """Share of the episodes that left the band, with its interval."""
+def violation_rate_text(row: dict[str, float]) -> str:
+    """Violation rate: share of the episodes that left target ±500 mbar, with its interval."""
     shares = (100 * (1 - row[k]) for k in ("C1_stayed", "C1_stayed_high", "C1_stayed_low"))
     return "{:.2f} % ({:.2f} to {:.2f} %)".format(*shares)
 
@@ -70,7 +73,7 @@ def iqm_table(means: pd.DataFrame) -> str:
     return markdown(["plants", "controller", *SCORES.values()], rows)
 
 
-def duel_table(found: pd.DataFrame, ours: str) -> str:
+def paired_comparison_table(found: pd.DataFrame, ours: str) -> str:
     """Paired differences, and the probability that ours is better."""
     rows = []
     for (plants, rival), cells in _grouped(found, "rival").items():
@@ -91,14 +94,18 @@ def _grouped(table: pd.DataFrame, who: str) -> dict[tuple[str, str], list[dict[s
     return groups
 
 
-def bar_table(found: Sequence[Bar], lost: Sequence[dict[str, str | float]]) -> str:
-    """The requirements, and where a model-based rival is better."""
-    rows = [[b.controller, b.bar, b.measured, "yes" if b.met else "**no**"] for b in found]
-    return markdown(["controller", "bar", "measured", "met?"], rows) + "\n\n" + lost_text(lost)
+def criteria_table(criteria: Sequence[Criterion], lost: Sequence[dict[str, str | float]]) -> str:
+    """The acceptance criteria, and where a model-based rival is better."""
+    rows = [[b.controller, b.requirement, b.measured, "yes" if b.met else "**no**"] for b in criteria]
+    headings = ["controller", "acceptance criterion", "measured", "met?"]
+    return markdown(headings, rows) + "\n\n" + lost_text(lost)
 
 
 def lost_text(lost: Sequence[dict[str, str | float]]) -> str:
-    """Where a model-based rival is better."""
+    """Where a model-based rival is better, as a table.
+
+    lost: rows of `lost_to_model_based`.
+    """
     if not lost:
         return "No model-based rival is better in any scenario."
     rows = [
@@ -112,7 +119,7 @@ def lost_text(lost: Sequence[dict[str, str | float]]) -> str:
     return "Where a model-based rival is better:\n\n" + markdown(headings, rows)
 
 
-def trade_table(traded: pd.DataFrame) -> str:
+def trade_off_table(traded: pd.DataFrame) -> str:
     """Switching against the figures of FRONT; bold: on the Pareto front."""
     rows = []
     for row in records(traded.sort_values("switchings_per_s")):
@@ -126,7 +133,7 @@ def trade_table(traded: pd.DataFrame) -> str:
     return markdown(headings, rows)
 
 
-def budget_text(c: Contest) -> str:
+def budget_text(c: ComparisonResults) -> str:
     """What the controllers were given to be at their best."""
     search, tunings = load_search(), load_tunings()
     efforts: dict[tuple[int, int], list[str]] = {}
@@ -147,7 +154,7 @@ def budget_text(c: Contest) -> str:
     return text
 
 
-def episodes_text(c: Contest) -> str:
+def episodes_text(c: ComparisonResults) -> str:
     """How many episodes stand behind the scenarios' figures, and who ran fewer."""
     text = []
     for contender in c.contenders:

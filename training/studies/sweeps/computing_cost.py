@@ -6,18 +6,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from training.studies.sweeps.plan import BATCH, Cell
-from training.studies.sweeps.run import Map, Outcome
-from training.studies.sweeps.tasks import Study
+from training.studies.episode_tasks import Study
+from training.studies.parallel_run import Outcome, TaskRunner
+from training.studies.sweeps.episode_plan import TASK_EPISODES, SweepCell
 
 MILLION = 1_000_000
 MACHINES = 100
-IDLE = 200
+EMPTY_TASKS = 200
 """Empty tasks that tell what handing one out takes."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Idle:
+class EmptyTask:
     """A task that does nothing."""
 
     name: str
@@ -28,9 +28,9 @@ class Idle:
         return {}
 
 
-def overhead(run: Map, study: Study) -> float:
+def overhead(run: TaskRunner, study: Study) -> float:
     """Time from one empty task to the next [s]: how fast tasks can be handed out, whatever they do."""
-    idle = [Idle(name=str(k)) for k in range(IDLE)]
+    idle = [EmptyTask(name=str(k)) for k in range(EMPTY_TASKS)]
     for _ in run(idle, study):  # starts the workers: those without work stop after minutes
         pass
     began = time.perf_counter()
@@ -38,7 +38,7 @@ def overhead(run: Map, study: Study) -> float:
     return (time.perf_counter() - began) / done
 
 
-def episode_cpu(cells: Sequence[Cell], outcomes: Mapping[str, Outcome]) -> dict[str, float]:
+def episode_cpu(cells: Sequence[SweepCell], outcomes: Mapping[str, Outcome]) -> dict[str, float]:
     """Core time of an episode by controller [s], over the sweep's largest batches."""
     batches = [batch for cell in cells for batch in cell.batches]
     largest = max((batch.episodes for batch in batches), default=0)
@@ -57,7 +57,7 @@ def million(cpu_s: float, overhead_s: float, *, cores: int, machines: int) -> fl
 
     As if no task began before all were handed out: an upper bound of what handing out adds.
     """
-    return MILLION * cpu_s / (cores * machines) + math.ceil(MILLION / BATCH) * overhead_s
+    return MILLION * cpu_s / (cores * machines) + math.ceil(MILLION / TASK_EPISODES) * overhead_s
 
 
 def cost(
@@ -68,7 +68,7 @@ def cost(
         "episode_duration_s": duration,
         "cores_of_a_machine": cores,
         "tasks_handed_out_by": where,
-        "episodes_of_a_task": BATCH,
+        "episodes_of_a_task": TASK_EPISODES,
         "overhead_of_a_task_s": overhead_s,
         "controllers": {
             name: {

@@ -1,4 +1,4 @@
-"""The picture of the circle: promised against delivered, before and after. Matplotlib only here."""
+"""The picture of the sim-to-real loop: simulated against measured, before and after."""
 
 import numpy as np
 import pandas as pd
@@ -7,8 +7,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from training.evaluation.plots import COLOURS, plt
-from training.studies.sim_to_real.aims import ENDS, end_of
-from training.studies.sim_to_real.deployment import AFTER, BEFORE, DELIVERED, PROMISED
+from training.studies.sim_to_real.deployment import AFTER, BEFORE, MEASURED, SIMULATED
+from training.studies.sim_to_real.performance_tables import ENDS, interval_column
 
 PANELS = {
     "C1_stayed": ("C1: episodes that stay\nwithin ±500 mbar [%]", 100.0),
@@ -19,15 +19,15 @@ PANELS = {
 """Label and factor of each panel, by its column in `figures`."""
 
 STAGES = {BEFORE: "before:\nnominal plant", AFTER: "after:\ncorrected plant"}
-MARKERS = {PROMISED: "o", DELIVERED: "s"}
+MARKERS = {SIMULATED: "o", MEASURED: "s"}
 APART, SHIFT = 0.2, 0.05
-"""Distances on the x-axis: between controllers, and from promised to delivered."""
+"""Distances on the x-axis: between controllers, and from simulated to measured."""
 
 
-def circle_figure(aims: pd.DataFrame) -> Figure:
-    """Open circles: promised by the simulation; full squares: delivered by the bench's valve.
+def performance_figure(aims: pd.DataFrame) -> Figure:
+    """Open circles: simulated; full squares: measured on the bench's valve.
 
-    aims: rows of `circle_aims.figures`. The line between the two is the gap; bars are 95 % intervals.
+    aims: rows of `performance_table`. The line between the two is the gap; bars are 95 % intervals.
     """
     figure, panels = plt.subplots(1, len(PANELS), figsize=(13, 4.2), layout="constrained")
     names = list(dict.fromkeys(aims["controller"]))
@@ -40,8 +40,8 @@ def circle_figure(aims: pd.DataFrame) -> Figure:
         axes.grid(alpha=0.3, axis="y")
     handles = [Line2D([], [], color=c, lw=3, label=n) for n, c in zip(names, COLOURS, strict=False)]
     handles += [
-        Line2D([], [], color="0.2", ls="", marker="o", mfc="white", label="promised (simulation)"),
-        Line2D([], [], color="0.2", ls="", marker="s", label="delivered (bench)"),
+        Line2D([], [], color="0.2", ls="", marker="o", mfc="white", label="simulated"),
+        Line2D([], [], color="0.2", ls="", marker="s", label="measured (bench)"),
     ]
     figure.legend(handles=handles, fontsize=9, ncols=len(handles), loc="outside upper center")
     return figure
@@ -50,16 +50,16 @@ def circle_figure(aims: pd.DataFrame) -> Figure:
 def _draw(
     axes: Axes, rows: pd.DataFrame, column: str, factor: float, offset: float, colour: str
 ) -> None:
-    """One controller's points, promised and delivered, before and after."""
+    """One controller's points, simulated and measured, before and after."""
     rows = rows.set_index(["stage", "place"])
     for x, stage in enumerate(STAGES):
-        places = {PROMISED: x + offset - SHIFT, DELIVERED: x + offset + SHIFT}
+        places = {SIMULATED: x + offset - SHIFT, MEASURED: x + offset + SHIFT}
         values = {place: factor * rows.loc[(stage, place), column] for place in places}
         axes.plot(list(places.values()), list(values.values()), color=colour, lw=1.2, alpha=0.7)
         for place, at in places.items():
             row, value = rows.loc[(stage, place)], values[place]
-            ends = factor * np.array([row.get(end_of(column, e), value / factor) for e in ENDS])
+            ends = factor * np.array([row.get(interval_column(column, e), value / factor) for e in ENDS])
             axes.errorbar(
                 at, value, yerr=np.abs(ends - value)[:, None], fmt=MARKERS[place], color=colour,
-                mfc="white" if place == PROMISED else colour, ms=6, capsize=2, lw=1.0,
+                mfc="white" if place == SIMULATED else colour, ms=6, capsize=2, lw=1.0,
             )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The comparison's figures. Each takes tables of scores.py and gives a Figure."""
+"""The comparison's figures. Each takes tables of score_tables.py and gives a Figure."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,25 +11,26 @@ from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 
 from epv_env.reward import BAND_BAR
 from training.evaluation.plots import COLOURS, plt
-from training.studies.comparison.scores import FRONT, HIGHER_IS_BETTER, JUDGED_ON, SCORES, records
+from training.studies.comparison.score_tables import FRONT, HIGHER_IS_BETTER, JUDGED_ON, SCORES
+from training.studies.result_files import records
 
 HIGHEST_BAR = 1.0
 """Top of the trade-off's pressure axes; points above it are in its table."""
 
-HEATED = {
-    "C1_left": ("episodes that left ±500 mbar [%]", 100.0, ".0f"),
+HEAT_MAPS = {
+    "C1_left": ("violation rate of ±500 mbar [%]", 100.0, ".0f"),
     "rms_error_bar": ("rms error [mbar]", 1e3, ".0f"),
 }
 """Label, factor and format of each heat map."""
 
 
 def scenario_maps(rows: pd.DataFrame, plants: str) -> Figure:
-    """A cell per scenario and controller: how often the band was left, and the rms error."""
+    """A cell per scenario and controller: the violation rate, and the rms error."""
     rows = rows.loc[rows["plants"] == plants].assign(C1_left=lambda r: 1 - r["C1_stayed"])
     names, scenarios = rows["controller"].unique(), rows["scenario"].unique()
     size = (13, 1.2 + 0.33 * len(scenarios))
-    figure, panels = plt.subplots(1, len(HEATED), figsize=size, layout="constrained", sharey=True)
-    for axes, (column, (label, factor, spec)) in zip(panels, HEATED.items(), strict=True):
+    figure, panels = plt.subplots(1, len(HEAT_MAPS), figsize=size, layout="constrained", sharey=True)
+    for axes, (column, (label, factor, spec)) in zip(panels, HEAT_MAPS.items(), strict=True):
         cells = factor * rows.pivot(index="scenario", columns="controller", values=column)
         cells = cells.loc[scenarios, names]
         top = max(float(np.nanquantile(cells, 0.8)), 1e-9)  # one bad controller must not bleach the rest
@@ -54,8 +55,8 @@ def aggregate(means: pd.DataFrame) -> Figure:
         for axes, (score, label) in zip(row, SCORES.items(), strict=True):
             own = means.loc[(means["plants"] == plants) & (means["score"] == score)]
             for k, name in enumerate(names):
-                found = records(own.loc[own["controller"] == name])[0]
-                _interval(axes, k, found, "value", COLOURS[k % len(COLOURS)])
+                row_of_name = records(own.loc[own["controller"] == name])[0]
+                _interval(axes, k, row_of_name, "value", COLOURS[k % len(COLOURS)])
             better = "higher" if score in HIGHER_IS_BETTER else "lower"
             axes.set_xlabel(f"{label}\n({better} is better)", fontsize=8)
             axes.grid(alpha=0.3, axis="x")
@@ -73,15 +74,15 @@ def _interval(axes: Axes, y: float, row: dict[str, Any], name: str, colour: str)
     axes.errorbar(value, y, xerr=ends, fmt="o", ms=4, capsize=3, color=colour)
 
 
-def duel_figure(found: pd.DataFrame, ours: str) -> Figure:
+def paired_comparison_figure(table: pd.DataFrame, ours: str) -> Figure:
     """Probability that ours is the better one in an episode both meet, and the paired differences."""
     shown = [score for score in SCORES if score != "episode_return"]
-    rivals = list(found["rival"].unique())
+    rivals = list(table["rival"].unique())
     size = (14, 1.6 + 0.4 * len(rivals))
     figure, panels = plt.subplots(1, len(shown) + 1, figsize=size, sharey=True, layout="constrained")
     shifts = np.linspace(-0.15, 0.15, len(JUDGED_ON))
     for plants, shift, colour in zip(JUDGED_ON, shifts, COLOURS, strict=False):
-        own = {(r["rival"], r["score"]): r for r in records(found) if r["plants"] == plants}
+        own = {(r["rival"], r["score"]): r for r in records(table) if r["plants"] == plants}
         for k, rival in enumerate(rivals):
             for axes, score in zip(panels, shown, strict=False):
                 _interval(axes, k + shift, own[rival, score], "difference", colour)
@@ -101,7 +102,7 @@ def duel_figure(found: pd.DataFrame, ours: str) -> Figure:
     return figure
 
 
-def trade_figure(traded: pd.DataFrame) -> Figure:
+def trade_off_figure(traded: pd.DataFrame) -> Figure:
     """Excursion, breakdown and rms error over switchings; the line is the Pareto front.
 
     Small numbers: prices of switching, where there are several. What lies above a panel is named there.

@@ -9,12 +9,12 @@ from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.scenarios import RANDOM, TUNING_REGION
 
 BOUNDED = ("confidence", "sensitive_ten_percent")
-"""Plant sets on which the probability of leaving the band is bounded: many random episodes."""
+"""Plant sets on which the violation rate is bounded: many random episodes."""
 
-TRADED_ON = "sensitive_ten_percent"
+TRADE_OFF_ON = "sensitive_ten_percent"
 """Plant set on which switching is set against excursion."""
 
-BARS_ON = "calibrated"
+CRITERIA_ON = "calibrated"
 """Plant set on which figures are set against each rival's at equal or fewer switchings."""
 
 TUNING = "tuning"
@@ -29,12 +29,12 @@ class Expense(NamedTuple):
     fewer: int
     """How many times fewer episodes it runs: the first of the others', so that the pairing holds."""
     random: int
-    """But of the random scenario at least so many where figures are set against each other (BARS_ON,
-    TRADED_ON), if the others run as many."""
+    """But of the random scenario at least so many where figures are set against each other (CRITERIA_ON,
+    TRADE_OFF_ON), if the others run as many."""
 
     def episodes(self, plants: str, scenario: str, wanted: int) -> int:
         """How many it runs where the others run so many."""
-        least = self.random if scenario == RANDOM and plants in (BARS_ON, TRADED_ON) else 0
+        least = self.random if scenario == RANDOM and plants in (CRITERIA_ON, TRADE_OFF_ON) else 0
         return max(-(-wanted // self.fewer), min(wanted, least))
 
 

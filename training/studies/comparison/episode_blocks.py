@@ -14,23 +14,23 @@ from training.evaluation.controller_table import PLANTS, plant_region
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.scenarios import EVALUATION, RANDOM, TUNING_REGION
 from training.evaluation.seeds import EVALUATION_SEED, TUNING_SEED
-from training.studies.comparison.plan import (
-    BARS_ON,
+from training.studies.comparison.contenders import (
     CHEAP,
+    CRITERIA_ON,
     EXPENSIVE,
-    TRADED_ON,
+    TRADE_OFF_ON,
     TUNING,
     Contender,
     Expense,
     Results,
     Sizes,
 )
-from training.studies.sweeps.tasks import Study
+from training.studies.episode_tasks import Study
 
-LARGEST_BLOCK = 512
+BLOCK_EPISODES = 512
 """Episodes side by side; larger batches are hardly faster, smaller ones resume in finer steps."""
 
-OF_EACH = ("scenario", "target_bar")
+EPISODE_OPTIONS = ("scenario", "target_bar")
 """Options that may differ from episode to episode of a block. A supply might, but then costs more."""
 
 
@@ -52,7 +52,7 @@ class Block:
     """Its fingerprint: what an earlier version found is not taken for this one's."""
     plants: str
     scenarios: tuple[str, ...]
-    """Their options are the same but for OF_EACH."""
+    """Their options are the same but for EPISODE_OPTIONS."""
     first_seed: int
     count: int
     """Of each scenario."""
@@ -74,7 +74,7 @@ class Block:
     def run(self, study: Study) -> dict[str, Any]:
         """Every figure of every episode, one scenario after another, ready for JSON."""
         asked = [_options(scenario) for scenario in self.scenarios]
-        differing = [o for o in OF_EACH if any(own.get(o) != asked[0].get(o) for own in asked)]
+        differing = [o for o in EPISODE_OPTIONS if any(own.get(o) != asked[0].get(o) for own in asked)]
         common = {name: value for name, value in asked[0].items() if name not in differing}
         common["parameters"] = plant_region(self.plants, study.plant)
         each = {o: [own.get(o) for own in asked for _ in range(self.count)] for o in differing}
@@ -93,53 +93,53 @@ def plan(contenders: list[Contender], scenarios: list[str], sizes: Sizes) -> lis
     blocks = []
     for contender in contenders:
         expense = EXPENSIVE.get(contender.name, CHEAP)
-        together = _alike(_cases(contender, scenarios, sizes), expense)
+        together = _sharing_blocks(_cases(contender, scenarios, sizes), expense)
         for run_name, controller in contender.runs.items():
             own = partial(Block, run_name=run_name, version=fingerprint(controller), cost=expense.times)
             for (plants, first, count, _), alike in together.items():
-                blocks += _cut(partial(own, plants=plants), alike, first, count)
+                blocks += _blocks_of(partial(own, plants=plants), alike, first, count)
     return blocks
 
 
 def _cases(contender: Contender, scenarios: list[str], sizes: Sizes) -> dict[tuple[str, str], int]:
     """Episodes of each run by plant set and scenario."""
     if contender.price is not None:
-        return {(plants, RANDOM): sizes.random for plants in (TRADED_ON, BARS_ON)}
+        return {(plants, RANDOM): sizes.random for plants in (TRADE_OFF_ON, CRITERIA_ON)}
     cases = {(p, scenario): sizes.of(p, scenario) for p in PLANTS for scenario in scenarios}
     if len(contender.runs) > 1:
         cases[TUNING_REGION, TUNING] = sizes.tuning
     return cases
 
 
-def _alike(
+def _sharing_blocks(
     cases: dict[tuple[str, str], int], expense: Expense
 ) -> dict[tuple[str, int, int, str], list[str]]:
-    """Scenarios that can share blocks, by plant set, first seed, episodes, and options but OF_EACH."""
+    """Scenarios that can share blocks, by plant set, first seed, episodes, and their other options."""
     together: dict[tuple[str, int, int, str], list[str]] = {}
     for (plants, scenario), wanted in cases.items():
         first = TUNING_SEED if scenario == TUNING else EVALUATION_SEED
-        others = {name: v for name, v in _options(scenario).items() if name not in OF_EACH}
+        others = {name: v for name, v in _options(scenario).items() if name not in EPISODE_OPTIONS}
         key = plants, first, expense.episodes(plants, scenario, wanted), repr(others)
         together.setdefault(key, []).append(scenario)
     return together
 
 
-def _cut(block: Callable[..., Block], scenarios: list[str], first: int, count: int) -> list[Block]:
+def _blocks_of(block: Callable[..., Block], scenarios: list[str], first: int, count: int) -> list[Block]:
     """Blocks that hold `count` episodes of each scenario."""
     if count == 0:
         return []
-    together = max(LARGEST_BLOCK // count, 1)
+    together = max(BLOCK_EPISODES // count, 1)
     return [
         block(
             scenarios=tuple(scenarios[k : k + together]),
-            first_seed=first + begin, count=min(LARGEST_BLOCK, count - begin),
+            first_seed=first + begin, count=min(BLOCK_EPISODES, count - begin),
         )
         for k in range(0, len(scenarios), together)
-        for begin in range(0, count, LARGEST_BLOCK)
+        for begin in range(0, count, BLOCK_EPISODES)
     ]  # fmt: skip
 
 
-def collect(blocks: list[Block], found: Mapping[str, dict[str, Any]]) -> Results:
+def joined_results(blocks: list[Block], found: Mapping[str, dict[str, Any]]) -> Results:
     """The blocks' episodes put together. found: what each block's `run` gave, by its name."""
     parts: dict[tuple[str, str, str], list[EpisodeMetrics]] = {}
     for block in blocks:

@@ -13,7 +13,7 @@ from epv_env.plant.plantfile import Plant
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.rollout import Trace, run_episodes
 
-MICROBAR = 6
+EXCURSION_DECIMALS = 6
 """Decimals of an excursion that is kept [bar]."""
 
 
@@ -99,7 +99,7 @@ def condensed(metrics: EpisodeMetrics) -> dict[str, Any]:
     return {
         "episodes": n,
         "left": int(n - metrics.stayed.sum()),
-        "excursion_bar": np.round(metrics.excursion_bar, MICROBAR).tolist(),
+        "excursion_bar": np.round(metrics.excursion_bar, EXCURSION_DECIMALS).tolist(),
         "figures": {
             name: _sums(values.astype(float))
             for name, values in columns.items()

@@ -1,4 +1,4 @@
-"""From tasks' outcomes to tables: leaving probability with its interval, excursions, other figures."""
+"""From tasks' outcomes to tables: violation rate with its interval, excursions, other figures."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -8,14 +8,14 @@ import pandas as pd
 from scipy.stats import spearmanr
 
 from training.evaluation.metrics import left_interval, tail_excursion
-from training.studies.sweeps.plan import Cell
-from training.studies.sweeps.run import Outcome
+from training.studies.parallel_run import Outcome
+from training.studies.sweeps.episode_plan import SweepCell
 
 FIGURES = ("breakdown_bar", "recovery_s", "rms_bar", "switchings_per_s", "vented_g_per_s")
 """Figures of an episode that the table holds beside the excursion (training/evaluation/metrics.py)."""
 
 
-def point_table(cells: Sequence[Cell], outcomes: Mapping[str, Outcome]) -> pd.DataFrame:
+def point_table(cells: Sequence[SweepCell], outcomes: Mapping[str, Outcome]) -> pd.DataFrame:
     """One row for each point and controller.
 
     `left` is the share of episodes that left the band, with its exact 95 % interval; `worst_seed` the
@@ -24,11 +24,11 @@ def point_table(cells: Sequence[Cell], outcomes: Mapping[str, Outcome]) -> pd.Da
     return pd.DataFrame([_row(cell, _parts(cell, outcomes)) for cell in cells])
 
 
-def _parts(cell: Cell, outcomes: Mapping[str, Outcome]) -> list[dict[str, Any]]:
+def _parts(cell: SweepCell, outcomes: Mapping[str, Outcome]) -> list[dict[str, Any]]:
     return [outcomes[batch.name]["result"] for batch in cell.batches]
 
 
-def _row(cell: Cell, parts: list[dict[str, Any]]) -> dict[str, Any]:
+def _row(cell: SweepCell, parts: list[dict[str, Any]]) -> dict[str, Any]:
     excursion = np.concatenate([part["excursion_bar"] for part in parts])
     n, left = len(excursion), sum(part["left"] for part in parts)
     low, high = left_interval(np.arange(n) >= left)
@@ -56,7 +56,7 @@ def _figure(name: str, parts: list[dict[str, Any]]) -> dict[str, float]:
     return {f"{name}_mean": mean, f"{name}_greatest": max(greatest, default=float("nan"))}
 
 
-def hypercube_table(cells: Sequence[Cell], outcomes: Mapping[str, Outcome]) -> pd.DataFrame:
+def rank_correlation_table(cells: Sequence[SweepCell], outcomes: Mapping[str, Outcome]) -> pd.DataFrame:
     """Spearman's rank correlation of each parameter with the excursion, over a Latin hypercube.
 
     `p_value`: of no association; a row for each parameter and controller.

@@ -11,9 +11,9 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from epv_env.common.journal import Journal
-from training.studies.sweeps.tasks import Study, Task
+from training.studies.episode_tasks import Study, Task
 
-WAIT = 60
+CLUSTER_TIMEOUT = 60
 """Longest wait for a cluster's first worker [s]."""
 
 
@@ -25,12 +25,12 @@ class Outcome(TypedDict):
     """Time that its thread computed [s]."""
 
 
-Map = Callable[[Iterable[Task], Study], Iterator[tuple[str, Outcome]]]
+TaskRunner = Callable[[Iterable[Task], Study], Iterator[tuple[str, Outcome]]]
 """Runs tasks side by side; yields name and outcome in the order in which they finish."""
 
 
 def run_tasks(
-    tasks: Sequence[Task], study: Study, journal: Journal, run: Map, *, what: str
+    tasks: Sequence[Task], study: Study, journal: Journal, run: TaskRunner, *, what: str
 ) -> dict[str, Outcome]:
     """Outcomes by name, in the order of the tasks; those in the journal are not run again.
 
@@ -50,7 +50,7 @@ def run_tasks(
 
 
 @contextmanager
-def workplace(workers: int, cluster: str | None) -> Iterator[Map]:
+def task_runner(workers: int, cluster: str | None) -> Iterator[TaskRunner]:
     """Where tasks run: as many processes of this machine, or a Dask cluster by its address.
 
     Processes, not threads: most of an episode is NumPy on short arrays, which holds Python's lock.
@@ -62,7 +62,7 @@ def workplace(workers: int, cluster: str | None) -> Iterator[Map]:
     from distributed import Client  # takes a second to import: only now
 
     try:
-        client = Client(cluster, timeout=f"{WAIT}s")
+        client = Client(cluster, timeout=f"{CLUSTER_TIMEOUT}s")
     except (OSError, ValueError) as error:
         raise ValueError(
             f"no Dask scheduler answers at {cluster} ({error}): start one with `dask scheduler` and "
@@ -70,19 +70,19 @@ def workplace(workers: int, cluster: str | None) -> Iterator[Map]:
         ) from None
     with client:
         try:
-            client.wait_for_workers(1, timeout=WAIT)
+            client.wait_for_workers(1, timeout=CLUSTER_TIMEOUT)
         except TimeoutError:
             raise ValueError(
-                f"the scheduler at {cluster} has no worker after {WAIT} s: start `dask worker {cluster} "
-                "--nthreads 1 --nworkers auto` on each machine"
+                f"the scheduler at {cluster} has no worker after {CLUSTER_TIMEOUT} s: start `dask "
+                f"worker {cluster} --nthreads 1 --nworkers auto` on each machine"
             ) from None
         yield lambda tasks, study: _on_cluster(client, tasks, study)
 
 
-def _on_cores(workers: int) -> Map:
+def _on_cores(workers: int) -> TaskRunner:
     def run(tasks: Iterable[Task], study: Study) -> Iterator[tuple[str, Outcome]]:
         pool: Any = Parallel(n_jobs=workers, return_as="generator_unordered")
-        yield from pool(delayed(_work)(task, study) for task in tasks)
+        yield from pool(delayed(_run_one)(task, study) for task in tasks)
 
     return run
 
@@ -91,8 +91,8 @@ def _on_cluster(client: Any, tasks: Iterable[Task], study: Study) -> Iterator[tu
     """A task whose worker dies is run again elsewhere, and so is the one that holds the study."""
     from distributed import as_completed
 
-    shared = client.submit(_itself, study, pure=False)
-    futures = client.map(_work, list(tasks), study=shared, pure=False)
+    shared = client.submit(_unchanged, study, pure=False)
+    futures = client.map(_run_one, list(tasks), study=shared, pure=False)
     try:
         for _, found in as_completed(futures, with_results=True):
             yield found
@@ -100,11 +100,11 @@ def _on_cluster(client: Any, tasks: Iterable[Task], study: Study) -> Iterator[tu
         client.cancel(futures)
 
 
-def _itself(study: Study) -> Study:
+def _unchanged(study: Study) -> Study:
     return study
 
 
-def _work(task: Task, study: Study) -> tuple[str, Outcome]:
+def _run_one(task: Task, study: Study) -> tuple[str, Outcome]:
     """Run a task in one thread: so its result does not depend on how many the linear algebra has."""
     began = time.thread_time()
     with threadpool_limits(1):

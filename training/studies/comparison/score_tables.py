@@ -1,4 +1,4 @@
-"""What a comparison's episodes say: figures of the aims, interquartile means, duels, Pareto front."""
+"""Tables of a comparison: figures of the aims, interquartile means, paired comparisons, Pareto front."""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -19,7 +19,7 @@ from training.evaluation.statistics import (
     pareto_front,
     probability_of_improvement,
 )
-from training.studies.comparison.plan import TRADED_ON, Contender, Results, chosen_run
+from training.studies.comparison.contenders import TRADE_OFF_ON, Contender, Results, chosen_run
 
 SCORES = {
     "excursion_bar": "worst excursion [bar]",
@@ -41,8 +41,8 @@ ALL_RUNS = ", all seeds"
 
 
 @dataclass(frozen=True)
-class Contest:
-    """Contenders and what their episodes came to."""
+class ComparisonResults:
+    """Contenders and the metrics of their episodes."""
 
     contenders: list[Contender]
     scenarios: list[str]
@@ -78,7 +78,7 @@ class Contest:
         return np.array([[values[:fewest] for values in run] for run in runs])
 
 
-def figures(c: Contest) -> pd.DataFrame:
+def figures(c: ComparisonResults) -> pd.DataFrame:
     """A row per plant set and contender: `summary` of the random scenario.
 
     A learned contender has two: its chosen run, and all its runs together.
@@ -95,7 +95,7 @@ def figures(c: Contest) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def by_scenario(c: Contest) -> pd.DataFrame:
+def by_scenario(c: ComparisonResults) -> pd.DataFrame:
     """A row per plant set of JUDGED_ON, scenario and contender: `summary` of its chosen run."""
     return pd.DataFrame(
         {
@@ -110,7 +110,7 @@ def by_scenario(c: Contest) -> pd.DataFrame:
     )
 
 
-def interquartile_means(c: Contest) -> pd.DataFrame:
+def interquartile_means(c: ComparisonResults) -> pd.DataFrame:
     """A row per plant set, contender and score: interquartile mean over runs and scenarios."""
     return _rows(
         {
@@ -123,27 +123,34 @@ def interquartile_means(c: Contest) -> pd.DataFrame:
     )  # fmt: skip
 
 
-def duels(c: Contest, ours: Contender) -> pd.DataFrame:
+def paired_comparisons(c: ComparisonResults, ours: Contender) -> pd.DataFrame:
     """A row per plant set, rival and score: ours against the rival, paired by episode.
 
     A rival that has learned too is its chosen run: its training seeds have nothing to do with ours.
     Columns: difference (ours - rival's) and probability that ours is better, each with its interval.
     """
     return _rows(
-        {"plants": plants, "rival": rival.name, "score": field, **_duel(c, ours, rival, plants, field)}
+        {
+            "plants": plants,
+            "rival": rival.name,
+            "score": field,
+            **_paired_comparison(c, ours, rival, plants, field),
+        }
         for plants in JUDGED_ON
         for rival in (_represented(c, other) for other in c.contenders if other is not ours)
         for field in SCORES
-    )
+    )  # fmt: skip
 
 
-def _represented(c: Contest, contender: Contender) -> Contender:
+def _represented(c: ComparisonResults, contender: Contender) -> Contender:
     """The contender with its chosen run alone."""
     run = c.chosen[contender.name]
     return replace(contender, runs={run: contender.runs[run]})
 
 
-def _duel(c: Contest, ours: Contender, rival: Contender, plants: str, field: str) -> dict[str, float]:
+def _paired_comparison(
+    c: ComparisonResults, ours: Contender, rival: Contender, plants: str, field: str
+) -> dict[str, float]:
     pair = c.scores(ours, plants, field), c.scores(rival, plants, field)
     lower = field not in HIGHER_IS_BETTER
     difference = paired_difference(*pair)
@@ -168,8 +175,8 @@ FRONT = {
 """Figures that are set against the switchings."""
 
 
-def trade(c: Contest, episodes: int) -> pd.DataFrame:
-    """A row per contender and variant: `summary` of the first episodes on TRADED_ON, and the front.
+def trade_off(c: ComparisonResults, episodes: int) -> pd.DataFrame:
+    """A row per contender and variant: `summary` of the first episodes on TRADE_OFF_ON, and the front.
 
     FIGURE_on_front: no other row is as good in the figure and in switchings, and better in one of them;
     who sees the plant is a limit, and not on it.
@@ -177,7 +184,7 @@ def trade(c: Contest, episodes: int) -> pd.DataFrame:
     rows, fair = [], []
     for contender in [*c.contenders, *c.variants]:
         run = c.chosen[contender.name] if contender.price is None else next(iter(contender.runs))
-        found = c.results[run, TRADED_ON, RANDOM].first(episodes)
+        found = c.results[run, TRADE_OFF_ON, RANDOM].first(episodes)
         price = RewardWeights().switching if contender.price is None else contender.price
         rows.append({"controller": contender.name, "switching_price": price, **summary(found)})
         fair.append(not contender.privileged)
@@ -189,8 +196,3 @@ def trade(c: Contest, episodes: int) -> pd.DataFrame:
             zip(rivals["switchings_per_s"], rivals[column], strict=True)
         )
     return table
-
-
-def records(table: pd.DataFrame) -> list[dict[str, Any]]:
-    """A table's rows as dictionaries."""
-    return table.to_dict("records")  # type: ignore[return-value]

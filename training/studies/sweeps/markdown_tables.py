@@ -5,16 +5,16 @@ from typing import Any
 
 import pandas as pd
 
-from training.studies.page_parts import markdown
-from training.studies.sweeps.designs import ONE_AT_A_TIME
+from training.studies.generated_pages import markdown
+from training.studies.sweeps.experiment_designs import ONE_AT_A_TIME
 
-MOST = 6
+NAMED_LEVELS = 6
 """Levels that are named for each controller and design."""
 
-FARTHEST = 4
+NAMED_PARAMETERS = 4
 """Parameters that are named for each worst case."""
 
-DOMAIN = ("least", "greatest", "top")
+RANGE_ENDS = ("least", "greatest", "top")
 """Levels at the ends of a range, beyond what a sound valve has; they are counted apart."""
 
 
@@ -22,7 +22,7 @@ def joint_table(points: pd.DataFrame) -> str:
     """The regions and the Latin hypercube under each controller."""
     rows = [
         [
-            row["level"], row["controller"], f"{row['episodes']}", leaving(row),
+            row["level"], row["controller"], f"{row['episodes']}", violation_rate_text(row),
             f"{row['excursion_worst_bar']:.3f}", f"{row['excursion_tail_bar']:.3f}",
             f"{row['breakdown_bar_greatest']:.3f}", f"{row['rms_bar_mean']:.3f}",
             f"{row['switchings_per_s_mean']:.2f}",
@@ -37,13 +37,13 @@ def joint_table(points: pd.DataFrame) -> str:
     return markdown(headings, rows)
 
 
-def leaving(row: Any) -> str:
+def violation_rate_text(row: Any) -> str:
     """Share of episodes that leave the band, with its exact interval; a row of `point_table`."""
     low, value, high = (100 * row[name] for name in ("left_low", "left", "left_high"))
     return f"{value:.3g} % ({low:.2g} to {high:.2g})"
 
 
-def harm_table(points: pd.DataFrame) -> str:
+def harmful_changes_table(points: pd.DataFrame) -> str:
     """How many changes of one thing make more episodes leave, and which ones most.
 
     A change hurts if its exact interval lies above that of the plant as it is.
@@ -56,19 +56,19 @@ def harm_table(points: pd.DataFrame) -> str:
         for design in ONE_AT_A_TIME:
             tried: Any = mine.loc[mine["design"] == design]
             for ends in (False, True):
-                some = tried.loc[tried["level"].isin(DOMAIN) == ends]
+                some = tried.loc[tried["level"].isin(RANGE_ENDS) == ends]
                 if len(some):
                     what = f"{design}, ends of their ranges" if ends else design
-                    rows.append([controller, what, *_harm(some, bound)])
+                    rows.append([controller, what, *_harmful_changes(some, bound)])
     return markdown(("controller", "changed", "tried", "hurt", "most [% leave]"), rows)
 
 
-def _harm(tried: pd.DataFrame, bound: float) -> tuple[str, str, str]:
+def _harmful_changes(tried: pd.DataFrame, bound: float) -> tuple[str, str, str]:
     """Number of changes, of those that hurt, and the worst of them."""
     hurt = tried.loc[tried["left_low"] > bound].sort_values("left", ascending=False, kind="stable")
     named = [
         f"{row['factor']} {row['level']} ({100 * row['left']:.3g})"
-        for _, row in hurt.head(MOST).iterrows()
+        for _, row in hurt.head(NAMED_LEVELS).iterrows()
     ]
     return f"{len(tried)}", f"{len(hurt)}", "; ".join(named) or "–"
 
@@ -78,7 +78,7 @@ def worst_table(worst: Sequence[Mapping[str, Any]], nominal: Mapping[str, float]
     rows = []
     for found in worst:
         off = {s: 100 * (v / nominal[s] - 1) for s, v in found["parameters"].items()}
-        farthest = sorted(off, key=lambda symbol: -abs(off[symbol]))[:FARTHEST]
+        farthest = sorted(off, key=lambda symbol: -abs(off[symbol]))[:NAMED_PARAMETERS]
         rows.append(
             [
                 found["region"], found["controller"],
