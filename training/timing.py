@@ -9,7 +9,6 @@ garbage. The exported C's are another matter (docs/deploy.md).
 
 import argparse
 import gc
-import json
 import sys
 import time
 from collections.abc import Mapping
@@ -30,8 +29,9 @@ from epv_env.reward import REFERENCE_PERIOD
 from training.evaluation.rollout import begin_episodes, make_env
 from training.evaluation.seeds import TIMING_SEED
 from training.studies.named_controllers import named_controllers
+from training.studies.result_files import records, write_json
 
-WARM_UP = 50
+WARM_UP_DECISIONS = 50
 """Decisions that are not counted: the first ones compile and fill caches."""
 
 
@@ -44,7 +44,7 @@ def decision_times(
     """
     env = make_env(controller, 1, threads=1, **options)
     observation = begin_episodes(env, controller, [seed])
-    seconds = np.zeros(WARM_UP + decisions)
+    seconds = np.zeros(WARM_UP_DECISIONS + decisions)
     collects = gc.isenabled()
     gc.disable()  # as timeit does
     try:
@@ -56,7 +56,7 @@ def decision_times(
     finally:
         if collects:
             gc.enable()
-    return seconds[WARM_UP:]
+    return seconds[WARM_UP_DECISIONS:]
 
 
 def timing_table(seconds: Mapping[str, NDArray], period: float = REFERENCE_PERIOD) -> pd.DataFrame:
@@ -106,7 +106,7 @@ def main(arguments: list[str] | None = None) -> int:
         }
     )
     write_text(chosen.out / "timing.csv", table.to_csv(index=False))
-    write_text(chosen.out / "timing.json", json.dumps(table.to_dict(orient="records"), indent=1) + "\n")
+    write_json(chosen.out / "timing.json", records(table))
     print(table.to_string(index=False, float_format="%.4g"))
     return 0
 

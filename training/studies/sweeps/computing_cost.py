@@ -11,9 +11,19 @@ from training.studies.parallel_run import Outcome, TaskRunner
 from training.studies.sweeps.episode_plan import TASK_EPISODES, SweepCell
 
 MILLION = 1_000_000
-MACHINES = 100
-EMPTY_TASKS = 200
-"""Empty tasks that tell what handing one out takes."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CostSettings:
+    """What the estimate assumes."""
+
+    machines: int = 100
+    """Machines like this one, beside one alone."""
+    empty_tasks: int = 200
+    """Tasks without work that are run to time the handing out of one."""
+
+
+SETTINGS = CostSettings()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,9 +38,9 @@ class EmptyTask:
         return {}
 
 
-def overhead(run: TaskRunner, study: Study) -> float:
+def overhead(run: TaskRunner, study: Study, settings: CostSettings = SETTINGS) -> float:
     """Time from one empty task to the next [s]: how fast tasks can be handed out, whatever they do."""
-    idle = [EmptyTask(name=str(k)) for k in range(EMPTY_TASKS)]
+    idle = [EmptyTask(name=str(k)) for k in range(settings.empty_tasks)]
     for _ in run(idle, study):  # starts the workers: those without work stop after minutes
         pass
     began = time.perf_counter()
@@ -42,13 +52,13 @@ def episode_cpu(cells: Sequence[SweepCell], outcomes: Mapping[str, Outcome]) -> 
     """Core time of an episode by controller [s], over the sweep's largest batches."""
     batches = [batch for cell in cells for batch in cell.batches]
     largest = max((batch.episodes for batch in batches), default=0)
-    found: dict[str, list[tuple[float, int]]] = {}
+    times: dict[str, list[tuple[float, int]]] = {}
     for batch in batches:
         if batch.episodes == largest:
             cpu = outcomes[batch.name]["cpu_s"]
-            found.setdefault(batch.controller, []).append((cpu, batch.episodes))
+            times.setdefault(batch.controller, []).append((cpu, batch.episodes))
     return {
-        name: sum(cpu for cpu, _ in parts) / sum(n for _, n in parts) for name, parts in found.items()
+        name: sum(cpu for cpu, _ in parts) / sum(n for _, n in parts) for name, parts in times.items()
     }
 
 
@@ -61,9 +71,28 @@ def million(cpu_s: float, overhead_s: float, *, cores: int, machines: int) -> fl
 
 
 def cost(
-    cpu_s: Mapping[str, float], overhead_s: float, *, cores: int, where: str, duration: float
+    cpu_s: Mapping[str, float],
+    overhead_s: float,
+    *,
+    cores: int,
+    where: str,
+    duration: float,
+    settings: CostSettings = SETTINGS,
 ) -> dict[str, Any]:
-    """Rates and what follows from them, ready for JSON. where: what handed the tasks out."""
+    """Rates and what follows from them, ready for JSON.
+
+    Args:
+        cpu_s: core time of an episode by controller [s].
+        overhead_s: time of handing out a task [s].
+        cores: of a machine.
+        where: what handed the tasks out.
+        duration: length of an episode [s].
+        settings: the number of machines.
+    """
+
+    def of_machines(cpu: float, machines: int) -> float:
+        return million(cpu, overhead_s, cores=cores, machines=machines)
+
     return {
         "episode_duration_s": duration,
         "cores_of_a_machine": cores,
@@ -73,10 +102,8 @@ def cost(
         "controllers": {
             name: {
                 "core_s_per_episode": cpu,
-                "million_on_one_machine_s": million(cpu, overhead_s, cores=cores, machines=1),
-                f"million_on_{MACHINES}_machines_s": million(
-                    cpu, overhead_s, cores=cores, machines=MACHINES
-                ),
+                "million_on_one_machine_s": of_machines(cpu, 1),
+                f"million_on_{settings.machines}_machines_s": of_machines(cpu, settings.machines),
             }
             for name, cpu in cpu_s.items()
         },

@@ -23,6 +23,23 @@ MS = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
+class ConditionLevels:
+    """Levels at which the conditions are tried, from gentle to beyond what the valve is made for."""
+
+    sensor_noise: tuple[float, ...] = (0.0, 1.0, 2.0, 4.0)
+    """Factors on the sensors' noise [1]."""
+    control_period_ms: tuple[int, ...] = (2, 5, 10, 20)
+    """Control periods [ms]."""
+    latency_ms: tuple[int, ...] = (1, 2, 5, 10)
+    """Delays of the command [ms]."""
+    supply_voltage: tuple[float, ...] = (18.0, 21.0, 28.0, 32.0)
+    """Supply voltages of the coil [V], nominally 24 V."""
+
+
+LEVELS = ConditionLevels()
+
+
+@dataclass(frozen=True, kw_only=True)
 class Point:
     """Conditions under which every controller runs the same episodes."""
 
@@ -55,32 +72,32 @@ def parameters(plant: Plant) -> Iterator[Point]:
         minus, plus = changed_values(symbol, plant.parameters[symbol])
         levels = {"-10 %": max(minus, low), "+10 %": min(plus, high), "least": low, "greatest": high}
         for level, value in levels.items():
-            yield _with("parameters", symbol, level, {symbol: value})
+            yield _changed_plant("parameters", symbol, level, {symbol: value})
 
 
 def effects(plant: Plant) -> Iterator[Point]:
     """Every effect of the gap catalogue, alone, at three sizes."""
     for effect, level, sizes in effect_levels():
-        yield _with("effects", effect, level, sizes)
+        yield _changed_plant("effects", effect, level, sizes)
 
 
-def conditions(plant: Plant) -> Iterator[Point]:
+def conditions(plant: Plant, levels: ConditionLevels = LEVELS) -> Iterator[Point]:
     """Consumption, sensor noise, control period, latency and supply voltage, one at a time."""
     for name in SCENARIOS:
         yield Point(design="conditions", factor="scenario", level=name, options={"scenario": name})
-    for factor in (0.0, 1.0, 2.0, 4.0):
+    for factor in levels.sensor_noise:
         yield Point(
             design="conditions", factor="sensor noise", level=f"{factor:g} x",
             options={"sensor_noise": factor},
         )  # fmt: skip
-    for ms in (2, 5, 10, 20):
+    for ms in levels.control_period_ms:
         yield Point(
             design="conditions", factor="control period", level=f"{ms} ms",
             options={"control_period": ms * MS},
         )  # fmt: skip
-    for ms in (1, 2, 5, 10):
-        yield _with("conditions", "latency", f"{ms} ms", {"t_delay": ms * MS})
-    for volts in (18.0, 21.0, 28.0, 32.0):
+    for ms in levels.latency_ms:
+        yield _changed_plant("conditions", "latency", f"{ms} ms", {"t_delay": ms * MS})
+    for volts in levels.supply_voltage:
         yield Point(
             design="conditions", factor="supply voltage", level=f"{volts:g} V",
             options={"supply_voltage": volts},
@@ -94,7 +111,7 @@ def hypercube(plant: Plant, points: int, seed: int) -> Point:
     return Point(design="hypercube", factor=SAMPLED, level="Latin hypercube", parameters=plants)
 
 
-def _with(design: str, factor: str, level: str, values: dict[str, float]) -> Point:
+def _changed_plant(design: str, factor: str, level: str, values: dict[str, float]) -> Point:
     """The plant with some values changed."""
     return Point(design=design, factor=factor, level=level, options={"parameters": values})
 
@@ -107,4 +124,4 @@ ONE_AT_A_TIME: dict[str, Callable[[Plant], Iterator[Point]]] = {
 """Designs that change one thing at a time, by name."""
 
 DESIGNS = ("regions", *ONE_AT_A_TIME, "hypercube", "worst")
-"""All designs; the last is no list of points but a search (worst.py)."""
+"""All designs; the last is no list of points but a search (worst_case_search.py)."""

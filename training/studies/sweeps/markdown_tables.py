@@ -31,20 +31,20 @@ def joint_table(points: pd.DataFrame) -> str:
         if row["design"] in ("regions", "hypercube")
     ]  # fmt: skip
     headings = (
-        "plants", "controller", "episodes", "leave ±500 mbar", "worst excursion [bar]", "99.9 % [bar]",
-        "largest breakdown [bar]", "rms error [bar]", "switchings [1/s]",
+        "plants", "controller", "episodes", "violations of ±500 mbar", "worst excursion [bar]",
+        "99.9 % [bar]", "largest breakdown [bar]", "rms error [bar]", "switchings [1/s]",
     )  # fmt: skip
     return markdown(headings, rows)
 
 
 def violation_rate_text(row: Any) -> str:
-    """Share of episodes that leave the band, with its exact interval; a row of `point_table`."""
+    """Violation rate of ±500 mbar with its exact interval; row: of `point_table`."""
     low, value, high = (100 * row[name] for name in ("left_low", "left", "left_high"))
     return f"{value:.3g} % ({low:.2g} to {high:.2g})"
 
 
 def harmful_changes_table(points: pd.DataFrame) -> str:
-    """How many changes of one thing make more episodes leave, and which ones most.
+    """How many changes of one thing raise the violation rate, and which ones most.
 
     A change hurts if its exact interval lies above that of the plant as it is.
     """
@@ -60,7 +60,7 @@ def harmful_changes_table(points: pd.DataFrame) -> str:
                 if len(some):
                     what = f"{design}, ends of their ranges" if ends else design
                     rows.append([controller, what, *_harmful_changes(some, bound)])
-    return markdown(("controller", "changed", "tried", "hurt", "most [% leave]"), rows)
+    return markdown(("controller", "changed", "tried", "hurt", "most [% violations]"), rows)
 
 
 def _harmful_changes(tried: pd.DataFrame, bound: float) -> tuple[str, str, str]:

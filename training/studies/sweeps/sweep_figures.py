@@ -1,20 +1,16 @@
-"""Figures of a sweep: who leaves the band, how far, and under what."""
+"""Figures of a sweep: violation rates and excursions, by what is changed."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
-
-mpl.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from epv_env.reward import BAND_BAR
-from training.evaluation.plots import COLOURS, save_figure
+from training.evaluation.plots import COLOURS, plt, save_figure
 from training.evaluation.rollout import Trace
 
 WIDEST_BAR = 2.0
@@ -44,7 +40,7 @@ def _axes(rows: int) -> tuple[Any, Axes, Axes]:
         1, 2, figsize=(11, 1.4 + 0.3 * rows), sharey=True, layout="constrained"
     )
     left.set(
-        xlabel="episodes that leave ±500 mbar [%], exact 95 % intervals",
+        xlabel="violation rate of ±500 mbar [%], exact 95 % intervals",
         xscale="symlog",
         xlim=(-0.1, 115),
     )
@@ -141,7 +137,7 @@ def effects(points: pd.DataFrame, path: Path) -> None:
     axes[0, 0].set_yticks(np.arange(len(names)), names, fontsize=8)
     if image is not None:
         figure.colorbar(image, ax=axes, label="worst excursion [bar]", extend="max")
-    figure.suptitle("Effects alone: number = episodes that leave ±500 mbar [%]", fontsize=10)
+    figure.suptitle("Effects alone: number = violation rate of ±500 mbar [%]", fontsize=10)
     save_figure(figure, path)
 
 
