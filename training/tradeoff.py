@@ -74,7 +74,7 @@ def finished_variants(folder: Path | None) -> list[Contender]:
     """
     if folder is None:
         return []
-    found = []
+    variants: list[Contender] = []
     for path in sorted(folder.glob("price-*")):
         price = float(path.name.removeprefix("price-"))
         controllers: list[Controller] = []
@@ -84,10 +84,10 @@ def finished_variants(folder: Path | None) -> list[Contender]:
             tunings = load_tunings(path / TUNED_FILE)
             plant = Parameters.calibrated()
             controllers += [build(kind, tuning.values, plant) for kind, tuning in tunings.items()]
-        found += [variant(controller, price) for controller in controllers]
-    if not found:
+        variants += [variant(controller, price) for controller in controllers]
+    if not variants:
         raise ValueError(f"{folder} holds no controllers: make them with `python training/tradeoff.py`")
-    return found
+    return variants
 
 
 def first_memory(chosen: argparse.Namespace) -> Training | None:

@@ -116,14 +116,17 @@ def as_structures(readings: dict[str, NDArray], variant: str) -> NDArray:
 
 
 def float_logits(code: ctypes.CDLL, observations: NDArray, *, cells: int) -> NDArray:
-    """Logits (episodes, periods, 2) of the float code along observations of episodes."""
-    given = np.ascontiguousarray(observations, dtype=np.float32)
-    logits = np.empty((*given.shape[:2], 2), dtype=np.float32)
+    """Logits (episodes, periods, 2) of the float code along observations (episodes, periods, entries).
+
+    cells: of the policy.
+    """
+    inputs = np.ascontiguousarray(observations, dtype=np.float32)
+    logits = np.empty((*inputs.shape[:2], 2), dtype=np.float32)
     function: Any = code.epv_float_logits
     function.argtypes = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
     function.restype = None
-    for episode in range(len(given)):
+    for episode in range(len(inputs)):
         memory = np.zeros(1, dtype=memory_type("float", cells))
-        for k in range(given.shape[1]):
-            function(memory.ctypes.data, given[episode, k].ctypes.data, logits[episode, k].ctypes.data)
+        for k in range(inputs.shape[1]):
+            function(memory.ctypes.data, inputs[episode, k].ctypes.data, logits[episode, k].ctypes.data)
     return logits

@@ -1,4 +1,4 @@
-"""What an export found, as it is printed."""
+"""The report of an export, as it is printed."""
 
 from typing import Any
 
@@ -8,12 +8,13 @@ def as_text(report: dict[str, Any], contract: dict[str, Any]) -> str:
     return "\n".join([*_agreement(report["agreement"]), *_cost(report, contract), *_loop(report)])
 
 
-def _agreement(found: dict[str, Any]) -> list[str]:
-    rounding = f"{found['rounding_of_c']:.2g} in C, {found['rounding_of_python']:.2g} in Python"
+def _agreement(a: dict[str, Any]) -> list[str]:
+    """Agreement of the C code with the policy; a: the report's `agreement`."""
+    rounding = f"{a['rounding_of_c']:.2g} in C, {a['rounding_of_python']:.2g} in Python"
     return [
-        f"agreement on {found['states']} visited states: float C {found['float_agrees']}, fixed C "
-        f"{found['fixed_agrees']}",
-        f"nearest to a tie: logits {found['least_margin']:.2g} apart; rounding moves that by {rounding}",
+        f"agreement on {a['states']} visited states: float C {a['float_agrees']}, fixed C "
+        f"{a['fixed_agrees']}",
+        f"nearest to a tie: logits {a['least_margin']:.2g} apart; rounding moves that by {rounding}",
     ]
 
 

@@ -111,9 +111,9 @@ def quantise(
     layers = []
     for number, (weight, bias) in enumerate(precise.layers):
         wanted = exact @ weight.T + bias
-        layer, found = _layer(weight * reach, wanted, signal, f"layer {number}", LARGEST_EXACT_SUM)
+        layer, rounded = _layer(weight * reach, wanted, signal, f"layer {number}", LARGEST_EXACT_SUM)
         layers.append(layer)
-        exact, signal, reach = np.tanh(wanted), _rounded(np.tanh(found)), 1.0
+        exact, signal, reach = np.tanh(wanted), _rounded(np.tanh(rounded)), 1.0
     tangent = np.rint(SIGNAL_ONE * np.tanh(np.arange(257) / 32)).astype(np.int16)
     return FixedPolicy(inputs=inputs, cell=cell, layers=layers, tangent=tangent)
 

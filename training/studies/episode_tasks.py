@@ -1,4 +1,4 @@
-"""A piece of a sweep: data that any process can run, and what comes back, ready for JSON."""
+"""Tasks of a study: data that any process can run, and their results, ready for JSON."""
 
 from collections.abc import Mapping
 from copy import deepcopy
@@ -19,7 +19,7 @@ EXCURSION_DECIMALS = 6
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """What all tasks of a sweep share. It travels whole, so that a worker elsewhere needs no files."""
+    """What all tasks share. The study is sent whole, so that a worker elsewhere needs no files."""
 
     controllers: Mapping[str, Controller]
     """By the name that tasks call them."""
@@ -46,10 +46,10 @@ class Study:
         )  # fmt: skip
 
     def controller(self, name: str, control_period: float | None = None) -> Controller:
-        """A controller of one's own, in one thread; told another control period if it knows any."""
+        """A copy of a controller, in one thread, and with another control period [s] if it has one."""
         chosen: Any = deepcopy(self.controllers[name])
-        told = {"threads": 1, "control_period": control_period}
-        known = {what: v for what, v in told.items() if v is not None and hasattr(chosen, what)}
+        settings = {"threads": 1, "control_period": control_period}
+        known = {k: v for k, v in settings.items() if v is not None and hasattr(chosen, k)}
         return replace(chosen, **known) if known else chosen
 
 
@@ -109,7 +109,7 @@ def condensed(metrics: EpisodeMetrics) -> dict[str, Any]:
 
 
 def _sums(values: NDArray) -> dict[str, float | None]:
-    """Number, sum, sum of squares and greatest of the finite values."""
+    """Number, sum, sum of squares and greatest of the finite values (n,)."""
     finite = values[np.isfinite(values)]
     return {
         "count": len(finite),

@@ -18,7 +18,7 @@ CLUSTER_TIMEOUT = 60
 
 
 class Outcome(TypedDict):
-    """What a task came to, and what it took."""
+    """The result of a task, and its computing time."""
 
     result: dict[str, Any]
     cpu_s: float
@@ -34,8 +34,14 @@ def run_tasks(
 ) -> dict[str, Outcome]:
     """Outcomes by name, in the order of the tasks; those in the journal are not run again.
 
-    what: name of the progress bar. The longest tasks begin first, so that none is left running alone at
-    the end.
+    The longest tasks begin first, so that none is left running alone at the end.
+
+    Args:
+        tasks: of a study, each with a name of its own.
+        study: what all tasks share.
+        journal: outcomes of an earlier run; new outcomes are added to it.
+        run: where the tasks run (`task_runner`).
+        what: name of the progress bar.
     """
     missing = [task for task in tasks if task.name not in journal]
     size = {task.name: task.episodes for task in missing}
@@ -94,13 +100,14 @@ def _on_cluster(client: Any, tasks: Iterable[Task], study: Study) -> Iterator[tu
     shared = client.submit(_unchanged, study, pure=False)
     futures = client.map(_run_one, list(tasks), study=shared, pure=False)
     try:
-        for _, found in as_completed(futures, with_results=True):
-            yield found
+        for _, outcome in as_completed(futures, with_results=True):
+            yield outcome
     finally:
         client.cancel(futures)
 
 
 def _unchanged(study: Study) -> Study:
+    """The study itself, so that the cluster keeps one copy for all tasks."""
     return study
 
 

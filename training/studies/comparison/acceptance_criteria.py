@@ -1,4 +1,4 @@
-"""What the learned controller has to reach, what it reached, and whether that is enough."""
+"""Acceptance criteria of a learned controller, and whether the controller meets them."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -54,13 +54,13 @@ def criteria(
 ) -> list[Criterion]:
     """All requirements on the chosen run of `ours`; random scenario, full sensor noise."""
     limits = settings.violation_limits.items()
-    found = [violation_criterion(c, ours, plants, limit) for plants, limit in limits]
+    criteria = [violation_criterion(c, ours, plants, limit) for plants, limit in limits]
     for rival in c.contenders:
         if rival.name == ORACLE:
-            found += against_oracle(c, ours, rival, settings.oracle_factor)
+            criteria += against_oracle(c, ours, rival, settings.oracle_factor)
         elif not (rival.learned or rival.privileged):
-            found += against_rival(c, ours, rival)
-    return found
+            criteria += against_rival(c, ours, rival)
+    return criteria
 
 
 def violation_criterion(c: ComparisonResults, ours: Contender, plants: str, limit: float) -> Criterion:
@@ -84,8 +84,8 @@ def against_rival(c: ComparisonResults, ours: Contender, rival: Contender) -> It
     than the rival; if there is none, at its own.
     """
     names, runs = zip(*c.at_prices(ours).values(), strict=True)
-    its, *found = _figures(c, c.chosen[rival.name], *runs)
-    at = dict(zip(names, found, strict=True))
+    its, *own = _figures(c, c.chosen[rival.name], *runs)
+    at = dict(zip(names, own, strict=True))
     fewer = [n for n, m in at.items() if m["switchings_per_s"] <= its["switchings_per_s"]]
     name = max(fewer, key=lambda n: at[n]["switchings_per_s"], default=ours.name)
     mine = at[name]
@@ -133,9 +133,9 @@ def _near(
 
 def _figures(c: ComparisonResults, *runs: str) -> list[dict[str, float]]:
     """Of random episodes on CRITERIA_ON that all these runs have run."""
-    found = [c.results[run, CRITERIA_ON, RANDOM] for run in runs]
-    fewest = min(map(len, found))
-    return [summary(m.first(fewest)) for m in found]
+    metrics = [c.results[run, CRITERIA_ON, RANDOM] for run in runs]
+    fewest = min(map(len, metrics))
+    return [summary(m.first(fewest)) for m in metrics]
 
 
 def _common(

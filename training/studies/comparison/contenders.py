@@ -82,7 +82,7 @@ class Contender:
 
     @property
     def privileged(self) -> bool:
-        """Whether it is told what no ECU can measure: a limit, not a rival."""
+        """Whether it uses privileged information, which no ECU can measure: a limit, not a rival."""
         return isinstance(next(iter(self.runs.values())), Privileged)
 
     @property

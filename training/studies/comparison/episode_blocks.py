@@ -49,7 +49,7 @@ class Block:
     run_name: str
     """Which of the study's controllers."""
     version: str
-    """Its fingerprint: what an earlier version found is not taken for this one's."""
+    """Its fingerprint: results of an earlier version are not taken for this one's."""
     plants: str
     scenarios: tuple[str, ...]
     """Their options are the same but for EPISODE_OPTIONS."""
@@ -139,11 +139,11 @@ def _blocks_of(block: Callable[..., Block], scenarios: list[str], first: int, co
     ]  # fmt: skip
 
 
-def joined_results(blocks: list[Block], found: Mapping[str, dict[str, Any]]) -> Results:
-    """The blocks' episodes put together. found: what each block's `run` gave, by its name."""
+def joined_results(blocks: list[Block], outcomes: Mapping[str, dict[str, Any]]) -> Results:
+    """The blocks' episodes put together. outcomes: what each block's `run` gave, by its name."""
     parts: dict[tuple[str, str, str], list[EpisodeMetrics]] = {}
     for block in blocks:
-        arrays: dict[str, NDArray] = {k: np.array(v) for k, v in found[block.name].items()}
+        arrays: dict[str, NDArray] = {k: np.array(v) for k, v in outcomes[block.name].items()}
         for k, scenario in enumerate(block.scenarios):
             rows = slice(k * block.count, (k + 1) * block.count)
             own = EpisodeMetrics(**{name: values[rows] for name, values in arrays.items()})

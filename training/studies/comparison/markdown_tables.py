@@ -73,10 +73,10 @@ def iqm_table(means: pd.DataFrame) -> str:
     return markdown(["plants", "controller", *SCORES.values()], rows)
 
 
-def paired_comparison_table(found: pd.DataFrame, ours: str) -> str:
+def paired_comparison_table(paired: pd.DataFrame, ours: str) -> str:
     """Paired differences, and the probability that ours is better."""
     rows = []
-    for (plants, rival), cells in _grouped(found, "rival").items():
+    for (plants, rival), cells in _grouped(paired, "rival").items():
         shown = [
             f"{r['difference']:+.3f} ({r['difference_low']:+.3f} to {r['difference_high']:+.3f}); "
             f"{100 * r['better']:.0f} %"
@@ -134,7 +134,7 @@ def trade_off_table(traded: pd.DataFrame) -> str:
 
 
 def budget_text(c: ComparisonResults) -> str:
-    """What the controllers were given to be at their best."""
+    """How the controllers were tuned and trained."""
     search, tunings = load_search(), load_tunings()
     efforts: dict[tuple[int, int], list[str]] = {}
     for kind, tuning in tunings.items():

@@ -1,5 +1,6 @@
 """Tables of a comparison: figures of the aims, interquartile means, paired comparisons, Pareto front."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -158,12 +159,13 @@ def _paired_comparison(
     return _named("difference", difference) | _named("better", better)
 
 
-def _named(name: str, found: Estimate) -> dict[str, float]:
+def _named(name: str, of: Estimate) -> dict[str, float]:
     """An estimate as columns."""
-    return {name: found.value, f"{name}_low": found.low, f"{name}_high": found.high}
+    return {name: of.value, f"{name}_low": of.low, f"{name}_high": of.high}
 
 
-def _rows(rows: Any) -> pd.DataFrame:
+def _rows(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
+    """A table of rows that are made one by one."""
     return pd.DataFrame(list(rows))
 
 
@@ -184,9 +186,9 @@ def trade_off(c: ComparisonResults, episodes: int) -> pd.DataFrame:
     rows, fair = [], []
     for contender in [*c.contenders, *c.variants]:
         run = c.chosen[contender.name] if contender.price is None else next(iter(contender.runs))
-        found = c.results[run, TRADE_OFF_ON, RANDOM].first(episodes)
+        episodes_run = c.results[run, TRADE_OFF_ON, RANDOM].first(episodes)
         price = RewardWeights().switching if contender.price is None else contender.price
-        rows.append({"controller": contender.name, "switching_price": price, **summary(found)})
+        rows.append({"controller": contender.name, "switching_price": price, **summary(episodes_run)})
         fair.append(not contender.privileged)
     table = pd.DataFrame(rows)
     for column in FRONT:

@@ -74,18 +74,18 @@ def _harmful_changes(tried: pd.DataFrame, bound: float) -> tuple[str, str, str]:
 
 
 def worst_table(worst: Sequence[Mapping[str, Any]], nominal: Mapping[str, float]) -> str:
-    """What the searches found: excursion after each stage, consumption, and how far the plant is off."""
+    """Worst cases: excursion after each stage, consumption, and how far the plant is off."""
     rows = []
-    for found in worst:
-        off = {s: 100 * (v / nominal[s] - 1) for s, v in found["parameters"].items()}
+    for each in worst:
+        off = {s: 100 * (v / nominal[s] - 1) for s, v in each["parameters"].items()}
         farthest = sorted(off, key=lambda symbol: -abs(off[symbol]))[:NAMED_PARAMETERS]
         rows.append(
             [
-                found["region"], found["controller"],
-                " → ".join(f"{bar:.3f}" for bar in found["stages_bar"].values()),
-                f"{found['scenario']}, {found['seed']}",
+                each["region"], each["controller"],
+                " → ".join(f"{bar:.3f}" for bar in each["stages_bar"].values()),
+                f"{each['scenario']}, {each['seed']}",
                 ", ".join(f"{symbol} {off[symbol]:+.2g} %" for symbol in farthest),
-                f"{found['episodes']}",
+                f"{each['episodes']}",
             ]
         )  # fmt: skip
     headings = (

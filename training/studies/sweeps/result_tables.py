@@ -1,4 +1,4 @@
-"""From tasks' outcomes to tables: violation rate with its interval, excursions, other figures."""
+"""Tables of a sweep's outcomes: violation rate with its interval, excursions, other figures."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -18,8 +18,8 @@ FIGURES = ("breakdown_bar", "recovery_s", "rms_bar", "switchings_per_s", "vented
 def point_table(cells: Sequence[SweepCell], outcomes: Mapping[str, Outcome]) -> pd.DataFrame:
     """One row for each point and controller.
 
-    `left` is the share of episodes that left the band, with its exact 95 % interval; `worst_seed` the
-    episode with the largest excursion. Other figures: mean (`rms_bar`: root mean square) and greatest.
+    `left` is the violation rate of target ±500 mbar [1], with its exact 95 % interval; `worst_seed` the
+    seed of the episode with the largest excursion. Other figures: mean (`rms_bar`: root mean square) and greatest.
     """
     return pd.DataFrame([_row(cell, _parts(cell, outcomes)) for cell in cells])
 
@@ -68,9 +68,9 @@ def rank_correlation_table(cells: Sequence[SweepCell], outcomes: Mapping[str, Ou
         excursion = np.concatenate([part["excursion_bar"] for part in _parts(cell, outcomes)])
         plants = pd.DataFrame(cell.point.parameters)
         for symbol in plants:
-            found: Any = spearmanr(plants[symbol], excursion)
+            correlation: Any = spearmanr(plants[symbol], excursion)
             rows.append(
                 {"controller": cell.controller, "symbol": symbol,
-                 "rank_correlation": float(found.statistic), "p_value": float(found.pvalue)}
+                 "rank_correlation": float(correlation.statistic), "p_value": float(correlation.pvalue)}
             )  # fmt: skip
     return pd.DataFrame(rows)

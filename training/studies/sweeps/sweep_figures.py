@@ -165,7 +165,7 @@ def worst_episodes(
     nominal: Mapping[str, float],
     path: Path,
 ) -> None:
-    """The worst episode that each search found: p2, the coil, what is drawn; the plant in its title."""
+    """The worst episode that of each search: p2, the coil, what is drawn; the plant in its title."""
     regions = list(dict.fromkeys(each["region"] for each in worst))
     controllers = list(dict.fromkeys(each["controller"] for each in worst))
     figure = plt.figure(figsize=(6.2 * len(controllers), 4.4 * len(regions)), layout="constrained")
@@ -185,12 +185,12 @@ def worst_episodes(
     save_figure(figure, path)
 
 
-def _title(found: Mapping[str, Any], nominal: Mapping[str, float]) -> str:
+def _title(worst: Mapping[str, Any], nominal: Mapping[str, float]) -> str:
     """Controller, region, excursion, and how far each parameter is off, in lines of five."""
     off = [
         f"{symbol} {100 * (value / nominal[symbol] - 1):+.2g} %"
-        for symbol, value in found["parameters"].items()
+        for symbol, value in worst["parameters"].items()
     ]
     lines = [", ".join(off[k : k + 5]) for k in range(0, len(off), 5)]
-    head = f"{found['controller']}, {found['region']}: {found['excursion_bar']:.3f} bar"
-    return "\n".join([f"{head} ({found['scenario']}, seed {found['seed']})", *lines])
+    head = f"{worst['controller']}, {worst['region']}: {worst['excursion_bar']:.3f} bar"
+    return "\n".join([f"{head} ({worst['scenario']}, seed {worst['seed']})", *lines])
