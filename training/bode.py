@@ -39,8 +39,6 @@ def bode(design: Design, path: Path) -> Path:
     figure, (gain_axes, phase_axes) = plt.subplots(
         2, 1, figsize=(7, 5.5), sharex=True, layout="constrained"
     )
-        2, 1, figsize=(7, 5.5), sharex=True, layout="constrained"
-    )
     gain_axes.semilogx(frequency, 20 * np.log10(np.abs(values)))
     gain_axes.axhline(0.0, color="0.5", lw=0.8)
     gain_axes.vlines(at_phase, -20 * np.log10(gain_margin), 0.0, color=COLOURS[3])

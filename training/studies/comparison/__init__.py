@@ -1,1 +1,1 @@
-"""The parts of the comparison: its contenders, blocks of episodes, tables, acceptance criteria and figures."""
+"""The comparison: contenders, blocks of episodes, tables, acceptance criteria and figures."""

@@ -19,7 +19,8 @@ def point_table(cells: Sequence[SweepCell], outcomes: Mapping[str, Outcome]) -> 
     """One row for each point and controller.
 
     `left` is the violation rate of target ±500 mbar [1], with its exact 95 % interval; `worst_seed` the
-    seed of the episode with the largest excursion. Other figures: mean (`rms_bar`: root mean square) and greatest.
+    seed of the episode with the largest excursion. Other figures: mean (`rms_bar`: root mean square) and
+    greatest.
     """
     return pd.DataFrame([_row(cell, _parts(cell, outcomes)) for cell in cells])
 
