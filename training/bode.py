@@ -18,16 +18,13 @@ from epv_env.plant.plantfile import load_plant
 
 
 def bode(design: Design, path: Path) -> Path:
-    """Draw a design's open loop, gain and phase margin at their frequencies; the path comes back.
+    """Draw a design's open loop with its gain and phase margin; returns the path of the picture.
 
     Margins are python-control's of the very response that is drawn. The axis ends at half the sampling
     frequency of the PWM: a sampled loop has no response beyond.
     """
-    from training.evaluation.plots import (  # matplotlib only where it is drawn with
-        COLOURS,
-        plt,
-        save_figure,
-    )
+    # matplotlib takes a second to import: only now
+    from training.evaluation.plots import COLOURS, plt, save_figure
 
     loop = open_loop(design)
     gain_margin, phase_margin, at_phase, at_gain = map(float, control.margin(loop))

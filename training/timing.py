@@ -60,7 +60,10 @@ def decision_times(
 
 
 def timing_table(seconds: Mapping[str, NDArray], period: float = REFERENCE_PERIOD) -> pd.DataFrame:
-    """A row per controller: median, 99.9 % and worst time, and the worst's share of the period [s]."""
+    """A row per controller: median, 99.9 % and worst time [us], and their shares of the period [1].
+
+    seconds: times of decisions (decisions,) [s] by controller. period: control period [s].
+    """
     rows = [
         {
             "controller": label,

@@ -10,7 +10,7 @@ from training.deploy.quantisation import FixedLayer, FixedPolicy
 
 
 def listed(values: NDArray) -> str:
-    """Numbers as C writes them, on indented lines of their own."""
+    """Numbers of an array of any shape, row after row, as C writes them, on indented lines."""
     text = ", ".join(literal(value) for value in values.ravel())
     return f"\n{fill(text, 100, initial_indent='    ', subsequent_indent='    ')}\n"
 
@@ -24,7 +24,10 @@ def literal(value: float | np.generic) -> str:
 
 
 def named_layers(policy: LearnedPolicy) -> dict[str, tuple[NDArray, NDArray]]:
-    """Weight and bias of each layer, those of a recurrent unit too, by what they are called in C."""
+    """Weight (outputs, inputs) and bias (outputs,) of each layer by its name in C.
+
+    A recurrent unit has two layers: NEW of the observation, OLD of the cells.
+    """
     layers = {str(k): layer for k, layer in enumerate(policy.layers)}
     unit = policy.cell
     if unit is not None:
@@ -63,7 +66,7 @@ def _tables(layers: dict[str, tuple[list[str], str]]) -> dict[str, str]:
 
 
 def _float_layer(name: str, weight: NDArray, bias: NDArray) -> tuple[list[str], str]:
-    """A layer's arrays, and the structure that holds them together."""
+    """A layer's arrays and structure in C, from weight (outputs, inputs) and bias (outputs,)."""
     arrays = [
         _array(f"const float WEIGHT_{name}[{weight.size}]", weight.astype(np.float32)),
         _array(f"const float BIAS_{name}[{bias.size}]", bias.astype(np.float32)),
@@ -84,4 +87,5 @@ def _fixed_layer(name: str, layer: FixedLayer) -> tuple[list[str], str]:
 
 
 def _array(declaration: str, values: NDArray) -> str:
+    """The definition of a constant array; values of any shape, row after row."""
     return f"static {declaration} = {{{listed(values)}}};\n"

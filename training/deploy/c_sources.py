@@ -108,10 +108,12 @@ def checks(states: int, *, rounding: float, settings: ExportSettings = SETTINGS)
 
 
 def _fill(name: str, values: Mapping[str, object]) -> str:
+    """A template with its fields filled in. Raises KeyError for a field without a value."""
     return Template((TEMPLATES / name).read_text(encoding="utf-8")).substitute(values)
 
 
 def _float_numbers(policy: LearnedPolicy, period: float) -> dict[str, str]:
+    """Constants of the float variant. period: control period [s]."""
     return float_tables(policy) | {
         "centre": listed(np.array([quantity.centre for quantity in LAYOUT])),
         "scale": listed(np.array([quantity.scale for quantity in LAYOUT])),
@@ -122,6 +124,7 @@ def _float_numbers(policy: LearnedPolicy, period: float) -> dict[str, str]:
 
 
 def _fixed_numbers(fixed: FixedPolicy) -> dict[str, str]:
+    """Constants of the integer variant."""
     return fixed_tables(fixed) | {
         "longest_us": str(round(LONGEST_WAIT * 1e6)),
         "centre": listed(fixed.inputs.centre),

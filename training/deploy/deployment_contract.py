@@ -39,6 +39,7 @@ def deployment_contract(export: Export, *, provenance: dict[str, Any]) -> dict[s
 
 
 def _onnx(export: Export) -> dict[str, Any]:
+    """Inputs and outputs of the ONNX model."""
     content = {
         "files": ["policy.onnx"],
         "input": "observation: (batch, entries) float32",
@@ -53,6 +54,7 @@ def _onnx(export: Export) -> dict[str, Any]:
 
 
 def _float(export: Export) -> dict[str, Any]:
+    """Units, operations and bytes of the float variant."""
     weights = sum(weight.size + bias.size for weight, bias in named_layers(export.policy).values())
     return {
         "files": ["epv_float.h", "epv_float.c"],
@@ -68,6 +70,7 @@ def _float(export: Export) -> dict[str, Any]:
 
 
 def _fixed(export: Export) -> dict[str, Any]:
+    """Units, scaling, operations and bytes of the integer variant."""
     layers, inputs = named_fixed_layers(export.fixed).values(), export.fixed.inputs
     cells = export.policy.cells
     rows = sum(len(layer.bias) for layer in layers)

@@ -19,6 +19,7 @@ def _agreement(a: dict[str, Any]) -> list[str]:
 
 
 def _cost(report: dict[str, Any], contract: dict[str, Any]) -> list[str]:
+    """Time, operations and memory of each variant."""
     lines = []
     for variant, time in report["microseconds"].items():
         operations, size = (contract["variants"][variant][part] for part in ("operations", "bytes"))
@@ -32,6 +33,7 @@ def _cost(report: dict[str, Any], contract: dict[str, Any]) -> list[str]:
 
 
 def _loop(report: dict[str, Any]) -> list[str]:
+    """Figures of the policy and of both variants in closed loop."""
     loop = report["closed_loop"]
     width = max(len(name) for name in loop["controllers"])
     return [

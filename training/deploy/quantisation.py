@@ -119,7 +119,7 @@ def quantise(
 
 
 def _rounded(signal: NDArray) -> NDArray:
-    """What int16 keeps of a signal."""
+    """The values that int16 keeps of a signal of any shape, 1 standing for its reach."""
     return np.rint(signal * SIGNAL_ONE) / SIGNAL_ONE
 
 
@@ -177,6 +177,6 @@ def _layer(
 
 
 def _factors(ratios: NDArray) -> tuple[NDArray, int]:
-    """Whole numbers below 2^31 and one shift, such that factor / 2^shift is each ratio."""
+    """Whole numbers (n,) below 2^31 and one shift, so that factor / 2^shift is each ratio (n,)."""
     shift = min(30 - int(np.floor(np.log2(ratios.max()))), 62)
     return np.rint(ratios * 2.0**shift).clip(max=2**31 - 1).astype(np.uint32), shift

@@ -56,8 +56,10 @@ def _wanted(text: str, parts: Sequence[str]) -> list[str]:
 
 
 def _begin(name: str) -> str:
+    """The marker before a part."""
     return f"<!-- generated: {name} -->"
 
 
 def _end(name: str) -> str:
+    """The marker after a part."""
     return f"<!-- end: {name} -->"

@@ -86,6 +86,8 @@ def task_runner(workers: int, cluster: str | None) -> Iterator[TaskRunner]:
 
 
 def _on_cores(workers: int) -> TaskRunner:
+    """Runs tasks in so many processes of this machine."""
+
     def run(tasks: Iterable[Task], study: Study) -> Iterator[tuple[str, Outcome]]:
         pool: Any = Parallel(n_jobs=workers, return_as="generator_unordered")
         yield from pool(delayed(_run_one)(task, study) for task in tasks)

@@ -86,11 +86,11 @@ def paired_comparison_table(paired: pd.DataFrame, ours: str) -> str:
     return markdown(["plants", f"{ours} against", *SCORES.values()], rows)
 
 
-def _grouped(table: pd.DataFrame, who: str) -> dict[tuple[str, str], list[dict[str, Any]]]:
+def _grouped(table: pd.DataFrame, column: str) -> dict[tuple[str, str], list[dict[str, Any]]]:
     """Rows by plant set and controller, one per score in the order of SCORES."""
     groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for row in records(table):
-        groups.setdefault((row["plants"], row[who]), []).append(row)
+        groups.setdefault((row["plants"], row[column]), []).append(row)
     return groups
 
 
@@ -155,7 +155,7 @@ def budget_text(c: ComparisonResults) -> str:
 
 
 def episodes_text(c: ComparisonResults) -> str:
-    """How many episodes stand behind the scenarios' figures, and who ran fewer."""
+    """How many episodes stand behind the scenarios' figures of each contender."""
     text = []
     for contender in c.contenders:
         run = c.chosen[contender.name]

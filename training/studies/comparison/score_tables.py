@@ -152,6 +152,7 @@ def _represented(c: ComparisonResults, contender: Contender) -> Contender:
 def _paired_comparison(
     c: ComparisonResults, ours: Contender, rival: Contender, plants: str, field: str
 ) -> dict[str, float]:
+    """Difference and probability of improvement of one score, with their intervals."""
     pair = c.scores(ours, plants, field), c.scores(rival, plants, field)
     lower = field not in HIGHER_IS_BETTER
     difference = paired_difference(*pair)
@@ -181,7 +182,7 @@ def trade_off(c: ComparisonResults, episodes: int) -> pd.DataFrame:
     """A row per contender and variant: `summary` of the first episodes on TRADE_OFF_ON, and the front.
 
     FIGURE_on_front: no other row is as good in the figure and in switchings, and better in one of them;
-    who sees the plant is a limit, and not on it.
+    a contender with privileged information is a limit, and not on it.
     """
     rows, fair = [], []
     for contender in [*c.contenders, *c.variants]:

@@ -111,6 +111,7 @@ def _by_controller(rows: list[dict[str, Any]]) -> pd.DataFrame:
 
 
 def _interval_columns(name: str) -> list[str]:
+    """Names of both ends of a figure's interval."""
     return [interval_column(name, end) for end in ENDS]
 
 

@@ -91,6 +91,7 @@ def cost(
     """
 
     def of_machines(cpu: float, machines: int) -> float:
+        """Time of a million episodes on so many machines [s]."""
         return million(cpu, overhead_s, cores=cores, machines=machines)
 
     return {

@@ -49,4 +49,5 @@ def _size(drawn: Range, level: str, sign: int) -> float:
 
 
 def _middle(drawn: Range) -> float:
+    """Geometric middle of a range [SI]."""
     return float(np.sqrt(drawn.low * drawn.high))

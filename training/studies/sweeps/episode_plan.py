@@ -68,6 +68,7 @@ def cells(points: Sequence[Point], controllers: Sequence[str], size: Size, seed:
 
 
 def _batches(point: Point, controller: str, size: Size, seed: int) -> list[Batch]:
+    """A point's episodes under one controller, cut into tasks."""
     joint = point.design in ("regions", "hypercube")
     episodes = size.joint_episodes if joint else size.episodes
     return [

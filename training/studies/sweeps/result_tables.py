@@ -26,10 +26,12 @@ def point_table(cells: Sequence[SweepCell], outcomes: Mapping[str, Outcome]) -> 
 
 
 def _parts(cell: SweepCell, outcomes: Mapping[str, Outcome]) -> list[dict[str, Any]]:
+    """Results of a cell's batches, in their order."""
     return [outcomes[batch.name]["result"] for batch in cell.batches]
 
 
 def _row(cell: SweepCell, parts: list[dict[str, Any]]) -> dict[str, Any]:
+    """A cell's row of `point_table`; parts: results of its batches."""
     excursion = np.concatenate([part["excursion_bar"] for part in parts])
     n, left = len(excursion), sum(part["left"] for part in parts)
     low, high = left_interval(np.arange(n) >= left)
