@@ -57,7 +57,7 @@ def criteria(
     criteria = [violation_criterion(c, ours, plants, limit) for plants, limit in limits]
     for rival in c.contenders:
         if rival.name == ORACLE:
-            criteria += against_oracle(c, ours, rival, settings.oracle_factor)
+            criteria += against_oracle(c, ours, rival, factor=settings.oracle_factor)
         elif not (rival.learned or rival.privileged):
             criteria += against_rival(c, ours, rival)
     return criteria
@@ -103,6 +103,7 @@ def against_oracle(
     c: ComparisonResults,
     ours: Contender,
     oracle: Contender,
+    *,
     factor: float = SETTINGS.oracle_factor,
 ) -> Iterator[Criterion]:
     """Figures near what is physically possible, on the calibrated plant.

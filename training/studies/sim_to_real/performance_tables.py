@@ -87,7 +87,8 @@ def as_markdown(aims: pd.DataFrame, differences: pd.DataFrame) -> str:
 
     aims: rows of `performance_table`; differences: rows of `gap_table`.
     """
-    shown = aims.loc[:, [*KEYS, *FIGURES]].assign(place=aims["place"].map(PLACE_NAMES))
+    shown = aims.loc[:, [*KEYS, *FIGURES]]
+    shown["place"] = [PLACE_NAMES[place] for place in aims["place"]]
     for name in ("C1_stayed", "C3_stayed"):
         shown[name] = [
             f"{value:.1%} ({low:.1%} to {high:.1%})"
