@@ -4,7 +4,7 @@
 
 writes the policy as ONNX, as C99 in single precision and in integers, the contract, and a parity test,
 but only after the C code was compiled here and agreed with the policy on every one of 10,000 states.
-docs/deploy.md says what each file is.
+docs/reference/exported-policy.md says what each file is.
 """
 
 import argparse

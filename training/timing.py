@@ -4,7 +4,7 @@
 
 Times are those of this implementation, Python and NumPy, on this machine: processor time of all the
 process's threads without garbage collection, since an ECU has neither other programs to wait for nor
-garbage. The exported C's are another matter (docs/deploy.md).
+garbage. The exported C's are another matter (docs/reference/exported-policy.md).
 """
 
 import argparse

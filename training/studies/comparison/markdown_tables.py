@@ -1,4 +1,4 @@
-"""The comparison in words and tables: the parts that docs/controllers.md and README.md hold."""
+"""The comparison in words and tables: the parts that docs/results/comparison.md and README.md hold."""
 
 from collections.abc import Sequence
 from typing import Any
