@@ -10,7 +10,7 @@ PACKAGES := epv_env identification controllers training
 
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help venv train test test-oldest identify gap blind real-bench circle pictures bench tune tradeoff results robustness export gif lint check format wheel clean
+.PHONY: help venv train test test-oldest identify gap blind real-bench sim-to-real pictures bench tune tradeoff results robustness export gif lint check format wheel clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z][a-z-]*\):.*## /\1	/p' Makefile | while IFS='	' read -r name text; do \
@@ -57,22 +57,23 @@ bench: $(VENV)/.installed ## measure speed and memory of plant and identificatio
 tune: $(VENV)/.installed ## search the classic controllers' settings anew (minutes)
 	$(PY) training/tune.py --out controllers/tuned.json $(ARGS)
 
-# The policies of docs/controllers.md, trained once and kept. To train them anew, remove the folder first.
-TRAINED := controllers/trained
-TRADEOFF := training/tradeoff.py --out $(TRAINED)/tradeoff
+# The policies of the comparison, trained once and kept. To train them anew, remove the folder first.
+# Two of them are links to those in the package: controllers/trained.
+POLICIES := docs/results/policies
+TRADEOFF := training/tradeoff.py --out $(POLICIES)/tradeoff
 # Where a switching costs nothing there is most to learn: long without a memory, then with one.
 tradeoff: $(VENV)/.installed ## optimise controllers at several prices of switching (what is there is kept)
-	$(PY) $(TRADEOFF) --prices 0.5 1 2 --recurrent $(TRAINED)/recurrent
+	$(PY) $(TRADEOFF) --prices 0.5 1 2 --recurrent $(POLICIES)/recurrent
 	$(PY) $(TRADEOFF) --prices 0 --timesteps 20000000
-	$(PY) $(TRADEOFF) --prices 0 --timesteps 12000000 --recurrent $(TRAINED)/recurrent
+	$(PY) $(TRADEOFF) --prices 0 --timesteps 12000000 --recurrent $(POLICIES)/recurrent
 
 results: tradeoff ## compare all controllers, and write docs/controllers.md's figures (trains what is missing)
-	$(PY) training/compare.py --recurrent $(TRAINED)/recurrent --policies $(TRAINED)/plain --tradeoff $(TRAINED)/tradeoff \
+	$(PY) training/compare.py --recurrent $(POLICIES)/recurrent --policies $(POLICIES)/plain --tradeoff $(POLICIES)/tradeoff \
 		--out runs/comparison --images docs/images --pages docs/controllers.md README.md $(ARGS)
 
 robustness: $(VENV)/.installed ## sweep parameters, effects and conditions, and write docs/robustness.md's figures
-	$(PY) training/sweep.py --controllers "hysteresis, extrapolating" PWM pulse PPO=$(TRAINED)/plain/seed-0 \
-		"PPO, recurrent=$(TRAINED)/recurrent/seed-7" \
+	$(PY) training/sweep.py --controllers "hysteresis, extrapolating" PWM pulse PPO=$(POLICIES)/plain/seed-0 \
+		"PPO, recurrent=$(POLICIES)/recurrent/seed-7" \
 		--out runs/robustness --images docs/images --pages docs/robustness.md $(ARGS)
 
 export: $(VENV)/.installed ## turn the policy of `make train` into C and ONNX (needs a C compiler)
@@ -94,8 +95,8 @@ blind: $(VENV)/.installed ## how often the diagnosis is right on 300 sealed camp
 real-bench: $(VENV)/.installed ## ask which effects give the report's printed errors (3 minutes)
 	$(PY) -m identification gap --tables --out runs/real-bench --images docs/images $(ARGS)
 
-circle: $(VENV)/.installed ## train, deploy on a bench, diagnose, retrain, deploy again (5 minutes)
-	$(PY) training/sim_to_real.py --out runs/circle --images docs/images $(ARGS)
+sim-to-real: $(VENV)/.installed ## train, deploy on a bench, diagnose, retrain, deploy again (5 minutes)
+	$(PY) training/sim_to_real.py --out runs/sim-to-real --images docs/images $(ARGS)
 
 pictures: $(VENV)/.installed ## draw the figures of docs/identification.md
 	$(PY) docs/scripts/identification_figures.py --out docs/images --coverage runs/coverage $(ARGS)

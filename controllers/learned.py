@@ -22,8 +22,8 @@ FORMAT = "epv-policy/1"
 WEIGHTS_FILE = "policy.safetensors"
 CONTRACT_FILE = "policy.json"
 TRAINED = Path(__file__).parent / "trained"
-"""Policies that come with the project, those of docs/controllers.md: recurrent/seed-0 to 9, plain/seed-0
-to 9, and by price of switching tradeoff/price-*."""
+"""The policies that come with the package, one of each kind: recurrent/seed-7 (with a memory) and
+plain/seed-0 (without one)."""
 
 
 class PolicyError(ValueError):

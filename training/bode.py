@@ -18,16 +18,13 @@ from epv_env.plant.plantfile import load_plant
 
 
 def bode(design: Design, path: Path) -> Path:
-    """Draw a design's open loop, gain and phase margin at their frequencies; the path comes back.
+    """Draw a design's open loop with its gain and phase margin; returns the path of the picture.
 
     Margins are python-control's of the very response that is drawn. The axis ends at half the sampling
-    frequency of the PWM, beyond which a sampled loop has nothing to show.
+    frequency of the PWM: a sampled loop has no response beyond.
     """
-    from training.evaluation.plots import (  # matplotlib only where it is drawn with
-        COLOURS,
-        plt,
-        save_figure,
-    )
+    # matplotlib takes a second to import: only now
+    from training.evaluation.plots import COLOURS, plt, save_figure
 
     loop = open_loop(design)
     gain_margin, phase_margin, at_phase, at_gain = map(float, control.margin(loop))
@@ -36,20 +33,22 @@ def bode(design: Design, path: Path) -> Path:
     phase = np.degrees(np.unwrap(np.angle(values)))
     phase -= 360 * np.round((np.interp(at_gain, frequency, phase) + 180 - phase_margin) / 360)
 
-    figure, (top, bottom) = plt.subplots(2, 1, figsize=(7, 5.5), sharex=True, layout="constrained")
-    top.semilogx(frequency, 20 * np.log10(np.abs(values)))
-    top.axhline(0.0, color="0.5", lw=0.8)
-    top.vlines(at_phase, -20 * np.log10(gain_margin), 0.0, color=COLOURS[3])
-    top.set_ylabel("gain [dB]")
-    bottom.semilogx(frequency, phase)
-    bottom.axhline(-180.0, color="0.5", lw=0.8)
-    bottom.vlines(at_gain, -180.0, phase_margin - 180.0, color=COLOURS[2])
-    bottom.set(ylabel="phase [°]", xlabel="frequency [rad/s]", xlim=(frequency[0], frequency[-1]))
-    for axis in (top, bottom):
-        axis.axvline(at_gain, color=COLOURS[2], lw=0.8, ls="--")
-        axis.axvline(at_phase, color=COLOURS[3], lw=0.8, ls="--")
-        axis.grid(alpha=0.3, which="both")
-    top.set_title(
+    figure, (gain_axes, phase_axes) = plt.subplots(
+        2, 1, figsize=(7, 5.5), sharex=True, layout="constrained"
+    )
+    gain_axes.semilogx(frequency, 20 * np.log10(np.abs(values)))
+    gain_axes.axhline(0.0, color="0.5", lw=0.8)
+    gain_axes.vlines(at_phase, -20 * np.log10(gain_margin), 0.0, color=COLOURS[3])
+    gain_axes.set_ylabel("gain [dB]")
+    phase_axes.semilogx(frequency, phase)
+    phase_axes.axhline(-180.0, color="0.5", lw=0.8)
+    phase_axes.vlines(at_gain, -180.0, phase_margin - 180.0, color=COLOURS[2])
+    phase_axes.set(ylabel="phase [°]", xlabel="frequency [rad/s]", xlim=(frequency[0], frequency[-1]))
+    for axes in (gain_axes, phase_axes):
+        axes.axvline(at_gain, color=COLOURS[2], lw=0.8, ls="--")
+        axes.axvline(at_phase, color=COLOURS[3], lw=0.8, ls="--")
+        axes.grid(alpha=0.3, which="both")
+    gain_axes.set_title(
         f"PWM loop: gain margin {gain_margin:.2f} ({20 * np.log10(gain_margin):.1f} dB) at "
         f"{at_phase:.0f} rad/s, phase margin {phase_margin:.0f}° at {at_gain:.1f} rad/s",
         fontsize=10,

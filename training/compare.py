@@ -40,13 +40,18 @@ from training.learners.policy_folders import (
     seed_trainings,
     train_missing,
 )
-from training.studies.comparison.blocks import Block, collect, plan
-from training.studies.comparison.output import PARTS, findings, write_figures, write_tables
-from training.studies.comparison.plan import Contender, Results, Sizes
-from training.studies.comparison.scores import Contest
-from training.studies.page_parts import check_pages
-from training.studies.sweeps.run import run_tasks, workplace
-from training.studies.sweeps.tasks import Study
+from training.studies.comparison.comparison_report import (
+    PARTS,
+    comparison_tables,
+    write_figures,
+    write_tables,
+)
+from training.studies.comparison.contenders import Contender, Results, Sizes
+from training.studies.comparison.episode_blocks import Block, joined_results, plan
+from training.studies.comparison.score_tables import ComparisonResults
+from training.studies.episode_tasks import Study
+from training.studies.generated_pages import check_pages
+from training.studies.parallel_run import run_tasks, task_runner
 from training.tradeoff import finished_variants, variant
 
 JOURNAL_FILE = "blocks.jsonl"
@@ -62,8 +67,29 @@ QUICK: dict[str, Any] = {
 
 def parse(arguments: list[str] | None) -> argparse.Namespace:
     """The command line's options, checked."""
-    parser = argparse.ArgumentParser(description="Compare controllers (docs/controllers.md).")
+    parser = argparse.ArgumentParser(description="Compare controllers (docs/results/comparison.md).")
     parser.add_argument("--out", type=writable_folder, default=Path("runs/comparison"))
+    _add_policies(parser)
+    _add_episodes(parser)
+    parser.add_argument("--workers", type=int, default=available_cores(), help="processes")
+    parser.add_argument("--cluster", help="address of a Dask scheduler to run on instead")
+    parser.add_argument("--images", type=writable_folder, help="another folder for the figures")
+    parser.add_argument(
+        "--pages", type=Path, nargs="+", default=[], help="pages whose generated parts are written"
+    )
+    chosen = parse_with_quick(parser, arguments, QUICK)
+    check_positive(
+        parser, chosen,
+        "seeds", "recurrent_seeds", "timesteps", "recurrent_timesteps", "named", "random", "bound",
+        "tuning", "duration", "workers",
+    )  # fmt: skip
+    if RANDOM not in chosen.scenarios:
+        parser.error(f"--scenarios must hold {RANDOM!r}: the probabilities refer to it")
+    return chosen
+
+
+def _add_policies(parser: argparse.ArgumentParser) -> None:
+    """Options that say which learned policies take part."""
     parser.add_argument(
         "--policies", type=writable_folder, help="folder with a learned policy for each training seed"
     )
@@ -82,30 +108,19 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--tradeoff", type=Path, help="folder of training/tradeoff.py: its controllers join the front"
     )
+
+
+def _add_episodes(parser: argparse.ArgumentParser) -> None:
+    """Options that say which episodes are run, and how many."""
     parser.add_argument("--scenarios", nargs="+", choices=list(EVALUATION), default=list(EVALUATION))
     parser.add_argument("--named", type=int, default=32, help="episodes in each named scenario")
     parser.add_argument("--random", type=int, default=512, help="random ones on the calibrated plant")
     parser.add_argument(
         "--bound", type=int, default=4096,
-        help="random ones on each region, to bound the probability of leaving the band",
+        help="random ones on each region, to bound the violation rate of ±500 mbar",
     )  # fmt: skip
     parser.add_argument("--tuning", type=int, default=256, help="episodes that choose a training seed")
     parser.add_argument("--duration", type=float, default=10.0, help="length of an episode [s]")
-    parser.add_argument("--workers", type=int, default=available_cores(), help="processes")
-    parser.add_argument("--cluster", help="address of a Dask scheduler to run on instead")
-    parser.add_argument("--images", type=writable_folder, help="another folder for the figures")
-    parser.add_argument(
-        "--pages", type=Path, nargs="+", default=[], help="pages whose generated parts are written"
-    )
-    chosen = parse_with_quick(parser, arguments, QUICK)
-    check_positive(
-        parser, chosen,
-        "seeds", "recurrent_seeds", "timesteps", "recurrent_timesteps", "named", "random", "bound",
-        "tuning", "duration", "workers",
-    )  # fmt: skip
-    if RANDOM not in chosen.scenarios:
-        parser.error(f"--scenarios must hold {RANDOM!r}: the probabilities refer to it")
-    return chosen
 
 
 def contenders(chosen: argparse.Namespace) -> list[Contender]:
@@ -151,12 +166,12 @@ def run_blocks(blocks: list[Block], everyone: list[Contender], chosen: argparse.
         "scenarios": {name: repr(scenario.options) for name, scenario in EVALUATION.items()},
     }
     journal = Journal(chosen.out / JOURNAL_FILE, subject)
-    with workplace(chosen.workers, chosen.cluster) as run:
+    with task_runner(chosen.workers, chosen.cluster) as run:
         outcomes = run_tasks(blocks, study, journal, run, what="comparison")
-    return collect(blocks, {name: outcome["result"] for name, outcome in outcomes.items()})
+    return joined_results(blocks, {name: outcome["result"] for name, outcome in outcomes.items()})
 
 
-def same_episode(c: Contest, duration: float) -> dict[str, Trace]:
+def same_episode(c: ComparisonResults, duration: float) -> dict[str, Trace]:
     """One random episode of the calibrated plant under each contender's chosen run, in time."""
     traces = {}
     for contender in c.contenders:
@@ -190,12 +205,12 @@ def main(arguments: list[str] | None = None) -> int:
     variants += limit_at_least_price(variants)
     blocks = plan([*everyone, *variants], chosen.scenarios, sizes)
     results = run_blocks(blocks, [*everyone, *variants], chosen)
-    contest = Contest(everyone, chosen.scenarios, results, variants)
-    found = findings(contest, trade_episodes=chosen.random)
+    comparison = ComparisonResults(everyone, chosen.scenarios, results, variants)
+    tables = comparison_tables(comparison, trade_off_episodes=chosen.random)
     settings = {name: getattr(chosen, name) for name in (*QUICK, "quick")}
-    print(write_tables(contest, found, settings=settings, out=chosen.out, pages=chosen.pages))
-    traces, curves = same_episode(contest, chosen.duration), learning_curves(chosen)
-    write_figures(contest, found, traces=traces, curves=curves, out=chosen.out, images=chosen.images)
+    print(write_tables(comparison, tables, settings=settings, out=chosen.out, pages=chosen.pages))
+    traces, curves = same_episode(comparison, chosen.duration), learning_curves(chosen)
+    write_figures(comparison, tables, traces=traces, curves=curves, out=chosen.out, images=chosen.images)
     print(f"\nresults in {chosen.out}")
     return 0
 

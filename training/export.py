@@ -4,7 +4,7 @@
 
 writes the policy as ONNX, as C99 in single precision and in integers, the contract, and a parity test,
 but only after the C code was compiled here and agreed with the policy on every one of 10,000 states.
-docs/deploy.md says what each file is.
+docs/reference/exported-policy.md says what each file is.
 """
 
 import argparse
@@ -24,19 +24,17 @@ from controllers.learned import CONTRACT_FILE, WEIGHTS_FILE, LearnedPolicy, load
 from epv_env.common.command_line import check_positive, fail_clearly, writable_folder
 from training.deploy import measurements as measure
 from training.deploy.atomic_folder import check_free, write_folder
+from training.deploy.c_arrays import named_layers
+from training.deploy.c_sources import Export, checks, sources
 from training.deploy.compiled_export import CompiledPolicy, find_compiler, library
-from training.deploy.contract import deployment_contract
+from training.deploy.deployment_contract import deployment_contract
 from training.deploy.double_precision import in_double
+from training.deploy.export_summary import as_text
 from training.deploy.onnx_model import onnx_model
-from training.deploy.quantise import ExportError, quantise
-from training.deploy.sources import Export, checks, sources
-from training.deploy.summary import as_text
-from training.deploy.tables import named_layers
+from training.deploy.quantisation import ExportError, quantise
+from training.deploy.settings import SETTINGS, ExportSettings
 from training.deploy.visited_states import states_table, visit
 from training.evaluation.seeds import CALIBRATION_SEED, CLOSED_LOOP_SEED, STATES_SEED
-
-EPISODES, PERIODS = 20, 500
-"""10,000 states: so many episodes of so many control periods (2.5 s)."""
 
 FILES = {
     "policy.onnx", "epv_float.h", "epv_float.c", "epv_fixed.h", "epv_fixed.c", "contract.json",
@@ -64,22 +62,26 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     return chosen
 
 
-def prepare(policy: LearnedPolicy, folder: Path) -> tuple[Export, dict[str, Any]]:
+def prepare(
+    policy: LearnedPolicy, folder: Path, settings: ExportSettings = SETTINGS
+) -> tuple[Export, dict[str, Any]]:
     """The policy with its integers, and its contract. Raises ExportError for another kind of policy."""
-    check(policy, folder)
+    check_exportable(policy, folder)
     content = json.loads((folder / CONTRACT_FILE).read_text(encoding="utf-8"))
     digest = hashlib.sha256((folder / WEIGHTS_FILE).read_bytes()).hexdigest()
-    calibration = visit(policy, first_seed=CALIBRATION_SEED, episodes=EPISODES, periods=PERIODS)
+    calibration = visit(
+        policy, first_seed=CALIBRATION_SEED, episodes=settings.episodes, periods=settings.periods
+    )
     export = Export(
         policy=policy,
-        fixed=quantise(policy, calibration.observations),
+        fixed=quantise(policy, calibration.observations, settings=settings),
         period=content["observation"]["control_period_s"],
         weights_sha256=digest,
     )
     return export, deployment_contract(export, provenance=content.get("provenance", {}))
 
 
-def check(policy: LearnedPolicy, folder: Path) -> None:
+def check_exportable(policy: LearnedPolicy, folder: Path) -> None:
     """Raises ExportError if the policy does not decide between off and on, or is damaged."""
     outputs = len(policy.layers[-1][1])
     if policy.environment != "EPValve-v0" or outputs != 2:
@@ -92,15 +94,18 @@ def check(policy: LearnedPolicy, folder: Path) -> None:
 
 
 def verify(
-    export: Export, compiler: list[str], chosen: argparse.Namespace
+    export: Export,
+    compiler: list[str],
+    chosen: argparse.Namespace,
+    settings: ExportSettings = SETTINGS,
 ) -> tuple[dict[str, str], dict[str, Any]]:
     """The C files by name and the report, once compiled code has passed. Raises ExportError."""
     policy = export.policy
-    states = visit(policy, first_seed=STATES_SEED, episodes=EPISODES, periods=PERIODS)
+    states = visit(policy, first_seed=STATES_SEED, episodes=settings.episodes, periods=settings.periods)
     files = sources(export)
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
-        put(folder, files)
+        write_texts(folder, files)
         code = library(compiler, folder)
         agreement = measure.agreement(policy, code, states)
         fixed_actions = measure.follow(
@@ -108,9 +113,9 @@ def verify(
         )
         agreement["fixed_agrees"] = int(np.sum(fixed_actions == states.actions))
         margins = measure.margins(in_double(policy), states)
-        tests = checks(states.actions.size, rounding=agreement["rounding_of_c"])
+        tests = checks(states.actions.size, rounding=agreement["rounding_of_c"], settings=settings)
         tests["states.csv"] = states_table(states, margins, fixed_actions)
-        put(folder, tests)
+        write_texts(folder, tests)
         measure.run_parity(compiler, folder)
         report = {
             "agreement": agreement,
@@ -121,7 +126,7 @@ def verify(
     return files | tests, report
 
 
-def put(folder: Path, files: dict[str, str]) -> None:
+def write_texts(folder: Path, files: dict[str, str]) -> None:
     """Write texts into a folder that nobody else sees."""
     for name, text in files.items():
         (folder / name).write_text(text, encoding="utf-8")

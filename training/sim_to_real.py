@@ -1,14 +1,17 @@
-"""The whole circle: train on the nominal plant, deploy on a bench, diagnose, retrain, deploy again.
+"""The sim-to-real loop: train on the nominal plant, deploy on a bench, diagnose, retrain, deploy again.
 
-    python training/sim_to_real.py --out runs/circle
+    python training/sim_to_real.py --out runs/sim-to-real
 
-The bench is a virtual one. Its valve has an effect that no other step is told of: training, simulation
-and diagnosis see what a user sees. What is finished in --out is kept, not done again (docs/circle.md).
+The bench is a virtual one. Its valve has an effect that is withheld from every other step: training,
+simulation and diagnosis see what a user sees. What is finished in --out is kept, not done
+again (docs/results/sim-to-real.md).
 """
 
 import argparse
 import json
 import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -34,22 +37,33 @@ from training.studies.results_folder import check_options, write_options
 from training.studies.sim_to_real.deployment import (
     AFTER,
     BEFORE,
-    DELIVERED,
-    PROMISED,
+    MEASURED,
+    SIMULATED,
     deployed,
     read_episodes,
 )
-from training.studies.sim_to_real.report import report
+from training.studies.sim_to_real.sim_to_real_report import report
 
-SCENARIO = "mixed"
-TRAINED_ON = "ten_percent"
-"""Region of plants around the simulated one that PPO trains on: no wider, so that a gap is felt."""
 
-SWITCHING_PRICE = 0.2
-"""Below the default: where switching is dear, so short a training has not learned to control yet."""
+@dataclass(frozen=True, kw_only=True)
+class LoopSettings:
+    """How the loop trains and deploys."""
 
-SMALLER_STEPS: dict[str, Any] = {"num_envs": 128, "batch_size": 1024, "n_epochs": 4}
-"""Four times as many updates per environment step as train_ppo.py: learns in a quarter of the steps."""
+    scenario: str = "mixed"
+    """Consumption of trainings and deployments."""
+    training_region: str = "ten_percent"
+    """Region of plants around the simulated one that PPO trains on: no wider, so that a gap is felt."""
+    switching_price: float = 0.2
+    """Price of a switching in the reward [1]. Below the default: at a high price, so short a training
+    has not learned to control yet."""
+    hyperparameters: Mapping[str, int] = field(
+        default_factory=lambda: {"num_envs": 128, "batch_size": 1024, "n_epochs": 4}
+    )
+    """Of PPO: four times as many updates per environment step as train_ppo.py, so that it learns in a
+    quarter of the steps."""
+
+
+SETTINGS = LoopSettings()
 
 QUICK: dict[str, Any] = {"timesteps": 8192, "episodes": 8, "duration": 1.0, "suite": "report"}
 """The defaults under --quick: everything is done, too short to learn anything."""
@@ -62,14 +76,15 @@ EPISODES = "episodes.csv"
 def parse(arguments: list[str] | None) -> argparse.Namespace:
     """The command line's options, checked."""
     parser = argparse.ArgumentParser(
-        description="Train, deploy on a bench, diagnose, retrain and deploy again (docs/circle.md)."
+        description="Train, deploy on a bench, diagnose, retrain and deploy again "
+        "(docs/results/sim-to-real.md)."
     )
     parser.add_argument(
-        "--out", type=writable_folder, default=Path("runs/circle"), help="folder of results"
+        "--out", type=writable_folder, default=Path("runs/sim-to-real"), help="folder of results"
     )
     parser.add_argument(
         "--effect", default="pressure_sensor_lag=0.02,0", metavar="NAME=SIZE",
-        help="what the bench's valve has and nobody is told (docs/effects.md)",
+        help="effect of the bench's valve, withheld from training and diagnosis (docs/effects.md)",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, default=0, help="of both trainings, sensors, diagnosis")
     parser.add_argument("--timesteps", type=int, default=1_200_000, help="steps of each training")
@@ -79,7 +94,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         "--suite", choices=SUITES, default="diagnosis", help="recordings that the bench makes"
     )
     parser.add_argument(
-        "--images", type=writable_folder, default=None, help="another folder for circle.png"
+        "--images", type=writable_folder, default=None, help="another folder for sim-to-real.png"
     )
     chosen = parse_with_quick(parser, arguments, QUICK)
     check_positive(parser, chosen, "timesteps", "episodes", "duration")
@@ -93,7 +108,7 @@ def options(chosen: argparse.Namespace) -> dict[str, Any]:
 
 
 def record(chosen: argparse.Namespace) -> None:
-    """Build the bench's valve and record its campaign: the only step that is told the effect.
+    """Build the bench's valve and record its campaign: the only step that knows the effect.
 
     It comes first, so that an effect that cannot be used is refused before anything is trained.
     """
@@ -113,15 +128,18 @@ def diagnose(chosen: argparse.Namespace) -> dict[str, Any]:
     return json.loads(path.read_text(encoding="utf-8"))
 
 
-def trained(folder: Path, plant: Plant, chosen: argparse.Namespace) -> Controller:
+def trained(
+    folder: Path, plant: Plant, chosen: argparse.Namespace, settings: LoopSettings = SETTINGS
+) -> Controller:
     """PPO trained on plants around this one, or as it was trained before."""
     if not holds_policy(folder):
         from training.learners.policy_files import save_policy  # torch takes seconds to import: only now
         from training.learners.ppo import Hyperparameters, train
 
         policy, _ = train(
-            Hyperparameters(**SMALLER_STEPS), folder=folder, plant=plant, scenario=SCENARIO,
-            parameters=TRAINED_ON, weights=RewardWeights(switching=SWITCHING_PRICE),
+            Hyperparameters(**settings.hyperparameters), folder=folder, plant=plant,
+            scenario=settings.scenario, parameters=settings.training_region,
+            weights=RewardWeights(switching=settings.switching_price),
             timesteps=chosen.timesteps, seed=chosen.seed, device="cpu", resume=True,
         )  # fmt: skip
         provenance = {"plant": plant.name, "timesteps": chosen.timesteps, "seed": chosen.seed}
@@ -129,45 +147,47 @@ def trained(folder: Path, plant: Plant, chosen: argparse.Namespace) -> Controlle
     return load_policy(folder)
 
 
-def stage(name: str, simulated: Plant, chosen: argparse.Namespace) -> pd.DataFrame:
+def stage(
+    name: str, simulated: Plant, chosen: argparse.Namespace, settings: LoopSettings = SETTINGS
+) -> pd.DataFrame:
     """Train on the simulated plant, then deploy in simulation and on the bench's valve.
 
     Returns the episodes of `deployed` with a column `stage`. The tuned controllers stay as they are.
     """
     folder = chosen.out / name
-    policy = trained(folder, simulated, chosen)
+    policy = trained(folder, simulated, chosen, settings)
     path = folder / EPISODES
     if not path.exists():
-        plants = {PROMISED: simulated, DELIVERED: load_plant(chosen.out / WITHHELD)}
+        plants = {SIMULATED: simulated, MEASURED: load_plant(chosen.out / WITHHELD)}
         rivals = tuned_controllers(without=SEARCHING)
         episodes = deployed(
-            [policy, *rivals], plants, scenario=SCENARIO, count=chosen.episodes,
+            [policy, *rivals], plants, scenario=settings.scenario, count=chosen.episodes,
             duration=chosen.duration, what=f"deployment {name}",
         )  # fmt: skip
         write_text(path, episodes.to_csv(index=False))
     return read_episodes(path).assign(stage=name)
 
 
-def say(step: str) -> None:
-    """Which step has begun, on stderr like its progress."""
+def announce(step: str) -> None:
+    """Say on stderr, like its progress, which step begins."""
     print(f"[{step}]", file=sys.stderr)
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Command line; returns the exit status."""
     chosen = parse(arguments)
-    check_options(chosen.out, options(chosen), "circle")
-    say("1 of 4: the bench records its valve")
+    check_options(chosen.out, options(chosen), "sim-to-real run")
+    announce("1 of 4: the bench records its valve")
     record(chosen)
     write_options(chosen.out, options(chosen))
-    say("2 of 4: train on the nominal plant, deploy")
+    announce("2 of 4: train on the nominal plant, deploy")
     before = stage(BEFORE, load_plant(None), chosen)
-    say("3 of 4: diagnose the campaign")
-    found = diagnose(chosen)
-    say("4 of 4: train on the corrected plant, deploy")
+    announce("3 of 4: diagnose the campaign")
+    diagnosis = diagnose(chosen)
+    announce("4 of 4: train on the corrected plant, deploy")
     after = stage(AFTER, load_plant(chosen.out / CORRECTED), chosen)
     episodes = pd.concat([before, after], ignore_index=True)
-    print(report(episodes, found, withheld=chosen.effect, folder=chosen.out, images=chosen.images))
+    print(report(episodes, diagnosis, withheld=chosen.effect, folder=chosen.out, images=chosen.images))
     print(f"\nresults in {chosen.out}")
     return 0
 

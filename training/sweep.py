@@ -3,14 +3,12 @@
     python training/sweep.py --out runs/sweep
     python training/sweep.py --out runs/sweep --cluster tcp://HOST:8786
 
-Killed, it goes on where it was when it is started again. docs/robustness.md says what it does.
+Killed, it goes on where it was when it is started again. docs/results/robustness.md says what it does.
 """
 
 import argparse
 import hashlib
-import json
 import sys
-from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -22,24 +20,26 @@ from epv_env.common.command_line import (
     parse_with_quick,
     writable_folder,
 )
-from epv_env.common.files import write_text
 from epv_env.common.journal import Journal
 from epv_env.plant.consumption import check_scenario
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.valves import available_cores
 from training.evaluation.seeds import CALIBRATION_SEED, SWEEP_SEED
-from training.studies.page_parts import check_pages
+from training.studies.episode_tasks import Study
+from training.studies.generated_pages import check_pages
+from training.studies.named_controllers import DEFAULT, named_controllers
+from training.studies.parallel_run import run_tasks, task_runner
+from training.studies.result_files import write_json
 from training.studies.results_folder import check_options, write_options
-from training.studies.sweeps.controllers import DEFAULT, named_controllers
-from training.studies.sweeps.cost import cost, episode_cpu, overhead
-from training.studies.sweeps.designs import DESIGNS
-from training.studies.sweeps.plan import Size, cells, chosen_points, searches
-from training.studies.sweeps.report import PARTS, report
-from training.studies.sweeps.run import run_tasks, workplace
-from training.studies.sweeps.tasks import Study
+from training.studies.sweeps.computing_cost import cost, episode_cpu, overhead
+from training.studies.sweeps.episode_plan import Size, cells, chosen_points, searches
+from training.studies.sweeps.experiment_designs import DESIGNS, Point
+from training.studies.sweeps.sweep_report import PARTS, SweepResults, report
 from training.studies.sweeps.worst_case_search import Effort
 
 JOURNAL, COST = "finished.jsonl", "cost.json"
+LEAST_SCREENED = 8
+"""Plants that a worst-case search needs at least: a generation of differential evolution."""
 
 QUICK: dict[str, Any] = {
     "controllers": DEFAULT[:1], "episodes": 4, "joint_episodes": 16, "duration": 0.6, "screened": 16,
@@ -51,10 +51,32 @@ QUICK: dict[str, Any] = {
 
 def parse(arguments: list[str] | None) -> argparse.Namespace:
     """The command line's options, checked."""
-    parser = argparse.ArgumentParser(description="Robustness of controllers (docs/robustness.md).")
+    parser = argparse.ArgumentParser(
+        description="Robustness of controllers (docs/results/robustness.md)."
+    )
     parser.add_argument(
         "--out", type=writable_folder, default=Path("runs/sweep"), help="folder of results"
     )
+    _add_plan(parser)
+    parser.add_argument("--workers", type=int, default=None, help="processes; default: all cores")
+    parser.add_argument("--cluster", default=None, help="address of a Dask scheduler, tcp://HOST:8786")
+    parser.add_argument(
+        "--images", type=writable_folder, default=None, help="another folder for the figures"
+    )
+    parser.add_argument(
+        "--pages", type=Path, nargs="+", default=[], help="pages whose generated parts are written"
+    )
+    chosen = parse_with_quick(parser, arguments, QUICK)
+    check_positive(
+        parser, chosen, "episodes", "joint_episodes", "duration", "generations", "workers"
+    )  # fmt: skip
+    check_not_negative(parser, chosen, "seed")
+    _check_episodes(parser, chosen)
+    return chosen
+
+
+def _add_plan(parser: argparse.ArgumentParser) -> None:
+    """Options that say what is run."""
     parser.add_argument(
         "--controllers", nargs="+", default=list(DEFAULT), metavar="NAME",
         help="kinds of controllers/tuned.json, folders of policies, or LABEL=FOLDER",
@@ -73,21 +95,12 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--scenario", default="mixed", help="consumption, where it is not what changes")
     parser.add_argument("--plant", default=None, help="plant file; default: the report's calibration")
     parser.add_argument("--seed", type=int, default=0, help="of episodes, hypercube and searches")
-    parser.add_argument("--workers", type=int, default=None, help="processes; default: all cores")
-    parser.add_argument("--cluster", default=None, help="address of a Dask scheduler, tcp://HOST:8786")
-    parser.add_argument(
-        "--images", type=writable_folder, default=None, help="another folder for the figures"
-    )
-    parser.add_argument(
-        "--pages", type=Path, nargs="+", default=[], help="pages whose generated parts are written"
-    )
-    chosen = parse_with_quick(parser, arguments, QUICK)
-    check_positive(
-        parser, chosen, "episodes", "joint_episodes", "duration", "generations", "workers"
-    )  # fmt: skip
-    check_not_negative(parser, chosen, "seed")
-    if chosen.screened < 8:
-        parser.error("--screened must be at least 8")
+
+
+def _check_episodes(parser: argparse.ArgumentParser, chosen: argparse.Namespace) -> None:
+    """Refuse a search that is too small, and episodes that reach into another range of seeds."""
+    if chosen.screened < LEAST_SCREENED:
+        parser.error(f"--screened must be at least {LEAST_SCREENED}")
     used = max(chosen.episodes, chosen.joint_episodes, 2 * chosen.screened)
     most = CALIBRATION_SEED - SWEEP_SEED - used
     if chosen.seed > most:
@@ -95,7 +108,6 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
             f"--seed {chosen.seed} would meet episodes kept for exports (evaluation/seeds.py): with "
             f"{used} episodes give one up to {most}"
         )
-    return chosen
 
 
 def configuration(
@@ -110,10 +122,37 @@ def configuration(
         "software": version("epv-valve"),
         "controllers": digests,
         "plant": {"name": plant.name, "sha256": hashlib.sha256(described.encode()).hexdigest()},
-        "size": asdict(size),
+        "size": {
+            "episodes": size.episodes,
+            "joint_episodes": size.joint_episodes,
+            "effort": {"screened": size.effort.screened, "generations": size.effort.generations},
+        },
         "first_seed": SWEEP_SEED,
         **{name: getattr(chosen, name) for name in depends},
     }
+
+
+def sweep(
+    chosen: argparse.Namespace, config: dict[str, Any], study: Study, size: Size, points: list[Point]
+) -> SweepResults:
+    """Run the points and worst-case searches that --out lacks, and estimate the computing cost."""
+    names = list(study.controllers)
+    planned = cells(points, names, size, chosen.seed)
+    searched = "worst" in chosen.designs
+    worst = searches(study.plant, names, size, chosen.seed) if searched else []
+    tasks = [*worst, *(batch for cell in planned for batch in cell.batches)]
+    cores = available_cores()
+    with task_runner(chosen.workers or cores, chosen.cluster) as run:
+        outcomes = run_tasks(tasks, study, Journal(chosen.out / JOURNAL, config), run, what="sweep")
+        handing_out = overhead(run, study)
+    estimate = cost(
+        episode_cpu(planned, outcomes), handing_out, cores=cores, duration=chosen.duration,
+        where="Dask" if chosen.cluster else "joblib",
+    )  # fmt: skip
+    return SweepResults(
+        configuration=config, cells=planned, searches=worst, outcomes=outcomes, study=study,
+        cost_estimate=estimate,
+    )  # fmt: skip
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -131,28 +170,12 @@ def main(arguments: list[str] | None = None) -> int:
     config = configuration(chosen, size, plant, digests)
     check_options(chosen.out, config, "sweep")
     write_options(chosen.out, config)
-
     study = Study(
         controllers=controllers, plant=plant, scenario=chosen.scenario, duration=chosen.duration
     )
-    planned = cells(points, list(controllers), size, chosen.seed)
-    hunts = searches(plant, list(controllers), size, chosen.seed) if "worst" in chosen.designs else []
-    tasks = [*hunts, *(batch for cell in planned for batch in cell.batches)]
-    cores = available_cores()
-    with workplace(chosen.workers or cores, chosen.cluster) as run:
-        outcomes = run_tasks(tasks, study, Journal(chosen.out / JOURNAL, config), run, what="sweep")
-        handing_out = overhead(run, study)
-    spent = cost(
-        episode_cpu(planned, outcomes), handing_out, cores=cores, duration=chosen.duration,
-        where="Dask" if chosen.cluster else "joblib",
-    )  # fmt: skip
-    write_text(chosen.out / COST, json.dumps(spent, indent=1) + "\n")
-    print(
-        report(
-            chosen.out, config, planned, hunts, outcomes, study, spent,
-            images=chosen.images, pages=chosen.pages,
-        )
-    )  # fmt: skip
+    results = sweep(chosen, config, study, size, points)
+    write_json(chosen.out / COST, results.cost_estimate)
+    print(report(results, chosen.out, images=chosen.images, pages=chosen.pages))
     print(f"\nresults in {chosen.out}")
     return 0
 

@@ -4,12 +4,11 @@
 
 Times are those of this implementation, Python and NumPy, on this machine: processor time of all the
 process's threads without garbage collection, since an ECU has neither other programs to wait for nor
-garbage. The exported C's are another matter (docs/deploy.md).
+garbage. The exported C's are another matter (docs/reference/exported-policy.md).
 """
 
 import argparse
 import gc
-import json
 import sys
 import time
 from collections.abc import Mapping
@@ -29,9 +28,10 @@ from epv_env.plant.plantfile import load_plant
 from epv_env.reward import REFERENCE_PERIOD
 from training.evaluation.rollout import begin_episodes, make_env
 from training.evaluation.seeds import TIMING_SEED
-from training.studies.sweeps.controllers import named_controllers
+from training.studies.named_controllers import named_controllers
+from training.studies.result_files import records, write_json
 
-WARM_UP = 50
+WARM_UP_DECISIONS = 50
 """Decisions that are not counted: the first ones compile and fill caches."""
 
 
@@ -44,7 +44,7 @@ def decision_times(
     """
     env = make_env(controller, 1, threads=1, **options)
     observation = begin_episodes(env, controller, [seed])
-    seconds = np.zeros(WARM_UP + decisions)
+    seconds = np.zeros(WARM_UP_DECISIONS + decisions)
     collects = gc.isenabled()
     gc.disable()  # as timeit does
     try:
@@ -56,11 +56,14 @@ def decision_times(
     finally:
         if collects:
             gc.enable()
-    return seconds[WARM_UP:]
+    return seconds[WARM_UP_DECISIONS:]
 
 
 def timing_table(seconds: Mapping[str, NDArray], period: float = REFERENCE_PERIOD) -> pd.DataFrame:
-    """A row per controller: median, 99.9 % and worst time, and the worst's share of the period [s]."""
+    """A row per controller: median, 99.9 % and worst time [us], and their shares of the period [1].
+
+    seconds: times of decisions (decisions,) [s] by controller. period: control period [s].
+    """
     rows = [
         {
             "controller": label,
@@ -106,7 +109,7 @@ def main(arguments: list[str] | None = None) -> int:
         }
     )
     write_text(chosen.out / "timing.csv", table.to_csv(index=False))
-    write_text(chosen.out / "timing.json", json.dumps(table.to_dict(orient="records"), indent=1) + "\n")
+    write_json(chosen.out / "timing.json", records(table))
     print(table.to_string(index=False, float_format="%.4g"))
     return 0
 

@@ -28,7 +28,7 @@ from epv_env.plant.valves import available_cores
 from epv_env.reward import RewardWeights
 from training.evaluation.scenarios import TUNING_REGION
 from training.learners.policy_folders import RECURRENT_TIMESTEPS, Training, seed_trainings, train_missing
-from training.studies.comparison.plan import Contender
+from training.studies.comparison.contenders import Contender
 from training.tune import tune
 
 FOLDER = "price-{:g}"
@@ -74,7 +74,7 @@ def finished_variants(folder: Path | None) -> list[Contender]:
     """
     if folder is None:
         return []
-    found = []
+    variants: list[Contender] = []
     for path in sorted(folder.glob("price-*")):
         price = float(path.name.removeprefix("price-"))
         controllers: list[Controller] = []
@@ -84,10 +84,10 @@ def finished_variants(folder: Path | None) -> list[Contender]:
             tunings = load_tunings(path / TUNED_FILE)
             plant = Parameters.calibrated()
             controllers += [build(kind, tuning.values, plant) for kind, tuning in tunings.items()]
-        found += [variant(controller, price) for controller in controllers]
-    if not found:
+        variants += [variant(controller, price) for controller in controllers]
+    if not variants:
         raise ValueError(f"{folder} holds no controllers: make them with `python training/tradeoff.py`")
-    return found
+    return variants
 
 
 def first_memory(chosen: argparse.Namespace) -> Training | None:

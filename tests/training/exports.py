@@ -12,7 +12,10 @@ from controllers.learned import GatedUnit
 from epv_env.common.command_line import fail_clearly
 from epv_env.observation import LAYOUT
 from tests.training.policies import Layers, fitted_layers, random_unit, write_policy
-from training.export import EPISODES, PERIODS, main
+from training.deploy.settings import SETTINGS
+from training.export import main
+
+EPISODES, PERIODS = SETTINGS.episodes, SETTINGS.periods
 
 GOOD = Hysteresis(open_below=-0.1, shut_above=0.0, shut_lookahead=0.03, name="good")
 QUICK = ("--episodes", "4", "--duration", "1")

@@ -1,4 +1,4 @@
-"""The comparison's command in its short form, its plan, its bars, and its generated pages."""
+"""The comparison's command in its short form, its plan, its criteria, and its generated pages."""
 
 import json
 from dataclasses import dataclass, replace
@@ -23,11 +23,15 @@ from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.scenarios import EVALUATION, RANDOM, TUNING_REGION
 from training.learners.distillation import NAME, Distillation, Student, policy_of
 from training.learners.policy_files import save_policy
-from training.studies.comparison.acceptance_criteria import against_oracle, against_rival, leaving, lost
-from training.studies.comparison.blocks import collect, plan
-from training.studies.comparison.figures import trade_figure
-from training.studies.comparison.output import PARTS, RESULTS_FILE, TABLES_FILE
-from training.studies.comparison.plan import (
+from training.studies.comparison.acceptance_criteria import (
+    against_oracle,
+    against_rival,
+    lost_to_model_based,
+    violation_criterion,
+)
+from training.studies.comparison.comparison_figures import trade_off_figure
+from training.studies.comparison.comparison_report import PARTS, RESULTS_FILE, TABLES_FILE
+from training.studies.comparison.contenders import (
     EXPENSIVE,
     TUNING,
     Contender,
@@ -35,9 +39,15 @@ from training.studies.comparison.plan import (
     Sizes,
     chosen_run,
 )
-from training.studies.comparison.scores import Contest, duels, figures, trade
-from training.studies.page_parts import check_pages, fill, markdown
-from training.studies.sweeps.tasks import Study
+from training.studies.comparison.episode_blocks import joined_results, plan
+from training.studies.comparison.score_tables import (
+    ComparisonResults,
+    figures,
+    paired_comparisons,
+    trade_off,
+)
+from training.studies.episode_tasks import Study
+from training.studies.generated_pages import check_pages, fill, markdown
 from training.tradeoff import variant
 
 pytestmark = pytest.mark.training
@@ -45,7 +55,7 @@ pytestmark = pytest.mark.training
 SIZES = Sizes(named=10, random=20, bound=1000, tuning=5)
 FIGURES = (
     "results.json", "tables.md", "excursions.png", "episode.png", "tradeoff.png",
-    "comparison-scenarios.png", "comparison-means.png", "comparison-duels.png",
+    "comparison-scenarios.png", "comparison-means.png", "comparison-paired.png",
 )  # fmt: skip
 
 
@@ -83,7 +93,7 @@ def episodes(n, *, left=0, breakdown=0.3, rms=0.1, switchings=4.0, returned=-10.
     )  # fmt: skip
 
 
-def contest(**figures_of):
+def comparison_of(**figures_of):
     """One classic contender for each name, PPO being the learned one; the same in every plant set."""
     contenders = [
         Contender(name="PPO", runs={"PPO": controller("PPO")}, learned=True) if name == "PPO"
@@ -96,7 +106,7 @@ def contest(**figures_of):
         for plants in PLANTS
         for scenario in (RANDOM, "steps")
     }
-    return Contest(contenders, [RANDOM, "steps"], results)
+    return ComparisonResults(contenders, [RANDOM, "steps"], results)
 
 
 @pytest.fixture(scope="module")
@@ -187,8 +197,8 @@ def test_an_episode_is_the_same_beside_other_scenarios_as_alone():
     study = Study(
         controllers={"a": controller("a")}, plant=Plant.calibrated(), scenario=MIXED, duration=0.8
     )
-    together = collect([beside], {beside.name: beside.run(study)})
-    alone = collect(apart, {block.name: block.run(study) for block in apart})
+    together = joined_results([beside], {beside.name: beside.run(study)})
+    alone = joined_results(apart, {block.name: block.run(study) for block in apart})
     assert together.keys() == alone.keys()
     returns = {key[2]: found.episode_return.tolist() for key, found in together.items()}
     assert returns == {key[2]: found.episode_return.tolist() for key, found in alone.items()}
@@ -201,7 +211,7 @@ def test_every_scenario_can_be_run():
     study = Study(
         controllers={"a": controller("a")}, plant=Plant.calibrated(), scenario=MIXED, duration=0.02
     )
-    found = collect(blocks, {block.name: block.run(study) for block in blocks})
+    found = joined_results(blocks, {block.name: block.run(study) for block in blocks})
     assert {scenario for _, _, scenario in found} == set(EVALUATION)
     assert all(len(episodes) == 1 for episodes in found.values())
 
@@ -232,11 +242,11 @@ def test_the_training_seed_is_chosen_on_the_tuning_scenarios_alone():
 
 
 def test_the_bound_is_met_with_enough_episodes_only():
-    enough, few = contest(PPO=episodes(4096)), contest(PPO=episodes(1000))
-    assert leaving(enough, enough.contenders[0], "confidence", 1e-3).met
-    assert not leaving(few, few.contenders[0], "confidence", 1e-3).met
-    once = contest(PPO=episodes(4096, left=1))
-    assert not leaving(once, once.contenders[0], "confidence", 1e-3).met
+    enough, few = comparison_of(PPO=episodes(4096)), comparison_of(PPO=episodes(1000))
+    assert violation_criterion(enough, enough.contenders[0], "confidence", 1e-3).met
+    assert not violation_criterion(few, few.contenders[0], "confidence", 1e-3).met
+    once = comparison_of(PPO=episodes(4096, left=1))
+    assert not violation_criterion(once, once.contenders[0], "confidence", 1e-3).met
 
 
 @pytest.mark.parametrize(
@@ -248,8 +258,8 @@ def test_the_bound_is_met_with_enough_episodes_only():
     ],
 )
 def test_a_rival_is_beaten_only_at_equal_or_fewer_switches(rival, met):
-    c = contest(PPO=episodes(50), other=episodes(50, **rival))
-    assert [bar.met for bar in against_rival(c, *c.contenders)] == met
+    c = comparison_of(PPO=episodes(50), other=episodes(50, **rival))
+    assert [criterion.met for criterion in against_rival(c, *c.contenders)] == met
 
 
 def add_variant(c, price, figures, name="PPO"):
@@ -260,39 +270,39 @@ def add_variant(c, price, figures, name="PPO"):
 
 def test_a_rival_that_switches_less_is_met_at_another_price():
     """By the variant that switches most among those that switch no more; by none where it is worse."""
-    c = contest(PPO=episodes(50), other=episodes(50, breakdown=0.4, rms=0.15, switchings=3.0))
+    c = comparison_of(PPO=episodes(50), other=episodes(50, breakdown=0.4, rms=0.15, switchings=3.0))
     figures_at = {2.0: (2.9, 0.12), 5.0: (1.0, 0.11), 1.0: (3.5, 0.10)}
     for price, (switchings, rms) in figures_at.items():
         add_variant(c, price, episodes(50, switchings=switchings, rms=rms))
     found = list(against_rival(c, *c.contenders))
-    assert [(bar.controller, bar.met) for bar in found] == [("PPO, price 2", True)] * 2
+    assert [(each.controller, each.met) for each in found] == [("PPO, price 2", True)] * 2
     assert "120 against 150 mbar" in found[1].measured
     c.results["PPO, price 2", "calibrated", RANDOM] = episodes(50, switchings=2.9, rms=0.2)
-    assert [bar.met for bar in against_rival(c, *c.contenders)] == [True, False]
+    assert [criterion.met for criterion in against_rival(c, *c.contenders)] == [True, False]
 
 
 def test_the_oracle_is_a_limit_and_no_rival():
-    c = contest(PPO=episodes(50), oracle=episodes(20, breakdown=0.25, rms=0.05))
+    c = comparison_of(PPO=episodes(50), oracle=episodes(20, breakdown=0.25, rms=0.05))
     assert c.contenders[1].privileged
-    assert [bar.met for bar in against_oracle(c, *c.contenders)] == [True, False]
+    assert [criterion.met for criterion in against_oracle(c, *c.contenders)] == [True, False]
 
 
 def test_what_lies_above_a_panel_of_the_tradeoff_is_named():
     far = episodes(50, breakdown=1.2)
-    found = trade(contest(PPO=episodes(50), far=far, pulse=episodes(50)), 50)
-    figure = trade_figure(found)
+    found = trade_off(comparison_of(PPO=episodes(50), far=far, pulse=episodes(50)), 50)
+    figure = trade_off_figure(found)
     plt.close(figure)
     assert [axes.get_title() for axes in figure.axes] == ["above: far", "above: far", ""]
 
 
 def test_how_near_the_oracle_cheaper_switching_comes_is_said_too():
-    c = contest(PPO=episodes(50), oracle=episodes(20, breakdown=0.25, rms=0.05))
+    c = comparison_of(PPO=episodes(50), oracle=episodes(20, breakdown=0.25, rms=0.05))
     add_variant(c, 2.0, episodes(50, switchings=1.0, rms=0.01))
     add_variant(c, 0.0, episodes(50, switchings=90.0, rms=0.07))
-    found = [(bar.controller, bar.met) for bar in against_oracle(c, *c.contenders)]
+    found = [(each.controller, each.met) for each in against_oracle(c, *c.contenders)]
     assert found == [("PPO", True), ("PPO", False), ("PPO, price 0", True), ("PPO, price 0", True)]
     add_variant(c, 0.0, episodes(20, switchings=90.0, rms=0.01, breakdown=0.1), name="oracle")
-    found = [(bar.controller, bar.met) for bar in against_oracle(c, *c.contenders)]
+    found = [(each.controller, each.met) for each in against_oracle(c, *c.contenders)]
     assert found[4:] == [("PPO, price 0", False), ("PPO, price 0", False)]
 
 
@@ -307,16 +317,16 @@ def test_the_oracle_is_asked_at_the_least_price_below_the_usual_one():
 
 
 def test_where_a_model_based_rival_wins_is_listed():
-    c = contest(PPO=episodes(50), MPC=episodes(10, breakdown=0.2))
-    found = lost(c, c.contenders[0])
+    c = comparison_of(PPO=episodes(50), MPC=episodes(10, breakdown=0.2))
+    found = lost_to_model_based(c, c.contenders[0])
     assert {(row["scenario"], row["figure"]) for row in found} == {
         (RANDOM, "largest breakdown"), ("steps", "largest breakdown"),
     }  # fmt: skip
 
 
-def test_a_duel_says_by_how_much_and_how_often():
-    c = contest(PPO=episodes(50), other=episodes(10, rms=0.3))
-    found = duels(c, c.contenders[0]).set_index(["plants", "score"])
+def test_a_paired_comparison_says_by_how_much_and_how_often():
+    c = comparison_of(PPO=episodes(50), other=episodes(10, rms=0.3))
+    found = paired_comparisons(c, c.contenders[0]).set_index(["plants", "score"])
     row = found.loc[("calibrated", "rms_bar")]
     assert row["difference"] == pytest.approx(-0.2)
     assert row["better"] == 1.0
@@ -331,18 +341,18 @@ def test_all_seeds_count_beside_the_chosen_one():
         for plants in (*PLANTS, TUNING_REGION)
     }
     results |= {(run, TUNING_REGION, TUNING): episodes(2) for run in both.runs}
-    table = figures(Contest([both], [RANDOM], results))
+    table = figures(ComparisonResults([both], [RANDOM], results))
     rows = table.loc[table["plants"] == "calibrated"].set_index("controller")
     assert rows.loc["PPO", "C1_stayed"] == 1.0
     assert rows.loc["PPO, all seeds", "C1_stayed"] == pytest.approx(19 / 20)
 
 
 def test_a_dominated_controller_is_off_the_front():
-    c = contest(
+    c = comparison_of(
         good=episodes(9), worse=episodes(9, rms=0.2, breakdown=0.4), fast=episodes(9, switchings=1.0),
         oracle=episodes(9, switchings=0.5, rms=0.01),
     )  # fmt: skip
-    found = trade(c, 5).set_index("controller")
+    found = trade_off(c, 5).set_index("controller")
     assert found["rms_error_bar_on_front"].to_dict() == {
         "good": False, "worse": False, "fast": True, "oracle": False,
     }  # fmt: skip

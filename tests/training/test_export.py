@@ -17,7 +17,9 @@ from controllers.learned import load_policy
 from epv_env.common.command_line import fail_clearly
 from epv_env.observation import contract
 from tests.training.exports import (
+    EPISODES,
     GOOD,
+    PERIODS,
     column,
     copied,
     export,
@@ -28,8 +30,10 @@ from tests.training.exports import (
     recurrent_export,
 )
 from tests.training.policies import fitted_layers, random_layers, random_unit, write_policy
+from training.deploy.c_arrays import named_layers
+from training.deploy.c_sources import Export, sources
 from training.deploy.compiled_export import (
-    VARIANTS,
+    VARIANT_NAMES,
     CompiledPolicy,
     build,
     float_logits,
@@ -38,11 +42,9 @@ from training.deploy.compiled_export import (
 )
 from training.deploy.double_precision import logits_along
 from training.deploy.measurements import follow
-from training.deploy.quantise import quantise
-from training.deploy.sources import Export, sources
-from training.deploy.tables import named_layers
+from training.deploy.quantisation import quantise
 from training.deploy.visited_states import visit
-from training.export import EPISODES, FILES, PERIODS, main
+from training.export import FILES, main
 
 pytestmark = [
     pytest.mark.training,
@@ -217,7 +219,9 @@ def test_it_decides_right_when_another_controller_switches_the_coil(name, reques
     along = visit(GOOD, first_seed=5, episodes=8, periods=400)
     wanted = follow(policy, along)
     assert np.any(wanted != along.actions)
-    floating, fixed = (CompiledPolicy(code=code, variant=each, cells=policy.cells) for each in VARIANTS)
+    floating, fixed = (
+        CompiledPolicy(code=code, variant=each, cells=policy.cells) for each in VARIANT_NAMES
+    )
     np.testing.assert_array_equal(follow(floating, along), wanted)
     assert np.mean(follow(fixed, along) == wanted) > 0.98
 
@@ -238,7 +242,7 @@ def test_the_memory_takes_what_the_contract_says(exported, tmp_path):
     policy, out = exported
     variants = json.loads((out / "contract.json").read_text())["variants"]
     copied(out, tmp_path)
-    for name in VARIANTS:
+    for name in VARIANT_NAMES:
         size = memory_type(name, load_policy(policy).cells).itemsize
         assert size == variants[name]["bytes"]["memory_of_a_valve"]
         (tmp_path / "size.c").write_text(

@@ -1,4 +1,4 @@
-"""The integer code is the arithmetic that docs/deploy.md describes, to the last bit."""
+"""The integer code is the arithmetic that the guide describes, to the last bit."""
 
 import shutil
 from pathlib import Path
@@ -11,15 +11,14 @@ pytest.importorskip("safetensors")
 
 from controllers.learned import GatedUnit, LearnedPolicy, load_policy
 from epv_env.observation import INDEX, LAYOUT
-from tests.training.exports import copied, export_of, recurrent_export
+from tests.training.exports import EPISODES, PERIODS, copied, export_of, recurrent_export
 from tests.training.policies import random_layers
+from training.deploy.c_sources import Export, sources
 from training.deploy.compiled_export import library, memory_type
 from training.deploy.double_precision import in_double, memory_along
-from training.deploy.quantise import FULL, GATE, FixedLayer, FixedPolicy, quantise
-from training.deploy.sources import Export, sources
+from training.deploy.quantisation import GATE_ONE, SIGNAL_ONE, FixedLayer, FixedPolicy, quantise
 from training.deploy.visited_states import visit
 from training.evaluation.seeds import CALIBRATION_SEED
-from training.export import EPISODES, PERIODS
 
 pytestmark = [
     pytest.mark.training,
@@ -43,7 +42,7 @@ def compiled_logits(folder: Path, signal: np.ndarray, memory: np.ndarray) -> np.
 def whole_number_logits(fixed: FixedPolicy, signal: np.ndarray) -> np.ndarray:
     """Logits (episodes, periods, 2) along observations, int16, in 64-bit whole numbers."""
     memory = np.zeros(
-        (len(signal), 0 if fixed.cell is None else len(fixed.cell.new.bias) // 3), np.int64
+        (len(signal), 0 if fixed.cell is None else len(fixed.cell.of_observation.bias) // 3), np.int64
     )
     logits = []
     for observation in signal.swapaxes(0, 1).astype(np.int64):
@@ -56,14 +55,14 @@ def whole_number_logits(fixed: FixedPolicy, signal: np.ndarray) -> np.ndarray:
 
 
 def next_memory(fixed: FixedPolicy, observation: np.ndarray, memory: np.ndarray) -> np.ndarray:
-    """(n, cells), FULL * GATE standing for 1."""
+    """(n, cells), SIGNAL_ONE * GATE_ONE standing for 1."""
     if fixed.cell is None:
         return memory
-    new = np.split(rows(fixed.cell.new, observation), 3, axis=1)
-    old = np.split(rows(fixed.cell.old, shifted(memory, 1, 15)), 3, axis=1)
+    new = np.split(rows(fixed.cell.of_observation, observation), 3, axis=1)
+    old = np.split(rows(fixed.cell.of_cells, shifted(memory, 1, 15)), 3, axis=1)
     reset, update = (gate(fixed, inside(a + b)) for a, b in zip(new[:2], old[:2], strict=True))
     candidate = tangent(fixed, inside(new[2] + shifted(old[2], reset, 15)))
-    return inside((GATE - update) * candidate + shifted(memory, update, 15))
+    return inside((GATE_ONE - update) * candidate + shifted(memory, update, 15))
 
 
 def inside(sums: np.ndarray) -> np.ndarray:
@@ -87,11 +86,11 @@ def tangent(fixed: FixedPolicy, x: np.ndarray) -> np.ndarray:
     size = np.minimum(np.abs(x), (256 << 11) - 1)
     place, part = size >> 11, size & 2047
     between = table[place] + (((table[place + 1] - table[place]) * part + 1024) >> 11)
-    return np.sign(x) * np.where(np.abs(x) >= 256 << 11, FULL, between)
+    return np.sign(x) * np.where(np.abs(x) >= 256 << 11, SIGNAL_ONE, between)
 
 
 def gate(fixed: FixedPolicy, x: np.ndarray) -> np.ndarray:
-    return (GATE + tangent(fixed, np.sign(x) * (np.abs(x) // 2)) + 1) >> 1
+    return (GATE_ONE + tangent(fixed, np.sign(x) * (np.abs(x) // 2)) + 1) >> 1
 
 
 def random_export(folder: Path) -> tuple[Path, Path]:
@@ -105,7 +104,11 @@ def test_the_integer_code_is_the_arithmetic_that_is_documented(make, tmp_path):
     policy = load_policy(folder)
     seen = visit(policy, first_seed=CALIBRATION_SEED, episodes=EPISODES, periods=PERIODS)
     fixed = quantise(policy, seen.observations)
-    given = np.random.default_rng(0).integers(-FULL, FULL, (20, 100, 13), endpoint=True).astype(np.int16)
+    given = (
+        np.random.default_rng(0)
+        .integers(-SIGNAL_ONE, SIGNAL_ONE, (20, 100, 13), endpoint=True)
+        .astype(np.int16)
+    )
     memory = np.zeros(len(given), memory_type("fixed", policy.cells))
     logits = compiled_logits(copied(out, tmp_path), given, memory)
     np.testing.assert_array_equal(logits, whole_number_logits(fixed, given))
@@ -131,8 +134,10 @@ def test_a_memory_that_fades_slowly_is_not_lost_to_rounding(tmp_path):
     for name, text in sources(export).items():
         (tmp_path / name).write_text(text)
     memory = np.zeros(1, memory_type("fixed", 1))
-    compiled_logits(tmp_path, np.rint(observed / fixed.inputs.amplitude * FULL).astype(np.int16), memory)
+    compiled_logits(
+        tmp_path, np.rint(observed / fixed.inputs.amplitude * SIGNAL_ONE).astype(np.int16), memory
+    )
     precise = in_double(policy).cell
     assert precise is not None
     wanted = memory_along(precise, observed)[0, -1]
-    np.testing.assert_allclose(memory["cell"][0] / (FULL * GATE), wanted, rtol=0.03)
+    np.testing.assert_allclose(memory["cell"][0] / (SIGNAL_ONE * GATE_ONE), wanted, rtol=0.03)

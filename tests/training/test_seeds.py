@@ -9,12 +9,13 @@ pytest.importorskip("stable_baselines3")
 from controllers.hysteresis import Hysteresis
 from epv_env.plant.plantfile import Plant
 from training import compare, export, sweep
+from training.deploy.settings import SETTINGS
 from training.evaluation import seeds
 from training.learners.distillation import Distillation
 from training.learners.ppo import Hyperparameters
-from training.studies.comparison.blocks import plan
-from training.studies.comparison.plan import TUNING, Contender, Sizes
-from training.studies.sweeps.plan import Size, cells, chosen_points, searches
+from training.studies.comparison.contenders import TUNING, Contender, Sizes
+from training.studies.comparison.episode_blocks import plan
+from training.studies.sweeps.episode_plan import Size, cells, chosen_points, searches
 from training.studies.sweeps.worst_case_search import Effort
 
 pytestmark = pytest.mark.training
@@ -65,8 +66,8 @@ def used() -> dict[str, Span]:
         "training": (seeds.TRAINING_SEED, trained),
         "validation": (seeds.VALIDATION_SEED, max(h.validation_episodes, d.validation_episodes)),
         "distillation": (seeds.DISTILLATION_SEED, chosen.recurrent_seeds * d.rounds * d.episodes),
-        "calibration": (seeds.CALIBRATION_SEED, export.EPISODES),
-        "states": (seeds.STATES_SEED, export.EPISODES),
+        "calibration": (seeds.CALIBRATION_SEED, SETTINGS.episodes),
+        "states": (seeds.STATES_SEED, SETTINGS.episodes),
         "closed loop": (seeds.CLOSED_LOOP_SEED, exported.episodes),
         "timing": (seeds.TIMING_SEED, 1),
         "resumed": (seeds.RESUMED_SEED, trained + chosen.timesteps),

@@ -58,6 +58,6 @@ def test_a_lost_worker_changes_nothing(cluster, tmp_path):
 
 
 def test_an_address_where_nobody_answers_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("training.studies.sweeps.run.WAIT", 1)
+    monkeypatch.setattr("training.studies.parallel_run.CLUSTER_TIMEOUT", 1)
     with pytest.raises(ValueError, match=r"no Dask scheduler answers at tcp://127.0.0.1:9"):
         sweep(tmp_path, "--cluster", "tcp://127.0.0.1:9")

@@ -14,19 +14,19 @@ from epv_env.plant.region import CALIBRATED_SYMBOLS, Region
 from epv_env.settings import make_settings
 from training.evaluation.rollout import run_episodes
 from training.evaluation.seeds import SWEEP_SEED
-from training.studies.sweeps.designs import ONE_AT_A_TIME, hypercube, parameters, regions
+from training.studies.episode_tasks import Batch, Study, condensed
+from training.studies.parallel_run import Outcome
 from training.studies.sweeps.effect_levels import LEVELS, effect_levels
-from training.studies.sweeps.plan import BATCH, Size, cells, chosen_points
-from training.studies.sweeps.results import point_table
-from training.studies.sweeps.run import Outcome
-from training.studies.sweeps.space import Space
-from training.studies.sweeps.tasks import Batch, Study, condensed
+from training.studies.sweeps.episode_plan import TASK_EPISODES, Size, cells, chosen_points
+from training.studies.sweeps.experiment_designs import ONE_AT_A_TIME, hypercube, parameters, regions
+from training.studies.sweeps.parameter_space import Space
+from training.studies.sweeps.result_tables import point_table
 from training.studies.sweeps.worst_case_search import Effort
 
 pytestmark = pytest.mark.training
 
 PLANT = Plant.calibrated()
-SIZE = Size(episodes=4, joint_episodes=BATCH + 8, effort=Effort(screened=8, generations=1))
+SIZE = Size(episodes=4, joint_episodes=TASK_EPISODES + 8, effort=Effort(screened=8, generations=1))
 EARLY = Hysteresis(open_below=-0.1, shut_above=0.0, shut_lookahead=0.03, name="early")
 
 
@@ -98,8 +98,11 @@ def test_only_named_factors_are_changed_and_regions_stay():
 def test_batches_share_out_the_episodes_and_every_controller_meets_the_same():
     point = hypercube(PLANT, SIZE.joint_episodes, seed=0)
     first, second = cells([point], ["a", "b"], SIZE, seed=7)
-    assert [batch.episodes for batch in first.batches] == [BATCH, 8]
-    assert [batch.first_seed for batch in second.batches] == [SWEEP_SEED + 7, SWEEP_SEED + 7 + BATCH]
+    assert [batch.episodes for batch in first.batches] == [TASK_EPISODES, 8]
+    assert [batch.first_seed for batch in second.batches] == [
+        SWEEP_SEED + 7,
+        SWEEP_SEED + 7 + TASK_EPISODES,
+    ]
     assert [p for batch in first.batches for p in batch.parameters or []] == point.parameters
 
 
@@ -123,7 +126,7 @@ def test_the_control_period_is_told_to_those_who_ask():
 def test_a_row_adds_its_batches_up():
     (cell,) = cells([hypercube(PLANT, SIZE.joint_episodes, 0)], ["early"], SIZE, seed=0)
     rng = np.random.default_rng(1)
-    excursion = rng.uniform(0.1, 0.6, BATCH + 8)
+    excursion = rng.uniform(0.1, 0.6, TASK_EPISODES + 8)
 
     def outcome(part: np.ndarray) -> Outcome:
         names = ("breakdown_bar", "recovery_s", "rms_bar", "switchings_per_s", "vented_g_per_s")

@@ -10,7 +10,7 @@ from controllers.hysteresis import Hysteresis
 from epv_env.observation import decode
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
-from training.studies.sweeps.tasks import Study
+from training.studies.episode_tasks import Study
 from training.studies.sweeps.worst_case_search import Effort, Search
 
 pytestmark = pytest.mark.training

@@ -5,7 +5,7 @@ import shutil
 import tempfile
 from pathlib import Path
 
-from training.deploy.quantise import ExportError
+from training.deploy.quantisation import ExportError
 
 
 def check_free(folder: Path, names: set[str]) -> None:

@@ -12,13 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.observation import HISTORY
-from training.deploy.quantise import ExportError
+from training.deploy.c_variants import VARIANTS
+from training.deploy.quantisation import ExportError
 from training.deploy.visited_states import READINGS, readings_of
 
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
 """What the exported code is compiled with here."""
-CODE = ("epv_float.c", "epv_fixed.c")
-VARIANTS = ("float", "fixed")
+VARIANT_NAMES = tuple(variant.name for variant in VARIANTS)
+CODE = tuple(f"epv_{name}.c" for name in VARIANT_NAMES)
+"""Files that hold the policy."""
 
 PER_UNIT = {"current": 1e6, "coil": 1.0}
 """Whole numbers to one A, and to the coil's 1; 10^5 Pa to one bar."""
@@ -77,7 +79,7 @@ class CompiledPolicy:
 
     code: ctypes.CDLL
     variant: str
-    """One of VARIANTS."""
+    """One of VARIANT_NAMES."""
     cells: int
     """Of the policy: its memory's size depends on them."""
     environment: str = "EPValve-v0"
@@ -114,14 +116,17 @@ def as_structures(readings: dict[str, NDArray], variant: str) -> NDArray:
 
 
 def float_logits(code: ctypes.CDLL, observations: NDArray, *, cells: int) -> NDArray:
-    """Logits (episodes, periods, 2) of the float code along observations of episodes."""
-    given = np.ascontiguousarray(observations, dtype=np.float32)
-    logits = np.empty((*given.shape[:2], 2), dtype=np.float32)
+    """Logits (episodes, periods, 2) of the float code along observations (episodes, periods, entries).
+
+    cells: of the policy.
+    """
+    inputs = np.ascontiguousarray(observations, dtype=np.float32)
+    logits = np.empty((*inputs.shape[:2], 2), dtype=np.float32)
     function: Any = code.epv_float_logits
     function.argtypes = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
     function.restype = None
-    for episode in range(len(given)):
+    for episode in range(len(inputs)):
         memory = np.zeros(1, dtype=memory_type("float", cells))
-        for k in range(given.shape[1]):
-            function(memory.ctypes.data, given[episode, k].ctypes.data, logits[episode, k].ctypes.data)
+        for k in range(inputs.shape[1]):
+            function(memory.ctypes.data, inputs[episode, k].ctypes.data, logits[episode, k].ctypes.data)
     return logits

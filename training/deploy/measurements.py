@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from controllers.base import Controller
 from controllers.learned import LearnedPolicy
-from training.deploy.compiled_export import CODE, VARIANTS, CompiledPolicy, build, float_logits
+from training.deploy.compiled_export import CODE, VARIANT_NAMES, CompiledPolicy, build, float_logits
 from training.deploy.double_precision import in_double, logits_along
-from training.deploy.quantise import ExportError
+from training.deploy.quantisation import ExportError
 from training.deploy.visited_states import PLANTS, SCENARIO, VisitedStates
 from training.evaluation.rollout import run_episodes
 
@@ -26,6 +26,7 @@ def margins(policy: LearnedPolicy, states: VisitedStates) -> NDArray:
 
 
 def _difference(logits: NDArray) -> NDArray:
+    """Logit of on minus that of off (...) in double precision, from logits (..., 2)."""
     return logits[..., 1].astype(np.float64) - logits[..., 0]
 
 
@@ -72,9 +73,9 @@ def closed_loop(
     progress: Callable[[float], None],
 ) -> dict[str, dict[str, float]]:
     """Figures of the policy and of each compiled variant on the same episodes, by controller's name."""
-    compiled = (CompiledPolicy(code=code, variant=name, cells=policy.cells) for name in VARIANTS)
+    compiled = (CompiledPolicy(code=code, variant=name, cells=policy.cells) for name in VARIANT_NAMES)
     contenders = [policy, *compiled]
-    found = {}
+    figures = {}
     for k, controller in enumerate(contenders):
         metrics, _ = run_episodes(
             controller,
@@ -83,14 +84,14 @@ def closed_loop(
             options={"scenario": SCENARIO, "parameters": PLANTS},
             progress=lambda share, before=k: progress((before + share) / len(contenders)),
         )
-        found[controller.name] = {
+        figures[controller.name] = {
             "C1_stayed": float(metrics.stayed.mean()),
             "C1_worst_excursion_bar": float(metrics.excursion_bar.max()),
             "C2_largest_breakdown_bar": float(metrics.breakdown_bar.max()),
             "rms_error_bar": float(np.sqrt(np.mean(metrics.rms_bar**2))),
             "switchings_per_s": float(metrics.switchings_per_s.mean()),
         }
-    return found
+    return figures
 
 
 def run_parity(compiler: list[str], folder: Path) -> str:

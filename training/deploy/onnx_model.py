@@ -84,14 +84,16 @@ def _unit(unit: GatedUnit) -> tuple[list[NodeProto], list[TensorProto]]:
 
 
 def _ordered(rows: NDArray) -> NDArray:
-    """Rows of reset gate, update gate and candidate as ONNX has them: the update gate first."""
+    """Rows of a (3m, ...) array in the order of ONNX: update gate, reset gate, candidate."""
     reset, update, candidate = np.split(rows, 3)
     return np.concatenate([update, reset, candidate])
 
 
 def _floats(name: str, width: int) -> ValueInfoProto:
+    """An input or output (batch, width) of float32."""
     return helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", width])
 
 
 def _constant(values: NDArray, name: str) -> TensorProto:
+    """A constant of float32, values of any shape."""
     return numpy_helper.from_array(np.ascontiguousarray(values, dtype=np.float32), name)

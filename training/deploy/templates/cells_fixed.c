@@ -1,10 +1,3 @@
-/* Cells: int32_t, 32767 * 32768 stands for 1; rounded to int16_t where weights multiply them.
- *
- * The gated recurrent unit's layers, of the new observation and of the old cells: rows of the reset gate,
- * of the update gate and of the candidate. */
-static const layer NEW = $NEW;
-static const layer OLD = $OLD;
-
 /* The logistic function of x, 1 to 32768, which stands for 1. */
 static uint16_t gate(int32_t x)
 {
@@ -22,17 +15,16 @@ static int32_t next_cell(const int16_t *observation, const int16_t *old, int32_t
     return (32768 - update) * candidate + scaled(cell, update, 15);
 }
 
-/* What the layers see: the observation, and the cells after it. */
-static void see(epv_fixed_memory *m, const int16_t *observation, int16_t *seen)
+/* Takes the cells one period on. Cells: int32_t, 32767 * 32768 stands for 1; rounded to int16_t where
+ * weights multiply them. */
+static void next_cells(epv_fixed_memory *m, const int16_t *observation, int16_t *cell)
 {
     int16_t old[CELLS];
-    int i, j;
-    for (i = 0; i < EPV_FIXED_INPUTS; i++)
-        seen[i] = observation[i];
+    int j;
     for (j = 0; j < CELLS; j++)
         old[j] = (int16_t)scaled(m->cell[j], 1, 15);
     for (j = 0; j < CELLS; j++) {
         m->cell[j] = next_cell(observation, old, m->cell[j], j);
-        seen[EPV_FIXED_INPUTS + j] = (int16_t)scaled(m->cell[j], 1, 15);
+        cell[j] = (int16_t)scaled(m->cell[j], 1, 15);
     }
 }

@@ -1,8 +1,3 @@
-/* The gated recurrent unit's layers, of the new observation and of the old cells: rows of the reset gate,
- * of the update gate and of the candidate. */
-static const layer NEW = $NEW;
-static const layer OLD = $OLD;
-
 static float logistic(float x)
 {
     return 0.5f + 0.5f * hyperbolic_tangent(0.5f * x);
@@ -18,14 +13,11 @@ static float next_cell(const float *observation, const float *cell, int j)
     return (1.0f - update) * candidate + update * cell[j];
 }
 
-/* What the layers see: the observation, and the cells after it. A cell that would not be a number, as when
- * an entry of the observation is none, stays as it was: or it would never be one again. */
-static void see(epv_float_memory *m, const float *observation, float *seen)
+/* Takes the cells one period on. A cell that would not be a number, as when an entry of the observation is
+ * none, stays as it was: or it would never be one again. */
+static void next_cells(epv_float_memory *m, const float *observation, float *cell)
 {
-    float *cell = seen + EPV_FLOAT_INPUTS;
-    int i, j;
-    for (i = 0; i < EPV_FLOAT_INPUTS; i++)
-        seen[i] = observation[i];
+    int j;
     for (j = 0; j < CELLS; j++) {
         const float next = next_cell(observation, m->cell, j);
         cell[j] = next == next ? next : m->cell[j];

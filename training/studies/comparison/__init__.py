@@ -1,1 +1,1 @@
-"""The parts of the comparison: its plan, scores, bars, tables and figures."""
+"""The comparison: contenders, blocks of episodes, tables, acceptance criteria and figures."""

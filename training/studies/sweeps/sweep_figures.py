@@ -1,20 +1,16 @@
-"""Figures of a sweep: who leaves the band, how far, and under what."""
+"""Figures of a sweep: violation rates and excursions, by what is changed."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
-
-mpl.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from epv_env.reward import BAND_BAR
-from training.evaluation.plots import COLOURS, save_figure
+from training.evaluation.plots import COLOURS, plt, save_figure
 from training.evaluation.rollout import Trace
 
 WIDEST_BAR = 2.0
@@ -39,12 +35,12 @@ def draw(points: pd.DataFrame, ranks: pd.DataFrame, folder: Path) -> None:
 
 
 def _axes(rows: int) -> tuple[Any, Axes, Axes]:
-    """A figure with a panel for the leaving probability and one for the excursion."""
+    """A figure with a panel for the violation rate and one for the excursion."""
     figure, (left, right) = plt.subplots(
         1, 2, figsize=(11, 1.4 + 0.3 * rows), sharey=True, layout="constrained"
     )
     left.set(
-        xlabel="episodes that leave ±500 mbar [%], exact 95 % intervals",
+        xlabel="violation rate of ±500 mbar [%], exact 95 % intervals",
         xscale="symlog",
         xlim=(-0.1, 115),
     )
@@ -59,7 +55,7 @@ def _axes(rows: int) -> tuple[Any, Axes, Axes]:
 def _dots(
     left: Axes, right: Axes, y: Any, rows: pd.DataFrame, marker: str, colour: str, **style: Any
 ) -> None:
-    """Leaving probability with its interval, and the excursion from median to worst."""
+    """Violation rate with its interval, and the excursion from median to worst."""
     share, low, high = (100 * rows[name] for name in ("left", "left_low", "left_high"))
     worst = np.minimum(rows["excursion_worst_bar"], WIDEST_BAR)
     bars = {"lw": 0.8, "alpha": 0.5 * style.get("alpha", 1.0), "color": colour}
@@ -115,7 +111,7 @@ def conditions(points: pd.DataFrame, path: Path) -> None:
 
 
 def effects(points: pd.DataFrame, path: Path) -> None:
-    """Worst excursion as colour, leaving probability as number, effect by size, for each controller."""
+    """Worst excursion as colour, violation rate as number, effect by size, for each controller."""
     table = points.loc[points["design"] == "effects"]
     controllers = list(dict.fromkeys(table["controller"]))
     names, levels = list(dict.fromkeys(table["factor"])), list(dict.fromkeys(table["level"]))
@@ -141,7 +137,7 @@ def effects(points: pd.DataFrame, path: Path) -> None:
     axes[0, 0].set_yticks(np.arange(len(names)), names, fontsize=8)
     if image is not None:
         figure.colorbar(image, ax=axes, label="worst excursion [bar]", extend="max")
-    figure.suptitle("Effects alone: number = episodes that leave ±500 mbar [%]", fontsize=10)
+    figure.suptitle("Effects alone: number = violation rate of ±500 mbar [%]", fontsize=10)
     save_figure(figure, path)
 
 
@@ -169,7 +165,7 @@ def worst_episodes(
     nominal: Mapping[str, float],
     path: Path,
 ) -> None:
-    """The worst episode that each search found: p2, the coil, what is drawn; the plant in its title."""
+    """The worst episode that of each search: p2, the coil, what is drawn; the plant in its title."""
     regions = list(dict.fromkeys(each["region"] for each in worst))
     controllers = list(dict.fromkeys(each["controller"] for each in worst))
     figure = plt.figure(figsize=(6.2 * len(controllers), 4.4 * len(regions)), layout="constrained")
@@ -189,12 +185,12 @@ def worst_episodes(
     save_figure(figure, path)
 
 
-def _title(found: Mapping[str, Any], nominal: Mapping[str, float]) -> str:
+def _title(worst: Mapping[str, Any], nominal: Mapping[str, float]) -> str:
     """Controller, region, excursion, and how far each parameter is off, in lines of five."""
     off = [
         f"{symbol} {100 * (value / nominal[symbol] - 1):+.2g} %"
-        for symbol, value in found["parameters"].items()
+        for symbol, value in worst["parameters"].items()
     ]
     lines = [", ".join(off[k : k + 5]) for k in range(0, len(off), 5)]
-    head = f"{found['controller']}, {found['region']}: {found['excursion_bar']:.3f} bar"
-    return "\n".join([f"{head} ({found['scenario']}, seed {found['seed']})", *lines])
+    head = f"{worst['controller']}, {worst['region']}: {worst['excursion_bar']:.3f} bar"
+    return "\n".join([f"{head} ({worst['scenario']}, seed {worst['seed']})", *lines])

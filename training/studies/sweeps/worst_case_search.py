@@ -15,11 +15,27 @@ from scipy.optimize import differential_evolution
 
 from epv_env.plant.consumption import MIXED, SCENARIOS
 from epv_env.settings import as_region
-from training.studies.sweeps.space import Space
-from training.studies.sweeps.tasks import MICROBAR, Study
+from training.studies.episode_tasks import EXCURSION_DECIMALS, Study
+from training.studies.sweeps.parameter_space import Space
 
-NEAR = 0.05
-"""Half the width of the last search's box, as a share of the region's."""
+
+@dataclass(frozen=True, kw_only=True)
+class SearchSettings:
+    """How a worst-case search shares its episodes out among its stages."""
+
+    screened_per_held_episode: int = 64
+    """Episodes of the first stage for each one that every plant of the middle stages meets."""
+    least_held_episodes: int = 2
+    screened_per_member: int = 32
+    """Plants of the first stage for each plant of a generation."""
+    least_population: int = 8
+    generations_per_refinement: int = 3
+    """Generations over the whole region for each one close to the worst plant."""
+    refined_half_width: float = 0.05
+    """Half the width of the box around the worst plant [1], as a share of the region's width."""
+
+
+SETTINGS = SearchSettings()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,21 +46,24 @@ class Effort:
     """Plants, and episodes, of the first stage; episodes of the last one."""
     generations: int
     """Of plants over the whole region."""
+    settings: SearchSettings = SETTINGS
 
     @property
     def held(self) -> int:
         """Episodes that every plant of the middle stages meets."""
-        return max(2, self.screened // 64)
+        share = self.screened // self.settings.screened_per_held_episode
+        return max(self.settings.least_held_episodes, share)
 
     @property
     def population(self) -> int:
         """Plants of a generation."""
-        return max(8, self.screened // 32)
+        share = self.screened // self.settings.screened_per_member
+        return max(self.settings.least_population, share)
 
     @property
     def refinements(self) -> int:
         """Generations close to the worst."""
-        return max(1, self.generations // 3)
+        return max(1, self.generations // self.settings.generations_per_refinement)
 
     @property
     def episodes(self) -> int:
@@ -54,7 +73,7 @@ class Effort:
 
 
 @dataclass
-class _Found:
+class _WorstEpisode:
     """The worst episode so far."""
 
     excursion_bar: float = -1.0
@@ -65,7 +84,7 @@ class _Found:
 
 @dataclass(frozen=True, kw_only=True)
 class Search:
-    """A task (tasks.py): one search for one controller over one region."""
+    """A task (episode_tasks.py): one search for one controller over one region."""
 
     name: str
     controller: str
@@ -83,33 +102,33 @@ class Search:
 
     def run(self, study: Study) -> dict[str, Any]:
         """The worst plant, scenario and seed, its excursion, and the worst after each stage."""
-        return _Hunt(self, study).result()
+        return _RunningSearch(self, study).result()
 
 
-class _Hunt:
-    """A search under way."""
+class _RunningSearch:
+    """A search under way: its parameter space, and the worst episode so far."""
 
     def __init__(self, search: Search, study: Study):
         self.search, self.study, self.effort = search, study, search.effort
         self.space = Space(region=as_region(search.region, study.plant))
-        self.worst = _Found()
+        self.worst = _WorstEpisode()
 
     def result(self) -> dict[str, Any]:
         """Run all stages."""
         effort, stages = self.effort, {}
         first = self.space.latin_hypercube(effort.screened, self.search.seed)
-        strayed = self._meet(first, self._episodes(0))
+        excursions = self._excursions(first, self._episodes(0))
         stages["hypercube"] = self.worst.excursion_bar
-        farthest = np.argsort(-strayed, kind="stable")
+        farthest = np.argsort(-excursions, kind="stable")
         held = [self._episodes(0)[i] for i in farthest[: effort.held]]
         self._evolve(held, first[farthest[: effort.population]], 1.0, effort.generations)
         stages["whole region"] = self.worst.excursion_bar
         near = self.space.latin_hypercube(effort.population, self.search.seed + 1)
         near[0] = 0.5  # the best itself, in the middle of its box
-        self._evolve(held, near, 2 * NEAR, effort.refinements)
+        self._evolve(held, near, 2 * effort.settings.refined_half_width, effort.refinements)
         stages["close to the worst"] = self.worst.excursion_bar
         there = np.tile(self.worst.coordinates, (effort.screened, 1))
-        self._meet(there, self._episodes(effort.screened))
+        self._excursions(there, self._episodes(effort.screened))
         stages["new consumption"] = self.worst.excursion_bar
         return {
             "parameters": self.space.values(self.worst.coordinates[None])[0],
@@ -135,18 +154,19 @@ class _Hunt:
         """
         corner = np.clip(self.worst.coordinates - width / 2, 0.0, 1.0 - width)
 
-        def mildness(inside: NDArray) -> NDArray:
+        def negative_excursion(inside: NDArray) -> NDArray:
             """-worst excursion over the held episodes of plants (symbols, plants)."""
             coordinates = np.repeat(corner + width * inside.T, len(held), axis=0)
-            return -self._meet(coordinates, held * inside.shape[1]).reshape(-1, len(held)).max(axis=1)
+            excursions = self._excursions(coordinates, held * inside.shape[1])
+            return -excursions.reshape(-1, len(held)).max(axis=1)
 
         settings: Any = {"init": population, "updating": "deferred", "polish": False, "tol": 0.0}
         differential_evolution(
-            mildness, [(0.0, 1.0)] * population.shape[1], maxiter=generations, rng=self.search.seed,
-            vectorized=True, **settings,
+            negative_excursion, [(0.0, 1.0)] * population.shape[1], maxiter=generations,
+            rng=self.search.seed, vectorized=True, **settings,
         )  # fmt: skip
 
-    def _meet(self, coordinates: NDArray, episodes: list[tuple[str, int]]) -> NDArray:
+    def _excursions(self, coordinates: NDArray, episodes: list[tuple[str, int]]) -> NDArray:
         """Excursions (episodes,) [bar]: plant k, at coordinates (episodes, symbols), in episode k."""
         excursions = []
         for begin in range(0, len(episodes), self.effort.screened):
@@ -155,8 +175,8 @@ class _Hunt:
             each = {"scenario": list(scenarios), "parameters": self.space.values(coordinates[part])}
             metrics, _ = self.study.run(self.search.controller, list(seeds), {}, each)
             excursions.append(metrics.excursion_bar)
-        found = np.round(np.concatenate(excursions), MICROBAR)
-        at = int(np.argmax(found))
-        if found[at] > self.worst.excursion_bar:
-            self.worst = _Found(float(found[at]), coordinates[at].copy(), *episodes[at])
-        return found
+        rounded = np.round(np.concatenate(excursions), EXCURSION_DECIMALS)
+        at = int(np.argmax(rounded))
+        if rounded[at] > self.worst.excursion_bar:
+            self.worst = _WorstEpisode(float(rounded[at]), coordinates[at].copy(), *episodes[at])
+        return rounded

@@ -1,0 +1,103 @@
+"""Who is compared on what: contenders, and how many episodes each of them runs."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from controllers.base import Controller, Privileged
+from training.evaluation.metrics import EpisodeMetrics
+from training.evaluation.scenarios import RANDOM, TUNING_REGION
+
+BOUNDED = ("confidence", "sensitive_ten_percent")
+"""Plant sets on which the violation rate is bounded: many random episodes."""
+
+TRADE_OFF_ON = "sensitive_ten_percent"
+"""Plant set on which switching is set against excursion."""
+
+CRITERIA_ON = "calibrated"
+"""Plant set on which figures are set against each rival's at equal or fewer switchings."""
+
+TUNING = "tuning"
+"""The scenarios of the tuning, on which one of the training seeds is chosen."""
+
+
+class Expense(NamedTuple):
+    """What a controller costs that searches on the plant's simulation."""
+
+    times: int
+    """CPU time of an episode, in those of the others (measured, 512 side by side against 16)."""
+    fewer: int
+    """How many times fewer episodes it runs: the first of the others', so that the pairing holds."""
+    random: int
+    """But of the random scenario at least so many where figures are set against each other (CRITERIA_ON,
+    TRADE_OFF_ON), if the others run as many."""
+
+    def episodes(self, plants: str, scenario: str, wanted: int) -> int:
+        """How many it runs where the others run so many."""
+        least = self.random if scenario == RANDOM and plants in (CRITERIA_ON, TRADE_OFF_ON) else 0
+        return max(-(-wanted // self.fewer), min(wanted, least))
+
+
+EXPENSIVE = {
+    "MPC": Expense(times=200, fewer=128, random=128),
+    "oracle": Expense(times=200, fewer=128, random=128),
+    "pulse, informed": Expense(times=30, fewer=8, random=512),
+}
+"""By contender. The informed pulse's is the table of each plant."""
+
+CHEAP = Expense(times=1, fewer=1, random=0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sizes:
+    """Episodes of one run of a contender."""
+
+    named: int
+    """In each named scenario and plant set."""
+    random: int
+    """In the random scenario on the calibrated plant, and of a variant in the trade-off."""
+    bound: int
+    """In the random scenario on each plant set of BOUNDED."""
+    tuning: int
+    """On the tuning scenarios, to choose a training seed."""
+
+    def of(self, plants: str, scenario: str) -> int:
+        """Episodes in a scenario and plant set; 0: left out."""
+        if scenario == RANDOM:
+            return self.bound if plants in BOUNDED else self.random
+        return 0 if plants == "confidence" else self.named
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contender:
+    """A row of the tables: one controller, or one per training seed."""
+
+    name: str
+    runs: Mapping[str, Controller]
+    """Its controllers, by names of their own: one of a classic, one per training seed of a learned."""
+    learned: bool = False
+    """Whether its runs differ by the seed of a training."""
+    price: float | None = None
+    """Of a switching, for a variant that was optimised at it and takes part in the trade-off only."""
+
+    @property
+    def privileged(self) -> bool:
+        """Whether it uses privileged information, which no ECU can measure: a limit, not a rival."""
+        return isinstance(next(iter(self.runs.values())), Privileged)
+
+    @property
+    def model_based(self) -> bool:
+        """Whether it simulates the plant as it runs."""
+        return "MPC" in self.name
+
+
+Results = dict[tuple[str, str, str], EpisodeMetrics]
+"""Episodes by run, plant set and scenario."""
+
+
+def chosen_run(contender: Contender, results: Results) -> str:
+    """Its run with the best mean return on the tuning scenarios; evaluations play no part in it."""
+    if len(contender.runs) == 1:
+        return next(iter(contender.runs))
+    returns = {r: results[r, TUNING_REGION, TUNING].episode_return.mean() for r in contender.runs}
+    return max(returns, key=lambda name: returns[name])
