@@ -68,12 +68,12 @@ tradeoff: $(VENV)/.installed ## optimise controllers at several prices of switch
 
 results: tradeoff ## compare all controllers, and write docs/controllers.md's figures (trains what is missing)
 	$(PY) training/compare.py --recurrent $(TRAINED)/recurrent --policies $(TRAINED)/plain --tradeoff $(TRAINED)/tradeoff \
-		--out runs/comparison --images docs/images --pages docs/controllers.md README.md $(ARGS)
+		--out runs/comparison --images docs/images --pages docs/results/comparison.md README.md $(ARGS)
 
 robustness: $(VENV)/.installed ## sweep parameters, effects and conditions, and write docs/robustness.md's figures
 	$(PY) training/sweep.py --controllers "hysteresis, extrapolating" PWM pulse PPO=$(TRAINED)/plain/seed-0 \
 		"PPO, recurrent=$(TRAINED)/recurrent/seed-7" \
-		--out runs/robustness --images docs/images --pages docs/robustness.md $(ARGS)
+		--out runs/robustness --images docs/images --pages docs/results/robustness.md $(ARGS)
 
 export: $(VENV)/.installed ## turn the policy of `make train` into C and ONNX (needs a C compiler)
 	$(PY) training/export.py runs/ppo --out runs/ecu $(ARGS)
