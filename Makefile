@@ -73,7 +73,7 @@ results: tradeoff ## compare all controllers, and write docs/controllers.md's fi
 robustness: $(VENV)/.installed ## sweep parameters, effects and conditions, and write docs/robustness.md's figures
 	$(PY) training/sweep.py --controllers "hysteresis, extrapolating" PWM pulse PPO=$(TRAINED)/plain/seed-0 \
 		"PPO, recurrent=$(TRAINED)/recurrent/seed-7" \
-		--out runs/robustness --images docs/images --pages docs/results/robustness.md $(ARGS)
+		--out runs/robustness --images docs/images --pages docs/results/robustness.md docs/results/speed.md $(ARGS)
 
 export: $(VENV)/.installed ## turn the policy of `make train` into C and ONNX (needs a C compiler)
 	$(PY) training/export.py runs/ppo --out runs/ecu $(ARGS)
