@@ -18,6 +18,7 @@ PAGES = (
     "docs/data.md",
     "docs/explanation/identification.md",
     "docs/explanation/effects.md",
+    "docs/explanation/learning.md",
 )
 OTHERS = (
     *(f"docs/{path.parent.name}/{path.name}" for path in sorted((ROOT / "docs").glob("[er]*/*.md"))),
