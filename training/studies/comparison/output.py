@@ -99,7 +99,7 @@ def write_tables(
 
 def _image(name: str) -> str:
     """A figure as Markdown, beneath a text."""
-    return f"\n\n![{name}](../images/{name}.png)"
+    return f"\n\n![{name}](images/{name}.png)"
 
 
 def write_figures(
