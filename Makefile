@@ -67,14 +67,14 @@ tradeoff: $(VENV)/.installed ## optimise controllers at several prices of switch
 	$(PY) $(TRADEOFF) --prices 0 --timesteps 20000000
 	$(PY) $(TRADEOFF) --prices 0 --timesteps 12000000 --recurrent $(POLICIES)/recurrent
 
-results: tradeoff ## compare all controllers, and write docs/controllers.md's figures (trains what is missing)
+results: tradeoff ## compare all controllers, and write docs/results/comparison.md's figures (trains what is missing)
 	$(PY) training/compare.py --recurrent $(POLICIES)/recurrent --policies $(POLICIES)/plain --tradeoff $(POLICIES)/tradeoff \
-		--out runs/comparison --images docs/images --pages docs/controllers.md README.md $(ARGS)
+		--out runs/comparison --images docs/images --pages docs/results/comparison.md README.md $(ARGS)
 
-robustness: $(VENV)/.installed ## sweep parameters, effects and conditions, and write docs/robustness.md's figures
+robustness: $(VENV)/.installed ## sweep parameters, effects and conditions, and write docs/results/robustness.md's figures
 	$(PY) training/sweep.py --controllers "hysteresis, extrapolating" PWM pulse PPO=$(POLICIES)/plain/seed-0 \
 		"PPO, recurrent=$(POLICIES)/recurrent/seed-7" \
-		--out runs/robustness --images docs/images --pages docs/robustness.md $(ARGS)
+		--out runs/robustness --images docs/images --pages docs/results/robustness.md docs/results/speed.md $(ARGS)
 
 export: $(VENV)/.installed ## turn the policy of `make train` into C and ONNX (needs a C compiler)
 	$(PY) training/export.py runs/ppo --out runs/ecu $(ARGS)

@@ -12,16 +12,16 @@ pytest.importorskip("stable_baselines3")
 pytestmark = pytest.mark.training
 
 ROOT = Path(__file__).parents[1]
-PAGES = ("README.md", "docs/env.md", "docs/data.md", "docs/identification.md", "docs/effects.md")
+PAGES = (
+    "README.md",
+    "docs/env.md",
+    "docs/data.md",
+    "docs/explanation/identification.md",
+    "docs/explanation/effects.md",
+    "docs/explanation/learning.md",
+)
 OTHERS = (
-    "docs/model.md",
-    "docs/controllers.md",
-    "docs/quality.md",
-    "docs/sensitivity.md",
-    "docs/real-bench.md",
-    "docs/component-data.md",
-    "docs/gap.md",
-    "docs/circle.md",
+    *(f"docs/{path.parent.name}/{path.name}" for path in sorted((ROOT / "docs").glob("[er]*/*.md"))),
     "docs/deploy.md",
 )
 """Pages without examples."""
