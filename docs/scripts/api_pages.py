@@ -8,6 +8,11 @@ PACKAGES = ("epv_env", "controllers", "identification", "training")
 """Top-level packages, in the order in which the reference lists them."""
 FOLDER = "reference/api"
 """Where the pages stand in the site."""
+FOLDER_OPTIONS = """    options:
+      members: []
+      show_root_heading: false
+      show_root_toc_entry: false"""
+"""Show a folder's docstring only; its modules follow."""
 
 
 def modules(package: Path) -> list[Path]:
@@ -37,9 +42,10 @@ def pages() -> dict[str, str]:
 
 
 def _page(folder: Path) -> str:
-    """A heading, and a line for each module from which mkdocstrings makes its section."""
+    """A heading, the folder's docstring, and a line for each module, which mkdocstrings replaces."""
+    name = dotted(folder)
     sections = [f"::: {dotted(module)}" for module in modules(folder)]
-    return "\n\n".join((f"# `{dotted(folder)}`", f"::: {dotted(folder)}\n    options:\n      members: []\n      show_root_heading: false\n      show_root_toc_entry: false", *sections)) + "\n"
+    return "\n\n".join((f"# `{name}`", f"::: {name}\n{FOLDER_OPTIONS}", *sections)) + "\n"
 
 
 def navigation() -> list[dict[str, object]]:

@@ -1,5 +1,6 @@
 """What mkdocs runs while it builds the site: generated pages join those that are written by hand."""
 
+import logging
 import sys
 from pathlib import Path
 from typing import Any
@@ -8,16 +9,20 @@ from mkdocs.structure.files import File, Files
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from docs.scripts import api_pages, command_lines
+from docs.scripts import api_pages, command_lines, public_names
 
 COMMAND_LINES = "<!-- generated: command lines -->"
 """The line of a page that the list of command lines replaces."""
+LOG = logging.getLogger("mkdocs.hooks.public_names")
+"""Its warnings fail a strict build."""
 API = "API"
 """The entry of the navigation that holds the generated API pages."""
 
 
 def on_config(config: Any) -> Any:
-    """Put the API pages into the navigation."""
+    """Put the API pages into the navigation; warn of public names without a docstring."""
+    for name in public_names.undocumented_names():
+        LOG.warning("%s has no docstring: give it one", name)
     for entry in config.nav:
         for part in entry.get("Reference", []):
             if API in part:
