@@ -27,7 +27,7 @@ SHORT_FORMS: dict[str, str] = {
     "python training/bode.py": "tests/training/test_bode.py",
     "python training/compare.py": "tests/training/test_compare.py",
     "python training/export.py": "tests/training/test_export.py",
-    "python training/sim_to_real.py": "tests/training/test_circle.py",
+    "python training/sim_to_real.py": "tests/training/test_sim_to_real.py",
     "python training/sweep.py": "tests/training/test_sweep_run.py",
     "python training/timing.py": "tests/training/test_timing.py",
     "python training/tradeoff.py": "tests/training/test_commands.py",
