@@ -85,6 +85,15 @@ def test_files_named_on_a_page_exist(page):
         assert (ROOT / path).exists(), path
 
 
+def test_pages_named_in_the_code_exist():
+    """In docstrings, messages and help texts: docs/reference/files.md."""
+    files = [path for package in (*PACKAGES, "docs", "tests") for path in (ROOT / package).rglob("*.py")]
+    for path in (*files, ROOT / "Makefile"):
+        if path != Path(__file__):
+            for page in re.findall(r"\bdocs/[\w/-]+\.md", path.read_text(encoding="utf-8")):
+                assert (ROOT / page).exists(), f"{path.relative_to(ROOT)} names {page}"
+
+
 def shown() -> Iterator[tuple[str, list[str]]]:
     """Every command of a page, with the page; those of a make target instead of the target."""
     for page in PAGES:
