@@ -20,7 +20,7 @@ import griffe  # noqa: E402
 from markdown.extensions.toc import slugify_unicode  # noqa: E402
 
 from docs.scripts.command_lines import parser_of, subparsers  # noqa: E402
-from docs.scripts.public_names import undocumented, undocumented_names  # noqa: E402
+from docs.scripts.public_names import undocumented  # noqa: E402
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("epv_env", "identification", "controllers", "training")
@@ -30,7 +30,7 @@ PAGES = tuple(
 )
 """Every page, as a path from the root."""
 FENCE = re.compile(r"^ *```.*?^ *```", re.S | re.M)
-HEADLESS = {**os.environ, "SDL_VIDEODRIVER": "dummy"}
+HEADLESS = {**os.environ, "SDL_VIDEODRIVER": "dummy", "NO_MKDOCS_2_WARNING": "1"}
 
 
 def text(page: str) -> str:
@@ -143,11 +143,6 @@ def test_options_shown_are_those_of_the_commands(tmp_path, monkeypatch):
             pytest.fail(f"{page}: {' '.join(words)}")
 
 
-def test_every_public_name_is_documented():
-    missing = undocumented_names()
-    assert not missing, f"give these a docstring: {', '.join(missing)}"
-
-
 def test_a_name_without_a_docstring_is_found():
     source = (
         "def shown(): ...\ndef _hidden(): ...\nclass Documented:\n    '''x'''\n    def told(self): ..."
@@ -201,7 +196,7 @@ def test_the_page_of_the_architecture_says_who_imports_whom():
 
 @pytest.mark.slow
 def test_the_site_builds_without_a_warning(tmp_path):
-    """A broken link, an unknown anchor or a page outside the navigation is a warning, which fails."""
+    """A warning fails: a broken link, a page outside the navigation, a public name without docstring."""
     done = run(sys.executable, "-m", "mkdocs", "build", "--strict", "-d", tmp_path / "site", cwd=ROOT)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "site/reference/api/epv_env.plant.html").is_file()
