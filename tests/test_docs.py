@@ -207,14 +207,23 @@ def test_the_site_builds_without_a_warning(tmp_path):
 
 def test_the_film_in_its_shortest_form(tmp_path):
     out = tmp_path / "valve.gif"
-    done = run(sys.executable, ROOT / "docs/film.py", "--seconds", "0.05", "--out", out, cwd=tmp_path)
+    done = run(
+        sys.executable, ROOT / "docs/scripts/film.py", "--seconds", "0.05", "--out", out, cwd=tmp_path
+    )
     assert done.returncode == 0, done.stderr
     assert out.read_bytes()[:3] == b"GIF"
 
 
 def test_the_pictures_of_the_identification_in_their_shortest_form(tmp_path):
     options = ("--coverage", tmp_path / "coverage", "--campaigns", "2")
-    done = run(sys.executable, ROOT / "docs/pictures.py", "--out", tmp_path, *options, cwd=tmp_path)
+    done = run(
+        sys.executable,
+        ROOT / "docs/scripts/identification_figures.py",
+        "--out",
+        tmp_path,
+        *options,
+        cwd=tmp_path,
+    )
     assert done.returncode == 0, done.stderr
     names = {path.name for path in tmp_path.glob("*.png")}
     assert names == {"calibration.png", "region.png", "coverage.png"}
