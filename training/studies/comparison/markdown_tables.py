@@ -25,6 +25,15 @@ FIGURES = {
     "coil [W]": "coil_W",
 }
 """Columns of the main table, and where `summary` has them."""
+README_CONTROLLERS = (
+    "PPO, recurrent",
+    "hysteresis, extrapolating",
+    "PWM",
+    "pulse",
+    "MPC",
+    "pulse, informed",
+)
+"""Rows of the README's table, by the names that the main table shows."""
 
 
 def results_table(table: pd.DataFrame) -> str:
@@ -48,19 +57,22 @@ def violation_rate_text(row: dict[str, float]) -> str:
 
 
 def short_table(table: pd.DataFrame) -> str:
-    """The table of the README: a row per contender, its cells the plant sets one after another."""
+    """The README's table: a row for each of README_CONTROLLERS that took part, in this order.
+
+    Each cell holds the figure on every plant set, in the order of PLANTS.
+    """
     headings = {
         "worst excursion [bar]": "C1_worst_excursion_bar",
-        "largest breakdown [bar]": "C2_largest_breakdown_bar",
         "rms error [bar]": "rms_error_bar",
         "switchings [1/s]": "switchings_per_s",
     }
+    groups = dict(iter(table.groupby("controller")))
     rows = []
-    for name, own in table.groupby("controller", sort=False):
-        of = own.set_index("plants").loc[list(PLANTS)]
+    for name in (name for name in README_CONTROLLERS if name in groups):
+        of = groups[name].set_index("plants").loc[list(PLANTS)]
         shares = " / ".join(f"{100 * (1 - stayed):.2f}" for stayed in of["C1_stayed"]) + " %"
         cells = [" / ".join(f"{value:.3g}" for value in of[column]) for column in headings.values()]
-        rows.append([str(name), shares, *cells])
+        rows.append([name, shares, *cells])
     return markdown(["", "left ±500 mbar", *headings], rows)
 
 

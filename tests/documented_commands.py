@@ -1,0 +1,109 @@
+"""Commands that the pages show, and the tests that run each of them in a short form."""
+
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+
+SHORT_FORMS: dict[str, str] = {
+    "python -m identification bench": "tests/identification/test_commands.py",
+    "python -m identification quality": "tests/identification/test_commands.py",
+    "python -m identification sensitivity": "tests/identification/test_commands.py",
+    "python -m identification calibrate": "tests/identification/test_commands.py",
+    "python -m identification confidence": "tests/identification/test_commands.py",
+    "python -m identification validate": "tests/identification/test_commands.py",
+    "python -m identification run": "tests/identification/test_commands.py",
+    "python -m identification coverage": "tests/identification/studies/coverage",
+    "python -m identification reproduce": "tests/identification/studies/reproduction",
+    "python -m identification gap": "tests/identification/valve_gap/test_diagnose.py",
+    "python -m identification gap --tables": "tests/identification/studies/error_tables",
+    "python -m identification blind": "tests/identification/studies/blind/test_command.py",
+    "python -m docs.examples.tank": "tests/test_tank_example.py",
+    "python -m docs.scripts.component_data": "tests/test_component_data.py",
+    "python docs/scripts/film.py": "tests/test_docs.py",
+    "python docs/scripts/identification_figures.py": "tests/test_docs.py",
+    "python training/bode.py": "tests/training/test_bode.py",
+    "python training/compare.py": "tests/training/test_compare.py",
+    "python training/export.py": "tests/training/test_export.py",
+    "python training/sim_to_real.py": "tests/training/test_sim_to_real.py",
+    "python training/sweep.py": "tests/training/test_sweep_run.py",
+    "python training/timing.py": "tests/training/test_timing.py",
+    "python training/tradeoff.py": "tests/training/test_commands.py",
+    "python training/train_ppo.py": "tests/training/test_commands.py",
+    "python training/tune.py": "tests/training/test_commands.py",
+    "python -m mkdocs": "tests/test_docs.py",
+    "cc": "tests/training/test_export.py",
+    "./parity": "tests/training/test_export.py",
+    "./bench": "tests/training/test_export.py",
+    "dask": "tests/training/test_sweep_cluster.py",
+}
+"""Test file or folder by the words that a command begins with; the longest beginning counts."""
+
+NOT_RUN: dict[str, str] = {
+    "python -m pytest": "it is the suite",
+    "python -m tests.benchmarks": "measurements; they need a quiet machine",
+    "python -m venv": "installation: the suite runs in its result",
+    "python3 -m venv": "installation: the suite runs in its result",
+    "python -m pip": "installation: the suite runs in its result",
+    "pip install": "installation: the suite runs in its result",
+    ".": "activates the environment",
+    "python -m ruff": "part of `make check`",
+    "python -m pyright": "part of `make check`",
+}
+"""Why a command has no short form, by the words that it begins with."""
+
+
+def shell_blocks(text: str) -> Iterator[str]:
+    """The `sh` blocks of a page, without their indentation."""
+    for block in re.findall(r"^ *```sh\n(.*?)^ *```", text, re.S | re.M):
+        yield re.sub(r"^ +", "", block, flags=re.M)
+
+
+def commands(shell: str) -> list[list[str]]:
+    """The commands of shell lines as lists of words, without comments and assignments."""
+    found = []
+    for line in shell.replace("\\\n", " ").splitlines():
+        for part in line.split("#")[0].split("&&"):
+            words = shlex.split(part)
+            while words and re.fullmatch(r"\w+=\S*", words[0]):
+                words.pop(0)
+            if words and words[0].startswith(".venv"):
+                words[0] = Path(words[0]).name
+            if words:
+                found.append(words)
+    return found
+
+
+def recipe(target: str) -> str:
+    """The lines of a target of the Makefile and of the targets that it needs, variables filled in.
+
+    Raises KeyError if there is no such target.
+    """
+    text = (ROOT / "Makefile").read_text(encoding="utf-8").replace("\\\n", " ")
+    variables = dict(re.findall(r"^(\w+) :?\??= ?(.*)$", text, re.M))
+    rules = {
+        name: (needs.split(), body)
+        for name, needs, body in re.findall(r"^([a-z][a-z-]*):([^#\n]*).*\n((?:\t.*\n?)*)", text, re.M)
+    }
+    needs, body = rules[target]
+    for _ in range(3):  # a variable may hold another one
+        body = re.sub(r"\$\((\w+)\)", lambda found: variables.get(found[1], ""), body)
+    needed = "\n".join(recipe(name) for name in needs if name in rules)
+    return needed + "\n" + re.sub(r"^\t[@-]?", "", body, flags=re.M)
+
+
+def beginning(words: list[str]) -> str | None:
+    """The longest entry of SHORT_FORMS or NOT_RUN that the command begins with.
+
+    An entry that ends in an option counts if the command has that option anywhere.
+    """
+    entries = sorted({**SHORT_FORMS, **NOT_RUN}, key=lambda entry: -len(entry.split()))
+    for entry in entries:
+        wanted = entry.split()
+        options = [word for word in wanted if word.startswith("--")]
+        plain = [word for word in wanted if word not in options]
+        if words[: len(plain)] == plain and set(options) <= set(words):
+            return entry
+    return None
