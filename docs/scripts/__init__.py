@@ -1,1 +1,1 @@
-"""Scripts that make the documentation's pictures and generated pages."""
+"""Scripts that make figures, films and tables of the documentation."""

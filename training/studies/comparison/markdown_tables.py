@@ -73,7 +73,7 @@ def short_table(table: pd.DataFrame) -> str:
         shares = " / ".join(f"{100 * (1 - stayed):.2f}" for stayed in of["C1_stayed"]) + " %"
         cells = [" / ".join(f"{value:.3g}" for value in of[column]) for column in headings.values()]
         rows.append([name, shares, *cells])
-    return markdown(["", "left ±500 mbar", *headings], rows)
+    return markdown(["controller", "violations of ±500 mbar", *headings], rows)
 
 
 def iqm_table(means: pd.DataFrame) -> str:
