@@ -29,13 +29,13 @@ def virtual_recordings(truth: Mapping[str, float], seed: int = 0) -> list[Run]:
     """
     steps, noise = np.random.default_rng(5), np.random.default_rng(seed)
     values = {symbol: np.array([value]) for symbol, value in truth.items()}
-    found = []
+    runs = []
     for number in range(1, RUNS + 1):
         inflow = np.repeat(steps.uniform(0.002, 0.02, 6), SAMPLES // 6)
         clean = readings(values, levels(values, inflow, PERIOD), PERIOD)[:, 0]
         name = f"test_{number}" if number < RUNS else HELD_OUT
-        found.append(as_run(name, PERIOD, inflow, clean + NOISE * noise.standard_normal(SAMPLES)))
-    return found
+        runs.append(as_run(name, PERIOD, inflow, clean + NOISE * noise.standard_normal(SAMPLES)))
+    return runs
 
 
 def as_run(name: str, period: float, inflow: NDArray, level: NDArray) -> Run:

@@ -40,14 +40,14 @@ def levels(
     forced = np.zeros((len(inflow), 1)) if forcing is None else forcing
     p = {**NOMINAL, **values}
     level = np.full(np.broadcast(forced[0], *p.values()).shape, START) + p["start"]
-    found = []
+    course = []
     for q, own in zip(inflow, forced, strict=True):
-        found.append(level)
+        course.append(level)
         for _ in range(SUBSTEPS):
             h = np.maximum(level, 1e-6)
             rate = q / AREA - p["c"] * np.sqrt(h) - p["leak"] * h - p["evaporation"] + own
             level = level + period / SUBSTEPS * rate
-    return np.array(found)
+    return np.array(course)
 
 
 def readings(values: Mapping[str, NDArray], level: NDArray, period: float) -> NDArray:

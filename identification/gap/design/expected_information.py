@@ -15,16 +15,14 @@ from numpy.typing import NDArray
 
 from identification.gap.design.information_gain import InformationGain, information_gain
 from identification.gap.design.outcome_distribution import outcome_distributions
-from identification.gap.design.parameter_posterior import ParameterPosterior, parameter_posteriors
+from identification.gap.design.parameter_posterior import parameter_posteriors
 from identification.gap.design.rivals import Rivals
 from identification.gap.design.settings import DesignSettings
 from identification.gap.fit.fitting_problem import FittingProblem
-from identification.gap.fit.hypothesis import Estimate
+from identification.gap.fit.hypothesis import Estimate, cause_places, nominal_vector
 from identification.gap.fit.linearisation import linearise, nuisance_slopes
 from identification.gap.fit.variable_projection import LinearisedRun
 from identification.gap.model.grey_box import GreyBox
-from identification.gap.model.recorded_run import Run
-from identification.gap.rank.misfit import cause_effects
 from identification.gap.rank.settings import RankingSettings
 
 
@@ -48,13 +46,17 @@ def expected_information(
     posteriors = parameter_posteriors(problem, rivals.estimates)
     planned, estimates = _planned_problem(problem, plan, rivals.estimates)
     predictions = linearise(planned, estimates, planned.all_runs)
+    effects = _simulated_effects(planned, estimates, predictions)
     gains = []
     for r, run in enumerate(plan.runs):
         own = [runs[r] for runs in predictions]
         if any(np.any(line.residual == planned.settings.failed_residual) for line in own):
             means, covariances = np.zeros((len(own), 1)), np.ones((len(own), 1, 1))
         else:
-            means, covariances = _distributions(estimates, own, posteriors, run, settings, ranking)
+            channels, period = run.measured.shape[0], float(run.time[1])
+            means, covariances = outcome_distributions(
+                own, posteriors, effects[r], channels, period, settings, ranking
+            )
         gains.append(information_gain(means, covariances, rivals.probability, settings.outcomes))
     return gains
 
@@ -75,17 +77,27 @@ def _planned(estimate: Estimate, plan: GreyBox) -> Estimate:
     return replace(estimate, run_values=np.tile(np.array(centres), (len(plan.runs), 1)), slopes=None)
 
 
-def _distributions(
+def _simulated_effects(
+    planned: FittingProblem,
     estimates: Sequence[Estimate],
-    runs: Sequence[LinearisedRun],
-    posteriors: Sequence[ParameterPosterior],
-    run: Run,
-    settings: DesignSettings,
-    ranking: RankingSettings,
-) -> tuple[NDArray, NDArray]:
-    """Means (rivals, d) and covariances (rivals, d, d) of one run's outcome [1]."""
-    effects = np.column_stack(
-        [cause_effects(estimate, own) for estimate, own in zip(estimates, runs, strict=True)]
-    )
-    channels, period = run.measured.shape[0], float(run.time[1])
-    return outcome_distributions(runs, posteriors, effects, channels, period, settings, ranking)
+    predictions: Sequence[Sequence[LinearisedRun]],
+) -> list[NDArray]:
+    """Effects of all rivals' causes of uncertain form, per run (values, causes) [noise deviations].
+
+    Each effect is the difference between simulations with and without the cause. The linear
+    `rank.misfit.cause_effects` holds near the campaign; a planned run may drive the plant beyond it.
+    """
+    without, rivals = [], []
+    for index, estimate in enumerate(estimates):
+        for cause, place, _ in cause_places(estimate):
+            if not cause.exact_form:
+                vector = estimate.vector.copy()
+                vector[place] = nominal_vector(cause)
+                without.append(replace(estimate, vector=vector))
+                rivals.append(index)
+    if not without:
+        return [np.zeros((len(measured), 0)) for measured in planned.measured]
+    return [
+        residuals - np.stack([predictions[index][r].residual for index in rivals], axis=1)
+        for r, residuals in enumerate(planned.residuals(without, planned.all_runs))
+    ]

@@ -93,7 +93,7 @@ def linearised_run(
     offsets = offset_slopes.shape[1]
     run_parameters = estimate.hypothesis.run_parameters
     known = (*run_parameters, *problem.plant.run_offsets[:offsets])
-    # The slopes describe tolerances from their centres: what the simulation has of them is undone.
+    # The slopes describe tolerances from their centres: their part in the simulation is undone.
     undone = tolerance_slopes @ nuisances.deviations
     return LinearisedRun(
         residual=problem.residual(run, outputs[:, None])[:, 0] + undone,
@@ -118,8 +118,10 @@ def nuisance_slopes(
     plant = problem.plant
     nuisances = (*plant.run_offsets, *plant.tolerances)
     n, offsets = 1 + len(nuisances), len(plant.run_offsets)
-    found = [NuisanceSlopes(deviations=d, offset_slopes=[], tolerance_slopes=[]) for d in deviations]
-    placed = [replace(e, slopes=slopes) for e, slopes in zip(estimates, found, strict=True)]
+    all_slopes = [
+        NuisanceSlopes(deviations=d, offset_slopes=[], tolerance_slopes=[]) for d in deviations
+    ]
+    placed = [replace(e, slopes=slopes) for e, slopes in zip(estimates, all_slopes, strict=True)]
     values = problem.candidates([estimate for estimate in placed for _ in range(n)])
     for j, nuisance in enumerate(nuisances, start=1):
         centre = np.full(n * len(estimates), nuisance.centre, dtype=float)
@@ -129,7 +131,7 @@ def nuisance_slopes(
     for r, output in enumerate(plant.outputs(values, problem.all_runs)):
         outputs = noise_weighted(plant, r, output).reshape(-1, len(estimates), n)
         slopes = np.nan_to_num(outputs[..., 1:] - outputs[..., :1]) / steps
-        for each, own in zip(found, slopes.transpose(1, 0, 2), strict=True):
+        for each, own in zip(all_slopes, slopes.transpose(1, 0, 2), strict=True):
             each.offset_slopes.append(own[:, :offsets])
             each.tolerance_slopes.append(own[:, offsets:] * sd)
-    return found
+    return all_slopes

@@ -112,7 +112,7 @@ def _fault_forms(
     settings: LocalisationSettings,
 ) -> list[QuadraticForm]:
     """Quadratic forms of the faults of the readings, in their physically possible forms."""
-    found = []
+    forms = []
     for fault in reading_faults(problem.plant, values, runs, settings):
         moment, precision = elimination.moment_and_precision(fault.changes, shared=True)
         kept = physical_forms(moment, precision, fault.either_sign)
@@ -123,5 +123,5 @@ def _fault_forms(
                 precision=precision[np.ix_(kept, kept)],
                 moment=moment[kept],
             )
-            found.append(form)
-    return found
+            forms.append(form)
+    return forms

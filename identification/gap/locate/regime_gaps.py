@@ -117,5 +117,5 @@ def _gap_and_interval(
         return float(np.sqrt(np.sum(squares) / np.sum(counts))), 0.0, np.inf
     least = np.finfo(float).tiny
     rms = np.sqrt((weights @ squares) / np.maximum(weights @ counts, least))
-    found = interval(rms, bootstrap.interval_level)
-    return found.value, found.low, found.high
+    gap = interval(rms, bootstrap.interval_level)
+    return gap.value, gap.low, gap.high

@@ -117,9 +117,9 @@ def _rank_refined(
     scale = ResidualScale(
         lowest_excess=min(0.0, *(each.excess for each in (recalibrated, *singles))), settings=settings
     )
-    found = fit_pairs(problem, recalibrated, singles, first_fits, scale, cache)
+    all_pairs = fit_pairs(problem, recalibrated, singles, first_fits, scale, cache)
     counts = [count // 2 for count in settings.finalists]
-    pairs = by_log_evidence(best_fit_of_each(found))
+    pairs = by_log_evidence(best_fit_of_each(all_pairs))
     pairs = refine(problem, pairs, counts, "pairs", cache, settings, lag)
     if pairs and scale.is_large(singles[0]):
         members = refit_members_of_best_pair(problem, singles, pairs, cache, settings)

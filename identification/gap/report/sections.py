@@ -22,7 +22,7 @@ def sections(diagnosis: Diagnosis, next_experiment: str = "") -> list[Section]:
 
     next_experiment: a sentence or two; empty where none was sought.
     """
-    found = [
+    parts = [
         _verdict(diagnosis, next_experiment),
         _localisation(diagnosis),
         _ranking(diagnosis),
@@ -30,8 +30,8 @@ def sections(diagnosis: Diagnosis, next_experiment: str = "") -> list[Section]:
     ]
     if next_experiment:
         plan = Verdict(status="note", text=next_experiment)
-        found.append(Section(title="Next experiment", verdicts=[plan], blocks=[]))
-    return [*found, _warnings(diagnosis)]
+        parts.append(Section(title="Next experiment", verdicts=[plan], blocks=[]))
+    return [*parts, _warnings(diagnosis)]
 
 
 def _verdict(diagnosis: Diagnosis, next_experiment: str) -> Section:

@@ -34,7 +34,7 @@ def component_at_fault(diagnosis: Diagnosis) -> str:
 
 def location_sentence(diagnosis: Diagnosis) -> str:
     """Where most of the gap lies."""
-    worst = max(diagnosis.localisation.regime_gaps, key=lambda found: found.gap)
+    worst = max(diagnosis.localisation.regime_gaps, key=lambda gap: gap.gap)
     text = (
         f"After recalibration the gap is largest in {worst.channel} during "
         f"{worst.regime.replace('_', ' ')}: {gap_text(worst.gap)} noise deviations, where {FLOOR:g} is "
