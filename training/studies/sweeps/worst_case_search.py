@@ -4,7 +4,7 @@ The search has four stages, each a few large batches:
 
 1. A Latin hypercube of plants meets as many different episodes. The search keeps the episodes with the
    largest excursions.
-2. Differential evolution (Storn and Price 1997) varies the plant over the whole region in these episodes.
+2. In these episodes, differential evolution (Storn and Price 1997) varies the plant over the region.
 3. Differential evolution varies the plant close to the worst one.
 4. The worst plant meets as many new episodes as the first stage had.
 """
