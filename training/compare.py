@@ -3,8 +3,8 @@
     python training/compare.py --policies runs/seeds --out runs/comparison
 
 The classic controllers are those of controllers/tuned.json; --policies holds a folder per training seed
-and is filled with what is missing. What is finished in --out is kept: an interrupted comparison goes on
-where it was. After a change of the plant or of a controller's code, choose another --out.
+and missing policies are trained into it. Finished blocks in --out are kept: an interrupted comparison
+continues where it stopped. After a change of the plant or of a controller's code, choose another --out.
 """
 
 import argparse

@@ -3,8 +3,8 @@
     python training/sim_to_real.py --out runs/sim-to-real
 
 The bench is a virtual one. Its valve has an effect that is withheld from every other step: training,
-simulation and diagnosis see what a user sees. What is finished in --out is kept, not done
-again (docs/results/sim-to-real.md).
+simulation and diagnosis see what a user sees. Finished steps in --out are kept
+(docs/results/sim-to-real.md).
 """
 
 import argparse

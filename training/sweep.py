@@ -1,9 +1,10 @@
-"""How far each controller holds: plants, effects, sensors and timing off by much, and the worst of all.
+"""Robustness of each controller: plants, effects, sensors and timing far off, and the worst case.
 
     python training/sweep.py --out runs/sweep
     python training/sweep.py --out runs/sweep --cluster tcp://HOST:8786
 
-Killed, it goes on where it was when it is started again. docs/results/robustness.md says what it does.
+A sweep that was stopped continues where it stopped when it is started again. docs/results/robustness.md
+explains the method.
 """
 
 import argparse

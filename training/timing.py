@@ -2,9 +2,9 @@
 
     python training/timing.py --out runs/timing --controllers pulse PWM runs/ppo
 
-Times are those of this implementation, Python and NumPy, on this machine: processor time of all the
-process's threads without garbage collection, since an ECU has neither other programs to wait for nor
-garbage. The exported C's are another matter (docs/reference/exported-policy.md).
+The times are those of this implementation, Python and NumPy, on this machine: processor time of all the
+process's threads without garbage collection, because an ECU has neither other programs nor garbage. The
+export times the C code (docs/reference/exported-policy.md).
 """
 
 import argparse

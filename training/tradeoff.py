@@ -2,9 +2,9 @@
 
     python training/tradeoff.py --prices 0.5 1 2 --out runs/tradeoff
 
-trains PPO and tunes classic controllers at every price; what is finished in --out is kept. With
---recurrent, PPO also trains a policy with a memory at every price (distillation.py). Measured and
-drawn they are by training/compare.py --tradeoff runs/tradeoff.
+trains PPO and tunes classic controllers at every price; finished controllers in --out are kept. With
+--recurrent, PPO also trains a policy with a memory at every price. The command
+`training/compare.py --tradeoff runs/tradeoff` measures and draws them.
 """
 
 import argparse

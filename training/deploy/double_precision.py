@@ -1,4 +1,4 @@
-"""A policy in double precision: what the export calibrates on, and measures rounding against."""
+"""A policy in double precision: the export's reference for calibration and rounding."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What the export measures before it writes: agreement, closed loop, time for a decision."""
+"""Measurements of an export before it is written: agreement, closed loop, time for a decision."""
 
 import csv
 import ctypes
@@ -58,7 +58,7 @@ def agreement(policy: LearnedPolicy, code: ctypes.CDLL, states: VisitedStates) -
 
 
 def follow(controller: Controller, states: VisitedStates) -> NDArray:
-    """What a controller decides (episodes, periods) along the states that another one visits."""
+    """Decisions (episodes, periods) of a controller along the states that another one visited."""
     controller.reset(len(states.observations))
     periods = range(states.observations.shape[1])
     return np.stack([controller.act(states.observations[:, k]) for k in periods], axis=1)
@@ -112,7 +112,7 @@ def run_bench(compiler: list[str], folder: Path) -> dict[str, dict[str, float]]:
 
 
 def machine(compiler: list[str]) -> dict[str, str]:
-    """What the times were measured with."""
+    """Processor, system and compiler of the measured times."""
     done = subprocess.run([*compiler, "--version"], capture_output=True, text=True, check=False)
     version = (done.stdout.splitlines() or ["unknown"])[0]
     return {"processor": platform.machine(), "system": platform.system(), "compiler": version}

@@ -1,4 +1,4 @@
-"""States that a policy really visits: what the export calibrates on and compares on."""
+"""States that a policy visits: the export calibrates on some and compares its code on others."""
 
 import csv
 import io
@@ -16,7 +16,7 @@ SCENARIO = "mixed"
 """Where the policy is followed: every scenario, the calibrated parameters within ±10 %."""
 
 READINGS = ("p1", "p2", "p3", "current", "target", "coil")
-"""What an electronic control unit knows at the end of a period, in the order of the C structures."""
+"""Readings of an electronic control unit at the end of a period, in the order of the C structures."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""Who is compared on what: contenders, and how many episodes each of them runs."""
+"""Contenders of a comparison, and how many episodes each of them runs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ TUNING = "tuning"
 
 
 class Expense(NamedTuple):
-    """What a controller costs that searches on the plant's simulation."""
+    """Computing cost of a controller, and how many fewer episodes it runs for that reason."""
 
     times: int
     """CPU time of an episode, in those of the others (measured, 512 side by side against 16)."""
@@ -33,7 +33,7 @@ class Expense(NamedTuple):
     TRADE_OFF_ON), if the others run as many."""
 
     def episodes(self, plants: str, scenario: str, wanted: int) -> int:
-        """How many it runs where the others run so many."""
+        """Episodes that it runs where the other controllers run `wanted`."""
         least = self.random if scenario == RANDOM and plants in (CRITERIA_ON, TRADE_OFF_ON) else 0
         return max(-(-wanted // self.fewer), min(wanted, least))
 
@@ -53,13 +53,13 @@ class Sizes:
     """Episodes of one run of a contender."""
 
     named: int
-    """In each named scenario and plant set."""
+    """Episodes in each named scenario and plant set."""
     random: int
-    """In the random scenario on the calibrated plant, and of a variant in the trade-off."""
+    """Episodes in the random scenario on the calibrated plant, and of a variant in the trade-off."""
     bound: int
-    """In the random scenario on each plant set of BOUNDED."""
+    """Episodes in the random scenario on each plant set of BOUNDED."""
     tuning: int
-    """On the tuning scenarios, to choose a training seed."""
+    """Episodes on the tuning scenarios, to choose a training seed."""
 
     def of(self, plants: str, scenario: str) -> int:
         """Episodes in a scenario and plant set; 0: left out."""

@@ -1,4 +1,4 @@
-"""The episodes of a comparison, cut into blocks that run side by side, and put together again."""
+"""The episodes of a comparison: blocks that run side by side, and their joined results."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
@@ -35,7 +35,7 @@ EPISODE_OPTIONS = ("scenario", "target_bar")
 
 
 def fingerprint(controller: Controller) -> str:
-    """Changes with the controller's settings or weights."""
+    """A short hash of the controller's settings and weights."""
     return str(joblib.hash(controller))[:12]
 
 
@@ -55,18 +55,18 @@ class Block:
     """Their options are the same but for EPISODE_OPTIONS."""
     first_seed: int
     count: int
-    """Of each scenario."""
+    """Episodes of each scenario."""
     cost: int = 1
-    """Of an episode, in those of a cheap controller."""
+    """Cost of an episode, in episodes of a cheap controller."""
 
     @property
     def episodes(self) -> int:
-        """What it costs, in episodes of a cheap controller: for the progress, and the order of work."""
+        """Cost in episodes of a cheap controller: for the progress bar and the order of work."""
         return len(self.scenarios) * self.count * self.cost
 
     @property
     def name(self) -> str:
-        """Its own among all blocks."""
+        """A name that no other block of the comparison has."""
         last = self.first_seed + self.count - 1
         where = f"{self.plants}, {' + '.join(self.scenarios)}, seeds {self.first_seed} to {last}"
         return f"{self.run_name} [{self.version}], {where}"
@@ -140,7 +140,10 @@ def _blocks_of(block: Callable[..., Block], scenarios: list[str], first: int, co
 
 
 def joined_results(blocks: list[Block], outcomes: Mapping[str, dict[str, Any]]) -> Results:
-    """The blocks' episodes put together. outcomes: what each block's `run` gave, by its name."""
+    """Episodes of all blocks by run, plant set and scenario.
+
+    outcomes: the results of `Block.run` by the name of the block.
+    """
     parts: dict[tuple[str, str, str], list[EpisodeMetrics]] = {}
     for block in blocks:
         arrays: dict[str, NDArray] = {k: np.array(v) for k, v in outcomes[block.name].items()}

@@ -32,7 +32,7 @@ SCORES = {
 """Fields of EpisodeMetrics that are averaged over a scenario's episodes and compared."""
 
 HIGHER_IS_BETTER = {"episode_return"}
-"""Of the scores; the others are better when they are lower."""
+"""Scores that are better when they are higher; all others are better when they are lower."""
 
 JUDGED_ON = ("calibrated", "sensitive_ten_percent")
 """Plant sets on which all scenarios run."""
@@ -49,7 +49,7 @@ class ComparisonResults:
     scenarios: list[str]
     results: Results
     variants: list[Contender] = field(default_factory=list)
-    """Of the contenders by name, each optimised at another price of switching."""
+    """Contenders that were optimised at another price of switching; names as in `contenders`."""
 
     @cached_property
     def chosen(self) -> dict[str, str]:

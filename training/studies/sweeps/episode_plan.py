@@ -1,4 +1,4 @@
-"""Which episodes a sweep runs: every point with every controller, cut into tasks."""
+"""The episodes of a sweep: every point with every controller, cut into tasks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from training.studies.sweeps.experiment_designs import ONE_AT_A_TIME, Point, hyp
 from training.studies.sweeps.worst_case_search import Effort, Search
 
 TASK_EPISODES = 512
-"""Most episodes of a task: more gain little, and a killed sweep loses what its tasks had begun."""
+"""Most episodes of a task: larger tasks gain little, and a stopped sweep loses its unfinished tasks."""
 
 SEARCHED = ("confidence", "sensitive_ten_percent")
 """Regions in which the worst case is searched."""
@@ -18,12 +18,12 @@ SEARCHED = ("confidence", "sensitive_ten_percent")
 
 @dataclass(frozen=True, kw_only=True)
 class Size:
-    """How much is run."""
+    """Numbers of episodes and plants."""
 
     episodes: int
-    """At each point that changes one thing."""
+    """Episodes at each point that changes one thing."""
     joint_episodes: int
-    """At each region, and plants of the Latin hypercube."""
+    """Episodes at each region, and plants of the Latin hypercube."""
     effort: Effort
 
 

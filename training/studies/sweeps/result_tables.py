@@ -50,7 +50,7 @@ def _row(cell: SweepCell, parts: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _figure(name: str, parts: list[dict[str, Any]]) -> dict[str, float]:
-    """Mean, or for a root mean square that of all, and greatest of one figure."""
+    """Mean and greatest value of one figure; for `rms_bar` the root mean square of all episodes."""
     count = max(sum(part["count"] for part in parts), 1)
     mean = sum(part["sum"] for part in parts) / count
     if name.startswith("rms"):

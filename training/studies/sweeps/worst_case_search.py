@@ -1,9 +1,12 @@
-"""Worst-case search: the plant of a region and the consumption under which p2 strays farthest.
+"""Worst-case search: the plant of a region and the consumption with the largest excursion of p2.
 
-Four stages, each a few large batches. A Latin hypercube of plants meets as many different episodes; the
-episodes that strayed farthest are then held, and differential evolution (Storn and Price 1997) moves the
-plant, first over the whole region, then close to the best one found; last, that plant meets as many new
-episodes as there were at first.
+The search has four stages, each a few large batches:
+
+1. A Latin hypercube of plants meets as many different episodes. The search keeps the episodes with the
+   largest excursions.
+2. In these episodes, differential evolution (Storn and Price 1997) varies the plant over the region.
+3. Differential evolution varies the plant close to the worst one.
+4. The worst plant meets as many new episodes as the first stage had.
 """
 
 from dataclasses import dataclass, field
