@@ -16,13 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.common.units import BAR
 from epv_env.observation import decode
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters, table
 from epv_env.plant.readings import MEASURED
 from epv_env.plant.sensors import SENSORS, Sensor
 from epv_env.plant.simulate import energised
-from epv_env.plant.supply import BAR
 from epv_env.plant.valves import Valves
 
 FLOORS = {"p1": 2e-3 * BAR, "p3": 5e-3 * BAR, "I": 2e-3}

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from controllers.estimator import Estimator
 from controllers.mpc_prediction import CHUNK, LEAD, Predictor, Question
+from controllers.registration import SIMULATING, Range, Registration
+from epv_env.common.units import BAR
 from epv_env.observation import decode
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.supply import BAR
 from epv_env.reward import RewardWeights
 
 
@@ -79,3 +80,18 @@ class MPC:
             chosen[rows] = self._predictor.table[best, 0]
         self._on = chosen
         return chosen.astype(np.int64)
+
+
+REGISTRATION = Registration(
+    kind="MPC",
+    controller=MPC,
+    build=lambda values, parameters: MPC(parameters=parameters, threads=1, **values),
+    search_space={
+        "tail": Range(low=0.02, high=0.3, log=True),
+        "floor": Range(low=-0.2, high=0.0),
+        "upkeep": Range(low=5.0, high=40.0),
+        "setpoint": Range(low=-0.05, high=0.15),
+        "reluctance": Range(low=0.0, high=0.2),
+    },
+    cost=SIMULATING,
+)

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.estimator import Estimate
+from epv_env.common.units import BAR
 from epv_env.plant.equations import Inputs, State
-from epv_env.plant.supply import BAR
 from epv_env.plant.valves import Valves
 from epv_env.reward import RewardWeights, reward_terms
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from numpy.typing import NDArray
 
 from controllers.oracle_search import LONGEST_LOOK, Search
+from controllers.registration import SIMULATING, Registration
 from epv_env.reward import RewardWeights
 from epv_env.task import LimitingTask
 
@@ -58,3 +59,12 @@ class Oracle:
         while self._search.depth < self.look_ahead:
             self._search.expand()
         return self._search.decide()
+
+
+REGISTRATION = Registration(
+    kind="oracle",
+    controller=Oracle,
+    build=lambda values, parameters: Oracle(threads=1),
+    search_space=None,
+    cost=SIMULATING,
+)

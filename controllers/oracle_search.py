@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.common.units import BAR
 from epv_env.plant.equations import State
-from epv_env.plant.supply import BAR
 from epv_env.plant.valves import Valves
 from epv_env.reward import RewardWeights, reward_terms
 from epv_env.settings import EMPTY_CIRCUIT_BAR

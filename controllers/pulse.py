@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.pulse_table import PulseTable
+from controllers.pulse_table import PulseTable, pulse_table
+from controllers.registration import CHEAP, Range, Registration
 from epv_env.observation import decode
 
 
@@ -90,3 +91,18 @@ class Pulse:
         growth = (1 - fading) ** 2 * surprise / self.control_period
         self._slope = self._slope + np.where(follows, growth, 0.0)
         self._was_shut = shut
+
+
+REGISTRATION = Registration(
+    kind="pulse",
+    controller=Pulse,
+    build=lambda values, parameters: Pulse(table=pulse_table(parameters), **values),
+    search_space={
+        "trigger": Range(low=-0.3, high=0.1),
+        "aim": Range(low=-0.1, high=0.3),
+        "filter_time": Range(low=0.004, high=0.04, log=True),
+        "look_ahead": Range(low=0.3, high=1.5),
+        "rounding": Range(low=0.2, high=1.2),
+    },
+    cost=CHEAP,
+)

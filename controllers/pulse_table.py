@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.opening_pressure import opening_pressure
+from epv_env.common.units import BAR
 from epv_env.plant.equations import State
 from epv_env.plant.simulate import energised
-from epv_env.plant.supply import BAR
 from epv_env.plant.valves import Valves
 
 SUPPLY = np.array([7.0, 11.0, 15.0]) * BAR

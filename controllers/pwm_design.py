@@ -18,12 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import root_scalar
 
+from epv_env.common.units import BAR
 from epv_env.plant.coefficients import coefficients
 from epv_env.plant.equations import Coefficients
 from epv_env.plant.flow import mass_flux
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised, simulate
-from epv_env.plant.supply import BAR
 
 QUARTER_PI = np.pi / 4
 OPENING = 0.05

@@ -16,7 +16,8 @@ import pandas as pd
 
 from controllers.base import Controller
 from controllers.learned import holds_policy, load_policy
-from controllers.tuned import SEARCHING, tuned_controllers
+from controllers.registry import SIMULATING_KINDS
+from controllers.tuned import tuned_controllers
 from epv_env.actions import OnOff
 from epv_env.common.command_line import (
     check_not_negative,
@@ -139,7 +140,7 @@ def stage(name: str, simulated: Plant, chosen: argparse.Namespace) -> pd.DataFra
     path = folder / EPISODES
     if not path.exists():
         plants = {PROMISED: simulated, DELIVERED: load_plant(chosen.out / WITHHELD)}
-        rivals = tuned_controllers(without=SEARCHING)
+        rivals = tuned_controllers(without=SIMULATING_KINDS)
         episodes = deployed(
             [policy, *rivals], plants, scenario=SCENARIO, count=chosen.episodes,
             duration=chosen.duration, what=f"deployment {name}",

@@ -19,7 +19,8 @@ from tqdm import tqdm
 
 from controllers.learned import load_policy
 from controllers.pwm import PWM
-from controllers.tuned import SEARCHING, tuned_controllers
+from controllers.registry import SIMULATING_KINDS
+from controllers.tuned import tuned_controllers
 from epv_env.actions import OnOff
 from epv_env.common.command_line import (
     check_not_negative,
@@ -123,7 +124,10 @@ def check_resume(chosen: argparse.Namespace) -> None:
 
 def evaluate(chosen: argparse.Namespace, plant: Plant) -> Comparison:
     """The comparison on unseen scenarios, with a progress bar."""
-    contenders = [load_policy(chosen.out), *tuned_controllers(plant.parameters, without=SEARCHING)]
+    contenders = [
+        load_policy(chosen.out),
+        *tuned_controllers(plant.parameters, without=SIMULATING_KINDS),
+    ]
     with tqdm(
         total=100,
         desc="evaluation",

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from controllers.estimator import Estimate, Estimator
+from epv_env.common.units import BAR
 from epv_env.observation import LAYOUT, encode
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.sensors import SENSORS
 from epv_env.plant.simulate import energised
-from epv_env.plant.supply import BAR
 from epv_env.plant.valves import Valves
 
 PERIOD = 5e-3

@@ -5,9 +5,9 @@ import pytest
 
 from controllers.opening_pressure import opening_pressure
 from controllers.pulse_table import STAY, pulse_table
+from epv_env.common.units import BAR
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised
-from epv_env.plant.supply import BAR
 from epv_env.plant.valves import Valves
 
 pytestmark = pytest.mark.training

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from controllers.tuned import KINDS, SEARCHING
+from controllers.registry import SIMULATING_KINDS, TUNED_KINDS
 
 pytest.importorskip("stable_baselines3")
 from training.learners.distillation import Distillation, Student, policy_of
@@ -46,7 +46,9 @@ def test_the_short_run_writes_everything_and_prints_the_table(finished):
     assert sorted(path.name for path in out.iterdir()) == sorted(WRITTEN)
     for heading in ("C1 stayed", "C2 largest breakdown [bar]", "sensitive_ten_percent", "PPO", "PWM"):
         assert heading in result.stdout
-    assert len(json.loads((out / "table.json").read_text())) == 3 * (1 + len(KINDS) - len(SEARCHING))
+    assert len(json.loads((out / "table.json").read_text())) == 3 * (
+        1 + len(TUNED_KINDS) - len(SIMULATING_KINDS)
+    )
 
 
 def test_a_run_resumes_from_its_checkpoint(finished):

@@ -13,7 +13,7 @@ from safetensors.numpy import load_file, save_file
 from controllers.base import Privileged
 from controllers.hysteresis import Hysteresis
 from controllers.learned import WEIGHTS_FILE, LearnedPolicy, PolicyError, load_policy
-from controllers.privileged_pulse import InformedPulse
+from controllers.privileged_pulse import PrivilegedPulse
 from controllers.pulse_table import PulseTables, pulse_table
 from controllers.tuned import build, load_tunings
 from epv_env.observation import LAYOUT
@@ -192,7 +192,7 @@ def test_each_valve_s_table_is_that_of_its_plant_to_the_bit():
 @pytest.mark.parametrize("informed", [False, True])
 def test_only_a_pulse_that_knows_its_plant_holds_the_band_on_others(informed):
     tuned = build("pulse", load_tunings()["pulse"].values, PLANT.parameters)
-    example = InformedPulse() if informed else tuned
+    example = PrivilegedPulse() if informed else tuned
     assert isinstance(example, Privileged) == informed
     metrics, _ = run_episodes(example, seeds=list(range(40, 64)), duration=4.0, options=OPTIONS)
     assert np.all(metrics.stayed) == informed

@@ -24,7 +24,7 @@ from tqdm import tqdm
 
 from controllers.base import Controller
 from controllers.learned import GatedUnit, LearnedPolicy, holds_policy, load_policy
-from controllers.privileged_pulse import InformedPulse
+from controllers.privileged_pulse import PrivilegedPulse
 from controllers.pulse_table import PulseTables
 from epv_env.actions import OnOff
 from epv_env.observation import LAYOUT
@@ -173,7 +173,7 @@ def _distil_into(folder: Path, d: Distillation, *, quiet: bool, **task: Any) -> 
     """Train a student. task: `train`'s arguments."""
     options = {name: task[name] for name in ("plant", "scenario", "parameters", "weights")}
     plants = known_plants(d.plants, options, seed=task["seed"], quiet=quiet)
-    found = distil(d, InformedPulse(), plants, options=options, seed=task["seed"], quiet=quiet)
+    found = distil(d, PrivilegedPulse(), plants, options=options, seed=task["seed"], quiet=quiet)
     provenance = {"distillation": asdict(d), "seed": task["seed"]}
     save_policy(found, folder, control_period=OnOff.default_period, provenance=provenance)
 
