@@ -27,11 +27,11 @@ from epv_env.common.command_line import (
     writable_folder,
 )
 from epv_env.common.files import write_text
+from epv_env.common.results_folder import check_options, write_options
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.reward import RewardWeights
 from identification.__main__ import main as identification
 from identification.bench.programmes import SUITES
-from training.studies.results_folder import check_options, write_options
 from training.studies.sim_to_real.deployment import (
     AFTER,
     BEFORE,
@@ -117,8 +117,9 @@ def diagnose(chosen: argparse.Namespace) -> dict[str, Any]:
 def trained(folder: Path, plant: Plant, chosen: argparse.Namespace) -> Controller:
     """PPO trained on plants around this one, or as it was trained before."""
     if not holds_policy(folder):
+        from training.learners.hyperparameters import Hyperparameters
         from training.learners.policy_files import save_policy  # torch takes seconds to import: only now
-        from training.learners.ppo import Hyperparameters, train
+        from training.learners.ppo import train
 
         policy, _ = train(
             Hyperparameters(**SMALLER_STEPS), folder=folder, plant=plant, scenario=SCENARIO,

@@ -24,12 +24,12 @@ from epv_env.common.command_line import (
 )
 from epv_env.common.files import write_text
 from epv_env.common.journal import Journal
+from epv_env.common.results_folder import check_options, write_options
 from epv_env.plant.consumption import check_scenario
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.valves import available_cores
 from training.evaluation.seeds import CALIBRATION_SEED, SWEEP_SEED
 from training.studies.page_parts import check_pages
-from training.studies.results_folder import check_options, write_options
 from training.studies.sweeps.controllers import DEFAULT, named_controllers
 from training.studies.sweeps.cost import cost, episode_cpu, overhead
 from training.studies.sweeps.designs import DESIGNS

@@ -98,7 +98,7 @@ def first_memory(chosen: argparse.Namespace) -> Training | None:
     """
     if chosen.recurrent is None:
         return None
-    from training.learners.distillation import load_student  # torch takes seconds to import: only now
+    from training.learners.student import load_student  # torch takes seconds to import: only now
 
     (first,) = seed_trainings(
         chosen.recurrent, count=1, timesteps=RECURRENT_TIMESTEPS, recurrent=True

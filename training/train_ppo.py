@@ -30,6 +30,7 @@ from epv_env.common.command_line import (
     writable_folder,
 )
 from epv_env.common.files import write_text
+from epv_env.common.results_folder import check_same, read_config, write_options
 from epv_env.plant.consumption import check_scenario
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.region import REGIONS
@@ -37,7 +38,9 @@ from epv_env.reward import RewardWeights
 from training.evaluation.controller_table import Comparison, as_text, compare
 from training.evaluation.scenarios import TUNING_REGION
 
-CONFIG_FILE = "config.json"
+SAME_WHEN_RESUMED = ("seed", "plant", "scenario", "parameters", "switching_price", "recurrent")
+"""Options that a resumed training must share with its beginning."""
+
 QUICK = {"timesteps": 65_536, "episodes": 16, "duration": 2.0}
 """The defaults under --quick: everything is done, too short to learn anything."""
 QUICK_HYPERPARAMETERS: dict[str, Any] = {
@@ -106,20 +109,14 @@ def configuration(chosen: argparse.Namespace, plant: Plant, hyperparameters: Any
 
 def check_resume(chosen: argparse.Namespace) -> None:
     """A folder with a checkpoint is continued only if that is asked for, and only with its options."""
-    path = chosen.out / CONFIG_FILE
-    if not path.exists():
-        if chosen.resume:
-            raise ValueError(f"nothing to resume in {chosen.out}: leave --resume out")
-        return
     if not chosen.resume:
         return
-    earlier = {"recurrent": False} | json.loads(path.read_text(encoding="utf-8"))["options"]
-    for name in ("seed", "plant", "scenario", "parameters", "switching_price", "recurrent"):
-        if earlier[name] != getattr(chosen, name):
-            raise ValueError(
-                f"{chosen.out} was trained with {name} {earlier[name]}, not "
-                f"{getattr(chosen, name)}: resume with the same, or choose another --out"
-            )
+    config = read_config(chosen.out)
+    if config is None:
+        raise ValueError(f"nothing to resume in {chosen.out}: leave --resume out")
+    options = {name: getattr(chosen, name) for name in SAME_WHEN_RESUMED}
+    earlier = {"recurrent": False} | config["options"]
+    check_same(earlier, options, f"{chosen.out} was trained with", "resume with the same")
 
 
 def evaluate(chosen: argparse.Namespace, plant: Plant) -> Comparison:
@@ -156,20 +153,22 @@ def main(arguments: list[str] | None = None) -> int:
     check_scenario(chosen.scenario)
     check_resume(chosen)
 
-    from training.learners import distillation as distil
+    from training.learners.distillation import Distillation
+    from training.learners.hyperparameters import Hyperparameters, recurrent_hyperparameters
     from training.learners.policy_files import save_policy
-    from training.learners.ppo import Hyperparameters, train
+    from training.learners.ppo import train
+    from training.learners.recurrent_training import train_recurrent
 
     weights = RewardWeights(switching=chosen.switching_price)
-    hyperparameters = distil.going_on(weights) if chosen.recurrent else Hyperparameters()
-    distillation = distil.FULL
+    hyperparameters = recurrent_hyperparameters(weights) if chosen.recurrent else Hyperparameters()
+    distillation = Distillation()
     if chosen.quick:
         hyperparameters = replace(hyperparameters, **QUICK_HYPERPARAMETERS)
         distillation = replace(distillation, **QUICK_DISTILLATION)
     config = configuration(chosen, plant, hyperparameters)
     if chosen.recurrent:
         config["distillation"] = asdict(distillation)
-    write_text(chosen.out / CONFIG_FILE, json.dumps(config, indent=1) + "\n")
+    write_options(chosen.out, config)
     task: dict[str, Any] = {
         "folder": chosen.out, "plant": plant, "scenario": chosen.scenario,
         "parameters": chosen.parameters, "weights": weights,
@@ -177,7 +176,7 @@ def main(arguments: list[str] | None = None) -> int:
         "resume": chosen.resume,
     }  # fmt: skip
     if chosen.recurrent:
-        policy, log = distil.train_recurrent(hyperparameters, distillation, **task)
+        policy, log = train_recurrent(hyperparameters, distillation, **task)
     else:
         policy, log = train(hyperparameters, **task)
     save_policy(policy, chosen.out, control_period=OnOff.default_period, provenance=config)

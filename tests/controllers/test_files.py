@@ -41,8 +41,10 @@ def test_a_written_policy_acts_as_the_model_it_came_from(tmp_path):
     from controllers.learned import PolicyError, load_policy
     from epv_env.plant.plantfile import Plant
     from epv_env.reward import RewardWeights
+    from training.learners.hyperparameters import Hyperparameters
     from training.learners.policy_files import greedy_policy, save_policy
-    from training.learners.ppo import Hyperparameters, make_model, make_training_env
+    from training.learners.ppo import make_model
+    from training.learners.training_env import make_training_env
 
     h = Hyperparameters(num_envs=4, n_steps=8, batch_size=32)
     env = make_training_env(

@@ -23,18 +23,13 @@ from epv_env.reward import RewardWeights
 from tests.training.policies import random_layers
 from training.deploy.double_precision import in_double, logits_along
 from training.evaluation.rollout import begin_episodes, make_env, run_episodes
-from training.learners.distillation import (
-    NAME,
-    Distillation,
-    Student,
-    distil,
-    known_plants,
-    policy_of,
-    train_recurrent,
-    with_memory_of,
-)
+from training.learners.distillation import Distillation, distil, known_plants
+from training.learners.hyperparameters import Hyperparameters
 from training.learners.policy_files import greedy_policy, put_layers, save_policy
-from training.learners.ppo import Hyperparameters, make_model, make_training_env
+from training.learners.ppo import make_model
+from training.learners.recurrent_training import train_recurrent
+from training.learners.student import NAME, Student, policy_of, with_memory_of
+from training.learners.training_env import make_training_env
 
 pytestmark = pytest.mark.training
 
@@ -56,7 +51,7 @@ TINY_PPO = Hyperparameters(
 @pytest.fixture(scope="module")
 def student():
     torch.manual_seed(3)
-    return Student(TINY)
+    return Student(memory=TINY.memory, width=TINY.width)
 
 
 @pytest.fixture(scope="module")
@@ -214,7 +209,7 @@ def agreement(policy, example) -> float:
 
 def untrained_policy(d, seed):
     torch.manual_seed(seed)
-    return policy_of(Student(d))
+    return policy_of(Student(memory=d.memory, width=d.width))
 
 
 def test_a_student_comes_to_act_as_its_teacher():

@@ -11,7 +11,7 @@ from epv_env.plant.plantfile import Plant
 from training import compare, export, sweep
 from training.evaluation import seeds
 from training.learners.distillation import Distillation
-from training.learners.ppo import Hyperparameters
+from training.learners.hyperparameters import Hyperparameters
 from training.studies.comparison.blocks import plan
 from training.studies.comparison.plan import TUNING, Contender, Sizes
 from training.studies.sweeps.plan import Size, cells, chosen_points, searches

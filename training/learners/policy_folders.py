@@ -55,20 +55,17 @@ class Training:
     @property
     def own_student(self) -> Path:
         """Folder of the student that a training with a memory trains, if it is given none."""
-        from training.learners.distillation import (
-            STUDENT_FOLDER,  # torch takes seconds to import: only now
-        )
+        from training.learners.student import STUDENT_FOLDER  # torch takes seconds to import: only now
 
         return self.folder / STUDENT_FOLDER
 
     def run(self, *, quiet: bool = False) -> None:
         """Train it. An interrupted training goes on."""
-        from training.learners.distillation import (  # torch takes seconds to import: only now
-            going_on,
-            train_recurrent,
-        )
-        from training.learners.policy_files import save_policy
-        from training.learners.ppo import Hyperparameters, train
+        from training.learners.distillation import Distillation
+        from training.learners.hyperparameters import Hyperparameters, recurrent_hyperparameters
+        from training.learners.policy_files import save_policy  # torch takes seconds to import: only now
+        from training.learners.ppo import train
+        from training.learners.recurrent_training import train_recurrent
 
         task: dict[str, Any] = {
             "plant": Plant.calibrated(), "scenario": MIXED, "parameters": TUNING_REGION,
@@ -77,7 +74,11 @@ class Training:
         }  # fmt: skip
         if self.recurrent:
             policy, _ = train_recurrent(
-                going_on(self.weights), student=self.student, memoryless=self.memoryless, **task
+                recurrent_hyperparameters(self.weights),
+                Distillation(),
+                student=self.student,
+                memoryless=self.memoryless,
+                **task,
             )
         else:
             policy, _ = train(Hyperparameters(), **task)
