@@ -7,11 +7,8 @@ writes policy, configuration, table and figures into runs/ppo and prints the tab
 
 import argparse
 import json
-import platform
 import sys
 from dataclasses import asdict, replace
-from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +34,7 @@ from epv_env.plant.region import REGIONS
 from epv_env.reward import RewardWeights
 from training.evaluation.controller_table import Comparison, as_text, compare
 from training.evaluation.scenarios import TUNING_REGION
+from training.learners.provenance import configuration
 
 SAME_WHEN_RESUMED = ("seed", "plant", "scenario", "parameters", "switching_price", "recurrent")
 """Options that a resumed training must share with its beginning."""
@@ -89,22 +87,6 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     check_positive(parser, chosen, "timesteps", "episodes", "duration")
     check_not_negative(parser, chosen, "seed")
     return chosen
-
-
-def configuration(chosen: argparse.Namespace, plant: Plant, hyperparameters: Any) -> dict[str, Any]:
-    """What a stranger needs to repeat the run."""
-    packages = ("gymnasium", "numba", "numpy", "stable-baselines3", "torch")
-    return {
-        "options": {name: str(v) if isinstance(v, Path) else v for name, v in vars(chosen).items()},
-        "hyperparameters": asdict(hyperparameters),
-        "plant": {
-            "name": plant.name,
-            "parameters": dict(plant.parameters),
-            "provenance": plant.provenance,
-        },
-        "versions": {"python": platform.python_version(), **{p: version(p) for p in packages}},
-        "written": datetime.now(UTC).isoformat(timespec="seconds"),
-    }
 
 
 def check_resume(chosen: argparse.Namespace) -> None:
@@ -165,7 +147,7 @@ def main(arguments: list[str] | None = None) -> int:
     if chosen.quick:
         hyperparameters = replace(hyperparameters, **QUICK_HYPERPARAMETERS)
         distillation = replace(distillation, **QUICK_DISTILLATION)
-    config = configuration(chosen, plant, hyperparameters)
+    config = configuration(vars(chosen), plant, hyperparameters)
     if chosen.recurrent:
         config["distillation"] = asdict(distillation)
     write_options(chosen.out, config)

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from epv_env.reward import RewardWeights
-from training.evaluation.metrics import EpisodeMetrics, left_interval, summary
+from training.evaluation.metrics import EpisodeMetrics, summary, violation_interval
 from training.evaluation.scenarios import RANDOM
 from training.studies.comparison.plan import BARS_ON, Contender
 from training.studies.comparison.scores import JUDGED_ON, Contest
@@ -46,8 +46,10 @@ def bars(c: Contest, ours: Contender) -> list[Bar]:
 def leaving(c: Contest, ours: Contender, plants: str, limit: float) -> Bar:
     """The bound on the probability of leaving the band, and how many training seeds keep it."""
     stayed = c.metrics(ours.name, plants).stayed
-    upper = left_interval(stayed)[1]
-    keep = sum(left_interval(c.results[run, plants, RANDOM].stayed)[1] <= limit for run in ours.runs)
+    upper = violation_interval(stayed)[1]
+    keep = sum(
+        violation_interval(c.results[run, plants, RANDOM].stayed)[1] <= limit for run in ours.runs
+    )
     return Bar(
         controller=ours.name,
         bar=f"upper 95 % bound of leaving ±500 mbar at most {100 * limit:g} %, {plants}",

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import spearmanr
 
-from training.evaluation.metrics import left_interval, tail_excursion
+from training.evaluation.metrics import tail_excursion, violation_interval
 from training.studies.sweeps.plan import Cell
 from training.studies.sweeps.run import Outcome
 
@@ -31,7 +31,7 @@ def _parts(cell: Cell, outcomes: Mapping[str, Outcome]) -> list[dict[str, Any]]:
 def _row(cell: Cell, parts: list[dict[str, Any]]) -> dict[str, Any]:
     excursion = np.concatenate([part["excursion_bar"] for part in parts])
     n, left = len(excursion), sum(part["left"] for part in parts)
-    low, high = left_interval(np.arange(n) >= left)
+    low, high = violation_interval(np.arange(n) >= left)
     row = {
         "design": cell.point.design, "factor": cell.point.factor, "level": cell.point.level,
         "controller": cell.controller, "episodes": n,
