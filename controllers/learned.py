@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError
 from safetensors.numpy import load_file
 
-from controllers.dense import dense
+from controllers.dense_layer import dense_layer
 from epv_env.observation import contract
 
 FORMAT = "epv-policy/1"
@@ -53,8 +53,8 @@ class GatedUnit:
 
     def step(self, observations: NDArray, memory: NDArray) -> NDArray:
         """The next memory (n, m) after observations (n, inputs)."""
-        new = dense(observations, self.weight_input, self.bias_input)
-        old = dense(memory, self.weight_memory, self.bias_memory)
+        new = dense_layer(observations, self.weight_input, self.bias_input)
+        old = dense_layer(memory, self.weight_memory, self.bias_memory)
         m = self.width
         gates = _logistic(new[:, : 2 * m] + old[:, : 2 * m])
         reset, update = gates[:, :m], gates[:, m:]
@@ -99,8 +99,8 @@ class LearnedPolicy:
             self._memory = self.cell.step(signal, self._memory)
             signal = np.concatenate([signal, self._memory], axis=1)
         for weight, bias in self.layers[:-1]:
-            signal = np.tanh(dense(signal, weight, bias))
-        return dense(signal, *self.layers[-1])
+            signal = np.tanh(dense_layer(signal, weight, bias))
+        return dense_layer(signal, *self.layers[-1])
 
 
 def _logistic(signal: NDArray) -> NDArray:

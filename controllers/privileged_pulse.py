@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from numpy.typing import NDArray
 
 from controllers.pulse import Pulse
-from controllers.pulse_table import PulseTables
+from controllers.pulse_simulation import pulse_tables
 from controllers.registration import TABLE_PER_PLANT, Registration
 from epv_env.task import LimitingTask
 
@@ -49,7 +49,7 @@ class PrivilegedPulse:
         plants = [parameters for parameters in task.parameters if parameters is not None]
         assert len(plants) == task.n, "the episodes must have begun"
         self._pulse = Pulse(
-            table=PulseTables.of(plants), trigger=self.trigger, aim=self.aim,
+            table=pulse_tables(plants), trigger=self.trigger, aim=self.aim,
             filter_time=self.filter_time, look_ahead=self.look_ahead, rounding=self.rounding,
         )  # fmt: skip
         self._pulse.reset(task.n)

@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.pulse_table import PulseTable, pulse_table
+from controllers.pulse_simulation import pulse_table
+from controllers.pulse_table import PulseTable
 from controllers.registration import CHEAP, Range, Registration
 from epv_env.observation import decode
 

@@ -14,7 +14,7 @@ from controllers.base import Privileged
 from controllers.hysteresis import Hysteresis
 from controllers.learned import WEIGHTS_FILE, LearnedPolicy, PolicyError, load_policy
 from controllers.privileged_pulse import PrivilegedPulse
-from controllers.pulse_table import PulseTables, pulse_table
+from controllers.pulse_simulation import pulse_table, pulse_tables
 from controllers.tuned import build, load_tunings
 from epv_env.observation import LAYOUT
 from epv_env.plant.parameters import Parameters
@@ -177,7 +177,7 @@ def test_each_valve_s_table_is_that_of_its_plant_to_the_bit():
     calibrated = Parameters.calibrated()
     plants = [calibrated.replace(cPV=f * calibrated["cPV"]) for f in (0.9, 1.0, 1.1)]
     p1, p2, p3, asked = (np.full(3, value) for value in (11.3, 7.9, 8.4, 0.15))
-    together = PulseTables.of(plants).duration(p1, p2, p3, asked)
+    together = pulse_tables(plants).duration(p1, p2, p3, asked)
     for k, plant in enumerate(plants):
         alone = pulse_table(plant).duration(p1[:1], p2[:1], p3[:1], asked[:1])
         assert together[k : k + 1] == alone

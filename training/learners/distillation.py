@@ -20,7 +20,7 @@ from tqdm import tqdm
 
 from controllers.base import Controller
 from controllers.learned import LearnedPolicy
-from controllers.pulse_table import PulseTables
+from controllers.pulse_simulation import pulse_tables
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
@@ -84,7 +84,7 @@ def known_plants(count: int, options: dict[str, Any], *, seed: int, quiet: bool)
     region, rng = Region.named(options["parameters"], plant.parameters), np.random.default_rng(seed)
     plants = [region.draw(rng) for _ in range(count)]
     for each in tqdm(plants, desc="tables", unit="plant", disable=quiet):
-        PulseTables.of([each])
+        pulse_tables([each])
     return plants
 
 
