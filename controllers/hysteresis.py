@@ -28,6 +28,7 @@ class Hysteresis:
     lag: int = 4
     """Control periods between the two readings whose difference is the slope, one of P2_LAGS."""
     control_period: float = 5e-3
+    """[s]"""
     name: str = "hysteresis"
     environment: str = "EPValve-v0"
     _on: NDArray = field(default_factory=lambda: np.ones(0, dtype=np.int64), repr=False)
@@ -46,7 +47,7 @@ class Hysteresis:
         self._on = np.ones(n, dtype=np.int64)
 
     def act(self, observations: NDArray) -> NDArray:
-        """0 (off) or 1 (on) for each valve."""
+        """0 (off) or 1 (on) for each valve, (n,)."""
         error = decode(observations, "p2_error")
         slope = decode(observations, f"p2_change_{self.lag}") / (self.lag * self.control_period)
         opens = error + self.open_lookahead * slope < self.open_below

@@ -17,23 +17,24 @@ from epv_env.plant.parameters import Parameters
 
 @dataclass(kw_only=True)
 class PWM:
-    """Holds p3 near where the protection valve opens, as far as the circuit's error asks; rests else.
+    """Holds p3 near the opening pressure of the protection valve while the circuit needs air.
 
     While p2 is high enough the coil stays on and nothing switches. Below `engage_below` the cascade
     takes over until p2 is above `rest_above`.
     """
 
     design: Design
+    """Gains of the cascade."""
     parameters: Parameters
-    """The plant it was designed on: areas and spring place the opening pressure (eq. 22)."""
+    """Of the plant of the design: areas and spring set the opening pressure (eq. 22)."""
     engage_below: float
     """p2 - target below which the cascade starts [bar]."""
     rest_above: float
     """p2 - target above which the coil stays on [bar]."""
     depth: float
-    """Most that p3 is asked to lie below the opening pressure [bar]: limits how far the PV opens."""
+    """Largest distance of the wanted p3 below the opening pressure [bar]: limits the PV's stroke."""
     setpoint: float = 0.0
-    """Error at which the cascade aims [bar]."""
+    """Setpoint of p2 - target in the cascade [bar]."""
     control_period: float = 20e-3
     """Period of the PWM [s]."""
     name: str = "PWM"
@@ -42,7 +43,7 @@ class PWM:
     _working: NDArray = field(default_factory=lambda: np.zeros(0, dtype=bool), repr=False)
 
     def reset(self, n: int) -> None:
-        """Integrators empty, all resting."""
+        """Empty integrators and all coils on; n episodes begin."""
         self._integral = np.zeros(n)
         self._working = np.zeros(n, dtype=bool)
 
