@@ -32,5 +32,5 @@ class Privileged(Controller, Protocol):
     """A controller with privileged information, which no ECU measures: a bound for the others."""
 
     def watch(self, task: LimitingTask) -> None:
-        """Take in the episodes that have just begun; called between the environment's reset and `act`."""
+        """Take in the episodes that have just begun; called after the environment's reset."""
         ...
