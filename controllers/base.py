@@ -1,4 +1,4 @@
-"""The one protocol of all controllers: observations of a batch in, actions of a batch out."""
+"""The protocol of all controllers: observations of a batch in, actions of a batch out."""
 
 from typing import Protocol, runtime_checkable
 
@@ -8,26 +8,29 @@ from epv_env.task import LimitingTask
 
 
 class Controller(Protocol):
-    """Decides for n valves at once from what an ECU can measure (epv_env.observation.LAYOUT)."""
+    """Decides for n valves at once from measurements of an ECU (epv_env.observation.LAYOUT)."""
 
     name: str
-    """For tables and figures."""
+    """Name in tables and figures."""
     environment: str
-    """Id of the environment whose actions it gives."""
+    """Id of the environment that its actions are for."""
 
     def reset(self, n: int) -> None:
         """Forget everything; n episodes begin."""
         ...
 
     def act(self, observations: NDArray) -> NDArray:
-        """Actions for observations (n, entries), as the environment's action space wants them."""
+        """Actions of the environment's action space for observations (n, entries).
+
+        Shape (n,) for the on/off environment, (n, 1) for the PWM environment.
+        """
         ...
 
 
 @runtime_checkable
 class Privileged(Controller, Protocol):
-    """A controller that sees what no ECU measures: a bound for the others, not a rival."""
+    """A controller with privileged information, which no ECU measures: a bound for the others."""
 
     def watch(self, task: LimitingTask) -> None:
-        """See the episodes that have just begun; called after the environment's reset, before `act`."""
+        """Take in the episodes that have just begun; called after the environment's reset."""
         ...

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from controllers.registration import CHEAP, Choice, Range, Registration
 from epv_env.observation import P2_LAGS, decode
 
 
@@ -25,8 +26,9 @@ class Hysteresis:
     shut_lookahead: float = 0.0
     """Extrapolation while open [s]: the time the valve takes to shut."""
     lag: int = 4
-    """Control periods over which the slope is taken, one of epv_env.observation.P2_LAGS."""
+    """Control periods between the two readings whose difference is the slope, one of P2_LAGS."""
     control_period: float = 5e-3
+    """[s]"""
     name: str = "hysteresis"
     environment: str = "EPValve-v0"
     _on: NDArray = field(default_factory=lambda: np.ones(0, dtype=np.int64), repr=False)
@@ -45,10 +47,39 @@ class Hysteresis:
         self._on = np.ones(n, dtype=np.int64)
 
     def act(self, observations: NDArray) -> NDArray:
-        """0 (off) or 1 (on) for each valve."""
+        """0 (off) or 1 (on) for each valve, (n,)."""
         error = decode(observations, "p2_error")
         slope = decode(observations, f"p2_change_{self.lag}") / (self.lag * self.control_period)
         opens = error + self.open_lookahead * slope < self.open_below
         shuts = error + self.shut_lookahead * slope > self.shut_above
         self._on = np.where(self._on == 1, np.where(opens, 0, 1), np.where(shuts, 1, 0))
         return self._on.copy()
+
+
+_THRESHOLDS = {
+    "open_below": Range(low=-0.45, high=0.3),
+    "shut_above": Range(low=-0.45, high=0.45),
+}
+
+HYSTERESIS = Registration(
+    kind="hysteresis",
+    controller=Hysteresis,
+    build=lambda values, parameters: Hysteresis(name="hysteresis", **values),
+    search_space=_THRESHOLDS,
+    cost=CHEAP,
+)
+"""The plain two-point controller."""
+
+EXTRAPOLATING_HYSTERESIS = Registration(
+    kind="hysteresis, extrapolating",
+    controller=Hysteresis,
+    build=lambda values, parameters: Hysteresis(name="hysteresis, extrapolating", **values),
+    search_space={
+        **_THRESHOLDS,
+        "open_lookahead": Range(low=0.0, high=0.15),
+        "shut_lookahead": Range(low=0.0, high=0.06),
+        "lag": Choice(values=P2_LAGS),
+    },
+    cost=CHEAP,
+)
+"""The same with extrapolation of the measured pressure."""

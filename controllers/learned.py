@@ -1,7 +1,7 @@
-"""A trained policy behind the controllers' protocol: weights as safetensors, meaning as JSON.
+"""A learned policy as a controller: its weights come as safetensors, their meaning as JSON.
 
-Nothing here runs code from a file: the weights are arrays, the contract is data, the network is the
-multilayer perceptron below, with a gated recurrent unit before it if the policy has a memory.
+Loading a policy runs no code from its files: the weights are arrays, the contract is data. The
+network is a multilayer perceptron, with a gated recurrent unit before it if the policy is recurrent.
 """
 
 import json
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError
 from safetensors.numpy import load_file
 
-from controllers.dense import dense
+from controllers.dense_layer import dense_layer
 from epv_env.observation import contract
 
 FORMAT = "epv-policy/1"
@@ -38,23 +38,23 @@ class GatedUnit:
     """
 
     weight_input: NDArray
-    """(3m, inputs)"""
+    """Weights of the input (3m, inputs)."""
     weight_memory: NDArray
-    """(3m, m)"""
+    """Weights of the recurrent state (3m, m)."""
     bias_input: NDArray
-    """(3m,)"""
+    """Bias of the input (3m,)."""
     bias_memory: NDArray
-    """(3m,)"""
+    """Bias of the recurrent state (3m,)."""
 
     @property
     def width(self) -> int:
-        """m."""
+        """Number of cells m."""
         return self.weight_memory.shape[1]
 
     def step(self, observations: NDArray, memory: NDArray) -> NDArray:
-        """The next memory (n, m) after observations (n, inputs)."""
-        new = dense(observations, self.weight_input, self.bias_input)
-        old = dense(memory, self.weight_memory, self.bias_memory)
+        """The recurrent state (n, m) that follows `memory` (n, m) after observations (n, inputs)."""
+        new = dense_layer(observations, self.weight_input, self.bias_input)
+        old = dense_layer(memory, self.weight_memory, self.bias_memory)
         m = self.width
         gates = _logistic(new[:, : 2 * m] + old[:, : 2 * m])
         reset, update = gates[:, :m], gates[:, m:]
@@ -69,19 +69,19 @@ class LearnedPolicy:
     layers: list[tuple[NDArray, NDArray]]
     """Weight (outputs, inputs) and bias (outputs,) of each layer; the last gives the logits."""
     cell: GatedUnit | None = None
-    """What the policy remembers with: the layers see its memory beside the observation."""
+    """Recurrent unit: the layers see its state beside the observation. None: no memory."""
     name: str = "PPO"
     environment: str = "EPValve-v0"
     _memory: NDArray = field(init=False, repr=False, default_factory=lambda: np.empty((0, 0)))
 
     @property
     def cells(self) -> int:
-        """How many figures it carries from one period to the next."""
+        """Size of the recurrent state; 0 for a policy without memory."""
         return 0 if self.cell is None else self.cell.width
 
     @property
     def precision(self) -> np.dtype:
-        """Of its weights, and so of all that it computes: single, as training writes it."""
+        """Precision of the weights, and so of all results: single, as training writes it."""
         return self.layers[0][0].dtype
 
     def reset(self, n: int) -> None:
@@ -89,18 +89,18 @@ class LearnedPolicy:
         self._memory = np.zeros((n, self.cells), dtype=self.precision)
 
     def act(self, observations: NDArray) -> NDArray:
-        """The action with the largest logit for each valve."""
+        """The action with the largest logit for each valve, (n,)."""
         return np.argmax(self.logits(observations), axis=1)
 
     def logits(self, observations: NDArray) -> NDArray:
-        """A figure for each action, (n, actions); a policy with a memory goes one period on."""
+        """Logits (n, actions) of observations (n, entries); the recurrent state advances a period."""
         signal = observations.astype(self.precision)
         if self.cell is not None:
             self._memory = self.cell.step(signal, self._memory)
             signal = np.concatenate([signal, self._memory], axis=1)
         for weight, bias in self.layers[:-1]:
-            signal = np.tanh(dense(signal, weight, bias))
-        return dense(signal, *self.layers[-1])
+            signal = np.tanh(dense_layer(signal, weight, bias))
+        return dense_layer(signal, *self.layers[-1])
 
 
 def _logistic(signal: NDArray) -> NDArray:
@@ -128,6 +128,20 @@ def load_policy(folder: str | PathLike[str]) -> LearnedPolicy:
             f"cannot read a policy from {folder}: {error}; give a folder that training wrote, with "
             f"{CONTRACT_FILE} and {WEIGHTS_FILE}"
         ) from None
+    _check_contract(content, folder)
+    try:
+        layers = [(arrays[f"{i}.weight"], arrays[f"{i}.bias"]) for i in range(content["layers"])]
+        cell = _unit(arrays) if content.get("memory") is not None else None
+    except KeyError as missing_array:
+        raise PolicyError(
+            f"policy {folder} lacks the array {missing_array} in {WEIGHTS_FILE}: train it anew"
+        ) from None
+    name = content.get("name", LearnedPolicy.name)
+    return LearnedPolicy(layers=layers, cell=cell, name=name, environment=content["environment"])
+
+
+def _check_contract(content: dict[str, Any], folder: Path) -> None:
+    """Raises PolicyError if the contract is of another version, incomplete, or of another layout."""
     if content.get("format") != FORMAT:
         raise PolicyError(
             f"policy {folder} has format {content.get('format')!r}, this version reads {FORMAT!r}: "
@@ -144,15 +158,8 @@ def load_policy(folder: str | PathLike[str]) -> LearnedPolicy:
             f"policy {folder} was trained on another observation layout than this version's: "
             "train it anew, or use the version that wrote it"
         )
-    cell = None
-    try:
-        layers = [(arrays[f"{i}.weight"], arrays[f"{i}.bias"]) for i in range(content["layers"])]
-        if content.get("memory") is not None:
-            names = [entry.name for entry in fields(GatedUnit)]
-            cell = GatedUnit(**{name: arrays[f"memory.{name}"] for name in names})
-    except KeyError as missing_array:
-        raise PolicyError(
-            f"policy {folder} lacks the array {missing_array} in {WEIGHTS_FILE}: train it anew"
-        ) from None
-    name = content.get("name", LearnedPolicy.name)
-    return LearnedPolicy(layers=layers, cell=cell, name=name, environment=content["environment"])
+
+
+def _unit(arrays: dict[str, NDArray]) -> GatedUnit:
+    """The recurrent unit among a policy's arrays. Raises KeyError if one of its arrays is missing."""
+    return GatedUnit(**{entry.name: arrays[f"memory.{entry.name}"] for entry in fields(GatedUnit)})

@@ -14,18 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.estimator import Estimator
-from controllers.mpc_prediction import CHUNK, LEAD, Predictor, Question
+from controllers.mpc_prediction import PREDICTION, Decision, PredictionSettings, Predictor
+from controllers.registration import SIMULATING, Range, Registration
+from epv_env.common.units import BAR
 from epv_env.observation import decode
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.supply import BAR
 from epv_env.reward import RewardWeights
 
 
 @dataclass(kw_only=True)
 class MPC:
-    """Predicts with the plant it is given, knows the true one by its sensors only."""
+    """Predicts with a nominal plant; knows the true plant by its sensors only."""
 
     parameters: Parameters
+    """Of the nominal plant."""
     tail: float = 0.05
     """Time at rest that is priced after the horizon [s]: the terminal cost's weight."""
     floor: float = -0.1
@@ -35,15 +37,19 @@ class MPC:
     setpoint: float = 0.0
     """p2 - target that is aimed at [bar]: a reserve against consumption yet to come."""
     reluctance: float = 0.0
-    """How much cheaper switching now has to be than what begins without [1]: what is estimated from
-    noise may look otherwise in the next period. Waiting a period is cheap; so a little delays a lot."""
+    """Price by which switching now must beat waiting [1]. The estimate is noisy and may look different
+    in the next period; waiting a period costs little."""
     act_below: float = 0.05
-    """While p2 - target after LEAD lies above this, rest is not questioned [bar]: saves computing."""
+    """While p2 - target after the opening time lies above this, the coil stays on without a prediction
+    [bar]: saves computing."""
     weights: RewardWeights = field(default_factory=RewardWeights)
     supply_voltage: float = 24.0
     """Of the coil when on [V]."""
     control_period: float = 5e-3
+    """Period of the decisions [s]."""
+    prediction: PredictionSettings = PREDICTION
     threads: int | None = None
+    """Of the simulation; None: all cores."""
     name: str = "MPC"
     environment: str = "EPValve-v0"
 
@@ -58,24 +64,40 @@ class MPC:
         self._estimator.reset(n)
         self._on = np.ones(n, dtype=bool)
         self._predictor = Predictor(
-            capacity=min(n, CHUNK), tail=self.tail, floor=self.floor, upkeep=self.upkeep,
+            capacity=min(n, self.prediction.batch), tail=self.tail, floor=self.floor, upkeep=self.upkeep,
             weights=self.weights, supply_voltage=self.supply_voltage, control_period=self.control_period,
-            threads=self.threads,
+            threads=self.threads, settings=self.prediction,
         )  # fmt: skip
 
     def act(self, observations: NDArray) -> NDArray:
         """0 (off) or 1 (on) for each valve."""
         estimate = self._estimator.observe(observations, self._on)
         target = decode(observations, "target").astype(float) + self.setpoint
-        soon = (estimate.state.p2 - LEAD * estimate.falling) / BAR - target
-        open_to_question = np.flatnonzero(~self._on | (soon < self.act_below))
+        soon = (estimate.state.p2 - self.prediction.opening_time * estimate.fall_rate) / BAR - target
+        undecided = np.flatnonzero(~self._on | (soon < self.act_below))
         chosen = np.ones(len(observations), dtype=bool)
-        for first in range(0, len(open_to_question), CHUNK):
-            rows = open_to_question[first : first + CHUNK]
-            asked = Question(estimate=estimate.of(rows), target=target[rows], coil=self._on[rows])
-            switches = self._predictor.table[:, 0] != asked.coil[:, None]
-            prices = self._predictor.prices(asked) + self.reluctance * switches
+        batch = self.prediction.batch
+        for first in range(0, len(undecided), batch):
+            rows = undecided[first : first + batch]
+            decision = Decision(estimate=estimate.of(rows), target=target[rows], coil=self._on[rows])
+            switches = self._predictor.table[:, 0] != decision.coil[:, None]
+            prices = self._predictor.prices(decision) + self.reluctance * switches
             best = np.argmin(prices, axis=1)
             chosen[rows] = self._predictor.table[best, 0]
         self._on = chosen
         return chosen.astype(np.int64)
+
+
+REGISTRATION = Registration(
+    kind="MPC",
+    controller=MPC,
+    build=lambda values, parameters: MPC(parameters=parameters, threads=1, **values),
+    search_space={
+        "tail": Range(low=0.02, high=0.3, log=True),
+        "floor": Range(low=-0.2, high=0.0),
+        "upkeep": Range(low=5.0, high=40.0),
+        "setpoint": Range(low=-0.05, high=0.15),
+        "reluctance": Range(low=0.0, high=0.2),
+    },
+    cost=SIMULATING,
+)

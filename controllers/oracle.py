@@ -1,27 +1,30 @@
-"""The oracle: about the best that any controller could do, knowing states, parameters and the future.
+"""The oracle: a search with privileged information that shows about the best possible control.
 
-Privileged, for comparison only. It searches the on/off sequences of the look-ahead on the plant's own
-simulation under the consumption that is to come, breadth first: every kept node has two children, coil
-off and coil on; of nodes in nearly the same state the best stays, and of those the best `width`. When
-the look-ahead is full, the first move of the best node is applied and nodes that began otherwise are
-dropped, so that a decision costs one layer (the truncated Viterbi algorithm: Forney, The Viterbi
-algorithm, Proc. IEEE 61 (1973); keeping a layer narrow is beam search: Russell and Norvig, Artificial
-Intelligence, 4th ed., ch. 4). Nodes are ranked by their price so far, less what was invested to open the
-valve and has not paid yet. A wider layer comes nearer to the optimum, at its price.
+It knows states, parameters and the future, and serves for comparison only. It searches the on/off
+sequences of the look-ahead on the plant's own simulation under the consumption that is to come, breadth
+first: every kept node has two children, coil off and coil on; of nodes in nearly the same state the best
+stays, and of those the best `width`. When the look-ahead is full, the oracle applies the first move of
+the best node and drops nodes that began with another, so that a decision costs one layer (the truncated
+Viterbi algorithm: Forney, The Viterbi algorithm, Proc. IEEE 61 (1973); keeping a layer narrow is beam
+search: Russell and Norvig, Artificial Intelligence, 4th ed., ch. 4). Nodes are ranked by their price so
+far, less what was invested to open the valve and has not paid yet. A wider layer comes nearer to the
+optimum and takes longer.
 """
 
 from dataclasses import dataclass
 
 from numpy.typing import NDArray
 
-from controllers.oracle_search import LONGEST_LOOK, Search
+from controllers.oracle_nodes import LONGEST_LOOK
+from controllers.oracle_search import Search
+from controllers.registration import SIMULATING, Registration
 from epv_env.reward import RewardWeights
 from epv_env.task import LimitingTask
 
 
 @dataclass(kw_only=True)
 class Oracle:
-    """Acts on the task that it watches; what an ECU measures it ignores."""
+    """Acts on the task that it watches and ignores the measurements."""
 
     width: int = 128
     """Nodes kept for each episode."""
@@ -58,3 +61,12 @@ class Oracle:
         while self._search.depth < self.look_ahead:
             self._search.expand()
         return self._search.decide()
+
+
+REGISTRATION = Registration(
+    kind="oracle",
+    controller=Oracle,
+    build=lambda values, parameters: Oracle(threads=1),
+    search_space=None,
+    cost=SIMULATING,
+)

@@ -1,62 +1,41 @@
-"""The oracle's search: on/off sequences as a tree on the simulation, kept narrow layer by layer."""
+"""The oracle's beam search: on/off sequences as a tree on the simulation, narrowed layer by layer."""
 
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import asdict
 
 import numpy as np
 from numpy.typing import NDArray
 
+from controllers.oracle_nodes import MERGE_TOLERANCE, MergeTolerance, Nodes
+from epv_env.common.units import BAR
 from epv_env.plant.equations import State
-from epv_env.plant.supply import BAR
 from epv_env.plant.valves import Valves
 from epv_env.reward import RewardWeights, reward_terms
 from epv_env.settings import EMPTY_CIRCUIT_BAR
 from epv_env.task import LimitingTask
-
-LONGEST_LOOK = 64
-"""Moves that a node remembers, one bit each."""
-
-CELL = {"p2": 0.01 * BAR, "p3": 0.1 * BAR, "I": 0.1, "xMV": 0.25e-3, "xPV": 0.25e-3}
-"""Differences within which two nodes count as the same [Pa, A, m]. A venting p3 has to pass a cell in
-each period: else the later of two vents, cheaper so far, would always take the place of the earlier."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Nodes:
-    """The kept nodes of one layer, arrays (n, width)."""
-
-    state: State
-    """Fields (n, width)."""
-    compressor: NDArray
-    """Whether it runs, bool."""
-    coil: NDArray
-    """The last move, bool."""
-    price: NDArray
-    """Of the moves since those that are decided; infinite where there is no node."""
-    moves: NDArray
-    """Those moves as bits, the last one lowest, uint64."""
-
-    def take(self, where: NDArray) -> "Nodes":
-        """The nodes at these places (n, k) of each row; a place may be named twice."""
-
-        def taken(values: NDArray) -> NDArray:
-            return np.take_along_axis(values, where, axis=1)
-
-        return Nodes(
-            state=State(*map(taken, self.state)), compressor=taken(self.compressor),
-            coil=taken(self.coil), price=taken(self.price), moves=taken(self.moves),
-        )  # fmt: skip
 
 
 class Search:
     """Searches ahead of n running episodes from where they stand, without touching them."""
 
     def __init__(
-        self, task: LimitingTask, width: int, threads: int | None, weights: RewardWeights | None = None
+        self,
+        task: LimitingTask,
+        width: int,
+        threads: int | None,
+        weights: RewardWeights | None = None,
+        tolerance: MergeTolerance = MERGE_TOLERANCE,
     ):
-        """task: just begun or under way. width: nodes kept of a layer. Raises ValueError.
+        """
+        Args:
+            task: n episodes, just begun or under way.
+            width: nodes kept of a layer.
+            threads: of the simulation; None: all cores.
+            weights: prices of the reward; None: the task's.
+            tolerance: within which two nodes count as the same.
 
-        weights: prices of the reward; None: the task's.
+        Raises:
+            ValueError: a plant's coil follows its voltage with a delay.
         """
         plants = [p for p in task.parameters if p is not None]
         if any(p["t_delay"] > 0 for p in plants):
@@ -64,7 +43,7 @@ class Search:
                 "the oracle does not know a coil that follows its voltage late: give plants with "
                 "t_delay = 0, or leave the oracle out"
             )
-        self._task, self._width = task, width
+        self._task, self._width, self._tolerance = task, width, tolerance
         self._weights = weights or task.settings.weights
         self.depth = 0
         """Layers that lie ahead of the episodes."""
@@ -145,7 +124,7 @@ class Search:
         return compressor
 
     def _priced(self, parents: Nodes, state: State, coil: NDArray) -> NDArray:
-        """What the reward takes for the period, (n, 2 width); infinite where there is no node."""
+        """Price of the period by the reward, (n, 2 width); infinite where there is no node."""
         task, target = self._task, self._task.target[:, None]
         present = (parents.price < np.inf) & ~np.isnan(state.p2)
         highest, lowest = (
@@ -165,7 +144,7 @@ class Search:
         return np.where(present, -terms.total(), np.inf)
 
     def _invested(self, nodes: Nodes) -> NDArray:
-        """What a node has paid before it yields: air vented from the control chamber, switching off."""
+        """Price of opening the valve that has not paid yet: vented control chamber, switching off."""
         vented = np.maximum(nodes.state.p1 - nodes.state.p3, 0.0) * self._air_per_pressure
         return self._weights.vented_air * 1e3 * vented + self._weights.switching * ~nodes.coil
 
@@ -173,8 +152,10 @@ class Search:
         """Ranks (n, k), price less investment; infinite but for the best node of each cell."""
         present = np.isfinite(nodes.price)
         rank = np.where(present, nodes.price - self._invested(nodes), np.inf)
-        columns = [np.where(present, getattr(nodes.state, name), 0.0) for name in CELL]
-        cells = [np.rint(x / width).ravel() for x, width in zip(columns, CELL.values(), strict=True)]
+        cells = [
+            np.rint(np.where(present, getattr(nodes.state, name), 0.0) / tolerance).ravel()
+            for name, tolerance in asdict(self._tolerance).items()
+        ]
         keys = [*cells, nodes.coil.ravel(), self._owner]
         order = np.lexsort([rank.ravel(), *keys])
         differs = np.any([key[order][1:] != key[order][:-1] for key in keys], axis=0)

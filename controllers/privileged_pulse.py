@@ -1,7 +1,7 @@
-"""The pulse controller that knows each valve's own plant: what knowing the parameters is worth.
+"""The privileged pulse controller: it knows each valve's own plant parameters.
 
-Privileged: no ECU knows them. It measures the state as the others do, and has no foresight, so that what
-the oracle can do beyond it takes either. It is the example that a policy with a memory imitates first
+No ECU knows these parameters, so the controller shows what knowing them is worth. It measures the state
+as the other controllers do and has no foresight. A recurrent policy imitates it first
 (training/learners/distillation.py).
 """
 
@@ -10,12 +10,13 @@ from dataclasses import dataclass, field
 from numpy.typing import NDArray
 
 from controllers.pulse import Pulse
-from controllers.pulse_table import PulseTables
+from controllers.pulse_simulation import pulse_tables
+from controllers.registration import TABLE_PER_PLANT, Registration
 from epv_env.task import LimitingTask
 
 
 @dataclass(kw_only=True)
-class InformedPulse:
+class PrivilegedPulse:
     """Acts on the measurements of the episodes that it watches.
 
     The quantities are `Pulse`'s. Their defaults were chosen by hand, near the best of 115 settings that
@@ -24,16 +25,21 @@ class InformedPulse:
     """
 
     trigger: float = -0.06
+    """Predicted p2 - target below which a pulse begins [bar]."""
     aim: float = 0.125
+    """p2 - target at which a pulse shall end [bar]."""
     filter_time: float = 0.009
+    """Time in which the weight of a reading of p2 fades by 1/e [s]."""
     look_ahead: float = 1.45
+    """Share of the time to open over which p2 is extrapolated [1]."""
     rounding: float = 0.77
+    """Remaining time below which a pulse ends now [control periods]."""
     name: str = "pulse, informed"
     environment: str = "EPValve-v0"
     _pulse: Pulse | None = field(default=None, repr=False)
 
     def reset(self, n: int) -> None:
-        """Nothing to forget: each batch is watched anew."""
+        """Nothing to forget: `watch` begins each batch anew."""
 
     def watch(self, task: LimitingTask) -> None:
         """Make the tables of the episodes that have just begun (controllers.base.Privileged).
@@ -43,13 +49,24 @@ class InformedPulse:
         plants = [parameters for parameters in task.parameters if parameters is not None]
         assert len(plants) == task.n, "the episodes must have begun"
         self._pulse = Pulse(
-            table=PulseTables.of(plants), trigger=self.trigger, aim=self.aim,
+            table=pulse_tables(plants), trigger=self.trigger, aim=self.aim,
             filter_time=self.filter_time, look_ahead=self.look_ahead, rounding=self.rounding,
         )  # fmt: skip
         self._pulse.reset(task.n)
 
     def act(self, observations: NDArray) -> NDArray:
-        """0 (off) or 1 (on) for each valve. Raises ValueError if no task is watched."""
+        """0 (off) or 1 (on) for each valve, (n,). Raises ValueError if no task is watched."""
         if self._pulse is None:
-            raise ValueError("the informed pulse sees no task: call watch(env.task) after the reset")
+            raise ValueError(
+                "the privileged pulse controller sees no task: call watch(env.task) after the reset"
+            )
         return self._pulse.act(observations)
+
+
+REGISTRATION = Registration(
+    kind="pulse, informed",
+    controller=PrivilegedPulse,
+    build=lambda values, parameters: PrivilegedPulse(),
+    search_space=None,
+    cost=TABLE_PER_PLANT,
+)

@@ -1,4 +1,4 @@
-"""Pulse control: the calibrated model, inverted, says how long the coil must be off.
+"""Pulse control: the inverse of the calibrated model gives the time for which the coil is off.
 
 The idea is the report's own deactivation pulse (section 3), planned instead of fixed. The filter is the
 fading-memory g-h filter of Brookner, Tracking and Kalman Filtering Made Easy (1998), chapter 1.
@@ -9,7 +9,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from controllers.pulse_simulation import pulse_table
 from controllers.pulse_table import PulseTable
+from controllers.registration import CHEAP, Range, Registration
 from epv_env.observation import decode
 
 
@@ -19,16 +21,17 @@ class Pulse:
 
     A pulse begins when p2 - target, extrapolated with the slope that consumption gives p2 to the instant
     at which the vented control chamber would let the valve open, is below the trigger. While the coil is
-    off its remaining time is planned anew every period, from the measured pressures: what the model
-    foresaw wrongly is corrected until the last period. The coil switches at whole periods only, and one
+    off, the controller plans its remaining time anew every period from the measured pressures. So errors
+    of the model are corrected until the last period. The coil switches at whole periods only, and one
     period may be worth 200 mbar; `rounding` says which of two neighbouring instants is taken.
 
-    What the coil did is read, not remembered: whoever overrules this controller is taken into account.
-    A pulse may follow another as soon as the valve has shut. If p3 is still low it opens the sooner, and
-    the extrapolation, being to that instant, waits the longer.
+    The controller reads the coil's last action from the observation, so it also works when another
+    controller overrules it. A pulse may follow another as soon as the valve has shut. If p3 is still
+    low, the valve opens sooner and the extrapolation is shorter, so the pulse begins later.
     """
 
     table: PulseTable
+    """Of the plant."""
     trigger: float
     """Predicted p2 - target below which a pulse begins [bar]."""
     aim: float
@@ -36,10 +39,11 @@ class Pulse:
     filter_time: float
     """Time in which the weight of a reading of p2 fades by 1/e [s]."""
     look_ahead: float
-    """Share of the time to open over which p2 is extrapolated."""
+    """Share of the time to open over which p2 is extrapolated [1]."""
     rounding: float
-    """Remaining time below which a pulse ends now, in periods: 0.5 rounds, 1 never exceeds the aim."""
+    """Remaining time below which a pulse ends now [control periods]: 0.5 rounds, 1 never overshoots."""
     control_period: float = 5e-3
+    """[s]"""
     name: str = "pulse"
     environment: str = "EPValve-v0"
     _error: NDArray = field(default_factory=lambda: np.zeros(0), repr=False)
@@ -54,7 +58,7 @@ class Pulse:
             )
 
     def reset(self, n: int) -> None:
-        """No consumption is known."""
+        """Forget the consumption; n episodes begin."""
         self._error = np.zeros(n)
         self._slope = np.zeros(n)
         self._was_shut = np.zeros(n, dtype=bool)
@@ -90,3 +94,18 @@ class Pulse:
         growth = (1 - fading) ** 2 * surprise / self.control_period
         self._slope = self._slope + np.where(follows, growth, 0.0)
         self._was_shut = shut
+
+
+REGISTRATION = Registration(
+    kind="pulse",
+    controller=Pulse,
+    build=lambda values, parameters: Pulse(table=pulse_table(parameters), **values),
+    search_space={
+        "trigger": Range(low=-0.3, high=0.1),
+        "aim": Range(low=-0.1, high=0.3),
+        "filter_time": Range(low=0.004, high=0.04, log=True),
+        "look_ahead": Range(low=0.3, high=1.5),
+        "rounding": Range(low=0.2, high=1.2),
+    },
+    cost=CHEAP,
+)

@@ -1,36 +1,40 @@
 """PWM control: a cascade of PI (circuit pressure) and P (control pressure) sets the coil's duty."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controllers.opening_pressure import opening_pressure
-from controllers.pwm_design import Design
+from controllers.pwm_design import Design, design
+from controllers.registration import CHEAP, Range, Registration
+from epv_env.common.units import BAR
 from epv_env.observation import decode
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.supply import BAR
 
 
 @dataclass(kw_only=True)
 class PWM:
-    """Holds p3 near where the protection valve opens, as far as the circuit's error asks; rests else.
+    """Holds p3 near the opening pressure of the protection valve while the circuit needs air.
 
     While p2 is high enough the coil stays on and nothing switches. Below `engage_below` the cascade
     takes over until p2 is above `rest_above`.
     """
 
     design: Design
+    """Gains of the cascade."""
     parameters: Parameters
-    """The plant it was designed on: areas and spring place the opening pressure (eq. 22)."""
+    """Of the plant of the design: areas and spring set the opening pressure (eq. 22)."""
     engage_below: float
     """p2 - target below which the cascade starts [bar]."""
     rest_above: float
     """p2 - target above which the coil stays on [bar]."""
     depth: float
-    """Most that p3 is asked to lie below the opening pressure [bar]: limits how far the PV opens."""
+    """Largest distance of the wanted p3 below the opening pressure [bar]: limits the PV's stroke."""
     setpoint: float = 0.0
-    """Error at which the cascade aims [bar]."""
+    """Setpoint of p2 - target in the cascade [bar]."""
     control_period: float = 20e-3
     """Period of the PWM [s]."""
     name: str = "PWM"
@@ -39,7 +43,7 @@ class PWM:
     _working: NDArray = field(default_factory=lambda: np.zeros(0, dtype=bool), repr=False)
 
     def reset(self, n: int) -> None:
-        """Integrators empty, all resting."""
+        """Empty integrators and all coils on; n episodes begin."""
         self._integral = np.zeros(n)
         self._working = np.zeros(n, dtype=bool)
 
@@ -62,3 +66,43 @@ class PWM:
         grown = self._integral + deviation * self.control_period / self.design.integral_time
         self._integral = np.where(inside, grown, np.where(self._working, self._integral, 0.0))
         return (2 * np.clip(duty, 0.0, 1.0) - 1)[:, None].astype(np.float32)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DesignPoint:
+    """Where the loop is designed."""
+
+    p1: float = 11.5 * BAR
+    """Supply pressure: the middle of the reservoirs' range [Pa]."""
+    p2: float = 8.0 * BAR
+    """Circuit pressure: near the middle of the targets' range [Pa]."""
+    period: float = 20e-3
+    """Period of the PWM [s]: the environment's."""
+
+
+def build(values: Mapping[str, Any], parameters: Parameters, point: DesignPoint = DesignPoint()) -> PWM:
+    """The controller with a loop shaped for a plant.
+
+    values: quantities of the search space by name. Raises ValueError if no gain keeps the phase margin.
+    """
+    loop = {name: values[name] for name in ("inner_time", "phase_margin", "integral_time")}
+    rest = {name: value for name, value in values.items() if name not in loop}
+    shaped = design(parameters, p1=point.p1, p2=point.p2, period=point.period, **loop)
+    return PWM(design=shaped, parameters=parameters, control_period=point.period, **rest)
+
+
+REGISTRATION = Registration(
+    kind="PWM",
+    controller=PWM,
+    build=build,
+    search_space={
+        "inner_time": Range(low=0.01, high=0.06, log=True),
+        "phase_margin": Range(low=20.0, high=60.0),
+        "integral_time": Range(low=0.2, high=3.0, log=True),
+        "depth": Range(low=0.03, high=0.8, log=True),
+        "setpoint": Range(low=-0.3, high=0.2),
+        "engage_below": Range(low=-0.4, high=0.3),
+        "rest_above": Range(low=-0.3, high=0.4),
+    },
+    cost=CHEAP,
+)

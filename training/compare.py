@@ -16,7 +16,7 @@ from typing import Any
 import pandas as pd
 
 from controllers.oracle import Oracle
-from controllers.privileged_pulse import InformedPulse
+from controllers.registry import untuned_controllers
 from controllers.tuned import tuned_controllers
 from epv_env.common.command_line import (
     check_positive,
@@ -26,6 +26,7 @@ from epv_env.common.command_line import (
 )
 from epv_env.common.journal import Journal
 from epv_env.plant.consumption import MIXED
+from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.valves import available_cores
 from epv_env.reward import RewardWeights
@@ -139,7 +140,7 @@ def contenders(chosen: argparse.Namespace) -> list[Contender]:
         name = next(iter(policies.values())).name
         runs = {f"{name}, {seed}": policy for seed, policy in policies.items()}
         found.append(Contender(name=name, runs=runs, learned=True))
-    others = [*tuned_controllers(), InformedPulse(), Oracle(threads=1)]
+    others = [*tuned_controllers(), *untuned_controllers(Parameters.calibrated())]
     return found + [Contender(name=c.name, runs={c.name: c}) for c in others]
 
 

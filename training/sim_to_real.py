@@ -19,7 +19,8 @@ import pandas as pd
 
 from controllers.base import Controller
 from controllers.learned import holds_policy, load_policy
-from controllers.tuned import SEARCHING, tuned_controllers
+from controllers.registry import SIMULATING_KINDS
+from controllers.tuned import tuned_controllers
 from epv_env.actions import OnOff
 from epv_env.common.command_line import (
     check_not_negative,
@@ -29,11 +30,11 @@ from epv_env.common.command_line import (
     writable_folder,
 )
 from epv_env.common.files import write_text
+from epv_env.common.results_folder import check_options, write_options
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.reward import RewardWeights
 from identification.__main__ import main as identification
 from identification.bench.programmes import SUITES
-from training.studies.results_folder import check_options, write_options
 from training.studies.sim_to_real.deployment import (
     AFTER,
     BEFORE,
@@ -133,8 +134,9 @@ def trained(
 ) -> Controller:
     """PPO trained on plants around this one, or as it was trained before."""
     if not holds_policy(folder):
+        from training.learners.hyperparameters import Hyperparameters
         from training.learners.policy_files import save_policy  # torch takes seconds to import: only now
-        from training.learners.ppo import Hyperparameters, train
+        from training.learners.ppo import train
 
         policy, _ = train(
             Hyperparameters(**settings.hyperparameters), folder=folder, plant=plant,
@@ -159,7 +161,7 @@ def stage(
     path = folder / EPISODES
     if not path.exists():
         plants = {SIMULATED: simulated, MEASURED: load_plant(chosen.out / WITHHELD)}
-        rivals = tuned_controllers(without=SEARCHING)
+        rivals = tuned_controllers(without=SIMULATING_KINDS)
         episodes = deployed(
             [policy, *rivals], plants, scenario=settings.scenario, count=chosen.episodes,
             duration=chosen.duration, what=f"deployment {name}",

@@ -16,7 +16,8 @@ import optuna
 
 from controllers.base import Controller
 from controllers.learned import holds_policy, load_policy
-from controllers.tuned import KINDS, build, load_search, load_tunings, save_tunings
+from controllers.registry import TUNED_KINDS
+from controllers.tuned import build, load_search, load_tunings, save_tunings
 from epv_env.common.command_line import (
     check_not_negative,
     check_positive,
@@ -97,7 +98,7 @@ def first_memory(chosen: argparse.Namespace) -> Training | None:
     """
     if chosen.recurrent is None:
         return None
-    from training.learners.distillation import load_student  # torch takes seconds to import: only now
+    from training.learners.student import load_student  # torch takes seconds to import: only now
 
     (first,) = seed_trainings(
         chosen.recurrent, count=1, timesteps=RECURRENT_TIMESTEPS, recurrent=True
@@ -135,7 +136,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--prices", type=float, nargs="+", default=[0.5, 1.0, 2.0])
     parser.add_argument("--timesteps", type=int, default=5_000_000, help="training steps at each price")
     parser.add_argument(
-        "--kinds", nargs="+", choices=KINDS, default=["hysteresis, extrapolating"],
+        "--kinds", nargs="+", choices=TUNED_KINDS, default=["hysteresis, extrapolating"],
         help="classic controllers to tune",
     )  # fmt: skip
     parser.add_argument("--trials", type=int, default=100, help="tuning evaluations of each of them")

@@ -7,11 +7,8 @@ writes policy, configuration, table and figures into runs/ppo and prints the tab
 
 import argparse
 import json
-import platform
 import sys
 from dataclasses import asdict, replace
-from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +16,8 @@ from tqdm import tqdm
 
 from controllers.learned import load_policy
 from controllers.pwm import PWM
-from controllers.tuned import SEARCHING, tuned_controllers
+from controllers.registry import SIMULATING_KINDS
+from controllers.tuned import tuned_controllers
 from epv_env.actions import OnOff
 from epv_env.common.command_line import (
     check_not_negative,
@@ -29,14 +27,18 @@ from epv_env.common.command_line import (
     writable_folder,
 )
 from epv_env.common.files import write_text
+from epv_env.common.results_folder import check_same, read_config, write_options
 from epv_env.plant.consumption import check_scenario
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.region import REGIONS
 from epv_env.reward import RewardWeights
 from training.evaluation.controller_table import Comparison, as_text, compare
 from training.evaluation.scenarios import TUNING_REGION
+from training.learners.provenance import configuration
 
-CONFIG_FILE = "config.json"
+SAME_WHEN_RESUMED = ("seed", "plant", "scenario", "parameters", "switching_price", "recurrent")
+"""Options that a resumed training must share with its beginning."""
+
 QUICK = {"timesteps": 65_536, "episodes": 16, "duration": 2.0}
 """The defaults under --quick: everything is done, too short to learn anything."""
 QUICK_HYPERPARAMETERS: dict[str, Any] = {
@@ -87,43 +89,24 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     return chosen
 
 
-def configuration(chosen: argparse.Namespace, plant: Plant, hyperparameters: Any) -> dict[str, Any]:
-    """What a stranger needs to repeat the run."""
-    packages = ("gymnasium", "numba", "numpy", "stable-baselines3", "torch")
-    return {
-        "options": {name: str(v) if isinstance(v, Path) else v for name, v in vars(chosen).items()},
-        "hyperparameters": asdict(hyperparameters),
-        "plant": {
-            "name": plant.name,
-            "parameters": dict(plant.parameters),
-            "provenance": plant.provenance,
-        },
-        "versions": {"python": platform.python_version(), **{p: version(p) for p in packages}},
-        "written": datetime.now(UTC).isoformat(timespec="seconds"),
-    }
-
-
 def check_resume(chosen: argparse.Namespace) -> None:
     """A folder with a checkpoint is continued only if that is asked for, and only with its options."""
-    path = chosen.out / CONFIG_FILE
-    if not path.exists():
-        if chosen.resume:
-            raise ValueError(f"nothing to resume in {chosen.out}: leave --resume out")
-        return
     if not chosen.resume:
         return
-    earlier = {"recurrent": False} | json.loads(path.read_text(encoding="utf-8"))["options"]
-    for name in ("seed", "plant", "scenario", "parameters", "switching_price", "recurrent"):
-        if earlier[name] != getattr(chosen, name):
-            raise ValueError(
-                f"{chosen.out} was trained with {name} {earlier[name]}, not "
-                f"{getattr(chosen, name)}: resume with the same, or choose another --out"
-            )
+    config = read_config(chosen.out)
+    if config is None:
+        raise ValueError(f"nothing to resume in {chosen.out}: leave --resume out")
+    options = {name: getattr(chosen, name) for name in SAME_WHEN_RESUMED}
+    earlier = {"recurrent": False} | config["options"]
+    check_same(earlier, options, f"{chosen.out} was trained with", "resume with the same")
 
 
 def evaluate(chosen: argparse.Namespace, plant: Plant) -> Comparison:
     """The comparison on unseen scenarios, with a progress bar."""
-    contenders = [load_policy(chosen.out), *tuned_controllers(plant.parameters, without=SEARCHING)]
+    contenders = [
+        load_policy(chosen.out),
+        *tuned_controllers(plant.parameters, without=SIMULATING_KINDS),
+    ]
     with tqdm(
         total=100,
         desc="evaluation",
@@ -152,20 +135,22 @@ def main(arguments: list[str] | None = None) -> int:
     check_scenario(chosen.scenario)
     check_resume(chosen)
 
-    from training.learners import distillation as distil
+    from training.learners.distillation import Distillation
+    from training.learners.hyperparameters import Hyperparameters, recurrent_hyperparameters
     from training.learners.policy_files import save_policy
-    from training.learners.ppo import Hyperparameters, train
+    from training.learners.ppo import train
+    from training.learners.recurrent_training import train_recurrent
 
     weights = RewardWeights(switching=chosen.switching_price)
-    hyperparameters = distil.going_on(weights) if chosen.recurrent else Hyperparameters()
-    distillation = distil.FULL
+    hyperparameters = recurrent_hyperparameters(weights) if chosen.recurrent else Hyperparameters()
+    distillation = Distillation()
     if chosen.quick:
         hyperparameters = replace(hyperparameters, **QUICK_HYPERPARAMETERS)
         distillation = replace(distillation, **QUICK_DISTILLATION)
-    config = configuration(chosen, plant, hyperparameters)
+    config = configuration(vars(chosen), plant, hyperparameters)
     if chosen.recurrent:
         config["distillation"] = asdict(distillation)
-    write_text(chosen.out / CONFIG_FILE, json.dumps(config, indent=1) + "\n")
+    write_options(chosen.out, config)
     task: dict[str, Any] = {
         "folder": chosen.out, "plant": plant, "scenario": chosen.scenario,
         "parameters": chosen.parameters, "weights": weights,
@@ -173,7 +158,7 @@ def main(arguments: list[str] | None = None) -> int:
         "resume": chosen.resume,
     }  # fmt: skip
     if chosen.recurrent:
-        policy, log = distil.train_recurrent(hyperparameters, distillation, **task)
+        policy, log = train_recurrent(hyperparameters, distillation, **task)
     else:
         policy, log = train(hyperparameters, **task)
     save_policy(policy, chosen.out, control_period=OnOff.default_period, provenance=config)

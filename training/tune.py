@@ -15,75 +15,60 @@ import optuna
 from optuna.trial import Trial
 from tqdm import tqdm
 
-from controllers.tuned import KINDS, Tuning, build, load_search, load_tunings, save_tunings
+from controllers.registration import Choice, Range, SearchSpace
+from controllers.registry import TUNED_KINDS, registration
+from controllers.tuned import Tuning, load_search, load_tunings, save_tunings
 from epv_env.common.command_line import (
     check_not_negative,
     check_positive,
     fail_clearly,
     writable_file,
 )
-from epv_env.observation import P2_LAGS
 from epv_env.plant.parameters import Parameters
 from training.evaluation.rollout import run_episodes
 from training.evaluation.scenarios import TUNING_REGION
 from training.evaluation.seeds import TUNING_SEED
 
-REDUCED = {"MPC": (16, 32)}
-"""Trials, and episodes of each, of kinds that simulate the plant as they decide: a thousandfold the
-computing of the others buys them less than an equal budget, not more."""
+
+def suggest(space: SearchSpace, trial: Trial) -> dict[str, Any]:
+    """A trial's values of the quantities of a search space, by name."""
+    return {name: _suggested(name, quantity, trial) for name, quantity in space.items()}
 
 
-def search_space(kind: str, trial: Trial) -> dict[str, Any]:
-    """The quantities searched for a kind of controller, with their ranges."""
-    if kind == "PWM":
-        return {
-            "inner_time": trial.suggest_float("inner_time", 0.01, 0.06, log=True),
-            "phase_margin": trial.suggest_float("phase_margin", 20.0, 60.0),
-            "integral_time": trial.suggest_float("integral_time", 0.2, 3.0, log=True),
-            "depth": trial.suggest_float("depth", 0.03, 0.8, log=True),
-            "setpoint": trial.suggest_float("setpoint", -0.3, 0.2),
-            "engage_below": trial.suggest_float("engage_below", -0.4, 0.3),
-            "rest_above": trial.suggest_float("rest_above", -0.3, 0.4),
-        }
-    if kind == "pulse":
-        return {
-            "trigger": trial.suggest_float("trigger", -0.3, 0.1),
-            "aim": trial.suggest_float("aim", -0.1, 0.3),
-            "filter_time": trial.suggest_float("filter_time", 0.004, 0.04, log=True),
-            "look_ahead": trial.suggest_float("look_ahead", 0.3, 1.5),
-            "rounding": trial.suggest_float("rounding", 0.2, 1.2),
-        }
-    if kind == "MPC":
-        return {
-            "tail": trial.suggest_float("tail", 0.02, 0.3, log=True),
-            "floor": trial.suggest_float("floor", -0.2, 0.0),
-            "upkeep": trial.suggest_float("upkeep", 5.0, 40.0),
-            "setpoint": trial.suggest_float("setpoint", -0.05, 0.15),
-            "reluctance": trial.suggest_float("reluctance", 0.0, 0.2),
-        }
-    values: dict[str, Any] = {
-        "open_below": trial.suggest_float("open_below", -0.45, 0.3),
-        "shut_above": trial.suggest_float("shut_above", -0.45, 0.45),
-    }
-    if kind == "hysteresis, extrapolating":
-        values["open_lookahead"] = trial.suggest_float("open_lookahead", 0.0, 0.15)
-        values["shut_lookahead"] = trial.suggest_float("shut_lookahead", 0.0, 0.06)
-        values["lag"] = trial.suggest_categorical("lag", list(P2_LAGS))
-    return values
+def _suggested(name: str, quantity: Range | Choice, trial: Trial) -> Any:
+    if isinstance(quantity, Choice):
+        return trial.suggest_categorical(name, list(quantity.values))
+    return trial.suggest_float(name, quantity.low, quantity.high, log=quantity.log)
+
+
+def budget(kind: str, trials: int, episodes: int) -> tuple[int, int]:
+    """Trials of a kind's search and episodes of a trial: at most what its cost class allows."""
+    cost = registration(kind).cost
+    return min(trials, cost.most_trials or trials), min(episodes, cost.most_episodes or episodes)
 
 
 def tune(
     kind: str, *, trials: int, episodes: int, duration: float, seed: int, options: dict[str, Any]
 ) -> Tuning:
-    """Search one kind of controller. Values that contradict each other cost a trial."""
-    parameters = Parameters.calibrated()
-    most_trials, most_episodes = REDUCED.get(kind, (trials, episodes))
-    trials, fewer = min(trials, most_trials), min(episodes, most_episodes)
-    seeds = list(range(TUNING_SEED, TUNING_SEED + fewer))
+    """Search one kind of controller. Values that contradict each other cost a trial.
+
+    Args:
+        kind: one of TUNED_KINDS.
+        trials: evaluations (`budget` may allow fewer).
+        episodes: episodes of an evaluation (`budget` may allow fewer).
+        duration: length of an episode [s].
+        seed: of the search.
+        options: of the environment.
+    """
+    entry, parameters = registration(kind), Parameters.calibrated()
+    assert entry.search_space is not None, f"{kind} has nothing to tune"
+    space = entry.search_space
+    trials, episodes = budget(kind, trials, episodes)
+    seeds = list(range(TUNING_SEED, TUNING_SEED + episodes))
 
     def objective(trial: Trial) -> float:
         try:
-            controller = build(kind, search_space(kind, trial), parameters)
+            controller = entry.built(suggest(space, trial), parameters)
         except ValueError as contradiction:
             raise optuna.TrialPruned(str(contradiction)) from None
         metrics, _ = run_episodes(controller, seeds=seeds, duration=duration, options=options)
@@ -99,8 +84,8 @@ def tune(
 
         study.optimize(objective, n_trials=trials, callbacks=[count])
     return Tuning(
-        values=study.best_params, trials=trials, mean_return=study.best_value, episodes=fewer
-    )  # fmt: skip
+        values=study.best_params, trials=trials, mean_return=study.best_value, episodes=episodes
+    )
 
 
 def kept(path: Path, search: dict[str, Any]) -> dict[str, Tuning]:
@@ -123,7 +108,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--duration", type=float, default=6.0, help="length of an episode [s]")
     parser.add_argument("--seed", type=int, default=0, help="of the search")
     parser.add_argument("--out", type=writable_file, required=True, help="JSON file to write")
-    parser.add_argument("--only", choices=KINDS, nargs="+", help="kinds to search; --out keeps others")
+    parser.add_argument(
+        "--only", choices=TUNED_KINDS, nargs="+", help="kinds to search; --out keeps others"
+    )
     chosen = parser.parse_args(arguments)
     check_positive(parser, chosen, "trials", "episodes", "duration")
     check_not_negative(parser, chosen, "seed")
@@ -134,10 +121,13 @@ def main(arguments: list[str] | None = None) -> int:
     if chosen.only:
         kept(chosen.out, search)  # before the work, since it may refuse
     tunings = {
-        kind: tune(kind, **settings, seed=chosen.seed, options=options) for kind in chosen.only or KINDS
+        kind: tune(kind, **settings, seed=chosen.seed, options=options)
+        for kind in chosen.only or TUNED_KINDS
     }
     others = kept(chosen.out, search) if chosen.only else {}
-    save_tunings({**others, **tunings}, chosen.out, search)
+    together = {**others, **tunings}
+    ordered = {kind: together[kind] for kind in TUNED_KINDS if kind in together}
+    save_tunings(ordered, chosen.out, search)
     for kind, tuning in tunings.items():
         print(f"{kind}: mean return {tuning.mean_return:.1f} with {tuning.values}")
     return 0

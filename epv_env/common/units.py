@@ -2,3 +2,6 @@
 
 BAR = 1e5
 """One bar [Pa]."""
+
+MILLISECOND = 1e-3
+"""One millisecond [s]."""

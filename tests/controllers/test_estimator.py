@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from controllers.estimator import Estimate, Estimator
+from controllers.estimator import Estimator, StateEstimate
+from epv_env.common.units import BAR
 from epv_env.observation import LAYOUT, encode
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.sensors import SENSORS
 from epv_env.plant.simulate import energised
-from epv_env.plant.supply import BAR
 from epv_env.plant.valves import Valves
 
 PERIOD = 5e-3
@@ -23,7 +23,7 @@ class Run:
     """What was and what was believed, after each period."""
 
     true: list[State]
-    believed: list[Estimate]
+    believed: list[StateEstimate]
 
 
 def follow(plant, coil, consumption, *, noise=0.0, n=1, seed=0):

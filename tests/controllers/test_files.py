@@ -5,10 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from controllers.tuned import KINDS, ControllersFileError, Tuning, load_tunings, save_tunings
+from controllers.registry import SIMULATING_KINDS, TUNED_KINDS
+from controllers.tuned import ControllersFileError, Tuning, load_tunings, save_tunings
 
 pytest.importorskip("optuna")
-from training.tune import REDUCED
+from training.tune import budget
 
 pytestmark = pytest.mark.training
 
@@ -21,11 +22,12 @@ def test_tunings_survive_a_round_trip(tmp_path):
 
 def test_every_controller_was_tuned_with_the_same_budget_or_a_stated_smaller_one():
     tunings = load_tunings()
-    assert tuple(tunings) == KINDS
-    full = {(t.trials, t.episodes) for kind, t in tunings.items() if kind not in REDUCED}
+    assert tuple(tunings) == TUNED_KINDS
+    full = {(t.trials, t.episodes) for kind, t in tunings.items() if kind not in SIMULATING_KINDS}
     assert full == {(100, 128)}
-    for kind, budget in REDUCED.items():
-        assert (tunings[kind].trials, tunings[kind].episodes) == budget
+    assert SIMULATING_KINDS == ("MPC",)
+    for kind in SIMULATING_KINDS:
+        assert (tunings[kind].trials, tunings[kind].episodes) == budget(kind, 100, 128) == (16, 32)
 
 
 def test_another_version_is_refused(tmp_path):
@@ -39,8 +41,10 @@ def test_a_written_policy_acts_as_the_model_it_came_from(tmp_path):
     from controllers.learned import PolicyError, load_policy
     from epv_env.plant.plantfile import Plant
     from epv_env.reward import RewardWeights
+    from training.learners.hyperparameters import Hyperparameters
     from training.learners.policy_files import greedy_policy, save_policy
-    from training.learners.ppo import Hyperparameters, make_model, make_training_env
+    from training.learners.ppo import make_model
+    from training.learners.training_env import make_training_env
 
     h = Hyperparameters(num_envs=4, n_steps=8, batch_size=32)
     env = make_training_env(

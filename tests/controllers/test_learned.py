@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("safetensors")
 from safetensors.numpy import save_file
 
-from controllers.dense import dense
+from controllers.dense_layer import dense_layer
 from controllers.learned import LearnedPolicy, PolicyError, load_policy
 
 pytestmark = pytest.mark.training
@@ -21,7 +21,7 @@ def layer(rng: np.random.Generator, inputs: int, outputs: int):
 def test_a_layer_is_the_product_of_matrices():
     rng = np.random.default_rng(0)
     (weight, bias), signal = layer(rng, 19, 64), rng.normal(size=(33, 19)).astype("f4")
-    np.testing.assert_allclose(dense(signal, weight, bias), signal @ weight.T + bias, atol=1e-5)
+    np.testing.assert_allclose(dense_layer(signal, weight, bias), signal @ weight.T + bias, atol=1e-5)
 
 
 @pytest.mark.parametrize("inputs", range(1, 10))
@@ -32,9 +32,9 @@ def test_a_layer_adds_its_inputs_in_their_order(inputs):
     total = np.broadcast_to(bias, (200, 5))
     for i in range(inputs):
         total = total + signal[:, i : i + 1] * weight[:, i]
-    np.testing.assert_array_equal(dense(signal, weight, bias), total)
+    np.testing.assert_array_equal(dense_layer(signal, weight, bias), total)
     if inputs > 2:
-        other = dense(signal[:, ::-1], weight[:, ::-1], bias)
+        other = dense_layer(signal[:, ::-1], weight[:, ::-1], bias)
         assert not np.array_equal(other, total)
 
 
@@ -63,5 +63,5 @@ def test_a_policy_without_its_meaning_is_refused(tmp_path):
 def hidden(layers, states):
     """What the last layer is given."""
     for weight, bias in layers[:-1]:
-        states = np.tanh(dense(states, weight, bias))
+        states = np.tanh(dense_layer(states, weight, bias))
     return states

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from controllers.estimator import Estimate
+from controllers.estimator import StateEstimate
 from controllers.mpc import MPC
-from controllers.mpc_prediction import HORIZON, Predictor, Question, sequences
+from controllers.mpc_prediction import PREDICTION, Decision, Predictor, sequences
 from controllers.tuned import build, load_tunings
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
@@ -21,7 +21,7 @@ def begun(n, seeds=None, **options):
 
 def test_every_sequence_ends_at_rest_long_enough_to_shut():
     table = sequences()
-    assert table.shape[1] == HORIZON
+    assert table.shape[1] == PREDICTION.horizon
     assert np.all(table[0])  # resting is the first
     assert np.all(table[:, -5:])
     assert len(np.unique(table, axis=0)) == len(table)
@@ -44,12 +44,12 @@ def test_prices_are_what_the_episodes_then_cost():
         control_period=5e-3, threads=1,
     )  # fmt: skip
     plant = {symbol: np.array([value]) for symbol, value in Parameters.calibrated().items()}
-    estimate = Estimate(
+    estimate = StateEstimate(
         state=State(*(field[:1].copy() for field in env.task.valves.state)),
-        consumption=np.zeros(1), falling=np.zeros(1), parameters=plant,
+        consumption=np.zeros(1), fall_rate=np.zeros(1), parameters=plant,
     )  # fmt: skip
     foreseen = predictor.prices(
-        Question(estimate=estimate, target=env.task.target[:1], coil=np.array([True]))
+        Decision(estimate=estimate, target=env.task.target[:1], coil=np.array([True]))
     )
     cost = -sum(env.task.step(*env.action.decode(move)).reward for move in table.T)
     assert np.ptp(cost) > 5  # the sequences differ

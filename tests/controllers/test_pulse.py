@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from controllers.pulse import Pulse
-from controllers.pulse_table import PulseTable, pulse_table
+from controllers.pulse_simulation import pulse_table
+from controllers.pulse_table import PulseTable
+from epv_env.common.units import BAR
 from epv_env.observation import LAYOUT, encode
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.supply import BAR
 from training.evaluation.rollout import make_env
 
 pytestmark = pytest.mark.training

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from controllers.opening_pressure import opening_pressure
-from controllers.pulse_table import STAY, pulse_table
+from controllers.pulse_simulation import pulse_table
+from controllers.pulse_table import GRID
+from epv_env.common.units import BAR
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised
-from epv_env.plant.supply import BAR
 from epv_env.plant.valves import Valves
 
 pytestmark = pytest.mark.training
@@ -102,7 +103,7 @@ def test_nothing_is_to_be_added_where_enough_is_under_way(table):
     assert under_way[0] > 0.3
     assert table.duration(*wide_open, 0.9 * under_way)[0] == 0.0
     assert table.duration(*wide_open, 1.1 * under_way)[0] > 0.0
-    assert table.duration(*wide_open, np.array([99.0]))[0] <= STAY[-1]
+    assert table.duration(*wide_open, np.array([99.0]))[0] <= GRID.stay[-1]
 
 
 def test_p3_vents_at_one_rate_until_the_valve_opens(plant, table):

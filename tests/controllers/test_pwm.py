@@ -1,11 +1,14 @@
 """The PWM controller's design: the linearisation is the plant's, the margins are the loop's."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 pytest.importorskip("control")
 
-from controllers.pwm_design import design, linearise, outer_loop
+from controllers.pwm_design import design, outer_loop
+from controllers.pwm_linearisation import linearise
 from epv_env.plant.equations import Inputs
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised
@@ -14,7 +17,7 @@ from epv_env.plant.valves import Valves
 pytestmark = pytest.mark.training
 
 P1, P2, PERIOD = 11.5e5, 8e5, 20e-3
-SHAPE = {
+SHAPE: dict[str, Any] = {
     "p1": P1, "p2": P2, "inner_time": 0.02, "phase_margin": 40.0, "integral_time": 1.0, "period": PERIOD,
 }  # fmt: skip
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from controllers.tuned import KINDS, SEARCHING
+from controllers.registry import SIMULATING_KINDS, TUNED_KINDS
 
 pytest.importorskip("stable_baselines3")
-from training.learners.distillation import Distillation, Student, policy_of
 from training.learners.policy_files import save_policy
+from training.learners.student import Student, policy_of
 from training.tradeoff import finished_variants
 
 pytestmark = pytest.mark.training
@@ -46,7 +46,9 @@ def test_the_short_run_writes_everything_and_prints_the_table(finished):
     assert sorted(path.name for path in out.iterdir()) == sorted(WRITTEN)
     for heading in ("C1 stayed", "C2 largest breakdown [bar]", "sensitive_ten_percent", "PPO", "PWM"):
         assert heading in result.stdout
-    assert len(json.loads((out / "table.json").read_text())) == 3 * (1 + len(KINDS) - len(SEARCHING))
+    assert len(json.loads((out / "table.json").read_text())) == 3 * (
+        1 + len(TUNED_KINDS) - len(SIMULATING_KINDS)
+    )
 
 
 def test_a_run_resumes_from_its_checkpoint(finished):
@@ -115,7 +117,7 @@ def test_tuning_without_a_trial_is_refused(script, tmp_path):
 @pytest.mark.parametrize("shape", [{"memory": 4, "width": 8}, None])
 def test_the_tradeoff_goes_on_from_no_other_kind_of_policy(shape, tmp_path):
     """One of other layers, and one without a memory."""
-    wrong = policy_of(Student(Distillation(**(shape or {}))))
+    wrong = policy_of(Student(**(shape or {"memory": 32, "width": 64})))
     wrong = wrong if shape else replace(wrong, cell=None)
     save_recurrent(wrong, tmp_path / "memory")
     out = tmp_path / "out"
@@ -133,7 +135,7 @@ def save_recurrent(student, folder):
 
 
 def test_the_tradeoff_in_its_shortest_form_keeps_what_is_done(tmp_path):
-    student = policy_of(Student(Distillation(memory=4)))
+    student = policy_of(Student(memory=4, width=64))
     save_recurrent(student, tmp_path / "memory")
     short = ("--recurrent", tmp_path / "memory", "--prices", 0.2, "--timesteps", 16384, "--trials", 1)
     script = "training/tradeoff.py"

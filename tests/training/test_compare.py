@@ -21,8 +21,8 @@ from training.compare import limit_at_least_price, main, parse
 from training.evaluation.controller_table import PLANTS
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.scenarios import EVALUATION, RANDOM, TUNING_REGION
-from training.learners.distillation import NAME, Distillation, Student, policy_of
 from training.learners.policy_files import save_policy
+from training.learners.student import NAME, Student, policy_of
 from training.studies.comparison.acceptance_criteria import (
     against_oracle,
     against_rival,
@@ -115,7 +115,7 @@ def finished(tmp_path_factory):
     for seed in range(2):
         write_policy(random_layers(seed=seed, widths=(8, 8)), out / "seeds" / f"seed-{seed}")
     for seed in range(3):
-        remembers = policy_of(Student(Distillation(memory=4, width=8)))
+        remembers = policy_of(Student(memory=4, width=8))
         folder = out / "memory" / f"seed-{seed}"
         save_policy(remembers, folder, control_period=5e-3, provenance={})
     page = out / "page.md"

@@ -6,8 +6,10 @@ pytest.importorskip("stable_baselines3")
 
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
-from training.learners.entropy_schedule import FadingEntropy
-from training.learners.ppo import Hyperparameters, make_model, make_training_env
+from training.learners.hyperparameters import Hyperparameters
+from training.learners.ppo import make_model
+from training.learners.schedules import FadingEntropy
+from training.learners.training_env import make_training_env
 
 pytestmark = pytest.mark.training
 

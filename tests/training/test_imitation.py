@@ -8,9 +8,11 @@ pytest.importorskip("stable_baselines3")
 from controllers.tuned import build, load_tunings
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
+from training.learners.hyperparameters import Hyperparameters
 from training.learners.imitation import demonstrate, imitate
 from training.learners.policy_files import greedy_policy
-from training.learners.ppo import TEACHER, Hyperparameters, make_model, make_training_env
+from training.learners.ppo import TEACHER, make_model
+from training.learners.training_env import make_training_env
 
 pytestmark = pytest.mark.training
 

@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from training.evaluation.metrics import EpisodeMetrics, Meter, left_interval, summary, tail_excursion
+from training.evaluation.metrics import (
+    EpisodeMetrics,
+    Meter,
+    summary,
+    tail_excursion,
+    violation_interval,
+)
 
 PERIOD = 0.1
 
@@ -108,9 +114,9 @@ def test_events_of_one_episode_do_not_touch_anothers():
 
 def test_the_exact_bound_needs_3688_episodes_for_a_thousandth():
     """Clopper and Pearson with no event: 1 - (alpha / 2)^(1 / n)."""
-    assert left_interval(np.ones(3687, dtype=bool))[1] > 1e-3
-    assert left_interval(np.ones(3688, dtype=bool))[1] <= 1e-3
-    assert left_interval(np.ones(10, dtype=bool)) == (0.0, pytest.approx(1 - 0.025**0.1))
+    assert violation_interval(np.ones(3687, dtype=bool))[1] > 1e-3
+    assert violation_interval(np.ones(3688, dtype=bool))[1] <= 1e-3
+    assert violation_interval(np.ones(10, dtype=bool)) == (0.0, pytest.approx(1 - 0.025**0.1))
 
 
 def test_the_tail_excursion_is_exceeded_by_one_episode_in_a_thousand():

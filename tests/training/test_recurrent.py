@@ -13,8 +13,8 @@ from safetensors.numpy import load_file, save_file
 from controllers.base import Privileged
 from controllers.hysteresis import Hysteresis
 from controllers.learned import WEIGHTS_FILE, LearnedPolicy, PolicyError, load_policy
-from controllers.privileged_pulse import InformedPulse
-from controllers.pulse_table import PulseTables, pulse_table
+from controllers.privileged_pulse import PrivilegedPulse
+from controllers.pulse_simulation import pulse_table, pulse_tables
 from controllers.tuned import build, load_tunings
 from epv_env.observation import LAYOUT
 from epv_env.plant.parameters import Parameters
@@ -23,18 +23,13 @@ from epv_env.reward import RewardWeights
 from tests.training.policies import random_layers
 from training.deploy.double_precision import in_double, logits_along
 from training.evaluation.rollout import begin_episodes, make_env, run_episodes
-from training.learners.distillation import (
-    NAME,
-    Distillation,
-    Student,
-    distil,
-    known_plants,
-    policy_of,
-    train_recurrent,
-    with_memory_of,
-)
+from training.learners.distillation import Distillation, distil, known_plants
+from training.learners.hyperparameters import Hyperparameters
 from training.learners.policy_files import greedy_policy, put_layers, save_policy
-from training.learners.ppo import Hyperparameters, make_model, make_training_env
+from training.learners.ppo import make_model
+from training.learners.recurrent_training import train_recurrent
+from training.learners.student import NAME, Student, policy_of, with_memory_of
+from training.learners.training_env import make_training_env
 
 pytestmark = pytest.mark.training
 
@@ -56,7 +51,7 @@ TINY_PPO = Hyperparameters(
 @pytest.fixture(scope="module")
 def student():
     torch.manual_seed(3)
-    return Student(TINY)
+    return Student(memory=TINY.memory, width=TINY.width)
 
 
 @pytest.fixture(scope="module")
@@ -182,7 +177,7 @@ def test_each_valve_s_table_is_that_of_its_plant_to_the_bit():
     calibrated = Parameters.calibrated()
     plants = [calibrated.replace(cPV=f * calibrated["cPV"]) for f in (0.9, 1.0, 1.1)]
     p1, p2, p3, asked = (np.full(3, value) for value in (11.3, 7.9, 8.4, 0.15))
-    together = PulseTables.of(plants).duration(p1, p2, p3, asked)
+    together = pulse_tables(plants).duration(p1, p2, p3, asked)
     for k, plant in enumerate(plants):
         alone = pulse_table(plant).duration(p1[:1], p2[:1], p3[:1], asked[:1])
         assert together[k : k + 1] == alone
@@ -192,7 +187,7 @@ def test_each_valve_s_table_is_that_of_its_plant_to_the_bit():
 @pytest.mark.parametrize("informed", [False, True])
 def test_only_a_pulse_that_knows_its_plant_holds_the_band_on_others(informed):
     tuned = build("pulse", load_tunings()["pulse"].values, PLANT.parameters)
-    example = InformedPulse() if informed else tuned
+    example = PrivilegedPulse() if informed else tuned
     assert isinstance(example, Privileged) == informed
     metrics, _ = run_episodes(example, seeds=list(range(40, 64)), duration=4.0, options=OPTIONS)
     assert np.all(metrics.stayed) == informed
@@ -214,7 +209,7 @@ def agreement(policy, example) -> float:
 
 def untrained_policy(d, seed):
     torch.manual_seed(seed)
-    return policy_of(Student(d))
+    return policy_of(Student(memory=d.memory, width=d.width))
 
 
 def test_a_student_comes_to_act_as_its_teacher():

@@ -12,7 +12,7 @@ from training import compare, export, sweep
 from training.deploy.settings import SETTINGS
 from training.evaluation import seeds
 from training.learners.distillation import Distillation
-from training.learners.ppo import Hyperparameters
+from training.learners.hyperparameters import Hyperparameters
 from training.studies.comparison.contenders import TUNING, Contender, Sizes
 from training.studies.comparison.episode_blocks import plan
 from training.studies.sweeps.episode_plan import Size, cells, chosen_points, searches

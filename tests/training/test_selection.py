@@ -13,9 +13,11 @@ from epv_env.reward import RewardWeights
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.rollout import run_episodes
 from training.evaluation.seeds import VALIDATION_SEED
-from training.learners.checkpoint_selection import VALIDATION_FILE, score, validation_points
+from training.learners.checkpoint_selection import VALIDATION_FILE, validation_points
+from training.learners.hyperparameters import Hyperparameters
 from training.learners.learning_log import read_rows
-from training.learners.ppo import Hyperparameters, train
+from training.learners.ppo import train
+from training.learners.validation import score
 
 pytestmark = pytest.mark.training
 

@@ -1,4 +1,4 @@
-"""Consumption events: how far p2 breaks down when air begins to be drawn, and how soon it is back."""
+"""Consumption events: how far p2 breaks down when air is drawn, and how soon it recovers."""
 
 from dataclasses import dataclass
 
@@ -7,17 +7,23 @@ from numpy.typing import NDArray
 
 from epv_env.reward import BAND_BAR
 
-SHORTFALL_BAR = BAND_BAR / 2
-"""Shortfall from which a breakdown counts as not yet recovered."""
 
-EVENT_G_PER_S = 0.9
-"""Consumption above which a period belongs to an application; the largest leak lies below."""
+@dataclass(frozen=True, kw_only=True)
+class EventSettings:
+    """What counts as a consumption event and as recovered from it."""
 
-ONSET_S = 0.5
-"""How long after an event's beginning a dip still counts as its answer, for the recovery."""
+    shortfall_bar: float = BAND_BAR / 2
+    """Shortfall below the target from which a breakdown counts as not yet recovered [bar]."""
+    flow_g_per_s: float = 0.9
+    """Consumption above which a period belongs to an application [g/s]; the largest leak lies below."""
+    onset_s: float = 0.5
+    """Time after an event's beginning within which a dip counts as its answer, for the recovery [s]."""
+    aftermath_s: float = 1.0
+    """Time after the end of its consumption for which a shortfall is still the event's [s]."""
 
-AFTERMATH_S = 1.0
-"""How long after its consumption has ceased a shortfall is still the event's."""
+
+EVENTS = EventSettings()
+"""Events as the comparison counts them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,27 +31,34 @@ class EventFigures:
     """Figures of every episode's events, arrays (n,); 0 for an episode without any."""
 
     count: NDArray
+    """Number of events."""
     mean_breakdown: NDArray
-    """[bar]"""
+    """Mean over the events of the largest shortfall [bar]."""
     mean_recovery: NDArray
-    """[s]"""
+    """Mean over the events of the recovery time [s]."""
     longest_recovery: NDArray
-    """[s]"""
+    """Longest recovery time [s]."""
 
 
 class ConsumptionEvents:
     """Accumulates the events of n episodes, period by period, in constant memory.
 
-    An event begins with the period in which consumption rises above EVENT_G_PER_S and ends where the
-    next one begins, or AFTERMATH_S after consumption has fallen below again, or with the episode. Its
+    An event begins with the period in which consumption rises above `flow_g_per_s`. It ends where the
+    next one begins, or `aftermath_s` after consumption has fallen below again, or with the episode. Its
     breakdown is the largest shortfall in that time. Its recovery is the time from its beginning until
-    p2 is back above target - SHORTFALL_BAR after the first dip below, or to the event's end if that
-    comes first; 0 if no dip begins within ONSET_S.
+    p2 is back above target - `shortfall_bar` after the first dip below, or to the event's end if that
+    comes first; 0 if no dip begins within `onset_s`.
     """
 
-    def __init__(self, n: int, period: float):
-        """period: control period [s]."""
+    def __init__(self, n: int, period: float, settings: EventSettings = EVENTS):
+        """
+        Args:
+            n: number of episodes.
+            period: control period [s].
+            settings: what counts as an event.
+        """
         self._period = period
+        self._settings = settings
         self._open = np.zeros(n, dtype=bool)
         self._consuming = np.zeros(n, dtype=bool)
         self._age = np.zeros(n)
@@ -60,7 +73,7 @@ class ConsumptionEvents:
 
     def update(self, consumption: NDArray, shortfall: NDArray) -> None:
         """Take in one period: mean consumption [g/s] and largest shortfall, 0 or more [bar], (n,)."""
-        consuming = consumption > EVENT_G_PER_S
+        consuming = consumption > self._settings.flow_g_per_s
         begins = consuming & ~self._consuming
         self._consuming = consuming
         self._close(begins)
@@ -70,11 +83,11 @@ class ConsumptionEvents:
         self._age += self._period
         self._quiet = np.where(consuming, 0.0, self._quiet + self._period)
         self._depth = np.maximum(self._depth, shortfall)
-        answer = (self._recovery > 0) | (self._age <= ONSET_S)
-        low = (shortfall > SHORTFALL_BAR) & answer & ~self._recovered
+        answer = (self._recovery > 0) | (self._age <= self._settings.onset_s)
+        low = (shortfall > self._settings.shortfall_bar) & answer & ~self._recovered
         self._recovered |= ~low & (self._recovery > 0)
         self._recovery = np.where(low, self._age, self._recovery)
-        self._close(self._quiet >= AFTERMATH_S)
+        self._close(self._quiet >= self._settings.aftermath_s)
 
     def _close(self, where: NDArray) -> None:
         """End the events among `where` that are open, and forget what was gathered there."""

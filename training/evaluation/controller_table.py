@@ -1,6 +1,6 @@
-"""The comparison: every controller on the same unseen scenarios and the same plants."""
+"""A table of controllers: each of them on the same unseen episodes and the same plants."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,7 +23,7 @@ PLANTS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """What a comparison found."""
+    """The outcome of a comparison."""
 
     table: pd.DataFrame
     """One row per plant set and controller."""
@@ -51,7 +51,16 @@ def compare(
     duration: float,
     progress: Callable[[str, float], None] = lambda what, share: None,
 ) -> Comparison:
-    """Run every controller on every plant set with common random numbers."""
+    """Run every controller on every plant set with common random numbers.
+
+    Args:
+        controllers: of different names.
+        plant: the calibrated plant and its confidence region.
+        scenario: of the consumption.
+        episodes: number of episodes on each plant set.
+        duration: length of an episode [s].
+        progress: called with the running controller and plant set, and the share done [1].
+    """
     seeds = list(range(EVALUATION_SEED, EVALUATION_SEED + episodes))
     metrics: dict[tuple[str, str], EpisodeMetrics] = {}
     traces: dict[str, Trace] = {}
@@ -73,8 +82,13 @@ def compare(
         )
         if trace is not None:
             traces[controller.name] = trace
+    return Comparison(table=summary_table(metrics), metrics=metrics, traces=traces)
+
+
+def summary_table(metrics: Mapping[tuple[str, str], EpisodeMetrics]) -> pd.DataFrame:
+    """A row per plant set and controller: `summary` of the episodes. metrics: by these two names."""
     rows = [{"plants": p, "controller": c, **summary(m)} for (p, c), m in metrics.items()]
-    return Comparison(table=pd.DataFrame(rows), metrics=metrics, traces=traces)
+    return pd.DataFrame(rows)
 
 
 HEADINGS = {

@@ -1,8 +1,8 @@
 """The control aims as figures, per episode and over many: C1 to C3 are defined here and nowhere else.
 
-C1  p2 stays within target ±500 mbar after the settling time: probability of leaving the band, worst
+C1  p2 stays within target ±500 mbar after the settling time: constraint violation rate, worst
     excursion, and the excursion that 99.9 % of the episodes do not exceed.
-C2  p2 breaks down little when air is drawn, and comes back soon: breakdown and recovery of every
+C2  p2 breaks down little when air is drawn, and recovers soon: breakdown and recovery of every
     consumption event (training/evaluation/consumption_events.py), largest shortfall of the episode.
 C3  the same figures on plants drawn from a region.
 Cost: switchings of the coil, air vented, coil energy.
@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from epv_env.reward import BAND_BAR
-from training.evaluation.consumption_events import SHORTFALL_BAR, ConsumptionEvents
+from training.evaluation.consumption_events import EVENTS, ConsumptionEvents, EventSettings
 from training.evaluation.statistics import mean_interval
 
-TAIL = 0.999
-"""Share of the episodes that the tail excursion bounds."""
+TAIL_SHARE = 0.999
+"""Share of the episodes that do not exceed the tail excursion [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,8 +72,15 @@ class EpisodeMetrics:
 class Meter:
     """Accumulates the metrics of n episodes, period by period, in constant memory."""
 
-    def __init__(self, n: int, period: float, settling_time: float):
-        """period: control period [s]; settling_time: from when pressures count [s]."""
+    def __init__(self, n: int, period: float, settling_time: float, events: EventSettings = EVENTS):
+        """
+        Args:
+            n: number of episodes.
+            period: control period [s].
+            settling_time: time from which pressures count [s].
+            events: what counts as a consumption event and as recovered from it.
+        """
+        self._shortfall_bar = events.shortfall_bar
         self._period = period
         self._settling_time = settling_time
         self._steps = 0
@@ -87,10 +94,16 @@ class Meter:
         self._vented = np.zeros(n)
         self._return = np.zeros(n)
         self._failed = np.zeros(n, dtype=bool)
-        self._events = ConsumptionEvents(n, period)
+        self._events = ConsumptionEvents(n, period, events)
 
     def update(self, reward: NDArray, failed: NDArray, info: dict[str, NDArray]) -> None:
-        """Take in one period of every episode (epv_env.infos)."""
+        """Take in one period of every episode.
+
+        Args:
+            reward: (n,).
+            failed: whether the circuit has emptied (n,), bool.
+            info: arrays (n,) by name (epv_env.infos).
+        """
         self._steps += 1
         self._switchings += info["switchings"]
         self._vented += info["vented_g"]
@@ -104,13 +117,13 @@ class Meter:
         self._highest = np.maximum(self._highest, deviation)
         self._lowest = np.minimum(self._lowest, deviation)
         self._squares += deviation**2
-        self._low_time = np.where(deviation < -SHORTFALL_BAR, self._low_time + self._period, 0.0)
+        self._low_time = np.where(deviation < -self._shortfall_bar, self._low_time + self._period, 0.0)
         self._longest_low = np.maximum(self._longest_low, self._low_time)
         consumption = np.where(over, 0.0, info["consumption_g_per_s"])
         self._events.update(consumption, np.maximum(-deviation, 0.0))
 
     def result(self, coil_energy: NDArray | float = 0.0) -> EpisodeMetrics:
-        """The metrics so far. coil_energy: what each coil has taken since the start [J]."""
+        """The metrics so far. coil_energy: electrical energy of each coil since the start, (n,) [J]."""
         excursion = np.maximum(self._highest, -self._lowest)
         time = self._steps * self._period
         events = self._events.result()
@@ -131,36 +144,41 @@ class Meter:
         )
 
 
-def left_interval(stayed: NDArray) -> tuple[float, float]:
-    """Exact 95 % interval (Clopper and Pearson 1934) of the probability of leaving the band.
+def violation_interval(stayed: NDArray) -> tuple[float, float]:
+    """Exact 95 % interval (Clopper and Pearson 1934) of the constraint violation rate.
 
-    Two-sided, so that its upper end is a 97.5 % bound: with no episode outside it needs 3688 episodes
-    to lie below 0.1 %.
+    The interval is two-sided, so its upper end is a 97.5 % bound. Without any violation this bound lies
+    below 0.1 % from 3688 episodes on.
+
+    stayed: whether an episode stayed within the band (n,), bool.
     """
-    left = len(stayed) - int(np.sum(stayed))
-    found = binomtest(left, len(stayed)).proportion_ci(0.95, "exact")
-    return float(found.low), float(found.high)
+    violations = len(stayed) - int(np.sum(stayed))
+    interval = binomtest(violations, len(stayed)).proportion_ci(0.95, "exact")
+    return float(interval.low), float(interval.high)
 
 
 def tail_excursion(excursion_bar: NDArray) -> float:
-    """Excursion that 99.9 % of the episodes do not exceed [bar]; of fewer than 1000 the worst."""
-    return float(np.quantile(excursion_bar, TAIL, method="inverted_cdf"))
+    """Excursion that 99.9 % of n episodes do not exceed [bar]; of fewer than 1000 the worst.
+
+    excursion_bar: of each episode (n,) [bar].
+    """
+    return float(np.quantile(excursion_bar, TAIL_SHARE, method="inverted_cdf"))
 
 
 def over_events(m: EpisodeMetrics, mean: NDArray) -> float:
-    """Mean over all events of a figure of which `mean` (n,) holds the episodes' means."""
+    """Mean of a figure over all events. mean: the mean over each episode's events (n,)."""
     return float(np.sum(mean * m.events) / max(np.sum(m.events), 1))
 
 
 def summary(m: EpisodeMetrics) -> dict[str, float]:
     """The aims over many episodes; intervals are 95 %, exact for shares, by bootstrap for means."""
-    left = left_interval(m.stayed)
+    violations = violation_interval(m.stayed)
     breakdown = mean_interval(m.breakdown_bar)
     return {
         "episodes": len(m),
         "C1_stayed": float(m.stayed.mean()),
-        "C1_stayed_low": 1.0 - left[1],
-        "C1_stayed_high": 1.0 - left[0],
+        "C1_stayed_low": 1.0 - violations[1],
+        "C1_stayed_high": 1.0 - violations[0],
         "C1_worst_excursion_bar": float(m.excursion_bar.max()),
         "C1_tail_excursion_bar": tail_excursion(m.excursion_bar),
         "C2_largest_breakdown_bar": float(m.breakdown_bar.max()),

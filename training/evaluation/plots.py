@@ -1,4 +1,4 @@
-"""Figures of a training run. Matplotlib is imported here only, without a display."""
+"""Figures of a training run, drawn without a display."""
 
 from pathlib import Path
 

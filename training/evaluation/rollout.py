@@ -10,24 +10,28 @@ from numpy.typing import NDArray
 
 import epv_env  # noqa: F401 - registers the ids
 from controllers.base import Controller, Privileged
+from epv_env.common.units import BAR
 from epv_env.infos import batch_info
-from epv_env.plant.supply import BAR
 from epv_env.vector_env import EPValvePWMVectorEnv, EPValveVectorEnv
 from training.evaluation.metrics import EpisodeMetrics, Meter
 
 
 @dataclass(frozen=True, kw_only=True)
 class Trace:
-    """One episode in time, for figures; arrays (periods,)."""
+    """One episode over time, for figures; arrays (periods,)."""
 
     time: NDArray
     """End of each period [s]."""
     p2_bar: NDArray
+    """Circuit pressure [bar absolute]."""
     p3_bar: NDArray
+    """Control pressure [bar absolute]."""
     target_bar: float
+    """Target of p2 [bar absolute]."""
     coil: NDArray
-    """Share of the period with the coil on."""
+    """Share of the period with the coil on [1]."""
     consumption_g_per_s: NDArray
+    """Mean consumption of the period [g/s]."""
 
 
 def make_env(controller: Controller, n: int, **options: Any) -> EPValveVectorEnv | EPValvePWMVectorEnv:
@@ -48,10 +52,15 @@ def begin_episodes(
     seeds: list[int],
     each: dict[str, list[Any]] | None = None,
 ) -> NDArray:
-    """Start an episode for each seed under the controller; returns the first observations.
+    """Start an episode for each seed under the controller; returns the first observations (n, entries).
 
-    each: options of the reset, lists with one value for each episode. A privileged controller gets to
-    see the task.
+    A privileged controller gets to see the task.
+
+    Args:
+        env: of n valves.
+        controller: is reset.
+        seeds: n of them.
+        each: options of the reset, lists with one value for each episode.
     """
     observation, _ = env.reset(seed=list(seeds), options=each)
     controller.reset(len(seeds))
@@ -70,12 +79,19 @@ def run_episodes(
     trace_of: int | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> tuple[EpisodeMetrics, Trace | None]:
-    """Run one episode per seed.
+    """Run one episode per seed; returns their metrics and the recorded episode.
 
-    duration: of each episode [s]. options: of the environment. each: options of its reset, lists with
-    one value for each episode (plants that are listed, not drawn). trace_of: index of an episode to
-    record. progress: called with the share done. An episode whose circuit empties counts as left (C1);
-    its valve runs on, since the batch runs as one.
+    An episode whose circuit empties counts as a constraint violation (C1); its valve runs on, since the
+    batch runs as one.
+
+    Args:
+        controller: decides for all episodes.
+        seeds: of the episodes.
+        duration: of each episode [s].
+        options: of the environment.
+        each: options of its reset, lists with one value for each episode.
+        trace_of: index of an episode to record; None: none.
+        progress: called with the share done [1].
     """
     env = make_env(controller, len(seeds), **options)
     observation = begin_episodes(env, controller, seeds, each)

@@ -1,7 +1,7 @@
-"""The scenarios of the evaluation: what is drawn from the circuit, at which target, from which supply.
+"""Scenarios of the evaluation: consumption of the circuit, target, and supply.
 
 `run_episodes` takes a scenario's `options` as they are. Those of the environment
-(epv_env/plant/consumption.py) are what training and tuning meet; most of these are not among them.
+(epv_env/plant/consumption.py) serve training and tuning; most of the scenarios here are not among them.
 """
 
 from dataclasses import dataclass, field, replace

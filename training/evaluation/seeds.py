@@ -1,8 +1,8 @@
-"""First seeds of all episodes that are run here: a range of its own for each purpose.
+"""First seeds of all episodes of `training`: a range of its own for each purpose.
 
-An episode depends on its seed alone, so one that was trained, tuned or chosen on says nothing about how
-a controller does on new ones. A range goes from its first seed up to the next one's (tests/training/
-test_seeds.py says how much of it the commands use).
+An episode depends on its seed alone, so an episode of training, tuning or selection says nothing about
+a controller's performance on new ones. A range goes from its first seed up to the next range's
+(tests/training/test_seeds.py says how much of it the commands use).
 """
 
 TRAINING_SEED = 0
@@ -12,13 +12,13 @@ TUNING_SEED = 1_000_000
 """On which the classic controllers are tuned, and one of several training seeds is chosen."""
 
 EVALUATION_SEED = 2_000_000
-"""On which controllers are compared, and deployed in the circle."""
+"""On which controllers are compared, and deployed in the sim-to-real loop."""
 
 VALIDATION_SEED = 3_000_000
 """On which a training chooses among the policies that it passes through."""
 
 DISTILLATION_SEED = 4_000_000
-"""On which a policy with a memory imitates an informed one; a training seed takes a stretch of them."""
+"""On which a student imitates a privileged controller; each training seed has its own stretch."""
 
 SWEEP_SEED = 5_000_000
 """Of sweeps and their worst-case searches; --seed counts from here."""

@@ -15,10 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import bootstrap, trim_mean
 
-RESAMPLES = 2000
-CONFIDENCE = 0.95
-BATCH_VALUES = 4_000_000
-"""Values that a bootstrap draws at a time: bounds its memory."""
+
+@dataclass(frozen=True, kw_only=True)
+class BootstrapSettings:
+    """Size of the bootstrap."""
+
+    resamples: int = 2000
+    """Number of resamples behind each interval."""
+    confidence: float = 0.95
+    """Level of the intervals [1]."""
+    batch_values: int = 4_000_000
+    """Values that a bootstrap draws at a time: bounds its memory."""
+
 
 Statistic = Callable[[NDArray], NDArray]
 """From score matrices (resamples, seeds, scenarios) to figures (resamples,)."""
@@ -26,14 +34,16 @@ Statistic = Callable[[NDArray], NDArray]
 
 @dataclass(frozen=True, kw_only=True)
 class Estimate:
-    """A figure and its 95 % interval."""
+    """A figure and its bootstrap interval."""
 
     value: float
     low: float
+    """Lower end of the interval."""
     high: float
+    """Upper end of the interval."""
 
 
-def iqm(scores: NDArray) -> NDArray:
+def interquartile_mean(scores: NDArray) -> NDArray:
     """Interquartile mean of each matrix of scores (resamples, seeds, scenarios): (resamples,).
 
     The mean of the middle half of all entries: less jumpy than a median, deaf to single outliers.
@@ -42,20 +52,32 @@ def iqm(scores: NDArray) -> NDArray:
 
 
 def mean(scores: NDArray) -> NDArray:
-    """Mean of each matrix of scores, shape as for `iqm`."""
+    """Mean of each matrix of scores, shape as for `interquartile_mean`."""
     return scores.reshape(len(scores), -1).mean(axis=1)
 
 
-def estimate(
-    scores: NDArray, statistic: Statistic = iqm, *, resamples: int = RESAMPLES, seed: int = 0
+def bootstrap_estimate(
+    scores: NDArray,
+    statistic: Statistic = interquartile_mean,
+    *,
+    settings: BootstrapSettings = BootstrapSettings(),
+    seed: int = 0,
 ) -> Estimate:
-    """A statistic of scores (seeds, scenarios, episodes) with its percentile bootstrap interval.
+    """A statistic of scores with its percentile bootstrap interval.
 
-    Stratified: every scenario keeps its number of seeds and of episodes. The seeds are drawn anew with
-    replacement within each scenario, and so are its episodes, the same ones for every seed.
+    The bootstrap is stratified: every scenario keeps its number of seeds and of episodes. The seeds are
+    drawn anew with replacement within each scenario, and so are its episodes, the same ones for every
+    seed (scipy.stats.bootstrap has no such nested resampling).
+
+    Args:
+        scores: (seeds, scenarios, episodes).
+        statistic: of the matrix of mean scores (seeds, scenarios).
+        settings: size of the bootstrap.
+        seed: of the resampling.
     """
-    found = statistic(_resampled(scores, seed, resamples))
-    low, high = np.quantile(found, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
+    resampled = statistic(_resampled(scores, seed, settings.resamples))
+    tails = [(1 - settings.confidence) / 2, (1 + settings.confidence) / 2]
+    low, high = np.quantile(resampled, tails)
     value = statistic(scores.mean(axis=2)[None])[0]
     return Estimate(value=float(value), low=float(low), high=float(high))
 
@@ -83,7 +105,7 @@ def paired_difference(ours: NDArray, theirs: NDArray) -> Estimate:
     Scores (seeds, scenarios, episodes) of the same scenarios; one side may have a single row (a classic
     controller), otherwise run k meets run k. Where one has fewer episodes, its own are compared.
     """
-    return estimate(_paired(ours, theirs, np.subtract), mean)
+    return bootstrap_estimate(_paired(ours, theirs, np.subtract), mean)
 
 
 def probability_of_improvement(ours: NDArray, theirs: NDArray, *, lower_is_better: bool) -> Estimate:
@@ -96,7 +118,7 @@ def probability_of_improvement(ours: NDArray, theirs: NDArray, *, lower_is_bette
         return (a < b) + 0.5 * (a == b)
 
     pair = (ours, theirs) if lower_is_better else (theirs, ours)
-    return estimate(_paired(*pair, better), mean)
+    return bootstrap_estimate(_paired(*pair, better), mean)
 
 
 def _paired(a: NDArray, b: NDArray, compare: Callable[[NDArray, NDArray], NDArray]) -> NDArray:
@@ -110,15 +132,18 @@ def _paired(a: NDArray, b: NDArray, compare: Callable[[NDArray, NDArray], NDArra
     return compare(a[:, :, :common], b[:, :, :common])
 
 
-def mean_interval(values: NDArray) -> tuple[float, float]:
-    """Ends of the 95 % percentile bootstrap interval of a mean of values (n,)."""
+def mean_interval(
+    values: NDArray, settings: BootstrapSettings = BootstrapSettings()
+) -> tuple[float, float]:
+    """Ends of the percentile bootstrap interval of a mean of values (n,)."""
     if np.ptp(values) == 0:
         return float(values[0]), float(values[0])
-    found = bootstrap(
-        (values,), np.mean, n_resamples=RESAMPLES, confidence_level=CONFIDENCE, method="percentile",
-        rng=np.random.default_rng(0), batch=max(BATCH_VALUES // len(values), 1),
+    interval = bootstrap(
+        (values,), np.mean, n_resamples=settings.resamples, confidence_level=settings.confidence,
+        method="percentile", rng=np.random.default_rng(0),
+        batch=max(settings.batch_values // len(values), 1),
     ).confidence_interval  # fmt: skip
-    return float(found.low), float(found.high)
+    return float(interval.low), float(interval.high)
 
 
 def pareto_front(points: Iterable[tuple[float, ...]]) -> list[bool]:

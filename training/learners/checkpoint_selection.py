@@ -1,8 +1,4 @@
-"""Which of the policies that a training passes through is kept: the best on scenarios of its own.
-
-The choice is part of the training, as early stopping is: it sees neither the scenarios of the
-evaluation nor those on which the classic controllers are tuned.
-"""
+"""Selection of the best model that a training passes through, judged by its validations."""
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -13,27 +9,17 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from controllers.base import Controller
 from training.evaluation.metrics import EpisodeMetrics
-from training.evaluation.rollout import run_episodes
-from training.evaluation.seeds import VALIDATION_SEED
 from training.learners.learning_log import read_rows, save_model, write_rows
+from training.learners.validation import ValidationSettings, score, validate
 
 VALIDATION_FILE = "validation.csv"
 BEST_FILE = "model.zip"
-
-LEAVING_PRICE = 300.0
-"""What an episode that leaves the band loses in the score, beside its return: somewhat more than a good
-episode loses in all, because such an episode is rare and the return's mean would hardly show it."""
 
 
 def validation_points(total: int, *, first_share: float, count: int) -> list[int]:
     """Steps of a training of `total` at which it is validated: evenly from a share of it to its end."""
     step = (1 - first_share) / max(count - 1, 1)
     return [round(total * (1 - step * (count - 1 - k))) for k in range(count)]
-
-
-def score(metrics: EpisodeMetrics) -> float:
-    """How good a policy is: its mean return, less the price of leaving the band."""
-    return float(metrics.episode_return.mean() - LEAVING_PRICE * (~metrics.stayed).mean())
 
 
 class Selection(BaseCallback):
@@ -44,20 +30,22 @@ class Selection(BaseCallback):
         folder: Path,
         *,
         points: Iterable[int],
-        episodes: int,
-        duration: float,
+        settings: ValidationSettings,
         options: dict[str, Any],
         controller: Callable[[PPO], Controller],
     ):
-        """points: steps at which to validate. duration: of an episode [s]. options: environment's.
-
-        controller: makes a controller of a model, its greedy policy.
+        """
+        Args:
+            folder: of the training.
+            points: environment steps after which the policy is validated.
+            settings: of a validation.
+            options: of the environment.
+            controller: makes a controller of a model, its greedy policy.
         """
         super().__init__()
         self._folder = folder
         self._points = sorted(points)
-        self._seeds = list(range(VALIDATION_SEED, VALIDATION_SEED + episodes))
-        self._duration = duration
+        self._settings = settings
         self._options = options
         self._controller = controller
         self.rows = read_rows(folder / VALIDATION_FILE)
@@ -86,13 +74,11 @@ class Selection(BaseCallback):
 
     def _validate(self) -> None:
         assert isinstance(self.model, PPO)
-        metrics, _ = run_episodes(
-            self._controller(self.model), seeds=self._seeds, duration=self._duration,
-            options=self._options,
-        )  # fmt: skip
+        metrics = validate(self._controller(self.model), self._settings, self._options)
         best = max((row["score"] for row in self.rows), default=float("-inf"))
-        self.rows.append({"timesteps": float(self.num_timesteps), **figures(metrics)})
-        if self.rows[-1]["score"] > best:
+        row = {"timesteps": float(self.num_timesteps), **figures(metrics, self._settings)}
+        self.rows.append(row)
+        if row["score"] > best:
             save_model(self.model, self._folder / BEST_FILE)
         write_rows(self._folder / VALIDATION_FILE, list(self.rows[0]), self.rows)
 
@@ -101,10 +87,10 @@ class Selection(BaseCallback):
         model.set_parameters(str(self._folder / BEST_FILE), device=model.device)
 
 
-def figures(metrics: EpisodeMetrics) -> dict[str, float]:
-    """What the validation's table says of a policy."""
+def figures(metrics: EpisodeMetrics, settings: ValidationSettings) -> dict[str, float]:
+    """A row of the validation's table by column. `left` counts episodes with a constraint violation."""
     return {
-        "score": score(metrics),
+        "score": score(metrics, settings.violation_price),
         "mean_return": float(metrics.episode_return.mean()),
         "left": float((~metrics.stayed).sum()),
         "worst_excursion_bar": float(metrics.excursion_bar.max()),

@@ -1,4 +1,4 @@
-"""What a training leaves behind as it runs: progress, learning curve, checkpoints to resume from."""
+"""Log of a running training: progress bar, learning curve, and checkpoints to resume from."""
 
 import csv
 import io
@@ -23,6 +23,13 @@ class TrainingLog(BaseCallback):
     """Progress bar with estimate and success rate, learning curve, and checkpoints to resume from."""
 
     def __init__(self, folder: Path, total: int, *, checkpoint_seconds: float = 20.0, quiet: bool):
+        """
+        Args:
+            folder: of checkpoint and learning curve.
+            total: environment steps of the whole training.
+            checkpoint_seconds: least time between two checkpoints [s].
+            quiet: no progress bar.
+        """
         super().__init__()
         self._folder = folder
         self._total = total
@@ -30,6 +37,7 @@ class TrainingLog(BaseCallback):
         self._checkpoint_seconds = checkpoint_seconds
         self._saved_at = time.monotonic()
         self.rows = read_rows(folder / CURVE_FILE)
+        """Of the learning curve, by CURVE_COLUMNS."""
         self._bar: tqdm | None = None
 
     def _on_training_start(self) -> None:
@@ -94,7 +102,7 @@ def read_rows(path: Path) -> list[dict[str, float]]:
 
 
 def write_rows(path: Path, columns: Sequence[str], rows: list[dict[str, float]]) -> None:
-    """Write such a table."""
+    """Write a table of numbers as a CSV file with a heading."""
     text = io.StringIO()
     writer: csv.DictWriter[str] = csv.DictWriter(text, list(columns))
     writer.writeheader()

@@ -1,4 +1,4 @@
-"""Writing a policy so that others can load it without running code: safetensors and a contract."""
+"""Writing a policy as safetensors and a contract, which others can load without running code."""
 
 import json
 from dataclasses import replace
@@ -18,7 +18,7 @@ from epv_env.observation import contract
 def greedy_policy(model: PPO, student: LearnedPolicy | None = None) -> LearnedPolicy:
     """The model's actor as a controller. It shares the model's weights: training changes it.
 
-    student: the policy that the model went on from; what it remembers with, and its name, are kept.
+    student: the policy that the model went on from; its recurrent unit and its name are kept.
     Raises TypeError for a policy that is not a plain multilayer perceptron with tanh layers.
     """
     layers = [(_array(layer.weight), _array(layer.bias)) for layer in _linear_layers(model)]
@@ -26,7 +26,7 @@ def greedy_policy(model: PPO, student: LearnedPolicy | None = None) -> LearnedPo
 
 
 def put_layers(model: PPO, policy: LearnedPolicy, sharpness: float) -> None:
-    """Make the policy's layers the model's actor, of the same shapes; its logits times `sharpness`."""
+    """Copy the policy's layers into the model's actor, of the same shapes; logits times `sharpness`."""
     *hidden, (weight, bias) = policy.layers
     layers = [*hidden, (sharpness * weight, sharpness * bias)]
     for layer, (weight, bias) in zip(_linear_layers(model), layers, strict=True):
@@ -36,7 +36,14 @@ def put_layers(model: PPO, policy: LearnedPolicy, sharpness: float) -> None:
 def save_policy(
     policy: LearnedPolicy, folder: Path, *, control_period: float, provenance: dict[str, Any]
 ) -> None:
-    """Write a policy's weights and what its inputs and outputs mean."""
+    """Write a policy's weights, and the meaning of its inputs and outputs.
+
+    Args:
+        policy: to write.
+        folder: to write into.
+        control_period: of the observations [s].
+        provenance: of the training, ready for JSON.
+    """
     arrays = {}
     for i, (weight, bias) in enumerate(policy.layers):
         arrays[f"{i}.weight"], arrays[f"{i}.bias"] = weight, bias

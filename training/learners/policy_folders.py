@@ -1,4 +1,4 @@
-"""Learned policies, one folder each: trained if missing, side by side; loaded if they are there."""
+"""Folders of learned policies: missing policies are trained in parallel, finished ones are loaded."""
 
 import sys
 from collections.abc import Sequence
@@ -18,10 +18,10 @@ from epv_env.reward import RewardWeights
 from training.evaluation.scenarios import TUNING_REGION
 
 RECURRENT_TIMESTEPS = 5_000_000
-"""PPO's steps for a policy with a memory."""
+"""Environment steps of PPO for a recurrent policy."""
 
-IMITATION = 25_000_000
-"""Steps of PPO that take about as long as the imitation that comes before (distillation.py)."""
+DISTILLATION_STEPS = 25_000_000
+"""Environment steps of PPO that take about as long as a distillation (distillation.py)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,44 +31,44 @@ class Training:
     folder: Path
     """Where the policy lies, or will."""
     timesteps: int
+    """Environment steps of PPO."""
     seed: int
+    """Of the training."""
     weights: RewardWeights = field(default_factory=RewardWeights)
     """Prices of the reward."""
     recurrent: bool = False
-    """With a memory (distillation.py)."""
+    """Whether the policy is recurrent (recurrent_training.py)."""
     student: Path | None = None
-    """Folder of the one that a policy with a memory goes on from; None: it is trained, too."""
+    """Folder of the student that a recurrent policy goes on from; None: it is trained, too."""
     memoryless: Path | None = None
-    """Folder of the policy that gets the student's memory where switching is cheap; None: the same."""
+    """Folder of the policy without memory that PPO goes on from where switching is cheap; None: it is
+    trained, too."""
 
     @property
     def finished(self) -> bool:
-        """Whether the policy is there."""
+        """Whether the folder holds the policy."""
         return holds_policy(self.folder)
 
     @property
     def cost(self) -> int:
-        """How long it takes, in steps of PPO."""
-        imitates = self.recurrent and self.student is None
-        return self.timesteps + (IMITATION if imitates else 0)
+        """Duration of the training in environment steps of PPO."""
+        distils = self.recurrent and self.student is None
+        return self.timesteps + (DISTILLATION_STEPS if distils else 0)
 
     @property
     def own_student(self) -> Path:
-        """Folder of the student that a training with a memory trains, if it is given none."""
-        from training.learners.distillation import (
-            STUDENT_FOLDER,  # torch takes seconds to import: only now
-        )
+        """Folder of the student that a recurrent training makes if it is given none."""
+        from training.learners.student import STUDENT_FOLDER  # torch takes seconds to import: only now
 
         return self.folder / STUDENT_FOLDER
 
     def run(self, *, quiet: bool = False) -> None:
-        """Train it. An interrupted training goes on."""
-        from training.learners.distillation import (  # torch takes seconds to import: only now
-            going_on,
-            train_recurrent,
-        )
-        from training.learners.policy_files import save_policy
-        from training.learners.ppo import Hyperparameters, train
+        """Train the policy. An interrupted training goes on. quiet: no progress bars."""
+        from training.learners.distillation import Distillation
+        from training.learners.hyperparameters import Hyperparameters, recurrent_hyperparameters
+        from training.learners.policy_files import save_policy  # torch takes seconds to import: only now
+        from training.learners.ppo import train
+        from training.learners.recurrent_training import train_recurrent
 
         task: dict[str, Any] = {
             "plant": Plant.calibrated(), "scenario": MIXED, "parameters": TUNING_REGION,
@@ -77,7 +77,11 @@ class Training:
         }  # fmt: skip
         if self.recurrent:
             policy, _ = train_recurrent(
-                going_on(self.weights), student=self.student, memoryless=self.memoryless, **task
+                recurrent_hyperparameters(self.weights),
+                Distillation(),
+                student=self.student,
+                memoryless=self.memoryless,
+                **task,
             )
         else:
             policy, _ = train(Hyperparameters(), **task)
@@ -87,7 +91,7 @@ class Training:
 
 
 def train_missing(trainings: Sequence[Training], *, workers: int) -> None:
-    """Train what is not finished, in so many processes; a policy does not depend on how many."""
+    """Train what is not finished. A policy does not depend on the number of processes, `workers`."""
     missing = [training for training in trainings if not training.finished]
     if workers == 1 or len(missing) < 2:
         for training in missing:

@@ -1,7 +1,8 @@
-"""An environment that shows a policy's memory beside the observation.
+"""Recurrent-state wrapper: an environment that shows a policy's recurrent state beside the observation.
 
-The memory depends on what was observed alone, so that a learner without one that sees it, as
-stable-baselines3's PPO, trains a policy with a memory: the layers learn, the unit stays as it is.
+The recurrent state depends on the observations alone. A learner without memory, such as
+stable-baselines3's PPO, therefore trains a recurrent policy when it sees this state: the layers learn,
+the recurrent unit stays as it is.
 """
 
 import gymnasium
@@ -13,35 +14,38 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepR
 from controllers.learned import GatedUnit
 
 
-class RememberingEnv(VecEnvWrapper):
-    """Observations end with what the unit remembers once it has seen them (`LearnedPolicy.logits`)."""
+class RecurrentStateWrapper(VecEnvWrapper):
+    """Observations end with the unit's state after it has seen them (`LearnedPolicy.logits`)."""
 
     def __init__(self, env: VecEnv, cell: GatedUnit):
+        """cell: the recurrent unit; its m cells become m entries of the observation, each in [-1, 1]."""
         space = env.observation_space
         assert isinstance(space, gymnasium.spaces.Box)
         limits = np.ones(cell.width, dtype=np.float32)
         low, high = np.append(space.low, -limits), np.append(space.high, limits)
         super().__init__(env, observation_space=gymnasium.spaces.Box(low, high, dtype=np.float32))
         self._cell = cell
-        self._memory = self._nothing()
+        self._state = self._zeros()
 
     def reset(self) -> VecEnvObs:
-        self._memory = self._nothing()
-        return self._remembering(self.venv.reset())
+        """First observations (n, entries + m)."""
+        self._state = self._zeros()
+        return self._with_state(self.venv.reset())
 
     def step_wait(self) -> VecEnvStepReturn:
+        """Observations (n, entries + m), rewards (n,), ends (n,) and infos."""
         observation, reward, done, infos = self.venv.step_wait()
-        for i in np.flatnonzero(done):  # the last observation of an episode belongs to its own memory
+        for i in np.flatnonzero(done):  # the last observation of an episode belongs to its own state
             last = infos[i]["terminal_observation"]
-            memory = self._cell.step(last[None], self._memory[i : i + 1])[0]
-            infos[i]["terminal_observation"] = np.append(last, memory)
-        self._memory[done] = 0.0
-        return self._remembering(observation), reward, done, infos
+            state = self._cell.step(last[None], self._state[i : i + 1])[0]
+            infos[i]["terminal_observation"] = np.append(last, state)
+        self._state[done] = 0.0
+        return self._with_state(observation), reward, done, infos
 
-    def _nothing(self) -> NDArray:
+    def _zeros(self) -> NDArray:
         return np.zeros((self.num_envs, self._cell.width), dtype=np.float32)
 
-    def _remembering(self, observation: VecEnvObs) -> NDArray:
+    def _with_state(self, observation: VecEnvObs) -> NDArray:
         assert isinstance(observation, np.ndarray)
-        self._memory = self._cell.step(observation, self._memory)
-        return np.concatenate([observation, self._memory], axis=1)
+        self._state = self._cell.step(observation, self._state)
+        return np.concatenate([observation, self._state], axis=1)

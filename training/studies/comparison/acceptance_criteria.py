@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from epv_env.reward import RewardWeights
-from training.evaluation.metrics import EpisodeMetrics, left_interval, summary
+from training.evaluation.metrics import EpisodeMetrics, summary, violation_interval
 from training.evaluation.scenarios import RANDOM
 from training.studies.comparison.contenders import CRITERIA_ON, Contender
 from training.studies.comparison.score_tables import JUDGED_ON, ComparisonResults
@@ -66,8 +66,10 @@ def criteria(
 def violation_criterion(c: ComparisonResults, ours: Contender, plants: str, limit: float) -> Criterion:
     """The bound on the violation rate, and how many training seeds keep it."""
     stayed = c.metrics(ours.name, plants).stayed
-    upper = left_interval(stayed)[1]
-    keep = sum(left_interval(c.results[run, plants, RANDOM].stayed)[1] <= limit for run in ours.runs)
+    upper = violation_interval(stayed)[1]
+    keep = sum(
+        violation_interval(c.results[run, plants, RANDOM].stayed)[1] <= limit for run in ours.runs
+    )
     return Criterion(
         controller=ours.name,
         requirement=f"upper 95 % bound of leaving ±500 mbar at most {100 * limit:g} %, {plants}",

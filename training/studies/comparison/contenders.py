@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from controllers.base import Controller, Privileged
+from controllers.registry import REGISTRY, cost_class
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.scenarios import RANDOM, TUNING_REGION
 
@@ -39,11 +40,14 @@ class Expense(NamedTuple):
 
 
 EXPENSIVE = {
-    "MPC": Expense(times=200, fewer=128, random=128),
-    "oracle": Expense(times=200, fewer=128, random=128),
-    "pulse, informed": Expense(times=30, fewer=8, random=512),
+    entry.kind: Expense(
+        times=entry.cost.relative_cpu_time,
+        fewer=entry.cost.episode_divisor,
+        random=entry.cost.paired_random_episodes,
+    )
+    for entry in REGISTRY
 }
-"""By contender. The informed pulse's is the table of each plant."""
+"""By contender, as its cost class in the registry says."""
 
 CHEAP = Expense(times=1, fewer=1, random=0)
 
@@ -88,7 +92,7 @@ class Contender:
     @property
     def model_based(self) -> bool:
         """Whether it simulates the plant as it runs."""
-        return "MPC" in self.name
+        return cost_class(self.name).simulates_plant
 
 
 Results = dict[tuple[str, str, str], EpisodeMetrics]

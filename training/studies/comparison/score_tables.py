@@ -10,12 +10,12 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from epv_env.reward import RewardWeights
-from training.evaluation.controller_table import PLANTS
+from training.evaluation.controller_table import PLANTS, summary_table
 from training.evaluation.metrics import EpisodeMetrics, summary
 from training.evaluation.scenarios import RANDOM
 from training.evaluation.statistics import (
     Estimate,
-    estimate,
+    bootstrap_estimate,
     paired_difference,
     pareto_front,
     probability_of_improvement,
@@ -84,16 +84,16 @@ def figures(c: ComparisonResults) -> pd.DataFrame:
 
     A learned contender has two: its chosen run, and all its runs together.
     """
-    rows = []
+    episodes = {}
     for plants in PLANTS:
         for contender in c.contenders:
             runs = {contender.name: [c.chosen[contender.name]]}
             if len(contender.runs) > 1:
                 runs[contender.name + ALL_RUNS] = list(contender.runs)
             for name, members in runs.items():
-                episodes = EpisodeMetrics.joined([c.results[run, plants, RANDOM] for run in members])
-                rows.append({"plants": plants, "controller": name, **summary(episodes)})
-    return pd.DataFrame(rows)
+                parts = [c.results[run, plants, RANDOM] for run in members]
+                episodes[plants, name] = EpisodeMetrics.joined(parts)
+    return summary_table(episodes)
 
 
 def by_scenario(c: ComparisonResults) -> pd.DataFrame:
@@ -116,7 +116,7 @@ def interquartile_means(c: ComparisonResults) -> pd.DataFrame:
     return _rows(
         {
             "plants": plants, "controller": contender.name, "score": field,
-            **_named("value", estimate(c.scores(contender, plants, field))),
+            **_named("value", bootstrap_estimate(c.scores(contender, plants, field))),
         }
         for plants in JUDGED_ON
         for contender in c.contenders

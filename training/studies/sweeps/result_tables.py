@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import spearmanr
 
-from training.evaluation.metrics import left_interval, tail_excursion
+from training.evaluation.metrics import tail_excursion, violation_interval
 from training.studies.parallel_run import Outcome
 from training.studies.sweeps.episode_plan import SweepCell
 
@@ -34,7 +34,7 @@ def _row(cell: SweepCell, parts: list[dict[str, Any]]) -> dict[str, Any]:
     """A cell's row of `point_table`; parts: results of its batches."""
     excursion = np.concatenate([part["excursion_bar"] for part in parts])
     n, left = len(excursion), sum(part["left"] for part in parts)
-    low, high = left_interval(np.arange(n) >= left)
+    low, high = violation_interval(np.arange(n) >= left)
     row = {
         "design": cell.point.design, "factor": cell.point.factor, "level": cell.point.level,
         "controller": cell.controller, "episodes": n,

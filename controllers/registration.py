@@ -1,0 +1,109 @@
+"""What a controller's file says about its controller: how it is built, tuned, and what it costs to run.
+
+The record stands beside the class, in the controller's own file. controllers/registry.py lists it.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from controllers.base import Controller
+from epv_env.plant.parameters import Parameters
+
+
+class RegistrationError(ValueError):
+    """A controller is unknown, or its record and its data do not fit: the message says what to do."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Range:
+    """A real quantity of a search space."""
+
+    low: float
+    """Lower end, in the unit of the quantity."""
+    high: float
+    """Upper end, in the unit of the quantity."""
+    log: bool = False
+    """Whether the search draws it uniformly in its logarithm."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """A quantity of a search space that takes one of a few values."""
+
+    values: tuple[Any, ...]
+
+
+SearchSpace = Mapping[str, Range | Choice]
+"""The tuned quantities by name, in the order in which the search draws them."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CostClass:
+    """How much computing a controller takes, and how much fewer episodes it therefore runs."""
+
+    simulates_plant: bool = False
+    """Whether it simulates the plant as it decides: a second or more of computing per episode."""
+    relative_cpu_time: int = 1
+    """CPU time of an episode over a cheap controller's [1]; measured, 16 side by side against 512."""
+    episode_divisor: int = 1
+    """How many times fewer episodes a comparison runs: the first ones, so that the pairing holds."""
+    paired_random_episodes: int = 0
+    """Least number of random episodes on plant sets where controllers are compared in pairs, if the
+    others run as many."""
+    most_trials: int | None = None
+    """Most trials of its tuning; None: as many as the others."""
+    most_episodes: int | None = None
+    """Most episodes of a trial; None: as many as the others."""
+
+
+CHEAP = CostClass()
+"""Decides by a formula or a table."""
+
+TABLE_PER_PLANT = CostClass(relative_cpu_time=30, episode_divisor=8, paired_random_episodes=512)
+"""Makes a table of each plant that it meets."""
+
+SIMULATING = CostClass(
+    simulates_plant=True, relative_cpu_time=200, episode_divisor=128, paired_random_episodes=128,
+    most_trials=16, most_episodes=32,
+)  # fmt: skip
+"""Simulates the plant as it decides. Its smaller tuning budget still takes a
+thousand times the computing of the others' budget."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Registration:
+    """A controller's record."""
+
+    kind: str
+    """Name in tables, in controllers/tuned.json and on command lines."""
+    controller: type
+    """The class."""
+    build: Callable[[Mapping[str, Any], Parameters], Controller]
+    """Makes the controller from its tuned quantities, designed for a plant. Raises ValueError if the
+    quantities contradict each other."""
+    search_space: SearchSpace | None
+    """The quantities that tuning searches; None: nothing is tuned."""
+    cost: CostClass
+
+    def built(self, values: Mapping[str, Any], parameters: Parameters) -> Controller:
+        """The controller, from exactly the quantities of its search space.
+
+        Args:
+            values: tuned quantities by name.
+            parameters: of the plant that it is designed for.
+
+        Raises:
+            RegistrationError: a quantity is missing or unknown.
+            ValueError: the quantities contradict each other.
+        """
+        expected = set(self.search_space or {})
+        differences = {"lacks": expected - set(values), "has unknown": set(values) - expected}
+        for problem, names in differences.items():
+            if names:
+                raise RegistrationError(
+                    f"controller {self.kind!r} {problem} {', '.join(sorted(names))}: its search space "
+                    "and its tuned values must name the same quantities; tune anew with "
+                    f"`python training/tune.py --only {self.kind!r}`"
+                )
+        return self.build(values, parameters)

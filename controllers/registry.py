@@ -1,0 +1,42 @@
+"""The controllers by kind: one line each. docs/extending.md says how to add one."""
+
+from controllers import hysteresis, mpc, oracle, privileged_pulse, pulse, pwm
+from controllers.base import Controller
+from controllers.registration import CHEAP, CostClass, Registration, RegistrationError
+from epv_env.plant.parameters import Parameters
+
+REGISTRY: tuple[Registration, ...] = (
+    hysteresis.HYSTERESIS,
+    hysteresis.EXTRAPOLATING_HYSTERESIS,
+    pwm.REGISTRATION,
+    pulse.REGISTRATION,
+    mpc.REGISTRATION,
+    privileged_pulse.REGISTRATION,
+    oracle.REGISTRATION,
+)
+"""In the order of the tables."""
+
+
+def registration(kind: str) -> Registration:
+    """The record of a kind. Raises RegistrationError if there is none."""
+    by_kind = {entry.kind: entry for entry in REGISTRY}
+    if kind not in by_kind:
+        raise RegistrationError(f"unknown controller {kind!r}: choose one of {', '.join(by_kind)}")
+    return by_kind[kind]
+
+
+def cost_class(name: str) -> CostClass:
+    """The cost class of a controller by its name in tables; a learned policy is cheap."""
+    return next((entry.cost for entry in REGISTRY if entry.kind == name), CHEAP)
+
+
+def untuned_controllers(parameters: Parameters) -> list[Controller]:
+    """The registered controllers that have nothing to tune: those that see what no ECU measures."""
+    return [entry.built({}, parameters) for entry in REGISTRY if entry.search_space is None]
+
+
+TUNED_KINDS = tuple(entry.kind for entry in REGISTRY if entry.search_space is not None)
+"""Controllers that are tuned, not trained."""
+
+SIMULATING_KINDS = tuple(kind for kind in TUNED_KINDS if cost_class(kind).simulates_plant)
+"""Tuned controllers that simulate the plant as they decide."""

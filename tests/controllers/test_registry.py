@@ -1,0 +1,147 @@
+"""The registry is complete: a class without a record, or a record without its data, is named."""
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import pytest
+
+pytest.importorskip("control")
+
+import controllers
+import epv_env  # noqa: F401 - registers the environments
+from controllers.learned import LearnedPolicy
+from controllers.registration import CHEAP, Choice, Range, Registration, RegistrationError, SearchSpace
+from controllers.registry import REGISTRY, cost_class, registration
+from controllers.tuned import Tuning, build, load_tunings
+from epv_env.plant.parameters import Parameters
+
+FROM_FILES = (LearnedPolicy,)
+"""Controllers that training writes into folders: not registered, since each folder names itself."""
+
+
+def controller_classes() -> list[type]:
+    """Every class in the folder `controllers` that has the protocol's methods."""
+    modules = [
+        import_module(f"controllers.{path.stem}")
+        for path in sorted(Path(controllers.__file__).parent.glob("*.py"))
+        if path.stem not in ("__init__", "base")
+    ]
+    return [
+        each
+        for module in modules
+        for each in vars(module).values()
+        if inspect.isclass(each) and each.__module__ == module.__name__
+        if callable(getattr(each, "act", None)) and callable(getattr(each, "reset", None))
+    ]
+
+
+def unregistered(classes: list[type], registry: tuple[Registration, ...]) -> list[str]:
+    """A sentence for each controller class that the registry does not know."""
+    known = {entry.controller for entry in registry} | set(FROM_FILES)
+    return [
+        f"{each.__module__}.{each.__name__} has no record in controllers/registry.py: write a "
+        "Registration beside the class and list it there"
+        for each in classes
+        if each not in known
+    ]
+
+
+def outside(space: SearchSpace, values: Mapping[str, Any]) -> list[str]:
+    """Quantities whose tuned values do not lie in their search space."""
+    return [
+        name
+        for name, quantity in space.items()
+        if not (
+            values[name] in quantity.values
+            if isinstance(quantity, Choice)
+            else quantity.low <= values[name] <= quantity.high
+        )
+    ]
+
+
+def problems(entry: Registration, tunings: Mapping[str, Tuning]) -> list[str]:
+    """A sentence for each thing that a record lacks or contradicts."""
+    space = entry.search_space
+    if space is not None and entry.kind not in tunings:
+        return [
+            f"controllers/tuned.json lacks {entry.kind!r}: run `python training/tune.py --only "
+            f"{entry.kind!r} --out controllers/tuned.json`"
+        ]
+    try:
+        values = tunings[entry.kind].values if space is not None else {}
+        made = entry.built(values, Parameters.calibrated())
+    except (TypeError, ValueError) as error:
+        return [f"{entry.kind!r} cannot be built from its tuned values: {error}"]
+    checks: dict[str, Callable[[], bool]] = {
+        f"it builds a {type(made).__name__}, not its class": lambda: isinstance(made, entry.controller),
+        f"it is called {made.name!r} in tables": lambda: made.name == entry.kind,
+        f"its environment {made.environment!r} is not registered": (
+            lambda: made.environment in gymnasium.registry
+        ),
+        "its search space is empty: say None if nothing is tuned": lambda: space is None or bool(space),
+        "its tuned values leave its search space": lambda: not outside(space or {}, values),
+    }
+    return [f"{entry.kind!r}: {sentence}" for sentence, holds in checks.items() if not holds()]
+
+
+def test_every_controller_class_is_registered():
+    assert unregistered(controller_classes(), REGISTRY) == []
+
+
+def test_a_class_that_is_not_registered_is_named():
+    (sentence,) = unregistered(controller_classes(), REGISTRY[:-1])
+    assert sentence.startswith("controllers.oracle.Oracle has no record in controllers/registry.py")
+
+
+@pytest.mark.parametrize("entry", REGISTRY, ids=lambda entry: entry.kind)
+def test_every_record_is_complete_and_has_its_data(entry):
+    assert problems(entry, load_tunings()) == []
+
+
+def test_kinds_are_unique():
+    kinds = [entry.kind for entry in REGISTRY]
+    assert sorted(set(kinds)) == sorted(kinds)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (
+            {"kind": "new"},
+            "controllers/tuned.json lacks 'new': run `python training/tune.py --only 'new'",
+        ),
+        ({"search_space": {"gain": Range(low=0.0, high=1.0)}}, "lacks gain"),
+        ({"search_space": {}}, "has unknown open_below, shut_above"),
+        (
+            {"search_space": dict.fromkeys(("open_below", "shut_above"), Range(low=0.0, high=1.0))},
+            "its tuned values leave its search space",
+        ),
+        ({"build": lambda values, parameters: LearnedPolicy(layers=[])}, "it builds a LearnedPolicy"),
+        ({"build": lambda values, parameters: LearnedPolicy(**values)}, "cannot be built"),
+    ],
+)
+def test_what_an_incomplete_record_lacks_is_named(changes, words):
+    assert words in " ".join(problems(replace(registration("hysteresis"), **changes), load_tunings()))
+
+
+def test_a_forgotten_field_is_named():
+    with pytest.raises(TypeError, match="search_space"):
+        Registration(kind="new", controller=LearnedPolicy, build=build, cost=CHEAP)  # type: ignore[call-arg]
+
+
+def test_an_unknown_kind_and_a_forgotten_value_get_one_sentence():
+    with pytest.raises(
+        RegistrationError, match="unknown controller 'fuzzy': choose one of hysteresis, "
+    ):
+        build("fuzzy", {}, Parameters.calibrated())
+    with pytest.raises(RegistrationError, match=r"'hysteresis' lacks shut_above: .* tune anew"):
+        build("hysteresis", {"open_below": -0.1}, Parameters.calibrated())
+
+
+def test_a_learned_policy_is_cheap():
+    assert cost_class("PPO, recurrent") == CHEAP

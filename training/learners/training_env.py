@@ -1,0 +1,68 @@
+"""The environment that PPO trains on: drawn plants, scaled rewards, a recurrent unit's state."""
+
+from stable_baselines3.common.vec_env import VecEnvWrapper, VecMonitor
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
+
+from controllers.learned import GatedUnit
+from epv_env.plant.plantfile import Plant
+from epv_env.reward import RewardWeights
+from epv_env.sb3 import make_sb3_env
+from training.evaluation.seeds import training_seeds
+from training.learners.hyperparameters import Hyperparameters
+from training.learners.recurrent_state_wrapper import RecurrentStateWrapper
+
+
+class ScaledReward(VecEnvWrapper):
+    """Rewards times a constant; the monitor inside counts them as they are."""
+
+    def __init__(self, env: VecMonitor, scale: float):
+        """scale: factor of the rewards [1]."""
+        super().__init__(env)
+        self._scale = scale
+
+    def reset(self) -> VecEnvObs:
+        """First observations (n, entries)."""
+        return self.venv.reset()
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """Observations (n, entries), scaled rewards (n,), ends (n,) and infos."""
+        observation, reward, done, infos = self.venv.step_wait()
+        return observation, self._scale * reward, done, infos
+
+
+def make_training_env(
+    h: Hyperparameters,
+    *,
+    plant: Plant,
+    scenario: str,
+    parameters: str,
+    seed: int,
+    weights: RewardWeights,
+    cell: GatedUnit | None = None,
+) -> VecEnvWrapper:
+    """Episodes on drawn plants. Trainings with different seeds meet different episodes.
+
+    Args:
+        h: hyperparameters, of which the number and the length of episodes and the reward's scale count.
+        plant: centre of the region.
+        scenario: of the consumption.
+        parameters: region that plants are drawn from, "confidence" or another (epv_env.settings).
+        seed: of the training.
+        weights: prices of the reward.
+        cell: a unit whose state ends the observations (training/learners/recurrent_state_wrapper.py).
+
+    Raises:
+        ValueError: the seed is too large (training/evaluation/seeds.py).
+    """
+    env = make_sb3_env(
+        "EPValve-v0",
+        h.num_envs,
+        max_episode_steps=h.episode_steps,
+        plant=plant,
+        parameters=parameters,
+        scenario=scenario,
+        weights=weights,
+    )
+    env.seed(training_seeds(seed, h.num_envs)[0])
+    scaled = ScaledReward(VecMonitor(env), h.reward_scale)
+    return RecurrentStateWrapper(scaled, cell) if cell else scaled
