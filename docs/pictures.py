@@ -16,7 +16,7 @@ from identification.bench.programmes import REPORT_SUITE
 from identification.bench.session import run_bench
 from identification.calibration.multi_start import METHODS
 from identification.confidence import confidence_figures as figures
-from identification.pipeline.stages import Identification
+from identification.pipeline.identification import Identification
 from identification.replay.response_figures import overlay
 from identification.studies.coverage.coverage import coverage_study
 from identification.studies.coverage.coverage_figure import distances

@@ -7,7 +7,7 @@ import numpy as np
 
 from epv_env.plant.parameters import Parameters, confidence_intervals, table
 from identification.calibration.multi_start import METHODS
-from identification.pipeline.stages import Identification
+from identification.pipeline.identification import Identification
 from identification.recordings.recording import OUTPUTS
 from identification.replay.error_tables import errors_as_json, percent
 from identification.replay.responses import Response, responses, total

@@ -6,7 +6,7 @@ from typing import Any
 from epv_env.plant.parameters import Parameters
 from identification.bench.programmes import REPORT_SUITE
 from identification.bench.session import run_bench
-from identification.pipeline.stages import Identification
+from identification.pipeline.identification import Identification
 from identification.quality.assess import assess
 from identification.quality.quality_export import as_json as quality_json
 from identification.quality.quality_section import quality_section
