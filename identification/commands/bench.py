@@ -3,7 +3,6 @@
 import argparse
 from pathlib import Path
 
-from epv_env.common.command_line import writable_folder
 from epv_env.plant.effects import CATALOGUE
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import load_plant, save_plant

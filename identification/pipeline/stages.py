@@ -43,7 +43,7 @@ class Stage:
     time_share: float
     """Share of a whole run's time, for the estimate of what is left."""
     role: str | None = None
-    """Role of the recordings without which a whole run leaves the stage out; None: it needs no others."""
+    """Role of recordings that the stage needs; a whole run without them leaves the stage out."""
 
 
 def quality(identification: Identification) -> Result:
