@@ -17,7 +17,7 @@ from identification.bench.session import run_bench
 from identification.calibration.multi_start import METHODS
 from identification.confidence import confidence_figures as figures
 from identification.pipeline.identification import Identification
-from identification.replay.response_figures import overlay
+from identification.replay.response_figures import response_figure
 from identification.studies.coverage.coverage import coverage_study
 from identification.studies.coverage.coverage_figure import distances
 
@@ -29,7 +29,7 @@ def drawn(coverage: Path, campaigns: int) -> dict[str, Figure]:
         identification = Identification(campaign, Path(folder) / "searches.jsonl", starts=1)
         study = coverage_study(journal=coverage / "coverage.jsonl", campaigns=campaigns)
         return {
-            "calibration.png": overlay(identification.calibration.after[METHODS[0]][0]),
+            "calibration.png": response_figure(identification.calibration.after[METHODS[0]][0]),
             "region.png": figures.region(identification.confidence),
             "coverage.png": distances(study),
         }

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 from identification.report_2003.cases import (
     CALIBRATION_CASES,
-    CIRCUIT,
-    SUPPLY,
+    CIRCUIT_PRESSURE,
+    ENERGISED_VOLTAGE,
+    SUPPLY_PRESSURE,
     VALIDATION_CASE,
-    VOLTAGE,
     Case,
 )
 
@@ -21,11 +21,11 @@ class Programme:
     name: str
     role: str
     case: Case
-    p1: float = SUPPLY
+    p1: float = SUPPLY_PRESSURE
     """Supply pressure at the start [Pa absolute]."""
-    p2: float = CIRCUIT
+    p2: float = CIRCUIT_PRESSURE
     """Circuit pressure at the start [Pa absolute]."""
-    U_on: float = VOLTAGE
+    U_on: float = ENERGISED_VOLTAGE
     """Voltage of the energised coil [V]."""
 
 

@@ -27,7 +27,7 @@ class Schedule:
         return float(self.borders[-1])
 
 
-def scheduled(
+def piecewise_schedule(
     parameters: Parameters,
     initial: State,
     borders: ArrayLike,

@@ -4,17 +4,17 @@ from collections.abc import Sequence
 
 from epv_env.common.progress import progress
 from epv_env.plant.parameters import Parameters
-from identification.bench.campaign import measured_campaign, run_programme
+from identification.bench.measurement import measured_campaign, run_programme
 from identification.bench.programmes import Programme
 from identification.recordings.recording import Campaign
-from identification.report_2003.cases import RATE
+from identification.report_2003.cases import SAMPLING_RATE
 
 SLOWEST, FASTEST = 500.0, 20_000.0
 """Sampling rates of the bench [1/s]."""
 
 
 def run_bench(
-    suite: Sequence[Programme], truth: Parameters, *, seed: int, rate: float = RATE
+    suite: Sequence[Programme], truth: Parameters, *, seed: int, rate: float = SAMPLING_RATE
 ) -> Campaign:
     """Run and measure every programme on a plant with the true parameters.
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from epv_env.common.journal import Journal
 from epv_env.plant.parameters import Parameters
-from identification.calibration.methods import Fit
-from identification.calibration.multi_start import best, fit_from_all, starting_points
-from identification.calibration.problem import Problem
-from identification.calibration.warnings import warnings_of
+from identification.calibration.calibration_warnings import calibration_warnings
+from identification.calibration.multi_start import best_search, search_from_all_starts, starting_points
+from identification.calibration.problem import CalibrationProblem
+from identification.calibration.search_methods import SearchResult
 from identification.replay.responses import Response, responses
 
 STARTS = 6
@@ -20,8 +20,8 @@ STARTS = 6
 class Calibration:
     """What the calibration found."""
 
-    problem: Problem
-    fits: Mapping[str, list[Fit]]
+    problem: CalibrationProblem
+    fits: Mapping[str, list[SearchResult]]
     """By method, one for each start; the first start is the reference (Table 10)."""
     warnings: list[str]
     before: list[Response]
@@ -29,9 +29,9 @@ class Calibration:
     after: Mapping[str, list[Response]]
     """By method (Table 13)."""
 
-    def best(self, method: str) -> Fit:
+    def best(self, method: str) -> SearchResult:
         """The least error that a method found."""
-        return best(self.fits[method])
+        return best_search(self.fits[method])
 
     def parameters(self, method: str) -> Parameters:
         """The estimate of a method."""
@@ -39,7 +39,7 @@ class Calibration:
 
 
 def calibrate(
-    problem: Problem,
+    problem: CalibrationProblem,
     *,
     journal: Path,
     subject: Mapping[str, object],
@@ -54,15 +54,15 @@ def calibrate(
     symbols = list(problem.vector.symbols)
     reference = dict(problem.vector.reference)
     about = {**subject, "symbols": symbols, "reference": reference, "seed": seed, "starts": starts}
-    fits = fit_from_all(problem, points, Journal(journal, about))
+    fits = search_from_all_starts(problem, points, Journal(journal, about))
     after = {
-        method: responses(problem.calibration, problem.vector.parameters(best(found).z))
+        method: responses(problem.calibration, problem.vector.parameters(best_search(found).z))
         for method, found in fits.items()
     }
     return Calibration(
         problem=problem,
         fits=fits,
-        warnings=warnings_of(problem, fits),
+        warnings=calibration_warnings(problem, fits),
         before=responses(problem.calibration, problem.vector.reference),
         after=after,
     )

@@ -4,10 +4,10 @@ from typing import Any
 
 from epv_env.plant.parameters import table
 from identification.calibration.calibrate import Calibration
-from identification.calibration.multi_start import METHODS, reached_the_best
+from identification.calibration.multi_start import METHODS, reached_best
 from identification.replay.error_tables import error_table, errors_as_json, percent
-from identification.replay.response_figures import overlay
-from identification.replay.responses import total
+from identification.replay.response_figures import response_figure
+from identification.replay.responses import total_response_error
 from identification.report.page import Picture, Section, Table, Text, Verdict
 
 TOLERANCE = 0.1
@@ -29,7 +29,7 @@ def calibration_section(calibration: Calibration) -> Section:
                 for method in METHODS
             ),
             *(
-                Picture(figure=overlay(answer), caption="Calibration: " + answer.recording.name)
+                Picture(figure=response_figure(answer), caption="Calibration: " + answer.recording.name)
                 for answer in calibration.after["least squares"][:8]
             ),
         ],
@@ -56,7 +56,10 @@ def calibration_json(calibration: Calibration) -> dict[str, Any]:
 
 
 def _verdict(calibration: Calibration) -> Verdict:
-    error, before = total(calibration.after["Nelder-Mead"]), total(calibration.before)
+    error, before = (
+        total_response_error(calibration.after["Nelder-Mead"]),
+        total_response_error(calibration.before),
+    )
     rms = calibration.best("least squares").error
     good = error < TOLERANCE
     return Verdict(
@@ -105,7 +108,7 @@ def _starts(calibration: Calibration) -> Table:
     rows = []
     for method in METHODS:
         fits = calibration.fits[method]
-        for fit, reached in zip(fits, reached_the_best(fits), strict=True):
+        for fit, reached in zip(fits, reached_best(fits), strict=True):
             rows.append(
                 [
                     method,

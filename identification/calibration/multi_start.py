@@ -6,14 +6,14 @@ from scipy.stats import qmc
 
 from epv_env.common.journal import Journal
 from epv_env.common.progress import progress
-from identification.calibration.methods import Fit, nelder_mead, weighted_least_squares
-from identification.calibration.problem import Problem
-from identification.replay.vector import Vector
+from identification.calibration.problem import CalibrationProblem
+from identification.calibration.search_methods import SearchResult, nelder_mead, weighted_least_squares
+from identification.replay.parameter_vector import ParameterVector
 
 METHODS = ("Nelder-Mead", "least squares")
 
 
-def starting_points(vector: Vector, count: int, seed: int) -> NDArray:
+def starting_points(vector: ParameterVector, count: int, seed: int) -> NDArray:
     """Scaled vectors (count, k): the reference, then a Latin hypercube over the domains.
 
     Each symbol is spread evenly over the logarithm of its domain, of which RML's spans a decade; over
@@ -27,26 +27,28 @@ def starting_points(vector: Vector, count: int, seed: int) -> NDArray:
     return np.vstack([vector.of(vector.reference), spread])
 
 
-def fit_from_all(problem: Problem, starts: NDArray, journal: Journal) -> dict[str, list[Fit]]:
+def search_from_all_starts(
+    problem: CalibrationProblem, starts: NDArray, journal: Journal
+) -> dict[str, list[SearchResult]]:
     """Both methods from every start; those that the journal holds are taken from it."""
     misfits = {"Nelder-Mead": problem.total_error(), "least squares": problem.least_squares()}
     searches = {"Nelder-Mead": nelder_mead, "least squares": weighted_least_squares}
-    found: dict[str, list[Fit]] = {method: [] for method in METHODS}
+    found: dict[str, list[SearchResult]] = {method: [] for method in METHODS}
     tasks = [(method, index) for index in range(len(starts)) for method in METHODS]
     for method, index in progress(tasks, what="calibrate: searches"):
         name = f"{method} {index}"
         if name not in journal:
             journal.add(name, searches[method](misfits[method], starts[index]).as_json())
-        found[method].append(Fit.from_json(journal[name]))
+        found[method].append(SearchResult.from_json(journal[name]))
     return found
 
 
-def best(fits: list[Fit]) -> Fit:
+def best_search(fits: list[SearchResult]) -> SearchResult:
     """The fit with the least error."""
     return min(fits, key=lambda fit: fit.error)
 
 
-def reached_the_best(fits: list[Fit], tolerance: float = 1e-3) -> NDArray:
+def reached_best(fits: list[SearchResult], tolerance: float = 1e-3) -> NDArray:
     """Which searches ended within a relative `tolerance` of the best, boolean (starts,)."""
-    ends, goal = np.array([fit.z for fit in fits]), best(fits).z
+    ends, goal = np.array([fit.z for fit in fits]), best_search(fits).z
     return np.all(np.abs(ends - goal) <= tolerance * np.maximum(np.abs(goal), tolerance), axis=1)

@@ -12,7 +12,7 @@ from identification.bench.session import run_bench
 from identification.commands.command import Command
 from identification.commands.options import add_out, add_seed
 from identification.recordings.campaign_files import check_vacant, write_campaign
-from identification.report_2003.cases import RATE
+from identification.report_2003.cases import SAMPLING_RATE
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -22,7 +22,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     recordings = parser.add_mutually_exclusive_group()
     recordings.add_argument("--suite", choices=SUITES, default="report", help="which recordings")
     recordings.add_argument("--programme", type=Path, default=None, help="JSON file of other recordings")
-    parser.add_argument("--rate", type=float, default=RATE, help="samples per second")
+    parser.add_argument("--rate", type=float, default=SAMPLING_RATE, help="samples per second")
     parser.add_argument("--plant", default=None, help="plant file of the truth; default: Table 12")
     parser.add_argument(
         "--set", action="append", default=[], metavar="SYMBOL=VALUE", help="another true value [SI]"

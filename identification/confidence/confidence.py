@@ -11,10 +11,10 @@ from statsmodels.tools.numdiff import approx_fprime, approx_hess
 
 from epv_env.plant.region import Region
 from identification.calibration.calibrate import Calibration
-from identification.calibration.problem import Problem
-from identification.confidence.bootstrap import block_bootstrap
-from identification.confidence.covariance import Covariance, covariance
-from identification.confidence.printed_interval import PROBABILITY, ReportInterval, report_interval
+from identification.calibration.problem import CalibrationProblem
+from identification.confidence.block_bootstrap import block_bootstrap
+from identification.confidence.covariance import EstimateCovariance, estimate_covariance
+from identification.confidence.report_interval import PROBABILITY, ReportInterval, report_interval
 
 DIFFERENCE = 1e-3
 """Relative step of the gradient and the Hessian of the total error."""
@@ -41,10 +41,10 @@ class Minimum:
 class Confidence:
     """How sure a calibration is."""
 
-    problem: Problem
+    problem: CalibrationProblem
     estimate: NDArray
     """Least-squares estimate, scaled (k,)."""
-    covariance: Covariance
+    covariance: EstimateCovariance
     bootstrap: NDArray
     """Movements of the estimate under the block bootstrap (draws, k)."""
     nelder_mead: NDArray
@@ -93,12 +93,12 @@ class Confidence:
         return {symbol: (float(low[i]), float(high[i])) for i, symbol in enumerate(vector.symbols)}
 
 
-def confidence(calibration: Calibration, *, seed: int = 0) -> Confidence:
+def assess_confidence(calibration: Calibration, *, seed: int = 0) -> Confidence:
     """Intervals of both estimates, the joint region, and the check of gradient and Hessian."""
     problem = calibration.problem
     misfit = problem.least_squares()
     z = calibration.best("least squares").z
-    found = covariance(problem, misfit, z, seed=seed)
+    found = estimate_covariance(problem, misfit, z, seed=seed)
     residuals, jacobians = misfit.linearised(z)
     simplex = calibration.best("Nelder-Mead")
     return Confidence(
@@ -112,7 +112,7 @@ def confidence(calibration: Calibration, *, seed: int = 0) -> Confidence:
     )
 
 
-def _minimum(problem: Problem, z: NDArray) -> Minimum:
+def _minimum(problem: CalibrationProblem, z: NDArray) -> Minimum:
     error = problem.total_error().error
     offsets = np.linspace(-PROFILE, PROFILE, 41)
     hessian = approx_hess(z, error, epsilon=np.full(len(z), DIFFERENCE))

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from statsmodels.stats.sandwich_covariance import S_hac_simple
 from statsmodels.tsa.stattools import acf
 
-from identification.calibration.problem import Problem
+from identification.calibration.problem import CalibrationProblem
 from identification.recordings.recording import OUTPUTS, Recording
-from identification.replay.drive import Drive, drive_of
-from identification.replay.misfit import Misfit
-from identification.replay.model import Replay
+from identification.replay.batch_simulation import Replay
+from identification.replay.model_inputs import ModelInputs, model_inputs
+from identification.replay.weighted_residuals import WeightedResiduals
 
 DRAWS = 8
 """Of the inputs' noise, for each recording."""
@@ -32,7 +32,7 @@ ZEROED = ("U", "p1", "p2")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Covariance:
+class EstimateCovariance:
     """Covariances (k, k) of a scaled vector."""
 
     independent: NDArray
@@ -50,7 +50,9 @@ class Covariance:
         return self.residual + self.inputs
 
 
-def covariance(problem: Problem, misfit: Misfit, z: NDArray, *, seed: int = 0) -> Covariance:
+def estimate_covariance(
+    problem: CalibrationProblem, misfit: WeightedResiduals, z: NDArray, *, seed: int = 0
+) -> EstimateCovariance:
     """Covariance of the estimate z (k,) that minimises one of the problem's misfits."""
     residuals, jacobians = misfit.linearised(z)
     H = np.linalg.inv(sum(J.T @ J for J in jacobians))
@@ -60,7 +62,7 @@ def covariance(problem: Problem, misfit: Misfit, z: NDArray, *, seed: int = 0) -
     middle = sum(S_hac_simple(s, nlags=lags) for s in score_series(residuals, jacobians))
     influence = [H @ J.T for J in jacobians]
     inputs = _input_share(problem, misfit, z, influence, seed)
-    return Covariance(
+    return EstimateCovariance(
         independent=variance * H,
         residual=H @ middle @ H,
         inputs=inputs + _offset_share(problem, misfit, z, influence),
@@ -93,7 +95,11 @@ def correlation_lags(residual: NDArray) -> int:
 
 
 def _input_share(
-    problem: Problem, misfit: Misfit, z: NDArray, influence: Sequence[NDArray], seed: int
+    problem: CalibrationProblem,
+    misfit: WeightedResiduals,
+    z: NDArray,
+    influence: Sequence[NDArray],
+    seed: int,
 ) -> NDArray:
     """Mean square of how far redrawn input noise moves the estimate, summed over the recordings.
 
@@ -111,7 +117,9 @@ def _input_share(
     return share
 
 
-def _offset_share(problem: Problem, misfit: Misfit, z: NDArray, influence: Sequence[NDArray]) -> NDArray:
+def _offset_share(
+    problem: CalibrationProblem, misfit: WeightedResiduals, z: NDArray, influence: Sequence[NDArray]
+) -> NDArray:
     """How far the standard errors of the offsets, common to all recordings, move the estimate."""
     values = misfit.vector.values(z)
     known = misfit.replay.outputs(values)
@@ -132,7 +140,7 @@ def _offset_share(problem: Problem, misfit: Misfit, z: NDArray, influence: Seque
     return share
 
 
-def _shifted(drive: Drive, channel: str, error: float) -> Drive:
+def _shifted(drive: ModelInputs, channel: str, error: float) -> ModelInputs:
     """The drive that would follow if a channel read higher by `error` [SI units]."""
     if channel == "U":
         return replace(drive, U=drive.U + error, U_start=drive.U_start + error)
@@ -141,11 +149,13 @@ def _shifted(drive: Drive, channel: str, error: float) -> Drive:
     return replace(drive, p2_start=drive.p2_start + error)
 
 
-def _redrawn(problem: Problem, drives: Sequence[Drive], rng: np.random.Generator) -> list[Drive]:
+def _redrawn(
+    problem: CalibrationProblem, drives: Sequence[ModelInputs], rng: np.random.Generator
+) -> list[ModelInputs]:
     """DRAWS drives per recording, as they would follow from other noise on the same inputs."""
     return [
         _with_start_of(
-            drive, drive_of(_noisy(recording, drive, problem.noise, rng), problem.vector.reference)
+            drive, model_inputs(_noisy(recording, drive, problem.noise, rng), problem.vector.reference)
         )
         for recording, drive in zip(problem.calibration, drives, strict=True)
         for _ in range(DRAWS)
@@ -153,7 +163,7 @@ def _redrawn(problem: Problem, drives: Sequence[Drive], rng: np.random.Generator
 
 
 def _noisy(
-    recording: Recording, drive: Drive, noise: Mapping[str, float], rng: np.random.Generator
+    recording: Recording, drive: ModelInputs, noise: Mapping[str, float], rng: np.random.Generator
 ) -> Recording:
     drawn = {
         name: getattr(drive, name) + noise[name] * rng.standard_normal(len(recording)) for name in INPUTS
@@ -161,6 +171,6 @@ def _noisy(
     return replace(recording, **drawn)
 
 
-def _with_start_of(drive: Drive, redrawn: Drive) -> Drive:
+def _with_start_of(drive: ModelInputs, redrawn: ModelInputs) -> ModelInputs:
     """The redrawn inputs with the circuit pressure of the original start, which is a nuisance."""
     return replace(redrawn, p2_start=drive.p2_start)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from epv_env.plant.parameters import Parameters
 from identification.calibration.calibrate import STARTS, Calibration, calibrate
-from identification.calibration.problem import Problem, calibration_problem
-from identification.confidence.confidence import Confidence, confidence
+from identification.calibration.problem import CalibrationProblem, calibration_problem
+from identification.confidence.confidence import Confidence, assess_confidence
 from identification.recordings.recording import Campaign
 
 ESTIMATOR = "least squares"
@@ -33,7 +33,7 @@ class Identification:
         return {recording.name: recording.sha256 for recording in self.campaign.recordings}
 
     @cached_property
-    def problem(self) -> Problem:
+    def problem(self) -> CalibrationProblem:
         """What is to be fitted to which recordings. Raises CampaignError."""
         return calibration_problem(self.campaign)
 
@@ -54,7 +54,7 @@ class Identification:
     @cached_property
     def confidence(self) -> Confidence:
         """Intervals and joint region."""
-        return confidence(self.calibration, seed=self.seed)
+        return assess_confidence(self.calibration, seed=self.seed)
 
     @property
     def parameters(self) -> Parameters:

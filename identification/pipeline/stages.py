@@ -8,15 +8,15 @@ from identification.calibration.calibration_section import calibration_json, cal
 from identification.confidence.confidence_section import confidence_json, confidence_section
 from identification.pipeline.identification import Identification
 from identification.quality import quality_export
-from identification.quality.assess import assess
+from identification.quality.assessment import assess_recording
 from identification.quality.quality_section import quality_section
 from identification.recordings.recording import CampaignError
 from identification.report.page import Section, Verdict
 from identification.sensitivity import sensitivity_export
 from identification.sensitivity.collinearity import sensitivities_on_recordings
 from identification.sensitivity.one_at_a_time import studied_symbols
-from identification.sensitivity.results import run_study
 from identification.sensitivity.sensitivity_section import sensitivity_section
+from identification.sensitivity.sensitivity_study import run_sensitivity_study
 from identification.validation.validate import validate
 from identification.validation.validation_section import validation_json, validation_section
 
@@ -54,7 +54,9 @@ def quality(identification: Identification) -> Result:
             f"campaign {identification.campaign.name!r} has no recording with role 'quality': record "
             "about 5 s at rest, coil off and exhausted, and list it in campaign.json"
         )
-    assessments = [assess(recording, identification.campaign.pressure) for recording in recordings]
+    assessments = [
+        assess_recording(recording, identification.campaign.pressure) for recording in recordings
+    ]
     return Result(
         sections=[quality_section(assessment) for assessment in assessments],
         content={"quality": [quality_export.as_json(assessment) for assessment in assessments]},
@@ -66,7 +68,7 @@ def sensitivity(identification: Identification) -> Result:
     problem = identification.problem
     replay = problem.least_squares().replay
     outputs = sensitivities_on_recordings(replay, studied_symbols(), problem.noise)
-    study = run_study(outputs=outputs, seed=identification.seed)
+    study = run_sensitivity_study(outputs=outputs, seed=identification.seed)
     return Result(
         sections=[sensitivity_section(study)],
         content={"sensitivity": sensitivity_export.as_json(study)},

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.sensors import SENSORS, Sensor
-from identification.quality.dependence import Whiteness, assess_whiteness
+from identification.quality.correlation_tests import WhitenessTest, assess_whiteness
 from identification.quality.normality import UNTESTED, Normality, assess_normality
-from identification.quality.resolution import longest_run, quantum, run_limit
+from identification.quality.quantisation import converter_step, longest_run, run_limit
 from identification.quality.statistics import (
-    Description,
+    DescriptiveStatistics,
     Trend,
-    describe,
+    descriptive_statistics,
     fit_trend,
     outlier_limit,
 )
@@ -26,7 +26,7 @@ SIGNIFICANCE = 1e-4
 
 
 @dataclass(frozen=True, kw_only=True)
-class Channel:
+class ChannelAssessment:
     """One channel's readings and what they show."""
 
     name: str
@@ -39,7 +39,7 @@ class Channel:
     rest: float
     """What a perfect sensor reads with the coil off and the chambers vented [A, V or bar]."""
     trend: Trend
-    description: Description
+    description: DescriptiveStatistics
     quantum: float
     """Step of the converter as the readings show it; 0.0 without a grid."""
     rounding: float
@@ -49,7 +49,7 @@ class Channel:
     run_limit: int
     """What independent readings do not reach."""
     normality: Normality
-    whiteness: Whiteness | None
+    whiteness: WhitenessTest | None
     """None for a signal that never changes."""
 
     @property
@@ -101,16 +101,18 @@ class Channel:
         return outlier_limit(len(self.readings), rounding=self.rounding)
 
 
-def assess_channel(name: str, readings: NDArray, *, period: float, rest: float, lags: int) -> Channel:
+def assess_channel(
+    name: str, readings: NDArray, *, period: float, rest: float, lags: int
+) -> ChannelAssessment:
     """Statistics of one channel; readings (samples,) and rest in A, V or bar, period [s]."""
     time = np.arange(len(readings)) * period
     trend = fit_trend(time, readings)
     moves = bool(np.ptp(readings) > 0)
     residual = readings - trend.at(time) if moves else np.zeros_like(readings)
-    description = describe(residual, greatest=SENSORS[name].high)
-    step = quantum(readings)
+    description = descriptive_statistics(residual, greatest=SENSORS[name].high)
+    step = converter_step(readings)
     rounding = step / description.standard_deviation if moves else 0.0
-    return Channel(
+    return ChannelAssessment(
         name=name,
         readings=readings,
         residual=residual,

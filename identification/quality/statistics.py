@@ -27,7 +27,7 @@ class Trend:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Description:
+class DescriptiveStatistics:
     """Central, dispersion and distribution properties of a detrended signal y (Table 3).
 
     A signal that never changes has no outlier factor, kurtosis or skewness: they are NaN.
@@ -68,14 +68,14 @@ def fit_trend(time: NDArray, signal: NDArray) -> Trend:
     )
 
 
-def describe(residual: NDArray, *, greatest: float) -> Description:
+def descriptive_statistics(residual: NDArray, *, greatest: float) -> DescriptiveStatistics:
     """Table 3's statistics of a detrended signal, (samples,).
 
     greatest: greatest value of the channel's range (Table 1), max(y) in eq. 17 [unit].
     """
     sigma = float(np.std(residual, ddof=1))
     moves = np.ptp(residual) > 0
-    return Description(
+    return DescriptiveStatistics(
         arithmetic_mean=float(np.mean(residual)),
         trimmed_mean=float(stats.trim_mean(residual, 0.025)),
         median=float(np.median(residual)),

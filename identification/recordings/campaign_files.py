@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.common.files import write_text
-from identification.recordings.checks import check_recording
-from identification.recordings.columns import CONSUMPTION, TIME, read_columns
+from identification.recordings.columns import CONSUMPTION_COLUMN, TIME_COLUMN, read_columns
 from identification.recordings.manifest import (
     BAR,
     FILE_NAME,
@@ -21,9 +20,10 @@ from identification.recordings.manifest import (
     read_manifest,
 )
 from identification.recordings.recording import Campaign, CampaignError, Recording
+from identification.recordings.recording_checks import check_recording
 
 DECIMALS = {
-    TIME: 9, "I_A": 6, "U_V": 5, "p1_bar": 5, "p2_bar": 5, "p3_bar": 5, CONSUMPTION: 9
+    TIME_COLUMN: 9, "I_A": 6, "U_V": 5, "p1_bar": 5, "p2_bar": 5, "p3_bar": 5, CONSUMPTION_COLUMN: 9
 }  # fmt: skip
 """Decimals written: a hundredth of an ADC step or less, and any rate's times as uniform."""
 
@@ -86,7 +86,7 @@ def _read_recording(path: Path, role: str, ambient: float) -> Recording:
         p1=np.mean(supply, axis=0) * BAR,
         p2=columns["p2_bar"] * BAR,
         p3=columns["p3_bar"] * BAR,
-        sigma_S=columns.get(CONSUMPTION, np.zeros_like(columns["U_V"])),
+        sigma_S=columns.get(CONSUMPTION_COLUMN, np.zeros_like(columns["U_V"])),
         sha256=hashlib.sha256(content).hexdigest(),
     )
 
@@ -94,7 +94,7 @@ def _read_recording(path: Path, role: str, ambient: float) -> Recording:
 def _columns(recording: Recording) -> dict[str, NDArray]:
     """A recording's columns as they are written: units of the file, rounded."""
     columns = {
-        TIME: recording.time,
+        TIME_COLUMN: recording.time,
         "I_A": recording.I,
         "U_V": recording.U,
         "p1_bar": recording.p1 / BAR,
@@ -102,7 +102,7 @@ def _columns(recording: Recording) -> dict[str, NDArray]:
         "p3_bar": recording.p3 / BAR,
     }
     if np.any(recording.sigma_S):
-        columns[CONSUMPTION] = recording.sigma_S
+        columns[CONSUMPTION_COLUMN] = recording.sigma_S
     return {name: np.round(values, DECIMALS[name]) for name, values in columns.items()}
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from identification.recordings.recording import CampaignError
 
-TIME, CONSUMPTION = "time_s", "sigmaS_kg_per_s"
+TIME_COLUMN, CONSUMPTION_COLUMN = "time_s", "sigmaS_kg_per_s"
 
 CHANNEL_OF: Mapping[str, str] = {
     "I_A": "I",
@@ -23,14 +23,14 @@ CHANNEL_OF: Mapping[str, str] = {
 }
 """Measured channel (recording.CHANNELS) in each column, in the unit of its name."""
 
-REQUIRED = (TIME, "I_A", "U_V", "p2_bar", "p3_bar")
-SUPPLY = (("p1_bar",), ("p1a_bar", "p1b_bar"))
+REQUIRED_COLUMNS = (TIME_COLUMN, "I_A", "U_V", "p2_bar", "p3_bar")
+SUPPLY_COLUMNS = (("p1_bar",), ("p1a_bar", "p1b_bar"))
 """The two ways to give p1: one column, or the two reservoirs' sensors."""
 
-KNOWN = (TIME, *CHANNEL_OF, CONSUMPTION)
+KNOWN_COLUMNS = (TIME_COLUMN, *CHANNEL_OF, CONSUMPTION_COLUMN)
 
 
-def line(sample: int) -> int:
+def line_number(sample: int) -> int:
     """Number of a sample's line in its file; the header is line 1."""
     return sample + 2
 
@@ -42,7 +42,7 @@ def read_columns(file: str, content: bytes) -> dict[str, NDArray]:
     """
     text = _decoded(file, content)
     names = _column_names(file, text)
-    wanted = [index for index, name in enumerate(names) if name in KNOWN]
+    wanted = [index for index, name in enumerate(names) if name in KNOWN_COLUMNS]
     values = _parsed_at_once(text, len(names), wanted)
     if values is None:
         values = _parsed_by_line(file, text, names, wanted)
@@ -74,14 +74,14 @@ def _check_names(place: str, names: Sequence[str]) -> None:
     for name in names:
         if names.count(name) > 1:
             raise CampaignError(f"{place}: column {name!r} stands twice: keep one of them")
-    missing = [name for name in REQUIRED if name not in names]
+    missing = [name for name in REQUIRED_COLUMNS if name not in names]
     if missing:
         raise CampaignError(
             f"{place}: missing {', '.join(missing)} in the header {','.join(names)[:120]!r}: "
             "name these columns as docs/data.md does, separated by commas"
         )
-    given = tuple(name for way in SUPPLY for name in way if name in names)
-    if given not in SUPPLY:
+    given = tuple(name for way in SUPPLY_COLUMNS for name in way if name in names)
+    if given not in SUPPLY_COLUMNS:
         raise CampaignError(
             f"{place}: p1 is given by {' and '.join(given) or 'no column'}: "
             "give p1_bar, or both p1a_bar and p1b_bar, not a mixture"

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.sensors import SENSORS
-from identification.recordings.columns import line
+from identification.recordings.columns import line_number
 from identification.recordings.recording import CampaignError
 
 CHOKED = 2.2
@@ -39,7 +39,8 @@ def check_above_ambient(file: str, name: str, pressure: NDArray, ambient: float)
     if np.quantile(pressure, 0.01) < ambient - MARGIN:
         sample = int(np.argmax(pressure < ambient - MARGIN))
         raise CampaignError(
-            f"{file}, line {line(sample)}: {name} is {pressure[sample]:g}, less than the environment's "
+            f"{file}, line {line_number(sample)}: {name} is {pressure[sample]:g}, less than the "
+            "environment's "
             f"{ambient:g} bar by more than the sensor's accuracy of {MARGIN:g} bar, which {REMEDY}"
         )
 
@@ -57,7 +58,8 @@ def check_discharge(file: str, U: NDArray, p3: NDArray, period: float, ambient: 
     found = np.array([end, _common_end(p3, late, period)])
     if np.all(np.abs(found + ambient) < LIKENESS * ambient):
         raise CampaignError(
-            f"{file}, line {line(discharges[0].start)}: p3_bar vents towards {end:.2f} bar where choked "
+            f"{file}, line {line_number(discharges[0].start)}: p3_bar vents towards {end:.2f} bar "
+            "where choked "
             f"flow leads towards 0 bar absolute, which {REMEDY}"
         )
 
@@ -67,7 +69,8 @@ def check_against_supply(file: str, name: str, p1: NDArray, p3: NDArray) -> None
     difference = float(np.mean(p1) - np.mean(p3))
     if difference < -2 * MARGIN:
         raise CampaignError(
-            f"{file}, lines {line(0)} to {line(len(p1) - 1)}: {name} is {-difference:.2f} bar less than "
+            f"{file}, lines {line_number(0)} to {line_number(len(p1) - 1)}: {name} is "
+            f"{-difference:.2f} bar less than "
             f"p3_bar, to which the energised valve joins it, which {REMEDY}"
         )
 

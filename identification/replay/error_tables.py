@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from identification.recordings.recording import OUTPUTS
-from identification.replay.responses import Response, total
+from identification.replay.responses import Response, total_response_error
 from identification.report.page import Table
 
 COLUMNS = ["Case", *(f"eps_{output} [%]" for output in OUTPUTS), "eps_partial [%]"]
@@ -17,7 +17,7 @@ def error_table(answers: Sequence[Response], caption: str) -> Table:
         for answer in answers
     ]
     if len(answers) > 1:
-        rows.append(["all (eps_total)", "", "", "", percent(total(answers))])
+        rows.append(["all (eps_total)", "", "", "", percent(total_response_error(answers))])
     return Table(columns=COLUMNS, rows=rows, caption=caption)
 
 
@@ -30,7 +30,7 @@ def errors_as_json(answers: Sequence[Response]) -> Mapping[str, Any]:
         }
         for answer in answers
     }
-    return {**found, "eps_total": 100 * total(answers)}
+    return {**found, "eps_total": 100 * total_response_error(answers)}
 
 
 def percent(fraction: float) -> str:

@@ -12,7 +12,7 @@ MEASURED = {"color": "tab:blue", "alpha": 0.35, "linewidth": 3.0, "label": "meas
 MODEL = {"color": "tab:red", "linewidth": 0.8, "label": "model"}
 
 
-def overlay(answer: Response) -> Figure:
+def response_figure(answer: Response) -> Figure:
     """Voltage, and the measured outputs with the model's over them (Figures 10 to 14)."""
     figure = Figure(figsize=(9, 6.5), layout="constrained")
     rows = figure.subplots(len(OUTPUTS) + 1, 1, sharex=True, height_ratios=[0.6, 1, 1, 1])
@@ -34,7 +34,7 @@ def overlay(answer: Response) -> Figure:
     return figure
 
 
-def errors_over_time(answers: Sequence[Response]) -> Figure:
+def error_figure(answers: Sequence[Response]) -> Figure:
     """Model error relative to each output's mean, as eq. 19 weighs it (Figure 15)."""
     figure = Figure(figsize=(9, 1.9 * len(OUTPUTS) + 0.6), layout="constrained")
     rows = figure.subplots(len(OUTPUTS), 1, sharex=True)

@@ -85,7 +85,7 @@ def write_page(path: Path, *, title: str, sections: Sequence[Section], footer: s
 
 @cache
 def _template() -> "Template":
-    """The page's template, every text escaped; read at the first page, so that only pages need Jinja2."""
+    """The page's template, every text escaped; only a page that is written needs Jinja2."""
     try:
         from jinja2 import Environment, PackageLoader, StrictUndefined
     except ImportError:

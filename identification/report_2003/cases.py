@@ -37,8 +37,8 @@ CALIBRATION_CASES = (
 )
 # Three such pulses fit into 0.75 s with a shorter pause only; its length is a choice of this project.
 VALIDATION_CASE = Case(name="Validation", openings=(0.11, 0.11, 0.11), duration=0.75, pause=0.1)
-RATE = 2000.0
+SAMPLING_RATE = 2000.0
 """Samples per second of the report's bench (section 3)."""
 
-SUPPLY, CIRCUIT, VOLTAGE = 12.54e5, 6.81e5, 18.9
+SUPPLY_PRESSURE, CIRCUIT_PRESSURE, ENERGISED_VOLTAGE = 12.54e5, 6.81e5, 18.9
 """p1 and p2 at the start [Pa absolute], U_on [V]: not printed, found by fitting Tables 8 and 9."""

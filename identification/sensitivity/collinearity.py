@@ -16,8 +16,13 @@ from numpy.typing import NDArray
 from epv_env.plant.parameters import table
 from epv_env.plant.sensors import SENSORS
 from identification.recordings.recording import OUTPUTS, UNITS
-from identification.replay.model import Replay
-from identification.sensitivity.study import STUDY, Conditions, outputs, run_cases
+from identification.replay.batch_simulation import Replay
+from identification.sensitivity.report_conditions import (
+    REPORT_CONDITIONS,
+    StudyConditions,
+    output_samples,
+    run_cases,
+)
 
 STEP = 2e-3
 """Of the central differences: in the logarithm of a value, or in half widths of the domain of a zero."""
@@ -33,7 +38,7 @@ ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sensitivities:
+class OutputSensitivities:
     """How all outputs of all test cases respond to each parameter, in standard deviations of noise."""
 
     symbols: tuple[str, ...]
@@ -90,21 +95,21 @@ def stepped(symbol: str, value: float) -> NDArray:
 
 
 def sensitivities_of_outputs(
-    nominal: Mapping[str, float], symbols: Sequence[str], conditions: Conditions = STUDY
-) -> Sensitivities:
+    nominal: Mapping[str, float], symbols: Sequence[str], conditions: StudyConditions = REPORT_CONDITIONS
+) -> OutputSensitivities:
     """How p2, p3 and I respond in the report's test cases, in units of Table 3's noise.
 
     Raises SimulationError.
     """
     runs = run_cases(_both_ways(nominal, symbols), conditions)
     noise = {name: SENSORS[name].noise * UNITS[name][1] for name in OUTPUTS}
-    found = [np.stack(outputs(run)) for run in runs]
+    found = [np.stack(output_samples(run)) for run in runs]
     return _central_differences(symbols, found, noise, "the report's test cases")
 
 
 def sensitivities_on_recordings(
     replay: Replay, symbols: Sequence[str], noise: Mapping[str, float]
-) -> Sensitivities:
+) -> OutputSensitivities:
     """How the outputs respond on recorded inputs, in units of the measured noise by output [SI]."""
     found = replay.outputs(_both_ways(replay.base, symbols))
     return _central_differences(symbols, found, noise, "the calibration recordings")
@@ -120,11 +125,11 @@ def _both_ways(nominal: Mapping[str, float], symbols: Sequence[str]) -> dict[str
 
 def _central_differences(
     symbols: Sequence[str], found: Sequence[NDArray], noise: Mapping[str, float], where: str
-) -> Sensitivities:
+) -> OutputSensitivities:
     """found: per test case the outputs (3, samples, 2 symbols) of `_both_ways`."""
     deviation = np.array([noise[name] for name in OUTPUTS])[:, None, None]
     columns = [
         ((y[..., 1::2] - y[..., ::2]) * CHANGE / (2 * STEP * deviation)).reshape(-1, len(symbols))
         for y in found
     ]
-    return Sensitivities(symbols=tuple(symbols), columns=np.concatenate(columns), where=where)
+    return OutputSensitivities(symbols=tuple(symbols), columns=np.concatenate(columns), where=where)

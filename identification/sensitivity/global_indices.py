@@ -19,7 +19,7 @@ from SALib.sample import morris as morris_sample
 from SALib.sample import sobol as sobol_sample
 
 from identification.sensitivity.one_at_a_time import changed_values
-from identification.sensitivity.study import STUDY, Conditions, total_errors
+from identification.sensitivity.report_conditions import REPORT_CONDITIONS, StudyConditions, total_errors
 
 SPAN = 0.5
 """Part of the change of Tables 8 and 9 over which the parameters vary."""
@@ -35,7 +35,7 @@ Model = Callable[[NDArray], NDArray]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Screening:
+class MorrisEffects:
     """Morris's elementary effects: change of the output over the whole range of one parameter."""
 
     symbols: tuple[str, ...]
@@ -48,7 +48,7 @@ class Screening:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Indices:
+class SobolIndices:
     """Sobol's indices: shares of the output's variance, (parameters,) each."""
 
     symbols: tuple[str, ...]
@@ -69,7 +69,7 @@ def ranges(nominal: Mapping[str, float], symbols: Sequence[str], span: float = S
 
 
 def total_error_model(
-    nominal: Mapping[str, float], symbols: Sequence[str], conditions: Conditions = STUDY
+    nominal: Mapping[str, float], symbols: Sequence[str], conditions: StudyConditions = REPORT_CONDITIONS
 ) -> Model:
     """Total error (eq. 21) against the nominal model in percent, as a function of parameter sets."""
 
@@ -81,7 +81,7 @@ def total_error_model(
 
 
 def _errors(
-    nominal: Mapping[str, float], symbols: Sequence[str], samples: NDArray, conditions: Conditions
+    nominal: Mapping[str, float], symbols: Sequence[str], samples: NDArray, conditions: StudyConditions
 ) -> NDArray:
     p = {symbol: np.full(1 + len(samples), value) for symbol, value in nominal.items()}
     for symbol, column in zip(symbols, samples.T, strict=True):
@@ -89,16 +89,16 @@ def _errors(
     return 100 * total_errors(p, conditions)
 
 
-def screen(
+def morris_effects(
     model: Model, symbols: Sequence[str], bounds: NDArray, *, trajectories: int, seed: int
-) -> Screening:
+) -> MorrisEffects:
     """Morris's screening: trajectories x (parameters + 1) evaluations. bounds: (parameters, 2)."""
     problem = _problem(symbols, bounds)
     samples = morris_sample.sample(problem, trajectories, num_levels=LEVELS, seed=seed)
     found = morris_analysis.analyze(
         problem, samples, model(samples), num_levels=LEVELS, num_resamples=1000, seed=seed
     )
-    return Screening(
+    return MorrisEffects(
         symbols=tuple(symbols),
         mean_absolute=np.asarray(found["mu_star"]),
         half_width=np.asarray(found["mu_star_conf"]),
@@ -108,7 +108,7 @@ def screen(
 
 def sobol_indices(
     model: Model, symbols: Sequence[str], bounds: NDArray, *, samples: int, seed: int
-) -> Indices:
+) -> SobolIndices:
     """Sobol's first-order and total indices: samples x (parameters + 2) evaluations.
 
     samples: a power of two. bounds: (parameters, 2).
@@ -118,7 +118,7 @@ def sobol_indices(
     found = sobol_analysis.analyze(
         problem, model(drawn), calc_second_order=False, num_resamples=1000, seed=seed
     )
-    return Indices(
+    return SobolIndices(
         symbols=tuple(symbols),
         first=np.asarray(found["S1"]),
         first_half_width=np.asarray(found["S1_conf"]),

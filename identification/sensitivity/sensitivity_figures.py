@@ -9,10 +9,10 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from identification.sensitivity.collinearity import CRITICAL, Sensitivities, collinearity_index
-from identification.sensitivity.global_indices import Indices, Screening
-from identification.sensitivity.one_at_a_time import THRESHOLD, Sensitivity
-from identification.sensitivity.results import OneAtATime
+from identification.sensitivity.collinearity import CRITICAL, OutputSensitivities, collinearity_index
+from identification.sensitivity.global_indices import MorrisEffects, SobolIndices
+from identification.sensitivity.one_at_a_time import THRESHOLD, ErrorSensitivity
+from identification.sensitivity.sensitivity_study import OneAtATime
 
 BAR: Mapping[str, Any] = {"color": "tab:blue", "alpha": 0.55, "height": 0.7}
 INTERVAL = {"color": "0.25", "linewidth": 1.2}
@@ -59,12 +59,12 @@ def _tornado_side(
     axes.grid(axis="x", alpha=0.3)
 
 
-def _side(found: Mapping[str, Sensitivity], order: Sequence[str], side: int) -> list[float]:
+def _side(found: Mapping[str, ErrorSensitivity], order: Sequence[str], side: int) -> list[float]:
     """Errors of one direction in an order [%]."""
     return [100 * (found[symbol].minus, found[symbol].plus)[side] for symbol in order]
 
 
-def collinearity_map(found: Sensitivities) -> Figure:
+def collinearity_map(found: OutputSensitivities) -> Figure:
     """Collinearity index of every pair; those from 10 up are written out."""
     figure = Figure(figsize=(9, 8), layout="constrained")
     axes = figure.subplots()
@@ -83,7 +83,7 @@ def collinearity_map(found: Sensitivities) -> Figure:
     return figure
 
 
-def pairwise_indices(found: Sensitivities) -> NDArray:
+def pairwise_indices(found: OutputSensitivities) -> NDArray:
     """Collinearity index of each pair below the diagonal, NaN elsewhere, (parameters, parameters)."""
     n = len(found.symbols)
     index = np.full((n, n), np.nan)
@@ -93,7 +93,7 @@ def pairwise_indices(found: Sensitivities) -> NDArray:
     return index
 
 
-def global_bars(indices: Indices, screening: Screening) -> Figure:
+def global_bars(indices: SobolIndices, screening: MorrisEffects) -> Figure:
     """Sobol's indices and Morris's mean absolute effects with 95 % intervals, in one order."""
     order = np.argsort(indices.total)
     figure = Figure(figsize=(9, 7.5), layout="constrained")
@@ -108,7 +108,7 @@ def global_bars(indices: Indices, screening: Screening) -> Figure:
     return figure
 
 
-def _sobol_bars(axes: Axes, indices: Indices, order: NDArray) -> None:
+def _sobol_bars(axes: Axes, indices: SobolIndices, order: NDArray) -> None:
     rows = np.arange(len(order))
     bars = (
         ("total", indices.total, indices.total_half_width, 0.2, "tab:blue"),

@@ -5,11 +5,20 @@ import math
 from epv_env.plant.parameters import confidence_intervals, sensitive_symbols, table
 from identification.report.page import Picture, Section, Table, Text, Verdict
 from identification.sensitivity import sensitivity_figures as figures
-from identification.sensitivity.agreement import Agreement, agreement, percentages, printed_rows
-from identification.sensitivity.collinearity import CRITICAL, Sensitivities
-from identification.sensitivity.global_indices import Indices
-from identification.sensitivity.results import FIXED_STEP_STUDY, OneAtATime, SensitivityStudy
-from identification.sensitivity.study import STUDY
+from identification.sensitivity.collinearity import CRITICAL, OutputSensitivities
+from identification.sensitivity.global_indices import SobolIndices
+from identification.sensitivity.printed_agreement import (
+    PrintedAgreement,
+    agreement_with_printed,
+    percentages,
+    printed_rows,
+)
+from identification.sensitivity.report_conditions import REPORT_CONDITIONS
+from identification.sensitivity.sensitivity_study import (
+    FIXED_STEP_CONDITIONS,
+    OneAtATime,
+    SensitivityStudy,
+)
 
 REQUIRED = 36
 """Figures of Tables 8 and 9 that must come back."""
@@ -27,8 +36,8 @@ def sensitivity_section(study: SensitivityStudy) -> Section:
     return Section(
         title="Parametric sensitivity (section 5)",
         verdicts=[
-            _reproduced("Fixed step", agreement(rows.fixed_step)),
-            _reproduced("Exact stops", agreement(rows.exact)),
+            _reproduced("Fixed step", agreement_with_printed(rows.fixed_step)),
+            _reproduced("Exact stops", agreement_with_printed(rows.exact)),
             *_separability(study.outputs),
             _dominant(study.indices),
         ],
@@ -51,7 +60,7 @@ def sensitivity_section(study: SensitivityStudy) -> Section:
     )
 
 
-def _reproduced(method: str, met: Agreement) -> Verdict:
+def _reproduced(method: str, met: PrintedAgreement) -> Verdict:
     classes = (
         f"classes differ for {', '.join(met.classes_differ)}"
         if met.classes_differ
@@ -65,7 +74,7 @@ def _reproduced(method: str, met: Agreement) -> Verdict:
     )
 
 
-def _separability(found: Sensitivities) -> list[Verdict]:
+def _separability(found: OutputSensitivities) -> list[Verdict]:
     four, sensitive = found.index(tuple(confidence_intervals())), found.index(sensitive_symbols())
     pairs = found.inseparable_pairs()
     return [
@@ -83,7 +92,7 @@ def _separability(found: Sensitivities) -> list[Verdict]:
     ]
 
 
-def _dominant(found: Indices) -> Verdict:
+def _dominant(found: SobolIndices) -> Verdict:
     order = sorted(zip(found.total, found.symbols, strict=True), reverse=True)
     names = ", ".join(f"{symbol} {value:.2f}" for value, symbol in order[:4])
     return Verdict(status="note", text=f"Greatest total Sobol indices of the total error: {names}.")
@@ -100,9 +109,11 @@ def _rows(study: OneAtATime) -> Table:
             "exact stops [%]",
         ],
         rows=[_cells(study, symbol, printed) for symbol, printed in printed_rows().items()],
-        caption=f"Total error for −10 % / +10 % (Tables 8 and 9) at p1 = {STUDY.p1 / 1e5:g} bar, "
-        f"p2(0) = {STUDY.p2 / 1e5:g} bar, U = {STUDY.U_on:g} V; with the fixed step "
-        f"{FIXED_STEP_STUDY.U_on:g} V, its scatter over 18.5 to 19.3 V.",
+        caption=f"Total error for −10 % / +10 % (Tables 8 and 9) at p1 = "
+        f"{REPORT_CONDITIONS.p1 / 1e5:g} bar, "
+        f"p2(0) = {REPORT_CONDITIONS.p2 / 1e5:g} bar, U = {REPORT_CONDITIONS.U_on:g} V; with the "
+        "fixed step "
+        f"{FIXED_STEP_CONDITIONS.U_on:g} V, its scatter over 18.5 to 19.3 V.",
     )
 
 
@@ -122,7 +133,7 @@ def _pair(values: tuple[float, float]) -> str:
     return f"{values[0]:.3g} / {values[1]:.3g}"
 
 
-def _pairs(found: Sensitivities) -> Table:
+def _pairs(found: OutputSensitivities) -> Table:
     return Table(
         columns=["Pair", "collinearity index"],
         rows=[[f"{a}, {b}", _index(index)] for a, b, index in found.inseparable_pairs()],

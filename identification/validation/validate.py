@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.parameters import Parameters
-from identification.calibration.problem import Problem
-from identification.quality.dependence import Whiteness, assess_whiteness
+from identification.calibration.problem import CalibrationProblem
+from identification.quality.correlation_tests import WhitenessTest, assess_whiteness
 from identification.recordings.recording import OUTPUTS, CampaignError
 from identification.replay.responses import Response, responses
 
@@ -17,14 +17,14 @@ LONGEST_LAG = 0.05
 
 
 @dataclass(frozen=True, kw_only=True)
-class Residual:
+class OutputResidual:
     """What the model leaves of one output of one recording, in noise deviations."""
 
     recording: str
     output: str
     rms: float
     """1.0 is the floor: nothing left to explain."""
-    whiteness: Whiteness
+    whiteness: WhitenessTest
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +33,7 @@ class Validation:
 
     parameters: Parameters
     answers: Sequence[Response]
-    residuals: Sequence[Residual]
+    residuals: Sequence[OutputResidual]
 
     @property
     def worst(self) -> float:
@@ -41,7 +41,7 @@ class Validation:
         return max(answer.partial for answer in self.answers)
 
 
-def validate(problem: Problem, parameters: Parameters) -> Validation:
+def validate(problem: CalibrationProblem, parameters: Parameters) -> Validation:
     """Simulate the held-out recordings; nothing is fitted to them.
 
     Raises CampaignError if there is none.
@@ -58,13 +58,13 @@ def validate(problem: Problem, parameters: Parameters) -> Validation:
     )
 
 
-def _residuals(answer: Response, problem: Problem) -> list[Residual]:
+def _residuals(answer: Response, problem: CalibrationProblem) -> list[OutputResidual]:
     lags = min(round(LONGEST_LAG / answer.recording.period), len(answer.recording) // 5)
     found = []
     for output, measured, model in zip(OUTPUTS, answer.measured, answer.model, strict=True):
         scaled: NDArray = (measured - model) / problem.noise[output]
         found.append(
-            Residual(
+            OutputResidual(
                 recording=answer.recording.name,
                 output=output,
                 rms=float(np.sqrt(np.mean(scaled**2))),

@@ -6,12 +6,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from identification.calibration.calibration_section import TOLERANCE
-from identification.quality.dependence import white_band
+from identification.quality.correlation_tests import white_noise_band
 from identification.recordings.recording import OUTPUTS
 from identification.replay.error_tables import error_table, errors_as_json, percent
-from identification.replay.response_figures import errors_over_time, overlay
+from identification.replay.response_figures import error_figure, response_figure
 from identification.report.page import Picture, Section, Table, Verdict
-from identification.validation.validate import Residual, Validation
+from identification.validation.validate import OutputResidual, Validation
 
 WHITE = 1e-4
 """Probability of white noise below which a residual is called predictable."""
@@ -29,10 +29,10 @@ def validation_section(validation: Validation) -> Section:
             error_table(validation.answers, "Result of the model validation (Table 15)."),
             _residual_table(validation),
             *(
-                Picture(figure=overlay(answer), caption="Validation: " + answer.recording.name)
+                Picture(figure=response_figure(answer), caption="Validation: " + answer.recording.name)
                 for answer in validation.answers[:8]
             ),
-            Picture(figure=errors_over_time(validation.answers[:8]), caption="Error over time."),
+            Picture(figure=error_figure(validation.answers[:8]), caption="Error over time."),
             Picture(
                 figure=autocorrelations(validation),
                 caption="Autocorrelation of the residuals; the band holds 95 % of white noise.",
@@ -70,7 +70,7 @@ def autocorrelations(validation: Validation) -> Figure:
         lags = 1e3 * periods[residual.recording] * np.arange(1, len(correlation) + 1)
         axes.plot(lags, correlation, linewidth=0.8, label=residual.recording)
     for axes, output in zip(panels, OUTPUTS, strict=True):
-        band = white_band(min(samples.values()))
+        band = white_noise_band(min(samples.values()))
         axes.axhspan(-band, band, color="tab:orange", alpha=0.25, linewidth=0)
         axes.set_title(output)
         axes.set_xlabel("lag [ms]")
@@ -115,7 +115,7 @@ def _residual_table(validation: Validation) -> Table:
     )
 
 
-def _row(residual: Residual) -> list[str]:
+def _row(residual: OutputResidual) -> list[str]:
     return [
         residual.recording,
         residual.output,

@@ -9,9 +9,9 @@ from epv_env.plant.parameters import Parameters
 from identification.calibration.problem import calibration_problem
 from identification.gap.model.grey_box import Channel, Equation, Nuisance, Run, Trace
 from identification.recordings.recording import OUTPUTS, UNITS, Campaign, Recording
-from identification.replay.drive import drive_of
-from identification.replay.misfit import measured_outputs
-from identification.replay.model import Replay
+from identification.replay.batch_simulation import Replay
+from identification.replay.model_inputs import model_inputs
+from identification.replay.weighted_residuals import measured_outputs
 from identification.valve_gap import causes
 from identification.valve_gap.equations import EQUATIONS, forced_changes, modelled
 from identification.valve_gap.noise import noise_of
@@ -54,7 +54,7 @@ class Valve:
         self.tolerances = tuple(_tolerance(symbol, self.base) for symbol in causes.PARAMETER_COMPONENTS)
         self.starts = (P2_START, P3_ZERO, I_ZERO)
         self.equations = EQUATIONS
-        self.replay = Replay([drive_of(r, self.base) for r in self.recordings], self.base)
+        self.replay = Replay([model_inputs(r, self.base) for r in self.recordings], self.base)
 
     def outputs(self, values: Mapping[str, NDArray], runs: Sequence[int]) -> list[NDArray]:
         """`GreyBox.outputs`."""

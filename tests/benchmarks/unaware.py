@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from epv_env.plant.coefficients import coefficients, effect_sizes
 from epv_env.plant.equations import Inputs
-from identification.bench.automaton import COMPILED, X
+from identification.bench.hybrid_automaton import COMPILED_RIGHT_HAND_SIDES, POSITIONS
 from identification.bench.schedule import Schedule
 
 RTOL, ATOL = 1e-6, 1e-9
@@ -29,7 +29,7 @@ class GaveUpError(RuntimeError):
 
 def _right_hand_side(schedule: Schedule, u: NDArray, clip: str) -> Callable:
     c, e = coefficients(schedule.parameters), effect_sizes(schedule.parameters)
-    limits = dict(zip(X, (schedule.parameters[s] for s in ("xPVmax", "xMVmax")), strict=True))
+    limits = dict(zip(POSITIONS, (schedule.parameters[s] for s in ("xPVmax", "xMVmax")), strict=True))
     evaluations = 0
 
     def rates(_t: float, y: NDArray) -> NDArray:
@@ -41,7 +41,7 @@ def _right_hand_side(schedule: Schedule, u: NDArray, clip: str) -> Callable:
         if clip != NO_STOPS:
             for x, limit in limits.items():
                 inside[x] = min(max(y[x], 0.0), limit)
-        out = COMPILED[False](inside, u, c, e, 1.0, 1.0)[:-2]
+        out = COMPILED_RIGHT_HAND_SIDES[False](inside, u, c, e, 1.0, 1.0)[:-2]
         if clip == STROKES_AND_RATES:
             for x, limit in limits.items():
                 if y[x] <= 0:

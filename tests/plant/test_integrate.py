@@ -7,15 +7,15 @@ import pytest
 
 from epv_env.plant.integrate import DEFAULT_STEP
 from epv_env.plant.parameters import Parameters
-from identification.bench.automaton import Run, simulate_reference
+from identification.bench.hybrid_automaton import ReferenceRun, simulate_reference
 from tests.reference.closed_loop import random_schedules
 from tests.reference.schedule import (
     Schedule,
     largest_difference,
+    piecewise_schedule,
     plant_states,
     report_tests,
     sample_times,
-    scheduled,
 )
 
 MILLIBAR = 100.0  # Pa
@@ -29,12 +29,12 @@ REBOUNDING = report_tests(CALIBRATED.replace(eMV=0.8, ePV=0.3))["test1"]
 
 
 @cache
-def reference(name: str) -> Run:
+def reference(name: str) -> ReferenceRun:
     """Reference run of a test of the report, sampled every 0.5 ms."""
     return simulate_reference(REPORT[name], sample_times(REPORT[name], 0.5e-3))
 
 
-def assert_agrees(schedule: Schedule, run: Run, within: float = 1.0) -> None:
+def assert_agrees(schedule: Schedule, run: ReferenceRun, within: float = 1.0) -> None:
     """The plant at its default step meets the bars, in units of `within`."""
     found = plant_states(schedule, run.time)
     everywhere = np.full(run.time.shape, True)
@@ -111,7 +111,7 @@ def test_a_bounce_within_one_step_is_not_missed():
     """Switched off on its way up, the armature touches the stop for less than a step and falls."""
     at_rest = REPORT["test1"].initial._replace(xMV=0.0, I=0.0, p2=8e5, p3=10e5)
     p = CALIBRATED.replace(eMV=0.3)
-    schedule = scheduled(p, at_rest, [0.0, 4.67e-3, 10.67e-3], U=[24.0, 0.0])
+    schedule = piecewise_schedule(p, at_rest, [0.0, 4.67e-3, 10.67e-3], U=[24.0, 0.0])
     assert_agrees(schedule, simulate_reference(schedule, sample_times(schedule, 1e-4)))
 
 
@@ -119,7 +119,7 @@ def test_a_rebound_takes_the_time_of_flight_of_a_thrown_body():
     """Under a constant force F, a mover that leaves a stop at v is back after 2 m v / F."""
     p = CALIBRATED.replace(eMV=0.95, kMV=0.0)
     falling = REPORT["test4"].initial._replace(xMV=2e-5, vMV=-0.02, I=0.0)
-    schedule = scheduled(p, falling, [0.0, 5e-3], U=0.0)
+    schedule = piecewise_schedule(p, falling, [0.0, 5e-3], U=0.0)
     landings = [e.time for e in simulate_reference(schedule, [0.0]).events if "lands" in e.what]
     times = np.array(landings[:3])
     after = plant_states(schedule, times + 1e-6)
@@ -132,7 +132,7 @@ def test_a_rebound_takes_the_time_of_flight_of_a_thrown_body():
 def opening_away_from_the_laminar_seam():
     """One opening whose p3 stays off p1 and so misses the laminar seam, which no event marks."""
     energised = REPORT["test1"].initial
-    return scheduled(
+    return piecewise_schedule(
         CALIBRATED, energised._replace(p3=0.95 * energised.p1), [0.0, 0.09, 0.12], U=[0.0, 24.0]
     )
 

@@ -9,12 +9,12 @@ from epv_env.plant.coefficients import coefficients, effect_sizes
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.readings import readings
-from identification.bench.automaton import simulate_reference
-from identification.bench.campaign import RESERVOIR, Truth, initial_state, measured_campaign
+from identification.bench.hybrid_automaton import simulate_reference
+from identification.bench.measurement import RESERVOIR, TrueSignals, initial_state, measured_campaign
 from identification.bench.programmes import DIAGNOSIS_SUITE, Programme
-from identification.bench.schedule import Schedule, scheduled
+from identification.bench.schedule import Schedule, piecewise_schedule
 from identification.recordings.recording import Campaign
-from identification.report_2003.cases import RATE
+from identification.report_2003.cases import SAMPLING_RATE
 from identification.studies.blind.deviating_forms import right_hand_side, terminal_currents
 from identification.studies.blind.truth import Trial
 
@@ -44,7 +44,7 @@ WARMING = 3.0
 """Recordings after which a winding is within 1/e of its warmest."""
 
 
-def true_recordings(trial: Trial, seed: int) -> list[Truth]:
+def true_recordings(trial: Trial, seed: int) -> list[TrueSignals]:
     """The noise-free course of every recording. Raises RuntimeError if no solver gets through.
 
     seed: of the winding's temperatures and of the jitter of delays.
@@ -60,7 +60,7 @@ def true_recordings(trial: Trial, seed: int) -> list[Truth]:
     ]
 
 
-def blind_campaign(truths: list[Truth], trial: Trial, seed: int) -> Campaign:
+def blind_campaign(truths: list[TrueSignals], trial: Trial, seed: int) -> Campaign:
     """What the bench's sensors make of them; its name says no more than the trial's number."""
     noise = int(np.random.SeedSequence([seed, trial.number, 0, 3]).generate_state(1)[0])
     name = f"trial-{trial.number:04d}"
@@ -69,17 +69,17 @@ def blind_campaign(truths: list[Truth], trial: Trial, seed: int) -> Campaign:
 
 def run_programme(
     parameters: Parameters, programme: Programme, *, deviation: float, rng: np.random.Generator
-) -> Truth:
+) -> TrueSignals:
     """One recording of a valve whose effects deviate in form; at 0 they have the plant's."""
-    U = programme.case.voltage(programme.U_on, RATE)
-    time = np.arange(len(U)) / RATE
+    U = programme.case.voltage(programme.U_on, SAMPLING_RATE)
+    time = np.arange(len(U)) / SAMPLING_RATE
     start = initial_state(parameters, programme)
-    schedule = scheduled(parameters, start, time, U=U[:-1], reservoir_volume=RESERVOIR)
+    schedule = piecewise_schedule(parameters, start, time, U=U[:-1], reservoir_volume=RESERVOIR)
     schedule = _delayed(schedule, parameters["t_delay"], deviation, rng)
     state = _solved(schedule, time, deviation)
-    return Truth(
+    return TrueSignals(
         programme=programme,
-        period=1.0 / RATE,
+        period=1.0 / SAMPLING_RATE,
         channels={"U": U, **_read(state, parameters, deviation)},
     )
 

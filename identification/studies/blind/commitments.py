@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from epv_env.common.files import write_bytes, write_text
-from identification.bench.campaign import Truth
+from identification.bench.measurement import TrueSignals
 from identification.recordings.recording import OUTPUTS
 from identification.studies.blind.noise_free_gap import NoiseFree, held_out_gap, recalibrated
 from identification.studies.blind.truth import NONE, PAIR, Trial
@@ -23,7 +23,7 @@ NOTHING_LEFT = 1.02
 """Noise-free gap after recalibration below which nothing is left to explain, and `no_gap` is right."""
 
 
-def noise_free(truths: Sequence[Truth]) -> list[NoiseFree]:
+def noise_free(truths: Sequence[TrueSignals]) -> list[NoiseFree]:
     """The bench's truth as the models are held against it; a record at rest tells nothing here."""
     return [
         NoiseFree(

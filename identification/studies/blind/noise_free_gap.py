@@ -15,9 +15,9 @@ from epv_env.plant.parameters import Parameters, table
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from epv_env.plant.sensors import SENSORS
 from identification.recordings.recording import OUTPUTS, UNITS
-from identification.replay.drive import Drive
-from identification.replay.model import Replay
-from identification.replay.vector import Vector
+from identification.replay.batch_simulation import Replay
+from identification.replay.model_inputs import ModelInputs
+from identification.replay.parameter_vector import ParameterVector
 from identification.studies.blind.truth import FARTHEST, SCATTER
 from identification.valve_gap.causes import PARAMETER_COMPONENTS
 
@@ -47,10 +47,10 @@ class NoiseFree:
     """U, p1 and OUTPUTS."""
 
     @property
-    def drive(self) -> Drive:
+    def drive(self) -> ModelInputs:
         """Inputs and start for the model: as a diagnosis takes them, but exact."""
         U = self.channels["U"]
-        return Drive(
+        return ModelInputs(
             period=self.period,
             U=U,
             p1=self.channels["p1"],
@@ -93,7 +93,7 @@ def recalibrated(recordings: Sequence[NoiseFree], *, scattered: bool) -> Paramet
     scattered: whether the others may give way, as far as they scatter from unit to unit.
     """
     others = tuple(PARAMETER_COMPONENTS) if scattered else ()
-    vector = Vector(CALIBRATED_SYMBOLS + others, Parameters.calibrated())
+    vector = ParameterVector(CALIBRATED_SYMBOLS + others, Parameters.calibrated())
     outputs = Outputs([r for r in recordings if not r.held_out], vector.reference)
     return vector.parameters(_nearest(outputs, vector, _bounds(vector)))
 
@@ -108,7 +108,7 @@ def distance(recordings: Sequence[NoiseFree], sizes: Mapping[str, float]) -> flo
     """
     others = tuple(symbol for symbol in PARAMETER_COMPONENTS if symbol not in sizes)
     symbols = CALIBRATED_SYMBOLS + others + tuple(sizes)
-    vector = Vector(symbols, Parameters.calibrated().replace(**sizes))
+    vector = ParameterVector(symbols, Parameters.calibrated().replace(**sizes))
     bounds = _bounds(vector)
     own = np.array([symbol in sizes for symbol in symbols])
     outputs = Outputs(recordings, vector.reference)
@@ -117,7 +117,9 @@ def distance(recordings: Sequence[NoiseFree], sizes: Mapping[str, float]) -> flo
     return float(np.sqrt(sum(squares)))
 
 
-def _nearest(outputs: Outputs, vector: Vector, bounds: NDArray, free: NDArray | bool = False) -> NDArray:
+def _nearest(
+    outputs: Outputs, vector: ParameterVector, bounds: NDArray, free: NDArray | bool = False
+) -> NDArray:
     """The scaled vector (k,) that follows the truth best, within bounds (2, k).
 
     What scatters from unit to unit is held by its prior, unless it is `free` (k,).
@@ -161,7 +163,7 @@ def held_out_gap(recordings: Sequence[NoiseFree], values: Mapping[str, float]) -
     return float(np.sqrt(1.0 + squares / count))
 
 
-def _bounds(vector: Vector) -> NDArray:
+def _bounds(vector: ParameterVector) -> NDArray:
     """The four within their domains, the others as far as a unit's scatter goes; scaled, (2, k)."""
     low, high = vector.bounds.T
     scatters = np.array([symbol in PARAMETER_COMPONENTS for symbol in vector.symbols])

@@ -16,12 +16,12 @@ from epv_env.common.journal import Journal
 from epv_env.common.progress import progress
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.valves import available_cores
-from identification.bench.campaign import Truth, measured_campaign, run_programme
+from identification.bench.measurement import TrueSignals, measured_campaign, run_programme
 from identification.bench.programmes import REPORT_SUITE
-from identification.calibration.methods import nelder_mead, weighted_least_squares
 from identification.calibration.problem import calibration_problem
-from identification.confidence.covariance import covariance
-from identification.confidence.printed_interval import PROBABILITY, report_interval
+from identification.calibration.search_methods import nelder_mead, weighted_least_squares
+from identification.confidence.covariance import estimate_covariance
+from identification.confidence.report_interval import PROBABILITY, report_interval
 
 CAMPAIGNS = 200
 
@@ -103,7 +103,7 @@ _twin: dict[str, Any] = {}
 """What every campaign of a worker shares: trajectories, truth and seed."""
 
 
-def _prepare(truths: list[Truth], truth: Parameters, seed: int) -> None:
+def _prepare(truths: list[TrueSignals], truth: Parameters, seed: int) -> None:
     threadpool_limits(1)  # threads of the linear algebra would take the other workers' cores
     _twin.update(truths=truths, truth=truth, seed=seed)
 
@@ -117,7 +117,7 @@ def _calibrated(index: int) -> dict[str, Any]:
     start, true = problem.vector.of(problem.vector.reference), problem.vector.of(truth)
     squares, total = problem.least_squares(), problem.total_error()
     fit, simplex = weighted_least_squares(squares, start), nelder_mead(total, start)
-    found = covariance(problem, squares, fit.z, seed=noise_seed)
+    found = estimate_covariance(problem, squares, fit.z, seed=noise_seed)
     report = report_interval(problem, simplex.z, simplex.error)
     return {
         "symbols": list(problem.vector.symbols),

@@ -10,14 +10,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.replay.drive import Drive
+from identification.replay.model_inputs import ModelInputs
 from identification.report_2003.cases import (
     CALIBRATION_CASES,
-    CIRCUIT,
-    RATE,
-    SUPPLY,
+    CIRCUIT_PRESSURE,
+    ENERGISED_VOLTAGE,
+    SAMPLING_RATE,
+    SUPPLY_PRESSURE,
     VALIDATION_CASE,
-    VOLTAGE,
     Case,
 )
 
@@ -67,7 +67,7 @@ class Conditions:
     """Departure of the winding's temperature from its mean over tests 1 to 4, within ±1 or so."""
 
     @property
-    def drives(self) -> list[Drive]:
+    def drives(self) -> list[ModelInputs]:
         """What the five tests impose on the model."""
         return [
             _drive(case, *values)
@@ -79,7 +79,8 @@ def fitted_conditions() -> Conditions:
     """The conditions that fit Tables 8 and 9; the winding grows warmer from test to test."""
     n = len(CASES)
     return Conditions(
-        cases=CASES, U_on=np.full(n, VOLTAGE), p1=np.full(n, SUPPLY), p2=np.full(n, CIRCUIT),
+        cases=CASES, U_on=np.full(n, ENERGISED_VOLTAGE),
+        p1=np.full(n, SUPPLY_PRESSURE), p2=np.full(n, CIRCUIT_PRESSURE),
         warmth=_centred(np.linspace(-1.0, 1.0, n)),
     )  # fmt: skip
 
@@ -88,9 +89,9 @@ def drawn_conditions(rng: np.random.Generator) -> Conditions:
     """Conditions drawn from the ranges above."""
     n = len(CASES)
     return Conditions(
-        U_on=VOLTAGE + VOLTAGES.draw(rng, n),
-        p1=SUPPLY + SUPPLIES.draw(rng, n),
-        p2=CIRCUIT + CIRCUITS.draw(rng, n),
+        U_on=ENERGISED_VOLTAGE + VOLTAGES.draw(rng, n),
+        p1=SUPPLY_PRESSURE + SUPPLIES.draw(rng, n),
+        p2=CIRCUIT_PRESSURE + CIRCUITS.draw(rng, n),
         cases=_drawn_cases(rng),
         warmth=_centred(TEMPERATURES.draw(rng, n)),
     )
@@ -112,9 +113,9 @@ def _centred(warmth: NDArray) -> NDArray:
     return warmth - np.mean(warmth[:N_FITTED])
 
 
-def _drive(case: Case, U_on: float, p1: float, p2: float) -> Drive:
-    U = case.voltage(U_on, RATE)
-    return Drive(
-        period=1.0 / RATE, U=U, p1=np.full(len(U), p1), sigma_S=np.zeros(len(U)), U_start=U_on,
+def _drive(case: Case, U_on: float, p1: float, p2: float) -> ModelInputs:
+    U = case.voltage(U_on, SAMPLING_RATE)
+    return ModelInputs(
+        period=1.0 / SAMPLING_RATE, U=U, p1=np.full(len(U), p1), sigma_S=np.zeros(len(U)), U_start=U_on,
         p2_start=p2,
     )  # fmt: skip

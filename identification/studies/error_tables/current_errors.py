@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from epv_env.plant.effects import COPPER
 from epv_env.plant.parameters import Parameters
 from identification.recordings.recording import OUTPUTS
-from identification.replay.model import Replay
+from identification.replay.batch_simulation import Replay
 from identification.studies.error_tables.bench_conditions import CASES, N_FITTED, Conditions
 from identification.studies.error_tables.patterns import initial_ratio, printed_after
 from identification.studies.error_tables.recalibration import STEP, SYMBOLS, vector

@@ -10,8 +10,8 @@ from scipy.signal import lfilter
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.sensors import SENSORS
 from identification.recordings.recording import OUTPUTS, UNITS
-from identification.replay.drive import Drive
-from identification.replay.model import Replay
+from identification.replay.batch_simulation import Replay
+from identification.replay.model_inputs import ModelInputs
 from identification.report_2003.printed_values import printed_errors
 from identification.studies.error_tables.bench_conditions import N_FITTED, Conditions
 from identification.studies.error_tables.recalibration import (
@@ -89,7 +89,7 @@ def _predicted(conditions: Conditions, valves: Sequence[Valve]) -> Prediction:
     return Prediction(after=errors[0], before=errors[1, :, :N_FITTED], z=z)
 
 
-def _truths(drives: Sequence[Drive], valves: Sequence[Valve]) -> list[NDArray]:
+def _truths(drives: Sequence[ModelInputs], valves: Sequence[Valve]) -> list[NDArray]:
     """Outputs of the valves in each test, (3, samples, n)."""
     base = Parameters.calibrated()
     symbols = {symbol for valve in valves for symbol in valve.values} | {SYMBOLS[0]}

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from epv_env.plant.parameters import Parameters, confidence_intervals
 from identification.recordings.recording import OUTPUTS
-from identification.replay.drive import Drive
-from identification.replay.model import Replay
-from identification.replay.vector import Vector
+from identification.replay.batch_simulation import Replay
+from identification.replay.model_inputs import ModelInputs
+from identification.replay.parameter_vector import ParameterVector
 
 SYMBOLS = tuple(confidence_intervals())
 """The four calibrated parameters."""
@@ -36,15 +36,15 @@ LEAST, MOST = 1 / 3, 3.0
 left, and a cause that scales a parameter leaves the same one at every scale."""
 
 
-def vector() -> Vector:
+def vector() -> ParameterVector:
     """The four parameters relative to Table 12."""
-    return Vector(SYMBOLS, Parameters.calibrated())
+    return ParameterVector(SYMBOLS, Parameters.calibrated())
 
 
 class Fits:
     """The state of n fits; arrays have n rows."""
 
-    def __init__(self, drives: Sequence[Drive], truths: Sequence[NDArray]):
+    def __init__(self, drives: Sequence[ModelInputs], truths: Sequence[NDArray]):
         self.replay = Replay(drives, Parameters.calibrated())
         self.truths = truths
         self.p2_shift = start_shift(drives, truths)
@@ -93,7 +93,7 @@ class Fits:
         return cost, total[:, 1:, 0], total[:, 1:, 1:]
 
 
-def recalibrated(drives: Sequence[Drive], truths: Sequence[NDArray]) -> NDArray:
+def recalibrated(drives: Sequence[ModelInputs], truths: Sequence[NDArray]) -> NDArray:
     """Fitted parameters relative to Table 12, (n, 4), of n valves.
 
     truths: their outputs in each of the tests `drives`, (3, samples, n).
@@ -105,7 +105,7 @@ def recalibrated(drives: Sequence[Drive], truths: Sequence[NDArray]) -> NDArray:
     return fits.z
 
 
-def start_shift(drives: Sequence[Drive], truths: Sequence[NDArray]) -> NDArray:
+def start_shift(drives: Sequence[ModelInputs], truths: Sequence[NDArray]) -> NDArray:
     """What the sensor of p2 shows at the start beyond the true pressure [Pa], (n,).
 
     The model starts where the recording does, as in the report.

@@ -4,7 +4,7 @@ import numpy as np
 from scipy import stats
 
 from epv_env.plant.sensors import SENSORS
-from identification.quality.published_noise import DESCRIPTIONS, OFFSETS, SAMPLES
+from identification.quality.printed_statistics import SAMPLES, STATISTICS, TREND_OFFSETS
 from identification.recordings.recording import CHANNELS, UNITS
 from identification.report_2003.printed_values import correlation_matrix
 from identification.studies.reproduction.finding import DOUBT, HOLDS, SLIP, Finding
@@ -55,7 +55,7 @@ def _samples() -> Finding:
 
 def _signal_to_noise(name: str) -> Finding:
     """Printed SNR against what any standard deviation that rounds to the printed one can give."""
-    deviation, printed = DESCRIPTIONS[name].standard_deviation, DESCRIPTIONS[name].signal_to_noise
+    deviation, printed = STATISTICS[name].standard_deviation, STATISTICS[name].signal_to_noise
     low, high = (signal_to_noise(name, deviation + change) for change in (HALF_DIGIT, -HALF_DIGIT))
     unit, greatest = UNITS[name][0], deviation * 10 ** (printed / 20)
     return Finding(
@@ -69,7 +69,7 @@ def _signal_to_noise(name: str) -> Finding:
 
 
 def _claimed_signal_to_noise() -> Finding:
-    found = {name: signal_to_noise(name, DESCRIPTIONS[name].standard_deviation) for name in CHANNELS}
+    found = {name: signal_to_noise(name, STATISTICS[name].standard_deviation) for name in CHANNELS}
     least = min(found, key=lambda name: found[name])
     return Finding(
         where="Section 4.1, SNR 'over 62 dB in all cases' [dB]",
@@ -82,7 +82,7 @@ def _claimed_signal_to_noise() -> Finding:
 
 def _outlier_factor(name: str) -> Finding:
     """The farthest sample lies between half the range and the range from the mean."""
-    row = DESCRIPTIONS[name]
+    row = STATISTICS[name]
     farthest = row.outlier_factor * row.standard_deviation
     slack = row.outlier_factor * HALF_DIGIT + HALF_DIGIT
     return Finding(
@@ -97,7 +97,7 @@ def _outlier_factor(name: str) -> Finding:
 
 def _interquartile_range(name: str) -> Finding:
     """For normal noise 1.349 standard deviations, within one step of the converter."""
-    row = DESCRIPTIONS[name]
+    row = STATISTICS[name]
     normal = float(2 * stats.norm.ppf(0.75)) * row.standard_deviation
     within = abs(normal - row.interquartile_range) <= SENSORS[name].resolution
     return Finding(
@@ -111,7 +111,7 @@ def _interquartile_range(name: str) -> Finding:
 
 def _median(name: str) -> Finding:
     """Of detrended, symmetric, rounded noise: within half a step of zero, and three standard errors."""
-    row = DESCRIPTIONS[name]
+    row = STATISTICS[name]
     error = np.sqrt(np.pi / 2 / SAMPLES) * row.standard_deviation
     half = SENSORS[name].resolution / 2 + 3 * float(error)
     return Finding(
@@ -125,12 +125,12 @@ def _median(name: str) -> Finding:
 
 
 def _kurtosis() -> Finding:
-    excess = {name: DESCRIPTIONS[name].kurtosis - 3 for name in CHANNELS}
+    excess = {name: STATISTICS[name].kurtosis - 3 for name in CHANNELS}
     return _beyond("kurtosis", excess, np.sqrt(24 / SAMPLES))
 
 
 def _skewness() -> Finding:
-    excess = {name: DESCRIPTIONS[name].skewness for name in CHANNELS}
+    excess = {name: STATISTICS[name].skewness for name in CHANNELS}
     return _beyond("skewness", excess, np.sqrt(6 / SAMPLES))
 
 
@@ -147,10 +147,10 @@ def _beyond(quantity: str, excess: dict[str, float], error: float) -> Finding:
 
 
 def _range_of_the_sensors() -> Finding:
-    outside = [name for name in CHANNELS if OFFSETS[name] < SENSORS[name].low]
+    outside = [name for name in CHANNELS if TREND_OFFSETS[name] < SENSORS[name].low]
     return Finding(
         where="Table 2 against Table 1, pressures at rest [bar]",
-        printed=", ".join(f"{name} {OFFSETS[name]:.4f}" for name in outside) or "inside",
+        printed=", ".join(f"{name} {TREND_OFFSETS[name]:.4f}" for name in outside) or "inside",
         recomputed=f"at least {SENSORS['p2'].low:g}",
         status=DOUBT if outside else HOLDS,
         remark="the record at ambient pressure lies at and below the lower end of the sensors' range",

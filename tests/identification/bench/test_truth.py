@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from epv_env.plant.simulate import energised, simulate
-from identification.bench.campaign import RESERVOIR, run_programme
+from identification.bench.measurement import RESERVOIR, run_programme
 from identification.bench.programmes import DIAGNOSIS_SUITE, REPORT_SUITE
 from identification.recordings.recording import HOLD
 from tests.identification.twins import PROGRAMMES, SWITCHING, TRUE, truth

@@ -10,18 +10,18 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.calibration import multi_start as starts
 from identification.calibration.calibrate import calibrate
+from identification.calibration.calibration_warnings import calibration_warnings
 from identification.calibration.multi_start import (
     METHODS,
-    fit_from_all,
-    reached_the_best,
+    reached_best,
+    search_from_all_starts,
     starting_points,
 )
-from identification.calibration.warnings import warnings_of
-from identification.replay.vector import Vector
+from identification.replay.parameter_vector import ParameterVector
 from tests.identification.twins import calibration, problem
 
 START = Parameters.initial_guess()
-FOUR = Vector(CALIBRATED_SYMBOLS, START)
+FOUR = ParameterVector(CALIBRATED_SYMBOLS, START)
 BAD_BASIN = (1.06, 0.92, 4.2, 0.95)
 """Of the reference: with so much reluctance the armature hardly moves."""
 
@@ -63,7 +63,7 @@ def test_each_symbol_is_spread_evenly_over_its_logarithm():
 
 def test_domains_that_hold_zero_are_spread_over_evenly():
     """kPV's begins at zero and a1's is symmetric about it."""
-    vector = Vector(("kPV", "a1"), START.replace(a1=-0.05))
+    vector = ParameterVector(("kPV", "a1"), START.replace(a1=-0.05))
     points = starting_points(vector, 41, 0)[1:]
     low, high = vector.bounds.T
     assert np.all((low <= points) & (points <= high))
@@ -82,19 +82,20 @@ def test_one_start_is_the_reference_alone():
 
 
 def test_a_start_in_another_basin_is_reported(tmp_path, monkeypatch):
-    monkeypatch.setattr("identification.calibration.methods.MOST_EVALUATIONS", 200)
+    monkeypatch.setattr("identification.calibration.search_methods.MOST_EVALUATIONS", 200)
     points = np.array([np.ones(4), BAD_BASIN])
-    fits = fit_from_all(problem(), points, Journal(tmp_path / "journal", {}))
+    fits = search_from_all_starts(problem(), points, Journal(tmp_path / "journal", {}))
     for method in METHODS:
-        assert reached_the_best(fits[method]).tolist() == [True, False]
+        assert reached_best(fits[method]).tolist() == [True, False]
         assert fits[method][1].error > 5 * fits[method][0].error
-    found = warnings_of(problem(), fits)
+    found = calibration_warnings(problem(), fits)
     assert [warning.split(":")[0] for warning in found] == list(METHODS)
     assert all("1 of 2 starts reach the least error" in warning for warning in found)
     assert not any("Table 10" in warning for warning in found)
     turned = {method: found_fits[::-1] for method, found_fits in fits.items()}
     assert all(
-        "the usual start (Table 10) is among" in warning for warning in warnings_of(problem(), turned)
+        "the usual start (Table 10) is among" in warning
+        for warning in calibration_warnings(problem(), turned)
     )
 
 
@@ -102,7 +103,7 @@ def test_ends_agree_relative_to_the_best_and_at_zero():
     fit = calibration().best("least squares")
     ends = ([1.0, 0.0], [1.0009, 1e-7], [1.002, 0.0], [1.0, 0.01])
     fits = [replace(fit, z=np.array(z), error=1.0 + i) for i, z in enumerate(ends)]
-    assert reached_the_best(fits).tolist() == [True, True, False, False]
+    assert reached_best(fits).tolist() == [True, True, False, False]
 
 
 def test_finished_searches_are_not_done_again(tmp_path, calls):

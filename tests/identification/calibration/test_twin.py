@@ -7,11 +7,11 @@ import pytest
 
 from epv_env.plant.parameters import ParameterError
 from epv_env.plant.region import CALIBRATED_SYMBOLS
-from identification.bench.campaign import OFFSETS
-from identification.calibration.methods import Fit, nelder_mead, weighted_least_squares
+from identification.bench.measurement import SENSOR_OFFSETS
 from identification.calibration.problem import calibration_problem
+from identification.calibration.search_methods import SearchResult, nelder_mead, weighted_least_squares
 from identification.recordings.recording import CHANNELS, UNITS, CampaignError
-from identification.replay.responses import total
+from identification.replay.responses import total_response_error
 from tests.identification.twins import TRUE, calibration, exact_problem, problem, twin
 
 TOLERANCE = {"alphaMV": 3e-4, "alphaPV": 9e-4, "RML": 8e-4, "R": 3e-4}
@@ -65,8 +65,8 @@ def test_with_noise_both_methods_find_table_12(method):
 def test_errors_fall_to_the_noise():
     """Table 13 falls from Table 11's size; the residual of least squares is the noise alone."""
     found = calibration()
-    assert total(found.before) > 5 * total(found.after["Nelder-Mead"])
-    assert total(found.after["Nelder-Mead"]) < 0.003
+    assert total_response_error(found.before) > 5 * total_response_error(found.after["Nelder-Mead"])
+    assert total_response_error(found.after["Nelder-Mead"]) < 0.003
     assert found.best("least squares").error == pytest.approx(1.0, abs=0.03)
     assert dict(found.parameters("least squares"))["R"] == pytest.approx(TRUE["R"], rel=3e-4)
 
@@ -110,7 +110,7 @@ def test_without_a_record_at_rest_nothing_is_subtracted():
 def test_with_one_the_bench_s_offsets_are():
     for channel in CHANNELS:
         offset, unit = problem().offsets[channel], UNITS[channel][1]
-        assert offset.value == pytest.approx(OFFSETS[channel] * unit, abs=4 * offset.error)
+        assert offset.value == pytest.approx(SENSOR_OFFSETS[channel] * unit, abs=4 * offset.error)
         read = twin().recordings[0].channel(channel) - problem().calibration[0].channel(channel)
         np.testing.assert_allclose(read, offset.value, rtol=1e-6)
 
@@ -147,7 +147,7 @@ def test_symbols_that_cannot_be_fitted_are_refused(symbols, message):
 
 def test_a_fit_comes_back_from_json():
     fit = calibration().best("least squares")
-    again = Fit.from_json(fit.as_json())
+    again = SearchResult.from_json(fit.as_json())
     assert again.as_json() == fit.as_json()
     np.testing.assert_array_equal(again.z, fit.z)
 

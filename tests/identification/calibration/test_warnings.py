@@ -6,11 +6,11 @@ import pytest
 
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import CALIBRATED_SYMBOLS
-from identification.calibration import methods as searches
+from identification.calibration import search_methods as searches
 from identification.calibration.calibrate import calibrate
 from identification.calibration.calibration_section import calibration_json, calibration_section
+from identification.calibration.calibration_warnings import calibration_warnings
 from identification.calibration.problem import calibration_problem
-from identification.calibration.warnings import warnings_of
 from tests.identification.twins import TRUE, calibration, problem, twin
 
 START = Parameters.initial_guess()
@@ -32,7 +32,7 @@ def fits(**changes):
 
 
 def test_a_good_calibration_has_none():
-    assert warnings_of(problem(), calibration().fits) == []
+    assert calibration_warnings(problem(), calibration().fits) == []
 
 
 def test_an_estimate_on_the_end_of_a_domain_is_named(warnings):
@@ -50,7 +50,9 @@ def test_either_end_of_any_domain_counts(symbol, end):
     z = calibration().best("least squares").z.copy()
     at = vector.symbols.index(symbol)
     z[at] = vector.bounds[at, end]
-    on_end = [warning for warning in warnings_of(problem(), fits(z=z)) if "ends at the end" in warning]
+    on_end = [
+        warning for warning in calibration_warnings(problem(), fits(z=z)) if "ends at the end" in warning
+    ]
     assert len(on_end) == 2
     assert all(f"of {symbol}'s domain" in warning for warning in on_end)
     assert vector.parameters(z)[symbol] == pytest.approx(vector.domains[at, end])
@@ -70,7 +72,7 @@ def test_parameters_that_act_by_their_ratio_cannot_be_separated(warnings):
 
 def test_only_those_are_named_that_cannot_be_separated():
     four = calibration_problem(twin(), symbols=("alphaMV", "R", "V3", "alphaPV"))
-    found = warnings_of(four, fits(z=four.vector.of(TRUE)))
+    found = calibration_warnings(four, fits(z=four.vector.of(TRUE)))
     (separate,) = (warning for warning in found if "cannot separate" in warning)
     assert "cannot separate alphaMV, V3 (" in separate
 

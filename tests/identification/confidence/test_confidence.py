@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
-from identification.confidence.confidence import confidence
+from identification.confidence.confidence import assess_confidence
 from identification.confidence.confidence_section import confidence_json, confidence_section
 from tests.identification.confidence.results import found
 from tests.identification.twins import TRUE, calibration, problem
@@ -33,7 +33,7 @@ def displaced(factors):
     fit = calibration().best("Nelder-Mead")
     z = fit.z * np.array(factors)
     moved = replace(fit, z=z, error=problem().total_error().error(z))
-    return confidence(replace(calibration(), fits={**calibration().fits, "Nelder-Mead": [moved]}))
+    return assess_confidence(replace(calibration(), fits={**calibration().fits, "Nelder-Mead": [moved]}))
 
 
 def verdicts(confidence):

@@ -7,10 +7,10 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
-from identification.calibration.methods import weighted_least_squares
+from identification.calibration.search_methods import weighted_least_squares
 from identification.confidence import covariance as stage
-from identification.confidence.bootstrap import block_bootstrap
-from identification.confidence.covariance import correlation_lags, covariance
+from identification.confidence.block_bootstrap import block_bootstrap
+from identification.confidence.covariance import correlation_lags, estimate_covariance
 from tests.identification.confidence.results import found
 from tests.identification.twins import TRUE, problem
 
@@ -44,7 +44,7 @@ def covariance_of(monkeypatch):
     """The covariance of a synthetic misfit, whose inputs are exact."""
     for share in ("_input_share", "_offset_share"):
         monkeypatch.setattr(stage, share, lambda *arguments: np.zeros((2, 2)))
-    return lambda misfit: covariance(problem(), misfit, np.ones(2))
+    return lambda misfit: estimate_covariance(problem(), misfit, np.ones(2))
 
 
 def known(misfit, phi):
@@ -117,7 +117,7 @@ def test_the_noise_of_the_inputs_adds_with_its_square(monkeypatch):
     for size in (0.0, 1.0, 2.0):
         noise = {n: v * (size if n in ("U", "p1") else 1.0) for n, v in problem().noise.items()}
         quiet = replace(problem(), noise=noise, offsets={})
-        shares[size] = covariance(quiet, problem().least_squares(), found().estimate).inputs
+        shares[size] = estimate_covariance(quiet, problem().least_squares(), found().estimate).inputs
     assert np.all(np.diag(shares[0.0]) < 1e-3 * np.diag(shares[1.0]))
     np.testing.assert_allclose(np.diag(shares[2.0]), 4 * np.diag(shares[1.0]), rtol=0.02)
 
@@ -125,7 +125,7 @@ def test_the_noise_of_the_inputs_adds_with_its_square(monkeypatch):
 def test_offsets_that_are_known_badly_widen_the_covariance():
     offsets = {n: replace(o, error=100 * o.error) for n, o in problem().offsets.items()}
     unsure = replace(problem(), offsets=offsets)
-    wide = covariance(unsure, problem().least_squares(), found().estimate)
+    wide = estimate_covariance(unsure, problem().least_squares(), found().estimate)
     assert np.all(np.diag(wide.inputs) > 3 * np.diag(found().covariance.inputs))
     np.testing.assert_allclose(wide.residual, found().covariance.residual)
 

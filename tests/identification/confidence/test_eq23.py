@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from identification.confidence.printed_interval import limit_ratio
+from identification.confidence.report_interval import limit_ratio
 from tests.identification.confidence.results import found
 from tests.identification.twins import problem
 

@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from identification.quality.dependence import assess_pair, assess_whiteness, spectrum, white_band
+from identification.quality.correlation_tests import (
+    assess_correlation,
+    assess_whiteness,
+    spectrum,
+    white_noise_band,
+)
 
 SAMPLES, LAGS = 10_000, 200
 
@@ -23,7 +28,7 @@ def test_white_noise_passes():
     assert found.autocorrelation.shape == (LAGS + 1,)
     assert found.autocorrelation[0] == 1.0
     assert found.probability > 0.01
-    inside = np.abs(found.autocorrelation[1:]) < white_band(SAMPLES)
+    inside = np.abs(found.autocorrelation[1:]) < white_noise_band(SAMPLES)
     assert np.mean(inside) == pytest.approx(0.95, abs=0.05)
     assert found.inflation == pytest.approx(1.0, abs=1.0)
 
@@ -68,7 +73,7 @@ def test_a_first_order_spectrum_is_its_closed_form():
 def test_a_signal_that_follows_another_is_found_at_its_lag(delay):
     second = white(5)
     first = 0.6 * np.roll(second, delay) + 0.8 * white(6)
-    pair = assess_pair(first, second, LAGS)
+    pair = assess_correlation(first, second, LAGS)
     assert pair.crosscorrelation.shape == (2 * LAGS + 1,)
     assert pair.peak_lag == delay
     assert pair.peak == pytest.approx(0.6, abs=0.03)
@@ -77,7 +82,7 @@ def test_a_signal_that_follows_another_is_found_at_its_lag(delay):
 
 def test_the_middle_is_the_correlation_of_numpy():
     first, second = white(7), white(8)
-    pair = assess_pair(first, second, LAGS)
+    pair = assess_correlation(first, second, LAGS)
     assert pair.correlation == pytest.approx(np.corrcoef(first, second)[0, 1], abs=1e-12)
     assert pair.crosscorrelation[LAGS] == pair.correlation
     assert pair.peak_probability > 0.01
@@ -85,11 +90,11 @@ def test_the_middle_is_the_correlation_of_numpy():
 
 def test_coloured_signals_count_as_fewer_samples():
     """Bartlett: two independent AR(1) have n (1 - phi^2)/(1 + phi^2) effective samples."""
-    pair = assess_pair(autoregressive(9, 0.9), autoregressive(10, 0.9), LAGS)
+    pair = assess_correlation(autoregressive(9, 0.9), autoregressive(10, 0.9), LAGS)
     assert pair.effective_samples == pytest.approx(SAMPLES * 0.19 / 1.81, rel=0.3)
     assert pair.probability > 1e-3
     assert pair.peak_probability > 1e-3
 
 
 def test_the_report_s_band():
-    assert white_band(10_000) == pytest.approx(0.0196, abs=1e-4)
+    assert white_noise_band(10_000) == pytest.approx(0.0196, abs=1e-4)

@@ -5,8 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.replay import drive
-from identification.replay.drive import drive_of, smooth_supply, smooth_voltage, without_offsets
+from identification.replay import model_inputs as drive
+from identification.replay.model_inputs import (
+    model_inputs,
+    smooth_supply,
+    smooth_voltage,
+    without_offsets,
+)
 from tests.identification.twins import SWITCHING, TRUE, exact_recording, truth
 
 NOISE = 680.0
@@ -120,7 +125,7 @@ def test_consumed_air_is_drawn_from_the_supply():
 
 def test_the_start_is_the_mean_of_the_hold():
     recording = exact_recording("test1", share=1.0)
-    found = drive_of(recording, TRUE)
+    found = model_inputs(recording, TRUE)
     assert found.p2_start == pytest.approx(np.mean(recording.p2[:80]))
     assert found.p2_start == pytest.approx(truth("test1").channels["p2"][0], abs=4 * 980 / np.sqrt(80))
     assert found.U_start == pytest.approx(18.9, abs=0.006)

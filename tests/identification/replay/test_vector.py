@@ -5,10 +5,10 @@ import pytest
 
 from epv_env.plant.parameters import Parameters, table
 from epv_env.plant.region import CALIBRATED_SYMBOLS
-from identification.replay.vector import Vector
+from identification.replay.parameter_vector import ParameterVector
 
 TRUE, START = Parameters.calibrated(), Parameters.initial_guess()
-FOUR = Vector(CALIBRATED_SYMBOLS, START)
+FOUR = ParameterVector(CALIBRATED_SYMBOLS, START)
 
 
 def test_the_reference_is_all_ones():
@@ -37,7 +37,7 @@ def test_bounds_are_the_ends_of_the_domains():
 
 def test_bounds_rise_for_a_negative_reference_too():
     """a1's domain is symmetric about zero."""
-    (ends,) = Vector(("a1",), TRUE.replace(a1=-0.05)).bounds
+    (ends,) = ParameterVector(("a1",), TRUE.replace(a1=-0.05)).bounds
     assert tuple(ends) == pytest.approx((-2.0, 2.0))
 
 

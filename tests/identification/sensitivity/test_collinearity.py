@@ -8,12 +8,18 @@ import pytest
 from epv_env.plant.parameters import Parameters, confidence_intervals, sensitive_symbols
 from epv_env.plant.sensors import SENSORS
 from identification.recordings.recording import OUTPUTS, UNITS
-from identification.replay.drive import Drive
-from identification.replay.model import Replay
-from identification.report_2003.cases import CALIBRATION_CASES, CIRCUIT, RATE, SUPPLY, VOLTAGE
+from identification.replay.batch_simulation import Replay
+from identification.replay.model_inputs import ModelInputs
+from identification.report_2003.cases import (
+    CALIBRATION_CASES,
+    CIRCUIT_PRESSURE,
+    ENERGISED_VOLTAGE,
+    SAMPLING_RATE,
+    SUPPLY_PRESSURE,
+)
 from identification.sensitivity.collinearity import (
     CRITICAL,
-    Sensitivities,
+    OutputSensitivities,
     collinearity_index,
     cosines,
     sensitivities_of_outputs,
@@ -23,7 +29,7 @@ from identification.sensitivity.one_at_a_time import studied_symbols
 
 
 @cache
-def found() -> Sensitivities:
+def found() -> OutputSensitivities:
     return sensitivities_of_outputs(Parameters.nominal(), studied_symbols())
 
 
@@ -80,13 +86,13 @@ def test_effects_do_not_depend_on_the_size_of_the_differences(monkeypatch):
 def test_recordings_of_the_report_s_cases_separate_what_the_cases_do():
     """The same inputs as recordings impose them, and a noise of half the size: twice the effects."""
     drives = [
-        Drive(
-            period=1 / RATE,
-            U=(U := case.voltage(VOLTAGE, RATE)),
-            p1=np.full(len(U), SUPPLY),
+        ModelInputs(
+            period=1 / SAMPLING_RATE,
+            U=(U := case.voltage(ENERGISED_VOLTAGE, SAMPLING_RATE)),
+            p1=np.full(len(U), SUPPLY_PRESSURE),
             sigma_S=np.zeros(len(U)),
-            U_start=VOLTAGE,
-            p2_start=CIRCUIT,
+            U_start=ENERGISED_VOLTAGE,
+            p2_start=CIRCUIT_PRESSURE,
         )
         for case in CALIBRATION_CASES
     ]

@@ -5,8 +5,8 @@ import pytest
 
 from epv_env.plant.parameters import Parameters, table
 from identification.sensitivity.global_indices import (
+    morris_effects,
     ranges,
-    screen,
     sobol_indices,
     total_error_model,
 )
@@ -34,7 +34,9 @@ def test_the_intervals_hold_the_truth():
 
 def test_elementary_effects_of_a_linear_function_are_its_slopes_times_the_ranges():
     bounds = np.array([[0.0, 1.0], [10.0, 14.0]])
-    found = screen(lambda x: 3 * x[:, 0] - 2 * x[:, 1], ("a", "b"), bounds, trajectories=5, seed=1)
+    found = morris_effects(
+        lambda x: 3 * x[:, 0] - 2 * x[:, 1], ("a", "b"), bounds, trajectories=5, seed=1
+    )
     assert found.mean_absolute == pytest.approx([3.0, 8.0])
     assert found.spread == pytest.approx([0.0, 0.0], abs=1e-9)
 
@@ -60,5 +62,5 @@ def test_screening_of_the_valve_finds_what_matters():
     """In a short form: piston and exhaust weigh a hundred times as much as the armature's mass."""
     p, symbols = Parameters.nominal(), ["d1", "dMVexh", "mMV", "mPV"]
     bounds = ranges(p, symbols)
-    found = screen(total_error_model(p, symbols), symbols, bounds, trajectories=8, seed=1)
+    found = morris_effects(total_error_model(p, symbols), symbols, bounds, trajectories=8, seed=1)
     assert found.mean_absolute[:2].min() > 100 * found.mean_absolute[2:].max()

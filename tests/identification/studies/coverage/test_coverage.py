@@ -37,7 +37,7 @@ class InProcess:
 @pytest.fixture
 def asked(monkeypatch):
     """Campaigns that were calibrated, in this process, the Nelder-Mead searches cut short."""
-    monkeypatch.setattr("identification.calibration.methods.MOST_EVALUATIONS", 30)
+    monkeypatch.setattr("identification.calibration.search_methods.MOST_EVALUATIONS", 30)
     monkeypatch.setattr(coverage, "ProcessPoolExecutor", InProcess)
     monkeypatch.setattr(InProcess, "asked", [])
     return InProcess.asked

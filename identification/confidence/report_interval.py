@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f
 
-from identification.calibration.problem import Problem
+from identification.calibration.problem import CalibrationProblem
 
 PROBABILITY = 0.95
 
@@ -48,7 +48,7 @@ def limit_ratio(values: int, parameters: int, probability: float = PROBABILITY) 
     return 1.0 + parameters / degrees * float(f.ppf(probability, parameters, degrees))
 
 
-def report_interval(problem: Problem, z: NDArray, error: float) -> ReportInterval:
+def report_interval(problem: CalibrationProblem, z: NDArray, error: float) -> ReportInterval:
     """Eq. 23 at the minimum z (k,) of the total error."""
     residuals, jacobians = problem.total_error().linearised(z)
     ratio = limit_ratio(sum(len(r) for r in residuals), len(z))

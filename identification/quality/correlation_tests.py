@@ -31,7 +31,7 @@ class Spectrum:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Whiteness:
+class WhitenessTest:
     """Whether a signal's samples are independent of each other."""
 
     autocorrelation: NDArray
@@ -54,7 +54,7 @@ class Whiteness:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Pair:
+class PairCorrelation:
     """How two signals depend on each other."""
 
     correlation: float
@@ -83,16 +83,16 @@ class Pair:
         return float(min(1.0, len(self.crosscorrelation) * single))
 
 
-def white_band(samples: float) -> float:
+def white_noise_band(samples: float) -> float:
     """A correlation of independent white signals lies within +- this in 95 % of cases."""
     return float(stats.norm.isf(0.025) / np.sqrt(samples))
 
 
-def assess_whiteness(residual: NDArray, lags: int) -> Whiteness:
+def assess_whiteness(residual: NDArray, lags: int) -> WhitenessTest:
     """Of a detrended signal (samples,) that changes, up to a lag."""
     table = acorr_ljungbox(residual, lags=sorted({min(FIRST_LAGS, lags), lags}))
     frequency, power = signal.periodogram(residual, fs=2.0)
-    return Whiteness(
+    return WhitenessTest(
         autocorrelation=np.asarray(acf(residual, nlags=lags, fft=True)),
         probability=float(min(1.0, 2 * np.min(table["lb_pvalue"]))),
         spectrum=spectrum(residual),
@@ -100,14 +100,14 @@ def assess_whiteness(residual: NDArray, lags: int) -> Whiteness:
     )
 
 
-def assess_pair(first: NDArray, second: NDArray, lags: int) -> Pair:
+def assess_correlation(first: NDArray, second: NDArray, lags: int) -> PairCorrelation:
     """Of two detrended signals (samples,) that change, up to a lag either way."""
     forward = np.asarray(ccf(first, second, adjusted=False, nlags=lags + 1))
     backward = np.asarray(ccf(second, first, adjusted=False, nlags=lags + 1))
     own = np.asarray(acf(first, nlags=lags, fft=True)) * np.asarray(acf(second, nlags=lags, fft=True))
     effective = len(first) / max(1.0, 1 + 2 * float(np.sum(own[1:])))
     correlation = float(forward[0])
-    return Pair(
+    return PairCorrelation(
         correlation=correlation,
         probability=float(2 * stats.norm.sf(abs(correlation) * np.sqrt(effective))),
         crosscorrelation=np.concatenate((backward[:0:-1], forward)),

@@ -10,7 +10,7 @@ from epv_env.plant.parameters import Parameters, table
 
 
 @dataclass(frozen=True)
-class Vector:
+class ParameterVector:
     """Fitted symbols in order; an optimiser sees each divided by its reference value."""
 
     symbols: tuple[str, ...]

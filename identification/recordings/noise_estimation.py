@@ -12,23 +12,25 @@ BLOCK = 0.05
 """Time over which a drift passes for straight [s]."""
 
 
-def noise_of(campaign: Campaign) -> dict[str, float]:
+def pooled_noise(campaign: Campaign) -> dict[str, float]:
     """Standard deviation of each channel's readings about the true value [A, V, Pa], pooled.
 
     From the quality recordings if there are any, otherwise from the holds that the other recordings
     start with. Raises CampaignError if a hold is too short.
     """
     steady = campaign.of("quality")
-    stretches = [(r, len(r)) for r in steady] or [(r, hold(r)) for r in campaign.recordings]
+    stretches = [(r, len(r)) for r in steady] or [
+        (r, energised_start_length(r)) for r in campaign.recordings
+    ]
     return {name: _pooled(name, stretches) for name in CHANNELS}
 
 
-def noise_from_hold(recording: Recording) -> dict[str, float]:
-    """As `noise_of`, from the energised steady start of one recording [A, V, Pa]."""
-    return {name: _pooled(name, [(recording, hold(recording))]) for name in CHANNELS}
+def noise_of_energised_start(recording: Recording) -> dict[str, float]:
+    """As `pooled_noise`, from the energised steady start of one recording [A, V, Pa]."""
+    return {name: _pooled(name, [(recording, energised_start_length(recording))]) for name in CHANNELS}
 
 
-def hold(recording: Recording) -> int:
+def energised_start_length(recording: Recording) -> int:
     """Length of the energised start [samples]. Raises CampaignError if it lasts less than HOLD."""
     energised = recording.energised
     samples = len(recording) if np.all(energised) else int(np.argmin(energised))

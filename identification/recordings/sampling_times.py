@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.recordings.columns import TIME, line
+from identification.recordings.columns import TIME_COLUMN, line_number
 from identification.recordings.recording import CampaignError
 
 LEAST_RATE = 500.0
@@ -25,7 +25,8 @@ def sampling_period(file: str, time: NDArray) -> float:
     """
     if len(time) < 2:
         raise CampaignError(
-            f"{file}, line {line(len(time))}: the file ends after {len(time)} samples, too few to tell "
+            f"{file}, line {line_number(len(time))}: the file ends after {len(time)} samples, too few "
+            "to tell "
             "the sampling rate: record for longer"
         )
     _check_order(file, time)
@@ -36,7 +37,8 @@ def sampling_period(file: str, time: NDArray) -> float:
     period = _roundest(least, greatest)
     if period * LEAST_RATE > 1 + 1e-9:
         raise CampaignError(
-            f"{file}, line {line(1)}: sampled at {1 / period:g} Hz: record at {LEAST_RATE:g} Hz or "
+            f"{file}, line {line_number(1)}: sampled at {1 / period:g} Hz: record at {LEAST_RATE:g} "
+            "Hz or "
             "faster"
         )
     return period
@@ -45,7 +47,8 @@ def sampling_period(file: str, time: NDArray) -> float:
 def _check_order(file: str, time: NDArray) -> None:
     if abs(time[0]) > 1e-9:
         raise CampaignError(
-            f"{file}, line {line(0)}: {TIME} starts at {time[0]:g} and must start at 0: subtract the "
+            f"{file}, line {line_number(0)}: {TIME_COLUMN} starts at {time[0]:g} and must start at 0: "
+            "subtract the "
             "first time from all"
         )
     backward = np.flatnonzero(np.diff(time) <= 0)
@@ -65,7 +68,7 @@ def _check_gaps(file: str, time: NDArray) -> None:
 
 def _refuse_step(file: str, time: NDArray, sample: int, rule: str) -> None:
     raise CampaignError(
-        f"{file}, line {line(sample + 1)}: {TIME} goes from {time[sample]:.9g} to "
+        f"{file}, line {line_number(sample + 1)}: {TIME_COLUMN} goes from {time[sample]:.9g} to "
         f"{time[sample + 1]:.9g} and {rule}"
     )
 
@@ -74,7 +77,8 @@ def _refuse_jitter(file: str, time: NDArray) -> None:
     uniform = np.linspace(0.0, time[-1], len(time))
     worst = int(np.argmax(np.abs(time - uniform)))
     raise CampaignError(
-        f"{file}, line {line(worst)}: {TIME} is {time[worst]:.9g} where uniform sampling has "
+        f"{file}, line {line_number(worst)}: {TIME_COLUMN} is {time[worst]:.9g} where uniform "
+        "sampling has "
         f"{uniform[worst]:.9g}, which rounding to the printed digits does not explain: resample to a "
         "uniform rate"
     )

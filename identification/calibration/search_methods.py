@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares, minimize
 
-from identification.replay.misfit import Misfit
+from identification.replay.weighted_residuals import WeightedResiduals
 
 MOST_EVALUATIONS = 2000
 """Of the total error; a search that needs more is reported as not converged."""
@@ -19,7 +19,7 @@ PRECISION = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fit:
+class SearchResult:
     """Where a search ended."""
 
     method: str
@@ -40,13 +40,13 @@ class Fit:
         return {**self.__dict__, "start": self.start.tolist(), "z": self.z.tolist()}
 
     @classmethod
-    def from_json(cls, content: Mapping[str, Any]) -> "Fit":
+    def from_json(cls, content: Mapping[str, Any]) -> "SearchResult":
         """A fit as `as_json` wrote it."""
         arrays = {name: np.array(content[name]) for name in ("start", "z")}
         return cls(**{**content, **arrays})
 
 
-def nelder_mead(misfit: Misfit, start: NDArray) -> Fit:
+def nelder_mead(misfit: WeightedResiduals, start: NDArray) -> SearchResult:
     """Minimise the total error by the simplex search that the report used (section 6.2)."""
     options = {"xatol": PRECISION, "fatol": 1e-3 * PRECISION, "maxfev": MOST_EVALUATIONS}
     began = perf_counter()
@@ -56,7 +56,7 @@ def nelder_mead(misfit: Misfit, start: NDArray) -> Fit:
     return _fit("Nelder-Mead", start, result, float(result.fun), began)
 
 
-def weighted_least_squares(misfit: Misfit, start: NDArray) -> Fit:
+def weighted_least_squares(misfit: WeightedResiduals, start: NDArray) -> SearchResult:
     """Minimise the sum of squares in units of the noise by a trust-region Gauss-Newton method."""
     began = perf_counter()
     result = least_squares(
@@ -72,8 +72,10 @@ def weighted_least_squares(misfit: Misfit, start: NDArray) -> Fit:
     return _fit("least squares", start, result, rms, began)
 
 
-def _fit(method: str, start: NDArray, result: OptimizeResult, error: float, began: float) -> Fit:
-    return Fit(
+def _fit(
+    method: str, start: NDArray, result: OptimizeResult, error: float, began: float
+) -> SearchResult:
+    return SearchResult(
         method=method,
         start=np.asarray(start, dtype=float),
         z=np.asarray(result.x, dtype=float),

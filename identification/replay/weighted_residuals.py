@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.recordings.recording import OUTPUTS, Recording
-from identification.replay.drive import drive_of
-from identification.replay.model import Replay
-from identification.replay.vector import Vector
+from identification.replay.batch_simulation import Replay
+from identification.replay.model_inputs import model_inputs
+from identification.replay.parameter_vector import ParameterVector
 
 P2_STEP = 1e3
 """Change of the start's circuit pressure by which its influence is measured [Pa]."""
@@ -43,15 +43,17 @@ def measured_outputs(recording: Recording) -> NDArray:
     return np.stack([recording.channel(output) for output in OUTPUTS])
 
 
-class Misfit:
+class WeightedResiduals:
     """Weighted residuals of recordings for scaled parameter vectors."""
 
-    def __init__(self, recordings: Sequence[Recording], vector: Vector, weights: Sequence[NDArray]):
+    def __init__(
+        self, recordings: Sequence[Recording], vector: ParameterVector, weights: Sequence[NDArray]
+    ):
         self.vector = vector
         self.weights = list(weights)
         self.measured = [measured_outputs(recording) for recording in recordings]
         self.replay = Replay(
-            [drive_of(recording, vector.reference) for recording in recordings], vector.reference
+            [model_inputs(recording, vector.reference) for recording in recordings], vector.reference
         )
 
     def error(self, z: NDArray) -> float:

@@ -6,9 +6,9 @@ from typing import Any
 
 from epv_env.plant.parameters import table
 from identification.report_2003.printed_values import printed_sensitivities
-from identification.sensitivity.one_at_a_time import Sensitivity
-from identification.sensitivity.results import FIXED_STEP_STUDY, OneAtATime
-from identification.sensitivity.study import STUDY
+from identification.sensitivity.one_at_a_time import ErrorSensitivity
+from identification.sensitivity.report_conditions import REPORT_CONDITIONS
+from identification.sensitivity.sensitivity_study import FIXED_STEP_CONDITIONS, OneAtATime
 
 RELATIVE, ABSOLUTE = 0.1, 0.1
 """A figure is reproduced within 10 % of the printed one or within 0.1 percentage points."""
@@ -19,7 +19,7 @@ NOT_COUNTED = ("a1",)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Agreement:
+class PrintedAgreement:
     """How one computation of Tables 8 and 9 meets the printed ones."""
 
     figures: int
@@ -32,7 +32,7 @@ class Agreement:
     """Largest ratio between a computed and a printed figure, either way."""
 
 
-def percentages(row: Sensitivity) -> tuple[float, float]:
+def percentages(row: ErrorSensitivity) -> tuple[float, float]:
     """Both total errors [%]."""
     return 100 * row.minus, 100 * row.plus
 
@@ -47,7 +47,7 @@ def printed_rows() -> dict[str, tuple[float, float]]:
     return {symbol: pair for number in TABLES for symbol, pair in printed_sensitivities(number).items()}
 
 
-def agreement(found: Mapping[str, Sensitivity]) -> Agreement:
+def agreement_with_printed(found: Mapping[str, ErrorSensitivity]) -> PrintedAgreement:
     """Compare a computation with the printed tables; its classes of all symbols, a1's figures apart."""
     pairs = [
         pair
@@ -55,7 +55,7 @@ def agreement(found: Mapping[str, Sensitivity]) -> Agreement:
         if symbol not in NOT_COUNTED
         for pair in zip(percentages(found[symbol]), printed, strict=True)
     ]
-    return Agreement(
+    return PrintedAgreement(
         figures=len(pairs),
         reproduced=sum(is_reproduced(*pair) for pair in pairs),
         classes_differ=tuple(s for s in printed_rows() if found[s].sensitive != table()[s].sensitive),
@@ -72,20 +72,20 @@ def sensitivity_tables(study: OneAtATime) -> dict[str, Any]:
         for number in TABLES
     }
     content["comparison"] = {
-        "fixed_step": _summary(study.fixed_step, FIXED_STEP_STUDY.U_on),
-        "exact": _summary(study.exact, STUDY.U_on),
+        "fixed_step": _summary(study.fixed_step, FIXED_STEP_CONDITIONS.U_on),
+        "exact": _summary(study.exact, REPORT_CONDITIONS.U_on),
         "rows": {symbol: _compared(study, symbol) for symbol in printed_rows()},
     }
     return content
 
 
-def _row(found: Sensitivity) -> dict[str, Any]:
+def _row(found: ErrorSensitivity) -> dict[str, Any]:
     minus, plus = percentages(found)
     return {"minus10": minus, "plus10": plus, "sensitive": found.sensitive}
 
 
-def _summary(found: Mapping[str, Sensitivity], U_on: float) -> dict[str, Any]:
-    met = agreement(found)
+def _summary(found: Mapping[str, ErrorSensitivity], U_on: float) -> dict[str, Any]:
+    met = agreement_with_printed(found)
     return {
         "U_on_V": U_on,
         "figures": met.figures,

@@ -27,7 +27,7 @@ DOUBT = 1e-4
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drive:
+class ModelInputs:
     """Inputs of the model for one recording; arrays (samples,), SI units."""
 
     period: float
@@ -45,10 +45,10 @@ class Drive:
         return float(self.p1[0])
 
 
-def drive_of(recording: Recording, p: Mapping[str, float]) -> Drive:
+def model_inputs(recording: Recording, p: Mapping[str, float]) -> ModelInputs:
     """The inputs that the model is given for a recording; p: volumes and temperature by symbol."""
     start = slice(0, max(2, round(HOLD / recording.period)))
-    return Drive(
+    return ModelInputs(
         period=recording.period,
         U=smooth_voltage(recording),
         p1=smooth_supply(recording, p),

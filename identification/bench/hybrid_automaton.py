@@ -22,7 +22,7 @@ from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at
 from identification.bench.schedule import Schedule
 
 RTOL = 1e-9
-SCALE = State(
+STATE_SCALES = State(
     p2=1e6, p3=1e6, xPV=1e-3, vPV=1.0, xMV=1e-3, vMV=1.0, I=1.0, p1=1e6,
     air_in_PV=1e-2, air_in_MV=1e-3, air_vented=1e-3, coil_energy=10.0, I_coil=1.0, coil_heat=10.0,
     heat_3=1.0, heat_2=1.0, far_pressure=1e6, supply_drop=1e6, lag_2=1e6, lag_3=1e6,
@@ -33,9 +33,9 @@ OVERSHOOT = 1e-12
 """A stop counts as reached this far beyond it [m], so that leaving it is no landing on it."""
 
 FREE, LOW, HIGH = 0, 1, 2
-X = (State._fields.index("xPV"), State._fields.index("xMV"))
-V = (State._fields.index("vPV"), State._fields.index("vMV"))
-NAMES = ("piston", "armature")
+POSITIONS = (State._fields.index("xPV"), State._fields.index("xMV"))
+SPEEDS = (State._fields.index("vPV"), State._fields.index("vMV"))
+MOVERS = ("piston", "armature")
 I_COIL = State._fields.index("I_coil")
 
 RightHandSide = Callable[[NDArray, NDArray, NDArray, NDArray, float, float], NDArray]
@@ -70,7 +70,7 @@ def compiled_right_hand_side(extended: bool) -> RightHandSide:
     return rates_and_forces
 
 
-COMPILED = {extended: compiled_right_hand_side(extended) for extended in (False, True)}
+COMPILED_RIGHT_HAND_SIDES = {extended: compiled_right_hand_side(extended) for extended in (False, True)}
 """Compiled on first use."""
 
 
@@ -84,7 +84,7 @@ class Event:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run:
+class ReferenceRun:
     """What the reference found; fields of `state` have the shape of `time`."""
 
     time: NDArray
@@ -99,14 +99,14 @@ class Run:
         return np.all(np.abs(self.time[:, None] - at) > margin, axis=1)
 
 
-class Automaton:
+class HybridAutomaton:
     """One valve on a schedule: the modes of both movers and the events that change them."""
 
     def __init__(self, schedule: Schedule, right_hand_side: RightHandSide | None, most: float):
         c = coefficients(schedule.parameters, schedule.reservoir_volume)
         e = effect_sizes(schedule.parameters)
         self.c, self.e = c, e
-        self.right_hand_side = right_hand_side or COMPILED[bool(np.any(has_effects(e)))]
+        self.right_hand_side = right_hand_side or COMPILED_RIGHT_HAND_SIDES[bool(np.any(has_effects(e)))]
         self.u = np.zeros(len(Inputs._fields))
         named = Coefficients(*c[:, 0])
         self.stroke = (named.xPVmax, named.xMVmax)
@@ -127,7 +127,7 @@ class Automaton:
     def settle_modes(self, y: NDArray) -> None:
         """Hold each mover that rests on a stop and is pressed against it."""
         forces = self.rates_and_forces(y)[-2:]
-        for mover, (x, v) in enumerate(zip(y[list(X)], y[list(V)], strict=True)):
+        for mover, (x, v) in enumerate(zip(y[list(POSITIONS)], y[list(SPEEDS)], strict=True)):
             low = v == 0 and x <= 0 and forces[mover] <= 0
             high = v == 0 and x >= self.stroke[mover] and forces[mover] >= 0
             self.mode[mover] = LOW if low else HIGH if high else FREE
@@ -136,14 +136,14 @@ class Automaton:
         """Undo what rounding in the solver did to the movers that are held."""
         for mover, mode in enumerate(self.mode):
             if mode != FREE:
-                y[X[mover]] = 0.0 if mode == LOW else self.stroke[mover]
-                y[V[mover]] = 0.0
+                y[POSITIONS[mover]] = 0.0 if mode == LOW else self.stroke[mover]
+                y[SPEEDS[mover]] = 0.0
 
     def land(self, y: NDArray, mover: int, stop: float) -> None:
         """Put a mover on the stop it has reached; it rebounds or stays."""
-        rebound = -self.restitution[mover] * y[V[mover]]
-        y[X[mover]] = stop
-        y[V[mover]] = rebound if abs(rebound) > STICK_SPEED else 0.0
+        rebound = -self.restitution[mover] * y[SPEEDS[mover]]
+        y[POSITIONS[mover]] = stop
+        y[SPEEDS[mover]] = rebound if abs(rebound) > STICK_SPEED else 0.0
 
     def read_current(self, out: NDArray, at: NDArray) -> None:
         """Fill in the current at the coil's terminals, which no equation of state holds."""
@@ -153,8 +153,8 @@ class Automaton:
     def events(self, y: NDArray) -> list[tuple[str, Callable, int]]:
         """(name, function of time and state whose zero ends the piece, direction) of each."""
         found = []
-        for mover, name in enumerate(NAMES):
-            x, top = X[mover], self.stroke[mover]
+        for mover, name in enumerate(MOVERS):
+            x, top = POSITIONS[mover], self.stroke[mover]
             if self.mode[mover] == FREE:
                 found.append((f"{name} lands low", lambda t, y, x=x: y[x] + OVERSHOOT, -1))
                 found.append((f"{name} lands high", lambda t, y, x=x, s=top: y[x] - s - OVERSHOOT, 1))
@@ -166,13 +166,15 @@ class Automaton:
                 )
         if self.mode[1] == FREE:
             for name, at in self.kinks.items():
-                if abs(y[X[1]] - at) > OVERSHOOT:
-                    found.append((f"armature passes {name}", lambda t, y, at=at: y[X[1]] - at, 0))
+                if abs(y[POSITIONS[1]] - at) > OVERSHOOT:
+                    found.append(
+                        (f"armature passes {name}", lambda t, y, at=at: y[POSITIONS[1]] - at, 0)
+                    )
         return found
 
     def apply(self, what: str, y: NDArray) -> None:
         """What an event does to the state."""
-        mover = NAMES.index(what.split()[0])
+        mover = MOVERS.index(what.split()[0])
         if what.endswith("lands low"):
             self.land(y, mover, 0.0)
         elif what.endswith("lands high"):
@@ -189,14 +191,14 @@ def simulate_reference(
     rtol: float = RTOL,
     right_hand_side: RightHandSide | None = None,
     most_evaluations: float = np.inf,
-) -> Run:
+) -> ReferenceRun:
     """Run a schedule through scipy.integrate.solve_ivp, piece by piece between events.
 
     times: sample times [s], rising. right_hand_side: another one than the plant's compiled one.
     Raises RuntimeError where the solver fails, or needs more than `most_evaluations` of it.
     """
     times = np.asarray(times, dtype=float)
-    automaton = Automaton(schedule, right_hand_side, most_evaluations)
+    automaton = HybridAutomaton(schedule, right_hand_side, most_evaluations)
     y = np.array(schedule.initial, dtype=float)
     out = np.full((len(times), len(y)), np.nan)
     out[times <= 0] = y
@@ -224,12 +226,12 @@ def simulate_reference(
                         automaton.apply(what, y)
                         if "lands" in what:
                             automaton.settle_modes(y)
-    return Run(
+    return ReferenceRun(
         time=times, state=State(*out.T), events=log, evaluations=automaton.evaluations, steps=steps
     )
 
 
-def _piece(automaton: Automaton, start: float, end: float, y: NDArray, method: str, rtol: float):
+def _piece(automaton: HybridAutomaton, start: float, end: float, y: NDArray, method: str, rtol: float):
     """Integrate from `start` until `end` or the first event. Returns solve_ivp's result."""
     names, functions = [], []
     for name, function, direction in automaton.events(y):
@@ -242,7 +244,7 @@ def _piece(automaton: Automaton, start: float, end: float, y: NDArray, method: s
         y,
         method=method,
         rtol=rtol,
-        atol=rtol * np.array(SCALE),
+        atol=rtol * np.array(STATE_SCALES),
         events=functions,
         dense_output=True,
     )

@@ -7,24 +7,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.parameters import Parameters
-from identification.sensitivity.collinearity import Sensitivities, sensitivities_of_outputs
+from identification.sensitivity.collinearity import OutputSensitivities, sensitivities_of_outputs
 from identification.sensitivity.fixed_step import simulate_fixed_step
 from identification.sensitivity.global_indices import (
-    Indices,
-    Screening,
+    MorrisEffects,
+    SobolIndices,
+    morris_effects,
     ranges,
-    screen,
     sobol_indices,
     total_error_model,
 )
-from identification.sensitivity.one_at_a_time import Sensitivity, sensitivities, studied_symbols
-from identification.sensitivity.study import STUDY, Conditions
+from identification.sensitivity.one_at_a_time import ErrorSensitivity, sensitivities, studied_symbols
+from identification.sensitivity.report_conditions import REPORT_CONDITIONS, StudyConditions
 
-FIXED_STEP_STUDY = replace(STUDY, U_on=18.835)
+FIXED_STEP_CONDITIONS = replace(REPORT_CONDITIONS, U_on=18.835)
 """The conditions for the fixed step, whose scatter changes within 0.02 V: this voltage, 0.065 V below
 the fitted one, lies amid 0.01 V where every class is as printed (docs/sensitivity.md)."""
 
-SCATTER_VOLTAGES = np.append(np.linspace(18.5, 19.3, 17), FIXED_STEP_STUDY.U_on)
+SCATTER_VOLTAGES = np.append(np.linspace(18.5, 19.3, 17), FIXED_STEP_CONDITIONS.U_on)
 """Over which the scatter of the fixed step is shown [V]."""
 
 TRAJECTORIES, SAMPLES, SEED = 40, 256, 1
@@ -35,9 +35,9 @@ TRAJECTORIES, SAMPLES, SEED = 40, 256, 1
 class OneAtATime:
     """Tables 8 and 9, computed three ways; by symbol."""
 
-    fixed_step: Mapping[str, Sensitivity]
+    fixed_step: Mapping[str, ErrorSensitivity]
     """As the report most likely simulated: a fixed step of 0.5 ms."""
-    exact: Mapping[str, Sensitivity]
+    exact: Mapping[str, ErrorSensitivity]
     """With the plant's own integrator, which locates every stop."""
     scatter: Mapping[str, NDArray]
     """Total errors with the fixed step at each of SCATTER_VOLTAGES, fractions, (voltages, 2)."""
@@ -48,9 +48,9 @@ class SensitivityStudy:
     """Everything that section 5 asks, and what it left out."""
 
     one_at_a_time: OneAtATime
-    outputs: Sensitivities
-    screening: Screening
-    indices: Indices
+    outputs: OutputSensitivities
+    screening: MorrisEffects
+    indices: SobolIndices
 
 
 def run_one_at_a_time(nominal: Mapping[str, float] | None = None) -> OneAtATime:
@@ -58,16 +58,16 @@ def run_one_at_a_time(nominal: Mapping[str, float] | None = None) -> OneAtATime:
     p = nominal or Parameters.nominal()
     symbols = studied_symbols()
     return OneAtATime(
-        fixed_step=_fixed_step(p, FIXED_STEP_STUDY),
+        fixed_step=_fixed_step(p, FIXED_STEP_CONDITIONS),
         exact=sensitivities(p, symbols),
         scatter=_scatter(p, symbols),
     )
 
 
-def run_study(
+def run_sensitivity_study(
     nominal: Mapping[str, float] | None = None,
     *,
-    outputs: Sensitivities | None = None,
+    outputs: OutputSensitivities | None = None,
     trajectories: int = TRAJECTORIES,
     samples: int = SAMPLES,
     seed: int = SEED,
@@ -83,18 +83,18 @@ def run_study(
     return SensitivityStudy(
         one_at_a_time=run_one_at_a_time(p),
         outputs=outputs or sensitivities_of_outputs(p, symbols),
-        screening=screen(model, symbols, bounds, trajectories=trajectories, seed=seed),
+        screening=morris_effects(model, symbols, bounds, trajectories=trajectories, seed=seed),
         indices=sobol_indices(model, symbols, bounds, samples=samples, seed=seed),
     )
 
 
-def _fixed_step(p: Mapping[str, float], conditions: Conditions) -> dict[str, Sensitivity]:
+def _fixed_step(p: Mapping[str, float], conditions: StudyConditions) -> dict[str, ErrorSensitivity]:
     symbols = studied_symbols()
     return sensitivities(p, symbols, conditions=conditions, simulator=simulate_fixed_step)
 
 
 def _scatter(p: Mapping[str, float], symbols: list[str]) -> dict[str, NDArray]:
-    runs = [_fixed_step(p, replace(STUDY, U_on=float(U))) for U in SCATTER_VOLTAGES]
+    runs = [_fixed_step(p, replace(REPORT_CONDITIONS, U_on=float(U))) for U in SCATTER_VOLTAGES]
     return {
         symbol: np.array([[run[symbol].minus, run[symbol].plus] for run in runs]) for symbol in symbols
     }

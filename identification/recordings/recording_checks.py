@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.sensors import SENSORS, Sensor
-from identification.recordings.columns import CHANNEL_OF, TIME, line
+from identification.recordings.columns import CHANNEL_OF, TIME_COLUMN, line_number
 from identification.recordings.pressure_reference import (
     check_above_ambient,
     check_against_supply,
     check_discharge,
 )
 from identification.recordings.recording import HOLD, CampaignError
-from identification.recordings.timing import sampling_period
+from identification.recordings.sampling_times import sampling_period
 
 LEAST_REST = 0.5
 """Least duration of a quality recording [s]; statistics of less mean little."""
@@ -41,7 +41,7 @@ def check_recording(
     file: what messages call it. role: one of recording.ROLES. ambient_bar: p_env [bar
     absolute]. Raises CampaignError at the first rule that is broken.
     """
-    period = sampling_period(file, columns[TIME])
+    period = sampling_period(file, columns[TIME_COLUMN])
     check_length(file, columns, role, period)
     for name, channel in CHANNEL_OF.items():
         if name in columns:
@@ -68,11 +68,12 @@ def _check_channel(
 
 def check_length(file: str, columns: Mapping[str, NDArray], role: str, period: float) -> None:
     """A recording holds its steady start and more; one for statistics LEAST_REST."""
-    found = len(columns[TIME])
+    found = len(columns[TIME_COLUMN])
     needed = _samples(LEAST_REST, period) if role == "quality" else _samples(HOLD, period) + 1
     if found < needed:
         raise CampaignError(
-            f"{file}, line {line(found)}: the file ends after {found} samples, and a {role} recording "
+            f"{file}, line {line_number(found)}: the file ends after {found} samples, and a {role} "
+            "recording "
             f"at {1 / period:g} Hz needs at least {needed}: record for longer"
         )
 
@@ -92,7 +93,7 @@ def check_unit(file: str, name: str, values: NDArray) -> None:
     if typical > KILOPASCAL:
         unit, factor = ("Pa", 100000) if typical > PASCAL else ("kPa", 100)
         raise CampaignError(
-            f"{file}, line {line(0)}: {name} is {values[0]:g}, which looks like {unit}: give bar "
+            f"{file}, line {line_number(0)}: {name} is {values[0]:g}, which looks like {unit}: give bar "
             f"absolute (divide {unit} by {factor})"
         )
 
@@ -104,7 +105,8 @@ def check_range(file: str, name: str, values: NDArray, sensor: Sensor) -> None:
     if np.any(outside):
         sample = int(np.argmax(outside))
         raise CampaignError(
-            f"{file}, line {line(sample)}: {name} is {values[sample]:g}, outside the sensor's range "
+            f"{file}, line {line_number(sample)}: {name} is {values[sample]:g}, outside the sensor's "
+            "range "
             f"[{sensor.low:g}, {sensor.high:g}] by more than its accuracy of {_margin(sensor):g}: "
             "check unit and scaling, or cut the recording there"
         )
@@ -136,7 +138,8 @@ def check_energised_start(file: str, U: NDArray, period: float) -> None:
     off = np.flatnonzero(0.5 * np.max(U) >= U[: _samples(HOLD, period)])
     if off.size:
         raise CampaignError(
-            f"{file}, line {line(off[0])}: U_V is {U[off[0]]:g} V at {1e3 * off[0] * period:g} ms, and "
+            f"{file}, line {line_number(off[0])}: U_V is {U[off[0]]:g} V at {1e3 * off[0] * period:g} "
+            "ms, and "
             f"recordings start energised for at least {1e3 * HOLD:g} ms: record from before the first "
             "switching"
         )
@@ -180,7 +183,7 @@ def _samples(duration: float, period: float) -> int:
 
 
 def _lines(first: int, count: int) -> str:
-    return f"lines {line(first)} to {line(first + count - 1)}"
+    return f"lines {line_number(first)} to {line_number(first + count - 1)}"
 
 
 def _longest_run(mask: NDArray) -> tuple[int, int]:

@@ -12,7 +12,7 @@ from epv_env.plant.readings import readings
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
 from identification.recordings.recording import OUTPUTS
-from identification.replay.drive import Drive
+from identification.replay.model_inputs import ModelInputs
 
 LARGEST_BATCH = 1_500_000
 """Samples times valves that are simulated at once: about 200 MB."""
@@ -21,7 +21,7 @@ LARGEST_BATCH = 1_500_000
 class Replay:
     """Simulates recordings under candidate parameters."""
 
-    def __init__(self, drives: Sequence[Drive], base: Parameters):
+    def __init__(self, drives: Sequence[ModelInputs], base: Parameters):
         """base: values of the parameters that the candidates do not change."""
         self.drives = list(drives)
         self.base = base
@@ -89,7 +89,7 @@ def _lanes(value: NDArray, recordings: Sequence[int]) -> NDArray:
 
 
 def _simulate(
-    drives: list[Drive], tiled: Mapping[str, ArrayLike], shift: NDArray, n: int
+    drives: list[ModelInputs], tiled: Mapping[str, ArrayLike], shift: NDArray, n: int
 ) -> list[NDArray]:
     """One batch: lane r n + j is candidate j on recording r. tiled, shift: by lane."""
     valves = Valves(n * len(drives))
@@ -115,7 +115,7 @@ def _read(state: State, p: Mapping[str, ArrayLike]) -> NDArray:
     return np.stack([read[output] for output in OUTPUTS])
 
 
-def _inputs(drives: list[Drive]) -> tuple[dict[str, NDArray], NDArray]:
+def _inputs(drives: list[ModelInputs]) -> tuple[dict[str, NDArray], NDArray]:
     """Inputs by name, and length of each period; (longest - 1, recordings), 0 past a recording's end."""
     steps = max(len(drive.U) for drive in drives) - 1
     table = np.zeros((4, steps, len(drives)))

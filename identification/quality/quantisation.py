@@ -8,7 +8,7 @@ CONTINUOUS = 0.2
 """Distinct readings per sample above which the readings lie on no grid."""
 
 
-def quantum(readings: NDArray) -> float:
+def converter_step(readings: NDArray) -> float:
     """Step of the converter [unit]: the least step between distinct readings.
 
     The few digits of a file make equal steps unequal, so the step is the slope of the line through

@@ -5,9 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.calibration.methods import Fit
-from identification.calibration.multi_start import METHODS, best, reached_the_best
-from identification.calibration.problem import Problem
+from identification.calibration.multi_start import METHODS, best_search, reached_best
+from identification.calibration.problem import CalibrationProblem
+from identification.calibration.search_methods import SearchResult
 
 NEAR_BOUND = 1e-3
 """Share of a domain within which an estimate counts as on its end."""
@@ -19,19 +19,21 @@ UNEXPLAINED = 1.2
 """Root mean square residual, in noise deviations, from which the model misses the recordings."""
 
 
-def warnings_of(problem: Problem, fits: Mapping[str, list[Fit]]) -> list[str]:
+def calibration_warnings(
+    problem: CalibrationProblem, fits: Mapping[str, list[SearchResult]]
+) -> list[str]:
     """Every reason for doubt, as a sentence with its figures and what to do."""
     found = []
     for method in METHODS:
-        found += _not_converged(method, best(fits[method]))
-        found += _on_bounds(problem, method, best(fits[method]))
+        found += _not_converged(method, best_search(fits[method]))
+        found += _on_bounds(problem, method, best_search(fits[method]))
         found += _other_minima(method, fits[method])
-    z = best(fits["least squares"]).z
+    z = best_search(fits["least squares"]).z
     found += _conditioning(problem, np.vstack(problem.least_squares().linearised(z)[1]))
-    return found + _unexplained(best(fits["least squares"]))
+    return found + _unexplained(best_search(fits["least squares"]))
 
 
-def _not_converged(method: str, fit: Fit) -> list[str]:
+def _not_converged(method: str, fit: SearchResult) -> list[str]:
     if fit.converged:
         return []
     return [
@@ -40,7 +42,7 @@ def _not_converged(method: str, fit: Fit) -> list[str]:
     ]
 
 
-def _on_bounds(problem: Problem, method: str, fit: Fit) -> list[str]:
+def _on_bounds(problem: CalibrationProblem, method: str, fit: SearchResult) -> list[str]:
     low, high = problem.vector.bounds.T
     margin = NEAR_BOUND * (high - low)
     at = (fit.z < low + margin) | (fit.z > high - margin)
@@ -52,19 +54,20 @@ def _on_bounds(problem: Problem, method: str, fit: Fit) -> list[str]:
     ]
 
 
-def _other_minima(method: str, fits: list[Fit]) -> list[str]:
-    same = reached_the_best(fits)
+def _other_minima(method: str, fits: list[SearchResult]) -> list[str]:
+    same = reached_best(fits)
     if same[0] and np.all(same):
         return []
     others = [fit.error for fit, reached in zip(fits, same, strict=True) if not reached]
     first = "" if same[0] else "; the usual start (Table 10) is among those that do not"
     return [
-        f"{method}: {np.sum(same)} of {len(fits)} starts reach the least error {best(fits).error:.6g}, "
+        f"{method}: {np.sum(same)} of {len(fits)} starts reach the least error "
+        f"{best_search(fits).error:.6g}, "
         f"the others end at {min(others):.6g} or more{first}: there are other local minima"
     ]
 
 
-def _conditioning(problem: Problem, jacobian: NDArray) -> list[str]:
+def _conditioning(problem: CalibrationProblem, jacobian: NDArray) -> list[str]:
     normalised = jacobian / np.maximum(np.linalg.norm(jacobian, axis=0), np.finfo(float).tiny)
     condition = float(np.linalg.cond(normalised))
     if condition < ILL_CONDITIONED:
@@ -77,7 +80,7 @@ def _conditioning(problem: Problem, jacobian: NDArray) -> list[str]:
     ]
 
 
-def _unexplained(fit: Fit) -> list[str]:
+def _unexplained(fit: SearchResult) -> list[str]:
     if fit.error < UNEXPLAINED:
         return []
     return [
