@@ -6,18 +6,11 @@ from itertools import combinations
 
 from identification.quality.channel import ChannelAssessment, assess_channel
 from identification.quality.correlation_tests import PairCorrelation, assess_correlation
+from identification.quality.settings import QUALITY, QualitySettings
 from identification.recordings.recording import CHANNELS, UNITS, CampaignError, Recording
 
-LEAST_SAMPLES = 250
-"""Half a second at 500 Hz; fewer do not show the distribution of a noise."""
-
-LONGEST_LAG = 0.1
-"""Up to where correlations are computed [s], at most a twentieth of the record.
-
-With more lags for the samples, the Ljung-Box test alarms too often on white noise.
-"""
-
 PRESSURES = ("p1", "p2", "p3")
+"""Channels whose rest value is the ambient pressure."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +35,8 @@ class QualityAssessment:
     """By name, in the order of Table 1."""
     pairs: Mapping[tuple[str, str], PairCorrelation]
     """Of all channels that change."""
+    settings: QualitySettings = QUALITY
+    """What the recording was judged by."""
 
     @property
     def adjusted(self) -> dict[tuple[str, str], float]:
@@ -68,28 +63,31 @@ class QualityAssessment:
     @property
     def lags(self) -> int:
         """Greatest lag of the correlations [samples]."""
-        return greatest_lag(self.samples, self.period)
+        return greatest_lag(self.samples, self.period, self.settings)
 
 
-def assess_recording(recording: Recording, environment_pressure: float) -> QualityAssessment:
+def assess_recording(
+    recording: Recording, environment_pressure: float, settings: QualitySettings = QUALITY
+) -> QualityAssessment:
     """Statistics of a steady recording.
 
     environment_pressure: p_env [Pa absolute]. Raises CampaignError for a record of fewer than
-    LEAST_SAMPLES.
+    `settings.least_samples`.
     """
-    if len(recording) < LEAST_SAMPLES:
+    if len(recording) < settings.least_samples:
         raise CampaignError(
             f"{recording.name}: {len(recording)} samples; the statistics of section 4 need "
-            f"{LEAST_SAMPLES} or more: record 5 s of steady state"
+            f"{settings.least_samples} or more: record 5 s of steady state"
         )
-    channels = {name: _channel(recording, name, environment_pressure) for name in CHANNELS}
-    pairs = _pairs(channels, greatest_lag(len(recording), recording.period))
+    channels = {name: _channel(recording, name, environment_pressure, settings) for name in CHANNELS}
+    pairs = _pairs(channels, greatest_lag(len(recording), recording.period, settings))
     return QualityAssessment(
         name=recording.name,
         period=recording.period,
         samples=len(recording),
         channels=channels,
         pairs=pairs,
+        settings=settings,
     )
 
 
@@ -110,19 +108,22 @@ def _offset(channel: ChannelAssessment) -> SensorOffset:
     return SensorOffset(value=value * size, error=channel.trend.offset_error * size)
 
 
-def greatest_lag(samples: int, period: float) -> int:
-    """Greatest lag at which correlations are computed [samples]."""
-    return max(1, min(round(LONGEST_LAG / period), samples // 20))
+def greatest_lag(samples: int, period: float, settings: QualitySettings = QUALITY) -> int:
+    """Greatest lag at which correlations are computed [samples]; period: between samples [s]."""
+    return max(1, min(round(settings.greatest_lag / period), samples // settings.samples_per_lag))
 
 
-def _channel(recording: Recording, name: str, environment_pressure: float) -> ChannelAssessment:
+def _channel(
+    recording: Recording, name: str, environment_pressure: float, settings: QualitySettings
+) -> ChannelAssessment:
     size = UNITS[name][1]
     return assess_channel(
         name,
         recording.channel(name) / size,
         period=recording.period,
         rest=environment_pressure / size if name in PRESSURES else 0.0,
-        lags=greatest_lag(len(recording), recording.period),
+        lags=greatest_lag(len(recording), recording.period, settings),
+        settings=settings,
     )
 
 

@@ -37,20 +37,20 @@ def as_text(quality: QualityAssessment) -> str:
     widths = {check: max(len(check), 5) for check in CHECKS}
     lines = ["channel  verdict  " + "  ".join(check.ljust(widths[check]) for check in CHECKS)]
     for name in CHANNELS:
-        found = {finding.check: finding.status for finding in check_results(quality, name)}
-        cells = "  ".join(found.get(check, "-").ljust(width) for check, width in widths.items())
+        statuses = {result.check: result.status for result in check_results(quality, name)}
+        cells = "  ".join(statuses.get(check, "-").ljust(width) for check, width in widths.items())
         lines.append(f"{name:7}  {worst_status(check_results(quality, name)):7}  {cells}")
     return "\n".join(line.rstrip() for line in lines)
 
 
 def _channel(quality: QualityAssessment, name: str) -> dict[str, Any]:
     channel = quality.channels[name]
-    found = check_results(quality, name)
+    results = check_results(quality, name)
     return {
         "unit": channel.unit,
-        "status": worst_status(found),
+        "status": worst_status(results),
         "findings": [
-            {"check": finding.check, "status": finding.status, "text": finding.text} for finding in found
+            {"check": result.check, "status": result.status, "text": result.text} for result in results
         ],
         "trend": _finite(asdict(channel.trend)),
         "statistics": _finite(asdict(channel.description)),
@@ -62,13 +62,13 @@ def _channel(quality: QualityAssessment, name: str) -> dict[str, Any]:
 
 
 def _whiteness(channel: ChannelAssessment) -> dict[str, float] | None:
-    found = channel.whiteness
-    if found is None:
+    test = channel.whiteness
+    if test is None:
         return None
     return {
-        "ljung_box_p": found.probability,
-        "greatest_autocorrelation": found.peak,
-        "variance_inflation": found.inflation,
+        "ljung_box_p": test.probability,
+        "greatest_autocorrelation": test.peak,
+        "variance_inflation": test.inflation,
     }
 
 

@@ -88,11 +88,11 @@ def spectra(quality: QualityAssessment) -> Figure:
     """Power spectral densities with the 95 % band of white noise (Figure 9)."""
     figure, panels = _grid(quality, "density [dB re 1 unit² per rad/sample]")
     for axes, channel, whiteness in panels:
-        found = whiteness.spectrum
-        level = 10 * np.log10(found.white)
+        spectrum = whiteness.spectrum
+        level = 10 * np.log10(spectrum.white)
         axes.update_datalim([(0, level - 5), (1, level + 5)])
-        axes.axhspan(*(10 * np.log10(found.band)), **BAND)
-        axes.plot(found.frequency, 10 * np.log10(found.density), **MARK)
+        axes.axhspan(*(10 * np.log10(spectrum.band)), **BAND)
+        axes.plot(spectrum.frequency, 10 * np.log10(spectrum.density), **MARK)
         axes.set_title(f"{channel.name} [{channel.unit}]")
         axes.set_xlabel("frequency / Nyquist frequency")
     return figure

@@ -47,12 +47,12 @@ def _state(quality: QualityAssessment) -> str:
 def _checks(quality: QualityAssessment) -> Table:
     rows = []
     for name in CHANNELS:
-        found = {finding.check: finding.status for finding in check_results(quality, name)}
+        statuses = {result.check: result.status for result in check_results(quality, name)}
         rows.append(
             [
                 name,
                 worst_status(check_results(quality, name)),
-                *(found.get(check, "–") for check in CHECKS),
+                *(statuses.get(check, "–") for check in CHECKS),
             ]
         )
     return Table(columns=["Channel", "verdict", *CHECKS], rows=rows, caption="Status of every check.")
@@ -77,11 +77,11 @@ def _estimate(value: float, error: float) -> str:
 
 
 def _statistics(quality: QualityAssessment) -> Table:
-    found = {name: channel.description for name, channel in quality.channels.items()}
+    statistics = {name: channel.description for name, channel in quality.channels.items()}
     rows = []
     for field in fields(DescriptiveStatistics):
         label = reported.STATISTIC_NAMES[field.name]
-        rows.append([label, *(_cell(found[name], field.name) for name in CHANNELS)])
+        rows.append([label, *(_cell(statistics[name], field.name) for name in CHANNELS)])
         report = (_cell(reported.STATISTICS[name], field.name) for name in CHANNELS)
         rows.append(["  the report's", *report])
     return Table(

@@ -8,23 +8,8 @@ import numpy as np
 from scipy import stats
 
 from identification.quality.assessment import PRESSURES, QualityAssessment
-from identification.quality.channel import MARGINAL_DRIFT, SIGNIFICANCE, ChannelAssessment
+from identification.quality.channel import ChannelAssessment
 from identification.quality.judgements import Judgement, graded_status, judgement_of, milli_text
-
-TREND_LEVELS = (MARGINAL_DRIFT, 1.0)
-"""Drift over the record, relative to Table 1's accuracy, from which it is in doubt, and bad."""
-
-NOISE_LEVELS = (1.5, 4.0)
-"""Standard deviation relative to Table 3's: 3.5 dB and 12 dB of its signal-to-noise ratio."""
-
-OUTLIER_LEVELS = (1.0, 2.0)
-"""Outlier factor (eq. 18) relative to its limit."""
-
-COARSE = 1.1
-"""Step relative to Table 1's twelve bits from which the converter is coarser than it should be."""
-
-LEAST_DITHER = 0.3
-"""Standard deviation of the noise in steps below which rounding errors no longer average out."""
 
 
 def check_offset(quality: QualityAssessment, channel: ChannelAssessment) -> Judgement:
@@ -49,9 +34,9 @@ def _no_offset(channel: ChannelAssessment, reason: str) -> Judgement:
 def check_trend(quality: QualityAssessment, channel: ChannelAssessment) -> Judgement:
     """Is the drift over the record small against the accuracy?"""
     ratio, deviations = abs(channel.drift) / channel.accuracy, channel.trend_deviations
-    significant = deviations > stats.norm.isf(SIGNIFICANCE / 2)
+    significant = deviations > stats.norm.isf(channel.settings.significance / 2)
     return judgement_of(
-        graded_status(ratio, TREND_LEVELS) if significant else "good",
+        graded_status(ratio, channel.settings.drift_levels) if significant else "good",
         f"drift {milli_text(channel, channel.drift)} in {channel.duration:.3g} s, "
         f"{deviations:.1f} standard errors and {100 * ratio:.2g} % of the accuracy",
         "let the bench settle, look for a leak or a warming sensor, and record again",
@@ -63,7 +48,7 @@ def check_noise(quality: QualityAssessment, channel: ChannelAssessment) -> Judge
     deviation = channel.normality.standard_deviation
     ratio = deviation / channel.sensor.noise
     return judgement_of(
-        graded_status(ratio, NOISE_LEVELS),
+        graded_status(ratio, channel.settings.noise_levels),
         f"noise {milli_text(channel, deviation)} before rounding, {ratio:.2f} times Table 3's, "
         f"signal-to-noise ratio {channel.description.signal_to_noise:.1f} dB",
         "check shielding, ground and supply of the sensor",
@@ -80,10 +65,11 @@ def check_resolution(quality: QualityAssessment, channel: ChannelAssessment) -> 
     ratio = channel.quantum / channel.sensor.resolution
     steps = channel.normality.standard_deviation / channel.quantum if channel.quantum else np.inf
     return judgement_of(
-        "doubt" if ratio > COARSE or steps < LEAST_DITHER else "good",
+        "doubt"
+        if ratio > channel.settings.coarse_step or steps < channel.settings.least_dither
+        else "good",
         f"one step is {milli_text(channel, channel.quantum)}, {ratio:.2f} times Table 1's range in 12 "
-        "bits, "
-        f"and the noise is {steps:.2g} steps",
+        f"bits, and the noise is {steps:.2g} steps",
         "check the converter's range and bits, since rounding errors do not average out",
     )
 
@@ -102,7 +88,7 @@ def check_outliers(quality: QualityAssessment, channel: ChannelAssessment) -> Ju
     factor, limit = channel.description.outlier_factor, channel.outlier_limit
     at = int(np.argmax(np.abs(channel.residual))) * quality.period
     return judgement_of(
-        graded_status(factor / limit, OUTLIER_LEVELS),
+        graded_status(factor / limit, channel.settings.outlier_levels),
         f"greatest outlier {factor:.2f} standard deviations, at {at:.4g} s; 99.9 % of normal records "
         f"stay below {limit:.2f}",
         "look for switching interference and loose contacts, and record again",

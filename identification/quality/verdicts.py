@@ -1,4 +1,4 @@
-"""A finding per channel and check: good, doubt or bad, with the figures and what to do."""
+"""A result per channel and check: good, doubt or bad, with the figures and what to do."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -53,18 +53,18 @@ def check_results(quality: QualityAssessment, name: str) -> tuple[CheckResult, .
     )
 
 
-def worst_status(found: Sequence[CheckResult]) -> str:
-    """Worst status among some findings."""
-    return max((finding.status for finding in found), key=SEVERITY.index)
+def worst_status(results: Sequence[CheckResult]) -> str:
+    """Worst status among some results."""
+    return max((result.status for result in results), key=SEVERITY.index)
 
 
 def channel_verdict(quality: QualityAssessment, name: str) -> Verdict:
     """One channel's verdict: what is not good about it, or its figures if all is."""
-    found = {finding.check: finding for finding in check_results(quality, name)}
-    status = worst_status(tuple(found.values()))
+    results = {result.check: result for result in check_results(quality, name)}
+    status = worst_status(tuple(results.values()))
     if status == "good":
-        text = f"no fault found; {found['offset'].text}; {found['noise'].text}."
+        text = f"no fault found; {results['offset'].text}; {results['noise'].text}."
     else:
-        faults = [finding for finding in found.values() if finding.status in ("doubt", "bad")]
-        text = " ".join(f"{finding.check}: {finding.text}." for finding in faults)
+        faults = [result for result in results.values() if result.status in ("doubt", "bad")]
+        text = " ".join(f"{result.check}: {result.text}." for result in faults)
     return Verdict(status=status, text=f"{name}: {text}")
