@@ -15,18 +15,22 @@ from epv_env.plant.parameters import Parameters
 from identification.bench.programmes import REPORT_SUITE
 from identification.bench.session import run_bench
 from identification.calibration.multi_start import METHODS
+from identification.calibration.settings import CalibrationSettings
 from identification.confidence import confidence_figures as figures
 from identification.pipeline.identification import Identification
+from identification.pipeline.settings import IdentificationSettings
 from identification.replay.response_figures import response_figure
 from identification.studies.coverage.coverage import coverage_study
 from identification.studies.coverage.coverage_figure import distances
+
+ONE_START = IdentificationSettings(calibration=CalibrationSettings(starts=1))
 
 
 def drawn(coverage: Path, campaigns: int) -> dict[str, Figure]:
     """Figures by file name; the coverage study's journal lies in the folder `coverage`."""
     campaign = run_bench(REPORT_SUITE, Parameters.calibrated(), seed=0)
     with TemporaryDirectory() as folder:
-        identification = Identification(campaign, Path(folder) / "searches.jsonl", starts=1)
+        identification = Identification(campaign, Path(folder) / "searches.jsonl", settings=ONE_START)
         study = coverage_study(journal=coverage / "coverage.jsonl", campaigns=campaigns)
         return {
             "calibration.png": response_figure(identification.calibration.after[METHODS[0]][0]),

@@ -8,29 +8,25 @@ from numpy.typing import NDArray
 from identification.calibration.multi_start import METHODS, best_search, reached_best
 from identification.calibration.problem import CalibrationProblem
 from identification.calibration.search_methods import SearchResult
-
-NEAR_BOUND = 1e-3
-"""Share of a domain within which an estimate counts as on its end."""
-
-ILL_CONDITIONED = 30.0
-"""Condition number of the normalised sensitivities from which collinearity is strong (Belsley 1980)."""
-
-UNEXPLAINED = 1.2
-"""Root mean square residual, in noise deviations, from which the model misses the recordings."""
+from identification.calibration.settings import CALIBRATION, CalibrationSettings
 
 
 def calibration_warnings(
-    problem: CalibrationProblem, fits: Mapping[str, list[SearchResult]]
+    problem: CalibrationProblem,
+    fits: Mapping[str, list[SearchResult]],
+    settings: CalibrationSettings = CALIBRATION,
 ) -> list[str]:
-    """Every reason for doubt, as a sentence with its figures and what to do."""
-    found = []
+    """Every reason for doubt, as a sentence with its figures and what to do; fits: by method."""
+    warnings = []
     for method in METHODS:
-        found += _not_converged(method, best_search(fits[method]))
-        found += _on_bounds(problem, method, best_search(fits[method]))
-        found += _other_minima(method, fits[method])
-    z = best_search(fits["least squares"]).z
-    found += _conditioning(problem, np.vstack(problem.least_squares().linearised(z)[1]))
-    return found + _unexplained(best_search(fits["least squares"]))
+        best = best_search(fits[method])
+        warnings += _not_converged(method, best)
+        warnings += _on_bounds(problem, method, best, settings.near_bound)
+        warnings += _other_minima(method, fits[method], settings.same_minimum)
+    best = best_search(fits["least squares"])
+    jacobian = np.vstack(problem.least_squares().linearised(best.z)[1])
+    warnings += _conditioning(problem, jacobian, settings)
+    return warnings + _unexplained(best, settings.unexplained)
 
 
 def _not_converged(method: str, fit: SearchResult) -> list[str]:
@@ -42,9 +38,9 @@ def _not_converged(method: str, fit: SearchResult) -> list[str]:
     ]
 
 
-def _on_bounds(problem: CalibrationProblem, method: str, fit: SearchResult) -> list[str]:
+def _on_bounds(problem: CalibrationProblem, method: str, fit: SearchResult, share: float) -> list[str]:
     low, high = problem.vector.bounds.T
-    margin = NEAR_BOUND * (high - low)
+    margin = share * (high - low)
     at = (fit.z < low + margin) | (fit.z > high - margin)
     return [
         f"{method} ends at the end of {symbol}'s domain: the recordings ask for a value outside it, so "
@@ -54,8 +50,8 @@ def _on_bounds(problem: CalibrationProblem, method: str, fit: SearchResult) -> l
     ]
 
 
-def _other_minima(method: str, fits: list[SearchResult]) -> list[str]:
-    same = reached_best(fits)
+def _other_minima(method: str, fits: list[SearchResult], tolerance: float) -> list[str]:
+    same = reached_best(fits, tolerance)
     if same[0] and np.all(same):
         return []
     others = [fit.error for fit, reached in zip(fits, same, strict=True) if not reached]
@@ -67,21 +63,25 @@ def _other_minima(method: str, fits: list[SearchResult]) -> list[str]:
     ]
 
 
-def _conditioning(problem: CalibrationProblem, jacobian: NDArray) -> list[str]:
+def _conditioning(
+    problem: CalibrationProblem, jacobian: NDArray, settings: CalibrationSettings
+) -> list[str]:
     normalised = jacobian / np.maximum(np.linalg.norm(jacobian, axis=0), np.finfo(float).tiny)
     condition = float(np.linalg.cond(normalised))
-    if condition < ILL_CONDITIONED:
+    if condition < settings.ill_conditioned:
         return []
     direction = np.abs(np.linalg.svd(normalised, full_matrices=False)[2][-1])
-    involved = [s for s, w in zip(problem.vector.symbols, direction, strict=True) if w > 0.3]
+    involved = [
+        s for s, w in zip(problem.vector.symbols, direction, strict=True) if w > settings.involved_weight
+    ]
     return [
         f"the recordings cannot separate {', '.join(involved)} (condition number {condition:.0f}): fix "
         "one of them, or record what moves them apart"
     ]
 
 
-def _unexplained(fit: SearchResult) -> list[str]:
-    if fit.error < UNEXPLAINED:
+def _unexplained(fit: SearchResult, limit: float) -> list[str]:
+    if fit.error < limit:
         return []
     return [
         f"the calibrated model misses the recordings by {fit.error:.3g} noise deviations (1 is the "

@@ -8,9 +8,11 @@ from epv_env.common.journal import Journal
 from epv_env.common.progress import progress
 from identification.calibration.problem import CalibrationProblem
 from identification.calibration.search_methods import SearchResult, nelder_mead, weighted_least_squares
+from identification.calibration.settings import CALIBRATION, CalibrationSettings
 from identification.replay.parameter_vector import ParameterVector
 
 METHODS = ("Nelder-Mead", "least squares")
+"""Names of the search methods; result files carry them."""
 
 
 def starting_points(vector: ParameterVector, count: int, seed: int) -> NDArray:
@@ -28,27 +30,33 @@ def starting_points(vector: ParameterVector, count: int, seed: int) -> NDArray:
 
 
 def search_from_all_starts(
-    problem: CalibrationProblem, starts: NDArray, journal: Journal
+    problem: CalibrationProblem,
+    starts: NDArray,
+    journal: Journal,
+    settings: CalibrationSettings = CALIBRATION,
 ) -> dict[str, list[SearchResult]]:
-    """Both methods from every start; those that the journal holds are taken from it."""
+    """Both methods from every start; finished searches are taken from the journal.
+
+    starts: scaled vectors (starts, k), without unit. Returns the searches by method.
+    """
     misfits = {"Nelder-Mead": problem.total_error(), "least squares": problem.least_squares()}
     searches = {"Nelder-Mead": nelder_mead, "least squares": weighted_least_squares}
-    found: dict[str, list[SearchResult]] = {method: [] for method in METHODS}
+    searched: dict[str, list[SearchResult]] = {method: [] for method in METHODS}
     tasks = [(method, index) for index in range(len(starts)) for method in METHODS]
     for method, index in progress(tasks, what="calibrate: searches"):
         name = f"{method} {index}"
         if name not in journal:
-            journal.add(name, searches[method](misfits[method], starts[index]).as_json())
-        found[method].append(SearchResult.from_json(journal[name]))
-    return found
+            journal.add(name, searches[method](misfits[method], starts[index], settings).as_json())
+        searched[method].append(SearchResult.from_json(journal[name]))
+    return searched
 
 
 def best_search(fits: list[SearchResult]) -> SearchResult:
-    """The fit with the least error."""
+    """The search that ended at the least error."""
     return min(fits, key=lambda fit: fit.error)
 
 
-def reached_best(fits: list[SearchResult], tolerance: float = 1e-3) -> NDArray:
+def reached_best(fits: list[SearchResult], tolerance: float = CALIBRATION.same_minimum) -> NDArray:
     """Which searches ended within a relative `tolerance` of the best, boolean (starts,)."""
     ends, goal = np.array([fit.z for fit in fits]), best_search(fits).z
     return np.all(np.abs(ends - goal) <= tolerance * np.maximum(np.abs(goal), tolerance), axis=1)

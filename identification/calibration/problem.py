@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from epv_env.plant.parameters import ParameterError, Parameters, table
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.quality.assessment import SensorOffset, assess_recording, sensor_offsets
+from identification.quality.settings import QUALITY, QualitySettings
 from identification.recordings.noise_estimation import pooled_noise
 from identification.recordings.recording import Campaign, CampaignError, Recording
 from identification.replay.model_inputs import without_offsets
@@ -42,6 +43,7 @@ def calibration_problem(
     *,
     start: Parameters | None = None,
     symbols: Sequence[str] = CALIBRATED_SYMBOLS,
+    quality: QualitySettings = QUALITY,
 ) -> CalibrationProblem:
     """The problem that a campaign poses, from `start` (None: Table 10) at the campaign's ambient.
 
@@ -56,7 +58,7 @@ def calibration_problem(
         T_env=campaign.temperature, p_env=campaign.pressure
     )
     _check_fitted(symbols, start)
-    offsets = _offsets(campaign)
+    offsets = _offsets(campaign, quality)
     values = {name: offset.value for name, offset in offsets.items()}
     return CalibrationProblem(
         calibration=tuple(without_offsets(r, values) for r in campaign.of("calibration")),
@@ -80,10 +82,10 @@ def _check_fitted(symbols: Sequence[str], start: Parameters) -> None:
         )
 
 
-def _offsets(campaign: Campaign) -> dict[str, SensorOffset]:
+def _offsets(campaign: Campaign, quality: QualitySettings) -> dict[str, SensorOffset]:
     """The sensors' offsets from the first quality recording that shows them."""
     for recording in campaign.of("quality"):
-        offsets = sensor_offsets(assess_recording(recording, campaign.pressure))
+        offsets = sensor_offsets(assess_recording(recording, campaign.pressure, quality))
         if offsets:
             return offsets
     return {}

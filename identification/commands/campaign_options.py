@@ -2,9 +2,10 @@
 
 import argparse
 
-from identification.calibration.calibrate import STARTS
+from identification.calibration.settings import CALIBRATION, CalibrationSettings
 from identification.commands.options import add_count, add_out, add_seed
 from identification.pipeline.identification import Identification
+from identification.pipeline.settings import IdentificationSettings
 from identification.recordings.campaign_files import read_campaign
 
 JOURNAL = "searches.jsonl"
@@ -16,10 +17,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("campaign", help="folder with campaign.json and the recordings (docs/data.md)")
     add_out(parser)
     add_seed(parser, help="of starts, draws and resampling")
-    add_count(parser, "--starts", default=STARTS, help="searches of each method")
+    add_count(parser, "--starts", default=CALIBRATION.starts, help="searches of each method")
 
 
 def chosen_identification(chosen: argparse.Namespace) -> Identification:
     """The identification of the chosen campaign. Raises CampaignError."""
     campaign = read_campaign(chosen.campaign)
-    return Identification(campaign, chosen.out / JOURNAL, seed=chosen.seed, starts=chosen.starts)
+    settings = IdentificationSettings(calibration=CalibrationSettings(starts=chosen.starts))
+    return Identification(campaign, chosen.out / JOURNAL, seed=chosen.seed, settings=settings)

@@ -16,13 +16,11 @@ from statsmodels.stats.sandwich_covariance import S_hac_simple
 from statsmodels.tsa.stattools import acf
 
 from identification.calibration.problem import CalibrationProblem
+from identification.confidence.settings import CONFIDENCE, ConfidenceSettings
 from identification.recordings.recording import OUTPUTS, Recording
 from identification.replay.batch_simulation import Replay
 from identification.replay.model_inputs import ModelInputs, model_inputs
 from identification.replay.weighted_residuals import WeightedResiduals
-
-DRAWS = 8
-"""Of the inputs' noise, for each recording."""
 
 INPUTS = ("U", "p1")
 """Channels that the model takes as known."""
@@ -51,9 +49,17 @@ class EstimateCovariance:
 
 
 def estimate_covariance(
-    problem: CalibrationProblem, misfit: WeightedResiduals, z: NDArray, *, seed: int = 0
+    problem: CalibrationProblem,
+    misfit: WeightedResiduals,
+    z: NDArray,
+    *,
+    seed: int = 0,
+    settings: ConfidenceSettings = CONFIDENCE,
 ) -> EstimateCovariance:
-    """Covariance of the estimate z (k,) that minimises one of the problem's misfits."""
+    """Covariance of an estimate that minimises one of the problem's weighted residuals.
+
+    z: the estimate, scaled (k,). seed: of the noise drawn for the inputs.
+    """
     residuals, jacobians = misfit.linearised(z)
     H = np.linalg.inv(sum(J.T @ J for J in jacobians))
     samples = sum(len(residual) for residual in residuals)
@@ -61,7 +67,7 @@ def estimate_covariance(
     lags = max(correlation_lags(residual) for residual in residuals)
     middle = sum(S_hac_simple(s, nlags=lags) for s in score_series(residuals, jacobians))
     influence = [H @ J.T for J in jacobians]
-    inputs = _input_share(problem, misfit, z, influence, seed)
+    inputs = _input_share(problem, misfit, z, influence, seed, settings.input_draws)
     return EstimateCovariance(
         independent=variance * H,
         residual=H @ middle @ H,
@@ -71,7 +77,11 @@ def estimate_covariance(
 
 
 def score_series(residuals: Sequence[NDArray], jacobians: Sequence[NDArray]) -> list[NDArray]:
-    """J'e of each instant, summed over the outputs; per recording (samples, k)."""
+    """J'e of each instant, summed over the outputs; per recording (samples, k), without unit.
+
+    residuals: weighted, per recording (3 samples,). jacobians: by the scaled parameters, per recording
+    (3 samples, k).
+    """
     return [
         (J * r[:, None]).reshape(len(OUTPUTS), -1, J.shape[1]).sum(axis=0)
         for r, J in zip(residuals, jacobians, strict=True)
@@ -100,20 +110,21 @@ def _input_share(
     z: NDArray,
     influence: Sequence[NDArray],
     seed: int,
+    draws: int,
 ) -> NDArray:
     """Mean square of how far redrawn input noise moves the estimate, summed over the recordings.
 
     influence: H J' per recording (k, 3 samples).
     """
-    redrawn = _redrawn(problem, misfit.replay.drives, np.random.default_rng(seed))
+    redrawn = _redrawn(problem, misfit.replay.drives, np.random.default_rng(seed), draws)
     values = misfit.vector.values(z)
     known = misfit.replay.outputs(values)
     noisy = Replay(redrawn, misfit.vector.reference).outputs(values)
     share = np.zeros((len(z), len(z)))
     for r, (influenced, weights) in enumerate(zip(influence, misfit.weights, strict=True)):
-        for model in noisy[r * DRAWS : (r + 1) * DRAWS]:
+        for model in noisy[r * draws : (r + 1) * draws]:
             moved = influenced @ (weights * (model - known[r])[:, :, 0]).ravel()
-            share += np.outer(moved, moved) / DRAWS
+            share += np.outer(moved, moved) / draws
     return share
 
 
@@ -150,15 +161,15 @@ def _shifted(drive: ModelInputs, channel: str, error: float) -> ModelInputs:
 
 
 def _redrawn(
-    problem: CalibrationProblem, drives: Sequence[ModelInputs], rng: np.random.Generator
+    problem: CalibrationProblem, drives: Sequence[ModelInputs], rng: np.random.Generator, draws: int
 ) -> list[ModelInputs]:
-    """DRAWS drives per recording, as they would follow from other noise on the same inputs."""
+    """`draws` inputs per recording, as they would follow from other noise on the same inputs."""
     return [
         _with_start_of(
             drive, model_inputs(_noisy(recording, drive, problem.noise, rng), problem.vector.reference)
         )
         for recording, drive in zip(problem.calibration, drives, strict=True)
-        for _ in range(DRAWS)
+        for _ in range(draws)
     ]
 
 

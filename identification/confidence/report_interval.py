@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from scipy.stats import f
 
 from identification.calibration.problem import CalibrationProblem
-
-PROBABILITY = 0.95
+from identification.confidence.settings import CONFIDENCE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,15 +41,23 @@ class ReportInterval:
         return bool(apart @ self.curvature @ apart <= self.squared_rise)
 
 
-def limit_ratio(values: int, parameters: int, probability: float = PROBABILITY) -> float:
-    """eps_p / eps_opt for the number of measured values and of parameters."""
+def limit_ratio(values: int, parameters: int, probability: float = CONFIDENCE.probability) -> float:
+    """eps_p / eps_opt for a number of measured values and of parameters."""
     degrees = values - parameters
     return 1.0 + parameters / degrees * float(f.ppf(probability, parameters, degrees))
 
 
-def report_interval(problem: CalibrationProblem, z: NDArray, error: float) -> ReportInterval:
-    """Eq. 23 at the minimum z (k,) of the total error."""
+def report_interval(
+    problem: CalibrationProblem,
+    z: NDArray,
+    error: float,
+    probability: float = CONFIDENCE.probability,
+) -> ReportInterval:
+    """Eq. 23 at the minimum of the total error.
+
+    z: the minimum, scaled (k,). error: the total error there, a fraction.
+    """
     residuals, jacobians = problem.total_error().linearised(z)
-    ratio = limit_ratio(sum(len(r) for r in residuals), len(z))
+    ratio = limit_ratio(sum(len(r) for r in residuals), len(z), probability)
     curvature = np.sum([J.T @ J for J in jacobians], axis=0)
     return ReportInterval(error=error, ratio=ratio, curvature=curvature)

@@ -6,9 +6,10 @@ from importlib.metadata import version
 from pathlib import Path
 
 from epv_env.plant.parameters import Parameters
-from identification.calibration.calibrate import STARTS, Calibration, calibrate
+from identification.calibration.calibrate import Calibration, calibrate
 from identification.calibration.problem import CalibrationProblem, calibration_problem
 from identification.confidence.confidence import Confidence, assess_confidence
+from identification.pipeline.settings import IDENTIFICATION, IdentificationSettings
 from identification.recordings.recording import Campaign
 
 ESTIMATOR = "least squares"
@@ -24,8 +25,8 @@ class Identification:
     """File of the finished searches."""
     seed: int = 0
     """Of starts, draws and resampling."""
-    starts: int = STARTS
-    """Searches of each method."""
+    settings: IdentificationSettings = IDENTIFICATION
+    """Judgements of every stage."""
 
     @property
     def hashes(self) -> dict[str, str]:
@@ -35,7 +36,7 @@ class Identification:
     @cached_property
     def problem(self) -> CalibrationProblem:
         """What is to be fitted to which recordings. Raises CampaignError."""
-        return calibration_problem(self.campaign)
+        return calibration_problem(self.campaign, quality=self.settings.quality)
 
     @cached_property
     def calibration(self) -> Calibration:
@@ -47,14 +48,14 @@ class Identification:
                 "software": version("epv-valve"),
                 "recordings": {r.name: r.digest() for r in self.campaign.recordings},
             },
-            starts=self.starts,
+            settings=self.settings.calibration,
             seed=self.seed,
         )
 
     @cached_property
     def confidence(self) -> Confidence:
         """Intervals and joint region."""
-        return assess_confidence(self.calibration, seed=self.seed)
+        return assess_confidence(self.calibration, seed=self.seed, settings=self.settings.confidence)
 
     @property
     def parameters(self) -> Parameters:

@@ -54,9 +54,8 @@ def quality(identification: Identification) -> Result:
             f"campaign {identification.campaign.name!r} has no recording with role 'quality': record "
             "about 5 s at rest, coil off and exhausted, and list it in campaign.json"
         )
-    assessments = [
-        assess_recording(recording, identification.campaign.pressure) for recording in recordings
-    ]
+    settings, pressure = identification.settings.quality, identification.campaign.pressure
+    assessments = [assess_recording(recording, pressure, settings) for recording in recordings]
     return Result(
         sections=[quality_section(assessment) for assessment in assessments],
         content={"quality": [quality_export.as_json(assessment) for assessment in assessments]},
@@ -67,8 +66,9 @@ def sensitivity(identification: Identification) -> Result:
     """Section 5 at the report's conditions, and what the campaign's own recordings can separate."""
     problem = identification.problem
     replay = problem.least_squares().replay
-    outputs = sensitivities_on_recordings(replay, studied_symbols(), problem.noise)
-    study = run_sensitivity_study(outputs=outputs, seed=identification.seed)
+    settings = identification.settings.sensitivity
+    outputs = sensitivities_on_recordings(replay, studied_symbols(), problem.noise, settings)
+    study = run_sensitivity_study(outputs=outputs, seed=identification.seed, settings=settings)
     return Result(
         sections=[sensitivity_section(study)],
         content={"sensitivity": sensitivity_export.as_json(study)},
@@ -94,7 +94,8 @@ def confidence(identification: Identification) -> Result:
 
 def validation(identification: Identification) -> Result:
     """Section 7. Raises CampaignError if nothing was held out."""
-    validated = validate(identification.problem, identification.parameters)
+    settings = identification.settings.validation
+    validated = validate(identification.problem, identification.parameters, settings)
     return Result(
         sections=[validation_section(validated)], content={"validation": validation_json(validated)}
     )

@@ -9,11 +9,11 @@ from identification.report_2003.printed_values import printed_sensitivities
 from identification.sensitivity.one_at_a_time import ErrorSensitivity
 from identification.sensitivity.report_conditions import REPORT_CONDITIONS
 from identification.sensitivity.sensitivity_study import FIXED_STEP_CONDITIONS, OneAtATime
-
-RELATIVE, ABSOLUTE = 0.1, 0.1
-"""A figure is reproduced within 10 % of the printed one or within 0.1 percentage points."""
+from identification.sensitivity.settings import SENSITIVITY, SensitivitySettings
 
 TABLES = (8, 9)
+"""The report's tables of sensitivities."""
+
 NOT_COUNTED = ("a1",)
 """Its change is not printed: what it must have been is this project's guess."""
 
@@ -37,9 +37,10 @@ def percentages(row: ErrorSensitivity) -> tuple[float, float]:
     return 100 * row.minus, 100 * row.plus
 
 
-def is_reproduced(found: float, printed: float) -> bool:
+def is_reproduced(percent: float, printed: float, settings: SensitivitySettings = SENSITIVITY) -> bool:
     """Whether a figure [%] is the printed one within the tolerance."""
-    return abs(found - printed) <= max(RELATIVE * printed, ABSOLUTE)
+    tolerance = max(settings.relative_agreement * printed, settings.absolute_agreement)
+    return abs(percent - printed) <= tolerance
 
 
 def printed_rows() -> dict[str, tuple[float, float]]:
@@ -47,18 +48,18 @@ def printed_rows() -> dict[str, tuple[float, float]]:
     return {symbol: pair for number in TABLES for symbol, pair in printed_sensitivities(number).items()}
 
 
-def agreement_with_printed(found: Mapping[str, ErrorSensitivity]) -> PrintedAgreement:
+def agreement_with_printed(rows: Mapping[str, ErrorSensitivity]) -> PrintedAgreement:
     """Compare a computation with the printed tables; its classes of all symbols, a1's figures apart."""
     pairs = [
         pair
         for symbol, printed in printed_rows().items()
         if symbol not in NOT_COUNTED
-        for pair in zip(percentages(found[symbol]), printed, strict=True)
+        for pair in zip(percentages(rows[symbol]), printed, strict=True)
     ]
     return PrintedAgreement(
         figures=len(pairs),
         reproduced=sum(is_reproduced(*pair) for pair in pairs),
-        classes_differ=tuple(s for s in printed_rows() if found[s].sensitive != table()[s].sensitive),
+        classes_differ=tuple(s for s in printed_rows() if rows[s].sensitive != table()[s].sensitive),
         worst_factor=max(max(a / b, b / a) for a, b in pairs),
     )
 
@@ -79,13 +80,13 @@ def sensitivity_tables(study: OneAtATime) -> dict[str, Any]:
     return content
 
 
-def _row(found: ErrorSensitivity) -> dict[str, Any]:
-    minus, plus = percentages(found)
-    return {"minus10": minus, "plus10": plus, "sensitive": found.sensitive}
+def _row(row: ErrorSensitivity) -> dict[str, Any]:
+    minus, plus = percentages(row)
+    return {"minus10": minus, "plus10": plus, "sensitive": row.sensitive}
 
 
-def _summary(found: Mapping[str, ErrorSensitivity], U_on: float) -> dict[str, Any]:
-    met = agreement_with_printed(found)
+def _summary(rows: Mapping[str, ErrorSensitivity], U_on: float) -> dict[str, Any]:
+    met = agreement_with_printed(rows)
     return {
         "U_on_V": U_on,
         "figures": met.figures,

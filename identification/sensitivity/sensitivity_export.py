@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from epv_env.plant.parameters import confidence_intervals, sensitive_symbols
-from identification.sensitivity.collinearity import CRITICAL, OutputSensitivities
+from identification.sensitivity.collinearity import OutputSensitivities
 from identification.sensitivity.global_indices import MorrisEffects, SobolIndices
 from identification.sensitivity.one_at_a_time import ErrorSensitivity
 from identification.sensitivity.report_conditions import REPORT_CONDITIONS
@@ -33,14 +33,14 @@ def _row(row: ErrorSensitivity) -> dict[str, Any]:
     return {"minus10": 100 * row.minus, "plus10": 100 * row.plus, "sensitive": row.sensitive}
 
 
-def _collinearity(found: OutputSensitivities) -> dict[str, Any]:
+def _collinearity(outputs: OutputSensitivities) -> dict[str, Any]:
     return {
-        "of": found.where,
-        "effect_noise_sd": dict(zip(found.symbols, found.effect.tolist(), strict=True)),
-        "critical_index": CRITICAL,
-        "inseparable_pairs": [[a, b, _finite(index)] for a, b, index in found.inseparable_pairs()],
-        "calibrated_four": _finite(found.index(tuple(confidence_intervals()))),
-        "all_sensitive": _finite(found.index(sensitive_symbols())),
+        "of": outputs.where,
+        "effect_noise_sd": dict(zip(outputs.symbols, outputs.effect.tolist(), strict=True)),
+        "critical_index": outputs.settings.critical_index,
+        "inseparable_pairs": [[a, b, _finite(index)] for a, b, index in outputs.inseparable_pairs()],
+        "calibrated_four": _finite(outputs.index(tuple(confidence_intervals()))),
+        "all_sensitive": _finite(outputs.index(sensitive_symbols())),
     }
 
 
@@ -48,23 +48,26 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _screening(found: MorrisEffects) -> dict[str, Any]:
+def _screening(screening: MorrisEffects) -> dict[str, Any]:
     columns = zip(
-        found.mean_absolute.tolist(), found.half_width.tolist(), found.spread.tolist(), strict=True
+        screening.mean_absolute.tolist(),
+        screening.half_width.tolist(),
+        screening.spread.tolist(),
+        strict=True,
     )
     return {
         symbol: {"mu_star": effect, "half_width95": width, "sigma": spread}
-        for symbol, (effect, width, spread) in zip(found.symbols, columns, strict=True)
+        for symbol, (effect, width, spread) in zip(screening.symbols, columns, strict=True)
     }
 
 
-def _indices(found: SobolIndices) -> dict[str, Any]:
+def _indices(indices: SobolIndices) -> dict[str, Any]:
     table = zip(
-        found.symbols,
-        found.first.tolist(),
-        found.first_half_width.tolist(),
-        found.total.tolist(),
-        found.total_half_width.tolist(),
+        indices.symbols,
+        indices.first.tolist(),
+        indices.first_half_width.tolist(),
+        indices.total.tolist(),
+        indices.total_half_width.tolist(),
         strict=True,
     )
     return {

@@ -9,7 +9,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from identification.sensitivity.collinearity import CRITICAL, OutputSensitivities, collinearity_index
+from identification.sensitivity.collinearity import OutputSensitivities, collinearity_index
 from identification.sensitivity.global_indices import MorrisEffects, SobolIndices
 from identification.sensitivity.one_at_a_time import THRESHOLD, ErrorSensitivity
 from identification.sensitivity.sensitivity_study import OneAtATime
@@ -59,37 +59,37 @@ def _tornado_side(
     axes.grid(axis="x", alpha=0.3)
 
 
-def _side(found: Mapping[str, ErrorSensitivity], order: Sequence[str], side: int) -> list[float]:
+def _side(errors: Mapping[str, ErrorSensitivity], order: Sequence[str], side: int) -> list[float]:
     """Errors of one direction in an order [%]."""
-    return [100 * (found[symbol].minus, found[symbol].plus)[side] for symbol in order]
+    return [100 * (errors[symbol].minus, errors[symbol].plus)[side] for symbol in order]
 
 
-def collinearity_map(found: OutputSensitivities) -> Figure:
+def collinearity_map(outputs: OutputSensitivities) -> Figure:
     """Collinearity index of every pair; those from 10 up are written out."""
     figure = Figure(figsize=(9, 8), layout="constrained")
     axes = figure.subplots()
-    index = pairwise_indices(found)
+    index = pairwise_indices(outputs)
     norm = LogNorm(1, GREATEST_SHOWN)
     shown = axes.imshow(np.minimum(index, GREATEST_SHOWN), norm=norm, cmap="Blues")
     figure.colorbar(
         shown, ax=axes, label=f"collinearity index (above {GREATEST_SHOWN:g}: as {GREATEST_SHOWN:g})"
     )
-    for row, column in np.argwhere(index >= CRITICAL):
+    for row, column in np.argwhere(index >= outputs.settings.critical_index):
         text = "∞" if np.isinf(index[row, column]) else f"{index[row, column]:.0f}"
         colour = "white" if index[row, column] > 30 else "black"
         axes.text(column, row, text, ha="center", va="center", fontsize=7, color=colour)
-    axes.set_xticks(range(len(found.symbols)), found.symbols, rotation=90)
-    axes.set_yticks(range(len(found.symbols)), found.symbols)
+    axes.set_xticks(range(len(outputs.symbols)), outputs.symbols, rotation=90)
+    axes.set_yticks(range(len(outputs.symbols)), outputs.symbols)
     return figure
 
 
-def pairwise_indices(found: OutputSensitivities) -> NDArray:
+def pairwise_indices(outputs: OutputSensitivities) -> NDArray:
     """Collinearity index of each pair below the diagonal, NaN elsewhere, (parameters, parameters)."""
-    n = len(found.symbols)
+    n = len(outputs.symbols)
     index = np.full((n, n), np.nan)
     for row in range(n):
         for column in range(row):
-            index[row, column] = collinearity_index(found.columns[:, [row, column]])
+            index[row, column] = collinearity_index(outputs.columns[:, [row, column]])
     return index
 
 

@@ -5,7 +5,7 @@ import math
 from epv_env.plant.parameters import confidence_intervals, sensitive_symbols, table
 from identification.report.page import Picture, Section, Table, Text, Verdict
 from identification.sensitivity import sensitivity_figures as figures
-from identification.sensitivity.collinearity import CRITICAL, OutputSensitivities
+from identification.sensitivity.collinearity import OutputSensitivities
 from identification.sensitivity.global_indices import SobolIndices
 from identification.sensitivity.printed_agreement import (
     PrintedAgreement,
@@ -19,9 +19,7 @@ from identification.sensitivity.sensitivity_study import (
     OneAtATime,
     SensitivityStudy,
 )
-
-REQUIRED = 36
-"""Figures of Tables 8 and 9 that must come back."""
+from identification.sensitivity.settings import SENSITIVITY
 
 METHOD = (
     "The report's rows of the armature most likely carry the scatter of its own simulation: with a "
@@ -66,7 +64,7 @@ def _reproduced(method: str, met: PrintedAgreement) -> Verdict:
         if met.classes_differ
         else "all classes agree"
     )
-    good = met.reproduced >= REQUIRED and not met.classes_differ
+    good = met.reproduced >= SENSITIVITY.required_figures and not met.classes_differ
     return Verdict(
         status="good" if good else "doubt",
         text=f"{method}: {met.reproduced} of {met.figures} figures of Tables 8 and 9 within 10 % or 0.1 "
@@ -74,17 +72,17 @@ def _reproduced(method: str, met: PrintedAgreement) -> Verdict:
     )
 
 
-def _separability(found: OutputSensitivities) -> list[Verdict]:
-    four, sensitive = found.index(tuple(confidence_intervals())), found.index(sensitive_symbols())
-    pairs = found.inseparable_pairs()
+def _separability(outputs: OutputSensitivities) -> list[Verdict]:
+    four, sensitive = outputs.index(tuple(confidence_intervals())), outputs.index(sensitive_symbols())
+    pairs, critical = outputs.inseparable_pairs(), outputs.settings.critical_index
     return [
         Verdict(
-            status="good" if four < CRITICAL else "bad",
+            status="good" if four < critical else "bad",
             text=f"The four calibrated parameters together have a collinearity index of {four:.1f}; "
-            f"below {CRITICAL:g} data can tell them apart.",
+            f"below {critical:g} data can tell them apart.",
         ),
         Verdict(
-            status="good" if sensitive < CRITICAL else "note",
+            status="good" if sensitive < critical else "note",
             text=f"All {len(sensitive_symbols())} sensitive ones together: {_index(sensitive)}. "
             f"{len(pairs)} pairs cannot be told apart, first "
             f"{' and '.join(f'{a}, {b}' for a, b, _ in pairs[:2])}, which act by their ratio alone.",
@@ -92,8 +90,8 @@ def _separability(found: OutputSensitivities) -> list[Verdict]:
     ]
 
 
-def _dominant(found: SobolIndices) -> Verdict:
-    order = sorted(zip(found.total, found.symbols, strict=True), reverse=True)
+def _dominant(indices: SobolIndices) -> Verdict:
+    order = sorted(zip(indices.total, indices.symbols, strict=True), reverse=True)
     names = ", ".join(f"{symbol} {value:.2f}" for value, symbol in order[:4])
     return Verdict(status="note", text=f"Greatest total Sobol indices of the total error: {names}.")
 
@@ -133,11 +131,12 @@ def _pair(values: tuple[float, float]) -> str:
     return f"{values[0]:.3g} / {values[1]:.3g}"
 
 
-def _pairs(found: OutputSensitivities) -> Table:
+def _pairs(outputs: OutputSensitivities) -> Table:
     return Table(
         columns=["Pair", "collinearity index"],
-        rows=[[f"{a}, {b}", _index(index)] for a, b, index in found.inseparable_pairs()],
-        caption=f"Pairs above {CRITICAL:g}: a change of one can be made up for by the other.",
+        rows=[[f"{a}, {b}", _index(index)] for a, b, index in outputs.inseparable_pairs()],
+        caption=f"Pairs above {outputs.settings.critical_index:g}: a change of one can be made up for "
+        "by the other.",
     )
 
 

@@ -11,19 +11,18 @@ from identification.calibration.problem import CalibrationProblem
 from identification.quality.correlation_tests import WhitenessTest, assess_whiteness
 from identification.recordings.recording import OUTPUTS, CampaignError
 from identification.replay.responses import Response, responses
-
-LONGEST_LAG = 0.05
-"""Up to where residuals are correlated with themselves [s]."""
+from identification.validation.settings import VALIDATION, ValidationSettings
 
 
 @dataclass(frozen=True, kw_only=True)
 class OutputResidual:
-    """What the model leaves of one output of one recording, in noise deviations."""
+    """What the model does not explain of one output of one recording."""
 
     recording: str
     output: str
+    """One of recording.OUTPUTS."""
     rms: float
-    """1.0 is the floor: nothing left to explain."""
+    """Root mean square [noise deviations]; at 1.0 nothing is left to explain."""
     whiteness: WhitenessTest
 
 
@@ -34,6 +33,8 @@ class Validation:
     parameters: Parameters
     answers: Sequence[Response]
     residuals: Sequence[OutputResidual]
+    settings: ValidationSettings = VALIDATION
+    """What the residuals are judged by."""
 
     @property
     def worst(self) -> float:
@@ -41,10 +42,12 @@ class Validation:
         return max(answer.partial for answer in self.answers)
 
 
-def validate(problem: CalibrationProblem, parameters: Parameters) -> Validation:
+def validate(
+    problem: CalibrationProblem, parameters: Parameters, settings: ValidationSettings = VALIDATION
+) -> Validation:
     """Simulate the held-out recordings; nothing is fitted to them.
 
-    Raises CampaignError if there is none.
+    parameters: the calibrated ones [SI]. Raises CampaignError if there is none.
     """
     if not problem.validation:
         raise CampaignError(
@@ -54,16 +57,19 @@ def validate(problem: CalibrationProblem, parameters: Parameters) -> Validation:
     return Validation(
         parameters=parameters,
         answers=answers,
-        residuals=[r for answer in answers for r in _residuals(answer, problem)],
+        residuals=[r for answer in answers for r in _residuals(answer, problem, settings)],
+        settings=settings,
     )
 
 
-def _residuals(answer: Response, problem: CalibrationProblem) -> list[OutputResidual]:
-    lags = min(round(LONGEST_LAG / answer.recording.period), len(answer.recording) // 5)
-    found = []
+def _residuals(
+    answer: Response, problem: CalibrationProblem, settings: ValidationSettings
+) -> list[OutputResidual]:
+    lags = min(round(settings.greatest_lag / answer.recording.period), len(answer.recording) // 5)
+    residuals = []
     for output, measured, model in zip(OUTPUTS, answer.measured, answer.model, strict=True):
         scaled: NDArray = (measured - model) / problem.noise[output]
-        found.append(
+        residuals.append(
             OutputResidual(
                 recording=answer.recording.name,
                 output=output,
@@ -71,4 +77,4 @@ def _residuals(answer: Response, problem: CalibrationProblem) -> list[OutputResi
                 whiteness=assess_whiteness(scaled, lags),
             )
         )
-    return found
+    return residuals

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from identification.calibration.calibration_section import TOLERANCE
 from identification.quality.correlation_tests import white_noise_band
 from identification.recordings.recording import OUTPUTS
 from identification.replay.error_tables import error_table, errors_as_json, percent
@@ -13,18 +12,12 @@ from identification.replay.response_figures import error_figure, response_figure
 from identification.report.page import Picture, Section, Table, Verdict
 from identification.validation.validate import OutputResidual, Validation
 
-WHITE = 1e-4
-"""Probability of white noise below which a residual is called predictable."""
-
-FLOOR = 1.2
-"""Residual in noise deviations up to which next to nothing is left to explain."""
-
 
 def validation_section(validation: Validation) -> Section:
     """The 10 % rule, the residuals, the responses."""
     return Section(
         title="Validation on held-out recordings (section 7)",
-        verdicts=[_rule(validation), _left(validation)],
+        verdicts=[_error_verdict(validation), _residual_verdict(validation)],
         blocks=[
             error_table(validation.answers, "Result of the model validation (Table 15)."),
             _residual_table(validation),
@@ -80,19 +73,22 @@ def autocorrelations(validation: Validation) -> Figure:
     return figure
 
 
-def _rule(validation: Validation) -> Verdict:
-    good = validation.worst < TOLERANCE
+def _error_verdict(validation: Validation) -> Verdict:
+    limit = validation.settings.accepted_error
+    good = validation.worst < limit
     return Verdict(
         status="good" if good else "bad",
         text=f"The greatest partial error on held-out recordings is {percent(validation.worst)} %, "
-        f"{'below' if good else 'not below'} the report's limit of {100 * TOLERANCE:.0f} %.",
+        f"{'below' if good else 'not below'} the report's limit of {100 * limit:.0f} %.",
     )
 
 
-def _left(validation: Validation) -> Verdict:
+def _residual_verdict(validation: Validation) -> Verdict:
     most = max(validation.residuals, key=lambda residual: residual.rms)
-    predictable = [r for r in validation.residuals if r.whiteness.probability < WHITE]
-    if most.rms <= FLOOR and not predictable:
+    predictable = [
+        r for r in validation.residuals if r.whiteness.probability < validation.settings.white
+    ]
+    if most.rms <= validation.settings.explained and not predictable:
         text = (
             f"The residuals are white and at most {most.rms:.3g} times the noise: "
             "nothing is left to explain."

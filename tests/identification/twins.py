@@ -13,12 +13,14 @@ from identification.bench.measurement import TrueSignals, measured_campaign, run
 from identification.bench.programmes import DIAGNOSIS_SUITE, REPORT_SUITE
 from identification.calibration.calibrate import Calibration, calibrate
 from identification.calibration.problem import CalibrationProblem, calibration_problem
+from identification.calibration.settings import CalibrationSettings
 from identification.recordings.recording import CHANNELS, UNITS, Campaign, Recording
 
 TRUE = Parameters.calibrated()
 PROGRAMMES = {programme.name: programme for programme in DIAGNOSIS_SUITE}
 REPORT = tuple(programme.name for programme in REPORT_SUITE)
 SWITCHING = tuple(name for name in REPORT if name != "rest")
+ONE_START = CalibrationSettings(starts=1)
 
 
 @cache
@@ -43,7 +45,9 @@ def problem(seed: int = 1) -> CalibrationProblem:
 def calibration() -> Calibration:
     """The measured suite, calibrated from Table 10 alone."""
     with TemporaryDirectory() as folder:
-        return calibrate(problem(), journal=Path(folder) / "journal.jsonl", subject={}, starts=1)
+        return calibrate(
+            problem(), journal=Path(folder) / "journal.jsonl", subject={}, settings=ONE_START
+        )
 
 
 def exact_recording(name: str, rate: float = 2000.0, share: float = 1e-6, seed: int = 0) -> Recording:

@@ -21,7 +21,8 @@ from identification.bench.programmes import REPORT_SUITE
 from identification.calibration.problem import calibration_problem
 from identification.calibration.search_methods import nelder_mead, weighted_least_squares
 from identification.confidence.covariance import estimate_covariance
-from identification.confidence.report_interval import PROBABILITY, report_interval
+from identification.confidence.report_interval import report_interval
+from identification.confidence.settings import CONFIDENCE
 
 CAMPAIGNS = 200
 
@@ -47,17 +48,17 @@ class Coverage:
     @property
     def joint(self) -> NDArray:
         """Whether the truth lay in the joint 95 % region, boolean (campaigns,)."""
-        return self.distance <= chi2.ppf(PROBABILITY, len(self.symbols))
+        return self.distance <= chi2.ppf(CONFIDENCE.probability, len(self.symbols))
 
     @property
     def joint_independent(self) -> NDArray:
         """As `joint`, for the covariance that assumes independent residuals."""
-        return self.independent <= chi2.ppf(PROBABILITY, len(self.symbols))
+        return self.independent <= chi2.ppf(CONFIDENCE.probability, len(self.symbols))
 
     @property
     def agree(self) -> NDArray:
         """Whether the Nelder-Mead estimate lay in the joint region, boolean (campaigns,)."""
-        return self.disagreement <= chi2.ppf(PROBABILITY, len(self.symbols))
+        return self.disagreement <= chi2.ppf(CONFIDENCE.probability, len(self.symbols))
 
 
 def share(hits: NDArray) -> tuple[float, float, float]:
@@ -124,7 +125,9 @@ def _calibrated(index: int) -> dict[str, Any]:
         "distance": _distance(fit.z - true, found.total),
         "independent": _distance(fit.z - true, found.independent),
         "disagreement": _distance(fit.z - simplex.z, found.total),
-        "inside": _inside(fit.z - true, np.sqrt(chi2.ppf(PROBABILITY, 1) * np.diag(found.total))),
+        "inside": _inside(
+            fit.z - true, np.sqrt(chi2.ppf(CONFIDENCE.probability, 1) * np.diag(found.total))
+        ),
         "report_inside": _inside(simplex.z - true, report.half_widths),
         "report_joint": report.holds_jointly(simplex.z - true),
         "seconds": {"least squares": fit.seconds, "Nelder-Mead": simplex.seconds},

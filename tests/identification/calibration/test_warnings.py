@@ -6,11 +6,11 @@ import pytest
 
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import CALIBRATED_SYMBOLS
-from identification.calibration import search_methods as searches
 from identification.calibration.calibrate import calibrate
 from identification.calibration.calibration_section import calibration_json, calibration_section
 from identification.calibration.calibration_warnings import calibration_warnings
 from identification.calibration.problem import calibration_problem
+from identification.calibration.settings import CalibrationSettings
 from tests.identification.twins import TRUE, calibration, problem, twin
 
 START = Parameters.initial_guess()
@@ -20,8 +20,10 @@ START = Parameters.initial_guess()
 def warnings(tmp_path):
     """The warnings of a problem, calibrated from its reference."""
 
-    def found(problem):
-        return calibrate(problem, journal=tmp_path / "journal", subject={}, starts=1).warnings
+    def found(problem, **changes):
+        settings = CalibrationSettings(starts=1, **changes)
+        path = tmp_path / "journal"
+        return calibrate(problem, journal=path, subject={}, settings=settings).warnings
 
     return found
 
@@ -58,9 +60,8 @@ def test_either_end_of_any_domain_counts(symbol, end):
     assert vector.parameters(z)[symbol] == pytest.approx(vector.domains[at, end])
 
 
-def test_a_search_that_is_cut_short_is_not_trusted(warnings, monkeypatch):
-    monkeypatch.setattr(searches, "MOST_EVALUATIONS", 20)
-    found = warnings(problem())
+def test_a_search_that_is_cut_short_is_not_trusted(warnings):
+    found = warnings(problem(), most_evaluations=20)
     assert any("Nelder-Mead has not converged after" in warning for warning in found)
     assert not any("least squares has not converged" in warning for warning in found)
 

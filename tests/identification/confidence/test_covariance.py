@@ -11,6 +11,7 @@ from identification.calibration.search_methods import weighted_least_squares
 from identification.confidence import covariance as stage
 from identification.confidence.block_bootstrap import block_bootstrap
 from identification.confidence.covariance import correlation_lags, estimate_covariance
+from identification.confidence.settings import ConfidenceSettings
 from tests.identification.confidence.results import found
 from tests.identification.twins import TRUE, problem
 
@@ -110,14 +111,16 @@ def test_on_the_bench_all_three_agree():
     np.testing.assert_allclose(np.var(found().bootstrap, axis=0), sandwich, rtol=0.3)
 
 
-def test_the_noise_of_the_inputs_adds_with_its_square(monkeypatch):
+def test_the_noise_of_the_inputs_adds_with_its_square():
     """U's and p1's, without the record at rest; none, none."""
-    monkeypatch.setattr(stage, "DRAWS", 2)
+    settings = ConfidenceSettings(input_draws=2)
     shares = {}
     for size in (0.0, 1.0, 2.0):
         noise = {n: v * (size if n in ("U", "p1") else 1.0) for n, v in problem().noise.items()}
         quiet = replace(problem(), noise=noise, offsets={})
-        shares[size] = estimate_covariance(quiet, problem().least_squares(), found().estimate).inputs
+        shares[size] = estimate_covariance(
+            quiet, problem().least_squares(), found().estimate, settings=settings
+        ).inputs
     assert np.all(np.diag(shares[0.0]) < 1e-3 * np.diag(shares[1.0]))
     np.testing.assert_allclose(np.diag(shares[2.0]), 4 * np.diag(shares[1.0]), rtol=0.02)
 

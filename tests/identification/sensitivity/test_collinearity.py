@@ -18,7 +18,6 @@ from identification.report_2003.cases import (
     SUPPLY_PRESSURE,
 )
 from identification.sensitivity.collinearity import (
-    CRITICAL,
     OutputSensitivities,
     collinearity_index,
     cosines,
@@ -26,6 +25,7 @@ from identification.sensitivity.collinearity import (
     sensitivities_on_recordings,
 )
 from identification.sensitivity.one_at_a_time import studied_symbols
+from identification.sensitivity.settings import SENSITIVITY, SensitivitySettings
 
 
 @cache
@@ -65,7 +65,7 @@ def test_volumes_and_contractions_act_by_their_ratio(pair):
 
 
 def test_the_calibrated_four_can_be_told_apart_but_not_all_sensitive_ones():
-    assert found().index(tuple(confidence_intervals())) < 4.0 < CRITICAL
+    assert found().index(tuple(confidence_intervals())) < 4.0 < SENSITIVITY.critical_index
     assert found().index(sensitive_symbols()) == np.inf
 
 
@@ -73,13 +73,13 @@ def test_pairs_are_listed_the_worst_first():
     pairs = found().inseparable_pairs()
     assert [index for _, _, index in pairs] == sorted((index for *_, index in pairs), reverse=True)
     assert ("cPV", "xPV0") in [(a, b) for a, b, _ in pairs]
-    assert all(index > CRITICAL for *_, index in pairs)
+    assert all(index > SENSITIVITY.critical_index for *_, index in pairs)
 
 
-def test_effects_do_not_depend_on_the_size_of_the_differences(monkeypatch):
+def test_effects_do_not_depend_on_the_size_of_the_differences():
     """The model is differentiable here: event times move smoothly with every parameter."""
-    monkeypatch.setattr("identification.sensitivity.collinearity.STEP", 1e-3)
-    finer = sensitivities_of_outputs(Parameters.nominal(), studied_symbols())
+    settings = SensitivitySettings(difference_step=1e-3)
+    finer = sensitivities_of_outputs(Parameters.nominal(), studied_symbols(), settings=settings)
     assert finer.effect == pytest.approx(found().effect, rel=0.01)
 
 

@@ -7,8 +7,9 @@ import pytest
 
 from identification.recordings.recording import OUTPUTS, CampaignError
 from identification.report_2003.output_error import relative_error
+from identification.validation.settings import VALIDATION
 from identification.validation.validate import validate
-from identification.validation.validation_section import WHITE, validation_json, validation_section
+from identification.validation.validation_section import validation_json, validation_section
 from tests.identification.twins import TRUE, calibration, exact_problem, problem
 
 
@@ -22,7 +23,7 @@ def test_the_right_model_leaves_white_noise_of_the_sensors_size(seed):
     assert [(r.recording, r.output) for r in found.residuals] == [("validation", o) for o in OUTPUTS]
     for residual in found.residuals:
         assert residual.rms == pytest.approx(1.0, abs=0.06)
-        assert residual.whiteness.probability > WHITE
+        assert residual.whiteness.probability > VALIDATION.white
     assert statuses(found) == ["good", "good"]
 
 
@@ -37,7 +38,7 @@ def test_a_parameter_that_is_2_percent_off_is_doubted(symbol, output):
     found = validate(problem(), TRUE.replace(**{symbol: 1.02 * TRUE[symbol]}))
     assert statuses(found) == ["good", "doubt"]
     (residual,) = (r for r in found.residuals if r.output == output)
-    assert residual.whiteness.probability < WHITE
+    assert residual.whiteness.probability < VALIDATION.white
     assert output in validation_section(found).verdicts[1].text
 
 
