@@ -14,14 +14,12 @@ from epv_env.plant.simulate import energised
 from identification.bench.hybrid_automaton import simulate_reference
 from identification.bench.programmes import Programme
 from identification.bench.schedule import delayed_schedule, piecewise_schedule
+from identification.bench.settings import BENCH, BenchSettings
 from identification.recordings.recording import CHANNELS, UNITS, Campaign, Recording
 from identification.report_2003.cases import SAMPLING_RATE
 
-RESERVOIR = 0.08
+RESERVOIR_VOLUME = 0.08
 """The bench's two reservoirs of 40 litres (section 3) [m^3]; air drawn from them lowers p1."""
-
-RTOL = 1e-8
-"""Relative tolerance of the bench's solver: errors below 0.1 mbar, a thirtieth of an ADC step."""
 
 SENSOR_OFFSETS = {"p1": 0.000909, "p2": -0.00728, "p3": -0.003112, "I": -0.000235, "U": 0.001837}
 """Reading less truth at the start of a recording (Table 2; pressures less 1 bar) [bar, A, V]."""
@@ -32,11 +30,13 @@ SENSOR_TRENDS = {"p1": 7.9e-5, "p2": -1.16e-4, "p3": -8.2e-5, "I": -6e-6, "U": 5
 
 @dataclass(frozen=True, kw_only=True)
 class TrueSignals:
-    """What really happened in one recording; arrays (samples,) by channel, SI units."""
+    """What really happened in one recording."""
 
     programme: Programme
     period: float
+    """Time between samples [s]."""
     channels: Mapping[str, NDArray]
+    """By name as recording.CHANNELS, each (samples,) [SI]."""
 
 
 def run_programme(
@@ -44,16 +44,21 @@ def run_programme(
     programme: Programme,
     *,
     rate: float = SAMPLING_RATE,
-    reservoir: float = RESERVOIR,
+    reservoir: float = RESERVOIR_VOLUME,
+    settings: BenchSettings = BENCH,
 ) -> TrueSignals:
-    """The true course of one recording at `rate` samples per second."""
+    """The true signals of one recording.
+
+    rate: samples per second [1/s]. reservoir: volume that feeds p1 [m^3]. Raises RuntimeError where the
+    solver fails.
+    """
     U = programme.case.voltage(programme.U_on, rate)
     time = np.arange(len(U)) / rate
     start = initial_state(parameters, programme)
     # Switching takes effect at the sample at which the voltage is first read, or later.
     schedule = piecewise_schedule(parameters, start, time, U=U[:-1], reservoir_volume=reservoir)
     delayed = delayed_schedule(schedule, parameters["t_delay"])
-    state = simulate_reference(delayed, time, rtol=RTOL).state
+    state = simulate_reference(delayed, time, rtol=settings.relative_tolerance).state
     channels = {"U": U, **readings(state, parameters)}
     return TrueSignals(programme=programme, period=1.0 / rate, channels=channels)
 
@@ -63,7 +68,7 @@ def measured_recording(
 ) -> Recording:
     """A recording of the truth by the sensors of Tables 1 to 3: offset, trend, noise, 12 bit.
 
-    offsets: by channel, as OFFSETS; a channel that is left out has none.
+    offsets: by channel, as SENSOR_OFFSETS [bar, A, V]; a channel that is left out has none.
     """
     readings = {}
     for channel in CHANNELS:

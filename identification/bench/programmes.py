@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from epv_env.common.units import BAR
 from identification.report_2003.cases import (
     CALIBRATION_CASES,
     CIRCUIT_PRESSURE,
@@ -10,8 +11,6 @@ from identification.report_2003.cases import (
     VALIDATION_CASE,
     Case,
 )
-
-BAR = 1e5
 
 
 @dataclass(frozen=True, kw_only=True)

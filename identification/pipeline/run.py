@@ -47,7 +47,7 @@ def calibrated_plant(identification: Identification) -> Plant:
             "seed": identification.seed,
             "recordings_sha256": identification.hashes,
             "calibrated_on": [r.name for r in identification.campaign.of("calibration")],
-            "warnings": identification.calibration.calibration_warnings,
+            "warnings": identification.calibration.warnings,
         },
     )
 

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.common.files import write_text
+from epv_env.common.units import BAR
 from identification.recordings.columns import CONSUMPTION_COLUMN, TIME_COLUMN, read_columns
 from identification.recordings.manifest import (
-    BAR,
     FILE_NAME,
     check_manifest,
     manifest_content,
@@ -21,6 +21,7 @@ from identification.recordings.manifest import (
 )
 from identification.recordings.recording import Campaign, CampaignError, Recording
 from identification.recordings.recording_checks import check_recording
+from identification.recordings.rules import RULES, RecordingRules
 
 DECIMALS = {
     TIME_COLUMN: 9, "I_A": 6, "U_V": 5, "p1_bar": 5, "p2_bar": 5, "p3_bar": 5, CONSUMPTION_COLUMN: 9
@@ -28,7 +29,7 @@ DECIMALS = {
 """Decimals written: a hundredth of an ADC step or less, and any rate's times as uniform."""
 
 
-def read_campaign(folder: str | PathLike[str]) -> Campaign:
+def read_campaign(folder: str | PathLike[str], rules: RecordingRules = RULES) -> Campaign:
     """The campaign in a folder, every rule of docs/data.md checked. Raises CampaignError."""
     folder = Path(folder)
     manifest = read_manifest(folder)
@@ -37,7 +38,8 @@ def read_campaign(folder: str | PathLike[str]) -> Campaign:
         temperature=manifest.temperature,
         pressure=manifest.pressure,
         recordings=tuple(
-            _read_recording(path, role, manifest.pressure) for path, role in manifest.roles.items()
+            _read_recording(path, role, manifest.pressure, rules)
+            for path, role in manifest.roles.items()
         ),
         folder=folder,
     )
@@ -50,7 +52,9 @@ def check_vacant(folder: Path) -> None:
         raise CampaignError(f"{path} exists already: write to another folder, or remove that campaign")
 
 
-def write_campaign(campaign: Campaign, folder: str | PathLike[str]) -> None:
+def write_campaign(
+    campaign: Campaign, folder: str | PathLike[str], rules: RecordingRules = RULES
+) -> None:
     """Write a campaign that `read_campaign` takes; its JSON last, so that a part of one is none.
 
     Each file is written whole or not at all, in place of one of the same name. Raises CampaignError,
@@ -61,13 +65,13 @@ def write_campaign(campaign: Campaign, folder: str | PathLike[str]) -> None:
     content = manifest_content(campaign)
     check_manifest(folder, content)
     for recording in campaign.recordings:
-        _check_writable(folder / f"{recording.name}.csv", recording, campaign.pressure)
+        _check_writable(folder / f"{recording.name}.csv", recording, campaign.pressure, rules)
     for recording in campaign.recordings:
         write_text(folder / f"{recording.name}.csv", _csv(_columns(recording)))
     write_text(folder / FILE_NAME, json.dumps(content, indent=1) + "\n")
 
 
-def _read_recording(path: Path, role: str, ambient: float) -> Recording:
+def _read_recording(path: Path, role: str, ambient: float, rules: RecordingRules) -> Recording:
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -75,7 +79,7 @@ def _read_recording(path: Path, role: str, ambient: float) -> Recording:
             f"{path} cannot be read ({error.strerror}): add the file, or take it out of {FILE_NAME}"
         ) from None
     columns = read_columns(str(path), content)
-    period = check_recording(str(path), columns, role=role, ambient_bar=ambient / BAR)
+    period = check_recording(str(path), columns, role=role, ambient_bar=ambient / BAR, rules=rules)
     supply = [columns[name] for name in ("p1_bar", "p1a_bar", "p1b_bar") if name in columns]
     return Recording(
         name=path.stem,
@@ -113,7 +117,7 @@ def _csv(columns: Mapping[str, NDArray]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _check_writable(path: Path, recording: Recording, ambient: float) -> None:
+def _check_writable(path: Path, recording: Recording, ambient: float, rules: RecordingRules) -> None:
     if path.stem != recording.name:
         raise CampaignError(
             f"recording {recording.name!r} does not name a file: give it a name without folders"
@@ -125,4 +129,4 @@ def _check_writable(path: Path, recording: Recording, ambient: float) -> None:
                 f"{path}: {name} has shape {values.shape} or a value that is not finite: give "
                 f"{len(recording)} finite samples"
             )
-    check_recording(str(path), columns, role=recording.role, ambient_bar=ambient / BAR)
+    check_recording(str(path), columns, role=recording.role, ambient_bar=ambient / BAR, rules=rules)

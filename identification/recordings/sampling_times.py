@@ -5,23 +5,15 @@ from numpy.typing import NDArray
 
 from identification.recordings.columns import TIME_COLUMN, line_number
 from identification.recordings.recording import CampaignError
-
-LEAST_RATE = 500.0
-"""Least samples per second: a slower bench misses the armature's movement."""
-
-HARMLESS = 1e-3
-"""Part of a period by which a sample may be off; it displaces the steepest signal by less than noise."""
-
-MOST_DIGITS = 9
-"""Decimals of a second beyond which nobody prints times."""
+from identification.recordings.rules import RULES, RecordingRules
 
 
-def sampling_period(file: str, time: NDArray) -> float:
+def sampling_period(file: str, time: NDArray, rules: RecordingRules = RULES) -> float:
     """Time between samples [s] of a `time_s` column, (samples,).
 
     Of all periods that explain the printed times the one with the roundest rate in Hz; their middle
     where no whole rate does. Raises CampaignError for times that are not uniform, do not start at 0 or
-    are slower than LEAST_RATE.
+    are slower than `rules.least_rate`.
     """
     if len(time) < 2:
         raise CampaignError(
@@ -31,15 +23,15 @@ def sampling_period(file: str, time: NDArray) -> float:
         )
     _check_order(file, time)
     _check_gaps(file, time)
-    least, greatest = _explaining_periods(time)
+    least, greatest = _explaining_periods(time, rules)
     if least > greatest:
         _refuse_jitter(file, time)
     period = _roundest(least, greatest)
-    if period * LEAST_RATE > 1 + 1e-9:
+    if period * rules.least_rate > 1 + 1e-9:
         raise CampaignError(
-            f"{file}, line {line_number(1)}: sampled at {1 / period:g} Hz: record at {LEAST_RATE:g} "
-            "Hz or "
-            "faster"
+            f"{file}, line {line_number(1)}: sampled at {1 / period:g} Hz: record at "
+            f"{rules.least_rate:g} "
+            "Hz or faster"
         )
     return period
 
@@ -84,13 +76,15 @@ def _refuse_jitter(file: str, time: NDArray) -> None:
     )
 
 
-def _explaining_periods(time: NDArray) -> tuple[float, float]:
+def _explaining_periods(time: NDArray, rules: RecordingRules) -> tuple[float, float]:
     """Ends of the range of periods with which every time is right up to its rounding [s].
 
     Time k, rounded by at most h, allows (t_k - h) / k to (t_k + h) / k; the first end lies above the
     second where nothing explains all.
     """
-    rounding = 0.5 * _last_digit(time) + HARMLESS * float(np.median(np.diff(time)))
+    rounding = 0.5 * _last_digit(time, rules.most_digits) + rules.harmless_jitter * float(
+        np.median(np.diff(time))
+    )
     count = np.arange(1, len(time))
     return (
         float(np.max((time[1:] - rounding) / count)),
@@ -98,12 +92,12 @@ def _explaining_periods(time: NDArray) -> tuple[float, float]:
     )
 
 
-def _last_digit(time: NDArray) -> float:
+def _last_digit(time: NDArray, most_digits: int) -> float:
     """Value of the last decimal in which times are printed [s]."""
-    for digits in range(MOST_DIGITS):
+    for digits in range(most_digits):
         if np.max(np.abs(time - np.round(time, digits))) < 1e-12:
             return 10.0**-digits
-    return 10.0**-MOST_DIGITS
+    return 10.0**-most_digits
 
 
 def _roundest(least: float, greatest: float) -> float:

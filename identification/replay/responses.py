@@ -16,7 +16,7 @@ from identification.report_2003.output_error import partial_error, relative_erro
 
 @dataclass(frozen=True, kw_only=True)
 class Response:
-    """One recording and the model's answer to its inputs; arrays (3, samples) of OUTPUTS, SI units."""
+    """One recording and the model's response to its inputs; arrays (3, samples) of OUTPUTS, SI units."""
 
     recording: Recording
     measured: NDArray
@@ -36,7 +36,7 @@ class Response:
 
 
 def responses(recordings: Sequence[Recording], parameters: Parameters) -> list[Response]:
-    """The model's answers, started where each recording's hold says; nothing is fitted."""
+    """The model's responses, started where each recording's hold says; nothing is fitted."""
     replay = Replay([model_inputs(recording, parameters) for recording in recordings], parameters)
     one = {"R": np.array([parameters["R"]])}
     return [
@@ -45,6 +45,6 @@ def responses(recordings: Sequence[Recording], parameters: Parameters) -> list[R
     ]
 
 
-def total_response_error(answers: Sequence[Response]) -> float:
+def total_response_error(responses: Sequence[Response]) -> float:
     """Eq. 21, as a fraction."""
-    return float(total_error([np.array(answer.partial) for answer in answers]))
+    return float(total_error([np.array(response.partial) for response in responses]))

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.bench.programmes import BAR, Programme
+from epv_env.common.units import BAR
+from identification.bench.programmes import Programme
 from identification.gap.design.experiment import Rivals, outlooks, rivals_of
 from identification.gap.design.information_gain import Outlook, odds
 from identification.gap.rank.ranking import Verdicts

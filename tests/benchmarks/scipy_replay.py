@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised
 from identification.bench.hybrid_automaton import simulate_reference
-from identification.bench.measurement import RESERVOIR
+from identification.bench.measurement import RESERVOIR_VOLUME
 from identification.bench.schedule import piecewise_schedule
 from identification.calibration.problem import CalibrationProblem
 from identification.replay.batch_simulation import Replay
@@ -58,6 +58,8 @@ def _answer(drive: ModelInputs, parameters: Parameters, p2_shift: float) -> NDAr
     """OUTPUTS of one recording under one set of parameters, (3, samples)."""
     start = energised(parameters, p1=drive.p1_start, p2=drive.p2_start + p2_shift, U=drive.U_start)
     time = np.arange(len(drive.U)) * drive.period
-    schedule = piecewise_schedule(parameters, start, time, U=drive.U[:-1], reservoir_volume=RESERVOIR)
+    schedule = piecewise_schedule(
+        parameters, start, time, U=drive.U[:-1], reservoir_volume=RESERVOIR_VOLUME
+    )
     state = simulate_reference(schedule, time, rtol=RTOL).state
     return np.stack([state.p2, state.p3, state.I])

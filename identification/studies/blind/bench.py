@@ -10,7 +10,12 @@ from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.readings import readings
 from identification.bench.hybrid_automaton import simulate_reference
-from identification.bench.measurement import RESERVOIR, TrueSignals, initial_state, measured_campaign
+from identification.bench.measurement import (
+    RESERVOIR_VOLUME,
+    TrueSignals,
+    initial_state,
+    measured_campaign,
+)
 from identification.bench.programmes import DIAGNOSIS_SUITE, Programme
 from identification.bench.schedule import Schedule, piecewise_schedule
 from identification.recordings.recording import Campaign
@@ -74,7 +79,7 @@ def run_programme(
     U = programme.case.voltage(programme.U_on, SAMPLING_RATE)
     time = np.arange(len(U)) / SAMPLING_RATE
     start = initial_state(parameters, programme)
-    schedule = piecewise_schedule(parameters, start, time, U=U[:-1], reservoir_volume=RESERVOIR)
+    schedule = piecewise_schedule(parameters, start, time, U=U[:-1], reservoir_volume=RESERVOIR_VOLUME)
     schedule = _delayed(schedule, parameters["t_delay"], deviation, rng)
     state = _solved(schedule, time, deviation)
     return TrueSignals(

@@ -11,6 +11,7 @@ from identification.replay.batch_simulation import Replay
 from identification.replay.model_inputs import model_inputs
 from identification.replay.parameter_vector import ParameterVector
 from identification.replay.responses import responses, total_response_error
+from identification.replay.settings import ReplaySettings
 from identification.replay.weighted_residuals import WeightedResiduals, report_weights
 from tests.identification.twins import SWITCHING, TRUE, exact_recording, problem, truth
 
@@ -44,11 +45,11 @@ def test_recordings_of_other_lengths_and_rates_are_each_alone_to_the_bit():
 
 
 @pytest.mark.parametrize(("largest", "batches"), [(1, 3), (9000, 2)])
-def test_smaller_batches_change_nothing(monkeypatch, largest, batches):
+def test_smaller_batches_change_nothing(largest, batches):
     whole = Replay(mixed(), TRUE).outputs(CANDIDATES)
-    monkeypatch.setattr("identification.replay.batch_simulation.LARGEST_BATCH", largest)
-    assert len(Replay(mixed(), TRUE)._groups(3, range(len(mixed())))) == batches
-    for one, other in zip(whole, Replay(mixed(), TRUE).outputs(CANDIDATES), strict=True):
+    parts = Replay(mixed(), TRUE, ReplaySettings(largest_batch=largest))
+    assert len(parts._groups(3, range(len(mixed())))) == batches
+    for one, other in zip(whole, parts.outputs(CANDIDATES), strict=True):
         np.testing.assert_array_equal(one, other)
 
 
