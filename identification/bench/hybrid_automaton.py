@@ -22,6 +22,8 @@ from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at
 from identification.bench.schedule import Schedule
 
 RTOL = 1e-9
+"""Relative tolerance of the solver."""
+
 STATE_SCALES = State(
     p2=1e6, p3=1e6, xPV=1e-3, vPV=1.0, xMV=1e-3, vMV=1.0, I=1.0, p1=1e6,
     air_in_PV=1e-2, air_in_MV=1e-3, air_vented=1e-3, coil_energy=10.0, I_coil=1.0, coil_heat=10.0,
@@ -33,10 +35,17 @@ OVERSHOOT = 1e-12
 """A stop counts as reached this far beyond it [m], so that leaving it is no landing on it."""
 
 FREE, LOW, HIGH = 0, 1, 2
+"""Modes of a mover: between the stops, held at the low stop, held at the high stop."""
+
 POSITIONS = (State._fields.index("xPV"), State._fields.index("xMV"))
 SPEEDS = (State._fields.index("vPV"), State._fields.index("vMV"))
+"""Indices of the movers' positions and speeds in the state."""
+
 MOVERS = ("piston", "armature")
+"""Names of the movers in the events, in the order of `POSITIONS`."""
+
 I_COIL = State._fields.index("I_coil")
+"""Index of the current at the coil's terminals in the state."""
 
 RightHandSide = Callable[[NDArray, NDArray, NDArray, NDArray, float, float], NDArray]
 """(state, inputs, coefficients, effects, free_PV, free_MV) -> rates and both forces."""
@@ -79,107 +88,128 @@ class Event:
     """An instant at which the right-hand side changes its form."""
 
     time: float
-    what: str
+    """[s]."""
+    name: str
     """'piston lands low', 'armature leaves high', 'armature passes inlet kink' .."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReferenceRun:
-    """What the reference found; fields of `state` have the shape of `time`."""
+    """Result of the reference; the fields of `state` have the shape of `time`."""
 
     time: NDArray
+    """Times of the samples, (samples,) [s]."""
     state: State
+    """States at these times, each (samples,) [SI]."""
     events: list[Event]
     evaluations: int
+    """Of the right-hand side."""
     steps: int
+    """Of the solver."""
 
-    def away_from_events(self, margin: float, what: str = "") -> NDArray:
-        """Which sample times lie farther than margin [s] from every event named with `what`."""
-        at = np.array([event.time for event in self.events if what in event.what])
+    def away_from_events(self, margin: float, name_part: str = "") -> NDArray:
+        """Whether each sample is farther than margin [s] from the named events, boolean (samples,)."""
+        at = np.array([event.time for event in self.events if name_part in event.name])
         return np.all(np.abs(self.time[:, None] - at) > margin, axis=1)
 
 
 class HybridAutomaton:
     """One valve on a schedule: the modes of both movers and the events that change them."""
 
-    def __init__(self, schedule: Schedule, right_hand_side: RightHandSide | None, most: float):
+    def __init__(
+        self, schedule: Schedule, right_hand_side: RightHandSide | None, most_evaluations: float
+    ):
         c = coefficients(schedule.parameters, schedule.reservoir_volume)
         e = effect_sizes(schedule.parameters)
-        self.c, self.e = c, e
+        self.coefficients, self.effects = c, e
         self.right_hand_side = right_hand_side or COMPILED_RIGHT_HAND_SIDES[bool(np.any(has_effects(e)))]
-        self.u = np.zeros(len(Inputs._fields))
+        self.inputs = np.zeros(len(Inputs._fields))
         named = Coefficients(*c[:, 0])
         self.stroke = (named.xPVmax, named.xMVmax)
         self.restitution = (named.ePV, named.eMV)
         self.kinks = {"inlet kink": named.kink_in, "exhaust kink": named.kink_exh}
         self.mode = [FREE, FREE]
-        self.evaluations, self.most = 0, most
+        self.evaluations, self.most_evaluations = 0, most_evaluations
 
     def rates_and_forces(self, y: NDArray) -> NDArray:
-        """Rates of the states in the present modes, then the forces on piston and armature [N]."""
+        """Rates of the states (states,) [SI/s] in the present modes, then the forces on both movers [N].
+
+        Raises RuntimeError beyond the greatest number of evaluations. Returns (states + 2,).
+        """
         self.evaluations += 1
-        if self.evaluations > self.most:
-            raise RuntimeError(f"reference needs more than {self.most:g} evaluations")
+        if self.evaluations > self.most_evaluations:
+            raise RuntimeError(f"reference needs more than {self.most_evaluations:g} evaluations")
         free = [1.0 if mode == FREE else 0.0 for mode in self.mode]
         y = np.ascontiguousarray(y)
-        return self.right_hand_side(y, self.u, self.c, self.e, free[0], free[1])
+        return self.right_hand_side(y, self.inputs, self.coefficients, self.effects, free[0], free[1])
 
-    def settle_modes(self, y: NDArray) -> None:
-        """Hold each mover that rests on a stop and is pressed against it."""
+    def update_modes(self, y: NDArray) -> None:
+        """Hold each mover that rests on a stop and is pressed against it; y: state (states,) [SI]."""
         forces = self.rates_and_forces(y)[-2:]
         for mover, (x, v) in enumerate(zip(y[list(POSITIONS)], y[list(SPEEDS)], strict=True)):
             low = v == 0 and x <= 0 and forces[mover] <= 0
             high = v == 0 and x >= self.stroke[mover] and forces[mover] >= 0
             self.mode[mover] = LOW if low else HIGH if high else FREE
 
-    def pin(self, y: NDArray) -> None:
-        """Undo what rounding in the solver did to the movers that are held."""
+    def hold_at_stops(self, y: NDArray) -> None:
+        """Undo rounding in the positions and speeds of held movers; y: state (states,) [SI]."""
         for mover, mode in enumerate(self.mode):
             if mode != FREE:
                 y[POSITIONS[mover]] = 0.0 if mode == LOW else self.stroke[mover]
                 y[SPEEDS[mover]] = 0.0
 
-    def land(self, y: NDArray, mover: int, stop: float) -> None:
-        """Put a mover on the stop it has reached; it rebounds or stays."""
+    def apply_impact(self, y: NDArray, mover: int, stop: float) -> None:
+        """Put a mover on the stop [m] that it has reached; the mover rebounds or stays.
+
+        y: state (states,) [SI], changed in place.
+        """
         rebound = -self.restitution[mover] * y[SPEEDS[mover]]
         y[POSITIONS[mover]] = stop
         y[SPEEDS[mover]] = rebound if abs(rebound) > STICK_SPEED else 0.0
 
     def read_current(self, out: NDArray, at: NDArray) -> None:
-        """Fill in the current at the coil's terminals, which no equation of state holds."""
-        q = State(*out[at].T)
-        out[at, I_COIL] = _coil_currents(self.u[0], q.I, q.coil_heat, self.c, self.e)
+        """Fill in the current at the coil's terminals [A], which no equation of state holds.
 
-    def events(self, y: NDArray) -> list[tuple[str, Callable, int]]:
-        """(name, function of time and state whose zero ends the piece, direction) of each."""
-        found = []
+        out: states (samples, states) [SI]; at: indices of samples.
+        """
+        q = State(*out[at].T)
+        out[at, I_COIL] = _coil_currents(
+            self.inputs[0], q.I, q.coil_heat, self.coefficients, self.effects
+        )
+
+    def possible_events(self, y: NDArray) -> list[tuple[str, Callable, int]]:
+        """(name, function of time [s] and state whose zero ends the piece, direction) of each.
+
+        y: state (states,) [SI].
+        """
+        events = []
         for mover, name in enumerate(MOVERS):
             x, top = POSITIONS[mover], self.stroke[mover]
             if self.mode[mover] == FREE:
-                found.append((f"{name} lands low", lambda t, y, x=x: y[x] + OVERSHOOT, -1))
-                found.append((f"{name} lands high", lambda t, y, x=x, s=top: y[x] - s - OVERSHOOT, 1))
+                events.append((f"{name} lands low", lambda t, y, x=x: y[x] + OVERSHOOT, -1))
+                events.append((f"{name} lands high", lambda t, y, x=x, s=top: y[x] - s - OVERSHOOT, 1))
             else:
                 at, way = ("low", 1) if self.mode[mover] == LOW else ("high", -1)
                 force = -2 + mover
-                found.append(
+                events.append(
                     (f"{name} leaves {at}", lambda t, y, k=force: self.rates_and_forces(y)[k], way)
                 )
         if self.mode[1] == FREE:
             for name, at in self.kinks.items():
                 if abs(y[POSITIONS[1]] - at) > OVERSHOOT:
-                    found.append(
+                    events.append(
                         (f"armature passes {name}", lambda t, y, at=at: y[POSITIONS[1]] - at, 0)
                     )
-        return found
+        return events
 
-    def apply(self, what: str, y: NDArray) -> None:
-        """What an event does to the state."""
-        mover = MOVERS.index(what.split()[0])
-        if what.endswith("lands low"):
-            self.land(y, mover, 0.0)
-        elif what.endswith("lands high"):
-            self.land(y, mover, self.stroke[mover])
-        elif "leaves" in what:
+    def apply_event(self, name: str, y: NDArray) -> None:
+        """Change the state (states,) [SI] and the modes as an event does."""
+        mover = MOVERS.index(name.split()[0])
+        if name.endswith("lands low"):
+            self.apply_impact(y, mover, 0.0)
+        elif name.endswith("lands high"):
+            self.apply_impact(y, mover, self.stroke[mover])
+        elif "leaves" in name:
             self.mode[mover] = FREE
 
 
@@ -194,7 +224,7 @@ def simulate_reference(
 ) -> ReferenceRun:
     """Run a schedule through scipy.integrate.solve_ivp, piece by piece between events.
 
-    times: sample times [s], rising. right_hand_side: another one than the plant's compiled one.
+    times: sample times, (samples,) [s], rising. right_hand_side: another than the plant's compiled one.
     Raises RuntimeError where the solver fails, or needs more than `most_evaluations` of it.
     """
     times = np.asarray(times, dtype=float)
@@ -206,8 +236,8 @@ def simulate_reference(
     steps = 0
     for segment, border in enumerate(schedule.borders[1:]):
         t = float(schedule.borders[segment])
-        automaton.u[:] = [field[segment] for field in schedule.inputs]
-        automaton.settle_modes(y)
+        automaton.inputs[:] = [field[segment] for field in schedule.inputs]
+        automaton.update_modes(y)
         while t < border:
             piece = _piece(automaton, t, float(border), y, method, rtol)
             steps += len(piece.t) - 1
@@ -218,14 +248,14 @@ def simulate_reference(
             if piece.t[-1] <= t and piece.status != 1:
                 raise RuntimeError(f"reference is stuck at {t} s: {piece.message}")
             t, y = float(piece.t[-1]), piece.y[:, -1].copy()
-            automaton.pin(y)
+            automaton.hold_at_stops(y)
             if piece.status == 1:
-                for what, at in zip(piece.names, piece.t_events, strict=True):
+                for name, at in zip(piece.names, piece.t_events, strict=True):
                     if len(at):
-                        log.append(Event(time=float(at[-1]), what=what))
-                        automaton.apply(what, y)
-                        if "lands" in what:
-                            automaton.settle_modes(y)
+                        log.append(Event(time=float(at[-1]), name=name))
+                        automaton.apply_event(name, y)
+                        if "lands" in name:
+                            automaton.update_modes(y)
     return ReferenceRun(
         time=times, state=State(*out.T), events=log, evaluations=automaton.evaluations, steps=steps
     )
@@ -234,7 +264,7 @@ def simulate_reference(
 def _piece(automaton: HybridAutomaton, start: float, end: float, y: NDArray, method: str, rtol: float):
     """Integrate from `start` until `end` or the first event. Returns solve_ivp's result."""
     names, functions = [], []
-    for name, function, direction in automaton.events(y):
+    for name, function, direction in automaton.possible_events(y):
         function.terminal, function.direction = True, direction  # type: ignore[attr-defined]
         names.append(name)
         functions.append(function)

@@ -15,6 +15,7 @@ from identification.recordings.recording import HOLD, ROLES
 from identification.report_2003.cases import Case
 
 FORMAT = "epv-programme/1"
+"""Version of the file, in its field `format`."""
 
 MILLISECONDS = 1e3
 """In a second."""

@@ -18,7 +18,9 @@ class Programme:
     """One recording: the case, and the conditions under which the bench runs it."""
 
     name: str
+    """Of the recording and of its file."""
     role: str
+    """One of recording.ROLES."""
     case: Case
     p1: float = SUPPLY_PRESSURE
     """Supply pressure at the start [Pa absolute]."""
@@ -64,3 +66,4 @@ DIAGNOSIS_SUITE = (
 """The report's recordings, and others that tell more causes of a gap apart."""
 
 SUITES = {"report": REPORT_SUITE, "diagnosis": DIAGNOSIS_SUITE}
+"""Programmes by the name of their suite."""

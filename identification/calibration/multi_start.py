@@ -16,7 +16,7 @@ METHODS = ("Nelder-Mead", "least squares")
 
 
 def starting_points(vector: ParameterVector, count: int, seed: int) -> NDArray:
-    """Scaled vectors (count, k): the reference, then a Latin hypercube over the domains.
+    """Scaled vectors (count, k), without unit: the reference, then a Latin hypercube over the domains.
 
     Each symbol is spread evenly over the logarithm of its domain, of which RML's spans a decade; over
     the domain itself where that holds zero.
@@ -26,7 +26,7 @@ def starting_points(vector: ParameterVector, count: int, seed: int) -> NDArray:
     positive = low > 0
     ratio = np.where(positive, high, 1.0) / np.where(positive, low, 1.0)
     spread = np.where(positive, low * ratio**draws, low + (high - low) * draws)
-    return np.vstack([vector.of(vector.reference), spread])
+    return np.vstack([vector.scaled(vector.reference), spread])
 
 
 def search_from_all_starts(

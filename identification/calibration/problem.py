@@ -50,7 +50,7 @@ def calibration_problem(
     Raises CampaignError if there is no recording to fit to; ParameterError for symbols that cannot be
     fitted.
     """
-    if not campaign.of("calibration"):
+    if not campaign.with_role("calibration"):
         raise CampaignError(
             f"campaign {campaign.name!r} has no recording with role 'calibration': give at least one"
         )
@@ -61,8 +61,8 @@ def calibration_problem(
     offsets = _offsets(campaign, quality)
     values = {name: offset.value for name, offset in offsets.items()}
     return CalibrationProblem(
-        calibration=tuple(without_offsets(r, values) for r in campaign.of("calibration")),
-        validation=tuple(without_offsets(r, values) for r in campaign.of("validation")),
+        calibration=tuple(without_offsets(r, values) for r in campaign.with_role("calibration")),
+        validation=tuple(without_offsets(r, values) for r in campaign.with_role("validation")),
         noise=pooled_noise(campaign),
         offsets=offsets,
         vector=ParameterVector(symbols=tuple(symbols), reference=start),
@@ -84,7 +84,7 @@ def _check_fitted(symbols: Sequence[str], start: Parameters) -> None:
 
 def _offsets(campaign: Campaign, quality: QualitySettings) -> dict[str, SensorOffset]:
     """The sensors' offsets from the first quality recording that shows them."""
-    for recording in campaign.of("quality"):
+    for recording in campaign.with_role("quality"):
         offsets = sensor_offsets(assess_recording(recording, campaign.pressure, quality))
         if offsets:
             return offsets

@@ -97,3 +97,4 @@ BENCH = Command(
     add_options=add_options,
     run=run,
 )
+"""The command, for the registry."""

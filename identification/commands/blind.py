@@ -43,3 +43,4 @@ BLIND = Command(
     add_options=add_options,
     run=run,
 )
+"""The command, for the registry."""

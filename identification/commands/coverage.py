@@ -38,3 +38,4 @@ COVERAGE = Command(
     add_options=add_options,
     run=run,
 )
+"""The command, for the registry."""

@@ -67,3 +67,4 @@ GAP = Command(
     add_options=add_options,
     run=run,
 )
+"""The command, for the registry."""

@@ -24,3 +24,4 @@ def run(chosen: argparse.Namespace) -> None:
 REPRODUCE = Command(
     name="reproduce", help="the report's tables beside ours", add_options=add_options, run=run
 )
+"""The command, for the registry."""

@@ -18,3 +18,4 @@ def run(chosen: argparse.Namespace) -> None:
 RUN = Command(
     name="run", help="all of these: plant.json and report.html", add_options=add_options, run=run
 )
+"""The command, for the registry."""

@@ -56,7 +56,7 @@ class Confidence:
 
     @property
     def half_widths(self) -> NDArray:
-        """Of the intervals of each parameter on its own, scaled (k,)."""
+        """Of the intervals of each parameter on its own, scaled (k,), without unit."""
         return np.sqrt(chi2.ppf(self.settings.probability, 1) * np.diag(self.covariance.total))
 
     @cached_property

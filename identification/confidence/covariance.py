@@ -31,7 +31,7 @@ ZEROED = ("U", "p1", "p2")
 
 @dataclass(frozen=True, kw_only=True)
 class EstimateCovariance:
-    """Covariances (k, k) of a scaled vector."""
+    """Covariances (k, k) of a scaled vector, without unit."""
 
     independent: NDArray
     """As if the residuals were independent: s^2 H."""
@@ -44,7 +44,7 @@ class EstimateCovariance:
 
     @property
     def total(self) -> NDArray:
-        """What the estimate's region is made of."""
+        """Sum of residual and inputs, (k, k), without unit; the joint region rests on this sum."""
         return self.residual + self.inputs
 
 
@@ -58,7 +58,7 @@ def estimate_covariance(
 ) -> EstimateCovariance:
     """Covariance of an estimate that minimises one of the problem's weighted residuals.
 
-    z: the estimate, scaled (k,). seed: of the noise drawn for the inputs.
+    z: the estimate, scaled (k,), without unit. seed: of the noise drawn for the inputs.
     """
     residuals, jacobians = misfit.linearised(z)
     H = np.linalg.inv(sum(J.T @ J for J in jacobians))
@@ -89,7 +89,7 @@ def score_series(residuals: Sequence[NDArray], jacobians: Sequence[NDArray]) -> 
 
 
 def correlation_lags(residual: NDArray) -> int:
-    """Lags over which neighbours may be correlated, for one recording's residual (3 samples,).
+    """Lags [samples] over which neighbours in one recording's residual (3 samples,) may correlate.
 
     Twice the first lag at which every output's autocorrelation is within its 95 % band, and at least
     Newey and West's rule of thumb 4 (n/100)^(2/9).

@@ -33,11 +33,14 @@ class ReportInterval:
 
     @property
     def half_widths(self) -> NDArray:
-        """Of the interval of each parameter while the others are held, scaled (k,)."""
+        """Of the interval of each parameter while the others are held, scaled (k,), without unit."""
         return np.sqrt(self.squared_rise / np.diag(self.curvature))
 
     def holds_jointly(self, apart: NDArray) -> bool:
-        """Whether a vector `apart` from the estimate (k,) has a total error below eps_p."""
+        """Whether a vector has a total error below eps_p.
+
+        apart: the vector less the estimate, scaled (k,), without unit.
+        """
         return bool(apart @ self.curvature @ apart <= self.squared_rise)
 
 

@@ -46,7 +46,7 @@ def calibrated_plant(identification: Identification) -> Plant:
             "software": f"epv-valve {version('epv-valve')}",
             "seed": identification.seed,
             "recordings_sha256": identification.hashes,
-            "calibrated_on": [r.name for r in identification.campaign.of("calibration")],
+            "calibrated_on": [r.name for r in identification.campaign.with_role("calibration")],
             "warnings": identification.calibration.warnings,
         },
     )

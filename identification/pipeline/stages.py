@@ -48,7 +48,7 @@ class Stage:
 
 def quality(identification: Identification) -> Result:
     """Section 4 for every quality recording. Raises CampaignError if there is none."""
-    recordings = identification.campaign.of("quality")
+    recordings = identification.campaign.with_role("quality")
     if not recordings:
         raise CampaignError(
             f"campaign {identification.campaign.name!r} has no recording with role 'quality': record "
@@ -128,7 +128,7 @@ STAGES = (
 
 def result_or_omission(stage: Stage, identification: Identification) -> Result:
     """A stage's result; where the campaign lacks its recordings, a section that says so."""
-    if stage.role is None or identification.campaign.of(stage.role):
+    if stage.role is None or identification.campaign.with_role(stage.role):
         return stage.compute(identification)
     text = f"The campaign has no recording with role {stage.role!r}: this stage was left out."
     verdict = Verdict(status="doubt", text=text)

@@ -18,19 +18,21 @@ class SensorOffset:
     """Reading of a sensor at the start of a record at rest, less what a perfect sensor reads [SI]."""
 
     value: float
+    """[SI]."""
     error: float
-    """Standard error."""
+    """Standard error of the value [SI]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class QualityAssessment:
-    """What one steady recording says about its channels, in A, V and bar."""
+    """Statistics of the channels of one steady recording [A, V, bar]."""
 
     name: str
     """Of the recording."""
     period: float
     """[s]."""
     samples: int
+    """Of each channel."""
     channels: Mapping[str, ChannelAssessment]
     """By name, in the order of Table 1."""
     pairs: Mapping[tuple[str, str], PairCorrelation]

@@ -25,10 +25,11 @@ class ChannelAssessment:
     """One channel's readings and what they show."""
 
     name: str
+    """One of recording.CHANNELS."""
     readings: NDArray
     """(samples,) [A, V or bar]."""
     residual: NDArray
-    """Readings minus the line of the trend."""
+    """Readings minus the line of the trend, (samples,) [A, V or bar]."""
     duration: float
     """Of the record [s]."""
     rest: float

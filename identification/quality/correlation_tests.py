@@ -17,9 +17,9 @@ class Spectrum:
     """Power spectral density by Welch's method (Figure 9)."""
 
     frequency: NDArray
-    """Normalised: 1 is the Nyquist frequency; without both ends."""
+    """Normalised, (frequencies,): 1 is the Nyquist frequency; without both ends."""
     density: NDArray
-    """[unit^2 per rad/sample]; sigma^2/pi for white noise."""
+    """(frequencies,) [unit^2 per rad/sample]; sigma^2/pi for white noise."""
     white: float
     """sigma^2/pi."""
     band: tuple[float, float]

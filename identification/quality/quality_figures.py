@@ -14,8 +14,14 @@ from identification.quality.correlation_tests import WhitenessTest, white_noise_
 from identification.quality.normality import probability_plot
 
 MARK = {"color": "tab:blue", "linewidth": 0.8}
+"""Line of a computed curve."""
+
 REFERENCE = {"color": "tab:red", "linewidth": 1.0}
+"""Line of a fit or a normal distribution."""
+
 BAND = {"color": "tab:orange", "alpha": 0.3, "linewidth": 0}
+"""Band of white noise."""
+
 TICKS = (0.001, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 0.999)
 """Probabilities on the axis of a normal probability plot."""
 

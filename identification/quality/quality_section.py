@@ -13,6 +13,7 @@ from identification.recordings.recording import CHANNELS, UNITS
 from identification.report.page import Picture, Section, Table, Text
 
 UNIT_COLUMNS = [f"{name} [{UNITS[name][0]}]" for name in CHANNELS]
+"""Headings of a table with a column per channel."""
 
 
 def quality_section(quality: QualityAssessment) -> Section:

@@ -22,7 +22,7 @@ class Trend:
     """Standard error of the offset, for white noise [unit]."""
 
     def at(self, time: NDArray) -> NDArray:
-        """The line at some times [s]."""
+        """The line [unit] at some times (times,) [s], (times,)."""
         return self.offset + self.factor * time
 
 
@@ -58,7 +58,7 @@ class DescriptiveStatistics:
 
 
 def fit_trend(time: NDArray, signal: NDArray) -> Trend:
-    """Line through a signal; time, signal: (samples,), at least three of them."""
+    """Line through a signal (samples,) [unit] over time (samples,) [s]; at least three samples."""
     line: Any = stats.linregress(time, signal)
     return Trend(
         factor=float(line.slope),

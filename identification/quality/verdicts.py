@@ -34,6 +34,7 @@ class CheckResult:
     """One check of one channel."""
 
     channel: str
+    """One of recording.CHANNELS."""
     check: str
     """One of CHECKS."""
     status: str

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from identification.recordings.recording import CampaignError
 
 TIME_COLUMN, CONSUMPTION_COLUMN = "time_s", "sigmaS_kg_per_s"
+"""Columns that are no channel: time [s] and consumed air [kg/s]."""
 
 CHANNEL_OF: Mapping[str, str] = {
     "I_A": "I",
@@ -24,10 +25,13 @@ CHANNEL_OF: Mapping[str, str] = {
 """Measured channel (recording.CHANNELS) in each column, in the unit of its name."""
 
 REQUIRED_COLUMNS = (TIME_COLUMN, "I_A", "U_V", "p2_bar", "p3_bar")
+"""Columns without which a file is refused."""
+
 SUPPLY_COLUMNS = (("p1_bar",), ("p1a_bar", "p1b_bar"))
 """The two ways to give p1: one column, or the two reservoirs' sensors."""
 
 KNOWN_COLUMNS = (TIME_COLUMN, *CHANNEL_OF, CONSUMPTION_COLUMN)
+"""Columns that are read; others are ignored."""
 
 
 def line_number(sample: int) -> int:
@@ -38,7 +42,8 @@ def line_number(sample: int) -> int:
 def read_columns(file: str, content: bytes) -> dict[str, NDArray]:
     """The known columns of a CSV file (RFC 4180, UTF-8), each (samples,), in the order of the file.
 
-    file: what messages call it. Columns that are not KNOWN are ignored. Raises CampaignError.
+    file: what messages call it. The unit of each column is in its name. Columns that are not
+    KNOWN_COLUMNS are ignored. Raises CampaignError.
     """
     text = _decoded(file, content)
     names = _column_names(file, text)
@@ -130,9 +135,9 @@ def _number(place: str, cell: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        found = repr(cell[:40]) if cell.strip() else "empty"
+        shown = repr(cell[:40]) if cell.strip() else "empty"
         raise CampaignError(
-            f"{place} is {found}, not a finite number: give one with '.' as decimal sign, or cut the "
+            f"{place} is {shown}, not a finite number: give one with '.' as decimal sign, or cut the "
             "recording before this line"
         )
     return value

@@ -11,14 +11,18 @@ from epv_env.plant.parameters import ParameterError, checked_value
 from identification.recordings.recording import ROLES, Campaign, CampaignError
 
 FORMAT = "epv-campaign/1"
+"""Version of the file, in its field `format`."""
+
 FILE_NAME = "campaign.json"
+"""Name of the file in the campaign's folder."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Manifest:
-    """What campaign.json says, checked."""
+    """Content of a campaign.json, checked."""
 
     name: str
+    """Of the campaign."""
     temperature: float
     """T_env [K]."""
     pressure: float

@@ -16,7 +16,7 @@ def pooled_noise(campaign: Campaign, rules: RecordingRules = RULES) -> dict[str,
     From the quality recordings if there are any, otherwise from the holds that the other recordings
     start with. Raises CampaignError if a hold is too short.
     """
-    steady = campaign.of("quality")
+    steady = campaign.with_role("quality")
     stretches = [(r, len(r)) for r in steady] or [
         (r, energised_start_length(r)) for r in campaign.recordings
     ]

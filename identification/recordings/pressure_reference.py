@@ -21,6 +21,7 @@ MARGIN = SENSORS["p1"].accuracy * SENSORS["p1"].high
 """Accuracy of the pressure sensors (Table 1) [bar]."""
 
 REMEDY = "looks like gauge pressure: give bar absolute (add the environment's pressure)"
+"""End of the sentences that refuse a gauge pressure."""
 
 
 def check_above_ambient(file: str, name: str, pressure: NDArray, ambient: float) -> None:
@@ -65,7 +66,10 @@ def check_discharge(
 
 
 def check_against_supply(file: str, name: str, p1: NDArray, p3: NDArray) -> None:
-    """The steady start has p3 = p1: p1 is not lower by more than both accuracies. Arrays: that start."""
+    """In the steady start p3 equals p1: p1 is not lower by more than both accuracies.
+
+    p1, p3: of the steady start, (samples,) [bar]. Raises CampaignError.
+    """
     difference = float(np.mean(p1) - np.mean(p3))
     if difference < -2 * MARGIN:
         raise CampaignError(

@@ -74,7 +74,10 @@ def _check_channel(
 def check_length(
     file: str, columns: Mapping[str, NDArray], role: str, period: float, rules: RecordingRules
 ) -> None:
-    """A recording holds its steady start and more; one for statistics `rules.least_rest`."""
+    """A recording holds its steady start and more; one for statistics `rules.least_rest`.
+
+    columns: by name, each (samples,) in the unit of the name. Raises CampaignError.
+    """
     samples = len(columns[TIME_COLUMN])
     needed = _samples(rules.least_rest, period) if role == "quality" else _samples(HOLD, period) + 1
     if samples < needed:
@@ -86,7 +89,7 @@ def check_length(
 
 
 def check_alive(file: str, name: str, values: NDArray) -> None:
-    """Noise and the ADC's steps move every channel, (samples,), that is connected."""
+    """Noise and the ADC's steps move every channel, (samples,) [A, V or bar], that is connected."""
     if np.min(values) == np.max(values):
         raise CampaignError(
             f"{file}, {_lines(0, len(values))}: {name} is {values[0]:g} throughout, and noise moves "
@@ -95,7 +98,7 @@ def check_alive(file: str, name: str, values: NDArray) -> None:
 
 
 def check_unit(file: str, name: str, values: NDArray, rules: RecordingRules) -> None:
-    """Pressures, (samples,), are in bar."""
+    """Pressures, (samples,), are in [bar]. Raises CampaignError."""
     typical = float(np.median(values))
     if typical > rules.kilopascal_median:
         unit, factor = ("Pa", 100000) if typical > rules.pascal_median else ("kPa", 100)
@@ -122,7 +125,7 @@ def check_range(file: str, name: str, values: NDArray, sensor: Sensor) -> None:
 def check_rail(
     file: str, name: str, values: NDArray, sensor: Sensor, period: float, rules: RecordingRules
 ) -> None:
-    """No reading, (samples,), stays at an end of the range, or where the ADC saturates beyond it."""
+    """No reading (samples,) [A, V, bar] stays at an end of the range, or where the ADC saturates beyond it."""
     at_end = (values <= sensor.low) | (values >= sensor.high - sensor.resolution)
     first, length = _longest_run(at_end[1:] & (values[1:] == values[:-1]))
     if length >= max(_samples(rules.stuck_time, period), rules.stuck_samples):
@@ -155,7 +158,10 @@ def check_energised_start(file: str, U: NDArray, period: float) -> None:
 
 
 def check_steady_start(file: str, columns: Mapping[str, NDArray], period: float) -> None:
-    """Current and pressures rest during HOLD: first and last quarter agree within the accuracy."""
+    """Current and pressures rest during HOLD: first and last quarter agree within the accuracy.
+
+    columns: by name, each (samples,) in the unit of the name. period [s]. Raises CampaignError.
+    """
     count = _samples(HOLD, period)
     quarter = count // 4
     for name, channel in CHANNEL_OF.items():
@@ -177,7 +183,10 @@ def check_pressures(
     ambient_bar: float,
     rules: RecordingRules,
 ) -> None:
-    """Pressures are absolute, as far as a recording that starts energised and switches can tell."""
+    """Pressures are absolute, as far as a recording that starts energised and switches can tell.
+
+    columns: by name, each (samples,) in the unit of the name. period [s]. Raises CampaignError.
+    """
     start = slice(_samples(HOLD, period))
     for name, channel in CHANNEL_OF.items():
         if name in columns and channel == "p1":

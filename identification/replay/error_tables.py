@@ -8,6 +8,7 @@ from identification.replay.responses import Response, total_response_error
 from identification.report.page import Table
 
 COLUMNS = ["Case", *(f"eps_{output} [%]" for output in OUTPUTS), "eps_partial [%]"]
+"""Headings of an error table."""
 
 
 def error_table(responses: Sequence[Response], caption: str) -> Table:

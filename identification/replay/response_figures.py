@@ -9,7 +9,10 @@ from identification.recordings.recording import OUTPUTS, UNITS
 from identification.replay.responses import Response
 
 MEASURED = {"color": "tab:blue", "alpha": 0.35, "linewidth": 3.0, "label": "measured"}
+"""Line of a measured signal."""
+
 MODEL = {"color": "tab:red", "linewidth": 0.8, "label": "model"}
+"""Line of a modelled signal."""
 
 
 def response_figure(response: Response) -> Figure:

@@ -16,11 +16,13 @@ from identification.report_2003.output_error import partial_error, relative_erro
 
 @dataclass(frozen=True, kw_only=True)
 class Response:
-    """One recording and the model's response to its inputs; arrays (3, samples) of OUTPUTS, SI units."""
+    """One recording and the model's response to its inputs."""
 
     recording: Recording
     measured: NDArray
+    """OUTPUTS, (3, samples) [Pa, Pa, A]."""
     model: NDArray
+    """OUTPUTS of the model, (3, samples) [Pa, Pa, A]."""
 
     @property
     def errors(self) -> dict[str, float]:
@@ -36,7 +38,7 @@ class Response:
 
 
 def responses(recordings: Sequence[Recording], parameters: Parameters) -> list[Response]:
-    """The model's responses, started where each recording's hold says; nothing is fitted."""
+    """The model's responses from each recording's steady start; nothing is fitted. parameters: [SI]."""
     replay = Replay([model_inputs(recording, parameters) for recording in recordings], parameters)
     one = {"R": np.array([parameters["R"]])}
     return [

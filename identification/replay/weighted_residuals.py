@@ -57,15 +57,18 @@ class WeightedResiduals:
         self.replay = Replay(drives, vector.reference, settings)
 
     def error(self, z: NDArray) -> float:
-        """Root of the sum of squares for one vector (k,): eq. 21 under `report_weights`."""
+        """Root of the sum of squares for one scaled vector (k,), without unit.
+
+        Under `report_weights` the total error of equation 21, a fraction.
+        """
         return float(np.linalg.norm(np.concatenate(self.residuals(z))))
 
     def residuals(self, z: NDArray) -> list[NDArray]:
-        """Weighted measured - model, freed of the nuisances; per recording (3 samples,)."""
+        """Weighted measured - model without nuisances, per recording (3 samples,), without unit."""
         return [residual for residual, _ in self._projected(z, np.zeros((0, len(z))))]
 
     def linearised(self, z: NDArray) -> tuple[list[NDArray], list[NDArray]]:
-        """`residuals`, and their derivatives by z, per recording (3 samples, k).
+        """`residuals`, and their derivatives by z, per recording (3 samples, k), without unit.
 
         A difference is taken away from the nearer end of a parameter's domain.
         """

@@ -28,6 +28,7 @@ class Verdict:
     status: str
     """'good', 'doubt', 'bad' or 'note'."""
     text: str
+    """One sentence; the page escapes it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,6 +36,7 @@ class Text:
     """A paragraph."""
 
     text: str
+    """Plain text; the page escapes it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,6 +64,7 @@ class Picture:
 
 
 Block = Text | Table | Picture
+"""Part of a section."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,6 +72,7 @@ class Section:
     """One stage of the identification: its verdicts first, then what supports them."""
 
     title: str
+    """Heading."""
     verdicts: Sequence[Verdict]
     blocks: Sequence[Block]
 

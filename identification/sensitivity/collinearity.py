@@ -40,7 +40,7 @@ class OutputSensitivities:
     """Steps, stated change and limits."""
 
     def columns_of(self, symbols: Sequence[str]) -> NDArray:
-        """The columns of some parameters, (samples, symbols)."""
+        """The columns of some parameters, (samples, symbols) [deviations of noise]."""
         return self.columns[:, [self.symbols.index(symbol) for symbol in symbols]]
 
     @property
@@ -50,7 +50,7 @@ class OutputSensitivities:
 
     @property
     def correlation(self) -> NDArray:
-        """Cosines between the columns, (parameters, parameters)."""
+        """Cosines between the columns, (parameters, parameters), without unit."""
         return cosines(self.columns)
 
     def index(self, symbols: Sequence[str]) -> float:
@@ -66,13 +66,13 @@ class OutputSensitivities:
 
 
 def cosines(columns: NDArray) -> NDArray:
-    """Cosines between columns (samples, n), as (n, n)."""
+    """Cosines between columns (samples, n) [any unit], as (n, n)."""
     unit = columns / np.linalg.norm(columns, axis=0)
     return np.clip(unit.T @ unit, -1.0, 1.0)
 
 
 def collinearity_index(columns: NDArray, zero: float = SENSITIVITY.zero_eigenvalue) -> float:
-    """Brun et al.'s index of columns (samples, n): between 1 and infinity.
+    """Brun et al.'s index of columns (samples, n) [any unit]: between 1 and infinity.
 
     zero: least eigenvalue below which one column replaces the others exactly.
     """

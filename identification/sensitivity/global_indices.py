@@ -52,6 +52,7 @@ class SobolIndices:
     total: NDArray
     """Lost if the parameter were known: alone and together with others."""
     total_half_width: NDArray
+    """Of the bootstrap 95 % interval."""
 
 
 def ranges(

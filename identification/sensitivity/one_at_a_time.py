@@ -55,7 +55,10 @@ def changed_values(symbol: str, nominal: float) -> tuple[float, float]:
 
 
 def variants(nominal: Mapping[str, float], symbols: Sequence[str]) -> dict[str, NDArray]:
-    """Parameters by symbol, (1 + 2 symbols,): the nominal ones, then each symbol lowered and raised."""
+    """Parameters by symbol [SI], (variants,): the nominal ones, then each symbol lowered and raised.
+
+    There are 1 + 2 symbols variants.
+    """
     p = {symbol: np.full(1 + 2 * len(symbols), value) for symbol, value in nominal.items()}
     for row, symbol in enumerate(symbols):
         p[symbol][1 + 2 * row : 3 + 2 * row] = changed_values(symbol, nominal[symbol])

@@ -45,6 +45,7 @@ class StudyConditions:
 
 
 REPORT_CONDITIONS = StudyConditions()
+"""Conditions that fit Tables 8 and 9 best."""
 
 
 def run_cases(
@@ -54,7 +55,7 @@ def run_cases(
 ) -> list[Trajectory]:
     """Each test case from the energised steady state, for all variants at once.
 
-    p: parameters by symbol, arrays (n,). Raises epv_env.plant.simulate.SimulationError.
+    p: parameters by symbol [SI], arrays (n,). Raises epv_env.plant.simulate.SimulationError.
     """
     start = energised(p, p1=conditions.p1, p2=conditions.p2, U=conditions.U_on)
     return [
@@ -75,7 +76,10 @@ def total_errors(
     conditions: StudyConditions = REPORT_CONDITIONS,
     simulator: Simulator = simulate,
 ) -> NDArray:
-    """Total error (eq. 21) of variants 1, 2, .. against variant 0, as fractions, (n - 1,)."""
+    """Total error (eq. 21) of variants 1, 2, .. against variant 0, as fractions, (n - 1,).
+
+    p: parameters by symbol [SI], arrays (n,). Raises SimulationError.
+    """
     partials = []
     for run in run_cases(p, conditions, simulator):
         errors = [relative_error(y[:, 0], y[:, 1:], run.time) for y in output_samples(run)]

@@ -15,7 +15,11 @@ from identification.sensitivity.one_at_a_time import THRESHOLD, ErrorSensitivity
 from identification.sensitivity.sensitivity_study import OneAtATime
 
 BAR: Mapping[str, Any] = {"color": "tab:blue", "alpha": 0.55, "height": 0.7}
+"""Bar of a computed figure."""
+
 INTERVAL = {"color": "0.25", "linewidth": 1.2}
+"""Line of a range."""
+
 GREATEST_SHOWN = 100.0
 """Collinearity indices above this share a colour."""
 
@@ -84,7 +88,10 @@ def collinearity_map(outputs: OutputSensitivities) -> Figure:
 
 
 def pairwise_indices(outputs: OutputSensitivities) -> NDArray:
-    """Collinearity index of each pair below the diagonal, NaN elsewhere, (parameters, parameters)."""
+    """Collinearity index of each pair below the diagonal, NaN elsewhere.
+
+    Returns (parameters, parameters), without unit.
+    """
     n = len(outputs.symbols)
     index = np.full((n, n), np.nan)
     for row in range(n):

@@ -26,6 +26,7 @@ METHOD = (
     "fixed step of 0.5 ms the plant's equations show it too, with exactly located stops they do not. a1 "
     "is zero, so 10 % of it is no change: its row shows the ends of its domain, ±0.1 rad."
 )
+"""How the tables were computed, for the page."""
 
 
 def sensitivity_section(study: SensitivityStudy) -> Section:

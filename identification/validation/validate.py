@@ -19,6 +19,7 @@ class OutputResidual:
     """What the model does not explain of one output of one recording."""
 
     recording: str
+    """Name of the recording."""
     output: str
     """One of recording.OUTPUTS."""
     rms: float

@@ -56,7 +56,7 @@ def fits(table: Table, problem: CalibrationProblem, quick: bool) -> None:
     table.section("four parameters from Table 10, four tests of 3 outputs at 2 kHz, CPU time")
     repetitions = 3 if quick else 9
     misfit, squares = problem.total_error(), problem.least_squares()
-    start = problem.vector.of(problem.vector.reference)
+    start = problem.vector.scaled(problem.vector.reference)
     seconds = durations(lambda: misfit.error(start), 10 * repetitions)
     one = table.add(
         "one evaluation of the total error", "ms", [1e3 * s for s in seconds], bar=BARS["evaluation"]

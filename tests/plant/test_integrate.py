@@ -54,7 +54,7 @@ def test_two_references_agree(name):
     """LSODA and DOP853 share nothing but the right-hand side and the automaton."""
     other = simulate_reference(REPORT[name], reference(name).time, method="DOP853", rtol=1e-11)
     assert np.max(np.abs(other.state.p2 - reference(name).state.p2)) < 1e-3 * MILLIBAR
-    assert [e.what for e in other.events] == [e.what for e in reference(name).events]
+    assert [e.name for e in other.events] == [e.name for e in reference(name).events]
 
 
 @pytest.mark.parametrize("name", REPORT)
@@ -65,7 +65,7 @@ def test_events_happen_when_scipy_finds_them(name):
     after = plant_states(schedule, at + EVENT_TIME)
     strokes = {"piston": ("xPV", "xPVmax"), "armature": ("xMV", "xMVmax")}
     for k, event in enumerate(events):
-        mover, what, where = event.what.split()[:3]
+        mover, what, where = event.name.split()[:3]
         stroke, limit = strokes[mover]
         x = getattr(before, stroke)[k], getattr(after, stroke)[k]
         stop = 0.0 if where == "low" else schedule.parameters[limit]
@@ -103,7 +103,7 @@ def test_agrees_with_scipy_in_many_random_closed_loops(seed):
 
 def test_rebounds_end_and_agree_with_scipy():
     run = simulate_reference(REBOUNDING, sample_times(REBOUNDING, 0.5e-3))
-    assert sum(event.what == "armature lands high" for event in run.events) > 10
+    assert sum(event.name == "armature lands high" for event in run.events) > 10
     assert_agrees(REBOUNDING, run, within=0.5)
 
 
@@ -120,7 +120,7 @@ def test_a_rebound_takes_the_time_of_flight_of_a_thrown_body():
     p = CALIBRATED.replace(eMV=0.95, kMV=0.0)
     falling = REPORT["test4"].initial._replace(xMV=2e-5, vMV=-0.02, I=0.0)
     schedule = piecewise_schedule(p, falling, [0.0, 5e-3], U=0.0)
-    landings = [e.time for e in simulate_reference(schedule, [0.0]).events if "lands" in e.what]
+    landings = [e.time for e in simulate_reference(schedule, [0.0]).events if "lands" in e.name]
     times = np.array(landings[:3])
     after = plant_states(schedule, times + 1e-6)
     assert np.all(after.vMV > 0)

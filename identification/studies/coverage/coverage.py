@@ -115,7 +115,7 @@ def _calibrated(index: int) -> dict[str, Any]:
     # One seed per campaign, not seed + index: neighbouring studies must not share campaigns.
     noise_seed = int(np.random.SeedSequence([_twin["seed"], index]).generate_state(1)[0])
     problem = calibration_problem(measured_campaign(_twin["truths"], truth, seed=noise_seed))
-    start, true = problem.vector.of(problem.vector.reference), problem.vector.of(truth)
+    start, true = problem.vector.scaled(problem.vector.reference), problem.vector.scaled(truth)
     squares, total = problem.least_squares(), problem.total_error()
     fit, simplex = weighted_least_squares(squares, start), nelder_mead(total, start)
     found = estimate_covariance(problem, squares, fit.z, seed=noise_seed)

@@ -68,7 +68,7 @@ def _validated(identification: Identification) -> list[Response]:
 
 def _recovered(identification: Identification) -> Verdict:
     confidence, vector = identification.confidence, identification.problem.vector
-    apart = confidence.estimate - vector.of(Parameters.calibrated())
+    apart = confidence.estimate - vector.scaled(Parameters.calibrated())
     distance = float(apart @ np.linalg.solve(confidence.covariance.total, apart))
     inside = distance <= confidence.chi_square
     return Verdict(

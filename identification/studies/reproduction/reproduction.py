@@ -27,7 +27,7 @@ def reproduce(out: Path, *, seed: int = 0) -> list[Section]:
     study = run_sensitivity_study()
     campaign = run_bench(REPORT_SUITE, Parameters.calibrated(), seed=seed)
     identification = Identification(campaign, out / "reproduce.jsonl", seed=seed)
-    rest = assess_recording(campaign.of("quality")[0], campaign.pressure)
+    rest = assess_recording(campaign.with_role("quality")[0], campaign.pressure)
     content: dict[str, Any] = {
         **sensitivity_tables(study.one_at_a_time),
         "virtual_bench": {"tables2to4": quality_json(rest), **bench_json(identification)},

@@ -19,7 +19,7 @@ TOLERANCE = {"alphaMV": 3e-4, "alphaPV": 9e-4, "RML": 8e-4, "R": 3e-4}
 
 
 def fitted(problem, method="least squares"):
-    start = problem.vector.of(problem.vector.reference)
+    start = problem.vector.scaled(problem.vector.reference)
     if method == "least squares":
         return weighted_least_squares(problem.least_squares(), start)
     return nelder_mead(problem.total_error(), start)
@@ -27,7 +27,7 @@ def fitted(problem, method="least squares"):
 
 def apart(problem, z):
     """Relative distance of a scaled vector from the truth, (k,)."""
-    return z / problem.vector.of(TRUE) - 1.0
+    return z / problem.vector.scaled(TRUE) - 1.0
 
 
 def assert_near_truth(problem, z):
@@ -127,7 +127,7 @@ def test_roles_stay_apart():
 
 
 def test_a_campaign_without_a_recording_to_fit_to_is_refused():
-    rest = replace(twin(), recordings=twin().of("quality"))
+    rest = replace(twin(), recordings=twin().with_role("quality"))
     with pytest.raises(CampaignError, match="no recording with role 'calibration': give at least one"):
         calibration_problem(rest)
 

@@ -73,7 +73,7 @@ def test_parameters_that_act_by_their_ratio_cannot_be_separated(warnings):
 
 def test_only_those_are_named_that_cannot_be_separated():
     four = calibration_problem(twin(), symbols=("alphaMV", "R", "V3", "alphaPV"))
-    found = calibration_warnings(four, fits(z=four.vector.of(TRUE)))
+    found = calibration_warnings(four, fits(z=four.vector.scaled(TRUE)))
     (separate,) = (warning for warning in found if "cannot separate" in warning)
     assert "cannot separate alphaMV, V3 (" in separate
 

@@ -7,5 +7,5 @@ from tests.identification.twins import calibration
 
 
 @cache
-def found() -> Confidence:
+def twin_confidence() -> Confidence:
     return assess_confidence(calibration())

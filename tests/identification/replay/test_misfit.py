@@ -16,7 +16,7 @@ from tests.identification.twins import TRUE, problem
 
 
 def true_vector():
-    return problem().vector.of(TRUE)
+    return problem().vector.scaled(TRUE)
 
 
 def eq21(misfit, z):

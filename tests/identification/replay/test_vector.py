@@ -12,12 +12,12 @@ FOUR = ParameterVector(CALIBRATED_SYMBOLS, START)
 
 
 def test_the_reference_is_all_ones():
-    np.testing.assert_array_equal(FOUR.of(START), np.ones(4))
+    np.testing.assert_array_equal(FOUR.scaled(START), np.ones(4))
     assert dict(FOUR.parameters(np.ones(4))) == dict(START)
 
 
 def test_a_set_comes_back():
-    found = FOUR.parameters(FOUR.of(TRUE))
+    found = FOUR.parameters(FOUR.scaled(TRUE))
     for symbol in TRUE:
         assert found[symbol] == pytest.approx(TRUE[symbol] if symbol in FOUR.symbols else START[symbol])
 

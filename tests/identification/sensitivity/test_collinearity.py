@@ -29,7 +29,7 @@ from identification.sensitivity.settings import SENSITIVITY, SensitivitySettings
 
 
 @cache
-def found() -> OutputSensitivities:
+def nominal_sensitivities() -> OutputSensitivities:
     return sensitivities_of_outputs(Parameters.nominal(), studied_symbols())
 
 
@@ -52,25 +52,27 @@ def test_two_columns_at_an_angle(angle):
 
 def test_an_index_never_falls_when_a_parameter_joins():
     four = tuple(confidence_intervals())
-    assert found().index(four[:3]) <= found().index(four)
+    assert nominal_sensitivities().index(four[:3]) <= nominal_sensitivities().index(four)
 
 
 @pytest.mark.parametrize("pair", [("V2", "alphaPV"), ("V3", "alphaMV")])
 def test_volumes_and_contractions_act_by_their_ratio(pair):
     """alphaPV/V2 and alphaMV/V3 are all that the state equations of p2 and p3 contain."""
-    assert found().index(pair) == np.inf
-    assert found().correlation[[found().symbols.index(s) for s in pair], :][:, 0].sum() == pytest.approx(
-        0.0, abs=1e-6
-    )
+    assert nominal_sensitivities().index(pair) == np.inf
+    assert nominal_sensitivities().correlation[
+        [nominal_sensitivities().symbols.index(s) for s in pair], :
+    ][:, 0].sum() == pytest.approx(0.0, abs=1e-6)
 
 
 def test_the_calibrated_four_can_be_told_apart_but_not_all_sensitive_ones():
-    assert found().index(tuple(confidence_intervals())) < 4.0 < SENSITIVITY.critical_index
-    assert found().index(sensitive_symbols()) == np.inf
+    assert (
+        nominal_sensitivities().index(tuple(confidence_intervals())) < 4.0 < SENSITIVITY.critical_index
+    )
+    assert nominal_sensitivities().index(sensitive_symbols()) == np.inf
 
 
 def test_pairs_are_listed_the_worst_first():
-    pairs = found().inseparable_pairs()
+    pairs = nominal_sensitivities().inseparable_pairs()
     assert [index for _, _, index in pairs] == sorted((index for *_, index in pairs), reverse=True)
     assert ("cPV", "xPV0") in [(a, b) for a, b, _ in pairs]
     assert all(index > SENSITIVITY.critical_index for *_, index in pairs)
@@ -80,7 +82,7 @@ def test_effects_do_not_depend_on_the_size_of_the_differences():
     """The model is differentiable here: event times move smoothly with every parameter."""
     settings = SensitivitySettings(difference_step=1e-3)
     finer = sensitivities_of_outputs(Parameters.nominal(), studied_symbols(), settings=settings)
-    assert finer.effect == pytest.approx(found().effect, rel=0.01)
+    assert finer.effect == pytest.approx(nominal_sensitivities().effect, rel=0.01)
 
 
 def test_recordings_of_the_report_s_cases_separate_what_the_cases_do():
