@@ -125,7 +125,7 @@ def check_range(file: str, name: str, values: NDArray, sensor: Sensor) -> None:
 def check_rail(
     file: str, name: str, values: NDArray, sensor: Sensor, period: float, rules: RecordingRules
 ) -> None:
-    """No reading (samples,) [A, V, bar] stays at an end of the range, or where the ADC saturates beyond it."""
+    """No reading (samples,) [A, V, bar] stays at an end of the range, or where the ADC saturates."""
     at_end = (values <= sensor.low) | (values >= sensor.high - sensor.resolution)
     first, length = _longest_run(at_end[1:] & (values[1:] == values[:-1]))
     if length >= max(_samples(rules.stuck_time, period), rules.stuck_samples):

@@ -133,7 +133,11 @@ def sobol_indices(
     problem = _problem(symbols, bounds)
     drawn = sobol_sample.sample(problem, samples, calc_second_order=False, seed=seed)
     indices = sobol_analysis.analyze(
-        problem, model(drawn), calc_second_order=False, num_resamples=settings.resamples, seed=seed
+        problem,
+        model(drawn),
+        calc_second_order=False,
+        num_resamples=settings.resamples,
+        seed=np.random.SeedSequence(seed),  # SALib takes the number 0 for "no seed"
     )
     return SobolIndices(
         symbols=tuple(symbols),
