@@ -11,8 +11,8 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.readings import readings
 from epv_env.plant.sensors import SENSORS
 from epv_env.plant.simulate import energised
-from identification.bench.hybrid_automaton import simulate_reference
 from identification.bench.programmes import Programme
+from identification.bench.reference_simulation import simulate_reference
 from identification.bench.schedule import delayed_schedule, piecewise_schedule
 from identification.bench.settings import BENCH, BenchSettings
 from identification.recordings.recording import CHANNELS, UNITS, Campaign, Recording

@@ -20,4 +20,4 @@ class BenchSettings:
 
 
 BENCH = BenchSettings()
-"""Today's values."""
+"""The default settings."""

@@ -41,4 +41,4 @@ class CalibrationSettings:
 
 
 CALIBRATION = CalibrationSettings()
-"""Today's values."""
+"""The default settings."""

@@ -31,4 +31,4 @@ class ConfidenceSettings:
 
 
 CONFIDENCE = ConfidenceSettings()
-"""Today's values."""
+"""The default settings."""

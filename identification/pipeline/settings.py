@@ -21,4 +21,4 @@ class IdentificationSettings:
 
 
 IDENTIFICATION = IdentificationSettings()
-"""Today's values."""
+"""The default settings."""

@@ -52,4 +52,4 @@ class QualitySettings:
 
 
 QUALITY = QualitySettings()
-"""Today's values."""
+"""The default settings."""

@@ -40,4 +40,4 @@ class RecordingRules:
 
 
 RULES = RecordingRules()
-"""Today's values."""
+"""The rules of docs/data.md."""

@@ -25,4 +25,4 @@ class ReplaySettings:
 
 
 REPLAY = ReplaySettings()
-"""Today's values."""
+"""The default settings."""

@@ -43,4 +43,4 @@ class SensitivitySettings:
 
 
 SENSITIVITY = SensitivitySettings()
-"""Today's values."""
+"""The default settings."""

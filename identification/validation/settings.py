@@ -18,4 +18,4 @@ class ValidationSettings:
 
 
 VALIDATION = ValidationSettings()
-"""Today's values."""
+"""The default settings."""

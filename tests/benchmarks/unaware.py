@@ -9,7 +9,8 @@ from scipy.integrate import solve_ivp
 
 from epv_env.plant.coefficients import coefficients, effect_sizes
 from epv_env.plant.equations import Inputs
-from identification.bench.hybrid_automaton import COMPILED_RIGHT_HAND_SIDES, POSITIONS
+from identification.bench.hybrid_automaton import POSITIONS
+from identification.bench.right_hand_side import COMPILED_RIGHT_HAND_SIDES
 from identification.bench.schedule import Schedule
 
 RTOL, ATOL = 1e-6, 1e-9

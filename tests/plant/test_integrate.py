@@ -7,7 +7,7 @@ import pytest
 
 from epv_env.plant.integrate import DEFAULT_STEP
 from epv_env.plant.parameters import Parameters
-from identification.bench.hybrid_automaton import ReferenceRun, simulate_reference
+from identification.bench.reference_simulation import ReferenceRun, simulate_reference
 from tests.reference.closed_loop import random_schedules
 from tests.reference.schedule import (
     Schedule,

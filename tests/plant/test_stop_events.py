@@ -2,7 +2,7 @@
 
 import pytest
 
-from identification.bench.hybrid_automaton import simulate_reference
+from identification.bench.reference_simulation import simulate_reference
 from tests.benchmarks.unaware import STROKES, final_p2
 from tests.benchmarks.workloads import CALIBRATED
 from tests.reference.schedule import plant_states, report_tests

@@ -9,7 +9,6 @@ from epv_env.plant.coefficients import coefficients, effect_sizes
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.readings import readings
-from identification.bench.hybrid_automaton import simulate_reference
 from identification.bench.measurement import (
     RESERVOIR_VOLUME,
     TrueSignals,
@@ -17,6 +16,7 @@ from identification.bench.measurement import (
     measured_campaign,
 )
 from identification.bench.programmes import DIAGNOSIS_SUITE, Programme
+from identification.bench.reference_simulation import simulate_reference
 from identification.bench.schedule import Schedule, piecewise_schedule
 from identification.recordings.recording import Campaign
 from identification.report_2003.cases import SAMPLING_RATE

@@ -52,7 +52,7 @@ from epv_env.plant.equations import (
     reluctance_inverse,
 )
 from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at, store_state
-from identification.bench.hybrid_automaton import RightHandSide
+from identification.bench.right_hand_side import RightHandSide
 
 BAR = 1e5
 

@@ -89,12 +89,12 @@ def test_a_written_campaign_keeps_every_rule_and_comes_back(tmp_path, suite):
     names = [programme.name for programme in SUITES[suite]]
     campaign = measured_campaign([truth(name) for name in names], TRUE, seed=3)
     write_campaign(campaign, tmp_path)
-    found = read_campaign(tmp_path)
-    assert [(r.name, r.role) for r in found.recordings] == [
+    reads = read_campaign(tmp_path)
+    assert [(r.name, r.role) for r in reads.recordings] == [
         (r.name, r.role) for r in campaign.recordings
     ]
-    assert (found.temperature, found.pressure) == (TRUE["T_env"], TRUE["p_env"])
-    for read, written in zip(found.recordings, campaign.recordings, strict=True):
+    assert (reads.temperature, reads.pressure) == (TRUE["T_env"], TRUE["p_env"])
+    for read, written in zip(reads.recordings, campaign.recordings, strict=True):
         np.testing.assert_allclose(read.p2, written.p2, atol=0.51)
         np.testing.assert_allclose(read.I, written.I, atol=0.51e-6)
 

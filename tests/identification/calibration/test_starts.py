@@ -91,10 +91,10 @@ def test_a_start_in_another_basin_is_reported(tmp_path):
     for method in METHODS:
         assert reached_best(fits[method]).tolist() == [True, False]
         assert fits[method][1].error > 5 * fits[method][0].error
-    found = calibration_warnings(problem(), fits)
-    assert [warning.split(":")[0] for warning in found] == list(METHODS)
-    assert all("1 of 2 starts reach the least error" in warning for warning in found)
-    assert not any("Table 10" in warning for warning in found)
+    sentences = calibration_warnings(problem(), fits)
+    assert [warning.split(":")[0] for warning in sentences] == list(METHODS)
+    assert all("1 of 2 starts reach the least error" in warning for warning in sentences)
+    assert not any("Table 10" in warning for warning in sentences)
     turned = {method: found_fits[::-1] for method, found_fits in fits.items()}
     assert all(
         "the usual start (Table 10) is among" in warning
@@ -148,9 +148,9 @@ def test_searches_of_another_subject_are_not_used(tmp_path, calls, change):
     usual = {"subject": {"of": "a"}, "settings": THREE_STARTS, "seed": 0}
     calibrate(problem(), journal=tmp_path / "journal", **usual)
     calls.clear()
-    found = calibrate(problem(), journal=tmp_path / "journal", **{**usual, **change})
+    calibrated = calibrate(problem(), journal=tmp_path / "journal", **{**usual, **change})
     assert len(calls) == 2 * {**usual, **change}["settings"].starts
-    ends = np.array([fit.start for fit in found.fits["Nelder-Mead"]])
+    ends = np.array([fit.start for fit in calibrated.fits["Nelder-Mead"]])
     expected = starting_points(problem().vector, len(ends), {**usual, **change}["seed"])
     np.testing.assert_array_equal(ends, expected)
 

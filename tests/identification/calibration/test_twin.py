@@ -42,19 +42,19 @@ def without_rest(campaign):
 @pytest.mark.parametrize("method", ["least squares", "Nelder-Mead"])
 def test_without_noise_both_methods_find_table_12_from_table_10(method):
     """What is left is that of the integrators and of the smoothed supply."""
-    found = fitted(exact_problem(), method)
-    assert found.converged
-    assert np.max(np.abs(apart(exact_problem(), found.z))) < 3e-5
-    assert found.error < 0.01
+    fit = fitted(exact_problem(), method)
+    assert fit.converged
+    assert np.max(np.abs(apart(exact_problem(), fit.z))) < 3e-5
+    assert fit.error < 0.01
 
 
 def test_a_wrong_constant_spoils_the_estimate():
     """The mass of the armature delays it by a part of a millisecond."""
     start = exact_problem().vector.reference.replace(mMV=0.0022)
     wrong = replace(exact_problem(), vector=replace(exact_problem().vector, reference=start))
-    found = fitted(wrong)
-    assert np.max(np.abs(apart(wrong, found.z))) > 1e-3
-    assert found.error > 0.1
+    fit = fitted(wrong)
+    assert np.max(np.abs(apart(wrong, fit.z))) > 1e-3
+    assert fit.error > 0.1
 
 
 @pytest.mark.parametrize("method", ["least squares", "Nelder-Mead"])
@@ -64,11 +64,13 @@ def test_with_noise_both_methods_find_table_12(method):
 
 def test_errors_fall_to_the_noise():
     """Table 13 falls from Table 11's size; the residual of least squares is the noise alone."""
-    found = calibration()
-    assert total_response_error(found.before) > 5 * total_response_error(found.after["Nelder-Mead"])
-    assert total_response_error(found.after["Nelder-Mead"]) < 0.003
-    assert found.best("least squares").error == pytest.approx(1.0, abs=0.03)
-    assert dict(found.parameters("least squares"))["R"] == pytest.approx(TRUE["R"], rel=3e-4)
+    calibrated = calibration()
+    assert total_response_error(calibrated.before) > 5 * total_response_error(
+        calibrated.after["Nelder-Mead"]
+    )
+    assert total_response_error(calibrated.after["Nelder-Mead"]) < 0.003
+    assert calibrated.best("least squares").error == pytest.approx(1.0, abs=0.03)
+    assert dict(calibrated.parameters("least squares"))["R"] == pytest.approx(TRUE["R"], rel=3e-4)
 
 
 def test_a_good_calibration_warns_of_nothing():
@@ -78,17 +80,17 @@ def test_a_good_calibration_warns_of_nothing():
 @pytest.mark.parametrize("symbols", [("alphaPV",), ("R", "RML"), ("alphaMV", "alphaPV", "R")])
 def test_fewer_parameters_can_be_fitted(symbols):
     moved = {symbol: 0.97 * TRUE[symbol] for symbol in symbols}
-    found = calibration_problem(twin(), start=TRUE.replace(**moved), symbols=symbols)
-    fit = fitted(found)
+    posed = calibration_problem(twin(), start=TRUE.replace(**moved), symbols=symbols)
+    fit = fitted(posed)
     assert fit.z.shape == (len(symbols),)
-    assert_near_truth(found, fit.z)
+    assert_near_truth(posed, fit.z)
 
 
 def test_other_parameters_than_the_report_s_can_be_fitted():
-    found = calibration_problem(
+    posed = calibration_problem(
         twin(), start=TRUE.replace(mMV=0.0024, V2=0.95e-3), symbols=("mMV", "V2")
     )
-    assert np.max(np.abs(apart(found, fitted(found).z))) < 0.01
+    assert np.max(np.abs(apart(posed, fitted(posed).z))) < 0.01
 
 
 def test_500_hz_are_enough():
@@ -116,8 +118,8 @@ def test_with_one_the_bench_s_offsets_are():
 
 
 def test_the_campaign_s_ambient_is_the_model_s():
-    found = calibration_problem(replace(twin(), temperature=300.0, pressure=0.98e5))
-    reference = found.vector.reference
+    posed = calibration_problem(replace(twin(), temperature=300.0, pressure=0.98e5))
+    reference = posed.vector.reference
     assert (reference["T_env"], reference["p_env"]) == (300.0, 0.98e5)
 
 

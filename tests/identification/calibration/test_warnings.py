@@ -20,17 +20,19 @@ START = Parameters.initial_guess()
 def warnings(tmp_path):
     """The warnings of a problem, calibrated from its reference."""
 
-    def found(problem, **changes):
+    def sentences_of(problem, **changes):
         settings = CalibrationSettings(starts=1, **changes)
         path = tmp_path / "journal"
         return calibrate(problem, journal=path, subject={}, settings=settings).warnings
 
-    return found
+    return sentences_of
 
 
 def fits(**changes):
     """The good calibration's fits, with another outcome of every method."""
-    return {m: [replace(fit, **changes) for fit in found] for m, found in calibration().fits.items()}
+    return {
+        m: [replace(fit, **changes) for fit in searches] for m, searches in calibration().fits.items()
+    }
 
 
 def test_a_good_calibration_has_none():
@@ -39,10 +41,10 @@ def test_a_good_calibration_has_none():
 
 def test_an_estimate_on_the_end_of_a_domain_is_named(warnings):
     """With too small a chamber the flow into it must be smaller than alphaMV may become."""
-    found = warnings(calibration_problem(twin(), start=START.replace(V3=2e-6)))
-    assert any("least squares ends at the end of alphaMV's domain" in warning for warning in found)
-    assert any("Nelder-Mead ends at the end of alphaMV's domain" in warning for warning in found)
-    assert not any("end of R's domain" in warning for warning in found)
+    sentences = warnings(calibration_problem(twin(), start=START.replace(V3=2e-6)))
+    assert any("least squares ends at the end of alphaMV's domain" in warning for warning in sentences)
+    assert any("Nelder-Mead ends at the end of alphaMV's domain" in warning for warning in sentences)
+    assert not any("end of R's domain" in warning for warning in sentences)
 
 
 @pytest.mark.parametrize("end", [0, 1])
@@ -61,27 +63,27 @@ def test_either_end_of_any_domain_counts(symbol, end):
 
 
 def test_a_search_that_is_cut_short_is_not_trusted(warnings):
-    found = warnings(problem(), most_evaluations=20)
-    assert any("Nelder-Mead has not converged after" in warning for warning in found)
-    assert not any("least squares has not converged" in warning for warning in found)
+    sentences = warnings(problem(), most_evaluations=20)
+    assert any("Nelder-Mead has not converged after" in warning for warning in sentences)
+    assert not any("least squares has not converged" in warning for warning in sentences)
 
 
 def test_parameters_that_act_by_their_ratio_cannot_be_separated(warnings):
-    found = warnings(calibration_problem(twin(), symbols=("alphaMV", "V3")))
-    assert any("the recordings cannot separate alphaMV, V3" in warning for warning in found)
+    sentences = warnings(calibration_problem(twin(), symbols=("alphaMV", "V3")))
+    assert any("the recordings cannot separate alphaMV, V3" in warning for warning in sentences)
 
 
 def test_only_those_are_named_that_cannot_be_separated():
     four = calibration_problem(twin(), symbols=("alphaMV", "R", "V3", "alphaPV"))
-    found = calibration_warnings(four, fits(z=four.vector.scaled(TRUE)))
-    (separate,) = (warning for warning in found if "cannot separate" in warning)
+    sentences = calibration_warnings(four, fits(z=four.vector.scaled(TRUE)))
+    (separate,) = (warning for warning in sentences if "cannot separate" in warning)
     assert "cannot separate alphaMV, V3 (" in separate
 
 
 def test_recordings_that_the_model_cannot_explain_are_noticed(warnings):
-    found = warnings(calibration_problem(twin(), symbols=("alphaMV",)))
-    assert any("misses the recordings by" in warning for warning in found)
-    assert not any("cannot separate" in warning for warning in found)
+    sentences = warnings(calibration_problem(twin(), symbols=("alphaMV",)))
+    assert any("misses the recordings by" in warning for warning in sentences)
+    assert not any("cannot separate" in warning for warning in sentences)
 
 
 def test_the_section_shows_every_warning_as_a_doubt():

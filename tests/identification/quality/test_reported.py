@@ -47,8 +47,8 @@ def test_outlier_factors_are_what_chance_makes_them_or_less():
 
 @pytest.mark.parametrize(("name", "errors"), [("I", 8.6), ("U", 5.8), ("p3", 7.4)])
 def test_kurtosis_lies_below_that_of_normal_noise(name, errors):
-    found = (3 - STATISTICS[name].kurtosis) / np.sqrt(24 / SAMPLES)
-    assert found == pytest.approx(errors, abs=0.06)
+    values = (3 - STATISTICS[name].kurtosis) / np.sqrt(24 / SAMPLES)
+    assert values == pytest.approx(errors, abs=0.06)
 
 
 def test_the_steps_of_p2_and_p3_were_coarser_than_twelve_bits():
@@ -62,6 +62,6 @@ def test_the_steps_of_p2_and_p3_were_coarser_than_twelve_bits():
     ("name", "excess"), [("I", 1.0), ("U", -1.4), ("p1", -0.2), ("p2", 0.0), ("p3", 0.4)]
 )
 def test_signal_to_noise_ratios_against_equation_17(name, excess):
-    found = STATISTICS[name]
-    expected = 20 * np.log10(SENSORS[name].high / found.standard_deviation)
-    assert found.signal_to_noise - expected == pytest.approx(excess, abs=0.06)
+    values = STATISTICS[name]
+    expected = 20 * np.log10(SENSORS[name].high / values.standard_deviation)
+    assert values.signal_to_noise - expected == pytest.approx(excess, abs=0.06)

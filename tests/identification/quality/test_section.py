@@ -63,12 +63,12 @@ def test_every_axis_has_a_unit_or_a_name(draw):
 
 @pytest.mark.parametrize("which", [0, 1])
 def test_json_is_strict_and_complete(which):
-    found = json.loads(json.dumps(as_json(qualities()[which]), allow_nan=False))
-    assert found["at_rest"] is True
-    assert list(found["channels"]) == list(CHANNELS)
-    assert len(found["correlations"]) == (10, 6)[which]
-    assert found["channels"]["I"]["status"] == "good"
-    assert (found["channels"]["U"]["statistics"]["kurtosis"] is None) == bool(which)
+    content = json.loads(json.dumps(as_json(qualities()[which]), allow_nan=False))
+    assert content["at_rest"] is True
+    assert list(content["channels"]) == list(CHANNELS)
+    assert len(content["correlations"]) == (10, 6)[which]
+    assert content["channels"]["I"]["status"] == "good"
+    assert (content["channels"]["U"]["statistics"]["kurtosis"] is None) == bool(which)
 
 
 def test_text_has_a_line_per_channel():

@@ -26,18 +26,18 @@ def test_the_standard_error_of_the_slope_is_that_of_white_noise():
 
 
 def test_a_sine_has_its_closed_forms():
-    found = descriptive_statistics(2 * np.sin(2 * np.pi * 10 * TIME), greatest=20.0)
-    assert found.arithmetic_mean == pytest.approx(0.0, abs=1e-12)
-    assert found.trimmed_mean == pytest.approx(0.0, abs=1e-12)
-    assert found.median == pytest.approx(0.0, abs=1e-12)
-    assert found.standard_deviation == pytest.approx(np.sqrt(2), rel=1e-4)
-    assert found.interquartile_range == pytest.approx(2 * np.sqrt(2), rel=1e-2)
-    assert found.absolute_deviation == pytest.approx(4 / np.pi, rel=1e-3)
-    assert found.range == pytest.approx(4.0)
-    assert found.signal_to_noise == pytest.approx(20 * np.log10(20 / np.sqrt(2)), abs=1e-3)
-    assert found.outlier_factor == pytest.approx(np.sqrt(2), rel=1e-4)
-    assert found.kurtosis == pytest.approx(1.5)
-    assert found.skewness == pytest.approx(0.0, abs=1e-9)
+    statistics = descriptive_statistics(2 * np.sin(2 * np.pi * 10 * TIME), greatest=20.0)
+    assert statistics.arithmetic_mean == pytest.approx(0.0, abs=1e-12)
+    assert statistics.trimmed_mean == pytest.approx(0.0, abs=1e-12)
+    assert statistics.median == pytest.approx(0.0, abs=1e-12)
+    assert statistics.standard_deviation == pytest.approx(np.sqrt(2), rel=1e-4)
+    assert statistics.interquartile_range == pytest.approx(2 * np.sqrt(2), rel=1e-2)
+    assert statistics.absolute_deviation == pytest.approx(4 / np.pi, rel=1e-3)
+    assert statistics.range == pytest.approx(4.0)
+    assert statistics.signal_to_noise == pytest.approx(20 * np.log10(20 / np.sqrt(2)), abs=1e-3)
+    assert statistics.outlier_factor == pytest.approx(np.sqrt(2), rel=1e-4)
+    assert statistics.kurtosis == pytest.approx(1.5)
+    assert statistics.skewness == pytest.approx(0.0, abs=1e-9)
 
 
 def test_skewness_is_that_of_the_exponential_distribution():
@@ -53,10 +53,10 @@ def test_the_trimmed_mean_leaves_the_extreme_five_percent_out():
 
 
 def test_a_signal_that_never_changes_has_no_shape():
-    found = descriptive_statistics(np.zeros(1000), greatest=1.0)
-    assert found.standard_deviation == 0.0
-    assert np.isinf(found.signal_to_noise)
-    assert np.isnan([found.outlier_factor, found.kurtosis, found.skewness]).all()
+    statistics = descriptive_statistics(np.zeros(1000), greatest=1.0)
+    assert statistics.standard_deviation == 0.0
+    assert np.isinf(statistics.signal_to_noise)
+    assert np.isnan([statistics.outlier_factor, statistics.kurtosis, statistics.skewness]).all()
 
 
 @pytest.mark.parametrize("rounding", [0.0, 0.6, 1.2])

@@ -42,9 +42,9 @@ def campaign(*recordings):
 @pytest.mark.parametrize("drift", [0.0, 0.05])
 def test_the_noise_of_a_long_hold_is_table_3_s(drift):
     """A drift of 50 mbar/s, 50 mA/s and 50 mV/s does not count as noise."""
-    found = noise_of_energised_start(recording(0, 4000, drift))
+    noise = noise_of_energised_start(recording(0, 4000, drift))
     for name in CHANNELS:
-        assert found[name] == pytest.approx(expected(name), rel=0.05)
+        assert noise[name] == pytest.approx(expected(name), rel=0.05)
 
 
 def test_a_hold_of_40_ms_is_enough_and_less_is_refused():
@@ -60,20 +60,20 @@ def test_a_recording_without_a_switch_is_a_hold_throughout():
 
 
 def test_noise_finer_than_a_step_counts_as_a_rounding_error():
-    found = noise_of_energised_start(recording(0, 200, noisy=0.0))
-    assert found["U"] == pytest.approx(SENSORS["U"].resolution / np.sqrt(12))
+    noise = noise_of_energised_start(recording(0, 200, noisy=0.0))
+    assert noise["U"] == pytest.approx(SENSORS["U"].resolution / np.sqrt(12))
 
 
 def test_many_short_holds_are_pooled():
-    found = pooled_noise(campaign(*(recording(seed, 100) for seed in range(20))))
+    pooled = pooled_noise(campaign(*(recording(seed, 100) for seed in range(20))))
     for name in CHANNELS:
-        assert found[name] == pytest.approx(expected(name), rel=0.08)
+        assert pooled[name] == pytest.approx(expected(name), rel=0.08)
 
 
 def test_the_steady_record_is_preferred():
     """All of it, though its coil is off."""
     steady = recording(0, 1000, role="quality")
     steady = replace(steady, U=np.zeros(2000))
-    found = pooled_noise(campaign(steady, recording(1, 100, noisy=3.0)))
+    pooled = pooled_noise(campaign(steady, recording(1, 100, noisy=3.0)))
     alone = pooled_noise(campaign(steady))
-    assert found == alone
+    assert pooled == alone

@@ -56,17 +56,17 @@ def test_smaller_batches_change_nothing(largest, batches):
 @pytest.mark.parametrize("name", SWITCHING)
 def test_the_truth_s_parameters_give_the_truth_back(name):
     """Through the smoothed inputs: p2 within 0.1 mbar, p3 within 0.1 mbar, I within 0.02 mA."""
-    found = Replay([model_inputs(exact_recording(name), TRUE)], TRUE).outputs(
+    outputs = Replay([model_inputs(exact_recording(name), TRUE)], TRUE).outputs(
         {"R": np.array([TRUE["R"]])}
     )
-    for output, model, limit in zip(OUTPUTS, found[0][:, :, 0], (10.0, 10.0, 2e-5), strict=True):
+    for output, model, limit in zip(OUTPUTS, outputs[0][:, :, 0], (10.0, 10.0, 2e-5), strict=True):
         assert np.max(np.abs(model - truth(name).channels[output])) < limit
 
 
 def test_other_parameters_do_not():
     values = {"alphaMV": np.array([1.01 * TRUE["alphaMV"]])}
-    found = Replay([model_inputs(exact_recording("test1"), TRUE)], TRUE).outputs(values)[0]
-    assert np.max(np.abs(found[0, :, 0] - truth("test1").channels["p2"])) > 100.0
+    outputs = Replay([model_inputs(exact_recording("test1"), TRUE)], TRUE).outputs(values)[0]
+    assert np.max(np.abs(outputs[0, :, 0] - truth("test1").channels["p2"])) > 100.0
 
 
 def test_consumed_air_is_missing_from_the_circuit():
@@ -82,10 +82,10 @@ def test_consumed_air_is_missing_from_the_circuit():
 
 def test_a_candidate_that_cannot_be_integrated_is_nan_and_harms_no_other():
     drive = model_inputs(cut(), TRUE)
-    found = Replay([drive], TRUE).outputs({"alphaMV": np.array([TRUE["alphaMV"], np.nan])})[0]
+    outputs = Replay([drive], TRUE).outputs({"alphaMV": np.array([TRUE["alphaMV"], np.nan])})[0]
     alone = Replay([drive], TRUE).outputs({"alphaMV": np.array([TRUE["alphaMV"]])})[0]
-    np.testing.assert_array_equal(found[:, :, :1], alone)
-    assert np.all(np.isnan(found[:2, 1:, 1]))
+    np.testing.assert_array_equal(outputs[:, :, :1], alone)
+    assert np.all(np.isnan(outputs[:2, 1:, 1]))
 
 
 def test_the_misfit_of_such_a_candidate_is_a_large_number():

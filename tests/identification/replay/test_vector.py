@@ -17,9 +17,11 @@ def test_the_reference_is_all_ones():
 
 
 def test_a_set_comes_back():
-    found = FOUR.parameters(FOUR.scaled(TRUE))
+    parameters = FOUR.parameters(FOUR.scaled(TRUE))
     for symbol in TRUE:
-        assert found[symbol] == pytest.approx(TRUE[symbol] if symbol in FOUR.symbols else START[symbol])
+        assert parameters[symbol] == pytest.approx(
+            TRUE[symbol] if symbol in FOUR.symbols else START[symbol]
+        )
 
 
 def test_many_vectors_are_each_alone():

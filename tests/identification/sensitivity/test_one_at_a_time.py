@@ -23,15 +23,15 @@ PNEUMATIC = (
 
 @pytest.mark.parametrize("symbol", PNEUMATIC)
 def test_exact_sensitivity_is_the_report_s(symbol):
-    found = percentages(one_at_a_time().exact[symbol])
-    for value, reported in zip(found, printed_rows()[symbol], strict=True):
+    percents = percentages(one_at_a_time().exact[symbol])
+    for value, reported in zip(percents, printed_rows()[symbol], strict=True):
         assert value == pytest.approx(reported, rel=0.1, abs=0.1 if reported > 1 else 0.01)
 
 
 def test_exactly_located_stops_class_all_parameters_but_one_as_the_report():
     """RML, 2.04 % in the report, stays just below 2 %."""
-    found = {symbol for symbol, row in one_at_a_time().exact.items() if row.sensitive}
-    assert found == {symbol for symbol, row in table().items() if row.sensitive} - {"RML"}
+    symbols = {symbol for symbol, row in one_at_a_time().exact.items() if row.sensitive}
+    assert symbols == {symbol for symbol, row in table().items() if row.sensitive} - {"RML"}
 
 
 def test_stroke_of_the_armature_weighs_little_because_bores_limit_the_flow():
@@ -63,5 +63,5 @@ def test_two_percent_in_either_direction_is_sensitive():
 
 def test_other_conditions_give_other_figures():
     """The comparison can fail: at 24 V the armature's rows are far from the report's."""
-    found = sensitivities(Parameters.nominal(), ["cMV"], conditions=StudyConditions(U_on=24.0))["cMV"]
-    assert 100 * found.minus < 0.6 * printed_rows()["cMV"][0]
+    values = sensitivities(Parameters.nominal(), ["cMV"], conditions=StudyConditions(U_on=24.0))["cMV"]
+    assert 100 * values.minus < 0.6 * printed_rows()["cMV"][0]

@@ -6,7 +6,7 @@ import pytest
 from epv_env.plant.coefficients import coefficients, effect_sizes
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.parameters import Parameters
-from identification.bench.hybrid_automaton import COMPILED_RIGHT_HAND_SIDES
+from identification.bench.right_hand_side import COMPILED_RIGHT_HAND_SIDES
 from identification.studies.blind.deviating_forms import right_hand_side, terminal_currents
 from identification.studies.blind.effect_draws import RANGES
 from identification.studies.blind.truth import EFFECTS
