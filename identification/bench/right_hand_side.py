@@ -19,7 +19,7 @@ RightHandSide = Callable[[NDArray, NDArray, NDArray, NDArray, float, float], NDA
 def terminal_currents(U, current, coil_heat, coefficients, effects):
     """Currents at the coil's terminals, (samples,) [A].
 
-    U: coil voltage [V]. current: state I, (samples,) [A]. coil_heat: state, (samples,) [J].
+    U: coil voltage [V]. current: state I, (samples,) [A]. coil_heat: state, (samples,) [K].
     coefficients, effects: tables of one valve, as epv_env.plant.coefficients makes them.
     """
     c, e = coefficients_at(coefficients, 0, 0), effects_at(effects, 0, 0)
