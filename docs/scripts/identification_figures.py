@@ -15,11 +15,15 @@ from epv_env.plant.parameters import Parameters
 from identification.bench.programmes import REPORT_SUITE
 from identification.bench.session import run_bench
 from identification.calibration.multi_start import METHODS
+from identification.calibration.settings import CalibrationSettings
 from identification.confidence import confidence_figures
-from identification.pipeline.stages import Identification
-from identification.replay.response_figures import overlay
+from identification.pipeline.identification import Identification
+from identification.pipeline.settings import IdentificationSettings
+from identification.replay.response_figures import response_figure
 from identification.studies.coverage.coverage import coverage_study
 from identification.studies.coverage.coverage_figure import distance_quantiles
+
+ONE_START = IdentificationSettings(calibration=CalibrationSettings(starts=1))
 
 
 def identification_figures(coverage: Path, campaigns: int) -> dict[str, Figure]:
@@ -29,10 +33,10 @@ def identification_figures(coverage: Path, campaigns: int) -> dict[str, Figure]:
     """
     campaign = run_bench(REPORT_SUITE, Parameters.calibrated(), seed=0)
     with TemporaryDirectory() as folder:
-        identification = Identification(campaign, Path(folder) / "searches.jsonl", starts=1)
+        identification = Identification(campaign, Path(folder) / "searches.jsonl", settings=ONE_START)
         study = coverage_study(journal=coverage / "coverage.jsonl", campaigns=campaigns)
         return {
-            "calibration.png": overlay(identification.calibration.after[METHODS[0]][0]),
+            "calibration.png": response_figure(identification.calibration.after[METHODS[0]][0]),
             "region.png": confidence_figures.region(identification.confidence),
             "coverage.png": distance_quantiles(study),
         }

@@ -7,21 +7,18 @@ from pathlib import Path
 from typing import Any
 
 from epv_env.common.files import write_text
+from epv_env.common.units import BAR
 from epv_env.plant.sensors import SENSORS
-from identification.bench.programmes import BAR, Programme
+from identification.bench.programmes import Programme
+from identification.bench.settings import BENCH
 from identification.recordings.recording import HOLD, ROLES
 from identification.report_2003.cases import Case
 
 FORMAT = "epv-programme/1"
+"""Version of the file, in its field `format`."""
 
-MS = 1e3
-"""Milliseconds in a second."""
-
-LONGEST = 60.0
-"""Longest recording that the bench makes [s]."""
-
-SHORTEST = 1e-3
-"""Shortest opening [s]."""
+MILLISECONDS = 1e3
+"""In a second."""
 
 
 class ProgrammeError(ValueError):
@@ -61,18 +58,18 @@ def _content(programme: Programme) -> dict[str, Any]:
         "supply_bar": round(programme.p1 / BAR, 9),
         "circuit_bar": round(programme.p2 / BAR, 9),
         "voltage_V": programme.U_on,
-        "first_ms": round(MS * case.first, 6),
-        "openings_ms": [round(MS * opening, 6) for opening in case.openings],
-        "pause_ms": round(MS * case.pause, 6),
-        "duration_ms": round(MS * case.duration, 6),
+        "first_ms": round(MILLISECONDS * case.first, 6),
+        "openings_ms": [round(MILLISECONDS * opening, 6) for opening in case.openings],
+        "pause_ms": round(MILLISECONDS * case.pause, 6),
+        "duration_ms": round(MILLISECONDS * case.duration, 6),
     }
 
 
 def _decode(path: str, content: Any) -> tuple[Programme, ...]:
-    found = content.get("format") if isinstance(content, dict) else None
-    if found != FORMAT:
+    version = content.get("format") if isinstance(content, dict) else None
+    if version != FORMAT:
         raise ProgrammeError(
-            f"programme file {path} has format {found!r}, this version reads {FORMAT!r}: write it anew"
+            f"programme file {path} has format {version!r}, this version reads {FORMAT!r}: write it anew"
         )
     entries = content.get("programmes")
     if not isinstance(entries, list) or not entries:
@@ -106,16 +103,17 @@ def _programme(place: str, entry: Any) -> Programme:
 
 def _case(place: str, entry: dict[str, Any], *, switches: bool) -> Case:
     """When the coil is switched off; a recording that `switches` needs at least one opening."""
-    longest = MS * LONGEST
+    longest = MILLISECONDS * BENCH.longest_recording
+    shortest = MILLISECONDS * BENCH.shortest_opening
     openings = entry.get("openings_ms")
     if not isinstance(openings, list) or (switches and not openings):
         raise ProgrammeError(
             f"{place}: openings_ms is not a list of lengths: give at least one, or the role 'quality'"
         )
-    lengths = [_checked(place, "openings_ms", value, MS * SHORTEST, longest) for value in openings]
-    first = _number(place, entry, "first_ms", MS * HOLD, longest)
-    pause = _number(place, entry, "pause_ms", MS * SHORTEST, longest)
-    duration = _number(place, entry, "duration_ms", MS * HOLD, longest)
+    lengths = [_checked(place, "openings_ms", value, shortest, longest) for value in openings]
+    first = _number(place, entry, "first_ms", MILLISECONDS * HOLD, longest)
+    pause = _number(place, entry, "pause_ms", shortest, longest)
+    duration = _number(place, entry, "duration_ms", MILLISECONDS * HOLD, longest)
     end = first + sum(lengths) + pause * (len(lengths) - 1)
     if lengths and end > duration:
         raise ProgrammeError(
@@ -124,10 +122,10 @@ def _case(place: str, entry: dict[str, Any], *, switches: bool) -> Case:
         )
     return Case(
         name=str(entry["name"]),
-        openings=tuple(length / MS for length in lengths),
-        duration=duration / MS,
-        first=first / MS,
-        pause=pause / MS,
+        openings=tuple(length / MILLISECONDS for length in lengths),
+        duration=duration / MILLISECONDS,
+        first=first / MILLISECONDS,
+        pause=pause / MILLISECONDS,
     )
 
 

@@ -2,16 +2,15 @@
 
 from dataclasses import dataclass
 
+from epv_env.common.units import BAR
 from identification.report_2003.cases import (
     CALIBRATION_CASES,
-    CIRCUIT,
-    SUPPLY,
+    CIRCUIT_PRESSURE,
+    ENERGISED_VOLTAGE,
+    SUPPLY_PRESSURE,
     VALIDATION_CASE,
-    VOLTAGE,
     Case,
 )
-
-BAR = 1e5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,13 +18,15 @@ class Programme:
     """One recording: the case, and the conditions under which the bench runs it."""
 
     name: str
+    """Of the recording and of its file."""
     role: str
+    """One of recording.ROLES."""
     case: Case
-    p1: float = SUPPLY
+    p1: float = SUPPLY_PRESSURE
     """Supply pressure at the start [Pa absolute]."""
-    p2: float = CIRCUIT
+    p2: float = CIRCUIT_PRESSURE
     """Circuit pressure at the start [Pa absolute]."""
-    U_on: float = VOLTAGE
+    U_on: float = ENERGISED_VOLTAGE
     """Voltage of the energised coil [V]."""
 
 
@@ -65,3 +66,4 @@ DIAGNOSIS_SUITE = (
 """The report's recordings, and others that tell more causes of a gap apart."""
 
 SUITES = {"report": REPORT_SUITE, "diagnosis": DIAGNOSIS_SUITE}
+"""Programmes by the name of their suite."""

@@ -20,6 +20,7 @@ class Schedule:
     inputs: Inputs
     """One value per segment, shape (segments,)."""
     reservoir_volume: float = np.inf
+    """Volume that feeds the input chamber [m^3]; infinite: p1 follows its inputs alone."""
 
     @property
     def duration(self) -> float:
@@ -27,7 +28,7 @@ class Schedule:
         return float(self.borders[-1])
 
 
-def scheduled(
+def piecewise_schedule(
     parameters: Parameters,
     initial: State,
     borders: ArrayLike,
@@ -38,7 +39,16 @@ def scheduled(
     refill: ArrayLike = 0.0,
     reservoir_volume: float = np.inf,
 ) -> Schedule:
-    """A Schedule; scalars hold throughout, and borders between equal inputs are dropped."""
+    """A Schedule; scalars hold throughout, and borders between equal inputs are dropped.
+
+    Args:
+        borders: times [s], (segments + 1,), from 0 to the end of the run.
+        U: coil voltage [V], () or (segments,).
+        sigma_S: air consumed from the circuit [kg/s], () or (segments,).
+        p1_slope: rate of the supply pressure [Pa/s], () or (segments,).
+        refill: air fed to the reservoir [kg/s], () or (segments,).
+        reservoir_volume: [m^3].
+    """
     times = np.asarray(borders, dtype=float)
     rows = np.stack(
         np.broadcast_arrays(*np.atleast_1d(U, sigma_S, p1_slope, refill), times[:-1])[:4]

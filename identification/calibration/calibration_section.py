@@ -4,14 +4,11 @@ from typing import Any
 
 from epv_env.plant.parameters import table
 from identification.calibration.calibrate import Calibration
-from identification.calibration.multi_start import METHODS, reached_the_best
+from identification.calibration.multi_start import METHODS, reached_best
 from identification.replay.error_tables import error_table, errors_as_json, percent
-from identification.replay.response_figures import overlay
-from identification.replay.responses import total
+from identification.replay.response_figures import response_figure
+from identification.replay.responses import total_response_error
 from identification.report.page import Picture, Section, Table, Text, Verdict
-
-TOLERANCE = 0.1
-"""Total error that the report accepts (sections 6.1 and 7)."""
 
 
 def calibration_section(calibration: Calibration) -> Section:
@@ -29,8 +26,10 @@ def calibration_section(calibration: Calibration) -> Section:
                 for method in METHODS
             ),
             *(
-                Picture(figure=overlay(answer), caption="Calibration: " + answer.recording.name)
-                for answer in calibration.after["least squares"][:8]
+                Picture(
+                    figure=response_figure(response), caption="Calibration: " + response.recording.name
+                )
+                for response in calibration.after["least squares"][:8]
             ),
         ],
     )
@@ -56,13 +55,17 @@ def calibration_json(calibration: Calibration) -> dict[str, Any]:
 
 
 def _verdict(calibration: Calibration) -> Verdict:
-    error, before = total(calibration.after["Nelder-Mead"]), total(calibration.before)
+    error, before = (
+        total_response_error(calibration.after["Nelder-Mead"]),
+        total_response_error(calibration.before),
+    )
     rms = calibration.best("least squares").error
-    good = error < TOLERANCE
+    limit = calibration.settings.accepted_error
+    good = error < limit
     return Verdict(
         status="good" if good else "bad",
         text=f"The total error (eq. 21) falls from {percent(before)} to {percent(error)} %, "
-        f"{'below' if good else 'not below'} the report's limit of {100 * TOLERANCE:.0f} %; the "
+        f"{'below' if good else 'not below'} the report's limit of {100 * limit:.0f} %; the "
         f"residual of the least-squares fit is {rms:.3g} times the noise (1 is the floor).",
     )
 
@@ -105,7 +108,9 @@ def _starts(calibration: Calibration) -> Table:
     rows = []
     for method in METHODS:
         fits = calibration.fits[method]
-        for fit, reached in zip(fits, reached_the_best(fits), strict=True):
+        for fit, reached in zip(
+            fits, reached_best(fits, calibration.settings.same_minimum), strict=True
+        ):
             rows.append(
                 [
                     method,

@@ -6,15 +6,17 @@ from scipy.stats import qmc
 
 from epv_env.common.journal import Journal
 from epv_env.common.progress import progress
-from identification.calibration.methods import Fit, nelder_mead, weighted_least_squares
-from identification.calibration.problem import Problem
-from identification.replay.vector import Vector
+from identification.calibration.problem import CalibrationProblem
+from identification.calibration.search_methods import SearchResult, nelder_mead, weighted_least_squares
+from identification.calibration.settings import CALIBRATION, CalibrationSettings
+from identification.replay.parameter_vector import ParameterVector
 
 METHODS = ("Nelder-Mead", "least squares")
+"""Names of the search methods; result files carry them."""
 
 
-def starting_points(vector: Vector, count: int, seed: int) -> NDArray:
-    """Scaled vectors (count, k): the reference, then a Latin hypercube over the domains.
+def starting_points(vector: ParameterVector, count: int, seed: int) -> NDArray:
+    """Scaled vectors (count, k), without unit: the reference, then a Latin hypercube over the domains.
 
     Each symbol is spread evenly over the logarithm of its domain, of which RML's spans a decade; over
     the domain itself where that holds zero.
@@ -24,29 +26,37 @@ def starting_points(vector: Vector, count: int, seed: int) -> NDArray:
     positive = low > 0
     ratio = np.where(positive, high, 1.0) / np.where(positive, low, 1.0)
     spread = np.where(positive, low * ratio**draws, low + (high - low) * draws)
-    return np.vstack([vector.of(vector.reference), spread])
+    return np.vstack([vector.scaled(vector.reference), spread])
 
 
-def fit_from_all(problem: Problem, starts: NDArray, journal: Journal) -> dict[str, list[Fit]]:
-    """Both methods from every start; those that the journal holds are taken from it."""
+def search_from_all_starts(
+    problem: CalibrationProblem,
+    starts: NDArray,
+    journal: Journal,
+    settings: CalibrationSettings = CALIBRATION,
+) -> dict[str, list[SearchResult]]:
+    """Both methods from every start; finished searches are taken from the journal.
+
+    starts: scaled vectors (starts, k), without unit. Returns the searches by method.
+    """
     misfits = {"Nelder-Mead": problem.total_error(), "least squares": problem.least_squares()}
     searches = {"Nelder-Mead": nelder_mead, "least squares": weighted_least_squares}
-    found: dict[str, list[Fit]] = {method: [] for method in METHODS}
+    searched: dict[str, list[SearchResult]] = {method: [] for method in METHODS}
     tasks = [(method, index) for index in range(len(starts)) for method in METHODS]
     for method, index in progress(tasks, what="calibrate: searches"):
         name = f"{method} {index}"
         if name not in journal:
-            journal.add(name, searches[method](misfits[method], starts[index]).as_json())
-        found[method].append(Fit.from_json(journal[name]))
-    return found
+            journal.add(name, searches[method](misfits[method], starts[index], settings).as_json())
+        searched[method].append(SearchResult.from_json(journal[name]))
+    return searched
 
 
-def best(fits: list[Fit]) -> Fit:
-    """The fit with the least error."""
+def best_search(fits: list[SearchResult]) -> SearchResult:
+    """The search that ended at the least error."""
     return min(fits, key=lambda fit: fit.error)
 
 
-def reached_the_best(fits: list[Fit], tolerance: float = 1e-3) -> NDArray:
+def reached_best(fits: list[SearchResult], tolerance: float = CALIBRATION.same_minimum) -> NDArray:
     """Which searches ended within a relative `tolerance` of the best, boolean (starts,)."""
-    ends, goal = np.array([fit.z for fit in fits]), best(fits).z
+    ends, goal = np.array([fit.z for fit in fits]), best_search(fits).z
     return np.all(np.abs(ends - goal) <= tolerance * np.maximum(np.abs(goal), tolerance), axis=1)

@@ -5,34 +5,37 @@ from dataclasses import dataclass
 
 from epv_env.plant.parameters import ParameterError, Parameters, table
 from epv_env.plant.region import CALIBRATED_SYMBOLS
-from identification.quality.assess import Offset, assess, sensor_offsets
-from identification.recordings.noise import noise_of
+from identification.quality.assessment import SensorOffset, assess_recording, sensor_offsets
+from identification.quality.settings import QUALITY, QualitySettings
+from identification.recordings.noise_estimation import pooled_noise
 from identification.recordings.recording import Campaign, CampaignError, Recording
-from identification.replay.drive import without_offsets
-from identification.replay.misfit import Misfit, noise_weights, report_weights
-from identification.replay.vector import Vector
+from identification.replay.model_inputs import without_offsets
+from identification.replay.parameter_vector import ParameterVector
+from identification.replay.weighted_residuals import WeightedResiduals, noise_weights, report_weights
 
 
 @dataclass(frozen=True, kw_only=True)
-class Problem:
+class CalibrationProblem:
     """Recordings free of their sensors' offsets, and a vector of parameters to fit to them."""
 
     calibration: tuple[Recording, ...]
     validation: tuple[Recording, ...]
     noise: Mapping[str, float]
     """Standard deviation of each channel's noise [SI units]."""
-    offsets: Mapping[str, Offset]
+    offsets: Mapping[str, SensorOffset]
     """What was subtracted from each channel; empty without a record at rest."""
-    vector: Vector
+    vector: ParameterVector
     """Its reference is where the calibration starts."""
 
-    def least_squares(self) -> Misfit:
+    def least_squares(self) -> WeightedResiduals:
         """The calibration recordings' misfit in units of their noise."""
-        return Misfit(self.calibration, self.vector, noise_weights(self.calibration, self.noise))
+        return WeightedResiduals(
+            self.calibration, self.vector, noise_weights(self.calibration, self.noise)
+        )
 
-    def total_error(self) -> Misfit:
+    def total_error(self) -> WeightedResiduals:
         """The calibration recordings' misfit by the report's total error (eqs 19-21)."""
-        return Misfit(self.calibration, self.vector, report_weights(self.calibration))
+        return WeightedResiduals(self.calibration, self.vector, report_weights(self.calibration))
 
 
 def calibration_problem(
@@ -40,13 +43,14 @@ def calibration_problem(
     *,
     start: Parameters | None = None,
     symbols: Sequence[str] = CALIBRATED_SYMBOLS,
-) -> Problem:
+    quality: QualitySettings = QUALITY,
+) -> CalibrationProblem:
     """The problem that a campaign poses, from `start` (None: Table 10) at the campaign's ambient.
 
     Raises CampaignError if there is no recording to fit to; ParameterError for symbols that cannot be
     fitted.
     """
-    if not campaign.of("calibration"):
+    if not campaign.with_role("calibration"):
         raise CampaignError(
             f"campaign {campaign.name!r} has no recording with role 'calibration': give at least one"
         )
@@ -54,14 +58,14 @@ def calibration_problem(
         T_env=campaign.temperature, p_env=campaign.pressure
     )
     _check_fitted(symbols, start)
-    offsets = _offsets(campaign)
+    offsets = _offsets(campaign, quality)
     values = {name: offset.value for name, offset in offsets.items()}
-    return Problem(
-        calibration=tuple(without_offsets(r, values) for r in campaign.of("calibration")),
-        validation=tuple(without_offsets(r, values) for r in campaign.of("validation")),
-        noise=noise_of(campaign),
+    return CalibrationProblem(
+        calibration=tuple(without_offsets(r, values) for r in campaign.with_role("calibration")),
+        validation=tuple(without_offsets(r, values) for r in campaign.with_role("validation")),
+        noise=pooled_noise(campaign),
         offsets=offsets,
-        vector=Vector(symbols=tuple(symbols), reference=start),
+        vector=ParameterVector(symbols=tuple(symbols), reference=start),
     )
 
 
@@ -78,10 +82,10 @@ def _check_fitted(symbols: Sequence[str], start: Parameters) -> None:
         )
 
 
-def _offsets(campaign: Campaign) -> dict[str, Offset]:
+def _offsets(campaign: Campaign, quality: QualitySettings) -> dict[str, SensorOffset]:
     """The sensors' offsets from the first quality recording that shows them."""
-    for recording in campaign.of("quality"):
-        offsets = sensor_offsets(assess(recording, campaign.pressure))
+    for recording in campaign.with_role("quality"):
+        offsets = sensor_offsets(assess_recording(recording, campaign.pressure, quality))
         if offsets:
             return offsets
     return {}

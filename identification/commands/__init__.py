@@ -1,1 +1,1 @@
-"""The subcommands of `python -m identification`, one file each."""
+"""The commands of `python -m identification`: one file each, and their registry."""

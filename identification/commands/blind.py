@@ -1,31 +1,30 @@
-"""`python -m identification blind`."""
+"""`python -m identification blind`: how often the diagnosis is right on sealed campaigns."""
 
 import argparse
 
 from epv_env.common.command_line import writable_folder
 from epv_env.plant.valves import available_cores
+from identification.commands.command import Command
+from identification.commands.options import add_count, add_out, add_seed, add_workers
 from identification.report.result_files import as_text
 from identification.studies.blind.blind_study import blind_check
 from identification.valve_gap.diagnose import diagnose_campaign
 
 TRIALS = 300
+"""Campaigns of a full study."""
 
 
-def add_blind(commands: "argparse._SubParsersAction") -> None:
-    """The command's options."""
-    text = "how often the diagnosis is right on campaigns whose cause is sealed"
-    parser = commands.add_parser("blind", help=text, description=text)
-    parser.add_argument(
-        "--out", type=writable_folder, required=True, help="folder of trials and results"
-    )
-    parser.add_argument("--trials", type=int, default=TRIALS, help="number of campaigns")
-    parser.add_argument("--seed", type=int, default=0, help="of truths and noise")
-    parser.add_argument("--workers", type=int, default=None, help="processes; default: all cores")
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the folder of results, the size of the study, and where its figures go."""
+    add_out(parser, help="folder of trials and results")
+    add_count(parser, "--trials", default=TRIALS, help="number of campaigns")
+    add_seed(parser, help="of truths and noise")
+    add_workers(parser)
     parser.add_argument("--images", type=writable_folder, default=None, help="folder of its figures")
 
 
-def blind(chosen: argparse.Namespace) -> None:
-    """Run the command. Raises ValueError for a folder of another study."""
+def run(chosen: argparse.Namespace) -> None:
+    """Run the study. Raises ValueError for a folder of another study."""
     section = blind_check(
         chosen.out,
         trials=chosen.trials,
@@ -36,3 +35,12 @@ def blind(chosen: argparse.Namespace) -> None:
     )
     print(as_text([section]))
     print(f"\nwritten: {chosen.out}/results.json and results.html")
+
+
+BLIND = Command(
+    name="blind",
+    help="how often the diagnosis is right on campaigns whose cause is sealed",
+    add_options=add_options,
+    run=run,
+)
+"""The command, for the registry."""

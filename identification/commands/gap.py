@@ -5,21 +5,24 @@ import json
 from pathlib import Path
 
 from epv_env.common.command_line import writable_folder
+from identification.commands.command import Command
+from identification.commands.options import add_out, add_seed
 from identification.gap.report.verdict_sentences import verdict_sentence
 from identification.report.result_files import as_text
 from identification.studies.error_tables.error_table_study import error_table_study
-from identification.valve_gap.diagnose import GAP, PLANT, REPORT, diagnose_campaign
+from identification.valve_gap import diagnose
+from identification.valve_gap.diagnose import diagnose_campaign
 
 
-def add_gap(commands: "argparse._SubParsersAction") -> None:
-    """The command's options."""
-    text = "which effect causes the gap between model and recordings"
-    parser = commands.add_parser("gap", help=text, description=f"{text} (docs/gap.md)")
-    what = parser.add_mutually_exclusive_group(required=True)
-    what.add_argument("campaign", nargs="?", type=Path, help="folder with campaign.json (docs/data.md)")
-    what.add_argument("--tables", action="store_true", help="diagnose Tables 11, 13 and 15 instead")
-    parser.add_argument("--out", type=writable_folder, required=True, help="folder of results")
-    parser.add_argument("--seed", type=int, default=0, help="of resampling and uncertain conditions")
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add what is diagnosed, the nominal model, the catalogue, and where the results go."""
+    subject = parser.add_mutually_exclusive_group(required=True)
+    subject.add_argument(
+        "campaign", nargs="?", type=Path, help="folder with campaign.json (docs/data.md)"
+    )
+    subject.add_argument("--tables", action="store_true", help="diagnose Tables 11, 13 and 15 instead")
+    add_out(parser)
+    add_seed(parser, help="of resampling and uncertain conditions")
     parser.add_argument(
         "--plant", default=None, help="plant file of the nominal model; default: Table 10"
     )
@@ -29,20 +32,39 @@ def add_gap(commands: "argparse._SubParsersAction") -> None:
     parser.add_argument("--images", type=writable_folder, default=None, help="of --tables: its figure")
 
 
-def gap(chosen: argparse.Namespace) -> None:
-    """Run the command. Raises ValueError for options that do not go together."""
+def run(chosen: argparse.Namespace) -> None:
+    """Diagnose what is chosen. Raises ValueError for options that exclude each other."""
     if chosen.tables:
-        if chosen.plant or chosen.without:
-            raise ValueError("--plant and --without belong to a campaign: leave them out with --tables")
-        sections = error_table_study(chosen.out, seed=chosen.seed, images=chosen.images)
-        print(as_text(sections))
-        print(f"\nwritten: {chosen.out}/tables.json and tables.html")
-        return
+        _diagnose_tables(chosen)
+    else:
+        _diagnose_campaign(chosen)
+
+
+def _diagnose_tables(chosen: argparse.Namespace) -> None:
+    if chosen.plant or chosen.without:
+        raise ValueError("--plant and --without belong to a campaign: leave them out with --tables")
+    sections = error_table_study(chosen.out, seed=chosen.seed, images=chosen.images)
+    print(as_text(sections))
+    print(f"\nwritten: {chosen.out}/tables.json and tables.html")
+
+
+def _diagnose_campaign(chosen: argparse.Namespace) -> None:
     if chosen.images:
         raise ValueError("--images belongs to --tables: a campaign's figures are in its report.html")
-    found = diagnose_campaign(
+    diagnosis = diagnose_campaign(
         chosen.campaign, chosen.out, plant=chosen.plant, without=chosen.without, seed=chosen.seed
     )
-    content = json.loads((chosen.out / GAP).read_text(encoding="utf-8"))
-    print(verdict_sentence(found, content["next_experiment"])[1])
-    print(f"written: {', '.join(str(chosen.out / name) for name in (REPORT, GAP, PLANT))}")
+    content = json.loads((chosen.out / diagnose.GAP).read_text(encoding="utf-8"))
+    print(verdict_sentence(diagnosis, content["next_experiment"])[1])
+    written = (diagnose.REPORT, diagnose.GAP, diagnose.PLANT)
+    print(f"written: {', '.join(str(chosen.out / name) for name in written)}")
+
+
+GAP = Command(
+    name="gap",
+    help="which effect causes the gap between model and recordings",
+    guide="docs/gap.md",
+    add_options=add_options,
+    run=run,
+)
+"""The command, for the registry."""

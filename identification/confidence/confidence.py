@@ -11,16 +11,11 @@ from statsmodels.tools.numdiff import approx_fprime, approx_hess
 
 from epv_env.plant.region import Region
 from identification.calibration.calibrate import Calibration
-from identification.calibration.problem import Problem
-from identification.confidence.bootstrap import block_bootstrap
-from identification.confidence.covariance import Covariance, covariance
-from identification.confidence.printed_interval import PROBABILITY, ReportInterval, report_interval
-
-DIFFERENCE = 1e-3
-"""Relative step of the gradient and the Hessian of the total error."""
-
-PROFILE = 0.01
-"""How far to either side a parameter is moved for its profile, relative."""
+from identification.calibration.problem import CalibrationProblem
+from identification.confidence.block_bootstrap import block_bootstrap
+from identification.confidence.covariance import EstimateCovariance, estimate_covariance
+from identification.confidence.report_interval import ReportInterval, report_interval
+from identification.confidence.settings import CONFIDENCE, ConfidenceSettings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,26 +36,28 @@ class Minimum:
 class Confidence:
     """How sure a calibration is."""
 
-    problem: Problem
+    problem: CalibrationProblem
     estimate: NDArray
     """Least-squares estimate, scaled (k,)."""
-    covariance: Covariance
+    covariance: EstimateCovariance
     bootstrap: NDArray
     """Movements of the estimate under the block bootstrap (draws, k)."""
     nelder_mead: NDArray
     """The report's estimate, scaled (k,)."""
     report: ReportInterval
     minimum: Minimum
+    settings: ConfidenceSettings = CONFIDENCE
+    """What the intervals were computed with."""
 
     @property
     def chi_square(self) -> float:
         """Squared Mahalanobis radius of the joint region."""
-        return float(chi2.ppf(PROBABILITY, len(self.estimate)))
+        return float(chi2.ppf(self.settings.probability, len(self.estimate)))
 
     @property
     def half_widths(self) -> NDArray:
-        """Of the intervals of each parameter on its own, scaled (k,)."""
-        return np.sqrt(chi2.ppf(PROBABILITY, 1) * np.diag(self.covariance.total))
+        """Of the intervals of each parameter on its own, scaled (k,), without unit."""
+        return np.sqrt(chi2.ppf(self.settings.probability, 1) * np.diag(self.covariance.total))
 
     @cached_property
     def disagreement(self) -> float:
@@ -93,31 +90,44 @@ class Confidence:
         return {symbol: (float(low[i]), float(high[i])) for i, symbol in enumerate(vector.symbols)}
 
 
-def confidence(calibration: Calibration, *, seed: int = 0) -> Confidence:
-    """Intervals of both estimates, the joint region, and the check of gradient and Hessian."""
+def assess_confidence(
+    calibration: Calibration, *, seed: int = 0, settings: ConfidenceSettings = CONFIDENCE
+) -> Confidence:
+    """Intervals of both estimates, the joint region, and the check of gradient and Hessian.
+
+    seed: of the noise drawn for the inputs and of the bootstrap.
+    """
     problem = calibration.problem
     misfit = problem.least_squares()
     z = calibration.best("least squares").z
-    found = covariance(problem, misfit, z, seed=seed)
+    covariance = estimate_covariance(problem, misfit, z, seed=seed, settings=settings)
     residuals, jacobians = misfit.linearised(z)
     simplex = calibration.best("Nelder-Mead")
     return Confidence(
         problem=problem,
         estimate=z,
-        covariance=found,
-        bootstrap=block_bootstrap(residuals, jacobians, block=2 * found.lags, seed=seed),
+        covariance=covariance,
+        bootstrap=block_bootstrap(
+            residuals,
+            jacobians,
+            block=settings.blocks_per_lag * covariance.lags,
+            seed=seed,
+            draws=settings.bootstrap_draws,
+        ),
         nelder_mead=simplex.z,
-        report=report_interval(problem, simplex.z, simplex.error),
-        minimum=_minimum(problem, simplex.z),
+        report=report_interval(problem, simplex.z, simplex.error, settings.probability),
+        minimum=_minimum(problem, simplex.z, settings),
+        settings=settings,
     )
 
 
-def _minimum(problem: Problem, z: NDArray) -> Minimum:
+def _minimum(problem: CalibrationProblem, z: NDArray, settings: ConfidenceSettings) -> Minimum:
     error = problem.total_error().error
-    offsets = np.linspace(-PROFILE, PROFILE, 41)
-    hessian = approx_hess(z, error, epsilon=np.full(len(z), DIFFERENCE))
+    width = settings.profile_half_width
+    offsets = np.linspace(-width, width, settings.profile_points)
+    hessian = approx_hess(z, error, epsilon=np.full(len(z), settings.hessian_step))
     return Minimum(
-        gradient=np.atleast_1d(approx_fprime(z, error, epsilon=1e-5, centered=True)),
+        gradient=np.atleast_1d(approx_fprime(z, error, epsilon=settings.gradient_step, centered=True)),
         eigenvalues=np.linalg.eigvalsh(0.5 * (hessian + hessian.T)),
         offsets=offsets,
         profiles=np.array([[error(z * (1 + d * axis)) for d in offsets] for axis in np.eye(len(z))]),

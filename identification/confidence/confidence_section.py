@@ -9,9 +9,6 @@ from identification.confidence import confidence_figures as figures
 from identification.confidence.confidence import Confidence
 from identification.report.page import Picture, Section, Table, Text, Verdict
 
-FLAT = 1e-3
-"""Largest possible decrease of the total error, relative to it, at which a gradient counts as zero."""
-
 
 def confidence_section(confidence: Confidence) -> Section:
     """Intervals of both kinds, the joint region, and the check of the minimum."""
@@ -55,7 +52,7 @@ def _precision(confidence: Confidence) -> Verdict:
     relative = confidence.half_widths / confidence.estimate
     worst = int(np.argmax(relative))
     return Verdict(
-        status="good" if relative[worst] < 0.05 else "doubt",
+        status="good" if relative[worst] < confidence.settings.precise else "doubt",
         text="95 % intervals, each parameter on its own: "
         + ", ".join(
             f"{symbol} ±{100 * width:.2g} %"
@@ -78,7 +75,7 @@ def _agreement(confidence: Confidence) -> Verdict:
 
 def _minimum(confidence: Confidence) -> Verdict:
     positive = bool(np.all(confidence.minimum.eigenvalues > 0))
-    flat = _decrease(confidence) < FLAT
+    flat = _decrease(confidence) < confidence.settings.flat
     return Verdict(
         status="good" if positive and flat else "doubt",
         text=f"At the Nelder-Mead estimate the gradient is {'zero' if flat else 'not zero'} and the "

@@ -15,14 +15,12 @@ from numpy.typing import NDArray
 from statsmodels.stats.sandwich_covariance import S_hac_simple
 from statsmodels.tsa.stattools import acf
 
-from identification.calibration.problem import Problem
+from identification.calibration.problem import CalibrationProblem
+from identification.confidence.settings import CONFIDENCE, ConfidenceSettings
 from identification.recordings.recording import OUTPUTS, Recording
-from identification.replay.drive import Drive, drive_of
-from identification.replay.misfit import Misfit
-from identification.replay.model import Replay
-
-DRAWS = 8
-"""Of the inputs' noise, for each recording."""
+from identification.replay.batch_simulation import Replay
+from identification.replay.model_inputs import ModelInputs, model_inputs
+from identification.replay.weighted_residuals import WeightedResiduals
 
 INPUTS = ("U", "p1")
 """Channels that the model takes as known."""
@@ -32,8 +30,8 @@ ZEROED = ("U", "p1", "p2")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Covariance:
-    """Covariances (k, k) of a scaled vector."""
+class EstimateCovariance:
+    """Covariances (k, k) of a scaled vector, without unit."""
 
     independent: NDArray
     """As if the residuals were independent: s^2 H."""
@@ -46,12 +44,22 @@ class Covariance:
 
     @property
     def total(self) -> NDArray:
-        """What the estimate's region is made of."""
+        """Sum of residual and inputs, (k, k), without unit; the joint region rests on this sum."""
         return self.residual + self.inputs
 
 
-def covariance(problem: Problem, misfit: Misfit, z: NDArray, *, seed: int = 0) -> Covariance:
-    """Covariance of the estimate z (k,) that minimises one of the problem's misfits."""
+def estimate_covariance(
+    problem: CalibrationProblem,
+    misfit: WeightedResiduals,
+    z: NDArray,
+    *,
+    seed: int = 0,
+    settings: ConfidenceSettings = CONFIDENCE,
+) -> EstimateCovariance:
+    """Covariance of an estimate that minimises one of the problem's weighted residuals.
+
+    z: the estimate, scaled (k,), without unit. seed: of the noise drawn for the inputs.
+    """
     residuals, jacobians = misfit.linearised(z)
     H = np.linalg.inv(sum(J.T @ J for J in jacobians))
     samples = sum(len(residual) for residual in residuals)
@@ -59,8 +67,8 @@ def covariance(problem: Problem, misfit: Misfit, z: NDArray, *, seed: int = 0) -
     lags = max(correlation_lags(residual) for residual in residuals)
     middle = sum(S_hac_simple(s, nlags=lags) for s in score_series(residuals, jacobians))
     influence = [H @ J.T for J in jacobians]
-    inputs = _input_share(problem, misfit, z, influence, seed)
-    return Covariance(
+    inputs = _input_share(problem, misfit, z, influence, seed, settings.input_draws)
+    return EstimateCovariance(
         independent=variance * H,
         residual=H @ middle @ H,
         inputs=inputs + _offset_share(problem, misfit, z, influence),
@@ -69,7 +77,11 @@ def covariance(problem: Problem, misfit: Misfit, z: NDArray, *, seed: int = 0) -
 
 
 def score_series(residuals: Sequence[NDArray], jacobians: Sequence[NDArray]) -> list[NDArray]:
-    """J'e of each instant, summed over the outputs; per recording (samples, k)."""
+    """J'e of each instant, summed over the outputs; per recording (samples, k), without unit.
+
+    residuals: weighted, per recording (3 samples,). jacobians: by the scaled parameters, per recording
+    (3 samples, k).
+    """
     return [
         (J * r[:, None]).reshape(len(OUTPUTS), -1, J.shape[1]).sum(axis=0)
         for r, J in zip(residuals, jacobians, strict=True)
@@ -77,7 +89,7 @@ def score_series(residuals: Sequence[NDArray], jacobians: Sequence[NDArray]) -> 
 
 
 def correlation_lags(residual: NDArray) -> int:
-    """Lags over which neighbours may be correlated, for one recording's residual (3 samples,).
+    """Lags [samples] over which neighbours in one recording's residual (3 samples,) may correlate.
 
     Twice the first lag at which every output's autocorrelation is within its 95 % band, and at least
     Newey and West's rule of thumb 4 (n/100)^(2/9).
@@ -93,25 +105,32 @@ def correlation_lags(residual: NDArray) -> int:
 
 
 def _input_share(
-    problem: Problem, misfit: Misfit, z: NDArray, influence: Sequence[NDArray], seed: int
+    problem: CalibrationProblem,
+    misfit: WeightedResiduals,
+    z: NDArray,
+    influence: Sequence[NDArray],
+    seed: int,
+    draws: int,
 ) -> NDArray:
     """Mean square of how far redrawn input noise moves the estimate, summed over the recordings.
 
     influence: H J' per recording (k, 3 samples).
     """
-    redrawn = _redrawn(problem, misfit.replay.drives, np.random.default_rng(seed))
+    redrawn = _redrawn(problem, misfit.replay.drives, np.random.default_rng(seed), draws)
     values = misfit.vector.values(z)
     known = misfit.replay.outputs(values)
     noisy = Replay(redrawn, misfit.vector.reference).outputs(values)
     share = np.zeros((len(z), len(z)))
     for r, (influenced, weights) in enumerate(zip(influence, misfit.weights, strict=True)):
-        for model in noisy[r * DRAWS : (r + 1) * DRAWS]:
+        for model in noisy[r * draws : (r + 1) * draws]:
             moved = influenced @ (weights * (model - known[r])[:, :, 0]).ravel()
-            share += np.outer(moved, moved) / DRAWS
+            share += np.outer(moved, moved) / draws
     return share
 
 
-def _offset_share(problem: Problem, misfit: Misfit, z: NDArray, influence: Sequence[NDArray]) -> NDArray:
+def _offset_share(
+    problem: CalibrationProblem, misfit: WeightedResiduals, z: NDArray, influence: Sequence[NDArray]
+) -> NDArray:
     """How far the standard errors of the offsets, common to all recordings, move the estimate."""
     values = misfit.vector.values(z)
     known = misfit.replay.outputs(values)
@@ -132,7 +151,7 @@ def _offset_share(problem: Problem, misfit: Misfit, z: NDArray, influence: Seque
     return share
 
 
-def _shifted(drive: Drive, channel: str, error: float) -> Drive:
+def _shifted(drive: ModelInputs, channel: str, error: float) -> ModelInputs:
     """The drive that would follow if a channel read higher by `error` [SI units]."""
     if channel == "U":
         return replace(drive, U=drive.U + error, U_start=drive.U_start + error)
@@ -141,19 +160,21 @@ def _shifted(drive: Drive, channel: str, error: float) -> Drive:
     return replace(drive, p2_start=drive.p2_start + error)
 
 
-def _redrawn(problem: Problem, drives: Sequence[Drive], rng: np.random.Generator) -> list[Drive]:
-    """DRAWS drives per recording, as they would follow from other noise on the same inputs."""
+def _redrawn(
+    problem: CalibrationProblem, drives: Sequence[ModelInputs], rng: np.random.Generator, draws: int
+) -> list[ModelInputs]:
+    """`draws` inputs per recording, as they would follow from other noise on the same inputs."""
     return [
         _with_start_of(
-            drive, drive_of(_noisy(recording, drive, problem.noise, rng), problem.vector.reference)
+            drive, model_inputs(_noisy(recording, drive, problem.noise, rng), problem.vector.reference)
         )
         for recording, drive in zip(problem.calibration, drives, strict=True)
-        for _ in range(DRAWS)
+        for _ in range(draws)
     ]
 
 
 def _noisy(
-    recording: Recording, drive: Drive, noise: Mapping[str, float], rng: np.random.Generator
+    recording: Recording, drive: ModelInputs, noise: Mapping[str, float], rng: np.random.Generator
 ) -> Recording:
     drawn = {
         name: getattr(drive, name) + noise[name] * rng.standard_normal(len(recording)) for name in INPUTS
@@ -161,6 +182,6 @@ def _noisy(
     return replace(recording, **drawn)
 
 
-def _with_start_of(drive: Drive, redrawn: Drive) -> Drive:
+def _with_start_of(drive: ModelInputs, redrawn: ModelInputs) -> ModelInputs:
     """The redrawn inputs with the circuit pressure of the original start, which is a nuisance."""
     return replace(redrawn, p2_start=drive.p2_start)

@@ -1,33 +1,24 @@
-"""The stages of an identification on one campaign; each runs what it needs, and nothing twice."""
+"""The stages of an identification: what each computes, and what it needs."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
-from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
-from epv_env.plant.parameters import Parameters
-from identification.calibration.calibrate import STARTS, Calibration, calibrate
 from identification.calibration.calibration_section import calibration_json, calibration_section
-from identification.calibration.problem import Problem, calibration_problem
-from identification.confidence.confidence import Confidence, confidence
 from identification.confidence.confidence_section import confidence_json, confidence_section
+from identification.pipeline.identification import Identification
 from identification.quality import quality_export
-from identification.quality.assess import assess
+from identification.quality.assessment import assess_recording
 from identification.quality.quality_section import quality_section
-from identification.recordings.recording import Campaign, CampaignError
+from identification.recordings.recording import CampaignError
 from identification.report.page import Section, Verdict
 from identification.sensitivity import sensitivity_export
 from identification.sensitivity.collinearity import sensitivities_on_recordings
 from identification.sensitivity.one_at_a_time import studied_symbols
-from identification.sensitivity.results import run_study
 from identification.sensitivity.sensitivity_section import sensitivity_section
+from identification.sensitivity.sensitivity_study import run_sensitivity_study
 from identification.validation.validate import validate
 from identification.validation.validation_section import validation_json, validation_section
-
-ESTIMATOR = "least squares"
-"""The method whose estimate goes on: it weighs the outputs by their noise, so it scatters least."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,64 +27,38 @@ class Result:
 
     sections: list[Section]
     content: dict[str, Any]
+    """Fields of the JSON file."""
 
 
-@dataclass(frozen=True)
-class Identification:
-    """A campaign, where finished searches are kept, and what follows from both when asked for."""
+@dataclass(frozen=True, kw_only=True)
+class Stage:
+    """One stage of the identification."""
 
-    campaign: Campaign
-    journal: Path
-    seed: int = 0
-    starts: int = STARTS
-
-    @property
-    def hashes(self) -> dict[str, str]:
-        """SHA-256 of each recording's file by name."""
-        return {recording.name: recording.sha256 for recording in self.campaign.recordings}
-
-    @cached_property
-    def problem(self) -> Problem:
-        """What is to be fitted to which recordings."""
-        return calibration_problem(self.campaign)
-
-    @cached_property
-    def calibration(self) -> Calibration:
-        """Both methods from every start."""
-        return calibrate(
-            self.problem,
-            journal=self.journal,
-            subject={
-                "software": version("epv-valve"),
-                "recordings": {r.name: r.digest() for r in self.campaign.recordings},
-            },
-            starts=self.starts,
-            seed=self.seed,
-        )
-
-    @cached_property
-    def confidence(self) -> Confidence:
-        """Intervals and joint region."""
-        return confidence(self.calibration, seed=self.seed)
-
-    @property
-    def parameters(self) -> Parameters:
-        """The estimate that goes on."""
-        return self.calibration.parameters(ESTIMATOR)
+    name: str
+    """The stage's command: `python -m identification NAME`."""
+    help: str
+    """The question that the stage answers, and the report's section."""
+    compute: Callable[[Identification], Result]
+    """Computes the stage and what it rests on. Raises CampaignError."""
+    time_share: float
+    """Share of a whole run's time, for the estimate of what is left."""
+    role: str | None = None
+    """Role of recordings that the stage needs; a whole run without them leaves the stage out."""
 
 
 def quality(identification: Identification) -> Result:
     """Section 4 for every quality recording. Raises CampaignError if there is none."""
-    recordings = identification.campaign.of("quality")
+    recordings = identification.campaign.with_role("quality")
     if not recordings:
         raise CampaignError(
             f"campaign {identification.campaign.name!r} has no recording with role 'quality': record "
             "about 5 s at rest, coil off and exhausted, and list it in campaign.json"
         )
-    found = [assess(recording, identification.campaign.pressure) for recording in recordings]
+    settings, pressure = identification.settings.quality, identification.campaign.pressure
+    assessments = [assess_recording(recording, pressure, settings) for recording in recordings]
     return Result(
-        sections=[quality_section(quality) for quality in found],
-        content={"quality": [quality_export.as_json(quality) for quality in found]},
+        sections=[quality_section(assessment) for assessment in assessments],
+        content={"quality": [quality_export.as_json(assessment) for assessment in assessments]},
     )
 
 
@@ -101,8 +66,9 @@ def sensitivity(identification: Identification) -> Result:
     """Section 5 at the report's conditions, and what the campaign's own recordings can separate."""
     problem = identification.problem
     replay = problem.least_squares().replay
-    outputs = sensitivities_on_recordings(replay, studied_symbols(), problem.noise)
-    study = run_study(outputs=outputs, seed=identification.seed)
+    settings = identification.settings.sensitivity
+    outputs = sensitivities_on_recordings(replay, studied_symbols(), problem.noise, settings)
+    study = run_sensitivity_study(outputs=outputs, seed=identification.seed, settings=settings)
     return Result(
         sections=[sensitivity_section(study)],
         content={"sensitivity": sensitivity_export.as_json(study)},
@@ -111,41 +77,61 @@ def sensitivity(identification: Identification) -> Result:
 
 def calibration(identification: Identification) -> Result:
     """Section 6.2."""
-    found = identification.calibration
+    calibrated = identification.calibration
     return Result(
-        sections=[calibration_section(found)], content={"calibration": calibration_json(found)}
+        sections=[calibration_section(calibrated)],
+        content={"calibration": calibration_json(calibrated)},
     )
 
 
-def confidence_stage(identification: Identification) -> Result:
+def confidence(identification: Identification) -> Result:
     """Section 6.3."""
-    found = identification.confidence
-    return Result(sections=[confidence_section(found)], content={"confidence": confidence_json(found)})
+    intervals = identification.confidence
+    return Result(
+        sections=[confidence_section(intervals)], content={"confidence": confidence_json(intervals)}
+    )
 
 
 def validation(identification: Identification) -> Result:
     """Section 7. Raises CampaignError if nothing was held out."""
-    found = validate(identification.problem, identification.parameters)
-    return Result(sections=[validation_section(found)], content={"validation": validation_json(found)})
+    settings = identification.settings.validation
+    validated = validate(identification.problem, identification.parameters, settings)
+    return Result(
+        sections=[validation_section(validated)], content={"validation": validation_json(validated)}
+    )
 
 
-STAGES: Mapping[str, Callable[[Identification], Result]] = {
-    "quality": quality,
-    "sensitivity": sensitivity,
-    "calibrate": calibration,
-    "confidence": confidence_stage,
-    "validate": validation,
-}
-"""By the command's name, in the order of the report."""
+STAGES = (
+    Stage(
+        name="quality", help="is the data good enough (section 4)",
+        compute=quality, time_share=0.15, role="quality",
+    ),
+    Stage(
+        name="sensitivity", help="which parameters matter (section 5)",
+        compute=sensitivity, time_share=0.4,
+    ),
+    Stage(
+        name="calibrate", help="fit the parameters (section 6.2)",
+        compute=calibration, time_share=0.25,
+    ),
+    Stage(
+        name="confidence", help="how sure the estimates are (section 6.3)",
+        compute=confidence, time_share=0.1,
+    ),
+    Stage(
+        name="validate", help="does the model hold on held-out recordings (section 7)",
+        compute=validation, time_share=0.1, role="validation",
+    ),
+)  # fmt: skip
+"""In the order of the report."""
 
 
-def possible(stage: str, identification: Identification) -> Result:
+def result_or_omission(stage: Stage, identification: Identification) -> Result:
     """A stage's result; where the campaign lacks its recordings, a section that says so."""
-    lacking = {"quality": "quality", "validate": "validation"}.get(stage)
-    if lacking is None or identification.campaign.of(lacking):
-        return STAGES[stage](identification)
-    text = f"The campaign has no recording with role {lacking!r}: this stage was left out."
+    if stage.role is None or identification.campaign.with_role(stage.role):
+        return stage.compute(identification)
+    text = f"The campaign has no recording with role {stage.role!r}: this stage was left out."
     verdict = Verdict(status="doubt", text=text)
     return Result(
-        sections=[Section(title=f"Not done: {stage}", verdicts=[verdict], blocks=[])], content={}
+        sections=[Section(title=f"Not done: {stage.name}", verdicts=[verdict], blocks=[])], content={}
     )

@@ -6,40 +6,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.sensors import SENSORS, Sensor
-from identification.quality.dependence import Whiteness, assess_whiteness
+from identification.quality.correlation_tests import WhitenessTest, assess_whiteness
 from identification.quality.normality import UNTESTED, Normality, assess_normality
-from identification.quality.resolution import longest_run, quantum, run_limit
+from identification.quality.quantisation import converter_step, longest_run, run_limit
+from identification.quality.settings import QUALITY, QualitySettings
 from identification.quality.statistics import (
-    Description,
+    DescriptiveStatistics,
     Trend,
-    describe,
+    descriptive_statistics,
     fit_trend,
     outlier_limit,
 )
 from identification.recordings.recording import UNITS
 
-MARGINAL_DRIFT = 0.1
-"""Drift over the record, relative to Table 1's accuracy, up to which a signal counts as steady."""
-
-SIGNIFICANCE = 1e-4
-"""Probability of a false alarm of one test; the 40 of a record stay below 1 % together."""
-
 
 @dataclass(frozen=True, kw_only=True)
-class Channel:
+class ChannelAssessment:
     """One channel's readings and what they show."""
 
     name: str
+    """One of recording.CHANNELS."""
     readings: NDArray
     """(samples,) [A, V or bar]."""
     residual: NDArray
-    """Readings minus the line of the trend."""
+    """Readings minus the line of the trend, (samples,) [A, V or bar]."""
     duration: float
     """Of the record [s]."""
     rest: float
     """What a perfect sensor reads with the coil off and the chambers vented [A, V or bar]."""
     trend: Trend
-    description: Description
+    description: DescriptiveStatistics
     quantum: float
     """Step of the converter as the readings show it; 0.0 without a grid."""
     rounding: float
@@ -49,8 +45,10 @@ class Channel:
     run_limit: int
     """What independent readings do not reach."""
     normality: Normality
-    whiteness: Whiteness | None
+    whiteness: WhitenessTest | None
     """None for a signal that never changes."""
+    settings: QualitySettings = QUALITY
+    """What the channel was judged by."""
 
     @property
     def unit(self) -> str:
@@ -93,24 +91,41 @@ class Channel:
     @property
     def at_rest(self) -> bool:
         """Whether the channel is steady, and within the accuracy of its rest value."""
-        return self.within_accuracy and abs(self.drift) < MARGINAL_DRIFT * self.accuracy
+        return self.within_accuracy and abs(self.drift) < self.settings.drift_levels[0] * self.accuracy
 
     @property
     def outlier_limit(self) -> float:
-        """Outlier factor that normal noise stays below in 99.9 % of such records."""
-        return outlier_limit(len(self.readings), rounding=self.rounding)
+        """Outlier factor that normal noise stays below in a share `outlier_confidence` of records."""
+        confidence = self.settings.outlier_confidence
+        return outlier_limit(len(self.readings), rounding=self.rounding, confidence=confidence)
 
 
-def assess_channel(name: str, readings: NDArray, *, period: float, rest: float, lags: int) -> Channel:
-    """Statistics of one channel; readings (samples,) and rest in A, V or bar, period [s]."""
+def assess_channel(
+    name: str,
+    readings: NDArray,
+    *,
+    period: float,
+    rest: float,
+    lags: int,
+    settings: QualitySettings = QUALITY,
+) -> ChannelAssessment:
+    """Statistics of one channel.
+
+    Args:
+        name: one of recording.CHANNELS.
+        readings: (samples,) [A, V or bar].
+        period: time between samples [s].
+        rest: what a perfect sensor reads at rest [A, V or bar].
+        lags: greatest lag of the autocorrelation [samples].
+    """
     time = np.arange(len(readings)) * period
     trend = fit_trend(time, readings)
     moves = bool(np.ptp(readings) > 0)
     residual = readings - trend.at(time) if moves else np.zeros_like(readings)
-    description = describe(residual, greatest=SENSORS[name].high)
-    step = quantum(readings)
+    description = descriptive_statistics(residual, greatest=SENSORS[name].high)
+    step = converter_step(readings, settings)
     rounding = step / description.standard_deviation if moves else 0.0
-    return Channel(
+    return ChannelAssessment(
         name=name,
         readings=readings,
         residual=residual,
@@ -121,7 +136,8 @@ def assess_channel(name: str, readings: NDArray, *, period: float, rest: float, 
         quantum=step,
         rounding=rounding,
         longest_run=longest_run(readings),
-        run_limit=run_limit(readings, rounding=rounding, significance=SIGNIFICANCE),
-        normality=assess_normality(readings, trend.at(time), step) if moves else UNTESTED,
-        whiteness=assess_whiteness(residual, lags) if moves else None,
+        run_limit=run_limit(readings, rounding=rounding, significance=settings.significance),
+        normality=assess_normality(readings, trend.at(time), step, settings) if moves else UNTESTED,
+        whiteness=assess_whiteness(residual, lags, settings) if moves else None,
+        settings=settings,
     )

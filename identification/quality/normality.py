@@ -14,20 +14,10 @@ from scipy import optimize, special, stats
 from statsmodels.stats.diagnostic import normal_ad
 from statsmodels.stats.stattools import jarque_bera
 
-LEAST_EXPECTED = 5.0
-"""Counts that a bin of the chi-square test must be expected to hold; thinner ones are merged."""
+from identification.quality.settings import QUALITY, QualitySettings
 
 ESTIMATED = 2
 """Parameters estimated from the counts: mean and standard deviation."""
-
-MOST_CELLS = 10_000
-"""Cells into which the readings of one channel are sorted."""
-
-MOST_POSITIONS = 500
-"""Points of the line, a quarter of sigma apart, over which the probability of a code is averaged."""
-
-CELLS_PER_SIGMA = 3.0
-"""Codes finer than sigma over this are taken together, or the test loses its power."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,46 +52,54 @@ UNTESTED = Normality(
 """Of a signal that never changes."""
 
 
-def assess_normality(readings: NDArray, line: NDArray, step: float) -> Normality:
+def assess_normality(
+    readings: NDArray, line: NDArray, step: float, settings: QualitySettings = QUALITY
+) -> Normality:
     """Test raw readings about a line for normality; readings, line: (samples,), [unit].
 
-    step: the converter's step, 0 for continuous readings. The raw readings are tested, since taking
-    the line off would smear the codes; the probability of a code is its mean along the line instead.
+    step: the converter's step [unit], 0 for continuous readings. The raw readings are tested, since
+    taking the line off would smear the codes; the probability of a code is its mean along the line.
     """
     sigma = float(np.std(readings - line, ddof=1))
-    edges, counts = _cells(readings, step, sigma)
-    positions = _positions(line, sigma)
+    edges, counts = _cells(readings, step, sigma, settings)
+    positions = _positions(line, sigma, settings)
     shift, deviation = _fit(edges, counts, positions, sigma)
     expected = len(readings) * _probabilities(edges, positions + shift, deviation)
     return Normality(
         standard_deviation=deviation,
         naive_anderson_darling=float(normal_ad(readings - line)[1]),
         naive_jarque_bera=float(jarque_bera(readings - line)[1]),
-        **_chi_square(*_merged(counts, expected)),
+        **_chi_square(*_merged(counts, expected, settings.least_expected)),
     )
 
 
 def probability_plot(residual: NDArray) -> tuple[NDArray, NDArray, float, float]:
-    """Normal quantiles and ordered values, (samples,) each; the slope and offset of their line."""
+    """Normal quantiles and ordered values of a signal [unit], (samples,) each; their line.
+
+    The line is given by its slope and its offset [unit].
+    """
     plot: Any = stats.probplot(residual)
     (quantiles, ordered), (slope, offset, _) = plot
     return quantiles, ordered, slope, offset
 
 
-def _positions(line: NDArray, sigma: float) -> NDArray:
+def _positions(line: NDArray, sigma: float, settings: QualitySettings) -> NDArray:
     """Midpoints of equal parts of the line; one point, unless the signal drifts."""
     drift = line[-1] - line[0]
-    parts = min(MOST_POSITIONS, 1 + int(4 * abs(drift) / sigma))
+    parts = min(settings.most_positions, 1 + int(4 * abs(drift) / sigma))
     return line[0] + drift * (np.arange(parts) + 0.5) / parts
 
 
-def _cells(readings: NDArray, step: float, sigma: float) -> tuple[NDArray, NDArray]:
+def _cells(
+    readings: NDArray, step: float, sigma: float, settings: QualitySettings
+) -> tuple[NDArray, NDArray]:
     """Inner edges (cells - 1,) and counts (cells,) of cells of whole codes."""
     least = float(np.min(readings))
     step = step or 1e-3 * sigma
     codes = np.rint((readings - least) / step).astype(int)
     # Readings that drift by thousands of deviations need no more cells than this to show it.
-    width = max(1, round(sigma / CELLS_PER_SIGMA / step), int(np.max(codes)) // MOST_CELLS + 1)
+    fewest = int(np.max(codes)) // settings.most_cells + 1
+    width = max(1, round(sigma / settings.cells_per_sigma / step), fewest)
     counts = np.bincount(codes // width)
     return least + (width * np.arange(1, len(counts)) - 0.5) * step, counts
 
@@ -124,12 +122,12 @@ def _fit(edges: NDArray, counts: NDArray, positions: NDArray, sigma: float) -> t
     return float(shift * sigma), float(sigma * np.exp(growth))
 
 
-def _merged(counts: NDArray, expected: NDArray) -> tuple[NDArray, NDArray]:
+def _merged(counts: NDArray, expected: NDArray, least: float) -> tuple[NDArray, NDArray]:
     """Neighbouring cells taken together until each is expected to hold enough."""
     starts, filled = [0], 0.0
     for cell, value in enumerate(expected[:-1]):
         filled += value
-        if filled >= LEAST_EXPECTED and np.sum(expected[cell + 1 :]) >= LEAST_EXPECTED:
+        if filled >= least and np.sum(expected[cell + 1 :]) >= least:
             starts.append(cell + 1)
             filled = 0.0
     return np.add.reduceat(counts, starts), np.add.reduceat(expected, starts)

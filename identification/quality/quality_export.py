@@ -4,13 +4,13 @@ import math
 from dataclasses import asdict
 from typing import Any
 
-from identification.quality.assess import Quality, sensor_offsets
-from identification.quality.channel import Channel
-from identification.quality.verdicts import CHECKS, findings, worst
+from identification.quality.assessment import QualityAssessment, sensor_offsets
+from identification.quality.channel import ChannelAssessment
+from identification.quality.verdicts import CHECKS, check_results, worst_status
 from identification.recordings.recording import CHANNELS
 
 
-def as_json(quality: Quality) -> dict[str, Any]:
+def as_json(quality: QualityAssessment) -> dict[str, Any]:
     """Figures in A, V and bar (sensor_offsets in SI units) and findings; None for what is undefined."""
     return {
         "recording": quality.name,
@@ -32,25 +32,25 @@ def as_json(quality: Quality) -> dict[str, Any]:
     }
 
 
-def as_text(quality: Quality) -> str:
+def as_text(quality: QualityAssessment) -> str:
     """A line per channel: its worst status, then the status of each check."""
     widths = {check: max(len(check), 5) for check in CHECKS}
     lines = ["channel  verdict  " + "  ".join(check.ljust(widths[check]) for check in CHECKS)]
     for name in CHANNELS:
-        found = {finding.check: finding.status for finding in findings(quality, name)}
-        cells = "  ".join(found.get(check, "-").ljust(width) for check, width in widths.items())
-        lines.append(f"{name:7}  {worst(findings(quality, name)):7}  {cells}")
+        statuses = {result.check: result.status for result in check_results(quality, name)}
+        cells = "  ".join(statuses.get(check, "-").ljust(width) for check, width in widths.items())
+        lines.append(f"{name:7}  {worst_status(check_results(quality, name)):7}  {cells}")
     return "\n".join(line.rstrip() for line in lines)
 
 
-def _channel(quality: Quality, name: str) -> dict[str, Any]:
+def _channel(quality: QualityAssessment, name: str) -> dict[str, Any]:
     channel = quality.channels[name]
-    found = findings(quality, name)
+    results = check_results(quality, name)
     return {
         "unit": channel.unit,
-        "status": worst(found),
+        "status": worst_status(results),
         "findings": [
-            {"check": finding.check, "status": finding.status, "text": finding.text} for finding in found
+            {"check": result.check, "status": result.status, "text": result.text} for result in results
         ],
         "trend": _finite(asdict(channel.trend)),
         "statistics": _finite(asdict(channel.description)),
@@ -61,14 +61,14 @@ def _channel(quality: Quality, name: str) -> dict[str, Any]:
     }
 
 
-def _whiteness(channel: Channel) -> dict[str, float] | None:
-    found = channel.whiteness
-    if found is None:
+def _whiteness(channel: ChannelAssessment) -> dict[str, float] | None:
+    test = channel.whiteness
+    if test is None:
         return None
     return {
-        "ljung_box_p": found.probability,
-        "greatest_autocorrelation": found.peak,
-        "variance_inflation": found.inflation,
+        "ljung_box_p": test.probability,
+        "greatest_autocorrelation": test.peak,
+        "variance_inflation": test.inflation,
     }
 
 

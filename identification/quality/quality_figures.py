@@ -8,19 +8,25 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy import stats
 
-from identification.quality.assess import Quality
-from identification.quality.channel import Channel
-from identification.quality.dependence import Whiteness, white_band
+from identification.quality.assessment import QualityAssessment
+from identification.quality.channel import ChannelAssessment
+from identification.quality.correlation_tests import WhitenessTest, white_noise_band
 from identification.quality.normality import probability_plot
 
 MARK = {"color": "tab:blue", "linewidth": 0.8}
+"""Line of a computed curve."""
+
 REFERENCE = {"color": "tab:red", "linewidth": 1.0}
+"""Line of a fit or a normal distribution."""
+
 BAND = {"color": "tab:orange", "alpha": 0.3, "linewidth": 0}
+"""Band of white noise."""
+
 TICKS = (0.001, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 0.999)
 """Probabilities on the axis of a normal probability plot."""
 
 
-def signals(quality: Quality) -> Figure:
+def signals(quality: QualityAssessment) -> Figure:
     """Readings over time, with the line of the trend (Figure 4)."""
     figure = Figure(figsize=(9, 7.5), layout="constrained")
     rows = figure.subplots(len(quality.channels), 1, sharex=True)
@@ -34,7 +40,7 @@ def signals(quality: Quality) -> Figure:
     return figure
 
 
-def probability_plots(quality: Quality) -> Figure:
+def probability_plots(quality: QualityAssessment) -> Figure:
     """Detrended signals on a normal probability scale (Figure 5)."""
     figure, panels = _grid(quality, "probability")
     for axes, channel, _ in panels:
@@ -46,7 +52,7 @@ def probability_plots(quality: Quality) -> Figure:
     return figure
 
 
-def histograms(quality: Quality) -> Figure:
+def histograms(quality: QualityAssessment) -> Figure:
     """Detrended signals, a bar per step of the converter, and the normal density (Figure 6)."""
     figure, panels = _grid(quality, "density [1/unit of the axis]")
     for axes, channel, _ in panels:
@@ -58,7 +64,7 @@ def histograms(quality: Quality) -> Figure:
     return figure
 
 
-def autocorrelations(quality: Quality) -> Figure:
+def autocorrelations(quality: QualityAssessment) -> Figure:
     """Two-sided autocorrelations without their 1 at lag 0 (Figure 7)."""
     figure, panels = _grid(quality, "autocorrelation")
     for axes, channel, whiteness in panels:
@@ -69,7 +75,7 @@ def autocorrelations(quality: Quality) -> Figure:
     return figure
 
 
-def crosscorrelations(quality: Quality) -> Figure:
+def crosscorrelations(quality: QualityAssessment) -> Figure:
     """Two-sided cross-correlations of all pairs (Figure 8)."""
     rows = max(1, (len(quality.pairs) + 1) // 2)
     figure = Figure(figsize=(9, 0.5 + 1.7 * rows), layout="constrained")
@@ -84,21 +90,21 @@ def crosscorrelations(quality: Quality) -> Figure:
     return figure
 
 
-def spectra(quality: Quality) -> Figure:
+def spectra(quality: QualityAssessment) -> Figure:
     """Power spectral densities with the 95 % band of white noise (Figure 9)."""
     figure, panels = _grid(quality, "density [dB re 1 unit² per rad/sample]")
     for axes, channel, whiteness in panels:
-        found = whiteness.spectrum
-        level = 10 * np.log10(found.white)
+        spectrum = whiteness.spectrum
+        level = 10 * np.log10(spectrum.white)
         axes.update_datalim([(0, level - 5), (1, level + 5)])
-        axes.axhspan(*(10 * np.log10(found.band)), **BAND)
-        axes.plot(found.frequency, 10 * np.log10(found.density), **MARK)
+        axes.axhspan(*(10 * np.log10(spectrum.band)), **BAND)
+        axes.plot(spectrum.frequency, 10 * np.log10(spectrum.density), **MARK)
         axes.set_title(f"{channel.name} [{channel.unit}]")
         axes.set_xlabel("frequency / Nyquist frequency")
     return figure
 
 
-CAPTIONS: Mapping[Callable[[Quality], Figure], str] = {
+CAPTIONS: Mapping[Callable[[QualityAssessment], Figure], str] = {
     signals: "Acquired data with its trend (Figure 4).",
     probability_plots: "Normal probability plots (Figure 5): normal noise lies on the line. Each column "
     "of points is one step of the converter.",
@@ -113,7 +119,9 @@ CAPTIONS: Mapping[Callable[[Quality], Figure], str] = {
 """What draws each figure, and its caption."""
 
 
-def _grid(quality: Quality, label: str) -> tuple[Figure, list[tuple[Axes, Channel, Whiteness]]]:
+def _grid(
+    quality: QualityAssessment, label: str
+) -> tuple[Figure, list[tuple[Axes, ChannelAssessment, WhitenessTest]]]:
     """A panel per channel that changes, three in a row."""
     channels = [(c, c.whiteness) for c in quality.channels.values() if c.whiteness is not None]
     figure = Figure(figsize=(9, 5.4), layout="constrained")
@@ -124,7 +132,7 @@ def _grid(quality: Quality, label: str) -> tuple[Figure, list[tuple[Axes, Channe
     return figure, [(axes, *channel) for axes, channel in zip(panels, channels, strict=False)]
 
 
-def _bars(channel: Channel) -> list[float]:
+def _bars(channel: ChannelAssessment) -> list[float]:
     """Edges of the bars [m unit]: a step each, or a quarter of sigma if steps are finer."""
     quarter = 0.25 * channel.description.standard_deviation
     width = max(1, round(quarter / channel.quantum)) * channel.quantum if channel.quantum else quarter
@@ -133,11 +141,11 @@ def _bars(channel: Channel) -> list[float]:
     return (1e3 * (least + width * (np.arange(count + 1) - 0.5))).tolist()
 
 
-def _correlation(axes: Axes, values: NDArray, quality: Quality, samples: float) -> None:
+def _correlation(axes: Axes, values: NDArray, quality: QualityAssessment, samples: float) -> None:
     """A two-sided correlation over the lag, and the band of independent signals."""
     half = len(values) // 2
     lag = 1e3 * quality.period * np.arange(-half, half + 1)
-    band = white_band(samples)
+    band = white_noise_band(samples)
     limit = 1.2 * max(3 * band, float(np.nanmax(np.abs(values))))
     axes.axhspan(-band, band, **BAND)
     axes.plot(lag, values, **MARK)

@@ -3,23 +3,24 @@
 import math
 from dataclasses import fields
 
-from identification.quality import published_noise as reported
+from identification.quality import printed_statistics as reported
 from identification.quality import quality_figures as figures
-from identification.quality.assess import Quality, sensor_offsets
-from identification.quality.dependence import white_band
-from identification.quality.statistics import Description
-from identification.quality.verdicts import CHECKS, findings, verdict, worst
+from identification.quality.assessment import QualityAssessment, sensor_offsets
+from identification.quality.correlation_tests import white_noise_band
+from identification.quality.statistics import DescriptiveStatistics
+from identification.quality.verdicts import CHECKS, channel_verdict, check_results, worst_status
 from identification.recordings.recording import CHANNELS, UNITS
 from identification.report.page import Picture, Section, Table, Text
 
 UNIT_COLUMNS = [f"{name} [{UNITS[name][0]}]" for name in CHANNELS]
+"""Headings of a table with a column per channel."""
 
 
-def quality_section(quality: Quality) -> Section:
+def quality_section(quality: QualityAssessment) -> Section:
     """Everything that section 4 shows, beside the report's values."""
     return Section(
         title=f"Data quality: {quality.name} ({quality.samples} samples, section 4)",
-        verdicts=[verdict(quality, name) for name in CHANNELS],
+        verdicts=[channel_verdict(quality, name) for name in CHANNELS],
         blocks=[
             _checks(quality),
             Text(text=_state(quality)),
@@ -31,7 +32,7 @@ def quality_section(quality: Quality) -> Section:
     )
 
 
-def _state(quality: Quality) -> str:
+def _state(quality: QualityAssessment) -> str:
     if quality.at_rest:
         values = ", ".join(
             f"{name} {offset.value:.3g}" for name, offset in sensor_offsets(quality).items()
@@ -44,23 +45,29 @@ def _state(quality: Quality) -> str:
     )
 
 
-def _checks(quality: Quality) -> Table:
+def _checks(quality: QualityAssessment) -> Table:
     rows = []
     for name in CHANNELS:
-        found = {finding.check: finding.status for finding in findings(quality, name)}
-        rows.append([name, worst(findings(quality, name)), *(found.get(check, "–") for check in CHECKS)])
+        statuses = {result.check: result.status for result in check_results(quality, name)}
+        rows.append(
+            [
+                name,
+                worst_status(check_results(quality, name)),
+                *(statuses.get(check, "–") for check in CHECKS),
+            ]
+        )
     return Table(columns=["Channel", "verdict", *CHECKS], rows=rows, caption="Status of every check.")
 
 
-def _trends(quality: Quality) -> Table:
+def _trends(quality: QualityAssessment) -> Table:
     trends = [quality.channels[name].trend for name in CHANNELS]
     return Table(
         columns=["Parameter", *UNIT_COLUMNS],
         rows=[
             ["factor [unit/s]", *(_estimate(trend.factor, trend.factor_error) for trend in trends)],
-            ["  the report's", *(f"{reported.FACTORS[name]:.6f}" for name in CHANNELS)],
+            ["  the report's", *(f"{reported.TREND_SLOPES[name]:.6f}" for name in CHANNELS)],
             ["offset [unit]", *(_estimate(trend.offset, trend.offset_error) for trend in trends)],
-            ["  the report's", *(f"{reported.OFFSETS[name]:.6f}" for name in CHANNELS)],
+            ["  the report's", *(f"{reported.TREND_OFFSETS[name]:.6f}" for name in CHANNELS)],
         ],
         caption="Signal offset and trend check (Table 2), ± one standard error.",
     )
@@ -70,13 +77,13 @@ def _estimate(value: float, error: float) -> str:
     return f"{value:z.6f} ± {error:.6f}" if math.isfinite(error) else f"{value:z.6f}"
 
 
-def _statistics(quality: Quality) -> Table:
-    found = {name: channel.description for name, channel in quality.channels.items()}
+def _statistics(quality: QualityAssessment) -> Table:
+    statistics = {name: channel.description for name, channel in quality.channels.items()}
     rows = []
-    for field in fields(Description):
-        label = reported.NAMES[field.name]
-        rows.append([label, *(_cell(found[name], field.name) for name in CHANNELS)])
-        report = (_cell(reported.DESCRIPTIONS[name], field.name) for name in CHANNELS)
+    for field in fields(DescriptiveStatistics):
+        label = reported.STATISTIC_NAMES[field.name]
+        rows.append([label, *(_cell(statistics[name], field.name) for name in CHANNELS)])
+        report = (_cell(reported.STATISTICS[name], field.name) for name in CHANNELS)
         rows.append(["  the report's", *report])
     return Table(
         columns=["Parameter", *UNIT_COLUMNS],
@@ -85,14 +92,14 @@ def _statistics(quality: Quality) -> Table:
     )
 
 
-def _cell(description: Description, name: str) -> str:
+def _cell(description: DescriptiveStatistics, name: str) -> str:
     value = getattr(description, name)
     if not math.isfinite(value):
         return "–"
     return f"{value:.2f}" if name == "signal_to_noise" else f"{value:z.4f}"
 
 
-def _correlations(quality: Quality) -> Table:
+def _correlations(quality: QualityAssessment) -> Table:
     rows = [
         [
             f"{first}, {second}",
@@ -107,10 +114,10 @@ def _correlations(quality: Quality) -> Table:
     columns = ["Pair", "correlation", "p, family-wise", "greatest", "at lag [ms]", "the report's"]
     caption = (
         f"Correlation of the detrended signals (Table 4). Independent white signals lie within "
-        f"±{white_band(quality.samples):.4f} in 95 % of cases."
+        f"±{white_noise_band(quality.samples):.4f} in 95 % of cases."
     )
     return Table(columns=columns, rows=rows, caption=caption)
 
 
-def _pictures(quality: Quality) -> list[Picture]:
+def _pictures(quality: QualityAssessment) -> list[Picture]:
     return [Picture(figure=draw(quality), caption=text) for draw, text in figures.CAPTIONS.items()]

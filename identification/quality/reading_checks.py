@@ -7,101 +7,88 @@ the first alone would condemn every real bench.
 import numpy as np
 from scipy import stats
 
-from identification.quality.assess import PRESSURES, Quality
-from identification.quality.channel import MARGINAL_DRIFT, SIGNIFICANCE, Channel
-from identification.quality.levels import Judgement, judgement, level, milli
-
-TREND_LEVELS = (MARGINAL_DRIFT, 1.0)
-"""Drift over the record, relative to Table 1's accuracy, from which it is in doubt, and bad."""
-
-NOISE_LEVELS = (1.5, 4.0)
-"""Standard deviation relative to Table 3's: 3.5 dB and 12 dB of its signal-to-noise ratio."""
-
-OUTLIER_LEVELS = (1.0, 2.0)
-"""Outlier factor (eq. 18) relative to its limit."""
-
-COARSE = 1.1
-"""Step relative to Table 1's twelve bits from which the converter is coarser than it should be."""
-
-LEAST_DITHER = 0.3
-"""Standard deviation of the noise in steps below which rounding errors no longer average out."""
+from identification.quality.assessment import PRESSURES, QualityAssessment
+from identification.quality.channel import ChannelAssessment
+from identification.quality.judgements import Judgement, graded_status, judgement_of, milli_text
 
 
-def offset(quality: Quality, channel: Channel) -> Judgement:
+def check_offset(quality: QualityAssessment, channel: ChannelAssessment) -> Judgement:
     """Is the mean reading within Table 1's accuracy of the rest value?"""
     pressure = channel.name in PRESSURES
     if not (quality.vented if pressure else quality.coil_off):
         return _no_offset(channel, "the chambers are not vented" if pressure else "the coil is on")
-    return judgement(
+    return judgement_of(
         "good" if abs(channel.offset) <= channel.accuracy else "bad",
-        f"offset {milli(channel, channel.offset)} against an accuracy of "
-        f"±{milli(channel, channel.accuracy)}",
+        f"offset {milli_text(channel, channel.offset)} against an accuracy of "
+        f"±{milli_text(channel, channel.accuracy)}",
         f"{'vent this chamber' if pressure else 'switch the coil off'} and record again, "
         "or have the sensor calibrated",
     )
 
 
-def _no_offset(channel: Channel, reason: str) -> Judgement:
+def _no_offset(channel: ChannelAssessment, reason: str) -> Judgement:
     mean = f"the mean reading is {channel.rest + channel.offset:.4g} {channel.unit}, but {reason}"
     return Judgement("note", f"{mean}, so no offset can be read off; record at rest for it")
 
 
-def trend(quality: Quality, channel: Channel) -> Judgement:
+def check_trend(quality: QualityAssessment, channel: ChannelAssessment) -> Judgement:
     """Is the drift over the record small against the accuracy?"""
     ratio, deviations = abs(channel.drift) / channel.accuracy, channel.trend_deviations
-    significant = deviations > stats.norm.isf(SIGNIFICANCE / 2)
-    return judgement(
-        level(ratio, TREND_LEVELS) if significant else "good",
-        f"drift {milli(channel, channel.drift)} in {channel.duration:.3g} s, "
+    significant = deviations > stats.norm.isf(channel.settings.significance / 2)
+    return judgement_of(
+        graded_status(ratio, channel.settings.drift_levels) if significant else "good",
+        f"drift {milli_text(channel, channel.drift)} in {channel.duration:.3g} s, "
         f"{deviations:.1f} standard errors and {100 * ratio:.2g} % of the accuracy",
         "let the bench settle, look for a leak or a warming sensor, and record again",
     )
 
 
-def noise(quality: Quality, channel: Channel) -> Judgement:
+def check_noise(quality: QualityAssessment, channel: ChannelAssessment) -> Judgement:
     """Is the noise as small as the report's?"""
     deviation = channel.normality.standard_deviation
     ratio = deviation / channel.sensor.noise
-    return judgement(
-        level(ratio, NOISE_LEVELS),
-        f"noise {milli(channel, deviation)} before rounding, {ratio:.2f} times Table 3's, "
+    return judgement_of(
+        graded_status(ratio, channel.settings.noise_levels),
+        f"noise {milli_text(channel, deviation)} before rounding, {ratio:.2f} times Table 3's, "
         f"signal-to-noise ratio {channel.description.signal_to_noise:.1f} dB",
         "check shielding, ground and supply of the sensor",
     )
 
 
-def resolution(quality: Quality, channel: Channel) -> Judgement:
+def check_resolution(quality: QualityAssessment, channel: ChannelAssessment) -> Judgement:
     """Do the readings move, in steps no coarser than Table 1's range in twelve bits?"""
     if channel.whiteness is None:
         figures = f"every sample reads {channel.readings[0]:.6g} {channel.unit}"
-        return judgement("bad", figures, "check the sensor's cable and the acquisition")
+        return judgement_of("bad", figures, "check the sensor's cable and the acquisition")
     if channel.longest_run > channel.run_limit:
         return _stands_still(quality, channel)
     ratio = channel.quantum / channel.sensor.resolution
     steps = channel.normality.standard_deviation / channel.quantum if channel.quantum else np.inf
-    return judgement(
-        "doubt" if ratio > COARSE or steps < LEAST_DITHER else "good",
-        f"one step is {milli(channel, channel.quantum)}, {ratio:.2f} times Table 1's range in 12 bits, "
-        f"and the noise is {steps:.2g} steps",
+    return judgement_of(
+        "doubt"
+        if ratio > channel.settings.coarse_step or steps < channel.settings.least_dither
+        else "good",
+        f"one step is {milli_text(channel, channel.quantum)}, {ratio:.2f} times Table 1's range in 12 "
+        f"bits, and the noise is {steps:.2g} steps",
         "check the converter's range and bits, since rounding errors do not average out",
     )
 
 
-def _stands_still(quality: Quality, channel: Channel) -> Judgement:
+def _stands_still(quality: QualityAssessment, channel: ChannelAssessment) -> Judgement:
     still, allowed = (1e3 * quality.period * n for n in (channel.longest_run, channel.run_limit))
-    return judgement(
+    return judgement_of(
         "bad",
         f"one reading lasts {still:.3g} ms, where independent noise stays below {allowed:.3g} ms",
         "check the sensor's cable and the acquisition",
     )
 
 
-def outliers(quality: Quality, channel: Channel) -> Judgement:
+def check_outliers(quality: QualityAssessment, channel: ChannelAssessment) -> Judgement:
     """Does the outlier factor (eq. 18) stay below what normal noise reaches?"""
     factor, limit = channel.description.outlier_factor, channel.outlier_limit
     at = int(np.argmax(np.abs(channel.residual))) * quality.period
-    return judgement(
-        level(factor / limit, OUTLIER_LEVELS),
+    return judgement_of(
+        graded_status(factor / limit, channel.settings.outlier_levels),
         f"greatest outlier {factor:.2f} standard deviations, at {at:.4g} s; 99.9 % of normal records "
         f"stay below {limit:.2f}",
         "look for switching interference and loose contacts, and record again",

@@ -22,12 +22,12 @@ class Trend:
     """Standard error of the offset, for white noise [unit]."""
 
     def at(self, time: NDArray) -> NDArray:
-        """The line at some times [s]."""
+        """The line [unit] at some times (times,) [s], (times,)."""
         return self.offset + self.factor * time
 
 
 @dataclass(frozen=True, kw_only=True)
-class Description:
+class DescriptiveStatistics:
     """Central, dispersion and distribution properties of a detrended signal y (Table 3).
 
     A signal that never changes has no outlier factor, kurtosis or skewness: they are NaN.
@@ -58,7 +58,7 @@ class Description:
 
 
 def fit_trend(time: NDArray, signal: NDArray) -> Trend:
-    """Line through a signal; time, signal: (samples,), at least three of them."""
+    """Line through a signal (samples,) [unit] over time (samples,) [s]; at least three samples."""
     line: Any = stats.linregress(time, signal)
     return Trend(
         factor=float(line.slope),
@@ -68,14 +68,14 @@ def fit_trend(time: NDArray, signal: NDArray) -> Trend:
     )
 
 
-def describe(residual: NDArray, *, greatest: float) -> Description:
+def descriptive_statistics(residual: NDArray, *, greatest: float) -> DescriptiveStatistics:
     """Table 3's statistics of a detrended signal, (samples,).
 
     greatest: greatest value of the channel's range (Table 1), max(y) in eq. 17 [unit].
     """
     sigma = float(np.std(residual, ddof=1))
     moves = np.ptp(residual) > 0
-    return Description(
+    return DescriptiveStatistics(
         arithmetic_mean=float(np.mean(residual)),
         trimmed_mean=float(stats.trim_mean(residual, 0.025)),
         median=float(np.median(residual)),

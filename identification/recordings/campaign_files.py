@@ -11,24 +11,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.common.files import write_text
-from identification.recordings.checks import check_recording
-from identification.recordings.columns import CONSUMPTION, TIME, read_columns
+from epv_env.common.units import BAR
+from identification.recordings.columns import CONSUMPTION_COLUMN, TIME_COLUMN, read_columns
 from identification.recordings.manifest import (
-    BAR,
     FILE_NAME,
     check_manifest,
     manifest_content,
     read_manifest,
 )
 from identification.recordings.recording import Campaign, CampaignError, Recording
+from identification.recordings.recording_checks import check_recording
+from identification.recordings.rules import RULES, RecordingRules
 
 DECIMALS = {
-    TIME: 9, "I_A": 6, "U_V": 5, "p1_bar": 5, "p2_bar": 5, "p3_bar": 5, CONSUMPTION: 9
+    TIME_COLUMN: 9, "I_A": 6, "U_V": 5, "p1_bar": 5, "p2_bar": 5, "p3_bar": 5, CONSUMPTION_COLUMN: 9
 }  # fmt: skip
 """Decimals written: a hundredth of an ADC step or less, and any rate's times as uniform."""
 
 
-def read_campaign(folder: str | PathLike[str]) -> Campaign:
+def read_campaign(folder: str | PathLike[str], rules: RecordingRules = RULES) -> Campaign:
     """The campaign in a folder, every rule of docs/data.md checked. Raises CampaignError."""
     folder = Path(folder)
     manifest = read_manifest(folder)
@@ -37,7 +38,8 @@ def read_campaign(folder: str | PathLike[str]) -> Campaign:
         temperature=manifest.temperature,
         pressure=manifest.pressure,
         recordings=tuple(
-            _read_recording(path, role, manifest.pressure) for path, role in manifest.roles.items()
+            _read_recording(path, role, manifest.pressure, rules)
+            for path, role in manifest.roles.items()
         ),
         folder=folder,
     )
@@ -50,7 +52,9 @@ def check_vacant(folder: Path) -> None:
         raise CampaignError(f"{path} exists already: write to another folder, or remove that campaign")
 
 
-def write_campaign(campaign: Campaign, folder: str | PathLike[str]) -> None:
+def write_campaign(
+    campaign: Campaign, folder: str | PathLike[str], rules: RecordingRules = RULES
+) -> None:
     """Write a campaign that `read_campaign` takes; its JSON last, so that a part of one is none.
 
     Each file is written whole or not at all, in place of one of the same name. Raises CampaignError,
@@ -61,13 +65,13 @@ def write_campaign(campaign: Campaign, folder: str | PathLike[str]) -> None:
     content = manifest_content(campaign)
     check_manifest(folder, content)
     for recording in campaign.recordings:
-        _check_writable(folder / f"{recording.name}.csv", recording, campaign.pressure)
+        _check_writable(folder / f"{recording.name}.csv", recording, campaign.pressure, rules)
     for recording in campaign.recordings:
         write_text(folder / f"{recording.name}.csv", _csv(_columns(recording)))
     write_text(folder / FILE_NAME, json.dumps(content, indent=1) + "\n")
 
 
-def _read_recording(path: Path, role: str, ambient: float) -> Recording:
+def _read_recording(path: Path, role: str, ambient: float, rules: RecordingRules) -> Recording:
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -75,7 +79,7 @@ def _read_recording(path: Path, role: str, ambient: float) -> Recording:
             f"{path} cannot be read ({error.strerror}): add the file, or take it out of {FILE_NAME}"
         ) from None
     columns = read_columns(str(path), content)
-    period = check_recording(str(path), columns, role=role, ambient_bar=ambient / BAR)
+    period = check_recording(str(path), columns, role=role, ambient_bar=ambient / BAR, rules=rules)
     supply = [columns[name] for name in ("p1_bar", "p1a_bar", "p1b_bar") if name in columns]
     return Recording(
         name=path.stem,
@@ -86,7 +90,7 @@ def _read_recording(path: Path, role: str, ambient: float) -> Recording:
         p1=np.mean(supply, axis=0) * BAR,
         p2=columns["p2_bar"] * BAR,
         p3=columns["p3_bar"] * BAR,
-        sigma_S=columns.get(CONSUMPTION, np.zeros_like(columns["U_V"])),
+        sigma_S=columns.get(CONSUMPTION_COLUMN, np.zeros_like(columns["U_V"])),
         sha256=hashlib.sha256(content).hexdigest(),
     )
 
@@ -94,7 +98,7 @@ def _read_recording(path: Path, role: str, ambient: float) -> Recording:
 def _columns(recording: Recording) -> dict[str, NDArray]:
     """A recording's columns as they are written: units of the file, rounded."""
     columns = {
-        TIME: recording.time,
+        TIME_COLUMN: recording.time,
         "I_A": recording.I,
         "U_V": recording.U,
         "p1_bar": recording.p1 / BAR,
@@ -102,7 +106,7 @@ def _columns(recording: Recording) -> dict[str, NDArray]:
         "p3_bar": recording.p3 / BAR,
     }
     if np.any(recording.sigma_S):
-        columns[CONSUMPTION] = recording.sigma_S
+        columns[CONSUMPTION_COLUMN] = recording.sigma_S
     return {name: np.round(values, DECIMALS[name]) for name, values in columns.items()}
 
 
@@ -113,7 +117,7 @@ def _csv(columns: Mapping[str, NDArray]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _check_writable(path: Path, recording: Recording, ambient: float) -> None:
+def _check_writable(path: Path, recording: Recording, ambient: float, rules: RecordingRules) -> None:
     if path.stem != recording.name:
         raise CampaignError(
             f"recording {recording.name!r} does not name a file: give it a name without folders"
@@ -125,4 +129,4 @@ def _check_writable(path: Path, recording: Recording, ambient: float) -> None:
                 f"{path}: {name} has shape {values.shape} or a value that is not finite: give "
                 f"{len(recording)} finite samples"
             )
-    check_recording(str(path), columns, role=recording.role, ambient_bar=ambient / BAR)
+    check_recording(str(path), columns, role=recording.role, ambient_bar=ambient / BAR, rules=rules)

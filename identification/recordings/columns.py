@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from identification.recordings.recording import CampaignError
 
-TIME, CONSUMPTION = "time_s", "sigmaS_kg_per_s"
+TIME_COLUMN, CONSUMPTION_COLUMN = "time_s", "sigmaS_kg_per_s"
+"""Columns that are no channel: time [s] and consumed air [kg/s]."""
 
 CHANNEL_OF: Mapping[str, str] = {
     "I_A": "I",
@@ -23,14 +24,17 @@ CHANNEL_OF: Mapping[str, str] = {
 }
 """Measured channel (recording.CHANNELS) in each column, in the unit of its name."""
 
-REQUIRED = (TIME, "I_A", "U_V", "p2_bar", "p3_bar")
-SUPPLY = (("p1_bar",), ("p1a_bar", "p1b_bar"))
+REQUIRED_COLUMNS = (TIME_COLUMN, "I_A", "U_V", "p2_bar", "p3_bar")
+"""Columns without which a file is refused."""
+
+SUPPLY_COLUMNS = (("p1_bar",), ("p1a_bar", "p1b_bar"))
 """The two ways to give p1: one column, or the two reservoirs' sensors."""
 
-KNOWN = (TIME, *CHANNEL_OF, CONSUMPTION)
+KNOWN_COLUMNS = (TIME_COLUMN, *CHANNEL_OF, CONSUMPTION_COLUMN)
+"""Columns that are read; others are ignored."""
 
 
-def line(sample: int) -> int:
+def line_number(sample: int) -> int:
     """Number of a sample's line in its file; the header is line 1."""
     return sample + 2
 
@@ -38,11 +42,12 @@ def line(sample: int) -> int:
 def read_columns(file: str, content: bytes) -> dict[str, NDArray]:
     """The known columns of a CSV file (RFC 4180, UTF-8), each (samples,), in the order of the file.
 
-    file: what messages call it. Columns that are not KNOWN are ignored. Raises CampaignError.
+    file: what messages call it. The unit of each column is in its name. Columns that are not
+    KNOWN_COLUMNS are ignored. Raises CampaignError.
     """
     text = _decoded(file, content)
     names = _column_names(file, text)
-    wanted = [index for index, name in enumerate(names) if name in KNOWN]
+    wanted = [index for index, name in enumerate(names) if name in KNOWN_COLUMNS]
     values = _parsed_at_once(text, len(names), wanted)
     if values is None:
         values = _parsed_by_line(file, text, names, wanted)
@@ -74,14 +79,14 @@ def _check_names(place: str, names: Sequence[str]) -> None:
     for name in names:
         if names.count(name) > 1:
             raise CampaignError(f"{place}: column {name!r} stands twice: keep one of them")
-    missing = [name for name in REQUIRED if name not in names]
+    missing = [name for name in REQUIRED_COLUMNS if name not in names]
     if missing:
         raise CampaignError(
             f"{place}: missing {', '.join(missing)} in the header {','.join(names)[:120]!r}: "
             "name these columns as docs/data.md does, separated by commas"
         )
-    given = tuple(name for way in SUPPLY for name in way if name in names)
-    if given not in SUPPLY:
+    given = tuple(name for way in SUPPLY_COLUMNS for name in way if name in names)
+    if given not in SUPPLY_COLUMNS:
         raise CampaignError(
             f"{place}: p1 is given by {' and '.join(given) or 'no column'}: "
             "give p1_bar, or both p1a_bar and p1b_bar, not a mixture"
@@ -130,9 +135,9 @@ def _number(place: str, cell: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        found = repr(cell[:40]) if cell.strip() else "empty"
+        shown = repr(cell[:40]) if cell.strip() else "empty"
         raise CampaignError(
-            f"{place} is {found}, not a finite number: give one with '.' as decimal sign, or cut the "
+            f"{place} is {shown}, not a finite number: give one with '.' as decimal sign, or cut the "
             "recording before this line"
         )
     return value

@@ -6,19 +6,23 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from epv_env.common.units import BAR
 from epv_env.plant.parameters import ParameterError, checked_value
-from identification.recordings.recording import ROLES, UNITS, Campaign, CampaignError
+from identification.recordings.recording import ROLES, Campaign, CampaignError
 
 FORMAT = "epv-campaign/1"
+"""Version of the file, in its field `format`."""
+
 FILE_NAME = "campaign.json"
-BAR = UNITS["p1"][1]
+"""Name of the file in the campaign's folder."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Manifest:
-    """What campaign.json says, checked."""
+    """Content of a campaign.json, checked."""
 
     name: str
+    """Of the campaign."""
     temperature: float
     """T_env [K]."""
     pressure: float
@@ -60,9 +64,11 @@ def manifest_content(campaign: Campaign) -> dict[str, Any]:
 def check_manifest(folder: Path, content: Any) -> Manifest:
     """The meaning of a campaign.json's content. Raises CampaignError; fields not listed are ignored."""
     file = str(folder / FILE_NAME)
-    found = content.get("format") if isinstance(content, dict) else None
-    if found != FORMAT:
-        raise CampaignError(f"{file} has format {found!r}, this version reads {FORMAT!r}: write it anew")
+    version = content.get("format") if isinstance(content, dict) else None
+    if version != FORMAT:
+        raise CampaignError(
+            f"{file} has format {version!r}, this version reads {FORMAT!r}: write it anew"
+        )
     environment = _field(file, content, "environment", dict)
     return Manifest(
         name=_field(file, content, "name", str),

@@ -13,77 +13,86 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.sensors import SENSORS
-from identification.recordings.columns import line
+from identification.recordings.columns import line_number
 from identification.recordings.recording import CampaignError
-
-CHOKED = 2.2
-"""Pressure over ambient above which outflow is choked (from 1.9 on), with room for noise."""
-
-SHORTEST, LEAST_FALL = 0.04, 0.25
-"""Duration [s] and relative fall of a discharge that shows where it leads to."""
-
-LIKENESS = 0.3
-"""Part of the ambient pressure within which a discharge that leads to minus that pressure meets it."""
+from identification.recordings.rules import RULES, RecordingRules
 
 MARGIN = SENSORS["p1"].accuracy * SENSORS["p1"].high
 """Accuracy of the pressure sensors (Table 1) [bar]."""
 
 REMEDY = "looks like gauge pressure: give bar absolute (add the environment's pressure)"
+"""End of the sentences that refuse a gauge pressure."""
 
 
 def check_above_ambient(file: str, name: str, pressure: NDArray, ambient: float) -> None:
-    """No chamber falls below ambient pressure by more than the sensor's accuracy.
+    """No pressure (samples,) [bar] falls below ambient pressure by more than the sensor's accuracy.
 
     A hundredth of the samples may: a few are a fault of another kind.
     """
     if np.quantile(pressure, 0.01) < ambient - MARGIN:
         sample = int(np.argmax(pressure < ambient - MARGIN))
         raise CampaignError(
-            f"{file}, line {line(sample)}: {name} is {pressure[sample]:g}, less than the environment's "
+            f"{file}, line {line_number(sample)}: {name} is {pressure[sample]:g}, less than the "
+            "environment's "
             f"{ambient:g} bar by more than the sensor's accuracy of {MARGIN:g} bar, which {REMEDY}"
         )
 
 
-def check_discharge(file: str, U: NDArray, p3: NDArray, period: float, ambient: float) -> None:
+def check_discharge(
+    file: str,
+    U: NDArray,
+    p3: NDArray,
+    period: float,
+    ambient: float,
+    rules: RecordingRules = RULES,
+) -> None:
     """p3 vents towards absolute zero while its outflow is choked, not towards ambient below it.
 
-    Whole discharges and the last two thirds of them must agree: a slow sensor bends the beginning.
+    U [V], p3 [bar]: (samples,). Whole discharges and the last two thirds of them must agree: a slow
+    sensor bends the beginning.
     """
-    discharges = list(_choked_discharges(U, p3, period, ambient))
+    discharges = list(_choked_discharges(U, p3, period, ambient, rules))
     if not discharges:
         return
     end = _common_end(p3, discharges, period)
     late = [slice((2 * part.start + part.stop) // 3, part.stop) for part in discharges]
-    found = np.array([end, _common_end(p3, late, period)])
-    if np.all(np.abs(found + ambient) < LIKENESS * ambient):
+    ends = np.array([end, _common_end(p3, late, period)])
+    if np.all(np.abs(ends + ambient) < rules.gauge_likeness * ambient):
         raise CampaignError(
-            f"{file}, line {line(discharges[0].start)}: p3_bar vents towards {end:.2f} bar where choked "
+            f"{file}, line {line_number(discharges[0].start)}: p3_bar vents towards {end:.2f} bar "
+            "where choked "
             f"flow leads towards 0 bar absolute, which {REMEDY}"
         )
 
 
 def check_against_supply(file: str, name: str, p1: NDArray, p3: NDArray) -> None:
-    """The steady start has p3 = p1: p1 is not lower by more than both accuracies. Arrays: that start."""
+    """In the steady start p3 equals p1: p1 is not lower by more than both accuracies.
+
+    p1, p3: of the steady start, (samples,) [bar]. Raises CampaignError.
+    """
     difference = float(np.mean(p1) - np.mean(p3))
     if difference < -2 * MARGIN:
         raise CampaignError(
-            f"{file}, lines {line(0)} to {line(len(p1) - 1)}: {name} is {-difference:.2f} bar less than "
+            f"{file}, lines {line_number(0)} to {line_number(len(p1) - 1)}: {name} is "
+            f"{-difference:.2f} bar less than "
             f"p3_bar, to which the energised valve joins it, which {REMEDY}"
         )
 
 
-def _choked_discharges(U: NDArray, p3: NDArray, period: float, ambient: float) -> Iterator[slice]:
+def _choked_discharges(
+    U: NDArray, p3: NDArray, period: float, ambient: float, rules: RecordingRules
+) -> Iterator[slice]:
     """Samples, from each switching-off, in which p3 falls far enough through choked flow."""
     energised = 0.5 * np.max(U) < U
     borders = [0, *(np.flatnonzero(np.diff(energised)) + 1), len(U)]
     for first, last in pairwise(borders):
-        falling = (p3[first:last] < 0.9 * p3[first]) & (p3[first:last] > CHOKED * ambient)
+        falling = (p3[first:last] < 0.9 * p3[first]) & (p3[first:last] > rules.choked_ratio * ambient)
         if energised[first] or not np.any(falling):
             continue
         inside = first + np.flatnonzero(falling)
         part = slice(int(inside[0]), int(inside[-1]) + 1)
-        long_enough = (part.stop - part.start) * period >= SHORTEST
-        if long_enough and p3[part.stop - 1] < (1 - LEAST_FALL) * p3[part.start]:
+        long_enough = (part.stop - part.start) * period >= rules.shortest_discharge
+        if long_enough and p3[part.stop - 1] < (1 - rules.least_fall) * p3[part.start]:
             yield part
 
 

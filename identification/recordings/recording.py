@@ -57,7 +57,7 @@ class Recording:
 
     @property
     def time(self) -> NDArray:
-        """Times of the samples [s]."""
+        """Times of the samples, (samples,) [s]."""
         return np.arange(len(self)) * self.period
 
     @property
@@ -67,13 +67,13 @@ class Recording:
 
     def digest(self) -> str:
         """SHA-256 of what was measured, the same whether it was read from a file or not."""
-        found = hashlib.sha256(repr((self.role, self.period)).encode())
+        digest = hashlib.sha256(repr((self.role, self.period)).encode())
         for name in (*CHANNELS, "sigma_S"):
-            found.update(np.ascontiguousarray(getattr(self, name), dtype=float).tobytes())
-        return found.hexdigest()
+            digest.update(np.ascontiguousarray(getattr(self, name), dtype=float).tobytes())
+        return digest.hexdigest()
 
     def channel(self, name: str) -> NDArray:
-        """One of CHANNELS [SI units]."""
+        """The signal of one of CHANNELS, (samples,) [SI]."""
         return {"I": self.I, "U": self.U, "p1": self.p1, "p2": self.p2, "p3": self.p3}[name]
 
 
@@ -82,6 +82,7 @@ class Campaign:
     """The recordings of one bench, and the ambient conditions they share."""
 
     name: str
+    """Of the bench or the session."""
     temperature: float
     """T_env [K]."""
     pressure: float
@@ -89,6 +90,6 @@ class Campaign:
     recordings: tuple[Recording, ...]
     folder: Path | None = None
 
-    def of(self, role: str) -> tuple[Recording, ...]:
+    def with_role(self, role: str) -> tuple[Recording, ...]:
         """The recordings with one of ROLES."""
         return tuple(recording for recording in self.recordings if recording.role == role)

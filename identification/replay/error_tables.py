@@ -4,33 +4,34 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from identification.recordings.recording import OUTPUTS
-from identification.replay.responses import Response, total
+from identification.replay.responses import Response, total_response_error
 from identification.report.page import Table
 
 COLUMNS = ["Case", *(f"eps_{output} [%]" for output in OUTPUTS), "eps_partial [%]"]
+"""Headings of an error table."""
 
 
-def error_table(answers: Sequence[Response], caption: str) -> Table:
+def error_table(responses: Sequence[Response], caption: str) -> Table:
     """Eqs 19 and 20 by recording, and eq. 21 over all, as in Tables 11, 13 and 15."""
     rows = [
-        [answer.recording.name, *map(percent, answer.errors.values()), percent(answer.partial)]
-        for answer in answers
+        [response.recording.name, *map(percent, response.errors.values()), percent(response.partial)]
+        for response in responses
     ]
-    if len(answers) > 1:
-        rows.append(["all (eps_total)", "", "", "", percent(total(answers))])
+    if len(responses) > 1:
+        rows.append(["all (eps_total)", "", "", "", percent(total_response_error(responses))])
     return Table(columns=COLUMNS, rows=rows, caption=caption)
 
 
-def errors_as_json(answers: Sequence[Response]) -> Mapping[str, Any]:
+def errors_as_json(responses: Sequence[Response]) -> Mapping[str, Any]:
     """The same in percent, with the field names of the report's tables."""
-    found: dict[str, Any] = {
-        answer.recording.name: {
-            **{f"eps_{output}": 100 * error for output, error in answer.errors.items()},
-            "eps_partial": 100 * answer.partial,
+    errors: dict[str, Any] = {
+        response.recording.name: {
+            **{f"eps_{output}": 100 * error for output, error in response.errors.items()},
+            "eps_partial": 100 * response.partial,
         }
-        for answer in answers
+        for response in responses
     }
-    return {**found, "eps_total": 100 * total(answers)}
+    return {**errors, "eps_total": 100 * total_response_error(responses)}
 
 
 def percent(fraction: float) -> str:

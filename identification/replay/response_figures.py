@@ -9,18 +9,21 @@ from identification.recordings.recording import OUTPUTS, UNITS
 from identification.replay.responses import Response
 
 MEASURED = {"color": "tab:blue", "alpha": 0.35, "linewidth": 3.0, "label": "measured"}
+"""Line of a measured signal."""
+
 MODEL = {"color": "tab:red", "linewidth": 0.8, "label": "model"}
+"""Line of a modelled signal."""
 
 
-def overlay(answer: Response) -> Figure:
+def response_figure(response: Response) -> Figure:
     """Voltage, and the measured outputs with the model's over them (Figures 10 to 14)."""
     figure = Figure(figsize=(9, 6.5), layout="constrained")
     rows = figure.subplots(len(OUTPUTS) + 1, 1, sharex=True, height_ratios=[0.6, 1, 1, 1])
-    time = answer.recording.time
-    rows[0].plot(time, answer.recording.U, color="tab:blue", linewidth=0.8)
+    time = response.recording.time
+    rows[0].plot(time, response.recording.U, color="tab:blue", linewidth=0.8)
     rows[0].set_ylabel("U [V]")
     for axes, output, measured, model in zip(
-        rows[1:], OUTPUTS, answer.measured, answer.model, strict=True
+        rows[1:], OUTPUTS, response.measured, response.model, strict=True
     ):
         unit, size = UNITS[output]
         axes.plot(time, measured / size, **MEASURED)
@@ -29,20 +32,20 @@ def overlay(answer: Response) -> Figure:
         axes.grid(alpha=0.3)
     rows[1].legend(loc="best", fontsize="small")
     rows[-1].set_xlabel("time [s]")
-    figure.suptitle(answer.recording.name)
+    figure.suptitle(response.recording.name)
     figure.align_ylabels()
     return figure
 
 
-def errors_over_time(answers: Sequence[Response]) -> Figure:
+def error_figure(responses: Sequence[Response]) -> Figure:
     """Model error relative to each output's mean, as eq. 19 weighs it (Figure 15)."""
     figure = Figure(figsize=(9, 1.9 * len(OUTPUTS) + 0.6), layout="constrained")
     rows = figure.subplots(len(OUTPUTS), 1, sharex=True)
     for index, (axes, output) in enumerate(zip(rows, OUTPUTS, strict=True)):
-        for answer in answers:
-            error = answer.model[index] - answer.measured[index]
-            relative = 100.0 * error / np.mean(answer.measured[index])
-            axes.plot(answer.recording.time, relative, linewidth=0.6, label=answer.recording.name)
+        for response in responses:
+            error = response.model[index] - response.measured[index]
+            relative = 100.0 * error / np.mean(response.measured[index])
+            axes.plot(response.recording.time, relative, linewidth=0.6, label=response.recording.name)
         axes.axhline(0.0, color="black", linewidth=0.6)
         axes.set_ylabel(f"{output}: model - measured\n[% of the mean]")
         axes.grid(alpha=0.3)

@@ -8,19 +8,21 @@ from numpy.typing import NDArray
 
 from epv_env.plant.parameters import Parameters
 from identification.recordings.recording import OUTPUTS, Recording
-from identification.replay.drive import drive_of
-from identification.replay.misfit import measured_outputs
-from identification.replay.model import Replay
+from identification.replay.batch_simulation import Replay
+from identification.replay.model_inputs import model_inputs
+from identification.replay.weighted_residuals import measured_outputs
 from identification.report_2003.output_error import partial_error, relative_error, total_error
 
 
 @dataclass(frozen=True, kw_only=True)
 class Response:
-    """One recording and the model's answer to its inputs; arrays (3, samples) of OUTPUTS, SI units."""
+    """One recording and the model's response to its inputs."""
 
     recording: Recording
     measured: NDArray
+    """OUTPUTS, (3, samples) [Pa, Pa, A]."""
     model: NDArray
+    """OUTPUTS of the model, (3, samples) [Pa, Pa, A]."""
 
     @property
     def errors(self) -> dict[str, float]:
@@ -36,8 +38,8 @@ class Response:
 
 
 def responses(recordings: Sequence[Recording], parameters: Parameters) -> list[Response]:
-    """The model's answers, started where each recording's hold says; nothing is fitted."""
-    replay = Replay([drive_of(recording, parameters) for recording in recordings], parameters)
+    """The model's responses from each recording's steady start; nothing is fitted. parameters: [SI]."""
+    replay = Replay([model_inputs(recording, parameters) for recording in recordings], parameters)
     one = {"R": np.array([parameters["R"]])}
     return [
         Response(recording=recording, measured=measured_outputs(recording), model=model[:, :, 0])
@@ -45,6 +47,6 @@ def responses(recordings: Sequence[Recording], parameters: Parameters) -> list[R
     ]
 
 
-def total(answers: Sequence[Response]) -> float:
+def total_response_error(responses: Sequence[Response]) -> float:
     """Eq. 21, as a fraction."""
-    return float(total_error([np.array(answer.partial) for answer in answers]))
+    return float(total_error([np.array(response.partial) for response in responses]))

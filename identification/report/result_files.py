@@ -1,4 +1,4 @@
-"""Writing what a command found: a page to read and a file to compute with."""
+"""Writing the results of a command: a page to read and a file to compute with."""
 
 import json
 from collections.abc import Mapping, Sequence

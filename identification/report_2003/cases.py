@@ -8,15 +8,18 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """Deactivations of the coil. Times in s; those that the report does not print are fitted to it."""
+    """When the coil is switched off; times that the report does not print are fitted to its tables."""
 
     name: str
+    """Of the test case."""
     openings: tuple[float, ...]
-    """Lengths of the deactivations."""
+    """Lengths of the deactivations [s]."""
     duration: float
+    """Of the recording [s]."""
     first: float = 0.05
+    """Start of the first deactivation [s]."""
     pause: float = 0.209
-    """From the end of a deactivation to the start of the next."""
+    """From the end of a deactivation to the start of the next [s]."""
 
     def voltage(self, U_on: float, rate: float) -> NDArray:
         """Voltage at `rate` samples per second [V], (samples,); exact in whole sample counts."""
@@ -35,10 +38,14 @@ CALIBRATION_CASES = (
     Case(name="Test3", openings=(0.11, 0.11), duration=0.65),
     Case(name="Test4", openings=(0.09,), duration=1.05),
 )
+"""Tests that the report calibrates with."""
+
 # Three such pulses fit into 0.75 s with a shorter pause only; its length is a choice of this project.
 VALIDATION_CASE = Case(name="Validation", openings=(0.11, 0.11, 0.11), duration=0.75, pause=0.1)
-RATE = 2000.0
+"""Test that the report holds out."""
+
+SAMPLING_RATE = 2000.0
 """Samples per second of the report's bench (section 3)."""
 
-SUPPLY, CIRCUIT, VOLTAGE = 12.54e5, 6.81e5, 18.9
+SUPPLY_PRESSURE, CIRCUIT_PRESSURE, ENERGISED_VOLTAGE = 12.54e5, 6.81e5, 18.9
 """p1 and p2 at the start [Pa absolute], U_on [V]: not printed, found by fitting Tables 8 and 9."""

@@ -20,10 +20,10 @@ def relative_error(reference: NDArray, modified: NDArray, time: NDArray) -> NDAr
 
 
 def partial_error(errors: Sequence[NDArray]) -> NDArray:
-    """Error of one test from those of its outputs (eq. 20)."""
+    """Error of one test, a fraction, from those of its outputs, each () or (n,) (eq. 20)."""
     return np.sqrt(sum(np.square(error) for error in errors))
 
 
 def total_error(partial_errors: Sequence[NDArray]) -> NDArray:
-    """Root mean square of the tests' partial errors (eq. 21)."""
+    """Root mean square of the tests' partial errors, fractions () or (n,) each (eq. 21)."""
     return np.sqrt(np.mean(np.square(partial_errors), axis=0))

@@ -19,36 +19,29 @@ from SALib.sample import morris as morris_sample
 from SALib.sample import sobol as sobol_sample
 
 from identification.sensitivity.one_at_a_time import changed_values
-from identification.sensitivity.study import STUDY, Conditions, total_errors
-
-SPAN = 0.5
-"""Part of the change of Tables 8 and 9 over which the parameters vary."""
-
-BATCH = 512
-"""Valves simulated together: a record of them takes 100 MB."""
-
-LEVELS = 4
-"""Of Morris's grid."""
+from identification.sensitivity.report_conditions import REPORT_CONDITIONS, StudyConditions, total_errors
+from identification.sensitivity.settings import SENSITIVITY, SensitivitySettings
 
 Model = Callable[[NDArray], NDArray]
-"""Parameter sets (samples, parameters) -> outputs (samples,)."""
+"""Parameter sets (samples, parameters) [SI] -> outputs (samples,)."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Screening:
+class MorrisEffects:
     """Morris's elementary effects: change of the output over the whole range of one parameter."""
 
     symbols: tuple[str, ...]
     mean_absolute: NDArray
-    """mu*, (parameters,)."""
+    """mu*, (parameters,), in the unit of the output."""
     half_width: NDArray
-    """Of the bootstrap 95 % interval of mu*."""
+    """Of the bootstrap 95 % interval of mu*, (parameters,)."""
     spread: NDArray
-    """sigma: beyond mu*, the effect depends on the other parameters or changes its sign."""
+    """sigma, (parameters,): beyond mu*, the effect depends on the other parameters or changes its "
+    "sign."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Indices:
+class SobolIndices:
     """Sobol's indices: shares of the output's variance, (parameters,) each."""
 
     symbols: tuple[str, ...]
@@ -59,29 +52,36 @@ class Indices:
     total: NDArray
     """Lost if the parameter were known: alone and together with others."""
     total_half_width: NDArray
+    """Of the bootstrap 95 % interval."""
 
 
-def ranges(nominal: Mapping[str, float], symbols: Sequence[str], span: float = SPAN) -> NDArray:
-    """Least and greatest value of each parameter, (parameters, 2)."""
+def ranges(
+    nominal: Mapping[str, float], symbols: Sequence[str], span: float = SENSITIVITY.span
+) -> NDArray:
+    """Least and greatest value of each parameter [SI], (parameters, 2)."""
     rows = [changed_values(symbol, nominal[symbol]) for symbol in symbols]
     centre = np.array([[nominal[symbol]] for symbol in symbols])
     return centre + span * (np.array(rows) - centre)
 
 
 def total_error_model(
-    nominal: Mapping[str, float], symbols: Sequence[str], conditions: Conditions = STUDY
+    nominal: Mapping[str, float],
+    symbols: Sequence[str],
+    conditions: StudyConditions = REPORT_CONDITIONS,
+    *,
+    batch: int = SENSITIVITY.batch,
 ) -> Model:
     """Total error (eq. 21) against the nominal model in percent, as a function of parameter sets."""
 
     def model(samples: NDArray) -> NDArray:
-        pieces = [samples[at : at + BATCH] for at in range(0, len(samples), BATCH)]
+        pieces = [samples[at : at + batch] for at in range(0, len(samples), batch)]
         return np.concatenate([_errors(nominal, symbols, piece, conditions) for piece in pieces])
 
     return model
 
 
 def _errors(
-    nominal: Mapping[str, float], symbols: Sequence[str], samples: NDArray, conditions: Conditions
+    nominal: Mapping[str, float], symbols: Sequence[str], samples: NDArray, conditions: StudyConditions
 ) -> NDArray:
     p = {symbol: np.full(1 + len(samples), value) for symbol, value in nominal.items()}
     for symbol, column in zip(symbols, samples.T, strict=True):
@@ -89,41 +89,62 @@ def _errors(
     return 100 * total_errors(p, conditions)
 
 
-def screen(
-    model: Model, symbols: Sequence[str], bounds: NDArray, *, trajectories: int, seed: int
-) -> Screening:
-    """Morris's screening: trajectories x (parameters + 1) evaluations. bounds: (parameters, 2)."""
+def morris_effects(
+    model: Model,
+    symbols: Sequence[str],
+    bounds: NDArray,
+    *,
+    trajectories: int,
+    seed: int,
+    settings: SensitivitySettings = SENSITIVITY,
+) -> MorrisEffects:
+    """Morris's screening: trajectories x (parameters + 1) evaluations; bounds: (parameters, 2) [SI]."""
     problem = _problem(symbols, bounds)
-    samples = morris_sample.sample(problem, trajectories, num_levels=LEVELS, seed=seed)
-    found = morris_analysis.analyze(
-        problem, samples, model(samples), num_levels=LEVELS, num_resamples=1000, seed=seed
+    samples = morris_sample.sample(problem, trajectories, num_levels=settings.grid_levels, seed=seed)
+    effects = morris_analysis.analyze(
+        problem,
+        samples,
+        model(samples),
+        num_levels=settings.grid_levels,
+        num_resamples=settings.resamples,
+        seed=seed,
     )
-    return Screening(
+    return MorrisEffects(
         symbols=tuple(symbols),
-        mean_absolute=np.asarray(found["mu_star"]),
-        half_width=np.asarray(found["mu_star_conf"]),
-        spread=np.asarray(found["sigma"]),
+        mean_absolute=np.asarray(effects["mu_star"]),
+        half_width=np.asarray(effects["mu_star_conf"]),
+        spread=np.asarray(effects["sigma"]),
     )
 
 
 def sobol_indices(
-    model: Model, symbols: Sequence[str], bounds: NDArray, *, samples: int, seed: int
-) -> Indices:
+    model: Model,
+    symbols: Sequence[str],
+    bounds: NDArray,
+    *,
+    samples: int,
+    seed: int,
+    settings: SensitivitySettings = SENSITIVITY,
+) -> SobolIndices:
     """Sobol's first-order and total indices: samples x (parameters + 2) evaluations.
 
-    samples: a power of two. bounds: (parameters, 2).
+    samples: a power of two. bounds: (parameters, 2) [SI].
     """
     problem = _problem(symbols, bounds)
     drawn = sobol_sample.sample(problem, samples, calc_second_order=False, seed=seed)
-    found = sobol_analysis.analyze(
-        problem, model(drawn), calc_second_order=False, num_resamples=1000, seed=seed
+    indices = sobol_analysis.analyze(
+        problem,
+        model(drawn),
+        calc_second_order=False,
+        num_resamples=settings.resamples,
+        seed=np.random.SeedSequence(seed),  # SALib takes the number 0 for "no seed"
     )
-    return Indices(
+    return SobolIndices(
         symbols=tuple(symbols),
-        first=np.asarray(found["S1"]),
-        first_half_width=np.asarray(found["S1_conf"]),
-        total=np.asarray(found["ST"]),
-        total_half_width=np.asarray(found["ST_conf"]),
+        first=np.asarray(indices["S1"]),
+        first_half_width=np.asarray(indices["S1_conf"]),
+        total=np.asarray(indices["ST"]),
+        total_half_width=np.asarray(indices["ST_conf"]),
     )
 
 

@@ -8,7 +8,12 @@ from numpy.typing import NDArray
 
 from epv_env.plant.parameters import table
 from epv_env.plant.simulate import simulate
-from identification.sensitivity.study import STUDY, Conditions, Simulator, total_errors
+from identification.sensitivity.report_conditions import (
+    REPORT_CONDITIONS,
+    Simulator,
+    StudyConditions,
+    total_errors,
+)
 
 FACTORS = (0.9, 1.1)
 """The changes of Tables 8 and 9."""
@@ -18,7 +23,7 @@ THRESHOLD = 0.02
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sensitivity:
+class ErrorSensitivity:
     """Total errors (eq. 21), as fractions, that two changes of one parameter cause."""
 
     minus: float
@@ -50,7 +55,10 @@ def changed_values(symbol: str, nominal: float) -> tuple[float, float]:
 
 
 def variants(nominal: Mapping[str, float], symbols: Sequence[str]) -> dict[str, NDArray]:
-    """Parameters by symbol, (1 + 2 symbols,): the nominal ones, then each symbol lowered and raised."""
+    """Parameters by symbol [SI], (variants,): the nominal ones, then each symbol lowered and raised.
+
+    There are 1 + 2 symbols variants.
+    """
     p = {symbol: np.full(1 + 2 * len(symbols), value) for symbol, value in nominal.items()}
     for row, symbol in enumerate(symbols):
         p[symbol][1 + 2 * row : 3 + 2 * row] = changed_values(symbol, nominal[symbol])
@@ -61,13 +69,13 @@ def sensitivities(
     nominal: Mapping[str, float],
     symbols: Sequence[str],
     *,
-    conditions: Conditions = STUDY,
+    conditions: StudyConditions = REPORT_CONDITIONS,
     simulator: Simulator = simulate,
-) -> dict[str, Sensitivity]:
+) -> dict[str, ErrorSensitivity]:
     """Total errors against the nominal model by symbol; all variants run in one batch."""
     errors = total_errors(variants(nominal, symbols), conditions, simulator)
     pairs = errors.reshape(-1, 2).tolist()
     return {
-        symbol: Sensitivity(minus=minus, plus=plus)
+        symbol: ErrorSensitivity(minus=minus, plus=plus)
         for symbol, (minus, plus) in zip(symbols, pairs, strict=True)
     }

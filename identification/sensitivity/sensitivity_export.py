@@ -4,11 +4,11 @@ import math
 from typing import Any
 
 from epv_env.plant.parameters import confidence_intervals, sensitive_symbols
-from identification.sensitivity.collinearity import CRITICAL, Sensitivities
-from identification.sensitivity.global_indices import Indices, Screening
-from identification.sensitivity.one_at_a_time import Sensitivity
-from identification.sensitivity.results import FIXED_STEP_STUDY, SensitivityStudy
-from identification.sensitivity.study import STUDY
+from identification.sensitivity.collinearity import OutputSensitivities
+from identification.sensitivity.global_indices import MorrisEffects, SobolIndices
+from identification.sensitivity.one_at_a_time import ErrorSensitivity
+from identification.sensitivity.report_conditions import REPORT_CONDITIONS
+from identification.sensitivity.sensitivity_study import FIXED_STEP_CONDITIONS, SensitivityStudy
 
 
 def as_json(study: SensitivityStudy) -> dict[str, Any]:
@@ -16,10 +16,10 @@ def as_json(study: SensitivityStudy) -> dict[str, Any]:
     rows = study.one_at_a_time
     return {
         "conditions": {
-            "p1_bar": STUDY.p1 / 1e5,
-            "p2_bar": STUDY.p2 / 1e5,
-            "U_on_V": STUDY.U_on,
-            "U_on_fixed_step_V": FIXED_STEP_STUDY.U_on,
+            "p1_bar": REPORT_CONDITIONS.p1 / 1e5,
+            "p2_bar": REPORT_CONDITIONS.p2 / 1e5,
+            "U_on_V": REPORT_CONDITIONS.U_on,
+            "U_on_fixed_step_V": FIXED_STEP_CONDITIONS.U_on,
         },
         "fixed_step": {symbol: _row(row) for symbol, row in rows.fixed_step.items()},
         "exact": {symbol: _row(row) for symbol, row in rows.exact.items()},
@@ -29,18 +29,18 @@ def as_json(study: SensitivityStudy) -> dict[str, Any]:
     }
 
 
-def _row(row: Sensitivity) -> dict[str, Any]:
+def _row(row: ErrorSensitivity) -> dict[str, Any]:
     return {"minus10": 100 * row.minus, "plus10": 100 * row.plus, "sensitive": row.sensitive}
 
 
-def _collinearity(found: Sensitivities) -> dict[str, Any]:
+def _collinearity(outputs: OutputSensitivities) -> dict[str, Any]:
     return {
-        "of": found.where,
-        "effect_noise_sd": dict(zip(found.symbols, found.effect.tolist(), strict=True)),
-        "critical_index": CRITICAL,
-        "inseparable_pairs": [[a, b, _finite(index)] for a, b, index in found.inseparable_pairs()],
-        "calibrated_four": _finite(found.index(tuple(confidence_intervals()))),
-        "all_sensitive": _finite(found.index(sensitive_symbols())),
+        "of": outputs.where,
+        "effect_noise_sd": dict(zip(outputs.symbols, outputs.effect.tolist(), strict=True)),
+        "critical_index": outputs.settings.critical_index,
+        "inseparable_pairs": [[a, b, _finite(index)] for a, b, index in outputs.inseparable_pairs()],
+        "calibrated_four": _finite(outputs.index(tuple(confidence_intervals()))),
+        "all_sensitive": _finite(outputs.index(sensitive_symbols())),
     }
 
 
@@ -48,23 +48,26 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _screening(found: Screening) -> dict[str, Any]:
+def _screening(screening: MorrisEffects) -> dict[str, Any]:
     columns = zip(
-        found.mean_absolute.tolist(), found.half_width.tolist(), found.spread.tolist(), strict=True
+        screening.mean_absolute.tolist(),
+        screening.half_width.tolist(),
+        screening.spread.tolist(),
+        strict=True,
     )
     return {
         symbol: {"mu_star": effect, "half_width95": width, "sigma": spread}
-        for symbol, (effect, width, spread) in zip(found.symbols, columns, strict=True)
+        for symbol, (effect, width, spread) in zip(screening.symbols, columns, strict=True)
     }
 
 
-def _indices(found: Indices) -> dict[str, Any]:
+def _indices(indices: SobolIndices) -> dict[str, Any]:
     table = zip(
-        found.symbols,
-        found.first.tolist(),
-        found.first_half_width.tolist(),
-        found.total.tolist(),
-        found.total_half_width.tolist(),
+        indices.symbols,
+        indices.first.tolist(),
+        indices.first_half_width.tolist(),
+        indices.total.tolist(),
+        indices.total_half_width.tolist(),
         strict=True,
     )
     return {

@@ -9,13 +9,17 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from identification.sensitivity.collinearity import CRITICAL, Sensitivities, collinearity_index
-from identification.sensitivity.global_indices import Indices, Screening
-from identification.sensitivity.one_at_a_time import THRESHOLD, Sensitivity
-from identification.sensitivity.results import OneAtATime
+from identification.sensitivity.collinearity import OutputSensitivities, collinearity_index
+from identification.sensitivity.global_indices import MorrisEffects, SobolIndices
+from identification.sensitivity.one_at_a_time import THRESHOLD, ErrorSensitivity
+from identification.sensitivity.sensitivity_study import OneAtATime
 
 BAR: Mapping[str, Any] = {"color": "tab:blue", "alpha": 0.55, "height": 0.7}
+"""Bar of a computed figure."""
+
 INTERVAL = {"color": "0.25", "linewidth": 1.2}
+"""Line of a range."""
+
 GREATEST_SHOWN = 100.0
 """Collinearity indices above this share a colour."""
 
@@ -59,41 +63,44 @@ def _tornado_side(
     axes.grid(axis="x", alpha=0.3)
 
 
-def _side(found: Mapping[str, Sensitivity], order: Sequence[str], side: int) -> list[float]:
+def _side(errors: Mapping[str, ErrorSensitivity], order: Sequence[str], side: int) -> list[float]:
     """Errors of one direction in an order [%]."""
-    return [100 * (found[symbol].minus, found[symbol].plus)[side] for symbol in order]
+    return [100 * (errors[symbol].minus, errors[symbol].plus)[side] for symbol in order]
 
 
-def collinearity_map(found: Sensitivities) -> Figure:
+def collinearity_map(outputs: OutputSensitivities) -> Figure:
     """Collinearity index of every pair; those from 10 up are written out."""
     figure = Figure(figsize=(9, 8), layout="constrained")
     axes = figure.subplots()
-    index = pairwise_indices(found)
+    index = pairwise_indices(outputs)
     norm = LogNorm(1, GREATEST_SHOWN)
     shown = axes.imshow(np.minimum(index, GREATEST_SHOWN), norm=norm, cmap="Blues")
     figure.colorbar(
         shown, ax=axes, label=f"collinearity index (above {GREATEST_SHOWN:g}: as {GREATEST_SHOWN:g})"
     )
-    for row, column in np.argwhere(index >= CRITICAL):
+    for row, column in np.argwhere(index >= outputs.settings.critical_index):
         text = "∞" if np.isinf(index[row, column]) else f"{index[row, column]:.0f}"
         colour = "white" if index[row, column] > 30 else "black"
         axes.text(column, row, text, ha="center", va="center", fontsize=7, color=colour)
-    axes.set_xticks(range(len(found.symbols)), found.symbols, rotation=90)
-    axes.set_yticks(range(len(found.symbols)), found.symbols)
+    axes.set_xticks(range(len(outputs.symbols)), outputs.symbols, rotation=90)
+    axes.set_yticks(range(len(outputs.symbols)), outputs.symbols)
     return figure
 
 
-def pairwise_indices(found: Sensitivities) -> NDArray:
-    """Collinearity index of each pair below the diagonal, NaN elsewhere, (parameters, parameters)."""
-    n = len(found.symbols)
+def pairwise_indices(outputs: OutputSensitivities) -> NDArray:
+    """Collinearity index of each pair below the diagonal, NaN elsewhere.
+
+    Returns (parameters, parameters), without unit.
+    """
+    n = len(outputs.symbols)
     index = np.full((n, n), np.nan)
     for row in range(n):
         for column in range(row):
-            index[row, column] = collinearity_index(found.columns[:, [row, column]])
+            index[row, column] = collinearity_index(outputs.columns[:, [row, column]])
     return index
 
 
-def global_bars(indices: Indices, screening: Screening) -> Figure:
+def global_bars(indices: SobolIndices, screening: MorrisEffects) -> Figure:
     """Sobol's indices and Morris's mean absolute effects with 95 % intervals, in one order."""
     order = np.argsort(indices.total)
     figure = Figure(figsize=(9, 7.5), layout="constrained")
@@ -108,7 +115,7 @@ def global_bars(indices: Indices, screening: Screening) -> Figure:
     return figure
 
 
-def _sobol_bars(axes: Axes, indices: Indices, order: NDArray) -> None:
+def _sobol_bars(axes: Axes, indices: SobolIndices, order: NDArray) -> None:
     rows = np.arange(len(order))
     bars = (
         ("total", indices.total, indices.total_half_width, 0.2, "tab:blue"),

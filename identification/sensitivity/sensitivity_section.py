@@ -5,20 +5,28 @@ import math
 from epv_env.plant.parameters import confidence_intervals, sensitive_symbols, table
 from identification.report.page import Picture, Section, Table, Text, Verdict
 from identification.sensitivity import sensitivity_figures as figures
-from identification.sensitivity.agreement import Agreement, agreement, percentages, printed_rows
-from identification.sensitivity.collinearity import CRITICAL, Sensitivities
-from identification.sensitivity.global_indices import Indices
-from identification.sensitivity.results import FIXED_STEP_STUDY, OneAtATime, SensitivityStudy
-from identification.sensitivity.study import STUDY
-
-REQUIRED = 36
-"""Figures of Tables 8 and 9 that must come back."""
+from identification.sensitivity.collinearity import OutputSensitivities
+from identification.sensitivity.global_indices import SobolIndices
+from identification.sensitivity.printed_agreement import (
+    PrintedAgreement,
+    agreement_with_printed,
+    percentages,
+    printed_rows,
+)
+from identification.sensitivity.report_conditions import REPORT_CONDITIONS
+from identification.sensitivity.sensitivity_study import (
+    FIXED_STEP_CONDITIONS,
+    OneAtATime,
+    SensitivityStudy,
+)
+from identification.sensitivity.settings import SENSITIVITY
 
 METHOD = (
     "The report's rows of the armature most likely carry the scatter of its own simulation: with a "
     "fixed step of 0.5 ms the plant's equations show it too, with exactly located stops they do not. a1 "
     "is zero, so 10 % of it is no change: its row shows the ends of its domain, ±0.1 rad."
 )
+"""How the tables were computed, for the page."""
 
 
 def sensitivity_section(study: SensitivityStudy) -> Section:
@@ -27,8 +35,8 @@ def sensitivity_section(study: SensitivityStudy) -> Section:
     return Section(
         title="Parametric sensitivity (section 5)",
         verdicts=[
-            _reproduced("Fixed step", agreement(rows.fixed_step)),
-            _reproduced("Exact stops", agreement(rows.exact)),
+            _reproduced("Fixed step", agreement_with_printed(rows.fixed_step)),
+            _reproduced("Exact stops", agreement_with_printed(rows.exact)),
             *_separability(study.outputs),
             _dominant(study.indices),
         ],
@@ -51,13 +59,13 @@ def sensitivity_section(study: SensitivityStudy) -> Section:
     )
 
 
-def _reproduced(method: str, met: Agreement) -> Verdict:
+def _reproduced(method: str, met: PrintedAgreement) -> Verdict:
     classes = (
         f"classes differ for {', '.join(met.classes_differ)}"
         if met.classes_differ
         else "all classes agree"
     )
-    good = met.reproduced >= REQUIRED and not met.classes_differ
+    good = met.reproduced >= SENSITIVITY.required_figures and not met.classes_differ
     return Verdict(
         status="good" if good else "doubt",
         text=f"{method}: {met.reproduced} of {met.figures} figures of Tables 8 and 9 within 10 % or 0.1 "
@@ -65,17 +73,17 @@ def _reproduced(method: str, met: Agreement) -> Verdict:
     )
 
 
-def _separability(found: Sensitivities) -> list[Verdict]:
-    four, sensitive = found.index(tuple(confidence_intervals())), found.index(sensitive_symbols())
-    pairs = found.inseparable_pairs()
+def _separability(outputs: OutputSensitivities) -> list[Verdict]:
+    four, sensitive = outputs.index(tuple(confidence_intervals())), outputs.index(sensitive_symbols())
+    pairs, critical = outputs.inseparable_pairs(), outputs.settings.critical_index
     return [
         Verdict(
-            status="good" if four < CRITICAL else "bad",
+            status="good" if four < critical else "bad",
             text=f"The four calibrated parameters together have a collinearity index of {four:.1f}; "
-            f"below {CRITICAL:g} data can tell them apart.",
+            f"below {critical:g} data can tell them apart.",
         ),
         Verdict(
-            status="good" if sensitive < CRITICAL else "note",
+            status="good" if sensitive < critical else "note",
             text=f"All {len(sensitive_symbols())} sensitive ones together: {_index(sensitive)}. "
             f"{len(pairs)} pairs cannot be told apart, first "
             f"{' and '.join(f'{a}, {b}' for a, b, _ in pairs[:2])}, which act by their ratio alone.",
@@ -83,8 +91,8 @@ def _separability(found: Sensitivities) -> list[Verdict]:
     ]
 
 
-def _dominant(found: Indices) -> Verdict:
-    order = sorted(zip(found.total, found.symbols, strict=True), reverse=True)
+def _dominant(indices: SobolIndices) -> Verdict:
+    order = sorted(zip(indices.total, indices.symbols, strict=True), reverse=True)
     names = ", ".join(f"{symbol} {value:.2f}" for value, symbol in order[:4])
     return Verdict(status="note", text=f"Greatest total Sobol indices of the total error: {names}.")
 
@@ -100,9 +108,11 @@ def _rows(study: OneAtATime) -> Table:
             "exact stops [%]",
         ],
         rows=[_cells(study, symbol, printed) for symbol, printed in printed_rows().items()],
-        caption=f"Total error for −10 % / +10 % (Tables 8 and 9) at p1 = {STUDY.p1 / 1e5:g} bar, "
-        f"p2(0) = {STUDY.p2 / 1e5:g} bar, U = {STUDY.U_on:g} V; with the fixed step "
-        f"{FIXED_STEP_STUDY.U_on:g} V, its scatter over 18.5 to 19.3 V.",
+        caption=f"Total error for −10 % / +10 % (Tables 8 and 9) at p1 = "
+        f"{REPORT_CONDITIONS.p1 / 1e5:g} bar, "
+        f"p2(0) = {REPORT_CONDITIONS.p2 / 1e5:g} bar, U = {REPORT_CONDITIONS.U_on:g} V; with the "
+        "fixed step "
+        f"{FIXED_STEP_CONDITIONS.U_on:g} V, its scatter over 18.5 to 19.3 V.",
     )
 
 
@@ -122,11 +132,12 @@ def _pair(values: tuple[float, float]) -> str:
     return f"{values[0]:.3g} / {values[1]:.3g}"
 
 
-def _pairs(found: Sensitivities) -> Table:
+def _pairs(outputs: OutputSensitivities) -> Table:
     return Table(
         columns=["Pair", "collinearity index"],
-        rows=[[f"{a}, {b}", _index(index)] for a, b, index in found.inseparable_pairs()],
-        caption=f"Pairs above {CRITICAL:g}: a change of one can be made up for by the other.",
+        rows=[[f"{a}, {b}", _index(index)] for a, b, index in outputs.inseparable_pairs()],
+        caption=f"Pairs above {outputs.settings.critical_index:g}: a change of one can be made up for "
+        "by the other.",
     )
 
 

@@ -7,24 +7,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.parameters import Parameters
-from identification.calibration.problem import Problem
-from identification.quality.dependence import Whiteness, assess_whiteness
+from identification.calibration.problem import CalibrationProblem
+from identification.quality.correlation_tests import WhitenessTest, assess_whiteness
 from identification.recordings.recording import OUTPUTS, CampaignError
 from identification.replay.responses import Response, responses
-
-LONGEST_LAG = 0.05
-"""Up to where residuals are correlated with themselves [s]."""
+from identification.validation.settings import VALIDATION, ValidationSettings
 
 
 @dataclass(frozen=True, kw_only=True)
-class Residual:
-    """What the model leaves of one output of one recording, in noise deviations."""
+class OutputResidual:
+    """What the model does not explain of one output of one recording."""
 
     recording: str
+    """Name of the recording."""
     output: str
+    """One of recording.OUTPUTS."""
     rms: float
-    """1.0 is the floor: nothing left to explain."""
-    whiteness: Whiteness
+    """Root mean square [noise deviations]; at 1.0 nothing is left to explain."""
+    whiteness: WhitenessTest
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +33,9 @@ class Validation:
 
     parameters: Parameters
     answers: Sequence[Response]
-    residuals: Sequence[Residual]
+    residuals: Sequence[OutputResidual]
+    settings: ValidationSettings = VALIDATION
+    """What the residuals are judged by."""
 
     @property
     def worst(self) -> float:
@@ -41,10 +43,12 @@ class Validation:
         return max(answer.partial for answer in self.answers)
 
 
-def validate(problem: Problem, parameters: Parameters) -> Validation:
+def validate(
+    problem: CalibrationProblem, parameters: Parameters, settings: ValidationSettings = VALIDATION
+) -> Validation:
     """Simulate the held-out recordings; nothing is fitted to them.
 
-    Raises CampaignError if there is none.
+    parameters: the calibrated ones [SI]. Raises CampaignError if there is none.
     """
     if not problem.validation:
         raise CampaignError(
@@ -54,21 +58,24 @@ def validate(problem: Problem, parameters: Parameters) -> Validation:
     return Validation(
         parameters=parameters,
         answers=answers,
-        residuals=[r for answer in answers for r in _residuals(answer, problem)],
+        residuals=[r for answer in answers for r in _residuals(answer, problem, settings)],
+        settings=settings,
     )
 
 
-def _residuals(answer: Response, problem: Problem) -> list[Residual]:
-    lags = min(round(LONGEST_LAG / answer.recording.period), len(answer.recording) // 5)
-    found = []
+def _residuals(
+    answer: Response, problem: CalibrationProblem, settings: ValidationSettings
+) -> list[OutputResidual]:
+    lags = min(round(settings.greatest_lag / answer.recording.period), len(answer.recording) // 5)
+    residuals = []
     for output, measured, model in zip(OUTPUTS, answer.measured, answer.model, strict=True):
         scaled: NDArray = (measured - model) / problem.noise[output]
-        found.append(
-            Residual(
+        residuals.append(
+            OutputResidual(
                 recording=answer.recording.name,
                 output=output,
                 rms=float(np.sqrt(np.mean(scaled**2))),
                 whiteness=assess_whiteness(scaled, lags),
             )
         )
-    return found
+    return residuals

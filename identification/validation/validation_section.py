@@ -5,34 +5,27 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from identification.calibration.calibration_section import TOLERANCE
-from identification.quality.dependence import white_band
+from identification.quality.correlation_tests import white_noise_band
 from identification.recordings.recording import OUTPUTS
 from identification.replay.error_tables import error_table, errors_as_json, percent
-from identification.replay.response_figures import errors_over_time, overlay
+from identification.replay.response_figures import error_figure, response_figure
 from identification.report.page import Picture, Section, Table, Verdict
-from identification.validation.validate import Residual, Validation
-
-WHITE = 1e-4
-"""Probability of white noise below which a residual is called predictable."""
-
-FLOOR = 1.2
-"""Residual in noise deviations up to which next to nothing is left to explain."""
+from identification.validation.validate import OutputResidual, Validation
 
 
 def validation_section(validation: Validation) -> Section:
     """The 10 % rule, the residuals, the responses."""
     return Section(
         title="Validation on held-out recordings (section 7)",
-        verdicts=[_rule(validation), _left(validation)],
+        verdicts=[_error_verdict(validation), _residual_verdict(validation)],
         blocks=[
             error_table(validation.answers, "Result of the model validation (Table 15)."),
             _residual_table(validation),
             *(
-                Picture(figure=overlay(answer), caption="Validation: " + answer.recording.name)
+                Picture(figure=response_figure(answer), caption="Validation: " + answer.recording.name)
                 for answer in validation.answers[:8]
             ),
-            Picture(figure=errors_over_time(validation.answers[:8]), caption="Error over time."),
+            Picture(figure=error_figure(validation.answers[:8]), caption="Error over time."),
             Picture(
                 figure=autocorrelations(validation),
                 caption="Autocorrelation of the residuals; the band holds 95 % of white noise.",
@@ -70,7 +63,7 @@ def autocorrelations(validation: Validation) -> Figure:
         lags = 1e3 * periods[residual.recording] * np.arange(1, len(correlation) + 1)
         axes.plot(lags, correlation, linewidth=0.8, label=residual.recording)
     for axes, output in zip(panels, OUTPUTS, strict=True):
-        band = white_band(min(samples.values()))
+        band = white_noise_band(min(samples.values()))
         axes.axhspan(-band, band, color="tab:orange", alpha=0.25, linewidth=0)
         axes.set_title(output)
         axes.set_xlabel("lag [ms]")
@@ -80,19 +73,22 @@ def autocorrelations(validation: Validation) -> Figure:
     return figure
 
 
-def _rule(validation: Validation) -> Verdict:
-    good = validation.worst < TOLERANCE
+def _error_verdict(validation: Validation) -> Verdict:
+    limit = validation.settings.accepted_error
+    good = validation.worst < limit
     return Verdict(
         status="good" if good else "bad",
         text=f"The greatest partial error on held-out recordings is {percent(validation.worst)} %, "
-        f"{'below' if good else 'not below'} the report's limit of {100 * TOLERANCE:.0f} %.",
+        f"{'below' if good else 'not below'} the report's limit of {100 * limit:.0f} %.",
     )
 
 
-def _left(validation: Validation) -> Verdict:
+def _residual_verdict(validation: Validation) -> Verdict:
     most = max(validation.residuals, key=lambda residual: residual.rms)
-    predictable = [r for r in validation.residuals if r.whiteness.probability < WHITE]
-    if most.rms <= FLOOR and not predictable:
+    predictable = [
+        r for r in validation.residuals if r.whiteness.probability < validation.settings.white
+    ]
+    if most.rms <= validation.settings.explained and not predictable:
         text = (
             f"The residuals are white and at most {most.rms:.3g} times the noise: "
             "nothing is left to explain."
@@ -115,7 +111,7 @@ def _residual_table(validation: Validation) -> Table:
     )
 
 
-def _row(residual: Residual) -> list[str]:
+def _row(residual: OutputResidual) -> list[str]:
     return [
         residual.recording,
         residual.output,

@@ -11,7 +11,7 @@ from epv_env.plant.simulate import Trajectory, energised, simulate
 from epv_env.plant.valves import Valves
 from identification.gap.model.state_equation import StateEquation
 from identification.recordings.recording import OUTPUTS
-from identification.replay.drive import Drive
+from identification.replay.model_inputs import ModelInputs
 
 GRAM, MILLIGRAM = 1e-3, 1e-6
 
@@ -38,7 +38,7 @@ FORCINGS = {
 """Input of the simulator by which each equation is forced, and its sign: drawn air lacks in p2."""
 
 
-def modelled(drive: Drive, p: Mapping[str, float]) -> Trajectory:
+def modelled(drive: ModelInputs, p: Mapping[str, float]) -> Trajectory:
     """The model on a recording's inputs; p: every parameter by symbol [SI]."""
     initial = energised(p, p1=drive.p1_start, p2=drive.p2_start, U=drive.U_start)
     return simulate(
@@ -47,7 +47,7 @@ def modelled(drive: Drive, p: Mapping[str, float]) -> Trajectory:
 
 
 def forced_changes(
-    drive: Drive, p: Mapping[str, float], equation: StateEquation, edges: NDArray
+    drive: ModelInputs, p: Mapping[str, float], equation: StateEquation, edges: NDArray
 ) -> NDArray:
     """`GreyBox.forced` on one recording; p: every parameter by symbol [SI]."""
     m, steps = len(edges) - 1, len(drive.U) - 1
@@ -66,7 +66,9 @@ def forced_changes(
     return changes
 
 
-def _simulated(drive: Drive, p: Mapping[str, float], m: int, inputs: Mapping[str, NDArray]) -> NDArray:
+def _simulated(
+    drive: ModelInputs, p: Mapping[str, float], m: int, inputs: Mapping[str, NDArray]
+) -> NDArray:
     """OUTPUTS from the second sample on, (3, samples - 1, m)."""
     valves = Valves(m)
     valves.set_parameters(np.arange(m), p)

@@ -13,8 +13,8 @@ from identification.gap.design.rivals import Rivals, select_rivals
 from identification.gap.design.settings import DesignSettings
 from identification.gap.rank.ranking import Ranking
 from identification.recordings.recording import Recording
-from identification.replay.drive import Drive
-from identification.replay.model import Replay
+from identification.replay.batch_simulation import Replay
+from identification.replay.model_inputs import ModelInputs
 from identification.report_2003.cases import Case
 from identification.valve_gap.valve import Valve, as_run
 
@@ -205,9 +205,9 @@ def _expected(programme: Programme, period: float) -> Recording:
     )  # fmt: skip
 
 
-def _drive(programme: Programme, recording: Recording) -> Drive:
+def _drive(programme: Programme, recording: Recording) -> ModelInputs:
     """What the programme imposes on the model."""
-    return Drive(
+    return ModelInputs(
         period=recording.period, U=recording.U, p1=recording.p1, sigma_S=recording.sigma_S,
         U_start=programme.U_on, p2_start=programme.p2,
     )  # fmt: skip

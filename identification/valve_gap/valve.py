@@ -11,9 +11,9 @@ from identification.gap.model.free_parameter import NuisanceParameter
 from identification.gap.model.recorded_run import Channel, Run
 from identification.gap.model.state_equation import StateEquation, StateTrace
 from identification.recordings.recording import OUTPUTS, UNITS, Campaign, Recording
-from identification.replay.drive import drive_of
-from identification.replay.misfit import measured_outputs
-from identification.replay.model import Replay
+from identification.replay.batch_simulation import Replay
+from identification.replay.model_inputs import model_inputs
+from identification.replay.weighted_residuals import measured_outputs
 from identification.valve_gap import causes
 from identification.valve_gap.equations import EQUATIONS, forced_changes, modelled
 from identification.valve_gap.noise import noise_of
@@ -56,7 +56,7 @@ class Valve:
         self.tolerances = tuple(_tolerance(symbol, self.base) for symbol in causes.PARAMETER_COMPONENTS)
         self.run_offsets = (P2_START, P3_ZERO, I_ZERO)
         self.equations = EQUATIONS
-        self.replay = Replay([drive_of(r, self.base) for r in self.recordings], self.base)
+        self.replay = Replay([model_inputs(r, self.base) for r in self.recordings], self.base)
 
     def outputs(self, values: Mapping[str, NDArray], runs: Sequence[int]) -> list[NDArray]:
         """`GreyBox.outputs`."""

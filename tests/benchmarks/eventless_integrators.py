@@ -10,7 +10,8 @@ from scipy.integrate import solve_ivp
 from epv_env.plant.coefficients import coefficients
 from epv_env.plant.effects.registry import effect_constants
 from epv_env.plant.equations import Inputs
-from identification.bench.automaton import COMPILED, X
+from identification.bench.hybrid_automaton import POSITIONS
+from identification.bench.right_hand_side import COMPILED_RIGHT_HAND_SIDES
 from identification.bench.schedule import Schedule
 
 RTOL, ATOL = 1e-6, 1e-9
@@ -30,7 +31,7 @@ class GaveUpError(RuntimeError):
 
 def _right_hand_side(schedule: Schedule, u: NDArray, clip: str) -> Callable:
     c, e = coefficients(schedule.parameters), effect_constants(schedule.parameters)
-    limits = dict(zip(X, (schedule.parameters[s] for s in ("xPVmax", "xMVmax")), strict=True))
+    limits = dict(zip(POSITIONS, (schedule.parameters[s] for s in ("xPVmax", "xMVmax")), strict=True))
     evaluations = 0
 
     def rates(_t: float, y: NDArray) -> NDArray:
@@ -42,7 +43,7 @@ def _right_hand_side(schedule: Schedule, u: NDArray, clip: str) -> Callable:
         if clip != NO_STOPS:
             for x, limit in limits.items():
                 inside[x] = min(max(y[x], 0.0), limit)
-        out = COMPILED[False](inside, u, c, e, 1.0, 1.0)[:-2]
+        out = COMPILED_RIGHT_HAND_SIDES[False](inside, u, c, e, 1.0, 1.0)[:-2]
         if clip == STROKES_AND_RATES:
             for x, limit in limits.items():
                 if y[x] <= 0:

@@ -14,10 +14,10 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from epv_env.plant.parameters import Parameters
-from identification.bench.campaign import Truth, measured_campaign, run_programme
+from identification.bench.measurement import TrueSignals, measured_campaign, run_programme
 from identification.bench.programmes import DIAGNOSIS_SUITE, REPORT_SUITE
-from identification.calibration.methods import Fit, nelder_mead, weighted_least_squares
-from identification.calibration.problem import Problem, calibration_problem
+from identification.calibration.problem import CalibrationProblem, calibration_problem
+from identification.calibration.search_methods import SearchResult, nelder_mead, weighted_least_squares
 from identification.recordings.campaign_files import write_campaign
 from identification.recordings.recording import Campaign
 from identification.studies.coverage.coverage import CAMPAIGNS
@@ -51,12 +51,12 @@ def benchmark(table: Table, quick: bool) -> None:
         diagnoses(table, Path(folder), quick)
 
 
-def fits(table: Table, problem: Problem, quick: bool) -> None:
+def fits(table: Table, problem: CalibrationProblem, quick: bool) -> None:
     """The report's fit, on this plant and on SciPy's solver."""
     table.section("four parameters from Table 10, four tests of 3 outputs at 2 kHz, CPU time")
     repetitions = 3 if quick else 9
     misfit, squares = problem.total_error(), problem.least_squares()
-    start = problem.vector.of(problem.vector.reference)
+    start = problem.vector.scaled(problem.vector.reference)
     seconds = durations(lambda: misfit.error(start), 10 * repetitions)
     one = table.add(
         "one evaluation of the total error",
@@ -76,7 +76,7 @@ def fits(table: Table, problem: Problem, quick: bool) -> None:
 
 
 def beside_scipy(
-    table: Table, problem: Problem, simplex: Fit, one: Row, search: Row, quick: bool
+    table: Table, problem: CalibrationProblem, simplex: SearchResult, one: Row, search: Row, quick: bool
 ) -> None:
     """The same error, and the same search, through SciPy's LSODA; one, search: this plant's rows."""
     table.section(f"the same fit through SciPy's LSODA at rtol {RTOL:g}; ratio: this plant is faster by")
@@ -101,7 +101,7 @@ def beside_scipy(
     table.add("Nelder-Mead to convergence", "s", taken, ratio=taken / search.median, note=note)
 
 
-def outcome(fit: Fit) -> str:
+def outcome(fit: SearchResult) -> str:
     """Evaluations and final error of a search."""
     error = f"{100 * fit.error:.5g} %" if fit.method == "Nelder-Mead" else f"rms {fit.error:.5g} sigma"
     return f"{fit.evaluations} evaluations, {error}{'' if fit.converged else ', NOT CONVERGED'}"
@@ -146,7 +146,7 @@ def coverage_seconds(folder: Path, campaigns: int) -> float:
     return identification_process("coverage", "--campaigns", campaigns, "--out", out).seconds
 
 
-def many_recordings(table: Table, folder: Path, truths: list[Truth], quick: bool) -> None:
+def many_recordings(table: Table, folder: Path, truths: list[TrueSignals], quick: bool) -> None:
     """A campaign of LARGE_CAMPAIGN recordings; quick: no more than its calibration from one start."""
     campaign = folder / "many"
     write_campaign(large_campaign(truths), campaign)
@@ -157,7 +157,7 @@ def many_recordings(table: Table, folder: Path, truths: list[Truth], quick: bool
     table.add("  its memory at most", "MiB", found.peak, limit=ACCEPTANCE_CRITERIA["memory"])
 
 
-def large_campaign(truths: list[Truth]) -> Campaign:
+def large_campaign(truths: list[TrueSignals]) -> Campaign:
     """The report's four tests measured again and again, each time with noise of their own."""
     tests = [truth for truth in truths if truth.programme.role == "calibration"]
     others = [truth for truth in truths if truth.programme.role != "calibration"]
@@ -188,7 +188,7 @@ def diagnoses(table: Table, folder: Path, quick: bool) -> None:
         table.add("  its memory at most", "MiB", found.peak, limit=ACCEPTANCE_CRITERIA["memory"])
 
 
-def renamed(truth: Truth, name: str) -> Truth:
+def renamed(truth: TrueSignals, name: str) -> TrueSignals:
     """The same course under another name."""
     return replace(truth, programme=replace(truth.programme, name=name))
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from epv_env.plant.integrate import DEFAULT_STEP
 from epv_env.plant.valves import available_cores
-from identification.bench.automaton import simulate_reference
+from identification.bench.reference_simulation import simulate_reference
 from tests.benchmarks import startup, workloads
 from tests.benchmarks.command_line import run
 from tests.benchmarks.eventless_integrators import CLIPS, final_p2

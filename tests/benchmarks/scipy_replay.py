@@ -13,13 +13,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised
-from identification.bench.automaton import simulate_reference
-from identification.bench.campaign import RESERVOIR
-from identification.bench.schedule import scheduled
-from identification.calibration.problem import Problem
-from identification.replay.drive import Drive
-from identification.replay.misfit import Misfit
-from identification.replay.model import Replay
+from identification.bench.measurement import RESERVOIR_VOLUME
+from identification.bench.reference_simulation import simulate_reference
+from identification.bench.schedule import piecewise_schedule
+from identification.calibration.problem import CalibrationProblem
+from identification.replay.batch_simulation import Replay
+from identification.replay.model_inputs import ModelInputs
+from identification.replay.weighted_residuals import WeightedResiduals
 
 RTOL = 1e-6
 
@@ -47,17 +47,19 @@ class ScipyReplay(Replay):
         ]
 
 
-def scipy_misfit(problem: Problem) -> Misfit:
+def scipy_misfit(problem: CalibrationProblem) -> WeightedResiduals:
     """The problem's total error with SciPy as the simulator."""
     misfit = problem.total_error()
     misfit.replay = ScipyReplay(misfit.replay.drives, misfit.replay.base)
     return misfit
 
 
-def _answer(drive: Drive, parameters: Parameters, p2_shift: float) -> NDArray:
+def _answer(drive: ModelInputs, parameters: Parameters, p2_shift: float) -> NDArray:
     """OUTPUTS of one recording under one set of parameters, (3, samples)."""
     start = energised(parameters, p1=drive.p1_start, p2=drive.p2_start + p2_shift, U=drive.U_start)
     time = np.arange(len(drive.U)) * drive.period
-    schedule = scheduled(parameters, start, time, U=drive.U[:-1], reservoir_volume=RESERVOIR)
+    schedule = piecewise_schedule(
+        parameters, start, time, U=drive.U[:-1], reservoir_volume=RESERVOIR_VOLUME
+    )
     state = simulate_reference(schedule, time, rtol=RTOL).state
     return np.stack([state.p2, state.p3, state.I])

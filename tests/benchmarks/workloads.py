@@ -6,7 +6,7 @@ from epv_env.plant.equations import Inputs
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
-from identification.bench.schedule import Schedule, scheduled
+from identification.bench.schedule import Schedule, piecewise_schedule
 
 PERIOD = 5e-3
 """Time between decisions [s]."""
@@ -52,7 +52,7 @@ def one_valve(duration: float, seed: int = 0) -> Schedule:
     """One valve of `random_switching` as a Schedule."""
     periods = round(duration / PERIOD)
     u = random_switching(1, periods, seed)
-    return scheduled(
+    return piecewise_schedule(
         CALIBRATED,
         energised(CALIBRATED, p1=P1, p2=P2, U=U_ON),
         np.arange(periods + 1) * PERIOD,

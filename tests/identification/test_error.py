@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.report_2003.cases import CALIBRATION_CASES, RATE, VALIDATION_CASE
+from identification.report_2003.cases import CALIBRATION_CASES, SAMPLING_RATE, VALIDATION_CASE
 from identification.report_2003.output_error import partial_error, relative_error, total_error
 
 TIME = np.linspace(0.0, 2.0, 2001)
@@ -39,6 +39,6 @@ def test_table_11_s_partial_errors_and_total_come_from_its_columns():
 
 @pytest.mark.parametrize("case", [*CALIBRATION_CASES, VALIDATION_CASE])
 def test_the_coil_is_off_as_long_and_as_often_as_stated(case):
-    off = case.voltage(24.0, RATE) == 0
-    assert np.sum(off) / RATE == pytest.approx(sum(case.openings))
+    off = case.voltage(24.0, SAMPLING_RATE) == 0
+    assert np.sum(off) / SAMPLING_RATE == pytest.approx(sum(case.openings))
     assert np.sum(np.diff(off.astype(int)) == 1) == len(case.openings)

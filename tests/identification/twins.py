@@ -9,20 +9,22 @@ import numpy as np
 
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.sensors import SENSORS
-from identification.bench.campaign import Truth, measured_campaign, run_programme
+from identification.bench.measurement import TrueSignals, measured_campaign, run_programme
 from identification.bench.programmes import DIAGNOSIS_SUITE, REPORT_SUITE
 from identification.calibration.calibrate import Calibration, calibrate
-from identification.calibration.problem import Problem, calibration_problem
+from identification.calibration.problem import CalibrationProblem, calibration_problem
+from identification.calibration.settings import CalibrationSettings
 from identification.recordings.recording import CHANNELS, UNITS, Campaign, Recording
 
 TRUE = Parameters.calibrated()
 PROGRAMMES = {programme.name: programme for programme in DIAGNOSIS_SUITE}
 REPORT = tuple(programme.name for programme in REPORT_SUITE)
 SWITCHING = tuple(name for name in REPORT if name != "rest")
+ONE_START = CalibrationSettings(starts=1)
 
 
 @cache
-def truth(name: str, rate: float = 2000.0) -> Truth:
+def truth(name: str, rate: float = 2000.0) -> TrueSignals:
     """What really happened in one recording of the diagnosis suite."""
     return run_programme(TRUE, PROGRAMMES[name], rate=rate)
 
@@ -34,7 +36,7 @@ def twin(seed: int = 1, rate: float = 2000.0) -> Campaign:
 
 
 @cache
-def problem(seed: int = 1) -> Problem:
+def problem(seed: int = 1) -> CalibrationProblem:
     """What the measured suite poses, from Table 10."""
     return calibration_problem(twin(seed))
 
@@ -43,7 +45,9 @@ def problem(seed: int = 1) -> Problem:
 def calibration() -> Calibration:
     """The measured suite, calibrated from Table 10 alone."""
     with TemporaryDirectory() as folder:
-        return calibrate(problem(), journal=Path(folder) / "journal.jsonl", subject={}, starts=1)
+        return calibrate(
+            problem(), journal=Path(folder) / "journal.jsonl", subject={}, settings=ONE_START
+        )
 
 
 def exact_recording(name: str, rate: float = 2000.0, share: float = 1e-6, seed: int = 0) -> Recording:
@@ -64,7 +68,7 @@ def exact_recording(name: str, rate: float = 2000.0, share: float = 1e-6, seed: 
 
 
 @cache
-def exact_problem() -> Problem:
+def exact_problem() -> CalibrationProblem:
     """The report's switching recordings almost free of noise, from Table 10."""
     recordings = tuple(exact_recording(name) for name in SWITCHING)
     campaign = Campaign(name="exact", temperature=293.0, pressure=1e5, recordings=recordings)

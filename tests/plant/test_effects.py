@@ -71,7 +71,7 @@ def test_sizes_of_zero_are_no_effects():
 
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_the_kernel_agrees_with_scipy_on_every_effect(name):
-    from identification.bench.automaton import simulate_reference
+    from identification.bench.reference_simulation import simulate_reference
     from identification.bench.schedule import delayed_schedule
 
     p = sized(name, 0.3)

@@ -18,7 +18,7 @@ from epv_env.plant.equations import (
 from epv_env.plant.flow import MAX_RELATIVE_ERROR
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised, simulate
-from identification.bench.automaton import COMPILED
+from identification.bench.right_hand_side import COMPILED_RIGHT_HAND_SIDES
 from tests.reference.numpy_rhs import numpy_rates
 
 CALIBRATED = Parameters.calibrated()
@@ -52,7 +52,7 @@ def test_compiled_derivative_agrees_with_equations_typed_independently(p):
     reservoir = 0.08
     expected = np.array([*(columns := numpy_rates(state, inputs, p, reservoir))[0], *columns[1:]])
     c, e = coefficients(p, reservoir), effect_constants(p)
-    right_hand_side = COMPILED[p is WITH_CONE]
+    right_hand_side = COMPILED_RIGHT_HAND_SIDES[p is WITH_CONE]
     found = np.stack(
         [
             right_hand_side(np.array(q), np.array(u), c, e, 1.0, 1.0)
@@ -67,7 +67,9 @@ def test_compiled_derivative_agrees_with_equations_typed_independently(p):
 def test_held_movers_have_no_rates():
     state, inputs = random_states(1)
     q, u = np.array(state)[:, 0], np.array(inputs)[:, 0]
-    held = COMPILED[False](q, u, coefficients(CALIBRATED), effect_constants(CALIBRATED), 0.0, 0.0)
+    held = COMPILED_RIGHT_HAND_SIDES[False](
+        q, u, coefficients(CALIBRATED), effect_constants(CALIBRATED), 0.0, 0.0
+    )
     np.testing.assert_array_equal(held[2:6], 0.0)
 
 
@@ -75,8 +77,8 @@ def test_no_effects_make_the_extended_kernel_the_nominal_one():
     state, inputs = random_states(100, seed=1)
     c, e = coefficients(CALIBRATED), effect_constants(CALIBRATED)
     for q, u in zip(np.array(state).T.copy(), np.array(inputs).T.copy(), strict=True):
-        nominal = COMPILED[False](q, u, c, e, 1.0, 1.0)
-        extended = COMPILED[True](q, u, c, e, 1.0, 1.0)
+        nominal = COMPILED_RIGHT_HAND_SIDES[False](q, u, c, e, 1.0, 1.0)
+        extended = COMPILED_RIGHT_HAND_SIDES[True](q, u, c, e, 1.0, 1.0)
         np.testing.assert_allclose(extended, nominal, rtol=1e-13, atol=1e-12 * np.max(np.abs(nominal)))
 
 

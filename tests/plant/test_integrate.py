@@ -7,15 +7,15 @@ import pytest
 
 from epv_env.plant.integrate import DEFAULT_STEP
 from epv_env.plant.parameters import Parameters
-from identification.bench.automaton import Run, simulate_reference
+from identification.bench.reference_simulation import ReferenceRun, simulate_reference
 from tests.reference.closed_loop import random_schedules
 from tests.reference.schedule import (
     Schedule,
     largest_difference,
+    piecewise_schedule,
     plant_states,
     report_tests,
     sample_times,
-    scheduled,
 )
 
 MILLIBAR = 100.0  # Pa
@@ -29,12 +29,12 @@ REBOUNDING = report_tests(CALIBRATED.replace(eMV=0.8, ePV=0.3))["test1"]
 
 
 @cache
-def reference(name: str) -> Run:
+def reference(name: str) -> ReferenceRun:
     """Reference run of a test of the report, sampled every 0.5 ms."""
     return simulate_reference(REPORT[name], sample_times(REPORT[name], 0.5e-3))
 
 
-def assert_agrees(schedule: Schedule, run: Run, within: float = 1.0) -> None:
+def assert_agrees(schedule: Schedule, run: ReferenceRun, within: float = 1.0) -> None:
     """The plant at its default step meets the bars, in units of `within`."""
     found = plant_states(schedule, run.time)
     everywhere = np.full(run.time.shape, True)
@@ -54,7 +54,7 @@ def test_two_references_agree(name):
     """LSODA and DOP853 share nothing but the right-hand side and the automaton."""
     other = simulate_reference(REPORT[name], reference(name).time, method="DOP853", rtol=1e-11)
     assert np.max(np.abs(other.state.p2 - reference(name).state.p2)) < 1e-3 * MILLIBAR
-    assert [e.what for e in other.events] == [e.what for e in reference(name).events]
+    assert [e.name for e in other.events] == [e.name for e in reference(name).events]
 
 
 @pytest.mark.parametrize("name", REPORT)
@@ -65,7 +65,7 @@ def test_events_happen_when_scipy_finds_them(name):
     after = plant_states(schedule, at + EVENT_TIME)
     strokes = {"piston": ("xPV", "xPVmax"), "armature": ("xMV", "xMVmax")}
     for k, event in enumerate(events):
-        mover, what, where = event.what.split()[:3]
+        mover, what, where = event.name.split()[:3]
         stroke, limit = strokes[mover]
         x = getattr(before, stroke)[k], getattr(after, stroke)[k]
         stop = 0.0 if where == "low" else schedule.parameters[limit]
@@ -103,7 +103,7 @@ def test_agrees_with_scipy_in_many_random_closed_loops(seed):
 
 def test_rebounds_end_and_agree_with_scipy():
     run = simulate_reference(REBOUNDING, sample_times(REBOUNDING, 0.5e-3))
-    assert sum(event.what == "armature lands high" for event in run.events) > 10
+    assert sum(event.name == "armature lands high" for event in run.events) > 10
     assert_agrees(REBOUNDING, run, within=0.5)
 
 
@@ -111,7 +111,7 @@ def test_a_bounce_within_one_step_is_not_missed():
     """Switched off on its way up, the armature touches the stop for less than a step and falls."""
     at_rest = REPORT["test1"].initial._replace(xMV=0.0, I=0.0, p2=8e5, p3=10e5)
     p = CALIBRATED.replace(eMV=0.3)
-    schedule = scheduled(p, at_rest, [0.0, 4.67e-3, 10.67e-3], U=[24.0, 0.0])
+    schedule = piecewise_schedule(p, at_rest, [0.0, 4.67e-3, 10.67e-3], U=[24.0, 0.0])
     assert_agrees(schedule, simulate_reference(schedule, sample_times(schedule, 1e-4)))
 
 
@@ -119,8 +119,8 @@ def test_a_rebound_takes_the_time_of_flight_of_a_thrown_body():
     """Under a constant force F, a mover that leaves a stop at v is back after 2 m v / F."""
     p = CALIBRATED.replace(eMV=0.95, kMV=0.0)
     falling = REPORT["test4"].initial._replace(xMV=2e-5, vMV=-0.02, I=0.0)
-    schedule = scheduled(p, falling, [0.0, 5e-3], U=0.0)
-    landings = [e.time for e in simulate_reference(schedule, [0.0]).events if "lands" in e.what]
+    schedule = piecewise_schedule(p, falling, [0.0, 5e-3], U=0.0)
+    landings = [e.time for e in simulate_reference(schedule, [0.0]).events if "lands" in e.name]
     times = np.array(landings[:3])
     after = plant_states(schedule, times + 1e-6)
     assert np.all(after.vMV > 0)
@@ -132,7 +132,7 @@ def test_a_rebound_takes_the_time_of_flight_of_a_thrown_body():
 def opening_away_from_the_laminar_seam():
     """One opening whose p3 stays off p1 and so misses the laminar seam, which no event marks."""
     energised = REPORT["test1"].initial
-    return scheduled(
+    return piecewise_schedule(
         CALIBRATED, energised._replace(p3=0.95 * energised.p1), [0.0, 0.09, 0.12], U=[0.0, 24.0]
     )
 

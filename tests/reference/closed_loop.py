@@ -9,7 +9,7 @@ from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters, table
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
-from identification.bench.schedule import Schedule, scheduled
+from identification.bench.schedule import Schedule, piecewise_schedule
 
 PERIOD = 5e-3
 """Time between decisions [s]."""
@@ -63,7 +63,7 @@ def random_schedules(n: int, seed: int) -> list[Schedule]:
     initial = [energised(p, p1=at, p2=6.5e5, U=U_ON) for p, at in zip(parameters, p1, strict=True)]
     U = _controlled(parameters, initial, imposed)
     return [
-        scheduled(
+        piecewise_schedule(
             parameters[k],
             initial[k],
             np.arange(decisions + 1) * PERIOD,

@@ -12,7 +12,7 @@ from epv_env.plant.integrate import DEFAULT_STEP
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
-from identification.bench.schedule import Schedule, scheduled
+from identification.bench.schedule import Schedule, piecewise_schedule
 
 MOST_STEPS = 5000
 """Steps that one `advance` is asked for; well below integrate.MAX_STEPS."""
@@ -32,7 +32,7 @@ def pulses(
     """Energised, then from 0.05 s on `count` deactivations of `opening` [s], `pause` [s] apart."""
     starts = 0.05 + (opening + pause) * np.arange(count)
     borders = np.concatenate([[0.0], np.stack([starts, starts + opening], 1).ravel(), [duration]])
-    return scheduled(
+    return piecewise_schedule(
         parameters,
         energised(parameters, p1=p1, p2=p2, U=U_on),
         borders,

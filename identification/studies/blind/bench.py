@@ -10,12 +10,17 @@ from epv_env.plant.effects.registry import effect_constants
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.readings import readings
-from identification.bench.automaton import simulate_reference
-from identification.bench.campaign import RESERVOIR, Truth, initial_state, measured_campaign
+from identification.bench.measurement import (
+    RESERVOIR_VOLUME,
+    TrueSignals,
+    initial_state,
+    measured_campaign,
+)
 from identification.bench.programmes import DIAGNOSIS_SUITE, Programme
-from identification.bench.schedule import Schedule, scheduled
+from identification.bench.reference_simulation import simulate_reference
+from identification.bench.schedule import Schedule, piecewise_schedule
 from identification.recordings.recording import Campaign
-from identification.report_2003.cases import RATE
+from identification.report_2003.cases import SAMPLING_RATE
 from identification.studies.blind.deviating_forms import right_hand_side, terminal_currents
 from identification.studies.blind.settings import DEFAULTS, BlindSettings
 from identification.studies.blind.truth import Trial
@@ -33,7 +38,7 @@ def blind_suite(settings: BlindSettings = DEFAULTS) -> tuple[Programme, ...]:
     )
 
 
-def true_recordings(trial: Trial, seed: int, settings: BlindSettings = DEFAULTS) -> list[Truth]:
+def true_recordings(trial: Trial, seed: int, settings: BlindSettings = DEFAULTS) -> list[TrueSignals]:
     """The noise-free course of every recording.
 
     Args:
@@ -56,7 +61,7 @@ def true_recordings(trial: Trial, seed: int, settings: BlindSettings = DEFAULTS)
     ]
 
 
-def blind_campaign(truths: list[Truth], trial: Trial, seed: int) -> Campaign:
+def blind_campaign(truths: list[TrueSignals], trial: Trial, seed: int) -> Campaign:
     """The readings of the bench's sensors; the campaign's name holds the trial's number only."""
     noise = int(np.random.SeedSequence([seed, trial.number, 0, 3]).generate_state(1)[0])
     name = f"trial-{trial.number:04d}"
@@ -70,7 +75,7 @@ def run_programme(
     form_deviation: float,
     rng: np.random.Generator,
     settings: BlindSettings = DEFAULTS,
-) -> Truth:
+) -> TrueSignals:
     """One recording of a valve whose effects deviate in form; at deviation 0 the forms are the plant's.
 
     Args:
@@ -83,15 +88,15 @@ def run_programme(
     Raises:
         RuntimeError: no solver follows the valve.
     """
-    U = programme.case.voltage(programme.U_on, RATE)
-    time = np.arange(len(U)) / RATE
+    U = programme.case.voltage(programme.U_on, SAMPLING_RATE)
+    time = np.arange(len(U)) / SAMPLING_RATE
     start = initial_state(parameters, programme)
-    schedule = scheduled(parameters, start, time, U=U[:-1], reservoir_volume=RESERVOIR)
+    schedule = piecewise_schedule(parameters, start, time, U=U[:-1], reservoir_volume=RESERVOIR_VOLUME)
     schedule = _delayed(schedule, parameters["t_delay"], form_deviation, rng)
     state = _simulated(schedule, time, form_deviation, settings)
-    return Truth(
+    return TrueSignals(
         programme=programme,
-        period=1.0 / RATE,
+        period=1.0 / SAMPLING_RATE,
         channels={"U": U, **_sensed(state, parameters, form_deviation)},
     )
 

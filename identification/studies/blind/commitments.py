@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from epv_env.common.files import write_bytes, write_text
-from identification.bench.campaign import Truth
+from identification.bench.measurement import TrueSignals
 from identification.recordings.recording import OUTPUTS
 from identification.studies.blind.kinds import NOMINAL, TWO_EFFECTS
 from identification.studies.blind.noise_free_gap import (
@@ -27,7 +27,7 @@ MODEL_CHANNELS = ("U", "p1", *OUTPUTS)
 """Channels that a comparison with the model needs."""
 
 
-def noise_free_recordings(truths: Sequence[Truth]) -> list[NoiseFreeRecording]:
+def noise_free_recordings(truths: Sequence[TrueSignals]) -> list[NoiseFreeRecording]:
     """The bench's truth, with which the models are compared; without the record at rest."""
     return [
         NoiseFreeRecording(

@@ -54,7 +54,7 @@ from epv_env.plant.equations import (
     reluctance_inverse,
 )
 from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at, store_state
-from identification.bench.automaton import RightHandSide
+from identification.bench.right_hand_side import RightHandSide
 
 FILM_THICKNESS = 20e-6
 """Thickness of the air film that an armature squeezes out as it lands [m]."""

@@ -15,9 +15,9 @@ from epv_env.plant.parameters import Parameters, table
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from epv_env.plant.sensors import SENSORS
 from identification.recordings.recording import OUTPUTS, UNITS
-from identification.replay.drive import Drive
-from identification.replay.model import Replay
-from identification.replay.vector import Vector
+from identification.replay.batch_simulation import Replay
+from identification.replay.model_inputs import ModelInputs
+from identification.replay.parameter_vector import ParameterVector
 from identification.studies.blind.settings import DEFAULTS, BlindSettings
 from identification.valve_gap.causes import PARAMETER_COMPONENTS
 
@@ -36,10 +36,10 @@ class NoiseFreeRecording:
     """U, p1 and OUTPUTS [SI], (samples,)."""
 
     @property
-    def drive(self) -> Drive:
+    def drive(self) -> ModelInputs:
         """Inputs and start for the model: as a diagnosis takes them, but exact."""
         U = self.channels["U"]
-        return Drive(
+        return ModelInputs(
             period=self.period,
             U=U,
             p1=self.channels["p1"],
@@ -96,7 +96,7 @@ def recalibrated_parameters(
     with_scatter: fit the other parameters too, within their scatter from unit to unit.
     """
     others = tuple(PARAMETER_COMPONENTS) if with_scatter else ()
-    vector = Vector(CALIBRATED_SYMBOLS + others, Parameters.calibrated())
+    vector = ParameterVector(CALIBRATED_SYMBOLS + others, Parameters.calibrated())
     fitted = [recording for recording in recordings if not recording.held_out]
     comparison = NoiseFreeComparison(fitted, vector.reference, settings)
     return vector.parameters(_best_fit(comparison, vector, _bounds(vector, settings), settings))
@@ -118,7 +118,7 @@ def hypothesis_distance(
     """
     others = tuple(symbol for symbol in PARAMETER_COMPONENTS if symbol not in sizes)
     symbols = CALIBRATED_SYMBOLS + others + tuple(sizes)
-    vector = Vector(symbols, Parameters.calibrated().replace(**sizes))
+    vector = ParameterVector(symbols, Parameters.calibrated().replace(**sizes))
     free = np.array([symbol in sizes for symbol in symbols])
     size_bounds = [[0.0], [settings.largest_size_ratio]]
     bounds = np.where(free, size_bounds, _bounds(vector, settings))
@@ -154,7 +154,7 @@ def held_out_gap(
 
 def _best_fit(
     comparison: NoiseFreeComparison,
-    vector: Vector,
+    vector: ParameterVector,
     bounds: NDArray,
     settings: BlindSettings,
     free: NDArray | bool = False,
@@ -185,12 +185,12 @@ def _best_fit(
     ).x
 
 
-def _scatters(vector: Vector) -> NDArray:
+def _scatters(vector: ParameterVector) -> NDArray:
     """Whether each parameter scatters from unit to unit, boolean (k,)."""
     return np.array([symbol in PARAMETER_COMPONENTS for symbol in vector.symbols])
 
 
-def _bounds(vector: Vector, settings: BlindSettings) -> NDArray:
+def _bounds(vector: ParameterVector, settings: BlindSettings) -> NDArray:
     """The four within their ranges, the others within a unit's scatter; scaled [-], (2, k)."""
     low, high = vector.bounds.T
     scatters, reach = _scatters(vector), settings.scatter_reach

@@ -19,7 +19,7 @@ from threadpoolctl import threadpool_limits
 
 from epv_env.common.files import write_text
 from epv_env.common.progress import progress
-from identification.bench.campaign import Truth
+from identification.bench.measurement import TrueSignals
 from identification.recordings.campaign_files import write_campaign
 from identification.recordings.manifest import FILE_NAME
 from identification.studies.blind.bench import blind_campaign, true_recordings
@@ -184,7 +184,7 @@ def run_in_processes(
 
 def _drawn_and_recorded(
     seed: int, number: int, kind: str, causes: Sequence[str], settings: BlindSettings
-) -> tuple[Trial, list[Truth], dict[str, float]]:
+) -> tuple[Trial, list[TrueSignals], dict[str, float]]:
     """A trial that a solver follows, its recordings, and the gaps of a pair's single effects [-]."""
     for attempt in range(settings.attempts):
         trial = draw_trial(seed, number, kind, causes, attempt, settings)

@@ -16,12 +16,13 @@ from epv_env.common.journal import Journal
 from epv_env.common.progress import progress
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.valves import available_cores
-from identification.bench.campaign import Truth, measured_campaign, run_programme
+from identification.bench.measurement import TrueSignals, measured_campaign, run_programme
 from identification.bench.programmes import REPORT_SUITE
-from identification.calibration.methods import nelder_mead, weighted_least_squares
 from identification.calibration.problem import calibration_problem
-from identification.confidence.covariance import covariance
-from identification.confidence.printed_interval import PROBABILITY, report_interval
+from identification.calibration.search_methods import nelder_mead, weighted_least_squares
+from identification.confidence.covariance import estimate_covariance
+from identification.confidence.report_interval import report_interval
+from identification.confidence.settings import CONFIDENCE
 
 CAMPAIGNS = 200
 """Campaigns of a study: a coverage of 0.95 is then known to about ±0.03."""
@@ -62,7 +63,7 @@ class Coverage:
         return self._in_region(self.disagreement)
 
     def _in_region(self, squared_distance: NDArray) -> NDArray:
-        return squared_distance <= chi2.ppf(PROBABILITY, len(self.symbols))
+        return squared_distance <= chi2.ppf(CONFIDENCE.probability, len(self.symbols))
 
 
 def coverage_study(
@@ -113,7 +114,7 @@ _worker: dict[str, Any] = {}
 """What all campaigns of a worker process share: noise-free recordings, truth and seed."""
 
 
-def _prepare_worker(truths: list[Truth], truth: Parameters, seed: int) -> None:
+def _prepare_worker(truths: list[TrueSignals], truth: Parameters, seed: int) -> None:
     threadpool_limits(1)  # threads of the linear algebra would take the other workers' cores
     _worker.update(truths=truths, truth=truth, seed=seed)
 
@@ -124,12 +125,12 @@ def _calibrated(index: int) -> dict[str, Any]:
     # One seed per campaign, not seed + index: neighbouring studies must not share campaigns.
     noise_seed = int(np.random.SeedSequence([_worker["seed"], index]).generate_state(1)[0])
     problem = calibration_problem(measured_campaign(_worker["truths"], truth, seed=noise_seed))
-    start, true = problem.vector.of(problem.vector.reference), problem.vector.of(truth)
+    start, true = problem.vector.scaled(problem.vector.reference), problem.vector.scaled(truth)
     squares, total = problem.least_squares(), problem.total_error()
     fit, simplex = weighted_least_squares(squares, start), nelder_mead(total, start)
-    estimate = covariance(problem, squares, fit.z, seed=noise_seed)
+    estimate = estimate_covariance(problem, squares, fit.z, seed=noise_seed)
     report = report_interval(problem, simplex.z, simplex.error)
-    half_widths = np.sqrt(chi2.ppf(PROBABILITY, 1) * np.diag(estimate.total))
+    half_widths = np.sqrt(chi2.ppf(CONFIDENCE.probability, 1) * np.diag(estimate.total))
     return {
         "symbols": list(problem.vector.symbols),
         "distance": _squared_distance(fit.z - true, estimate.total),

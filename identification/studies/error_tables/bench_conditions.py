@@ -10,14 +10,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.replay.drive import Drive
+from identification.replay.model_inputs import ModelInputs
 from identification.report_2003.cases import (
     CALIBRATION_CASES,
-    CIRCUIT,
-    RATE,
-    SUPPLY,
+    CIRCUIT_PRESSURE,
+    ENERGISED_VOLTAGE,
+    SAMPLING_RATE,
+    SUPPLY_PRESSURE,
     VALIDATION_CASE,
-    VOLTAGE,
     Case,
 )
 from identification.studies.error_tables.settings import DEFAULTS, ErrorTableSettings
@@ -44,7 +44,7 @@ class Conditions:
     """Winding temperature less its mean over tests 1 to 4 [-], within ±1 or so, (5,)."""
 
     @property
-    def drives(self) -> list[Drive]:
+    def drives(self) -> list[ModelInputs]:
         """Inputs and starts that the five tests impose on the model."""
         return [
             _drive(case, *values)
@@ -57,9 +57,9 @@ def fitted_conditions() -> Conditions:
     n = len(CASES)
     return Conditions(
         cases=CASES,
-        U_on=np.full(n, VOLTAGE),
-        p1=np.full(n, SUPPLY),
-        p2=np.full(n, CIRCUIT),
+        U_on=np.full(n, ENERGISED_VOLTAGE),
+        p1=np.full(n, SUPPLY_PRESSURE),
+        p2=np.full(n, CIRCUIT_PRESSURE),
         winding_deviation=_centred(np.linspace(-1.0, 1.0, n)),
     )
 
@@ -68,9 +68,9 @@ def drawn_conditions(rng: np.random.Generator, settings: ErrorTableSettings = DE
     """Conditions drawn about the fitted ones."""
     n = len(CASES)
     return Conditions(
-        U_on=VOLTAGE + settings.voltage.draw(rng, n),
-        p1=SUPPLY + settings.supply_pressure.draw(rng, n),
-        p2=CIRCUIT + settings.circuit_pressure.draw(rng, n),
+        U_on=ENERGISED_VOLTAGE + settings.voltage.draw(rng, n),
+        p1=SUPPLY_PRESSURE + settings.supply_pressure.draw(rng, n),
+        p2=CIRCUIT_PRESSURE + settings.circuit_pressure.draw(rng, n),
         cases=_drawn_cases(rng, settings),
         winding_deviation=_centred(settings.winding_temperature.draw(rng, n)),
     )
@@ -100,10 +100,10 @@ def _centred(deviation: NDArray) -> NDArray:
     return deviation - np.mean(deviation[:N_FITTED])
 
 
-def _drive(case: Case, U_on: float, p1: float, p2: float) -> Drive:
-    U = case.voltage(U_on, RATE)
-    return Drive(
-        period=1.0 / RATE,
+def _drive(case: Case, U_on: float, p1: float, p2: float) -> ModelInputs:
+    U = case.voltage(U_on, SAMPLING_RATE)
+    return ModelInputs(
+        period=1.0 / SAMPLING_RATE,
         U=U,
         p1=np.full(len(U), p1),
         sigma_S=np.zeros(len(U)),

@@ -16,7 +16,7 @@ from epv_env.plant.effects.coil import COPPER
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.recordings.recording import OUTPUTS
-from identification.replay.model import Replay
+from identification.replay.batch_simulation import Replay
 from identification.studies.error_tables.bench_conditions import CASES, N_FITTED, Conditions
 from identification.studies.error_tables.error_prediction import (
     initial_guess_ratio,

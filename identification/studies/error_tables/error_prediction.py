@@ -11,8 +11,8 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from epv_env.plant.sensors import SENSORS
 from identification.recordings.recording import OUTPUTS, UNITS
-from identification.replay.drive import Drive
-from identification.replay.model import Replay
+from identification.replay.batch_simulation import Replay
+from identification.replay.model_inputs import ModelInputs
 from identification.report_2003.printed_values import printed_errors
 from identification.studies.error_tables.bench_conditions import N_FITTED, Conditions
 from identification.studies.error_tables.recalibration import (
@@ -107,7 +107,7 @@ def _predicted_block(
     return PredictedErrors(calibrated=errors[0], initial=errors[1, :, :N_FITTED], z=z)
 
 
-def _outputs(drives: Sequence[Drive], valves: Sequence[HypotheticalValve]) -> list[NDArray]:
+def _outputs(drives: Sequence[ModelInputs], valves: Sequence[HypotheticalValve]) -> list[NDArray]:
     """Outputs of n valves in each test [SI], (3, samples, n)."""
     base = Parameters.calibrated()
     symbols = {symbol for valve in valves for symbol in valve.values} | {CALIBRATED_SYMBOLS[0]}

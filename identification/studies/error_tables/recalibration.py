@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.recordings.recording import OUTPUTS
-from identification.replay.drive import Drive
-from identification.replay.model import Replay
-from identification.replay.vector import Vector
+from identification.replay.batch_simulation import Replay
+from identification.replay.model_inputs import ModelInputs
+from identification.replay.parameter_vector import ParameterVector
 from identification.studies.error_tables.settings import DEFAULTS, ErrorTableSettings
 
 
-def calibrated_vector() -> Vector:
+def calibrated_vector() -> ParameterVector:
     """The four calibrated parameters relative to Table 12."""
-    return Vector(CALIBRATED_SYMBOLS, Parameters.calibrated())
+    return ParameterVector(CALIBRATED_SYMBOLS, Parameters.calibrated())
 
 
 class BatchFit:
@@ -42,7 +42,7 @@ class BatchFit:
 
     def __init__(
         self,
-        drives: Sequence[Drive],
+        drives: Sequence[ModelInputs],
         truths: Sequence[NDArray],
         settings: ErrorTableSettings = DEFAULTS,
     ):
@@ -107,7 +107,7 @@ class BatchFit:
 
 
 def recalibrated(
-    drives: Sequence[Drive], truths: Sequence[NDArray], settings: ErrorTableSettings = DEFAULTS
+    drives: Sequence[ModelInputs], truths: Sequence[NDArray], settings: ErrorTableSettings = DEFAULTS
 ) -> NDArray:
     """Fitted parameters of n valves relative to Table 12 [-], (n, 4).
 
@@ -122,7 +122,7 @@ def recalibrated(
     return batch.z
 
 
-def start_shift(drives: Sequence[Drive], truths: Sequence[NDArray]) -> NDArray:
+def start_shift(drives: Sequence[ModelInputs], truths: Sequence[NDArray]) -> NDArray:
     """Reading of p2 at the start less the true pressure [Pa], (n,).
 
     The model starts where the recording does, as in the report. truths: outputs [SI], (3, samples, n).

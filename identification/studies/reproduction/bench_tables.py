@@ -7,10 +7,10 @@ import numpy as np
 
 from epv_env.plant.parameters import Parameters, confidence_intervals, table
 from identification.calibration.multi_start import METHODS
-from identification.pipeline.stages import Identification
+from identification.pipeline.identification import Identification
 from identification.recordings.recording import OUTPUTS
 from identification.replay.error_tables import errors_as_json, percent
-from identification.replay.responses import Response, responses, total
+from identification.replay.responses import Response, responses, total_response_error
 from identification.report.page import Section, Table, Text, Verdict
 from identification.report_2003.printed_values import printed_errors, printed_total
 
@@ -68,7 +68,7 @@ def _validation_responses(identification: Identification) -> list[Response]:
 
 def _truth_recovered(identification: Identification) -> Verdict:
     confidence, vector = identification.confidence, identification.problem.vector
-    deviation = confidence.estimate - vector.of(Parameters.calibrated())
+    deviation = confidence.estimate - vector.scaled(Parameters.calibrated())
     distance = float(deviation @ np.linalg.solve(confidence.covariance.total, deviation))
     inside = distance <= confidence.chi_square
     return Verdict(
@@ -124,5 +124,7 @@ def _table_rows(number: str, answers: Sequence[Response]) -> list[list[str]]:
         rows.append([number, case, *cells, percent(answer.partial), f"{errors['partial']:.4f}"])
     if len(answers) > 1:
         total_printed = f"{printed_total(int(number)):.4f}"
-        rows.append([number, "eps_total", "", "", "", percent(total(answers)), total_printed])
+        rows.append(
+            [number, "eps_total", "", "", "", percent(total_response_error(answers)), total_printed]
+        )
     return rows

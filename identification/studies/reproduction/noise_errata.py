@@ -4,7 +4,7 @@ import numpy as np
 from scipy import stats
 
 from epv_env.plant.sensors import SENSORS
-from identification.quality.published_noise import DESCRIPTIONS, OFFSETS, SAMPLES
+from identification.quality.printed_statistics import SAMPLES, STATISTICS, TREND_OFFSETS
 from identification.recordings.recording import CHANNELS, UNITS
 from identification.report_2003.printed_values import correlation_matrix
 from identification.studies.reproduction.figure_check import (
@@ -67,7 +67,7 @@ def _samples() -> FigureCheck:
 
 def _signal_to_noise(name: str) -> FigureCheck:
     """Printed SNR against what any standard deviation that rounds to the printed one can give."""
-    deviation, printed = DESCRIPTIONS[name].standard_deviation, DESCRIPTIONS[name].signal_to_noise
+    deviation, printed = STATISTICS[name].standard_deviation, STATISTICS[name].signal_to_noise
     low, high = (
         signal_to_noise(name, deviation + change) for change in (PRINTED_HALF_DIGIT, -PRINTED_HALF_DIGIT)
     )
@@ -83,7 +83,7 @@ def _signal_to_noise(name: str) -> FigureCheck:
 
 
 def _claimed_signal_to_noise() -> FigureCheck:
-    found = {name: signal_to_noise(name, DESCRIPTIONS[name].standard_deviation) for name in CHANNELS}
+    found = {name: signal_to_noise(name, STATISTICS[name].standard_deviation) for name in CHANNELS}
     least = min(found, key=lambda name: found[name])
     return FigureCheck(
         where="Section 4.1, SNR 'over 62 dB in all cases' [dB]",
@@ -96,7 +96,7 @@ def _claimed_signal_to_noise() -> FigureCheck:
 
 def _outlier_factor(name: str) -> FigureCheck:
     """The farthest sample lies between half the range and the range from the mean."""
-    row = DESCRIPTIONS[name]
+    row = STATISTICS[name]
     farthest = row.outlier_factor * row.standard_deviation
     slack = row.outlier_factor * PRINTED_HALF_DIGIT + PRINTED_HALF_DIGIT
     return FigureCheck(
@@ -111,7 +111,7 @@ def _outlier_factor(name: str) -> FigureCheck:
 
 def _interquartile_range(name: str) -> FigureCheck:
     """For normal noise 1.349 standard deviations, within one step of the converter."""
-    row = DESCRIPTIONS[name]
+    row = STATISTICS[name]
     normal = float(2 * stats.norm.ppf(0.75)) * row.standard_deviation
     within = abs(normal - row.interquartile_range) <= SENSORS[name].resolution
     return FigureCheck(
@@ -125,7 +125,7 @@ def _interquartile_range(name: str) -> FigureCheck:
 
 def _median(name: str, settings: CheckSettings) -> FigureCheck:
     """Of detrended, symmetric, rounded noise: within half a step and some standard errors of zero."""
-    row = DESCRIPTIONS[name]
+    row = STATISTICS[name]
     error = np.sqrt(np.pi / 2 / SAMPLES) * row.standard_deviation
     half = SENSORS[name].resolution / 2 + settings.standard_errors * float(error)
     return FigureCheck(
@@ -139,12 +139,12 @@ def _median(name: str, settings: CheckSettings) -> FigureCheck:
 
 
 def _kurtosis(settings: CheckSettings) -> FigureCheck:
-    excess = {name: DESCRIPTIONS[name].kurtosis - 3 for name in CHANNELS}
+    excess = {name: STATISTICS[name].kurtosis - 3 for name in CHANNELS}
     return _beyond_normal("kurtosis", excess, np.sqrt(24 / SAMPLES), settings)
 
 
 def _skewness(settings: CheckSettings) -> FigureCheck:
-    excess = {name: DESCRIPTIONS[name].skewness for name in CHANNELS}
+    excess = {name: STATISTICS[name].skewness for name in CHANNELS}
     return _beyond_normal("skewness", excess, np.sqrt(6 / SAMPLES), settings)
 
 
@@ -167,10 +167,10 @@ def _beyond_normal(
 
 
 def _sensor_range() -> FigureCheck:
-    outside = [name for name in CHANNELS if OFFSETS[name] < SENSORS[name].low]
+    outside = [name for name in CHANNELS if TREND_OFFSETS[name] < SENSORS[name].low]
     return FigureCheck(
         where="Table 2 against Table 1, pressures at rest [bar]",
-        printed=", ".join(f"{name} {OFFSETS[name]:.4f}" for name in outside) or "inside",
+        printed=", ".join(f"{name} {TREND_OFFSETS[name]:.4f}" for name in outside) or "inside",
         recomputed=f"at least {SENSORS['p2'].low:g}",
         status=DOUBT if outside else HOLDS,
         remark="the record at ambient pressure lies at and below the lower end of the sensors' range",

@@ -6,7 +6,7 @@ from scipy import stats
 
 from epv_env.plant.parameters import Parameters, confidence_intervals, table
 from identification.recordings.recording import OUTPUTS
-from identification.report_2003.cases import CALIBRATION_CASES, RATE
+from identification.report_2003.cases import CALIBRATION_CASES, SAMPLING_RATE
 from identification.studies.reproduction.figure_check import (
     CHECK_DEFAULTS,
     DOUBT,
@@ -38,7 +38,7 @@ def parameter_checks(settings: CheckSettings = CHECK_DEFAULTS) -> list[FigureChe
 
 def measurement_points() -> int:
     """Samples of all outputs in the four calibration tests."""
-    return len(OUTPUTS) * sum(len(case.voltage(1.0, RATE)) for case in CALIBRATION_CASES)
+    return len(OUTPUTS) * sum(len(case.voltage(1.0, SAMPLING_RATE)) for case in CALIBRATION_CASES)
 
 
 def _permeability() -> FigureCheck:

@@ -6,15 +6,15 @@ from typing import Any
 from epv_env.plant.parameters import Parameters
 from identification.bench.programmes import REPORT_SUITE
 from identification.bench.session import run_bench
-from identification.pipeline.stages import Identification
-from identification.quality.assess import assess
+from identification.pipeline.identification import Identification
+from identification.quality.assessment import assess_recording
 from identification.quality.quality_export import as_json as quality_json
 from identification.quality.quality_section import quality_section
 from identification.report.page import Section
 from identification.report.result_files import write_results
-from identification.sensitivity.agreement import sensitivity_tables
-from identification.sensitivity.results import run_study
+from identification.sensitivity.printed_agreement import sensitivity_tables
 from identification.sensitivity.sensitivity_section import sensitivity_section
+from identification.sensitivity.sensitivity_study import run_sensitivity_study
 from identification.studies.reproduction.bench_tables import bench_json, bench_section
 from identification.studies.reproduction.errata import errata_json, errata_section
 
@@ -24,10 +24,10 @@ def reproduce(out: Path, *, seed: int = 0) -> list[Section]:
 
     Tables 8 and 9 need no bench; 2 to 4 and 10 to 15 come from a virtual one with Table 12 as truth.
     """
-    study = run_study()
+    study = run_sensitivity_study()
     campaign = run_bench(REPORT_SUITE, Parameters.calibrated(), seed=seed)
     identification = Identification(campaign, out / "reproduce.jsonl", seed=seed)
-    quality = assess(campaign.of("quality")[0], campaign.pressure)
+    quality = assess_recording(campaign.with_role("quality")[0], campaign.pressure)
     content: dict[str, Any] = {
         **sensitivity_tables(study.one_at_a_time),
         "virtual_bench": {"tables2to4": quality_json(quality), **bench_json(identification)},

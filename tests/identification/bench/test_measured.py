@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from epv_env.plant.sensors import SENSORS
-from identification.bench.campaign import OFFSETS, TRENDS, measured, measured_campaign
+from identification.bench.measurement import (
+    SENSOR_OFFSETS,
+    SENSOR_TRENDS,
+    measured_campaign,
+    measured_recording,
+)
 from identification.bench.programmes import DIAGNOSIS_SUITE, SUITES
 from identification.recordings.campaign_files import read_campaign, write_campaign
 from identification.recordings.recording import CHANNELS, UNITS
@@ -14,7 +19,7 @@ from tests.identification.twins import REPORT, TRUE, truth, twin
 
 
 def rest(seed=5):
-    return measured(truth("rest"), np.random.default_rng(seed))
+    return measured_recording(truth("rest"), np.random.default_rng(seed))
 
 
 def line(channel, seed=5):
@@ -35,8 +40,8 @@ def deviation(channel):
 def test_offset_and_trend_of_table_2_are_in_the_rest_record(channel):
     offset, slope, _, samples = line(channel)
     error = deviation(channel) / np.sqrt(samples)
-    assert offset == pytest.approx(OFFSETS[channel], abs=4 * 2 * error)
-    assert slope == pytest.approx(TRENDS[channel], abs=4 * np.sqrt(12) * error / 5.0)
+    assert offset == pytest.approx(SENSOR_OFFSETS[channel], abs=4 * 2 * error)
+    assert slope == pytest.approx(SENSOR_TRENDS[channel], abs=4 * np.sqrt(12) * error / 5.0)
 
 
 @pytest.mark.parametrize("channel", ["p2", "p3", "U"])
@@ -84,12 +89,12 @@ def test_a_written_campaign_keeps_every_rule_and_comes_back(tmp_path, suite):
     names = [programme.name for programme in SUITES[suite]]
     campaign = measured_campaign([truth(name) for name in names], TRUE, seed=3)
     write_campaign(campaign, tmp_path)
-    found = read_campaign(tmp_path)
-    assert [(r.name, r.role) for r in found.recordings] == [
+    reads = read_campaign(tmp_path)
+    assert [(r.name, r.role) for r in reads.recordings] == [
         (r.name, r.role) for r in campaign.recordings
     ]
-    assert (found.temperature, found.pressure) == (TRUE["T_env"], TRUE["p_env"])
-    for read, written in zip(found.recordings, campaign.recordings, strict=True):
+    assert (reads.temperature, reads.pressure) == (TRUE["T_env"], TRUE["p_env"])
+    for read, written in zip(reads.recordings, campaign.recordings, strict=True):
         np.testing.assert_allclose(read.p2, written.p2, atol=0.51)
         np.testing.assert_allclose(read.I, written.I, atol=0.51e-6)
 
@@ -107,5 +112,5 @@ def test_roles_are_the_programmes():
 def test_a_recording_of_another_truth_differs_by_more_than_noise():
     true = truth("test1")
     hotter = replace(true, channels={**true.channels, "I": 0.98 * true.channels["I"]})
-    one, other = (measured(t, np.random.default_rng(0)) for t in (true, hotter))
+    one, other = (measured_recording(t, np.random.default_rng(0)) for t in (true, hotter))
     assert np.sqrt(np.mean((one.I - other.I) ** 2)) > 5 * SENSORS["I"].noise

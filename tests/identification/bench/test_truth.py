@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from epv_env.plant.simulate import energised, simulate
-from identification.bench.campaign import RESERVOIR, run_programme
+from identification.bench.measurement import RESERVOIR_VOLUME, run_programme
 from identification.bench.programmes import DIAGNOSIS_SUITE, REPORT_SUITE
 from identification.recordings.recording import HOLD
 from tests.identification.twins import PROGRAMMES, SWITCHING, TRUE, truth
@@ -15,7 +15,7 @@ SETTLED = 0.03
 """After a switching the armature rests within this [s]."""
 
 
-def volumes(true, reservoir=RESERVOIR):
+def volumes(true, reservoir=RESERVOIR_VOLUME):
     """Air in the reservoirs, the circuit and the control chamber [kg], (samples,)."""
     RT = TRUE["R_gas"] * TRUE["T_env"]
     held = reservoir * true.channels["p1"] + TRUE["V2"] * true.channels["p2"]
@@ -30,7 +30,7 @@ def since_switching(true):
     return (index - last) * true.period
 
 
-def plant_s_own(true, reservoir=RESERVOIR):
+def plant_s_own(true, reservoir=RESERVOIR_VOLUME):
     programme = true.programme
     start = energised(TRUE, p1=programme.p1, p2=programme.p2, U=programme.U_on)
     voltage = true.channels["U"]
@@ -66,7 +66,7 @@ def test_the_plant_s_own_integrator_finds_the_same(name):
 
 def test_another_supply_is_noticed():
     with pytest.raises(AssertionError):
-        assert_agrees(truth("test1"), plant_s_own(truth("test1"), reservoir=1.05 * RESERVOIR))
+        assert_agrees(truth("test1"), plant_s_own(truth("test1"), reservoir=1.05 * RESERVOIR_VOLUME))
 
 
 def test_at_rest_nothing_moves():
@@ -83,7 +83,9 @@ def test_with_the_coil_on_the_air_of_the_three_volumes_stays(name):
     shut = (true.channels["U"] > 0) & (since_switching(true) > SETTLED)
     last = shut & (np.cumsum(true.channels["U"] == 0) == np.sum(true.channels["U"] == 0))
     air = volumes(true)[last]
-    drawn = volumes(true)[0] - RESERVOIR * true.channels["p1"][-1] / (TRUE["R_gas"] * TRUE["T_env"])
+    drawn = volumes(true)[0] - RESERVOIR_VOLUME * true.channels["p1"][-1] / (
+        TRUE["R_gas"] * TRUE["T_env"]
+    )
     assert np.sum(last) > 50
     assert np.ptp(air) < 1e-6 * drawn
 
@@ -101,7 +103,7 @@ def test_over_a_recording_the_air_falls_by_what_the_control_chamber_vents(name):
 
 def test_a_reservoir_of_another_size_would_break_the_balance():
     true = truth("test1")
-    lost = volumes(true, 1.05 * RESERVOIR)[0] - volumes(true, 1.05 * RESERVOIR)[-1]
+    lost = volumes(true, 1.05 * RESERVOIR_VOLUME)[0] - volumes(true, 1.05 * RESERVOIR_VOLUME)[-1]
     assert lost != pytest.approx(plant_s_own(true).air_vented[-1], rel=0.5)
 
 

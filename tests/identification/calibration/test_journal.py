@@ -17,12 +17,12 @@ def path(tmp_path):
 
 
 def test_results_come_back(path):
-    found = Journal(path, SUBJECT)
-    assert len(found) == 2
-    assert found["one"] == {"z": [0.1, 1e-300], "converged": True}
-    assert "two" in found
-    assert found["two"] is None
-    assert "three" not in found
+    journal = Journal(path, SUBJECT)
+    assert len(journal) == 2
+    assert journal["one"] == {"z": [0.1, 1e-300], "converged": True}
+    assert "two" in journal
+    assert journal["two"] is None
+    assert "three" not in journal
 
 
 def test_the_order_of_the_subject_s_fields_does_not_matter(path):
@@ -39,9 +39,9 @@ def test_a_torn_last_line_is_dropped_and_written_anew(path, torn):
     """A line without its end may lack digits, so even one that reads well is none."""
     with path.open("a") as stream:
         stream.write(torn)
-    found = Journal(path, SUBJECT)
-    assert len(found) == 2
-    found.add("three", 3)
+    journal = Journal(path, SUBJECT)
+    assert len(journal) == 2
+    journal.add("three", 3)
     again = Journal(path, SUBJECT)
     assert len(again) == 3
     assert again["three"] == 3

@@ -10,18 +10,21 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.calibration import multi_start as starts
 from identification.calibration.calibrate import calibrate
+from identification.calibration.calibration_warnings import calibration_warnings
 from identification.calibration.multi_start import (
     METHODS,
-    fit_from_all,
-    reached_the_best,
+    reached_best,
+    search_from_all_starts,
     starting_points,
 )
-from identification.calibration.warnings import warnings_of
-from identification.replay.vector import Vector
+from identification.calibration.settings import CalibrationSettings
+from identification.replay.parameter_vector import ParameterVector
 from tests.identification.twins import calibration, problem
 
 START = Parameters.initial_guess()
-FOUR = Vector(CALIBRATED_SYMBOLS, START)
+FOUR = ParameterVector(CALIBRATED_SYMBOLS, START)
+TWO_STARTS, THREE_STARTS = CalibrationSettings(starts=2), CalibrationSettings(starts=3)
+
 BAD_BASIN = (1.06, 0.92, 4.2, 0.95)
 """Of the reference: with so much reluctance the armature hardly moves."""
 
@@ -32,7 +35,7 @@ def calls(monkeypatch):
     asked = []
 
     def searching(method):
-        def search(misfit, start):
+        def search(misfit, start, settings):
             asked.append((method, tuple(start)))
             error = float(np.sum((start - 1.0) ** 2))
             return replace(calibration().best(method), start=start, z=start, error=error)
@@ -63,7 +66,7 @@ def test_each_symbol_is_spread_evenly_over_its_logarithm():
 
 def test_domains_that_hold_zero_are_spread_over_evenly():
     """kPV's begins at zero and a1's is symmetric about it."""
-    vector = Vector(("kPV", "a1"), START.replace(a1=-0.05))
+    vector = ParameterVector(("kPV", "a1"), START.replace(a1=-0.05))
     points = starting_points(vector, 41, 0)[1:]
     low, high = vector.bounds.T
     assert np.all((low <= points) & (points <= high))
@@ -81,20 +84,21 @@ def test_one_start_is_the_reference_alone():
     np.testing.assert_array_equal(starting_points(FOUR, 1, 0), np.ones((1, 4)))
 
 
-def test_a_start_in_another_basin_is_reported(tmp_path, monkeypatch):
-    monkeypatch.setattr("identification.calibration.methods.MOST_EVALUATIONS", 200)
+def test_a_start_in_another_basin_is_reported(tmp_path):
+    settings = CalibrationSettings(most_evaluations=200)
     points = np.array([np.ones(4), BAD_BASIN])
-    fits = fit_from_all(problem(), points, Journal(tmp_path / "journal", {}))
+    fits = search_from_all_starts(problem(), points, Journal(tmp_path / "journal", {}), settings)
     for method in METHODS:
-        assert reached_the_best(fits[method]).tolist() == [True, False]
+        assert reached_best(fits[method]).tolist() == [True, False]
         assert fits[method][1].error > 5 * fits[method][0].error
-    found = warnings_of(problem(), fits)
-    assert [warning.split(":")[0] for warning in found] == list(METHODS)
-    assert all("1 of 2 starts reach the least error" in warning for warning in found)
-    assert not any("Table 10" in warning for warning in found)
+    sentences = calibration_warnings(problem(), fits)
+    assert [warning.split(":")[0] for warning in sentences] == list(METHODS)
+    assert all("1 of 2 starts reach the least error" in warning for warning in sentences)
+    assert not any("Table 10" in warning for warning in sentences)
     turned = {method: found_fits[::-1] for method, found_fits in fits.items()}
     assert all(
-        "the usual start (Table 10) is among" in warning for warning in warnings_of(problem(), turned)
+        "the usual start (Table 10) is among" in warning
+        for warning in calibration_warnings(problem(), turned)
     )
 
 
@@ -102,13 +106,23 @@ def test_ends_agree_relative_to_the_best_and_at_zero():
     fit = calibration().best("least squares")
     ends = ([1.0, 0.0], [1.0009, 1e-7], [1.002, 0.0], [1.0, 0.01])
     fits = [replace(fit, z=np.array(z), error=1.0 + i) for i, z in enumerate(ends)]
-    assert reached_the_best(fits).tolist() == [True, True, False, False]
+    assert reached_best(fits).tolist() == [True, True, False, False]
 
 
 def test_finished_searches_are_not_done_again(tmp_path, calls):
-    first = calibrate(problem(), journal=tmp_path / "journal", subject={"of": "a"}, starts=3)
+    first = calibrate(
+        problem(),
+        journal=tmp_path / "journal",
+        subject={"of": "a"},
+        settings=THREE_STARTS,
+    )
     assert len(calls) == len(set(calls)) == 6
-    again = calibrate(problem(), journal=tmp_path / "journal", subject={"of": "a"}, starts=3)
+    again = calibrate(
+        problem(),
+        journal=tmp_path / "journal",
+        subject={"of": "a"},
+        settings=THREE_STARTS,
+    )
     assert len(calls) == 6
     for method in METHODS:
         pairs = zip(first.fits[method], again.fits[method], strict=True)
@@ -117,31 +131,45 @@ def test_finished_searches_are_not_done_again(tmp_path, calls):
 
 def test_an_interrupted_run_goes_on_where_it_was(tmp_path, calls):
     path = tmp_path / "journal"
-    calibrate(problem(), journal=path, subject={}, starts=3)
+    calibrate(problem(), journal=path, subject={}, settings=THREE_STARTS)
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join(lines[:4]) + lines[4][:20])
     calls.clear()
-    calibrate(problem(), journal=path, subject={}, starts=3)
+    calibrate(problem(), journal=path, subject={}, settings=THREE_STARTS)
     assert [method for method, _ in calls] == ["least squares", "Nelder-Mead", "least squares"]
     assert path.read_text().splitlines() == [line.rstrip("\n") for line in lines]
 
 
-@pytest.mark.parametrize("change", [{"subject": {"of": "b"}}, {"seed": 1}, {"starts": 4}])
+@pytest.mark.parametrize(
+    "change", [{"subject": {"of": "b"}}, {"seed": 1}, {"settings": CalibrationSettings(starts=4)}]
+)
 def test_searches_of_another_subject_are_not_used(tmp_path, calls, change):
     """Another number of starts moves all of them but the first."""
-    usual = {"subject": {"of": "a"}, "starts": 3, "seed": 0}
+    usual = {"subject": {"of": "a"}, "settings": THREE_STARTS, "seed": 0}
     calibrate(problem(), journal=tmp_path / "journal", **usual)
     calls.clear()
-    found = calibrate(problem(), journal=tmp_path / "journal", **{**usual, **change})
-    assert len(calls) == 2 * {**usual, **change}["starts"]
-    ends = np.array([fit.start for fit in found.fits["Nelder-Mead"]])
+    calibrated = calibrate(problem(), journal=tmp_path / "journal", **{**usual, **change})
+    assert len(calls) == 2 * {**usual, **change}["settings"].starts
+    ends = np.array([fit.start for fit in calibrated.fits["Nelder-Mead"]])
     expected = starting_points(problem().vector, len(ends), {**usual, **change}["seed"])
     np.testing.assert_array_equal(ends, expected)
 
 
+def test_searches_with_another_precision_are_not_used(tmp_path, calls):
+    for precision in (1e-6, 1e-4):
+        settings = CalibrationSettings(starts=2, precision=precision)
+        calibrate(problem(), journal=tmp_path / "journal", subject={}, settings=settings)
+    assert len(calls) == 8
+
+
 def test_searches_of_another_reference_are_not_used(tmp_path, calls):
-    calibrate(problem(), journal=tmp_path / "journal", subject={}, starts=2)
+    calibrate(problem(), journal=tmp_path / "journal", subject={}, settings=TWO_STARTS)
     moved = replace(problem().vector, reference=problem().vector.reference.replace(d1=0.0181))
     calls.clear()
-    calibrate(replace(problem(), vector=moved), journal=tmp_path / "journal", subject={}, starts=2)
+    calibrate(
+        replace(problem(), vector=moved),
+        journal=tmp_path / "journal",
+        subject={},
+        settings=TWO_STARTS,
+    )
     assert len(calls) == 4

@@ -7,11 +7,11 @@ import pytest
 
 from epv_env.plant.parameters import ParameterError
 from epv_env.plant.region import CALIBRATED_SYMBOLS
-from identification.bench.campaign import OFFSETS
-from identification.calibration.methods import Fit, nelder_mead, weighted_least_squares
+from identification.bench.measurement import SENSOR_OFFSETS
 from identification.calibration.problem import calibration_problem
+from identification.calibration.search_methods import SearchResult, nelder_mead, weighted_least_squares
 from identification.recordings.recording import CHANNELS, UNITS, CampaignError
-from identification.replay.responses import total
+from identification.replay.responses import total_response_error
 from tests.identification.twins import TRUE, calibration, exact_problem, problem, twin
 
 TOLERANCE = {"alphaMV": 3e-4, "alphaPV": 9e-4, "RML": 8e-4, "R": 3e-4}
@@ -19,7 +19,7 @@ TOLERANCE = {"alphaMV": 3e-4, "alphaPV": 9e-4, "RML": 8e-4, "R": 3e-4}
 
 
 def fitted(problem, method="least squares"):
-    start = problem.vector.of(problem.vector.reference)
+    start = problem.vector.scaled(problem.vector.reference)
     if method == "least squares":
         return weighted_least_squares(problem.least_squares(), start)
     return nelder_mead(problem.total_error(), start)
@@ -27,7 +27,7 @@ def fitted(problem, method="least squares"):
 
 def apart(problem, z):
     """Relative distance of a scaled vector from the truth, (k,)."""
-    return z / problem.vector.of(TRUE) - 1.0
+    return z / problem.vector.scaled(TRUE) - 1.0
 
 
 def assert_near_truth(problem, z):
@@ -42,19 +42,19 @@ def without_rest(campaign):
 @pytest.mark.parametrize("method", ["least squares", "Nelder-Mead"])
 def test_without_noise_both_methods_find_table_12_from_table_10(method):
     """What is left is that of the integrators and of the smoothed supply."""
-    found = fitted(exact_problem(), method)
-    assert found.converged
-    assert np.max(np.abs(apart(exact_problem(), found.z))) < 3e-5
-    assert found.error < 0.01
+    fit = fitted(exact_problem(), method)
+    assert fit.converged
+    assert np.max(np.abs(apart(exact_problem(), fit.z))) < 3e-5
+    assert fit.error < 0.01
 
 
 def test_a_wrong_constant_spoils_the_estimate():
     """The mass of the armature delays it by a part of a millisecond."""
     start = exact_problem().vector.reference.replace(mMV=0.0022)
     wrong = replace(exact_problem(), vector=replace(exact_problem().vector, reference=start))
-    found = fitted(wrong)
-    assert np.max(np.abs(apart(wrong, found.z))) > 1e-3
-    assert found.error > 0.1
+    fit = fitted(wrong)
+    assert np.max(np.abs(apart(wrong, fit.z))) > 1e-3
+    assert fit.error > 0.1
 
 
 @pytest.mark.parametrize("method", ["least squares", "Nelder-Mead"])
@@ -64,11 +64,13 @@ def test_with_noise_both_methods_find_table_12(method):
 
 def test_errors_fall_to_the_noise():
     """Table 13 falls from Table 11's size; the residual of least squares is the noise alone."""
-    found = calibration()
-    assert total(found.before) > 5 * total(found.after["Nelder-Mead"])
-    assert total(found.after["Nelder-Mead"]) < 0.003
-    assert found.best("least squares").error == pytest.approx(1.0, abs=0.03)
-    assert dict(found.parameters("least squares"))["R"] == pytest.approx(TRUE["R"], rel=3e-4)
+    calibrated = calibration()
+    assert total_response_error(calibrated.before) > 5 * total_response_error(
+        calibrated.after["Nelder-Mead"]
+    )
+    assert total_response_error(calibrated.after["Nelder-Mead"]) < 0.003
+    assert calibrated.best("least squares").error == pytest.approx(1.0, abs=0.03)
+    assert dict(calibrated.parameters("least squares"))["R"] == pytest.approx(TRUE["R"], rel=3e-4)
 
 
 def test_a_good_calibration_warns_of_nothing():
@@ -78,17 +80,17 @@ def test_a_good_calibration_warns_of_nothing():
 @pytest.mark.parametrize("symbols", [("alphaPV",), ("R", "RML"), ("alphaMV", "alphaPV", "R")])
 def test_fewer_parameters_can_be_fitted(symbols):
     moved = {symbol: 0.97 * TRUE[symbol] for symbol in symbols}
-    found = calibration_problem(twin(), start=TRUE.replace(**moved), symbols=symbols)
-    fit = fitted(found)
+    posed = calibration_problem(twin(), start=TRUE.replace(**moved), symbols=symbols)
+    fit = fitted(posed)
     assert fit.z.shape == (len(symbols),)
-    assert_near_truth(found, fit.z)
+    assert_near_truth(posed, fit.z)
 
 
 def test_other_parameters_than_the_report_s_can_be_fitted():
-    found = calibration_problem(
+    posed = calibration_problem(
         twin(), start=TRUE.replace(mMV=0.0024, V2=0.95e-3), symbols=("mMV", "V2")
     )
-    assert np.max(np.abs(apart(found, fitted(found).z))) < 0.01
+    assert np.max(np.abs(apart(posed, fitted(posed).z))) < 0.01
 
 
 def test_500_hz_are_enough():
@@ -110,14 +112,14 @@ def test_without_a_record_at_rest_nothing_is_subtracted():
 def test_with_one_the_bench_s_offsets_are():
     for channel in CHANNELS:
         offset, unit = problem().offsets[channel], UNITS[channel][1]
-        assert offset.value == pytest.approx(OFFSETS[channel] * unit, abs=4 * offset.error)
+        assert offset.value == pytest.approx(SENSOR_OFFSETS[channel] * unit, abs=4 * offset.error)
         read = twin().recordings[0].channel(channel) - problem().calibration[0].channel(channel)
         np.testing.assert_allclose(read, offset.value, rtol=1e-6)
 
 
 def test_the_campaign_s_ambient_is_the_model_s():
-    found = calibration_problem(replace(twin(), temperature=300.0, pressure=0.98e5))
-    reference = found.vector.reference
+    posed = calibration_problem(replace(twin(), temperature=300.0, pressure=0.98e5))
+    reference = posed.vector.reference
     assert (reference["T_env"], reference["p_env"]) == (300.0, 0.98e5)
 
 
@@ -127,7 +129,7 @@ def test_roles_stay_apart():
 
 
 def test_a_campaign_without_a_recording_to_fit_to_is_refused():
-    rest = replace(twin(), recordings=twin().of("quality"))
+    rest = replace(twin(), recordings=twin().with_role("quality"))
     with pytest.raises(CampaignError, match="no recording with role 'calibration': give at least one"):
         calibration_problem(rest)
 
@@ -147,7 +149,7 @@ def test_symbols_that_cannot_be_fitted_are_refused(symbols, message):
 
 def test_a_fit_comes_back_from_json():
     fit = calibration().best("least squares")
-    again = Fit.from_json(fit.as_json())
+    again = SearchResult.from_json(fit.as_json())
     assert again.as_json() == fit.as_json()
     np.testing.assert_array_equal(again.z, fit.z)
 

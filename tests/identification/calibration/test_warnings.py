@@ -6,11 +6,11 @@ import pytest
 
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import CALIBRATED_SYMBOLS
-from identification.calibration import methods as searches
 from identification.calibration.calibrate import calibrate
 from identification.calibration.calibration_section import calibration_json, calibration_section
+from identification.calibration.calibration_warnings import calibration_warnings
 from identification.calibration.problem import calibration_problem
-from identification.calibration.warnings import warnings_of
+from identification.calibration.settings import CalibrationSettings
 from tests.identification.twins import TRUE, calibration, problem, twin
 
 START = Parameters.initial_guess()
@@ -20,27 +20,31 @@ START = Parameters.initial_guess()
 def warnings(tmp_path):
     """The warnings of a problem, calibrated from its reference."""
 
-    def found(problem):
-        return calibrate(problem, journal=tmp_path / "journal", subject={}, starts=1).warnings
+    def sentences_of(problem, **changes):
+        settings = CalibrationSettings(starts=1, **changes)
+        path = tmp_path / "journal"
+        return calibrate(problem, journal=path, subject={}, settings=settings).warnings
 
-    return found
+    return sentences_of
 
 
 def fits(**changes):
     """The good calibration's fits, with another outcome of every method."""
-    return {m: [replace(fit, **changes) for fit in found] for m, found in calibration().fits.items()}
+    return {
+        m: [replace(fit, **changes) for fit in searches] for m, searches in calibration().fits.items()
+    }
 
 
 def test_a_good_calibration_has_none():
-    assert warnings_of(problem(), calibration().fits) == []
+    assert calibration_warnings(problem(), calibration().fits) == []
 
 
 def test_an_estimate_on_the_end_of_a_domain_is_named(warnings):
     """With too small a chamber the flow into it must be smaller than alphaMV may become."""
-    found = warnings(calibration_problem(twin(), start=START.replace(V3=2e-6)))
-    assert any("least squares ends at the end of alphaMV's domain" in warning for warning in found)
-    assert any("Nelder-Mead ends at the end of alphaMV's domain" in warning for warning in found)
-    assert not any("end of R's domain" in warning for warning in found)
+    sentences = warnings(calibration_problem(twin(), start=START.replace(V3=2e-6)))
+    assert any("least squares ends at the end of alphaMV's domain" in warning for warning in sentences)
+    assert any("Nelder-Mead ends at the end of alphaMV's domain" in warning for warning in sentences)
+    assert not any("end of R's domain" in warning for warning in sentences)
 
 
 @pytest.mark.parametrize("end", [0, 1])
@@ -50,35 +54,36 @@ def test_either_end_of_any_domain_counts(symbol, end):
     z = calibration().best("least squares").z.copy()
     at = vector.symbols.index(symbol)
     z[at] = vector.bounds[at, end]
-    on_end = [warning for warning in warnings_of(problem(), fits(z=z)) if "ends at the end" in warning]
+    on_end = [
+        warning for warning in calibration_warnings(problem(), fits(z=z)) if "ends at the end" in warning
+    ]
     assert len(on_end) == 2
     assert all(f"of {symbol}'s domain" in warning for warning in on_end)
     assert vector.parameters(z)[symbol] == pytest.approx(vector.domains[at, end])
 
 
-def test_a_search_that_is_cut_short_is_not_trusted(warnings, monkeypatch):
-    monkeypatch.setattr(searches, "MOST_EVALUATIONS", 20)
-    found = warnings(problem())
-    assert any("Nelder-Mead has not converged after" in warning for warning in found)
-    assert not any("least squares has not converged" in warning for warning in found)
+def test_a_search_that_is_cut_short_is_not_trusted(warnings):
+    sentences = warnings(problem(), most_evaluations=20)
+    assert any("Nelder-Mead has not converged after" in warning for warning in sentences)
+    assert not any("least squares has not converged" in warning for warning in sentences)
 
 
 def test_parameters_that_act_by_their_ratio_cannot_be_separated(warnings):
-    found = warnings(calibration_problem(twin(), symbols=("alphaMV", "V3")))
-    assert any("the recordings cannot separate alphaMV, V3" in warning for warning in found)
+    sentences = warnings(calibration_problem(twin(), symbols=("alphaMV", "V3")))
+    assert any("the recordings cannot separate alphaMV, V3" in warning for warning in sentences)
 
 
 def test_only_those_are_named_that_cannot_be_separated():
     four = calibration_problem(twin(), symbols=("alphaMV", "R", "V3", "alphaPV"))
-    found = warnings_of(four, fits(z=four.vector.of(TRUE)))
-    (separate,) = (warning for warning in found if "cannot separate" in warning)
+    sentences = calibration_warnings(four, fits(z=four.vector.scaled(TRUE)))
+    (separate,) = (warning for warning in sentences if "cannot separate" in warning)
     assert "cannot separate alphaMV, V3 (" in separate
 
 
 def test_recordings_that_the_model_cannot_explain_are_noticed(warnings):
-    found = warnings(calibration_problem(twin(), symbols=("alphaMV",)))
-    assert any("misses the recordings by" in warning for warning in found)
-    assert not any("cannot separate" in warning for warning in found)
+    sentences = warnings(calibration_problem(twin(), symbols=("alphaMV",)))
+    assert any("misses the recordings by" in warning for warning in sentences)
+    assert not any("cannot separate" in warning for warning in sentences)
 
 
 def test_the_section_shows_every_warning_as_a_doubt():

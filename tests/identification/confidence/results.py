@@ -2,10 +2,10 @@
 
 from functools import cache
 
-from identification.confidence.confidence import Confidence, confidence
+from identification.confidence.confidence import Confidence, assess_confidence
 from tests.identification.twins import calibration
 
 
 @cache
-def found() -> Confidence:
-    return confidence(calibration())
+def twin_confidence() -> Confidence:
+    return assess_confidence(calibration())

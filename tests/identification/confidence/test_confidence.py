@@ -7,16 +7,18 @@ import pytest
 from scipy.stats import chi2
 
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
-from identification.confidence.confidence import confidence
+from identification.confidence.confidence import assess_confidence
 from identification.confidence.confidence_section import confidence_json, confidence_section
-from tests.identification.confidence.results import found
+from tests.identification.confidence.results import twin_confidence
 from tests.identification.twins import TRUE, calibration, problem
 
 
 @pytest.fixture
 def region(tmp_path):
     """The joint region as a plant file gives it back."""
-    plant = Plant(parameters=found().region.centre, region=found().region, name="twin")
+    plant = Plant(
+        parameters=twin_confidence().region.centre, region=twin_confidence().region, name="twin"
+    )
     save_plant(plant, tmp_path / "plant.json")
     return load_plant(tmp_path / "plant.json").region
 
@@ -33,7 +35,7 @@ def displaced(factors):
     fit = calibration().best("Nelder-Mead")
     z = fit.z * np.array(factors)
     moved = replace(fit, z=z, error=problem().total_error().error(z))
-    return confidence(replace(calibration(), fits={**calibration().fits, "Nelder-Mead": [moved]}))
+    return assess_confidence(replace(calibration(), fits={**calibration().fits, "Nelder-Mead": [moved]}))
 
 
 def verdicts(confidence):
@@ -41,53 +43,64 @@ def verdicts(confidence):
 
 
 def test_the_truth_lies_in_the_joint_region_and_in_every_interval():
-    apart = problem().vector.of(TRUE) - found().estimate
-    assert apart @ np.linalg.solve(found().covariance.total, apart) < found().chi_square
-    for symbol, (low, high) in found().intervals().items():
+    apart = problem().vector.scaled(TRUE) - twin_confidence().estimate
+    assert (
+        apart @ np.linalg.solve(twin_confidence().covariance.total, apart) < twin_confidence().chi_square
+    )
+    for symbol, (low, high) in twin_confidence().intervals().items():
         assert low < TRUE[symbol] < high
 
 
 def test_a_truth_that_is_half_a_percent_off_would_not():
-    apart = 1.005 * problem().vector.of(TRUE) - found().estimate
-    assert apart @ np.linalg.solve(found().covariance.total, apart) > 10 * found().chi_square
+    apart = 1.005 * problem().vector.scaled(TRUE) - twin_confidence().estimate
+    assert (
+        apart @ np.linalg.solve(twin_confidence().covariance.total, apart)
+        > 10 * twin_confidence().chi_square
+    )
 
 
 def test_half_widths_are_chi_square_s_of_one_parameter():
-    expected = 1.959964 * np.sqrt(np.diag(found().covariance.total))
-    np.testing.assert_allclose(found().half_widths, expected, rtol=1e-6)
-    assert found().chi_square == pytest.approx(chi2.ppf(0.95, 4)) == pytest.approx(9.4877, abs=1e-4)
+    expected = 1.959964 * np.sqrt(np.diag(twin_confidence().covariance.total))
+    np.testing.assert_allclose(twin_confidence().half_widths, expected, rtol=1e-6)
+    assert (
+        twin_confidence().chi_square
+        == pytest.approx(chi2.ppf(0.95, 4))
+        == pytest.approx(9.4877, abs=1e-4)
+    )
 
 
 def test_the_plant_file_gives_the_region_back(region):
-    assert region.symbols == found().region.symbols
-    assert dict(region.centre) == dict(found().region.centre)
-    assert region.chi_square == found().chi_square
+    assert region.symbols == twin_confidence().region.symbols
+    assert dict(region.centre) == dict(twin_confidence().region.centre)
+    assert region.chi_square == twin_confidence().chi_square
     scale = problem().vector.scale
     np.testing.assert_allclose(
-        region.covariance, found().covariance.total * np.outer(scale, scale), rtol=1e-12
+        region.covariance, twin_confidence().covariance.total * np.outer(scale, scale), rtol=1e-12
     )
 
 
 def test_its_draws_stay_inside_the_ellipsoid(region):
     change = drawn(region) / problem().vector.scale
-    squared = np.einsum("ni,ij,nj->n", change, np.linalg.inv(found().covariance.total), change)
-    assert np.max(squared) <= found().chi_square * (1 + 1e-6)
-    assert np.max(squared) > 0.95 * found().chi_square
+    squared = np.einsum("ni,ij,nj->n", change, np.linalg.inv(twin_confidence().covariance.total), change)
+    assert np.max(squared) <= twin_confidence().chi_square * (1 + 1e-6)
+    assert np.max(squared) > 0.95 * twin_confidence().chi_square
 
 
 def test_its_draws_have_the_covariance_of_a_uniform_ellipsoid(region):
     """That of a k-dimensional one is chi_square / (k + 2) times the estimate's."""
-    deviation = np.sqrt(np.diag(found().covariance.total))
+    deviation = np.sqrt(np.diag(twin_confidence().covariance.total))
     change = drawn(region) / problem().vector.scale / deviation
-    correlation = found().covariance.total / np.outer(deviation, deviation)
-    np.testing.assert_allclose(np.cov(change.T), found().chi_square / 6 * correlation, atol=0.15)
+    correlation = twin_confidence().covariance.total / np.outer(deviation, deviation)
+    np.testing.assert_allclose(
+        np.cov(change.T), twin_confidence().chi_square / 6 * correlation, atol=0.15
+    )
 
 
 def test_at_the_estimate_the_gradient_is_zero_and_the_hessian_positive():
-    minimum = found().minimum
+    minimum = twin_confidence().minimum
     assert np.all(minimum.eigenvalues > 0.1)
     assert np.max(np.abs(minimum.gradient)) < 1e-4
-    assert verdicts(found()) == ["good", "good", "good"]
+    assert verdicts(twin_confidence()) == ["good", "good", "good"]
 
 
 def test_beside_it_the_gradient_is_not_zero():
@@ -105,20 +118,20 @@ def test_far_from_it_the_hessian_is_not_positive():
 
 
 def test_profiles_are_least_at_the_estimate():
-    minimum = found().minimum
+    minimum = twin_confidence().minimum
     assert minimum.profiles.shape == (4, len(minimum.offsets))
     for profile in minimum.profiles:
         assert minimum.offsets[np.argmin(profile)] == pytest.approx(0.0, abs=1e-12)
-        assert np.min(profile) == pytest.approx(found().report.error, rel=1e-9)
+        assert np.min(profile) == pytest.approx(twin_confidence().report.error, rel=1e-9)
 
 
 def test_wide_intervals_are_doubted():
-    wide = replace(found(), covariance=replace(found().covariance, inputs=np.eye(4)))
+    wide = replace(twin_confidence(), covariance=replace(twin_confidence().covariance, inputs=np.eye(4)))
     assert verdicts(wide)[0] == "doubt"
 
 
 def test_the_json_holds_si_units():
-    content = confidence_json(found())
+    content = confidence_json(twin_confidence())
     low, high = content["intervals95"]["R"]
     assert low < TRUE["R"] < high
     deviation = np.sqrt(content["covariance"][3][3])

@@ -7,11 +7,12 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
-from identification.calibration.methods import weighted_least_squares
+from identification.calibration.search_methods import weighted_least_squares
 from identification.confidence import covariance as stage
-from identification.confidence.bootstrap import block_bootstrap
-from identification.confidence.covariance import correlation_lags, covariance
-from tests.identification.confidence.results import found
+from identification.confidence.block_bootstrap import block_bootstrap
+from identification.confidence.covariance import correlation_lags, estimate_covariance
+from identification.confidence.settings import ConfidenceSettings
+from tests.identification.confidence.results import twin_confidence
 from tests.identification.twins import TRUE, problem
 
 SAMPLES, RECORDINGS = 4000, 3
@@ -44,7 +45,7 @@ def covariance_of(monkeypatch):
     """The covariance of a synthetic misfit, whose inputs are exact."""
     for share in ("_input_share", "_offset_share"):
         monkeypatch.setattr(stage, share, lambda *arguments: np.zeros((2, 2)))
-    return lambda misfit: covariance(problem(), misfit, np.ones(2))
+    return lambda misfit: estimate_covariance(problem(), misfit, np.ones(2))
 
 
 def known(misfit, phi):
@@ -104,20 +105,22 @@ def test_one_seed_gives_one_bootstrap():
 
 def test_on_the_bench_all_three_agree():
     """Its noise is white."""
-    parts = found().covariance
+    parts = twin_confidence().covariance
     sandwich = np.diag(parts.residual)
     np.testing.assert_allclose(np.diag(parts.independent), sandwich, rtol=0.3)
-    np.testing.assert_allclose(np.var(found().bootstrap, axis=0), sandwich, rtol=0.3)
+    np.testing.assert_allclose(np.var(twin_confidence().bootstrap, axis=0), sandwich, rtol=0.3)
 
 
-def test_the_noise_of_the_inputs_adds_with_its_square(monkeypatch):
+def test_the_noise_of_the_inputs_adds_with_its_square():
     """U's and p1's, without the record at rest; none, none."""
-    monkeypatch.setattr(stage, "DRAWS", 2)
+    settings = ConfidenceSettings(input_draws=2)
     shares = {}
     for size in (0.0, 1.0, 2.0):
         noise = {n: v * (size if n in ("U", "p1") else 1.0) for n, v in problem().noise.items()}
         quiet = replace(problem(), noise=noise, offsets={})
-        shares[size] = covariance(quiet, problem().least_squares(), found().estimate).inputs
+        shares[size] = estimate_covariance(
+            quiet, problem().least_squares(), twin_confidence().estimate, settings=settings
+        ).inputs
     assert np.all(np.diag(shares[0.0]) < 1e-3 * np.diag(shares[1.0]))
     np.testing.assert_allclose(np.diag(shares[2.0]), 4 * np.diag(shares[1.0]), rtol=0.02)
 
@@ -125,9 +128,9 @@ def test_the_noise_of_the_inputs_adds_with_its_square(monkeypatch):
 def test_offsets_that_are_known_badly_widen_the_covariance():
     offsets = {n: replace(o, error=100 * o.error) for n, o in problem().offsets.items()}
     unsure = replace(problem(), offsets=offsets)
-    wide = covariance(unsure, problem().least_squares(), found().estimate)
-    assert np.all(np.diag(wide.inputs) > 3 * np.diag(found().covariance.inputs))
-    np.testing.assert_allclose(wide.residual, found().covariance.residual)
+    wide = estimate_covariance(unsure, problem().least_squares(), twin_confidence().estimate)
+    assert np.all(np.diag(wide.inputs) > 3 * np.diag(twin_confidence().covariance.inputs))
+    np.testing.assert_allclose(wide.residual, twin_confidence().covariance.residual)
 
 
 def test_estimates_of_other_campaigns_scatter_as_it_says():
@@ -135,9 +138,9 @@ def test_estimates_of_other_campaigns_scatter_as_it_says():
     distances = []
     for seed in range(2, 10):
         twin = problem(seed)
-        fit = weighted_least_squares(twin.least_squares(), twin.vector.of(TRUE))
-        apart = fit.z - twin.vector.of(TRUE)
-        distances.append(apart @ np.linalg.solve(found().covariance.total, apart))
+        fit = weighted_least_squares(twin.least_squares(), twin.vector.scaled(TRUE))
+        apart = fit.z - twin.vector.scaled(TRUE)
+        distances.append(apart @ np.linalg.solve(twin_confidence().covariance.total, apart))
     low, high = chi2.ppf([0.001, 0.999], 4 * len(distances))
     assert low < np.sum(distances) < high
     assert not low < 4 * np.sum(distances) < high

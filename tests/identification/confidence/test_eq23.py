@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from identification.confidence.printed_interval import limit_ratio
-from tests.identification.confidence.results import found
+from identification.confidence.report_interval import limit_ratio
+from tests.identification.confidence.results import twin_confidence
 from tests.identification.twins import problem
 
 
@@ -29,11 +29,11 @@ def test_more_values_leave_less_room():
 @pytest.mark.parametrize("symbol", ["alphaMV", "alphaPV", "RML", "R"])
 def test_at_the_ends_of_an_interval_the_total_error_is_the_limit(symbol):
     """One parameter moved, the others held: the error's rise is eps_p - eps_opt within 2 %."""
-    error, report = problem().total_error().error, found().report
-    at = found().problem.vector.symbols.index(symbol)
+    error, report = problem().total_error().error, twin_confidence().report
+    at = twin_confidence().problem.vector.symbols.index(symbol)
     rise = report.error * (report.ratio - 1)
     for way in (-1, 1):
-        moved = found().nelder_mead.copy()
+        moved = twin_confidence().nelder_mead.copy()
         moved[at] += way * report.half_widths[at]
         assert error(moved) - report.error == pytest.approx(rise, rel=0.02)
         moved[at] += way * report.half_widths[at]
@@ -41,20 +41,20 @@ def test_at_the_ends_of_an_interval_the_total_error_is_the_limit(symbol):
 
 
 def test_the_joint_limit_is_met_along_any_direction():
-    report, error = found().report, problem().total_error().error
+    report, error = twin_confidence().report, problem().total_error().error
     direction = np.array([1.0, -2.0, 0.5, 1.0]) * report.half_widths
     rise = direction @ report.curvature @ direction
     edge = direction * np.sqrt(report.squared_rise / rise)
     assert report.holds_jointly(0.999 * edge)
     assert not report.holds_jointly(1.001 * edge)
     limit = report.error * report.ratio
-    assert error(found().nelder_mead + edge) - report.error == pytest.approx(
+    assert error(twin_confidence().nelder_mead + edge) - report.error == pytest.approx(
         limit - report.error, rel=0.02
     )
 
 
 def test_the_intervals_lie_around_the_nelder_mead_estimate():
-    for i, (symbol, (low, high)) in enumerate(found().report_intervals().items()):
+    for i, (symbol, (low, high)) in enumerate(twin_confidence().report_intervals().items()):
         scale = problem().vector.reference[symbol]
-        assert 0.5 * (low + high) == pytest.approx(found().nelder_mead[i] * scale)
-        assert 0.5 * (high - low) == pytest.approx(found().report.half_widths[i] * scale)
+        assert 0.5 * (low + high) == pytest.approx(twin_confidence().nelder_mead[i] * scale)
+        assert 0.5 * (high - low) == pytest.approx(twin_confidence().report.half_widths[i] * scale)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.sensors import SENSORS
-from identification.quality.published_noise import OFFSETS
+from identification.quality.printed_statistics import TREND_OFFSETS
 from identification.recordings.recording import CHANNELS, UNITS, Recording
 
 PERIOD = 1 / 2000
@@ -23,7 +23,7 @@ def rest_record(seed: int, samples: int = 10_000) -> Recording:
     """The report's bench at rest: Table 2's offsets, Table 3's noise, 12 bits."""
     rng = np.random.default_rng(seed)
     signals: dict[str, Any] = {
-        name: UNITS[name][1] * readings(name, OFFSETS[name], rng, samples) for name in CHANNELS
+        name: UNITS[name][1] * readings(name, TREND_OFFSETS[name], rng, samples) for name in CHANNELS
     }
     return Recording(name="rest", role="quality", period=PERIOD, sigma_S=np.zeros(samples), **signals)
 

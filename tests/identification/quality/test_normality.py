@@ -21,10 +21,10 @@ def assessed(readings, step):
 @pytest.mark.parametrize("step", [0.3, 0.6, 1.3])
 def test_only_the_naive_test_rejects_normal_noise_for_being_rounded(step):
     """Steps of p2, I and U relative to their noise, on the report's bench."""
-    found = assessed(rounded(np.random.default_rng(0).standard_normal(SAMPLES), step), step)
-    assert found.naive_anderson_darling < 1e-4
-    assert found.probability > 0.01
-    assert found.standard_deviation == pytest.approx(1.0, abs=4 / np.sqrt(2 * SAMPLES))
+    quality = assessed(rounded(np.random.default_rng(0).standard_normal(SAMPLES), step), step)
+    assert quality.naive_anderson_darling < 1e-4
+    assert quality.probability > 0.01
+    assert quality.standard_deviation == pytest.approx(1.0, abs=4 / np.sqrt(2 * SAMPLES))
 
 
 def test_its_p_values_are_uniform_for_normal_noise():
@@ -46,9 +46,9 @@ def test_its_p_values_are_uniform_for_normal_noise():
     ],
 )
 def test_other_distributions_are_rejected_and_far_from_normal(name, noise):
-    found = assessed(rounded(noise(np.random.default_rng(2)), 0.6), 0.6)
-    assert found.probability < 1e-10, name
-    assert found.effect > 0.1, name
+    quality = assessed(rounded(noise(np.random.default_rng(2)), 0.6), 0.6)
+    assert quality.probability < 1e-10, name
+    assert quality.effect > 0.1, name
 
 
 def test_a_missing_code_is_found():
@@ -62,23 +62,23 @@ def test_a_missing_code_is_found():
 def test_a_drift_does_not_count_against_normality(drift):
     rng = np.random.default_rng(4)
     line = np.linspace(-drift / 2, drift / 2, SAMPLES)
-    found = assess_normality(rounded(line + rng.standard_normal(SAMPLES), 0.6), line, 0.6)
-    assert found.probability > 0.01
-    assert found.standard_deviation == pytest.approx(1.0, abs=0.03)
+    normality = assess_normality(rounded(line + rng.standard_normal(SAMPLES), 0.6), line, 0.6)
+    assert normality.probability > 0.01
+    assert normality.standard_deviation == pytest.approx(1.0, abs=0.03)
 
 
 def test_continuous_and_finely_divided_readings_are_grouped_by_the_test():
     noise = np.random.default_rng(5).standard_normal(SAMPLES)
     for readings, step in ((noise, 0.0), (rounded(noise, 0.01), 0.01)):
-        found = assessed(readings, step)
-        assert found.probability > 0.01
-        assert found.degrees < 40
+        quality = assessed(readings, step)
+        assert quality.probability > 0.01
+        assert quality.degrees < 40
 
 
 def test_two_codes_are_too_few():
-    found = assessed(np.array([0.0, 1.0] * 500), 1.0)
-    assert found.degrees < 1
-    assert np.isnan(found.probability)
+    quality = assessed(np.array([0.0, 1.0] * 500), 1.0)
+    assert quality.degrees < 1
+    assert np.isnan(quality.probability)
 
 
 def test_the_probability_plot_of_normal_noise_has_its_deviation_as_slope():
@@ -94,5 +94,5 @@ def test_a_drift_of_millions_of_steps_needs_little_memory():
     """A converter so fine that its steps vanish in the drift: cells of equal width, not of one code."""
     time = np.linspace(0.0, 1.0, SAMPLES)
     readings = 1e9 * time + np.random.default_rng(3).standard_normal(SAMPLES)
-    found = assess_normality(readings, 1e9 * time, 1e-3)
-    assert np.isfinite(found.standard_deviation)
+    normality = assess_normality(readings, 1e9 * time, 1e-3)
+    assert np.isfinite(normality.standard_deviation)

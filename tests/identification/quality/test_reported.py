@@ -5,8 +5,14 @@ import pytest
 from scipy import stats
 
 from epv_env.plant.sensors import SENSORS
-from identification.quality.dependence import white_band
-from identification.quality.published_noise import CORRELATIONS, DESCRIPTIONS, FACTORS, OFFSETS, SAMPLES
+from identification.quality.correlation_tests import white_noise_band
+from identification.quality.printed_statistics import (
+    CORRELATIONS,
+    SAMPLES,
+    STATISTICS,
+    TREND_OFFSETS,
+    TREND_SLOPES,
+)
 from identification.recordings.recording import CHANNELS
 
 
@@ -17,22 +23,22 @@ def chance_of_staying_below(factor):
 
 def test_trends_are_insignificant_and_offsets_small():
     for name in CHANNELS:
-        sensor, sigma = SENSORS[name], DESCRIPTIONS[name].standard_deviation
-        assert abs(FACTORS[name]) < 1.8 * sigma * np.sqrt(12 / SAMPLES) / 5
-        offset = OFFSETS[name] - name.startswith("p")
+        sensor, sigma = SENSORS[name], STATISTICS[name].standard_deviation
+        assert abs(TREND_SLOPES[name]) < 1.8 * sigma * np.sqrt(12 / SAMPLES) / 5
+        offset = TREND_OFFSETS[name] - name.startswith("p")
         assert abs(offset) < 0.029 * sensor.accuracy * sensor.high
 
 
 def test_seven_of_ten_correlations_leave_the_band_and_five_are_significant():
     values = np.abs(list(CORRELATIONS.values()))
     raw = 2 * stats.norm.sf(values * np.sqrt(SAMPLES))
-    assert np.sum(values > white_band(SAMPLES)) == 7
+    assert np.sum(values > white_noise_band(SAMPLES)) == 7
     assert np.sum(len(raw) * raw < 0.05) == 5
     assert np.max(values**2) == pytest.approx(0.005, abs=1e-4)
 
 
 def test_outlier_factors_are_what_chance_makes_them_or_less():
-    p3, step = DESCRIPTIONS["p3"], SENSORS["p3"].resolution
+    p3, step = STATISTICS["p3"], SENSORS["p3"].resolution
     assert chance_of_staying_below(4.0) == pytest.approx(0.53, abs=0.005)
     assert chance_of_staying_below(p3.outlier_factor) == pytest.approx(2e-9, rel=0.2)
     rounded = p3.outlier_factor + step / 2 / p3.standard_deviation
@@ -41,21 +47,21 @@ def test_outlier_factors_are_what_chance_makes_them_or_less():
 
 @pytest.mark.parametrize(("name", "errors"), [("I", 8.6), ("U", 5.8), ("p3", 7.4)])
 def test_kurtosis_lies_below_that_of_normal_noise(name, errors):
-    found = (3 - DESCRIPTIONS[name].kurtosis) / np.sqrt(24 / SAMPLES)
-    assert found == pytest.approx(errors, abs=0.06)
+    values = (3 - STATISTICS[name].kurtosis) / np.sqrt(24 / SAMPLES)
+    assert values == pytest.approx(errors, abs=0.06)
 
 
 def test_the_steps_of_p2_and_p3_were_coarser_than_twelve_bits():
     step = SENSORS["p3"].resolution
-    assert abs(DESCRIPTIONS["p3"].median) > step
+    assert abs(STATISTICS["p3"].median) > step
     for name in ("p2", "p3"):
-        assert DESCRIPTIONS[name].interquartile_range == pytest.approx(2.5 * step, rel=0.03)
+        assert STATISTICS[name].interquartile_range == pytest.approx(2.5 * step, rel=0.03)
 
 
 @pytest.mark.parametrize(
     ("name", "excess"), [("I", 1.0), ("U", -1.4), ("p1", -0.2), ("p2", 0.0), ("p3", 0.4)]
 )
 def test_signal_to_noise_ratios_against_equation_17(name, excess):
-    found = DESCRIPTIONS[name]
-    expected = 20 * np.log10(SENSORS[name].high / found.standard_deviation)
-    assert found.signal_to_noise - expected == pytest.approx(excess, abs=0.06)
+    values = STATISTICS[name]
+    expected = 20 * np.log10(SENSORS[name].high / values.standard_deviation)
+    assert values.signal_to_noise - expected == pytest.approx(excess, abs=0.06)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from identification.quality import quality_figures as figures
-from identification.quality.assess import assess
-from identification.quality.published_noise import CORRELATIONS, DESCRIPTIONS, FACTORS
+from identification.quality.assessment import assess_recording
+from identification.quality.printed_statistics import CORRELATIONS, STATISTICS, TREND_SLOPES
 from identification.quality.quality_export import as_json, as_text
 from identification.quality.quality_section import quality_section
 from identification.recordings.recording import CHANNELS
@@ -20,7 +20,7 @@ from tests.identification.quality.records import AMBIENT, rest_record, with_chan
 def qualities():
     """A perfect record, and one with a channel that never changes."""
     stuck = with_channel(rest_record(1, 2000), "U", np.zeros(2000))
-    return assess(rest_record(0, 2000), AMBIENT), assess(stuck, AMBIENT)
+    return assess_recording(rest_record(0, 2000), AMBIENT), assess_recording(stuck, AMBIENT)
 
 
 def test_a_page_can_be_written(tmp_path):
@@ -47,8 +47,8 @@ def test_tables_show_the_report_s_figures_beside_their_own():
         for cell in row
     }
     for name in CHANNELS:
-        assert f"{FACTORS[name]:.6f}" in cells
-        assert f"{DESCRIPTIONS[name].kurtosis:.4f}" in cells
+        assert f"{TREND_SLOPES[name]:.6f}" in cells
+        assert f"{STATISTICS[name].kurtosis:.4f}" in cells
     for value in CORRELATIONS.values():
         assert f"{value:.4f}" in cells
 
@@ -63,12 +63,12 @@ def test_every_axis_has_a_unit_or_a_name(draw):
 
 @pytest.mark.parametrize("which", [0, 1])
 def test_json_is_strict_and_complete(which):
-    found = json.loads(json.dumps(as_json(qualities()[which]), allow_nan=False))
-    assert found["at_rest"] is True
-    assert list(found["channels"]) == list(CHANNELS)
-    assert len(found["correlations"]) == (10, 6)[which]
-    assert found["channels"]["I"]["status"] == "good"
-    assert (found["channels"]["U"]["statistics"]["kurtosis"] is None) == bool(which)
+    content = json.loads(json.dumps(as_json(qualities()[which]), allow_nan=False))
+    assert content["at_rest"] is True
+    assert list(content["channels"]) == list(CHANNELS)
+    assert len(content["correlations"]) == (10, 6)[which]
+    assert content["channels"]["I"]["status"] == "good"
+    assert (content["channels"]["U"]["statistics"]["kurtosis"] is None) == bool(which)
 
 
 def test_text_has_a_line_per_channel():

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from identification.quality.resolution import longest_run, quantum, run_limit
-from identification.quality.statistics import describe, fit_trend, outlier_limit
+from identification.quality.quantisation import converter_step, longest_run, run_limit
+from identification.quality.statistics import descriptive_statistics, fit_trend, outlier_limit
 
 TIME = np.arange(10_000) / 2000
 
@@ -26,37 +26,37 @@ def test_the_standard_error_of_the_slope_is_that_of_white_noise():
 
 
 def test_a_sine_has_its_closed_forms():
-    found = describe(2 * np.sin(2 * np.pi * 10 * TIME), greatest=20.0)
-    assert found.arithmetic_mean == pytest.approx(0.0, abs=1e-12)
-    assert found.trimmed_mean == pytest.approx(0.0, abs=1e-12)
-    assert found.median == pytest.approx(0.0, abs=1e-12)
-    assert found.standard_deviation == pytest.approx(np.sqrt(2), rel=1e-4)
-    assert found.interquartile_range == pytest.approx(2 * np.sqrt(2), rel=1e-2)
-    assert found.absolute_deviation == pytest.approx(4 / np.pi, rel=1e-3)
-    assert found.range == pytest.approx(4.0)
-    assert found.signal_to_noise == pytest.approx(20 * np.log10(20 / np.sqrt(2)), abs=1e-3)
-    assert found.outlier_factor == pytest.approx(np.sqrt(2), rel=1e-4)
-    assert found.kurtosis == pytest.approx(1.5)
-    assert found.skewness == pytest.approx(0.0, abs=1e-9)
+    statistics = descriptive_statistics(2 * np.sin(2 * np.pi * 10 * TIME), greatest=20.0)
+    assert statistics.arithmetic_mean == pytest.approx(0.0, abs=1e-12)
+    assert statistics.trimmed_mean == pytest.approx(0.0, abs=1e-12)
+    assert statistics.median == pytest.approx(0.0, abs=1e-12)
+    assert statistics.standard_deviation == pytest.approx(np.sqrt(2), rel=1e-4)
+    assert statistics.interquartile_range == pytest.approx(2 * np.sqrt(2), rel=1e-2)
+    assert statistics.absolute_deviation == pytest.approx(4 / np.pi, rel=1e-3)
+    assert statistics.range == pytest.approx(4.0)
+    assert statistics.signal_to_noise == pytest.approx(20 * np.log10(20 / np.sqrt(2)), abs=1e-3)
+    assert statistics.outlier_factor == pytest.approx(np.sqrt(2), rel=1e-4)
+    assert statistics.kurtosis == pytest.approx(1.5)
+    assert statistics.skewness == pytest.approx(0.0, abs=1e-9)
 
 
 def test_skewness_is_that_of_the_exponential_distribution():
     quantiles = stats.expon.ppf((np.arange(100_000) + 0.5) / 100_000)
-    assert describe(quantiles, greatest=1.0).skewness == pytest.approx(2.0, rel=0.01)
+    assert descriptive_statistics(quantiles, greatest=1.0).skewness == pytest.approx(2.0, rel=0.01)
 
 
 def test_the_trimmed_mean_leaves_the_extreme_five_percent_out():
     """2.5 % at either end, so two wild values of a hundred do not count."""
     wild = np.zeros(100)
     wild[:2] = 1e6
-    assert describe(wild, greatest=1.0).trimmed_mean == 0.0
+    assert descriptive_statistics(wild, greatest=1.0).trimmed_mean == 0.0
 
 
 def test_a_signal_that_never_changes_has_no_shape():
-    found = describe(np.zeros(1000), greatest=1.0)
-    assert found.standard_deviation == 0.0
-    assert np.isinf(found.signal_to_noise)
-    assert np.isnan([found.outlier_factor, found.kurtosis, found.skewness]).all()
+    statistics = descriptive_statistics(np.zeros(1000), greatest=1.0)
+    assert statistics.standard_deviation == 0.0
+    assert np.isinf(statistics.signal_to_noise)
+    assert np.isnan([statistics.outlier_factor, statistics.kurtosis, statistics.skewness]).all()
 
 
 @pytest.mark.parametrize("rounding", [0.0, 0.6, 1.2])
@@ -78,17 +78,17 @@ def test_the_step_is_found_though_codes_are_missing_and_digits_are_few(digits):
     codes = np.array([0, 1, 2, 5, 6, 40] * 100)
     readings = 1.0 + step * codes
     readings = readings if digits is None else np.round(readings, digits)
-    assert quantum(readings) == pytest.approx(step, rel=1e-4)
+    assert converter_step(readings) == pytest.approx(step, rel=1e-4)
 
 
 def test_rounding_in_sums_is_no_step():
     readings = np.array([0.1 + 0.2, 0.3, 0.4, 0.5] * 100)
-    assert quantum(readings) == pytest.approx(0.1, rel=1e-6)
+    assert converter_step(readings) == pytest.approx(0.1, rel=1e-6)
 
 
 def test_continuous_readings_have_no_step():
-    assert quantum(np.random.default_rng(0).standard_normal(1000)) == 0.0
-    assert quantum(np.ones(1000)) == 0.0
+    assert converter_step(np.random.default_rng(0).standard_normal(1000)) == 0.0
+    assert converter_step(np.ones(1000)) == 0.0
 
 
 def test_runs():

@@ -8,9 +8,9 @@ import pytest
 from scipy import signal
 
 from epv_env.plant.sensors import SENSORS
-from identification.quality.assess import assess, sensor_offsets
-from identification.quality.published_noise import DESCRIPTIONS, OFFSETS
-from identification.quality.verdicts import CHECKS, findings, verdict, worst
+from identification.quality.assessment import assess_recording, sensor_offsets
+from identification.quality.printed_statistics import STATISTICS, TREND_OFFSETS
+from identification.quality.verdicts import CHECKS, channel_verdict, check_results, worst_status
 from identification.recordings.recording import CHANNELS, UNITS, CampaignError
 from tests.identification.quality.records import (
     AMBIENT,
@@ -26,24 +26,24 @@ TIME = np.arange(SAMPLES) * PERIOD
 
 @cache
 def perfect():
-    return assess(rest_record(0), AMBIENT)
+    return assess_recording(rest_record(0), AMBIENT)
 
 
 def statuses(quality, name):
-    return {finding.check: finding.status for finding in findings(quality, name)}
+    return {finding.check: finding.status for finding in check_results(quality, name)}
 
 
 def faulty(name, value, **changes):
     """The perfect record with another true value in one channel [A, V or bar]."""
     rng = np.random.default_rng(1)
     record = with_channel(rest_record(0), name, readings(name, value, rng, SAMPLES))
-    return assess(replace(record, **changes), AMBIENT)
+    return assess_recording(replace(record, **changes), AMBIENT)
 
 
 def test_a_perfect_bench_is_good_in_every_check():
     """Over all 40 checks and long and short records; the false alarms are to stay below 1 %."""
     for seed in range(12):
-        quality = assess(rest_record(seed, 2000 if seed % 4 else SAMPLES), AMBIENT)
+        quality = assess_recording(rest_record(seed, 2000 if seed % 4 else SAMPLES), AMBIENT)
         for name in CHANNELS:
             assert statuses(quality, name) == dict.fromkeys(CHECKS, "good"), seed
 
@@ -52,11 +52,11 @@ def test_a_perfect_bench_is_good_in_every_check():
 def test_a_rest_record_gives_tables_2_and_3_back(name):
     """Within four standard errors: sigma/sqrt(n) of a mean, sigma/sqrt(2 n) of sigma."""
     channel, sigma = perfect().channels[name], SENSORS[name].noise
-    assert DESCRIPTIONS[name].standard_deviation == sigma
+    assert STATISTICS[name].standard_deviation == sigma
     assert channel.normality.standard_deviation == pytest.approx(
         sigma, abs=4 * sigma / np.sqrt(2 * SAMPLES)
     )
-    assert channel.trend.at(np.array(2.5)) == pytest.approx(OFFSETS[name], abs=0.05 * sigma)
+    assert channel.trend.at(np.array(2.5)) == pytest.approx(TREND_OFFSETS[name], abs=0.05 * sigma)
     assert channel.quantum == pytest.approx(SENSORS[name].resolution, rel=1e-6)
 
 
@@ -67,22 +67,22 @@ def test_offsets_of_a_record_at_rest_come_in_si_units():
         size = UNITS[name][1]
         error = offsets[name].error
         assert error == pytest.approx(2 * SENSORS[name].noise * size / np.sqrt(SAMPLES), rel=0.1)
-        assert offsets[name].value == pytest.approx((OFFSETS[name] - rest) * size, abs=4 * error)
+        assert offsets[name].value == pytest.approx((TREND_OFFSETS[name] - rest) * size, abs=4 * error)
 
 
 def test_no_offset_is_read_off_an_energised_record():
     record, rng = rest_record(0), np.random.default_rng(2)
     for name, value in {"I": 0.57, "U": 24.0, "p1": 12.0, "p2": 7.5, "p3": 12.0}.items():
         record = with_channel(record, name, readings(name, value, rng, SAMPLES))
-    quality = assess(record, AMBIENT)
+    quality = assess_recording(record, AMBIENT)
     assert sensor_offsets(quality) == {}
     for name in CHANNELS:
         assert statuses(quality, name) == {**dict.fromkeys(CHECKS, "good"), "offset": "note"}
-        assert worst(findings(quality, name)) == "good"
+        assert worst_status(check_results(quality, name)) == "good"
 
 
 def test_the_ambient_pressure_is_that_of_the_campaign():
-    quality = assess(rest_record(0), 0.7e5)
+    quality = assess_recording(rest_record(0), 0.7e5)
     assert not quality.vented
     assert sensor_offsets(quality) == {}
 
@@ -112,7 +112,7 @@ def test_hum(amplitude, status):
     quality = faulty("p2", 1.0 + amplitude * np.sin(2 * np.pi * 50 * TIME))
     assert statuses(quality, "p2")["whiteness"] == status
     if status != "good":
-        assert "near 50 Hz" in verdict(quality, "p2").text
+        assert "near 50 Hz" in channel_verdict(quality, "p2").text
 
 
 def test_hum_in_two_channels_is_crosstalk_as_well():
@@ -120,7 +120,7 @@ def test_hum_in_two_channels_is_crosstalk_as_well():
     for seed, name in enumerate(("p1", "p3")):
         hum = 1.0 + 0.008 * np.sin(2 * np.pi * 50 * TIME + seed)
         record = with_channel(record, name, readings(name, hum, np.random.default_rng(seed), SAMPLES))
-    quality = assess(record, AMBIENT)
+    quality = assess_recording(record, AMBIENT)
     assert statuses(quality, "p1")["correlation"] == "bad"
     assert statuses(quality, "p2")["correlation"] == "good"
 
@@ -129,7 +129,7 @@ def test_coloured_noise():
     """A filter of 20 samples in a sensor, with Table 3's standard deviation."""
     white = np.random.default_rng(3).standard_normal(SAMPLES)
     noise = np.asarray(signal.lfilter([1.0], [1.0, -0.95], white))
-    quality = assess(with_channel(rest_record(0), "p2", 1.0 + 0.003 * noise), AMBIENT)
+    quality = assess_recording(with_channel(rest_record(0), "p2", 1.0 + 0.003 * noise), AMBIENT)
     assert statuses(quality, "p2")["whiteness"] == "bad"
 
 
@@ -146,9 +146,11 @@ def test_crosstalk():
     rng = np.random.default_rng(4)
     source = rng.standard_normal(SAMPLES)
     record = with_channel(rest_record(0), "I", SENSORS["I"].measure(0 * source, source))
-    quality = assess(with_channel(record, "U", readings("U", 0.005 * source, rng, SAMPLES)), AMBIENT)
+    quality = assess_recording(
+        with_channel(record, "U", readings("U", 0.005 * source, rng, SAMPLES)), AMBIENT
+    )
     assert statuses(quality, "I")["correlation"] == "bad"
-    assert "with U at a lag of 0 ms" in verdict(quality, "I").text
+    assert "with U at a lag of 0 ms" in channel_verdict(quality, "I").text
     assert quality.adjusted["I", "U"] < 1e-10 < quality.adjusted["p1", "p2"]
 
 
@@ -156,12 +158,14 @@ def test_crosstalk():
 def test_noise_beyond_table_3(factor, status):
     noise = factor * SENSORS["p1"].noise * np.random.default_rng(5).standard_normal(SAMPLES)
     step = SENSORS["p1"].resolution
-    quality = assess(with_channel(rest_record(0), "p1", step * np.rint((1 + noise) / step)), AMBIENT)
+    quality = assess_recording(
+        with_channel(rest_record(0), "p1", step * np.rint((1 + noise) / step)), AMBIENT
+    )
     assert statuses(quality, "p1") == {**dict.fromkeys(CHECKS, "good"), "noise": status}
 
 
 def test_a_stuck_code():
-    quality = assess(with_channel(rest_record(0), "p3", np.ones(SAMPLES)), AMBIENT)
+    quality = assess_recording(with_channel(rest_record(0), "p3", np.ones(SAMPLES)), AMBIENT)
     assert statuses(quality, "p3") == {"offset": "good", "resolution": "bad"}
     assert statuses(quality, "p2") == dict.fromkeys(CHECKS, "good")
     assert not any("p3" in pair for pair in quality.pairs)
@@ -170,21 +174,21 @@ def test_a_stuck_code():
 def test_a_code_that_sticks_for_a_while():
     record = rest_record(0)
     record.p3[4000:4300] = record.p3[4000]
-    assert statuses(assess(record, AMBIENT), "p3")["resolution"] == "bad"
+    assert statuses(assess_recording(record, AMBIENT), "p3")["resolution"] == "bad"
 
 
 def test_a_lost_bit():
     """Steps twice as coarse as Table 1's."""
     step = 2 * SENSORS["p2"].resolution
     coarse = step * np.rint(rest_record(0).p2 / 1e5 / step)
-    quality = assess(with_channel(rest_record(0), "p2", coarse), AMBIENT)
+    quality = assess_recording(with_channel(rest_record(0), "p2", coarse), AMBIENT)
     assert statuses(quality, "p2")["resolution"] == "doubt"
 
 
 def test_noise_that_is_not_normal():
     noise = SENSORS["I"].noise * np.random.default_rng(6).laplace(scale=0.7, size=SAMPLES)
     step = SENSORS["I"].resolution
-    quality = assess(with_channel(rest_record(0), "I", step * np.rint(noise / step)), AMBIENT)
+    quality = assess_recording(with_channel(rest_record(0), "I", step * np.rint(noise / step)), AMBIENT)
     assert statuses(quality, "I")["normality"] in ("doubt", "bad")
 
 
@@ -193,11 +197,11 @@ def test_significant_is_not_yet_large():
     source = np.random.default_rng(7).standard_normal(SAMPLES)
     record = with_channel(rest_record(0), "p1", 1.0 + 0.0068 * source)
     other = 1.0 + 0.0075 * (0.07 * source + np.random.default_rng(8).standard_normal(SAMPLES))
-    quality = assess(with_channel(record, "p3", other), AMBIENT)
+    quality = assess_recording(with_channel(record, "p3", other), AMBIENT)
     assert quality.adjusted["p1", "p3"] < 1e-3
     assert statuses(quality, "p1")["correlation"] == "good"
 
 
 def test_too_short_a_record_is_refused():
     with pytest.raises(CampaignError, match="249 samples"):
-        assess(rest_record(0, 249), AMBIENT)
+        assess_recording(rest_record(0, 249), AMBIENT)

@@ -8,11 +8,11 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.sensors import SENSORS
 from epv_env.plant.simulate import energised, simulate
 from identification.recordings.recording import CHANNELS, UNITS, Campaign, Recording
-from identification.report_2003.cases import CALIBRATION_CASES, RATE
+from identification.report_2003.cases import CALIBRATION_CASES, SAMPLING_RATE
 
 
 @cache
-def switching(role: str = "calibration", rate: float = RATE, name: str = "test1") -> Recording:
+def switching(role: str = "calibration", rate: float = SAMPLING_RATE, name: str = "test1") -> Recording:
     """The report's Test1 (0.65 s), measured."""
     p = Parameters.calibrated()
     U = CALIBRATION_CASES[0].voltage(24.0, rate)
@@ -24,10 +24,10 @@ def switching(role: str = "calibration", rate: float = RATE, name: str = "test1"
 @cache
 def resting(name: str = "rest") -> Recording:
     """Half a second with the coil off and every chamber vented, measured."""
-    count = round(0.5 * RATE)
+    count = round(0.5 * SAMPLING_RATE)
     vented, off = np.full(count, 1e5), np.zeros(count)
     truth = {"I": off, "U": off, "p1": vented, "p2": vented, "p3": vented}
-    return _measured(name, "quality", RATE, truth)
+    return _measured(name, "quality", SAMPLING_RATE, truth)
 
 
 @cache

@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 import identification.recordings.campaign_files as campaign_files
 from identification.recordings.campaign_files import read_campaign, write_campaign
 from identification.recordings.recording import CampaignError
-from identification.recordings.timing import sampling_period
+from identification.recordings.sampling_times import sampling_period
 from tests.identification.recordings.good_campaign import campaign_of, good_campaign, resting, switching
 
 BLIND = Path(__file__).parents[4] / "shared" / "blind" / "round-1"
@@ -47,18 +47,18 @@ def with_column(text: str, cell: str) -> str:
     return "\n".join([f"weather,{header}", *(f"{cell},{row}" for row in rows)])
 
 
-def assert_close(found, expected):
+def assert_close(actual, expected):
     for name, rounding in ROUNDING.items():
-        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), 0, rounding)
+        np.testing.assert_allclose(getattr(actual, name), getattr(expected, name), 0, rounding)
 
 
 def test_a_campaign_comes_back(tmp_path):
     written = good_campaign()
     write_campaign(written, tmp_path / "new" / "folder")
-    found = read_campaign(tmp_path / "new" / "folder")
-    assert replace(found, recordings=(), folder=None) == replace(written, recordings=())
-    assert found.folder == tmp_path / "new" / "folder"
-    for one, other in zip(found.recordings, written.recordings, strict=True):
+    read = read_campaign(tmp_path / "new" / "folder")
+    assert replace(read, recordings=(), folder=None) == replace(written, recordings=())
+    assert read.folder == tmp_path / "new" / "folder"
+    for one, other in zip(read.recordings, written.recordings, strict=True):
         assert (one.name, one.role, one.period) == (other.name, other.role, other.period)
         assert_close(one, other)
 
@@ -67,9 +67,9 @@ def test_a_campaign_comes_back(tmp_path):
 def test_any_rate_comes_back(tmp_path, rate):
     recording = switching(rate=rate)
     write_campaign(campaign_of(recording), tmp_path)
-    found = read_campaign(tmp_path).recordings[0]
-    assert found.period == 1 / rate
-    assert_close(found, recording)
+    recordings = read_campaign(tmp_path).recordings[0]
+    assert recordings.period == 1 / rate
+    assert_close(recordings, recording)
 
 
 def test_a_period_without_a_whole_rate_comes_back(tmp_path):

@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 from epv_env.plant.sensors import SENSORS
-from identification.recordings.noise import hold, noise_from_hold, noise_of
+from identification.recordings.noise_estimation import (
+    energised_start_length,
+    noise_of_energised_start,
+    pooled_noise,
+)
 from identification.recordings.recording import CHANNELS, UNITS, Campaign, CampaignError, Recording
 
 HELD = {"I": 0.57, "U": 24.0, "p1": 12.0, "p2": 7.5, "p3": 12.0}
@@ -38,38 +42,38 @@ def campaign(*recordings):
 @pytest.mark.parametrize("drift", [0.0, 0.05])
 def test_the_noise_of_a_long_hold_is_table_3_s(drift):
     """A drift of 50 mbar/s, 50 mA/s and 50 mV/s does not count as noise."""
-    found = noise_from_hold(recording(0, 4000, drift))
+    noise = noise_of_energised_start(recording(0, 4000, drift))
     for name in CHANNELS:
-        assert found[name] == pytest.approx(expected(name), rel=0.05)
+        assert noise[name] == pytest.approx(expected(name), rel=0.05)
 
 
 def test_a_hold_of_40_ms_is_enough_and_less_is_refused():
-    assert hold(recording(0, 80)) == 80
-    assert noise_from_hold(recording(0, 80))["p2"] == pytest.approx(expected("p2"), rel=0.3)
+    assert energised_start_length(recording(0, 80)) == 80
+    assert noise_of_energised_start(recording(0, 80))["p2"] == pytest.approx(expected("p2"), rel=0.3)
     with pytest.raises(CampaignError, match=r"test0: energised for the first 39\.5 ms only"):
-        noise_from_hold(recording(0, 79))
+        noise_of_energised_start(recording(0, 79))
 
 
 def test_a_recording_without_a_switch_is_a_hold_throughout():
     steady = recording(0, 200)
-    assert hold(replace(steady, U=np.full(400, 24.0))) == 400
+    assert energised_start_length(replace(steady, U=np.full(400, 24.0))) == 400
 
 
 def test_noise_finer_than_a_step_counts_as_a_rounding_error():
-    found = noise_from_hold(recording(0, 200, noisy=0.0))
-    assert found["U"] == pytest.approx(SENSORS["U"].resolution / np.sqrt(12))
+    noise = noise_of_energised_start(recording(0, 200, noisy=0.0))
+    assert noise["U"] == pytest.approx(SENSORS["U"].resolution / np.sqrt(12))
 
 
 def test_many_short_holds_are_pooled():
-    found = noise_of(campaign(*(recording(seed, 100) for seed in range(20))))
+    pooled = pooled_noise(campaign(*(recording(seed, 100) for seed in range(20))))
     for name in CHANNELS:
-        assert found[name] == pytest.approx(expected(name), rel=0.08)
+        assert pooled[name] == pytest.approx(expected(name), rel=0.08)
 
 
 def test_the_steady_record_is_preferred():
     """All of it, though its coil is off."""
     steady = recording(0, 1000, role="quality")
     steady = replace(steady, U=np.zeros(2000))
-    found = noise_of(campaign(steady, recording(1, 100, noisy=3.0)))
-    alone = noise_of(campaign(steady))
-    assert found == alone
+    pooled = pooled_noise(campaign(steady, recording(1, 100, noisy=3.0)))
+    alone = pooled_noise(campaign(steady))
+    assert pooled == alone

@@ -5,8 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.replay import drive
-from identification.replay.drive import drive_of, smooth_supply, smooth_voltage, without_offsets
+from identification.replay import model_inputs as drive
+from identification.replay.model_inputs import (
+    model_inputs,
+    smooth_supply,
+    smooth_voltage,
+    without_offsets,
+)
 from tests.identification.twins import SWITCHING, TRUE, exact_recording, truth
 
 NOISE = 680.0
@@ -24,8 +29,8 @@ def supply_error(name, seed=0, life=lambda time: 0.0 * time):
     """smooth_supply less the truth [Pa], (samples,)."""
     recording = exact_recording(name, share=1.0, seed=seed)
     moved = life(recording.time)
-    found = smooth_supply(replace(recording, p1=recording.p1 + moved), TRUE)
-    return found - truth(name).channels["p1"] - moved
+    supply = smooth_supply(replace(recording, p1=recording.p1 + moved), TRUE)
+    return supply - truth(name).channels["p1"] - moved
 
 
 def rms(values):
@@ -34,8 +39,8 @@ def rms(values):
 
 @pytest.mark.parametrize("name", SWITCHING)
 def test_a_constant_voltage_loses_its_noise(name):
-    found = smooth_voltage(exact_recording(name, share=1.0))
-    assert np.max(np.abs(found - truth(name).channels["U"])) < 0.005
+    voltage = smooth_voltage(exact_recording(name, share=1.0))
+    assert np.max(np.abs(voltage - truth(name).channels["U"])) < 0.005
 
 
 def test_a_voltage_that_sags_is_kept_as_it_was_read():
@@ -43,18 +48,18 @@ def test_a_voltage_that_sags_is_kept_as_it_was_read():
     recording = exact_recording("test1", share=1.0)
     on = recording.energised
     sagging = replace(recording, U=recording.U - 0.6 * recording.time * on)
-    found = smooth_voltage(sagging)
+    voltage = smooth_voltage(sagging)
     later = on & (recording.time > 0.1)
-    np.testing.assert_array_equal(found[later], sagging.U[later])
-    assert set(np.diff(found[~on][:100])) == {0.0}
+    np.testing.assert_array_equal(voltage[later], sagging.U[later])
+    assert set(np.diff(voltage[~on][:100])) == {0.0}
 
 
 def test_a_dip_in_one_stretch_is_kept():
     recording = exact_recording("test4", share=1.0)
     dipped = recording.U.copy()
     dipped[1000:1200] -= 0.1
-    found = smooth_voltage(replace(recording, U=dipped))
-    assert np.mean(found[1000:1200]) == pytest.approx(np.mean(found[1300:1500]) - 0.1, abs=0.01)
+    voltage = smooth_voltage(replace(recording, U=dipped))
+    assert np.mean(voltage[1000:1200]) == pytest.approx(np.mean(voltage[1300:1500]) - 0.1, abs=0.01)
 
 
 def test_switching_times_stay():
@@ -86,7 +91,7 @@ def test_a_supply_with_a_life_of_its_own_is_followed_within_millibars(name, life
 
 @pytest.mark.parametrize("life", LIVES)
 def test_the_air_balance_alone_would_miss_it(monkeypatch, life):
-    monkeypatch.setattr(drive, "_is_white", lambda residual, period: True)
+    monkeypatch.setattr(drive, "_is_white", lambda residual, period, settings: True)
     assert rms(supply_error("test4", life=LIVES[life])) > 0.5 * NOISE
 
 
@@ -102,8 +107,8 @@ def test_any_rate_is_smoothed(rate):
     true = truth("test4", rate).channels["p1"]
     assert rms(smooth_supply(recording, TRUE) - true) < 150.0
     swinging = replace(recording, p1=recording.p1 + LIVES["sine"](recording.time))
-    found = smooth_supply(swinging, TRUE)
-    assert rms(found - true - LIVES["sine"](recording.time)) < 0.4 * NOISE
+    supply = smooth_supply(swinging, TRUE)
+    assert rms(supply - true - LIVES["sine"](recording.time)) < 0.4 * NOISE
 
 
 def test_consumed_air_is_drawn_from_the_supply():
@@ -120,16 +125,16 @@ def test_consumed_air_is_drawn_from_the_supply():
 
 def test_the_start_is_the_mean_of_the_hold():
     recording = exact_recording("test1", share=1.0)
-    found = drive_of(recording, TRUE)
-    assert found.p2_start == pytest.approx(np.mean(recording.p2[:80]))
-    assert found.p2_start == pytest.approx(truth("test1").channels["p2"][0], abs=4 * 980 / np.sqrt(80))
-    assert found.U_start == pytest.approx(18.9, abs=0.006)
-    assert found.p1_start == found.p1[0]
+    inputs = model_inputs(recording, TRUE)
+    assert inputs.p2_start == pytest.approx(np.mean(recording.p2[:80]))
+    assert inputs.p2_start == pytest.approx(truth("test1").channels["p2"][0], abs=4 * 980 / np.sqrt(80))
+    assert inputs.U_start == pytest.approx(18.9, abs=0.006)
+    assert inputs.p1_start == inputs.p1[0]
 
 
 def test_offsets_are_subtracted_from_their_channels_alone():
     recording = exact_recording("test1")
-    found = without_offsets(recording, {"p2": 700.0, "U": -0.01})
-    np.testing.assert_allclose(recording.p2 - found.p2, 700.0)
-    np.testing.assert_allclose(recording.U - found.U, -0.01)
-    assert found.p1 is recording.p1
+    corrected = without_offsets(recording, {"p2": 700.0, "U": -0.01})
+    np.testing.assert_allclose(recording.p2 - corrected.p2, 700.0)
+    np.testing.assert_allclose(recording.U - corrected.U, -0.01)
+    assert corrected.p1 is recording.p1

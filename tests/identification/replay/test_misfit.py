@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.replay.misfit import (
-    Misfit,
+from identification.replay.weighted_residuals import (
+    WeightedResiduals,
     measured_outputs,
     noise_weights,
     report_weights,
@@ -16,7 +16,7 @@ from tests.identification.twins import TRUE, problem
 
 
 def true_vector():
-    return problem().vector.of(TRUE)
+    return problem().vector.scaled(TRUE)
 
 
 def eq21(misfit, z):
@@ -35,7 +35,7 @@ def changed(**changes):
         replace(r, **{name: change(r.time, r.channel(name)) for name, change in changes.items()})
         for r in problem().calibration
     ]
-    return Misfit(recordings, problem().vector, noise_weights(recordings, problem().noise))
+    return WeightedResiduals(recordings, problem().vector, noise_weights(recordings, problem().noise))
 
 
 def moved(**changes):

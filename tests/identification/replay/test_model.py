@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from identification.recordings.recording import OUTPUTS
-from identification.replay.drive import drive_of
-from identification.replay.misfit import Misfit, report_weights
-from identification.replay.model import Replay
-from identification.replay.responses import responses, total
-from identification.replay.vector import Vector
+from identification.replay.batch_simulation import Replay
+from identification.replay.model_inputs import model_inputs
+from identification.replay.parameter_vector import ParameterVector
+from identification.replay.responses import responses, total_response_error
+from identification.replay.settings import ReplaySettings
+from identification.replay.weighted_residuals import WeightedResiduals, report_weights
 from tests.identification.twins import SWITCHING, TRUE, exact_recording, problem, truth
 
 CANDIDATES = {
@@ -24,7 +25,7 @@ CANDIDATES = {
 def mixed():
     """Drives of different lengths and rates."""
     recordings = [exact_recording("test1"), exact_recording("test4", 500.0), exact_recording("hold")]
-    return [drive_of(recording, TRUE) for recording in recordings]
+    return [model_inputs(recording, TRUE) for recording in recordings]
 
 
 def test_many_candidates_are_each_alone_to_the_bit():
@@ -44,26 +45,28 @@ def test_recordings_of_other_lengths_and_rates_are_each_alone_to_the_bit():
 
 
 @pytest.mark.parametrize(("largest", "batches"), [(1, 3), (9000, 2)])
-def test_smaller_batches_change_nothing(monkeypatch, largest, batches):
+def test_smaller_batches_change_nothing(largest, batches):
     whole = Replay(mixed(), TRUE).outputs(CANDIDATES)
-    monkeypatch.setattr("identification.replay.model.LARGEST_BATCH", largest)
-    assert len(Replay(mixed(), TRUE)._groups(3, range(len(mixed())))) == batches
-    for one, other in zip(whole, Replay(mixed(), TRUE).outputs(CANDIDATES), strict=True):
+    parts = Replay(mixed(), TRUE, ReplaySettings(largest_batch=largest))
+    assert len(parts._groups(3, range(len(mixed())))) == batches
+    for one, other in zip(whole, parts.outputs(CANDIDATES), strict=True):
         np.testing.assert_array_equal(one, other)
 
 
 @pytest.mark.parametrize("name", SWITCHING)
 def test_the_truth_s_parameters_give_the_truth_back(name):
     """Through the smoothed inputs: p2 within 0.1 mbar, p3 within 0.1 mbar, I within 0.02 mA."""
-    found = Replay([drive_of(exact_recording(name), TRUE)], TRUE).outputs({"R": np.array([TRUE["R"]])})
-    for output, model, limit in zip(OUTPUTS, found[0][:, :, 0], (10.0, 10.0, 2e-5), strict=True):
+    outputs = Replay([model_inputs(exact_recording(name), TRUE)], TRUE).outputs(
+        {"R": np.array([TRUE["R"]])}
+    )
+    for output, model, limit in zip(OUTPUTS, outputs[0][:, :, 0], (10.0, 10.0, 2e-5), strict=True):
         assert np.max(np.abs(model - truth(name).channels[output])) < limit
 
 
 def test_other_parameters_do_not():
     values = {"alphaMV": np.array([1.01 * TRUE["alphaMV"]])}
-    found = Replay([drive_of(exact_recording("test1"), TRUE)], TRUE).outputs(values)[0]
-    assert np.max(np.abs(found[0, :, 0] - truth("test1").channels["p2"])) > 100.0
+    outputs = Replay([model_inputs(exact_recording("test1"), TRUE)], TRUE).outputs(values)[0]
+    assert np.max(np.abs(outputs[0, :, 0] - truth("test1").channels["p2"])) > 100.0
 
 
 def test_consumed_air_is_missing_from_the_circuit():
@@ -78,16 +81,16 @@ def test_consumed_air_is_missing_from_the_circuit():
 
 
 def test_a_candidate_that_cannot_be_integrated_is_nan_and_harms_no_other():
-    drive = drive_of(cut(), TRUE)
-    found = Replay([drive], TRUE).outputs({"alphaMV": np.array([TRUE["alphaMV"], np.nan])})[0]
+    drive = model_inputs(cut(), TRUE)
+    outputs = Replay([drive], TRUE).outputs({"alphaMV": np.array([TRUE["alphaMV"], np.nan])})[0]
     alone = Replay([drive], TRUE).outputs({"alphaMV": np.array([TRUE["alphaMV"]])})[0]
-    np.testing.assert_array_equal(found[:, :, :1], alone)
-    assert np.all(np.isnan(found[:2, 1:, 1]))
+    np.testing.assert_array_equal(outputs[:, :, :1], alone)
+    assert np.all(np.isnan(outputs[:2, 1:, 1]))
 
 
 def test_the_misfit_of_such_a_candidate_is_a_large_number():
-    vector = Vector(("alphaMV", "R"), TRUE)
-    misfit = Misfit([cut()], vector, report_weights([cut()]))
+    vector = ParameterVector(("alphaMV", "R"), TRUE)
+    misfit = WeightedResiduals([cut()], vector, report_weights([cut()]))
     assert misfit.error(np.array([np.nan, 1.0])) > 1e3 * misfit.error(np.ones(2))
 
 
@@ -95,8 +98,14 @@ def test_responses_have_the_errors_of_eqs_19_to_21():
     answers = responses(problem().calibration, TRUE)
     for answer in answers:
         assert answer.partial == pytest.approx(np.linalg.norm(list(answer.errors.values())))
-    assert total(answers) == pytest.approx(np.sqrt(np.mean([a.partial**2 for a in answers])))
-    assert total(answers) < 0.004 < total(responses(problem().calibration, problem().vector.reference))
+    assert total_response_error(answers) == pytest.approx(
+        np.sqrt(np.mean([a.partial**2 for a in answers]))
+    )
+    assert (
+        total_response_error(answers)
+        < 0.004
+        < total_response_error(responses(problem().calibration, problem().vector.reference))
+    )
 
 
 def cut():

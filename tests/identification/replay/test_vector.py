@@ -5,21 +5,23 @@ import pytest
 
 from epv_env.plant.parameters import Parameters, table
 from epv_env.plant.region import CALIBRATED_SYMBOLS
-from identification.replay.vector import Vector
+from identification.replay.parameter_vector import ParameterVector
 
 TRUE, START = Parameters.calibrated(), Parameters.initial_guess()
-FOUR = Vector(CALIBRATED_SYMBOLS, START)
+FOUR = ParameterVector(CALIBRATED_SYMBOLS, START)
 
 
 def test_the_reference_is_all_ones():
-    np.testing.assert_array_equal(FOUR.of(START), np.ones(4))
+    np.testing.assert_array_equal(FOUR.scaled(START), np.ones(4))
     assert dict(FOUR.parameters(np.ones(4))) == dict(START)
 
 
 def test_a_set_comes_back():
-    found = FOUR.parameters(FOUR.of(TRUE))
+    parameters = FOUR.parameters(FOUR.scaled(TRUE))
     for symbol in TRUE:
-        assert found[symbol] == pytest.approx(TRUE[symbol] if symbol in FOUR.symbols else START[symbol])
+        assert parameters[symbol] == pytest.approx(
+            TRUE[symbol] if symbol in FOUR.symbols else START[symbol]
+        )
 
 
 def test_many_vectors_are_each_alone():
@@ -37,7 +39,7 @@ def test_bounds_are_the_ends_of_the_domains():
 
 def test_bounds_rise_for_a_negative_reference_too():
     """a1's domain is symmetric about zero."""
-    (ends,) = Vector(("a1",), TRUE.replace(a1=-0.05)).bounds
+    (ends,) = ParameterVector(("a1",), TRUE.replace(a1=-0.05)).bounds
     assert tuple(ends) == pytest.approx((-2.0, 2.0))
 
 

@@ -2,7 +2,7 @@
 
 from functools import cache
 
-from identification.sensitivity.results import OneAtATime, run_one_at_a_time
+from identification.sensitivity.sensitivity_study import OneAtATime, run_one_at_a_time
 
 
 @cache

@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 from epv_env.plant.parameters import table
-from identification.sensitivity.agreement import (
-    agreement,
+from identification.sensitivity.printed_agreement import (
+    agreement_with_printed,
     is_reproduced,
     printed_rows,
     sensitivity_tables,
@@ -16,7 +16,7 @@ from tests.identification.sensitivity.study import one_at_a_time
 
 
 def test_the_fixed_step_reproduces_tables_8_and_9():
-    met = agreement(one_at_a_time().fixed_step)
+    met = agreement_with_printed(one_at_a_time().fixed_step)
     assert met.figures == 46
     assert met.reproduced >= 36
     assert met.classes_differ == ()
@@ -24,7 +24,7 @@ def test_the_fixed_step_reproduces_tables_8_and_9():
 
 
 def test_exact_stops_reproduce_fewer():
-    met = agreement(one_at_a_time().exact)
+    met = agreement_with_printed(one_at_a_time().exact)
     assert met.reproduced >= 33
     assert met.classes_differ == ("RML",)
 
@@ -32,10 +32,10 @@ def test_exact_stops_reproduce_fewer():
 def test_another_class_is_noticed():
     rows = dict(one_at_a_time().fixed_step)
     rows["d1"] = replace(rows["d1"], minus=0.001, plus=0.001)
-    met = agreement(rows)
+    met = agreement_with_printed(rows)
     assert met.classes_differ == ("d1",)
     assert met.worst_factor > 100
-    assert met.reproduced == agreement(one_at_a_time().fixed_step).reproduced - 2
+    assert met.reproduced == agreement_with_printed(one_at_a_time().fixed_step).reproduced - 2
 
 
 @pytest.mark.parametrize(

@@ -8,22 +8,28 @@ import pytest
 from epv_env.plant.parameters import Parameters, confidence_intervals, sensitive_symbols
 from epv_env.plant.sensors import SENSORS
 from identification.recordings.recording import OUTPUTS, UNITS
-from identification.replay.drive import Drive
-from identification.replay.model import Replay
-from identification.report_2003.cases import CALIBRATION_CASES, CIRCUIT, RATE, SUPPLY, VOLTAGE
+from identification.replay.batch_simulation import Replay
+from identification.replay.model_inputs import ModelInputs
+from identification.report_2003.cases import (
+    CALIBRATION_CASES,
+    CIRCUIT_PRESSURE,
+    ENERGISED_VOLTAGE,
+    SAMPLING_RATE,
+    SUPPLY_PRESSURE,
+)
 from identification.sensitivity.collinearity import (
-    CRITICAL,
-    Sensitivities,
+    OutputSensitivities,
     collinearity_index,
     cosines,
     sensitivities_of_outputs,
     sensitivities_on_recordings,
 )
 from identification.sensitivity.one_at_a_time import studied_symbols
+from identification.sensitivity.settings import SENSITIVITY, SensitivitySettings
 
 
 @cache
-def found() -> Sensitivities:
+def nominal_sensitivities() -> OutputSensitivities:
     return sensitivities_of_outputs(Parameters.nominal(), studied_symbols())
 
 
@@ -46,47 +52,49 @@ def test_two_columns_at_an_angle(angle):
 
 def test_an_index_never_falls_when_a_parameter_joins():
     four = tuple(confidence_intervals())
-    assert found().index(four[:3]) <= found().index(four)
+    assert nominal_sensitivities().index(four[:3]) <= nominal_sensitivities().index(four)
 
 
 @pytest.mark.parametrize("pair", [("V2", "alphaPV"), ("V3", "alphaMV")])
 def test_volumes_and_contractions_act_by_their_ratio(pair):
     """alphaPV/V2 and alphaMV/V3 are all that the state equations of p2 and p3 contain."""
-    assert found().index(pair) == np.inf
-    assert found().correlation[[found().symbols.index(s) for s in pair], :][:, 0].sum() == pytest.approx(
-        0.0, abs=1e-6
-    )
+    assert nominal_sensitivities().index(pair) == np.inf
+    assert nominal_sensitivities().correlation[
+        [nominal_sensitivities().symbols.index(s) for s in pair], :
+    ][:, 0].sum() == pytest.approx(0.0, abs=1e-6)
 
 
 def test_the_calibrated_four_can_be_told_apart_but_not_all_sensitive_ones():
-    assert found().index(tuple(confidence_intervals())) < 4.0 < CRITICAL
-    assert found().index(sensitive_symbols()) == np.inf
+    assert (
+        nominal_sensitivities().index(tuple(confidence_intervals())) < 4.0 < SENSITIVITY.critical_index
+    )
+    assert nominal_sensitivities().index(sensitive_symbols()) == np.inf
 
 
 def test_pairs_are_listed_the_worst_first():
-    pairs = found().inseparable_pairs()
+    pairs = nominal_sensitivities().inseparable_pairs()
     assert [index for _, _, index in pairs] == sorted((index for *_, index in pairs), reverse=True)
     assert ("cPV", "xPV0") in [(a, b) for a, b, _ in pairs]
-    assert all(index > CRITICAL for *_, index in pairs)
+    assert all(index > SENSITIVITY.critical_index for *_, index in pairs)
 
 
-def test_effects_do_not_depend_on_the_size_of_the_differences(monkeypatch):
+def test_effects_do_not_depend_on_the_size_of_the_differences():
     """The model is differentiable here: event times move smoothly with every parameter."""
-    monkeypatch.setattr("identification.sensitivity.collinearity.STEP", 1e-3)
-    finer = sensitivities_of_outputs(Parameters.nominal(), studied_symbols())
-    assert finer.effect == pytest.approx(found().effect, rel=0.01)
+    settings = SensitivitySettings(difference_step=1e-3)
+    finer = sensitivities_of_outputs(Parameters.nominal(), studied_symbols(), settings=settings)
+    assert finer.effect == pytest.approx(nominal_sensitivities().effect, rel=0.01)
 
 
 def test_recordings_of_the_report_s_cases_separate_what_the_cases_do():
     """The same inputs as recordings impose them, and a noise of half the size: twice the effects."""
     drives = [
-        Drive(
-            period=1 / RATE,
-            U=(U := case.voltage(VOLTAGE, RATE)),
-            p1=np.full(len(U), SUPPLY),
+        ModelInputs(
+            period=1 / SAMPLING_RATE,
+            U=(U := case.voltage(ENERGISED_VOLTAGE, SAMPLING_RATE)),
+            p1=np.full(len(U), SUPPLY_PRESSURE),
             sigma_S=np.zeros(len(U)),
-            U_start=VOLTAGE,
-            p2_start=CIRCUIT,
+            U_start=ENERGISED_VOLTAGE,
+            p2_start=CIRCUIT_PRESSURE,
         )
         for case in CALIBRATION_CASES
     ]

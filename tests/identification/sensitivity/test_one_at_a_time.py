@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from epv_env.plant.parameters import Parameters, table
-from identification.sensitivity.agreement import percentages, printed_rows
 from identification.sensitivity.one_at_a_time import (
-    Sensitivity,
+    ErrorSensitivity,
     changed_values,
     sensitivities,
     variants,
 )
-from identification.sensitivity.study import Conditions, total_errors
+from identification.sensitivity.printed_agreement import percentages, printed_rows
+from identification.sensitivity.report_conditions import StudyConditions, total_errors
 from tests.identification.sensitivity.study import one_at_a_time
 
 PNEUMATIC = (
@@ -23,15 +23,15 @@ PNEUMATIC = (
 
 @pytest.mark.parametrize("symbol", PNEUMATIC)
 def test_exact_sensitivity_is_the_report_s(symbol):
-    found = percentages(one_at_a_time().exact[symbol])
-    for value, reported in zip(found, printed_rows()[symbol], strict=True):
+    percents = percentages(one_at_a_time().exact[symbol])
+    for value, reported in zip(percents, printed_rows()[symbol], strict=True):
         assert value == pytest.approx(reported, rel=0.1, abs=0.1 if reported > 1 else 0.01)
 
 
 def test_exactly_located_stops_class_all_parameters_but_one_as_the_report():
     """RML, 2.04 % in the report, stays just below 2 %."""
-    found = {symbol for symbol, row in one_at_a_time().exact.items() if row.sensitive}
-    assert found == {symbol for symbol, row in table().items() if row.sensitive} - {"RML"}
+    symbols = {symbol for symbol, row in one_at_a_time().exact.items() if row.sensitive}
+    assert symbols == {symbol for symbol, row in table().items() if row.sensitive} - {"RML"}
 
 
 def test_stroke_of_the_armature_weighs_little_because_bores_limit_the_flow():
@@ -57,11 +57,11 @@ def test_a_parameter_that_is_zero_goes_to_the_ends_of_its_domain():
 
 
 def test_two_percent_in_either_direction_is_sensitive():
-    assert Sensitivity(minus=0.0, plus=0.02).sensitive
-    assert not Sensitivity(minus=0.0199, plus=0.0199).sensitive
+    assert ErrorSensitivity(minus=0.0, plus=0.02).sensitive
+    assert not ErrorSensitivity(minus=0.0199, plus=0.0199).sensitive
 
 
 def test_other_conditions_give_other_figures():
     """The comparison can fail: at 24 V the armature's rows are far from the report's."""
-    found = sensitivities(Parameters.nominal(), ["cMV"], conditions=Conditions(U_on=24.0))["cMV"]
-    assert 100 * found.minus < 0.6 * printed_rows()["cMV"][0]
+    values = sensitivities(Parameters.nominal(), ["cMV"], conditions=StudyConditions(U_on=24.0))["cMV"]
+    assert 100 * values.minus < 0.6 * printed_rows()["cMV"][0]

@@ -5,16 +5,16 @@ import json
 from epv_env.plant.parameters import Parameters
 from identification.report.page import Picture, write_page
 from identification.sensitivity.global_indices import (
+    morris_effects,
     ranges,
-    screen,
     sobol_indices,
     total_error_model,
 )
-from identification.sensitivity.results import SensitivityStudy
 from identification.sensitivity.sensitivity_export import as_json
 from identification.sensitivity.sensitivity_section import sensitivity_section
+from identification.sensitivity.sensitivity_study import SensitivityStudy
 from tests.identification.sensitivity.study import one_at_a_time
-from tests.identification.sensitivity.test_collinearity import found
+from tests.identification.sensitivity.test_collinearity import nominal_sensitivities
 
 
 def short_study() -> SensitivityStudy:
@@ -22,8 +22,8 @@ def short_study() -> SensitivityStudy:
     model, bounds = total_error_model(p, symbols), ranges(p, symbols)
     return SensitivityStudy(
         one_at_a_time=one_at_a_time(),
-        outputs=found(),
-        screening=screen(model, symbols, bounds, trajectories=4, seed=1),
+        outputs=nominal_sensitivities(),
+        screening=morris_effects(model, symbols, bounds, trajectories=4, seed=1),
         indices=sobol_indices(model, symbols, bounds, samples=8, seed=1),
     )
 

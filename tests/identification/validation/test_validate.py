@@ -7,8 +7,9 @@ import pytest
 
 from identification.recordings.recording import OUTPUTS, CampaignError
 from identification.report_2003.output_error import relative_error
+from identification.validation.settings import VALIDATION
 from identification.validation.validate import validate
-from identification.validation.validation_section import WHITE, validation_json, validation_section
+from identification.validation.validation_section import validation_json, validation_section
 from tests.identification.twins import TRUE, calibration, exact_problem, problem
 
 
@@ -18,12 +19,14 @@ def statuses(validation):
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_the_right_model_leaves_white_noise_of_the_sensors_size(seed):
-    found = validate(problem(seed), TRUE)
-    assert [(r.recording, r.output) for r in found.residuals] == [("validation", o) for o in OUTPUTS]
-    for residual in found.residuals:
+    validation = validate(problem(seed), TRUE)
+    assert [(r.recording, r.output) for r in validation.residuals] == [
+        ("validation", o) for o in OUTPUTS
+    ]
+    for residual in validation.residuals:
         assert residual.rms == pytest.approx(1.0, abs=0.06)
-        assert residual.whiteness.probability > WHITE
-    assert statuses(found) == ["good", "good"]
+        assert residual.whiteness.probability > VALIDATION.white
+    assert statuses(validation) == ["good", "good"]
 
 
 def test_so_does_the_calibrated_one():
@@ -34,17 +37,17 @@ def test_so_does_the_calibrated_one():
     ("symbol", "output"), [("R", "I"), ("alphaMV", "p3"), ("alphaPV", "p2"), ("cMV", "I")]
 )
 def test_a_parameter_that_is_2_percent_off_is_doubted(symbol, output):
-    found = validate(problem(), TRUE.replace(**{symbol: 1.02 * TRUE[symbol]}))
-    assert statuses(found) == ["good", "doubt"]
-    (residual,) = (r for r in found.residuals if r.output == output)
-    assert residual.whiteness.probability < WHITE
-    assert output in validation_section(found).verdicts[1].text
+    validation = validate(problem(), TRUE.replace(**{symbol: 1.02 * TRUE[symbol]}))
+    assert statuses(validation) == ["good", "doubt"]
+    (residual,) = (r for r in validation.residuals if r.output == output)
+    assert residual.whiteness.probability < VALIDATION.white
+    assert output in validation_section(validation).verdicts[1].text
 
 
 def test_a_total_error_above_the_limit_is_bad():
-    found = validate(problem(), TRUE.replace(alphaPV=0.21))
-    assert found.worst > 0.1
-    assert statuses(found) == ["bad", "doubt"]
+    validation = validate(problem(), TRUE.replace(alphaPV=0.21))
+    assert validation.worst > 0.1
+    assert statuses(validation) == ["bad", "doubt"]
 
 
 def test_without_a_recording_that_was_held_out_there_is_no_validation():
@@ -54,27 +57,27 @@ def test_without_a_recording_that_was_held_out_there_is_no_validation():
 
 def test_without_noise_nothing_is_left():
     """A hundredth of an ADC step or so."""
-    found = validate(exact_problem(), TRUE)
-    assert found.worst < 1e-5
-    assert all(residual.rms < 0.05 for residual in found.residuals)
+    validation = validate(exact_problem(), TRUE)
+    assert validation.worst < 1e-5
+    assert all(residual.rms < 0.05 for residual in validation.residuals)
 
 
 def test_errors_are_eqs_19_and_20():
-    found = validate(problem(), TRUE)
-    (answer,) = found.answers
+    validation = validate(problem(), TRUE)
+    (answer,) = validation.answers
     errors = [
         relative_error(answer.measured[i], answer.model[i], answer.recording.time)
         for i in range(len(OUTPUTS))
     ]
     assert list(answer.errors.values()) == pytest.approx(errors)
-    assert found.worst == pytest.approx(np.linalg.norm(errors))
+    assert validation.worst == pytest.approx(np.linalg.norm(errors))
 
 
 def test_the_worst_of_several_recordings_counts():
     both = replace(problem(), validation=problem().validation + problem().calibration[:1])
-    found = validate(both, TRUE.replace(R=43.0))
-    assert len(found.residuals) == 6
-    assert found.worst == max(answer.partial for answer in found.answers)
+    validation = validate(both, TRUE.replace(R=43.0))
+    assert len(validation.residuals) == 6
+    assert validation.worst == max(answer.partial for answer in validation.answers)
 
 
 def test_the_json_holds_percent_and_noise_deviations():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from epv_env.plant.parameters import Parameters
-from identification.bench.campaign import measured_campaign, run_programme
+from identification.bench.measurement import measured_campaign, run_programme
 from identification.bench.programme_file import load_programmes, save_programmes
 from identification.bench.programmes import BAR, DIAGNOSIS_SUITE, Programme
 from identification.gap.design.rivals import Rivals

@@ -10,8 +10,8 @@ from identification.commands import blind as command
 
 def parsed(*arguments):
     parser = argparse.ArgumentParser()
-    command.add_blind(parser.add_subparsers())
-    return parser.parse_args(["blind", *arguments])
+    command.add_options(parser)
+    return parser.parse_args(arguments)
 
 
 def test_the_command_passes_what_is_chosen(monkeypatch, tmp_path):
@@ -24,7 +24,7 @@ def test_the_command_passes_what_is_chosen(monkeypatch, tmp_path):
     monkeypatch.setattr(command, "blind_check", check)
     arguments = ["--out", str(tmp_path), "--trials", "3", "--seed", "5", "--workers", "2"]
     with pytest.raises(ValueError, match="stop here"):
-        command.blind(parsed(*arguments))
+        command.run(parsed(*arguments))
     assert seen == {
         "out": tmp_path, "trials": 3, "seed": 5, "workers": 2, "diagnosis": command.diagnose_campaign,
         "images": None,

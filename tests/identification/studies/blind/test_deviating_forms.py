@@ -8,7 +8,7 @@ from epv_env.plant.effects.registry import EFFECTS as RECORDS
 from epv_env.plant.effects.registry import effect, effect_constants
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.parameters import Parameters
-from identification.bench.automaton import COMPILED
+from identification.bench.right_hand_side import COMPILED_RIGHT_HAND_SIDES
 from identification.studies.blind.deviating_forms import right_hand_side, terminal_currents
 from identification.studies.blind.truth import EFFECTS
 
@@ -65,7 +65,7 @@ def with_effect(name):
 def test_without_deviation_the_forms_are_the_plant_s():
     p = Parameters.calibrated().replace(**SIZES)
     np.testing.assert_allclose(
-        rates(right_hand_side(0.0), p, 20.0), rates(COMPILED[True], p, 20.0), rtol=1e-12
+        rates(right_hand_side(0.0), p, 20.0), rates(COMPILED_RIGHT_HAND_SIDES[True], p, 20.0), rtol=1e-12
     )
 
 

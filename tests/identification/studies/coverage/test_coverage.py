@@ -2,11 +2,14 @@
 
 import json
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 from scipy.stats import beta
 
+from identification.calibration.search_methods import nelder_mead
+from identification.calibration.settings import CalibrationSettings
 from identification.studies.coverage import coverage
 from identification.studies.coverage.coverage import Coverage, coverage_study
 from identification.studies.coverage.coverage_section import coverage_json, coverage_section
@@ -38,7 +41,8 @@ class InProcess:
 @pytest.fixture
 def asked(monkeypatch):
     """Campaigns that were calibrated, in this process, the Nelder-Mead searches cut short."""
-    monkeypatch.setattr("identification.calibration.methods.MOST_EVALUATIONS", 30)
+    short = partial(nelder_mead, settings=CalibrationSettings(most_evaluations=30))
+    monkeypatch.setattr(coverage, "nelder_mead", short)
     monkeypatch.setattr(coverage, "ProcessPoolExecutor", InProcess)
     monkeypatch.setattr(InProcess, "asked", [])
     return InProcess.asked

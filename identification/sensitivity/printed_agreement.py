@@ -6,20 +6,20 @@ from typing import Any
 
 from epv_env.plant.parameters import table
 from identification.report_2003.printed_values import printed_sensitivities
-from identification.sensitivity.one_at_a_time import Sensitivity
-from identification.sensitivity.results import FIXED_STEP_STUDY, OneAtATime
-from identification.sensitivity.study import STUDY
-
-RELATIVE, ABSOLUTE = 0.1, 0.1
-"""A figure is reproduced within 10 % of the printed one or within 0.1 percentage points."""
+from identification.sensitivity.one_at_a_time import ErrorSensitivity
+from identification.sensitivity.report_conditions import REPORT_CONDITIONS
+from identification.sensitivity.sensitivity_study import FIXED_STEP_CONDITIONS, OneAtATime
+from identification.sensitivity.settings import SENSITIVITY, SensitivitySettings
 
 TABLES = (8, 9)
+"""The report's tables of sensitivities."""
+
 NOT_COUNTED = ("a1",)
 """Its change is not printed: what it must have been is this project's guess."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Agreement:
+class PrintedAgreement:
     """How one computation of Tables 8 and 9 meets the printed ones."""
 
     figures: int
@@ -32,14 +32,15 @@ class Agreement:
     """Largest ratio between a computed and a printed figure, either way."""
 
 
-def percentages(row: Sensitivity) -> tuple[float, float]:
+def percentages(row: ErrorSensitivity) -> tuple[float, float]:
     """Both total errors [%]."""
     return 100 * row.minus, 100 * row.plus
 
 
-def is_reproduced(found: float, printed: float) -> bool:
+def is_reproduced(percent: float, printed: float, settings: SensitivitySettings = SENSITIVITY) -> bool:
     """Whether a figure [%] is the printed one within the tolerance."""
-    return abs(found - printed) <= max(RELATIVE * printed, ABSOLUTE)
+    tolerance = max(settings.relative_agreement * printed, settings.absolute_agreement)
+    return abs(percent - printed) <= tolerance
 
 
 def printed_rows() -> dict[str, tuple[float, float]]:
@@ -47,18 +48,18 @@ def printed_rows() -> dict[str, tuple[float, float]]:
     return {symbol: pair for number in TABLES for symbol, pair in printed_sensitivities(number).items()}
 
 
-def agreement(found: Mapping[str, Sensitivity]) -> Agreement:
+def agreement_with_printed(rows: Mapping[str, ErrorSensitivity]) -> PrintedAgreement:
     """Compare a computation with the printed tables; its classes of all symbols, a1's figures apart."""
     pairs = [
         pair
         for symbol, printed in printed_rows().items()
         if symbol not in NOT_COUNTED
-        for pair in zip(percentages(found[symbol]), printed, strict=True)
+        for pair in zip(percentages(rows[symbol]), printed, strict=True)
     ]
-    return Agreement(
+    return PrintedAgreement(
         figures=len(pairs),
         reproduced=sum(is_reproduced(*pair) for pair in pairs),
-        classes_differ=tuple(s for s in printed_rows() if found[s].sensitive != table()[s].sensitive),
+        classes_differ=tuple(s for s in printed_rows() if rows[s].sensitive != table()[s].sensitive),
         worst_factor=max(max(a / b, b / a) for a, b in pairs),
     )
 
@@ -72,20 +73,20 @@ def sensitivity_tables(study: OneAtATime) -> dict[str, Any]:
         for number in TABLES
     }
     content["comparison"] = {
-        "fixed_step": _summary(study.fixed_step, FIXED_STEP_STUDY.U_on),
-        "exact": _summary(study.exact, STUDY.U_on),
+        "fixed_step": _summary(study.fixed_step, FIXED_STEP_CONDITIONS.U_on),
+        "exact": _summary(study.exact, REPORT_CONDITIONS.U_on),
         "rows": {symbol: _compared(study, symbol) for symbol in printed_rows()},
     }
     return content
 
 
-def _row(found: Sensitivity) -> dict[str, Any]:
-    minus, plus = percentages(found)
-    return {"minus10": minus, "plus10": plus, "sensitive": found.sensitive}
+def _row(row: ErrorSensitivity) -> dict[str, Any]:
+    minus, plus = percentages(row)
+    return {"minus10": minus, "plus10": plus, "sensitive": row.sensitive}
 
 
-def _summary(found: Mapping[str, Sensitivity], U_on: float) -> dict[str, Any]:
-    met = agreement(found)
+def _summary(rows: Mapping[str, ErrorSensitivity], U_on: float) -> dict[str, Any]:
+    met = agreement_with_printed(rows)
     return {
         "U_on_V": U_on,
         "figures": met.figures,

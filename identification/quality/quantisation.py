@@ -4,18 +4,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-CONTINUOUS = 0.2
-"""Distinct readings per sample above which the readings lie on no grid."""
+from identification.quality.settings import QUALITY, QualitySettings
 
 
-def quantum(readings: NDArray) -> float:
-    """Step of the converter [unit]: the least step between distinct readings.
+def converter_step(readings: NDArray, settings: QualitySettings = QUALITY) -> float:
+    """Step of the converter [unit]: the least step between distinct readings, (samples,).
 
     The few digits of a file make equal steps unequal, so the step is the slope of the line through
     the distinct readings over their codes. 0.0: fewer than two distinct readings, or no grid.
     """
     distinct = np.unique(readings)
-    if len(distinct) < 2 or len(distinct) > CONTINUOUS * len(readings):
+    if len(distinct) < 2 or len(distinct) > settings.distinct_share * len(readings):
         return 0.0
     steps = np.diff(distinct)
     steps = steps[steps > 1e-3 * np.median(steps)]  # the same reading but for rounding in sums
@@ -24,17 +23,17 @@ def quantum(readings: NDArray) -> float:
 
 
 def longest_run(readings: NDArray) -> int:
-    """Length of the longest run of one and the same reading [samples]."""
+    """Length of the longest run of one and the same reading [samples]; readings: (samples,)."""
     changes = np.flatnonzero(np.diff(readings) != 0)
     return int(np.max(np.diff(np.concatenate(([-1], changes, [len(readings) - 1])))))
 
 
 def run_limit(readings: NDArray, *, rounding: float, significance: float) -> int:
-    """Length that runs of independent readings reach with this probability at most [samples].
+    """Length that runs of independent readings, (samples,), reach with a small probability [samples].
 
     A run of L readings starts at one of n samples with probability p^L, so the limit solves
-    n p^L = significance. p is the share of the commonest reading, or what normal noise about that
-    reading gives it if that is more, as under a drift; `rounding` is the step over sigma. The limit
+    n p^L = significance, a probability. p is the share of the commonest reading, or what normal noise
+    about that reading gives it if that is more, as under a drift. rounding: step over sigma. The limit
     is n for readings that never change.
     """
     share = np.max(np.unique(readings, return_counts=True)[1]) / len(readings)

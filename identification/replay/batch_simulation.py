@@ -12,19 +12,20 @@ from epv_env.plant.readings import readings
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
 from identification.recordings.recording import OUTPUTS
-from identification.replay.drive import Drive
-
-LARGEST_BATCH = 1_500_000
-"""Samples times valves that are simulated at once: about 200 MB."""
+from identification.replay.model_inputs import ModelInputs
+from identification.replay.settings import REPLAY, ReplaySettings
 
 
 class Replay:
     """Simulates recordings under candidate parameters."""
 
-    def __init__(self, drives: Sequence[Drive], base: Parameters):
-        """base: values of the parameters that the candidates do not change."""
+    def __init__(
+        self, drives: Sequence[ModelInputs], base: Parameters, settings: ReplaySettings = REPLAY
+    ):
+        """base: values of the parameters that the candidates do not change [SI]."""
         self.drives = list(drives)
         self.base = base
+        self.settings = settings
 
     def outputs(
         self,
@@ -34,25 +35,31 @@ class Replay:
     ) -> list[NDArray]:
         """Model outputs of n candidates for each recording.
 
-        candidates: values by symbol, (n,), or (n, recordings) where recordings differ. p2_shift: added
-        to the recordings' p2 at the start [Pa], (), (n,) or (n, recordings). which: indices of the
-        recordings, None for all. Returns per recording an array (3, samples, n) of OUTPUTS [Pa, Pa, A];
-        NaN where a candidate cannot be integrated.
+        Args:
+            candidates: values by symbol [SI], (n,), or (n, recordings) where recordings differ.
+            p2_shift: added to the recordings' p2 at the start [Pa], (), (n,) or (n, recordings).
+            which: indices of the recordings, None for all.
+
+        Returns per recording an array (3, samples, n) of OUTPUTS [Pa, Pa, A]; NaN where a candidate
+        cannot be integrated.
         """
         chosen = range(len(self.drives)) if which is None else which
         n = max(np.shape(value)[0] for value in candidates.values())
         shift = np.asarray(p2_shift, dtype=float)
         each = {"": np.broadcast_to(shift[:, None] if shift.ndim == 1 else shift, (n, len(self.drives)))}
         each |= {s: np.asarray(value) for s, value in candidates.items()}
-        ailing = self._with_effects(each, n)
-        if np.all(ailing) or not np.any(ailing):
+        with_effects = self._with_effects(each, n)
+        if np.all(with_effects) or not np.any(with_effects):
             return self._outputs(each, n, chosen)
-        found = [np.empty((len(OUTPUTS), len(self.drives[r].U), n)) for r in chosen]
-        for part in (ailing, ~ailing):  # each by its own kernel, which the other need not wait for
+        answers = [np.empty((len(OUTPUTS), len(self.drives[r].U), n)) for r in chosen]
+        for part in (
+            with_effects,
+            ~with_effects,
+        ):  # each by its own kernel, which the other need not wait for
             own = self._outputs({s: v[part] for s, v in each.items()}, int(np.sum(part)), chosen)
-            for whole, some in zip(found, own, strict=True):
+            for whole, some in zip(answers, own, strict=True):
                 whole[:, :, part] = some
-        return found
+        return answers
 
     def _with_effects(self, each: Mapping[str, NDArray], n: int) -> NDArray:
         """Which candidates have an effect in any recording, boolean (n,)."""
@@ -61,12 +68,12 @@ class Replay:
 
     def _outputs(self, each: Mapping[str, NDArray], n: int, chosen: Sequence[int]) -> list[NDArray]:
         """`outputs` of candidates that one kernel can simulate; '' holds the shifts of p2."""
-        found: list[NDArray] = []
+        answers: list[NDArray] = []
         for group in self._groups(n, chosen):
             lanes = {s: _lanes(value, group) for s, value in each.items()}
             shifts = lanes.pop("")
-            found += _simulate([self.drives[r] for r in group], {**self.base, **lanes}, shifts, n)
-        return found
+            answers += _simulate([self.drives[r] for r in group], {**self.base, **lanes}, shifts, n)
+        return answers
 
     def _groups(self, n: int, chosen: Sequence[int]) -> list[list[int]]:
         """Consecutive recordings that fit into one batch together."""
@@ -74,7 +81,7 @@ class Replay:
         longest = 0
         for index in chosen:
             longest = max(longest, len(self.drives[index].U))
-            if groups[-1] and longest * n * (len(groups[-1]) + 1) > LARGEST_BATCH:
+            if groups[-1] and longest * n * (len(groups[-1]) + 1) > self.settings.largest_batch:
                 groups.append([])
                 longest = len(self.drives[index].U)
             groups[-1].append(index)
@@ -89,7 +96,7 @@ def _lanes(value: NDArray, recordings: Sequence[int]) -> NDArray:
 
 
 def _simulate(
-    drives: list[Drive], tiled: Mapping[str, ArrayLike], shift: NDArray, n: int
+    drives: list[ModelInputs], tiled: Mapping[str, ArrayLike], shift: NDArray, n: int
 ) -> list[NDArray]:
     """One batch: lane r n + j is candidate j on recording r. tiled, shift: by lane."""
     valves = Valves(n * len(drives))
@@ -115,7 +122,7 @@ def _read(state: State, p: Mapping[str, ArrayLike]) -> NDArray:
     return np.stack([read[output] for output in OUTPUTS])
 
 
-def _inputs(drives: list[Drive]) -> tuple[dict[str, NDArray], NDArray]:
+def _inputs(drives: list[ModelInputs]) -> tuple[dict[str, NDArray], NDArray]:
     """Inputs by name, and length of each period; (longest - 1, recordings), 0 past a recording's end."""
     steps = max(len(drive.U) for drive in drives) - 1
     table = np.zeros((4, steps, len(drives)))

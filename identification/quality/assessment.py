@@ -1,47 +1,44 @@
-"""Section 4 for one recording: `assess`, and the offsets that a calibration may subtract."""
+"""Section 4 for one recording: `assess_recording`, and the offsets that a calibration may subtract."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
 
-from identification.quality.channel import Channel, assess_channel
-from identification.quality.dependence import Pair, assess_pair
+from identification.quality.channel import ChannelAssessment, assess_channel
+from identification.quality.correlation_tests import PairCorrelation, assess_correlation
+from identification.quality.settings import QUALITY, QualitySettings
 from identification.recordings.recording import CHANNELS, UNITS, CampaignError, Recording
 
-LEAST_SAMPLES = 250
-"""Half a second at 500 Hz; fewer do not show the distribution of a noise."""
-
-LONGEST_LAG = 0.1
-"""Up to where correlations are computed [s], at most a twentieth of the record.
-
-With more lags for the samples, the Ljung-Box test alarms too often on white noise.
-"""
-
 PRESSURES = ("p1", "p2", "p3")
+"""Channels whose rest value is the ambient pressure."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Offset:
+class SensorOffset:
     """Reading of a sensor at the start of a record at rest, less what a perfect sensor reads [SI]."""
 
     value: float
+    """[SI]."""
     error: float
-    """Standard error."""
+    """Standard error of the value [SI]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Quality:
-    """What one steady recording says about its channels, in A, V and bar."""
+class QualityAssessment:
+    """Statistics of the channels of one steady recording [A, V, bar]."""
 
     name: str
     """Of the recording."""
     period: float
     """[s]."""
     samples: int
-    channels: Mapping[str, Channel]
+    """Of each channel."""
+    channels: Mapping[str, ChannelAssessment]
     """By name, in the order of Table 1."""
-    pairs: Mapping[tuple[str, str], Pair]
+    pairs: Mapping[tuple[str, str], PairCorrelation]
     """Of all channels that change."""
+    settings: QualitySettings = QUALITY
+    """What the recording was judged by."""
 
     @property
     def adjusted(self) -> dict[tuple[str, str], float]:
@@ -68,32 +65,35 @@ class Quality:
     @property
     def lags(self) -> int:
         """Greatest lag of the correlations [samples]."""
-        return longest_lag(self.samples, self.period)
+        return greatest_lag(self.samples, self.period, self.settings)
 
 
-def assess(recording: Recording, environment_pressure: float) -> Quality:
+def assess_recording(
+    recording: Recording, environment_pressure: float, settings: QualitySettings = QUALITY
+) -> QualityAssessment:
     """Statistics of a steady recording.
 
     environment_pressure: p_env [Pa absolute]. Raises CampaignError for a record of fewer than
-    LEAST_SAMPLES.
+    `settings.least_samples`.
     """
-    if len(recording) < LEAST_SAMPLES:
+    if len(recording) < settings.least_samples:
         raise CampaignError(
             f"{recording.name}: {len(recording)} samples; the statistics of section 4 need "
-            f"{LEAST_SAMPLES} or more: record 5 s of steady state"
+            f"{settings.least_samples} or more: record 5 s of steady state"
         )
-    channels = {name: _channel(recording, name, environment_pressure) for name in CHANNELS}
-    pairs = _pairs(channels, longest_lag(len(recording), recording.period))
-    return Quality(
+    channels = {name: _channel(recording, name, environment_pressure, settings) for name in CHANNELS}
+    pairs = _pairs(channels, greatest_lag(len(recording), recording.period, settings))
+    return QualityAssessment(
         name=recording.name,
         period=recording.period,
         samples=len(recording),
         channels=channels,
         pairs=pairs,
+        settings=settings,
     )
 
 
-def sensor_offsets(quality: Quality) -> dict[str, Offset]:
+def sensor_offsets(quality: QualityAssessment) -> dict[str, SensorOffset]:
     """Offset of each channel, which a calibration may subtract.
 
     Empty unless the record is at rest: elsewhere an offset cannot be told from the signal.
@@ -103,32 +103,37 @@ def sensor_offsets(quality: Quality) -> dict[str, Offset]:
     return {name: _offset(channel) for name, channel in quality.channels.items()}
 
 
-def _offset(channel: Channel) -> Offset:
+def _offset(channel: ChannelAssessment) -> SensorOffset:
     """Of the trend's line at time 0, since a drift starts with the recording."""
     size = UNITS[channel.name][1]
     value = channel.trend.offset - channel.rest
-    return Offset(value=value * size, error=channel.trend.offset_error * size)
+    return SensorOffset(value=value * size, error=channel.trend.offset_error * size)
 
 
-def longest_lag(samples: int, period: float) -> int:
-    """Greatest lag at which correlations are computed [samples]."""
-    return max(1, min(round(LONGEST_LAG / period), samples // 20))
+def greatest_lag(samples: int, period: float, settings: QualitySettings = QUALITY) -> int:
+    """Greatest lag at which correlations are computed [samples]; period: between samples [s]."""
+    return max(1, min(round(settings.greatest_lag / period), samples // settings.samples_per_lag))
 
 
-def _channel(recording: Recording, name: str, environment_pressure: float) -> Channel:
+def _channel(
+    recording: Recording, name: str, environment_pressure: float, settings: QualitySettings
+) -> ChannelAssessment:
     size = UNITS[name][1]
     return assess_channel(
         name,
         recording.channel(name) / size,
         period=recording.period,
         rest=environment_pressure / size if name in PRESSURES else 0.0,
-        lags=longest_lag(len(recording), recording.period),
+        lags=greatest_lag(len(recording), recording.period, settings),
+        settings=settings,
     )
 
 
-def _pairs(channels: Mapping[str, Channel], lags: int) -> dict[tuple[str, str], Pair]:
+def _pairs(
+    channels: Mapping[str, ChannelAssessment], lags: int
+) -> dict[tuple[str, str], PairCorrelation]:
     moving = [name for name, channel in channels.items() if channel.whiteness is not None]
     return {
-        (first, second): assess_pair(channels[first].residual, channels[second].residual, lags)
+        (first, second): assess_correlation(channels[first].residual, channels[second].residual, lags)
         for first, second in combinations(moving, 2)
     }

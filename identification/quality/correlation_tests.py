@@ -9,11 +9,7 @@ from scipy import signal, stats
 from statsmodels.stats.diagnostic import acorr_ljungbox
 from statsmodels.tsa.stattools import acf, ccf
 
-FIRST_LAGS = 10
-"""Lags of the short Ljung-Box test, which finds dependence between neighbours."""
-
-SEGMENT = 256
-"""Samples per segment of Welch's method, at most an eighth of the record."""
+from identification.quality.settings import QUALITY, QualitySettings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,9 +17,9 @@ class Spectrum:
     """Power spectral density by Welch's method (Figure 9)."""
 
     frequency: NDArray
-    """Normalised: 1 is the Nyquist frequency; without both ends."""
+    """Normalised, (frequencies,): 1 is the Nyquist frequency; without both ends."""
     density: NDArray
-    """[unit^2 per rad/sample]; sigma^2/pi for white noise."""
+    """(frequencies,) [unit^2 per rad/sample]; sigma^2/pi for white noise."""
     white: float
     """sigma^2/pi."""
     band: tuple[float, float]
@@ -31,7 +27,7 @@ class Spectrum:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Whiteness:
+class WhitenessTest:
     """Whether a signal's samples are independent of each other."""
 
     autocorrelation: NDArray
@@ -54,7 +50,7 @@ class Whiteness:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Pair:
+class PairCorrelation:
     """How two signals depend on each other."""
 
     correlation: float
@@ -83,31 +79,34 @@ class Pair:
         return float(min(1.0, len(self.crosscorrelation) * single))
 
 
-def white_band(samples: float) -> float:
-    """A correlation of independent white signals lies within +- this in 95 % of cases."""
+def white_noise_band(samples: float) -> float:
+    """Half width of the band that holds 95 % of the correlations of independent white signals."""
     return float(stats.norm.isf(0.025) / np.sqrt(samples))
 
 
-def assess_whiteness(residual: NDArray, lags: int) -> Whiteness:
-    """Of a detrended signal (samples,) that changes, up to a lag."""
-    table = acorr_ljungbox(residual, lags=sorted({min(FIRST_LAGS, lags), lags}))
+def assess_whiteness(residual: NDArray, lags: int, settings: QualitySettings = QUALITY) -> WhitenessTest:
+    """Of a detrended signal (samples,), in any unit, that changes; lags: the greatest [samples]."""
+    table = acorr_ljungbox(residual, lags=sorted({min(settings.first_lags, lags), lags}))
     frequency, power = signal.periodogram(residual, fs=2.0)
-    return Whiteness(
+    return WhitenessTest(
         autocorrelation=np.asarray(acf(residual, nlags=lags, fft=True)),
         probability=float(min(1.0, 2 * np.min(table["lb_pvalue"]))),
-        spectrum=spectrum(residual),
+        spectrum=spectrum(residual, settings),
         peak_frequency=float(frequency[np.argmax(power)]),
     )
 
 
-def assess_pair(first: NDArray, second: NDArray, lags: int) -> Pair:
-    """Of two detrended signals (samples,) that change, up to a lag either way."""
+def assess_correlation(first: NDArray, second: NDArray, lags: int) -> PairCorrelation:
+    """Of two detrended signals (samples,), in any unit, that change.
+
+    lags: the greatest lag, either way [samples].
+    """
     forward = np.asarray(ccf(first, second, adjusted=False, nlags=lags + 1))
     backward = np.asarray(ccf(second, first, adjusted=False, nlags=lags + 1))
     own = np.asarray(acf(first, nlags=lags, fft=True)) * np.asarray(acf(second, nlags=lags, fft=True))
     effective = len(first) / max(1.0, 1 + 2 * float(np.sum(own[1:])))
     correlation = float(forward[0])
-    return Pair(
+    return PairCorrelation(
         correlation=correlation,
         probability=float(2 * stats.norm.sf(abs(correlation) * np.sqrt(effective))),
         crosscorrelation=np.concatenate((backward[:0:-1], forward)),
@@ -115,12 +114,14 @@ def assess_pair(first: NDArray, second: NDArray, lags: int) -> Pair:
     )
 
 
-def spectrum(residual: NDArray) -> Spectrum:
-    """Welch's density with Hann windows that overlap by half, and the band of white noise.
+def spectrum(residual: NDArray, settings: QualitySettings = QUALITY) -> Spectrum:
+    """Power density of a detrended signal (samples,) [unit], and the band of white noise.
+
+    Welch's method with Hann windows that overlap by half.
 
     K such segments have 36 K^2/(19 K - 1) degrees of freedom (Percival and Walden 1993, chapter 6).
     """
-    length = min(SEGMENT, len(residual) // 8)
+    length = min(settings.spectrum_segment, len(residual) // 8)
     whole: Any = False  # the line is off already
     frequency, density = signal.welch(residual, fs=2.0, nperseg=length, detrend=whole)
     segments = (len(residual) - length) // (length - length // 2) + 1

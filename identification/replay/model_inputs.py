@@ -15,29 +15,25 @@ from scipy.signal import savgol_filter
 from scipy.stats import chi2
 
 from identification.recordings.recording import HOLD, Recording
-
-SMOOTHING = 0.01
-"""Window in which p2 is smoothed before the air drawn from the supply is read off it [s]."""
-
-BLOCK = 0.02
-"""Length of the blocks over which what is left of p1 must average out [s]."""
-
-DOUBT = 1e-4
-"""Probability of what is left of a signal, as white noise, below which a simple course is given up."""
+from identification.replay.settings import REPLAY, ReplaySettings
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drive:
-    """Inputs of the model for one recording; arrays (samples,), SI units."""
+class ModelInputs:
+    """Inputs of the model for one recording."""
 
     period: float
+    """Time between samples [s]."""
     U: NDArray
+    """Coil voltage, (samples,) [V]."""
     p1: NDArray
+    """Supply pressure, (samples,) [Pa absolute]."""
     sigma_S: NDArray
+    """Air consumed from the circuit, (samples,) [kg/s]."""
     U_start: float
     """Voltage in the steady start, of which I(0) follows [V]."""
     p2_start: float
-    """Circuit pressure in the steady start [Pa]."""
+    """Circuit pressure in the steady start [Pa absolute]."""
 
     @property
     def p1_start(self) -> float:
@@ -45,41 +41,45 @@ class Drive:
         return float(self.p1[0])
 
 
-def drive_of(recording: Recording, p: Mapping[str, float]) -> Drive:
-    """The inputs that the model is given for a recording; p: volumes and temperature by symbol."""
+def model_inputs(
+    recording: Recording, p: Mapping[str, float], settings: ReplaySettings = REPLAY
+) -> ModelInputs:
+    """The inputs that the model is given for a recording; p: volumes and temperature by symbol [SI]."""
     start = slice(0, max(2, round(HOLD / recording.period)))
-    return Drive(
+    return ModelInputs(
         period=recording.period,
-        U=smooth_voltage(recording),
-        p1=smooth_supply(recording, p),
+        U=smooth_voltage(recording, settings),
+        p1=smooth_supply(recording, p, settings),
         sigma_S=recording.sigma_S,
         U_start=float(np.mean(recording.U[start])),
         p2_start=float(np.mean(recording.p2[start])),
     )
 
 
-def smooth_voltage(recording: Recording) -> NDArray:
+def smooth_voltage(recording: Recording, settings: ReplaySettings = REPLAY) -> NDArray:
     """U with each stretch between switchings at its mean, if only noise hides that [V], (samples,)."""
     U = recording.U.copy()
     borders = np.flatnonzero(np.diff(recording.energised)) + 1
     for stretch in np.split(U, borders):  # views: assigning to one changes U
         residual = stretch - np.mean(stretch)
-        if len(stretch) > 2 and _is_white(residual, recording.period):
+        if len(stretch) > 2 and _is_white(residual, recording.period, settings):
             stretch[:] = np.mean(stretch)
     return U
 
 
-def smooth_supply(recording: Recording, p: Mapping[str, float]) -> NDArray:
+def smooth_supply(
+    recording: Recording, p: Mapping[str, float], settings: ReplaySettings = REPLAY
+) -> NDArray:
     """p1 without its noise [Pa], (samples,).
 
     Reservoirs lose the air that is drawn from them, by which p1 falls in proportion (R T / V1). Where
     this leaves more than white noise, because the supply has a life of its own, a smoothing spline
     (generalised cross-validation) takes its place.
     """
-    fitted = _air_balance(recording, p)
-    if _is_white(recording.p1 - fitted, recording.period):
+    fitted = _air_balance(recording, p, settings.smoothing_window)
+    if _is_white(recording.p1 - fitted, recording.period, settings):
         return fitted
-    return _spline(recording)
+    return _spline(recording, settings.block)
 
 
 def without_offsets(recording: Recording, offsets: Mapping[str, float]) -> Recording:
@@ -88,41 +88,43 @@ def without_offsets(recording: Recording, offsets: Mapping[str, float]) -> Recor
     return replace(recording, **corrected)
 
 
-def _air_balance(recording: Recording, p: Mapping[str, float]) -> NDArray:
+def _air_balance(
+    recording: Recording, p: Mapping[str, float], window: float = REPLAY.smoothing_window
+) -> NDArray:
     """Least squares of p1 on a constant, a line in time, and the air drawn so far."""
-    drawn = _air_drawn(recording, p)
+    drawn = _air_drawn(recording, p, window)
     basis = np.stack([np.ones_like(drawn), recording.time, drawn], axis=1)
     basis /= np.maximum(np.max(np.abs(basis), axis=0), np.finfo(float).tiny)
     return basis @ np.linalg.lstsq(basis, recording.p1, rcond=None)[0]
 
 
-def _air_drawn(recording: Recording, p: Mapping[str, float]) -> NDArray:
+def _air_drawn(recording: Recording, p: Mapping[str, float], window: float) -> NDArray:
     """What the circuit holds and has consumed, and what has filled the control chamber [kg]."""
-    window = min(2 * round(0.5 * SMOOTHING / recording.period) + 1, len(recording) // 2 * 2 - 1)
-    p2, p3 = np.asarray(savgol_filter([recording.p2, recording.p3], window, 1))
+    samples = min(2 * round(0.5 * window / recording.period) + 1, len(recording) // 2 * 2 - 1)
+    p2, p3 = np.asarray(savgol_filter([recording.p2, recording.p3], samples, 1))
     filling = np.cumsum(np.diff(p3, prepend=p3[0]) * recording.energised)
     stored = (p["V2"] * p2 + p["V3"] * filling) / (p["R_gas"] * p["T_env"])
     return stored + np.cumsum(recording.sigma_S) * recording.period
 
 
-def _is_white(residual: NDArray, period: float) -> bool:
+def _is_white(residual: NDArray, period: float, settings: ReplaySettings) -> bool:
     """Whether block means scatter no more than independent samples of the same spread allow.
 
     The spread is read off differences between neighbours, which slow courses hardly enter.
     """
-    length = min(max(2, round(BLOCK / period)), len(residual))
+    length = min(max(2, round(settings.block / period)), len(residual))
     blocks = residual[: len(residual) // length * length].reshape(-1, length)
     variance = 0.5 * np.mean(np.diff(residual) ** 2)
     statistic = length * np.sum(np.mean(blocks, axis=1) ** 2)
-    return bool(statistic <= variance * chi2.isf(DOUBT, len(blocks)))
+    return bool(statistic <= variance * chi2.isf(settings.white_probability, len(blocks)))
 
 
-def _spline(recording: Recording) -> NDArray:
+def _spline(recording: Recording, block: float) -> NDArray:
     """Smoothing spline through means of a few samples each, which keep it cheap.
 
     Its search for the least cross-validation error needs knots about 1 apart.
     """
-    every = max(1, round(0.1 * BLOCK / recording.period))
+    every = max(1, round(0.1 * block / recording.period))
     count = len(recording) // every
     means = recording.p1[: count * every].reshape(count, every).mean(axis=1)
     spline = make_smoothing_spline(np.arange(count), means - means[0])

@@ -3,41 +3,35 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.recordings.columns import TIME, line
+from identification.recordings.columns import TIME_COLUMN, line_number
 from identification.recordings.recording import CampaignError
-
-LEAST_RATE = 500.0
-"""Least samples per second: a slower bench misses the armature's movement."""
-
-HARMLESS = 1e-3
-"""Part of a period by which a sample may be off; it displaces the steepest signal by less than noise."""
-
-MOST_DIGITS = 9
-"""Decimals of a second beyond which nobody prints times."""
+from identification.recordings.rules import RULES, RecordingRules
 
 
-def sampling_period(file: str, time: NDArray) -> float:
+def sampling_period(file: str, time: NDArray, rules: RecordingRules = RULES) -> float:
     """Time between samples [s] of a `time_s` column, (samples,).
 
     Of all periods that explain the printed times the one with the roundest rate in Hz; their middle
     where no whole rate does. Raises CampaignError for times that are not uniform, do not start at 0 or
-    are slower than LEAST_RATE.
+    are slower than `rules.least_rate`.
     """
     if len(time) < 2:
         raise CampaignError(
-            f"{file}, line {line(len(time))}: the file ends after {len(time)} samples, too few to tell "
+            f"{file}, line {line_number(len(time))}: the file ends after {len(time)} samples, too few "
+            "to tell "
             "the sampling rate: record for longer"
         )
     _check_order(file, time)
     _check_gaps(file, time)
-    least, greatest = _explaining_periods(time)
+    least, greatest = _explaining_periods(time, rules)
     if least > greatest:
         _refuse_jitter(file, time)
     period = _roundest(least, greatest)
-    if period * LEAST_RATE > 1 + 1e-9:
+    if period * rules.least_rate > 1 + 1e-9:
         raise CampaignError(
-            f"{file}, line {line(1)}: sampled at {1 / period:g} Hz: record at {LEAST_RATE:g} Hz or "
-            "faster"
+            f"{file}, line {line_number(1)}: sampled at {1 / period:g} Hz: record at "
+            f"{rules.least_rate:g} "
+            "Hz or faster"
         )
     return period
 
@@ -45,7 +39,8 @@ def sampling_period(file: str, time: NDArray) -> float:
 def _check_order(file: str, time: NDArray) -> None:
     if abs(time[0]) > 1e-9:
         raise CampaignError(
-            f"{file}, line {line(0)}: {TIME} starts at {time[0]:g} and must start at 0: subtract the "
+            f"{file}, line {line_number(0)}: {TIME_COLUMN} starts at {time[0]:g} and must start at 0: "
+            "subtract the "
             "first time from all"
         )
     backward = np.flatnonzero(np.diff(time) <= 0)
@@ -65,7 +60,7 @@ def _check_gaps(file: str, time: NDArray) -> None:
 
 def _refuse_step(file: str, time: NDArray, sample: int, rule: str) -> None:
     raise CampaignError(
-        f"{file}, line {line(sample + 1)}: {TIME} goes from {time[sample]:.9g} to "
+        f"{file}, line {line_number(sample + 1)}: {TIME_COLUMN} goes from {time[sample]:.9g} to "
         f"{time[sample + 1]:.9g} and {rule}"
     )
 
@@ -74,19 +69,22 @@ def _refuse_jitter(file: str, time: NDArray) -> None:
     uniform = np.linspace(0.0, time[-1], len(time))
     worst = int(np.argmax(np.abs(time - uniform)))
     raise CampaignError(
-        f"{file}, line {line(worst)}: {TIME} is {time[worst]:.9g} where uniform sampling has "
+        f"{file}, line {line_number(worst)}: {TIME_COLUMN} is {time[worst]:.9g} where uniform "
+        "sampling has "
         f"{uniform[worst]:.9g}, which rounding to the printed digits does not explain: resample to a "
         "uniform rate"
     )
 
 
-def _explaining_periods(time: NDArray) -> tuple[float, float]:
+def _explaining_periods(time: NDArray, rules: RecordingRules) -> tuple[float, float]:
     """Ends of the range of periods with which every time is right up to its rounding [s].
 
     Time k, rounded by at most h, allows (t_k - h) / k to (t_k + h) / k; the first end lies above the
     second where nothing explains all.
     """
-    rounding = 0.5 * _last_digit(time) + HARMLESS * float(np.median(np.diff(time)))
+    rounding = 0.5 * _last_digit(time, rules.most_digits) + rules.harmless_jitter * float(
+        np.median(np.diff(time))
+    )
     count = np.arange(1, len(time))
     return (
         float(np.max((time[1:] - rounding) / count)),
@@ -94,12 +92,12 @@ def _explaining_periods(time: NDArray) -> tuple[float, float]:
     )
 
 
-def _last_digit(time: NDArray) -> float:
+def _last_digit(time: NDArray, most_digits: int) -> float:
     """Value of the last decimal in which times are printed [s]."""
-    for digits in range(MOST_DIGITS):
+    for digits in range(most_digits):
         if np.max(np.abs(time - np.round(time, digits))) < 1e-12:
             return 10.0**-digits
-    return 10.0**-MOST_DIGITS
+    return 10.0**-most_digits
 
 
 def _roundest(least: float, greatest: float) -> float:

@@ -11,74 +11,85 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.sensors import SENSORS, Sensor
-from identification.recordings.columns import CHANNEL_OF, TIME, line
+from identification.recordings.columns import CHANNEL_OF, TIME_COLUMN, line_number
 from identification.recordings.pressure_reference import (
     check_above_ambient,
     check_against_supply,
     check_discharge,
 )
 from identification.recordings.recording import HOLD, CampaignError
-from identification.recordings.timing import sampling_period
-
-LEAST_REST = 0.5
-"""Least duration of a quality recording [s]; statistics of less mean little."""
-
-LEAST_VOLTAGE = 1.0
-"""Least greatest voltage of a coil that is on at all [V]; noise has 0.012 V."""
-
-PASCAL, KILOPASCAL = 1e4, 50.0
-"""Medians of a pressure column above which it is in Pa, and else in kPa; the range ends at 16 bar."""
-
-STUCK_TIME, STUCK_SAMPLES = 0.02, 20
-"""A reading that stays at the end of a range for both [s and samples] is stuck; noise moves it."""
+from identification.recordings.rules import RULES, RecordingRules
+from identification.recordings.sampling_times import sampling_period
 
 
 def check_recording(
-    file: str, columns: Mapping[str, NDArray], *, role: str, ambient_bar: float
+    file: str,
+    columns: Mapping[str, NDArray],
+    *,
+    role: str,
+    ambient_bar: float,
+    rules: RecordingRules = RULES,
 ) -> float:
-    """Apply every rule to a recording's columns, each (samples,); returns the sampling period [s].
+    """Apply every rule to a recording's columns; returns the sampling period [s].
 
-    file: what messages call it. role: one of recording.ROLES. ambient_bar: p_env [bar
-    absolute]. Raises CampaignError at the first rule that is broken.
+    Args:
+        file: what messages call the recording.
+        columns: by the file's column names, each (samples,) in the unit of the name.
+        role: one of recording.ROLES.
+        ambient_bar: p_env [bar absolute].
+
+    Raises CampaignError at the first rule that is broken.
     """
-    period = sampling_period(file, columns[TIME])
-    check_length(file, columns, role, period)
+    period = sampling_period(file, columns[TIME_COLUMN], rules)
+    check_length(file, columns, role, period, rules)
     for name, channel in CHANNEL_OF.items():
         if name in columns:
-            _check_channel(file, name, columns[name], SENSORS[channel], period, ambient_bar)
+            _check_channel(file, name, columns[name], SENSORS[channel], period, ambient_bar, rules)
     if role != "quality":
-        check_switching(file, columns["U_V"])
+        check_switching(file, columns["U_V"], rules)
         check_energised_start(file, columns["U_V"], period)
         check_steady_start(file, columns, period)
-        check_pressures(file, columns, period, ambient_bar)
+        check_pressures(file, columns, period, ambient_bar, rules)
     return period
 
 
 def _check_channel(
-    file: str, name: str, values: NDArray, sensor: Sensor, period: float, ambient_bar: float
+    file: str,
+    name: str,
+    values: NDArray,
+    sensor: Sensor,
+    period: float,
+    ambient_bar: float,
+    rules: RecordingRules,
 ) -> None:
     if name != "U_V":  # a voltage may be fed back without noise
         check_alive(file, name, values)
     if name.startswith("p"):
-        check_unit(file, name, values)
+        check_unit(file, name, values, rules)
         check_above_ambient(file, name, values, ambient_bar)
     check_range(file, name, values, sensor)
-    check_rail(file, name, values, sensor, period)
+    check_rail(file, name, values, sensor, period, rules)
 
 
-def check_length(file: str, columns: Mapping[str, NDArray], role: str, period: float) -> None:
-    """A recording holds its steady start and more; one for statistics LEAST_REST."""
-    found = len(columns[TIME])
-    needed = _samples(LEAST_REST, period) if role == "quality" else _samples(HOLD, period) + 1
-    if found < needed:
+def check_length(
+    file: str, columns: Mapping[str, NDArray], role: str, period: float, rules: RecordingRules
+) -> None:
+    """A recording holds its steady start and more; one for statistics `rules.least_rest`.
+
+    columns: by name, each (samples,) in the unit of the name. Raises CampaignError.
+    """
+    samples = len(columns[TIME_COLUMN])
+    needed = _samples(rules.least_rest, period) if role == "quality" else _samples(HOLD, period) + 1
+    if samples < needed:
         raise CampaignError(
-            f"{file}, line {line(found)}: the file ends after {found} samples, and a {role} recording "
+            f"{file}, line {line_number(samples)}: the file ends after {samples} samples, and a {role} "
+            "recording "
             f"at {1 / period:g} Hz needs at least {needed}: record for longer"
         )
 
 
 def check_alive(file: str, name: str, values: NDArray) -> None:
-    """Noise and the ADC's steps move every channel that is connected."""
+    """Noise and the ADC's steps move every channel, (samples,) [A, V or bar], that is connected."""
     if np.min(values) == np.max(values):
         raise CampaignError(
             f"{file}, {_lines(0, len(values))}: {name} is {values[0]:g} throughout, and noise moves "
@@ -86,35 +97,38 @@ def check_alive(file: str, name: str, values: NDArray) -> None:
         )
 
 
-def check_unit(file: str, name: str, values: NDArray) -> None:
-    """Pressures are in bar."""
+def check_unit(file: str, name: str, values: NDArray, rules: RecordingRules) -> None:
+    """Pressures, (samples,), are in [bar]. Raises CampaignError."""
     typical = float(np.median(values))
-    if typical > KILOPASCAL:
-        unit, factor = ("Pa", 100000) if typical > PASCAL else ("kPa", 100)
+    if typical > rules.kilopascal_median:
+        unit, factor = ("Pa", 100000) if typical > rules.pascal_median else ("kPa", 100)
         raise CampaignError(
-            f"{file}, line {line(0)}: {name} is {values[0]:g}, which looks like {unit}: give bar "
+            f"{file}, line {line_number(0)}: {name} is {values[0]:g}, which looks like {unit}: give bar "
             f"absolute (divide {unit} by {factor})"
         )
 
 
 def check_range(file: str, name: str, values: NDArray, sensor: Sensor) -> None:
-    """Table 1's range holds, but for the sensor's accuracy."""
+    """Values (samples,) [the sensor's unit] lie in Table 1's range, but for the accuracy."""
     margin = _margin(sensor) + 1e-9
     outside = (values < sensor.low - margin) | (values > sensor.high + margin)
     if np.any(outside):
         sample = int(np.argmax(outside))
         raise CampaignError(
-            f"{file}, line {line(sample)}: {name} is {values[sample]:g}, outside the sensor's range "
+            f"{file}, line {line_number(sample)}: {name} is {values[sample]:g}, outside the sensor's "
+            "range "
             f"[{sensor.low:g}, {sensor.high:g}] by more than its accuracy of {_margin(sensor):g}: "
             "check unit and scaling, or cut the recording there"
         )
 
 
-def check_rail(file: str, name: str, values: NDArray, sensor: Sensor, period: float) -> None:
-    """No reading stays at an end of the range, or where the ADC saturates beyond it."""
+def check_rail(
+    file: str, name: str, values: NDArray, sensor: Sensor, period: float, rules: RecordingRules
+) -> None:
+    """No reading (samples,) [A, V, bar] stays at an end of the range, or where the ADC saturates."""
     at_end = (values <= sensor.low) | (values >= sensor.high - sensor.resolution)
     first, length = _longest_run(at_end[1:] & (values[1:] == values[:-1]))
-    if length >= max(_samples(STUCK_TIME, period), STUCK_SAMPLES):
+    if length >= max(_samples(rules.stuck_time, period), rules.stuck_samples):
         raise CampaignError(
             f"{file}, {_lines(first, length + 1)}: {name} is stuck at {values[first]:g}, an end of the "
             f"sensor's range [{sensor.low:g}, {sensor.high:g}]: check the sensor, or record again with "
@@ -122,9 +136,9 @@ def check_rail(file: str, name: str, values: NDArray, sensor: Sensor, period: fl
         )
 
 
-def check_switching(file: str, U: NDArray) -> None:
-    """The coil is on and off: below and above half its greatest voltage."""
-    if np.max(U) < LEAST_VOLTAGE or np.min(U) > 0.5 * np.max(U):
+def check_switching(file: str, U: NDArray, rules: RecordingRules) -> None:
+    """The coil, at voltages (samples,) [V], is on and off: below and above half its greatest voltage."""
+    if np.max(U) < rules.least_voltage or np.min(U) > 0.5 * np.max(U):
         raise CampaignError(
             f"{file}, {_lines(0, len(U))}: U_V never switches, it stays between {np.min(U):g} and "
             f"{np.max(U):g} V: record a switching of the coil, or give the recording the role quality"
@@ -132,18 +146,22 @@ def check_switching(file: str, U: NDArray) -> None:
 
 
 def check_energised_start(file: str, U: NDArray, period: float) -> None:
-    """The coil is on for HOLD before it first switches."""
+    """The coil, at voltages (samples,) [V], is on for HOLD before it first switches."""
     off = np.flatnonzero(0.5 * np.max(U) >= U[: _samples(HOLD, period)])
     if off.size:
         raise CampaignError(
-            f"{file}, line {line(off[0])}: U_V is {U[off[0]]:g} V at {1e3 * off[0] * period:g} ms, and "
+            f"{file}, line {line_number(off[0])}: U_V is {U[off[0]]:g} V at {1e3 * off[0] * period:g} "
+            "ms, and "
             f"recordings start energised for at least {1e3 * HOLD:g} ms: record from before the first "
             "switching"
         )
 
 
 def check_steady_start(file: str, columns: Mapping[str, NDArray], period: float) -> None:
-    """Current and pressures rest during HOLD: first and last quarter agree within the accuracy."""
+    """Current and pressures rest during HOLD: first and last quarter agree within the accuracy.
+
+    columns: by name, each (samples,) in the unit of the name. period [s]. Raises CampaignError.
+    """
     count = _samples(HOLD, period)
     quarter = count // 4
     for name, channel in CHANNEL_OF.items():
@@ -159,14 +177,21 @@ def check_steady_start(file: str, columns: Mapping[str, NDArray], period: float)
 
 
 def check_pressures(
-    file: str, columns: Mapping[str, NDArray], period: float, ambient_bar: float
+    file: str,
+    columns: Mapping[str, NDArray],
+    period: float,
+    ambient_bar: float,
+    rules: RecordingRules,
 ) -> None:
-    """Pressures are absolute, as far as a recording that starts energised and switches can tell."""
+    """Pressures are absolute, as far as a recording that starts energised and switches can tell.
+
+    columns: by name, each (samples,) in the unit of the name. period [s]. Raises CampaignError.
+    """
     start = slice(_samples(HOLD, period))
     for name, channel in CHANNEL_OF.items():
         if name in columns and channel == "p1":
             check_against_supply(file, name, columns[name][start], columns["p3_bar"][start])
-    check_discharge(file, columns["U_V"], columns["p3_bar"], period, ambient_bar)
+    check_discharge(file, columns["U_V"], columns["p3_bar"], period, ambient_bar, rules)
 
 
 def _margin(sensor: Sensor) -> float:
@@ -180,7 +205,7 @@ def _samples(duration: float, period: float) -> int:
 
 
 def _lines(first: int, count: int) -> str:
-    return f"lines {line(first)} to {line(first + count - 1)}"
+    return f"lines {line_number(first)} to {line_number(first + count - 1)}"
 
 
 def _longest_run(mask: NDArray) -> tuple[int, int]:

@@ -10,20 +10,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.confidence.covariance import score_series
-
-DRAWS = 2000
+from identification.confidence.settings import CONFIDENCE
 
 
 def block_bootstrap(
-    residuals: Sequence[NDArray], jacobians: Sequence[NDArray], *, block: int, seed: int = 0
+    residuals: Sequence[NDArray],
+    jacobians: Sequence[NDArray],
+    *,
+    block: int,
+    seed: int = 0,
+    draws: int = CONFIDENCE.bootstrap_draws,
 ) -> NDArray:
-    """Movements of the estimate (DRAWS, k) under blocks of `block` samples, within each recording."""
+    """Movements of the scaled estimate (draws, k) under blocks drawn within each recording.
+
+    Args:
+        residuals: weighted, per recording (3 samples,).
+        jacobians: by the scaled parameters, per recording (3 samples, k).
+        block: length of the blocks [samples].
+    """
     H = np.linalg.inv(sum(J.T @ J for J in jacobians))
     sums = [_block_sums(s, block) for s in score_series(residuals, jacobians)]
     rng = np.random.default_rng(seed)
-    moved = np.zeros((DRAWS, H.shape[0]))
+    moved = np.zeros((draws, H.shape[0]))
     for blocks in sums:
-        counts = rng.multinomial(len(blocks), np.full(len(blocks), 1.0 / len(blocks)), DRAWS)
+        counts = rng.multinomial(len(blocks), np.full(len(blocks), 1.0 / len(blocks)), draws)
         moved += (counts - 1.0) @ blocks @ H
     return moved
 

@@ -7,28 +7,29 @@ from numpy.typing import NDArray
 
 from epv_env.plant.sensors import SENSORS
 from identification.recordings.recording import CHANNELS, HOLD, UNITS, Campaign, CampaignError, Recording
-
-BLOCK = 0.05
-"""Time over which a drift passes for straight [s]."""
+from identification.recordings.rules import RULES, RecordingRules
 
 
-def noise_of(campaign: Campaign) -> dict[str, float]:
+def pooled_noise(campaign: Campaign, rules: RecordingRules = RULES) -> dict[str, float]:
     """Standard deviation of each channel's readings about the true value [A, V, Pa], pooled.
 
     From the quality recordings if there are any, otherwise from the holds that the other recordings
     start with. Raises CampaignError if a hold is too short.
     """
-    steady = campaign.of("quality")
-    stretches = [(r, len(r)) for r in steady] or [(r, hold(r)) for r in campaign.recordings]
-    return {name: _pooled(name, stretches) for name in CHANNELS}
+    steady = campaign.with_role("quality")
+    stretches = [(r, len(r)) for r in steady] or [
+        (r, energised_start_length(r)) for r in campaign.recordings
+    ]
+    return {name: _pooled(name, stretches, rules.noise_block) for name in CHANNELS}
 
 
-def noise_from_hold(recording: Recording) -> dict[str, float]:
-    """As `noise_of`, from the energised steady start of one recording [A, V, Pa]."""
-    return {name: _pooled(name, [(recording, hold(recording))]) for name in CHANNELS}
+def noise_of_energised_start(recording: Recording, rules: RecordingRules = RULES) -> dict[str, float]:
+    """As `pooled_noise`, from the energised steady start of one recording [A, V, Pa]."""
+    stretch = (recording, energised_start_length(recording))
+    return {name: _pooled(name, [stretch], rules.noise_block) for name in CHANNELS}
 
 
-def hold(recording: Recording) -> int:
+def energised_start_length(recording: Recording) -> int:
     """Length of the energised start [samples]. Raises CampaignError if it lasts less than HOLD."""
     energised = recording.energised
     samples = len(recording) if np.all(energised) else int(np.argmin(energised))
@@ -40,20 +41,20 @@ def hold(recording: Recording) -> int:
     return samples
 
 
-def _pooled(name: str, stretches: Sequence[tuple[Recording, int]]) -> float:
+def _pooled(name: str, stretches: Sequence[tuple[Recording, int]], block: float) -> float:
     """Root of the summed squares over the summed degrees of freedom, at least the rounding error."""
     parts = [
-        _about_lines(recording.channel(name)[:samples], recording.period)
+        _about_lines(recording.channel(name)[:samples], recording.period, block)
         for recording, samples in stretches
     ]
     variance = sum(squares for squares, _ in parts) / sum(degrees for _, degrees in parts)
     return max(float(np.sqrt(variance)), _rounding_error(name))
 
 
-def _about_lines(signal: NDArray, period: float) -> tuple[float, int]:
+def _about_lines(signal: NDArray, period: float, block: float) -> tuple[float, int]:
     """Sum of squares and degrees of freedom about one straight line per block, (samples,)."""
-    blocks = np.array_split(signal, max(1, int(len(signal) * period / BLOCK)))
-    return sum(_squares(block) for block in blocks), len(signal) - 2 * len(blocks)
+    blocks = np.array_split(signal, max(1, int(len(signal) * period / block)))
+    return sum(_squares(part) for part in blocks), len(signal) - 2 * len(blocks)
 
 
 def _squares(block: NDArray) -> float:

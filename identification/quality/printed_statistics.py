@@ -2,11 +2,11 @@
 
 from itertools import combinations
 
-from identification.quality.statistics import Description
+from identification.quality.statistics import DescriptiveStatistics
 from identification.recordings.recording import CHANNELS
 from identification.report_2003.printed_values import correlation_matrix
 
-NAMES = {
+STATISTIC_NAMES = {
     "arithmetic_mean": "arithmetic mean",
     "trimmed_mean": "trimmed mean [by 5 %]",
     "median": "median",
@@ -21,10 +21,10 @@ NAMES = {
 }
 """Rows of Table 3, by field of Description."""
 
-FACTORS = {"I": -6e-6, "U": 5.8e-5, "p1": 7.9e-5, "p2": -1.16e-4, "p3": -8.2e-5}
+TREND_SLOPES = {"I": -6e-6, "U": 5.8e-5, "p1": 7.9e-5, "p2": -1.16e-4, "p3": -8.2e-5}
 """Table 2 [unit/s]."""
 
-OFFSETS = {"I": -0.000235, "U": 0.001837, "p1": 1.000909, "p2": 0.99272, "p3": 0.996888}
+TREND_OFFSETS = {"I": -0.000235, "U": 0.001837, "p1": 1.000909, "p2": 0.99272, "p3": 0.996888}
 """Table 2 [unit]."""
 
 _TABLE_3 = {
@@ -35,8 +35,9 @@ _TABLE_3 = {
     "p3": (0.0, 0.0, -0.0044, 0.0075, 0.0093, 0.0065, 0.0459, 66.995, 3.0882, 2.6351, 0.115),
 }
 
-DESCRIPTIONS = {
-    name: Description(**dict(zip(NAMES, column, strict=True))) for name, column in _TABLE_3.items()
+STATISTICS = {
+    name: DescriptiveStatistics(**dict(zip(STATISTIC_NAMES, column, strict=True)))
+    for name, column in _TABLE_3.items()
 }
 """Table 3 by channel."""
 

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f
 
-from identification.calibration.problem import Problem
-
-PROBABILITY = 0.95
+from identification.calibration.problem import CalibrationProblem
+from identification.confidence.settings import CONFIDENCE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,23 +33,34 @@ class ReportInterval:
 
     @property
     def half_widths(self) -> NDArray:
-        """Of the interval of each parameter while the others are held, scaled (k,)."""
+        """Of the interval of each parameter while the others are held, scaled (k,), without unit."""
         return np.sqrt(self.squared_rise / np.diag(self.curvature))
 
     def holds_jointly(self, apart: NDArray) -> bool:
-        """Whether a vector `apart` from the estimate (k,) has a total error below eps_p."""
+        """Whether a vector has a total error below eps_p.
+
+        apart: the vector less the estimate, scaled (k,), without unit.
+        """
         return bool(apart @ self.curvature @ apart <= self.squared_rise)
 
 
-def limit_ratio(values: int, parameters: int, probability: float = PROBABILITY) -> float:
-    """eps_p / eps_opt for the number of measured values and of parameters."""
+def limit_ratio(values: int, parameters: int, probability: float = CONFIDENCE.probability) -> float:
+    """eps_p / eps_opt for a number of measured values and of parameters."""
     degrees = values - parameters
     return 1.0 + parameters / degrees * float(f.ppf(probability, parameters, degrees))
 
 
-def report_interval(problem: Problem, z: NDArray, error: float) -> ReportInterval:
-    """Eq. 23 at the minimum z (k,) of the total error."""
+def report_interval(
+    problem: CalibrationProblem,
+    z: NDArray,
+    error: float,
+    probability: float = CONFIDENCE.probability,
+) -> ReportInterval:
+    """Eq. 23 at the minimum of the total error.
+
+    z: the minimum, scaled (k,). error: the total error there, a fraction.
+    """
     residuals, jacobians = problem.total_error().linearised(z)
-    ratio = limit_ratio(sum(len(r) for r in residuals), len(z))
+    ratio = limit_ratio(sum(len(r) for r in residuals), len(z), probability)
     curvature = np.sum([J.T @ J for J in jacobians], axis=0)
     return ReportInterval(error=error, ratio=ratio, curvature=curvature)

@@ -10,7 +10,7 @@ from epv_env.plant.parameters import Parameters, table
 
 
 @dataclass(frozen=True)
-class Vector:
+class ParameterVector:
     """Fitted symbols in order; an optimiser sees each divided by its reference value."""
 
     symbols: tuple[str, ...]
@@ -29,7 +29,7 @@ class Vector:
 
     @property
     def bounds(self) -> NDArray:
-        """Scaled ends of the domains, the lesser first, (k, 2)."""
+        """Scaled ends of the domains, the lesser first, (k, 2), without unit."""
         return np.sort(self.domains / self.scale[:, None], axis=1)
 
     def values(self, z: NDArray) -> dict[str, NDArray]:
@@ -37,10 +37,10 @@ class Vector:
         return dict(zip(self.symbols, np.moveaxis(np.atleast_2d(z) * self.scale, 1, 0), strict=True))
 
     def parameters(self, z: NDArray) -> Parameters:
-        """The complete set for one scaled vector (k,), within the domains."""
+        """The complete set [SI] for one scaled vector (k,), within the domains."""
         inside = np.clip(z * self.scale, *self.domains.T)
         return self.reference.replace(**dict(zip(self.symbols, inside.tolist(), strict=True)))
 
-    def of(self, parameters: Mapping[str, float]) -> NDArray:
-        """The scaled vector of a set of parameters, (k,)."""
+    def scaled(self, parameters: Mapping[str, float]) -> NDArray:
+        """The scaled vector (k,), without unit, of a set of parameters [SI]."""
         return np.array([parameters[symbol] for symbol in self.symbols]) / self.scale

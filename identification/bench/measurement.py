@@ -11,61 +11,70 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.readings import readings
 from epv_env.plant.sensors import SENSORS
 from epv_env.plant.simulate import energised
-from identification.bench.automaton import simulate_reference
 from identification.bench.programmes import Programme
-from identification.bench.schedule import delayed_schedule, scheduled
+from identification.bench.reference_simulation import simulate_reference
+from identification.bench.schedule import delayed_schedule, piecewise_schedule
+from identification.bench.settings import BENCH, BenchSettings
 from identification.recordings.recording import CHANNELS, UNITS, Campaign, Recording
-from identification.report_2003.cases import RATE
+from identification.report_2003.cases import SAMPLING_RATE
 
-RESERVOIR = 0.08
+RESERVOIR_VOLUME = 0.08
 """The bench's two reservoirs of 40 litres (section 3) [m^3]; air drawn from them lowers p1."""
 
-RTOL = 1e-8
-"""Relative tolerance of the bench's solver: errors below 0.1 mbar, a thirtieth of an ADC step."""
-
-OFFSETS = {"p1": 0.000909, "p2": -0.00728, "p3": -0.003112, "I": -0.000235, "U": 0.001837}
+SENSOR_OFFSETS = {"p1": 0.000909, "p2": -0.00728, "p3": -0.003112, "I": -0.000235, "U": 0.001837}
 """Reading less truth at the start of a recording (Table 2; pressures less 1 bar) [bar, A, V]."""
 
-TRENDS = {"p1": 7.9e-5, "p2": -1.16e-4, "p3": -8.2e-5, "I": -6e-6, "U": 5.8e-5}
+SENSOR_TRENDS = {"p1": 7.9e-5, "p2": -1.16e-4, "p3": -8.2e-5, "I": -6e-6, "U": 5.8e-5}
 """Drift of the readings (Table 2) [bar/s, A/s, V/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Truth:
-    """What really happened in one recording; arrays (samples,) by channel, SI units."""
+class TrueSignals:
+    """What really happened in one recording."""
 
     programme: Programme
     period: float
+    """Time between samples [s]."""
     channels: Mapping[str, NDArray]
+    """By name as recording.CHANNELS, each (samples,) [SI]."""
 
 
 def run_programme(
-    parameters: Parameters, programme: Programme, *, rate: float = RATE, reservoir: float = RESERVOIR
-) -> Truth:
-    """The true course of one recording at `rate` samples per second."""
+    parameters: Parameters,
+    programme: Programme,
+    *,
+    rate: float = SAMPLING_RATE,
+    reservoir: float = RESERVOIR_VOLUME,
+    settings: BenchSettings = BENCH,
+) -> TrueSignals:
+    """The true signals of one recording.
+
+    rate: samples per second [1/s]. reservoir: volume that feeds p1 [m^3]. Raises RuntimeError where the
+    solver fails.
+    """
     U = programme.case.voltage(programme.U_on, rate)
     time = np.arange(len(U)) / rate
     start = initial_state(parameters, programme)
     # Switching takes effect at the sample at which the voltage is first read, or later.
-    schedule = scheduled(parameters, start, time, U=U[:-1], reservoir_volume=reservoir)
+    schedule = piecewise_schedule(parameters, start, time, U=U[:-1], reservoir_volume=reservoir)
     delayed = delayed_schedule(schedule, parameters["t_delay"])
-    state = simulate_reference(delayed, time, rtol=RTOL).state
+    state = simulate_reference(delayed, time, rtol=settings.relative_tolerance).state
     channels = {"U": U, **readings(state, parameters)}
-    return Truth(programme=programme, period=1.0 / rate, channels=channels)
+    return TrueSignals(programme=programme, period=1.0 / rate, channels=channels)
 
 
-def measured(
-    truth: Truth, rng: np.random.Generator, offsets: Mapping[str, float] = OFFSETS
+def measured_recording(
+    truth: TrueSignals, rng: np.random.Generator, offsets: Mapping[str, float] = SENSOR_OFFSETS
 ) -> Recording:
     """A recording of the truth by the sensors of Tables 1 to 3: offset, trend, noise, 12 bit.
 
-    offsets: by channel, as OFFSETS; a channel that is left out has none.
+    offsets: by channel, as SENSOR_OFFSETS [bar, A, V]; a channel that is left out has none.
     """
     readings = {}
     for channel in CHANNELS:
         value = truth.channels[channel] / UNITS[channel][1]
         time = np.arange(len(value)) * truth.period
-        drifted = value + offsets.get(channel, 0.0) + TRENDS[channel] * time
+        drifted = value + offsets.get(channel, 0.0) + SENSOR_TRENDS[channel] * time
         reading = SENSORS[channel].measure(drifted, rng.standard_normal(len(value)))
         readings[channel] = reading * UNITS[channel][1]
     return Recording(
@@ -78,12 +87,12 @@ def measured(
 
 
 def measured_campaign(
-    truths: Sequence[Truth],
+    truths: Sequence[TrueSignals],
     parameters: Parameters,
     *,
     seed: int,
     name: str = "virtual bench",
-    offsets: Mapping[str, float] = OFFSETS,
+    offsets: Mapping[str, float] = SENSOR_OFFSETS,
 ) -> Campaign:
     """A campaign of the truths; each recording's noise has a generator of its own, from the seed."""
     generators = [np.random.default_rng([seed, index]) for index in range(len(truths))]
@@ -91,7 +100,9 @@ def measured_campaign(
         name=name,
         temperature=parameters["T_env"],
         pressure=parameters["p_env"],
-        recordings=tuple(measured(t, rng, offsets) for t, rng in zip(truths, generators, strict=True)),
+        recordings=tuple(
+            measured_recording(t, rng, offsets) for t, rng in zip(truths, generators, strict=True)
+        ),
     )
 
 

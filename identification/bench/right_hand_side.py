@@ -1,0 +1,51 @@
+"""The plant's state equations for one valve as a compiled function of arrays."""
+
+from collections.abc import Callable
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from epv_env.plant.compiled import FLAGS
+from epv_env.plant.effects.coil import coil_current
+from epv_env.plant.equations import derivative
+from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at, store_state
+
+RightHandSide = Callable[[NDArray, NDArray, NDArray, NDArray, float, float], NDArray]
+"""(state, inputs, coefficients, effects, free_PV, free_MV) -> rates and both forces."""
+
+
+@numba.njit(**FLAGS)
+def terminal_currents(U, current, coil_heat, coefficients, effects):
+    """Currents at the coil's terminals, (samples,) [A].
+
+    U: coil voltage [V]. current: state I, (samples,) [A]. coil_heat: state, (samples,) [K].
+    coefficients, effects: tables of one valve, as epv_env.plant.coefficients makes them.
+    """
+    c, e = coefficients_at(coefficients, 0, 0), effects_at(effects, 0, 0)
+    out = np.empty_like(current)
+    for k in range(current.size):
+        out[k] = coil_current(U, current[k], c.R, coil_heat[k], e)
+    return out
+
+
+def compiled_right_hand_side(extended: bool) -> RightHandSide:
+    """`derivative` for one valve as a compiled function of arrays."""
+
+    @numba.njit(**FLAGS)
+    def rates_and_forces(y, u, c, e, free_PV, free_MV):
+        q = state_at(y.reshape(-1, 1), 0, 0)
+        inputs = inputs_at(u.reshape(-1, 1), 0, 0)
+        rates, force_PV, force_MV = derivative(
+            q, inputs, coefficients_at(c, 0, 0), effects_at(e, 0, 0), free_PV, free_MV, extended
+        )
+        out = np.empty(y.size + 2)
+        store_state(out.reshape(-1, 1), 0, 0, rates)
+        out[-2], out[-1] = force_PV, force_MV
+        return out
+
+    return rates_and_forces
+
+
+COMPILED_RIGHT_HAND_SIDES = {extended: compiled_right_hand_side(extended) for extended in (False, True)}
+"""Compiled on first use."""

@@ -1,0 +1,100 @@
+"""`python -m identification bench`: write a campaign of a virtual bench."""
+
+import argparse
+from pathlib import Path
+
+from epv_env.plant.effects.registry import CATALOGUE
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.plantfile import load_plant, save_plant
+from identification.bench.programme_file import load_programmes
+from identification.bench.programmes import SUITES
+from identification.bench.session import run_bench
+from identification.commands.command import Command
+from identification.commands.options import add_out, add_seed
+from identification.recordings.campaign_files import check_vacant, write_campaign
+from identification.report_2003.cases import SAMPLING_RATE
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the recordings, the true plant, and where both are written."""
+    add_out(parser, help="folder of the campaign")
+    add_seed(parser, help="of the sensors' noise")
+    recordings = parser.add_mutually_exclusive_group()
+    recordings.add_argument("--suite", choices=SUITES, default="report", help="which recordings")
+    recordings.add_argument("--programme", type=Path, default=None, help="JSON file of other recordings")
+    parser.add_argument("--rate", type=float, default=SAMPLING_RATE, help="samples per second")
+    parser.add_argument("--plant", default=None, help="plant file of the truth; default: Table 12")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="SYMBOL=VALUE", help="another true value [SI]"
+    )
+    parser.add_argument(
+        "--effect", action="append", default=[], metavar="NAME=SIZE", help="an effect (docs/effects.md)"
+    )
+    parser.add_argument("--truth", type=Path, default=None, help="plant file to write the truth to")
+
+
+def run(chosen: argparse.Namespace) -> None:
+    """Write the campaign. Raises ValueError for a wrong value, or a folder that holds a campaign."""
+    check_vacant(chosen.out)
+    truth = _with_values(load_plant(chosen.plant).parameters, chosen.set)
+    truth = _with_effects(truth, chosen.effect)
+    suite = load_programmes(chosen.programme) if chosen.programme else SUITES[chosen.suite]
+    campaign = run_bench(suite, truth, seed=chosen.seed, rate=chosen.rate)
+    write_campaign(campaign, chosen.out)
+    if chosen.truth is not None:
+        _save_truth(truth, chosen)
+    print(f"{len(campaign.recordings)} recordings in {chosen.out}")
+
+
+def _save_truth(truth: Parameters, chosen: argparse.Namespace) -> None:
+    """Write the true parameters as a plant file whose region is that one point."""
+    plant = load_plant(chosen.plant)
+    save_plant(
+        type(plant)(parameters=truth, region=type(plant.region)(centre=truth), name="truth"),
+        chosen.truth,
+    )
+
+
+def _with_values(parameters: Parameters, settings: list[str]) -> Parameters:
+    """Parameters with SYMBOL=VALUE settings applied. Raises ValueError for what is not of that form."""
+    changes = {}
+    for setting in settings:
+        symbol, _, text = setting.partition("=")
+        changes[symbol] = _number(text, f"--set {setting}: give SYMBOL=VALUE", "--set R=43.5")
+    return parameters.replace(**changes)
+
+
+def _with_effects(parameters: Parameters, settings: list[str]) -> Parameters:
+    """Parameters with NAME=SIZE effects switched on; commas separate several sizes of one effect."""
+    for setting in settings:
+        name, _, text = setting.partition("=")
+        symbols = CATALOGUE.get(name)
+        if symbols is None:
+            raise ValueError(f"--effect {setting}: unknown effect; known are {', '.join(CATALOGUE)}")
+        sizes = text.split(",")
+        if len(sizes) != len(symbols):
+            raise ValueError(
+                f"--effect {setting}: {name} is sized by {', '.join(symbols)}: give a number for each, "
+                "parted by commas"
+            )
+        rule = f"--effect {setting}: give NAME=SIZE"
+        values = [_number(size, rule, "--effect piston_friction=8,0") for size in sizes]
+        parameters = parameters.replace(**dict(zip(symbols, values, strict=True)))
+    return parameters
+
+
+def _number(text: str, rule: str, example: str) -> float:
+    """The text as a number; ValueError says the rule and gives an example."""
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError(f"{rule} with a number in SI units, as in {example}") from None
+
+
+BENCH = Command(
+    name="bench",
+    help="write a campaign of a virtual bench whose truth is known",
+    add_options=add_options,
+    run=run,
+)
+"""The command, for the registry."""

@@ -1,0 +1,27 @@
+"""The options and the campaign that `run` and the commands of the single stages share."""
+
+import argparse
+
+from identification.calibration.settings import CALIBRATION, CalibrationSettings
+from identification.commands.options import add_count, add_out, add_seed
+from identification.pipeline.identification import Identification
+from identification.pipeline.settings import IdentificationSettings
+from identification.recordings.campaign_files import read_campaign
+
+JOURNAL = "searches.jsonl"
+"""File of the finished searches in the folder of results."""
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the campaign, the folder of results, the seed and the number of starts."""
+    parser.add_argument("campaign", help="folder with campaign.json and the recordings (docs/data.md)")
+    add_out(parser)
+    add_seed(parser, help="of starts, draws and resampling")
+    add_count(parser, "--starts", default=CALIBRATION.starts, help="searches of each method")
+
+
+def chosen_identification(chosen: argparse.Namespace) -> Identification:
+    """The identification of the chosen campaign. Raises CampaignError."""
+    campaign = read_campaign(chosen.campaign)
+    settings = IdentificationSettings(calibration=CalibrationSettings(starts=chosen.starts))
+    return Identification(campaign, chosen.out / JOURNAL, seed=chosen.seed, settings=settings)

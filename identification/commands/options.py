@@ -1,0 +1,48 @@
+"""Options that several commands share, with the checks of their values."""
+
+import argparse
+from typing import Any
+
+from epv_env.common.command_line import writable_folder
+
+
+def add_out(parser: argparse.ArgumentParser, *, help: str = "folder of results") -> None:
+    """Add --out, a required folder that exists or can be made."""
+    parser.add_argument("--out", type=writable_folder, required=True, help=help)
+
+
+def add_seed(parser: argparse.ArgumentParser, *, help: str) -> None:
+    """Add --seed, a whole number from 0 up; help: what the seed draws."""
+    parser.add_argument("--seed", type=int, action=_NotNegative, default=0, help=help)
+
+
+def add_count(parser: argparse.ArgumentParser, option: str, *, default: int | None, help: str) -> None:
+    """Add a whole number that is at least 1, such as --trials."""
+    parser.add_argument(option, type=int, action=_AtLeastOne, default=default, help=help)
+
+
+def add_workers(parser: argparse.ArgumentParser) -> None:
+    """Add --workers, the number of processes."""
+    add_count(parser, "--workers", default=None, help="processes; default: all cores")
+
+
+class _AtLeastOne(argparse.Action):
+    """Stores a number; ends with one sentence if it is below 1."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, chosen: argparse.Namespace, value: Any, option: Any = None
+    ) -> None:
+        if value < 1:
+            parser.error(f"{self.option_strings[0]} must be at least 1")
+        setattr(chosen, self.dest, value)
+
+
+class _NotNegative(argparse.Action):
+    """Stores a number; ends with one sentence if it is below 0."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, chosen: argparse.Namespace, value: Any, option: Any = None
+    ) -> None:
+        if value < 0:
+            parser.error(f"{self.option_strings[0]} must not be negative")
+        setattr(chosen, self.dest, value)

@@ -1,0 +1,63 @@
+"""One campaign and everything that the stages of its identification share."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.metadata import version
+from pathlib import Path
+
+from epv_env.plant.parameters import Parameters
+from identification.calibration.calibrate import Calibration, calibrate
+from identification.calibration.problem import CalibrationProblem, calibration_problem
+from identification.confidence.confidence import Confidence, assess_confidence
+from identification.pipeline.settings import IDENTIFICATION, IdentificationSettings
+from identification.recordings.recording import Campaign
+
+ESTIMATOR = "least squares"
+"""The method whose estimate goes on: it weighs the outputs by their noise, so it scatters least."""
+
+
+@dataclass(frozen=True)
+class Identification:
+    """A campaign, where finished searches are kept, and what follows from both, computed once."""
+
+    campaign: Campaign
+    journal: Path
+    """File of the finished searches."""
+    seed: int = 0
+    """Of starts, draws and resampling."""
+    settings: IdentificationSettings = IDENTIFICATION
+    """Judgements of every stage."""
+
+    @property
+    def hashes(self) -> dict[str, str]:
+        """SHA-256 of each recording's file by name."""
+        return {recording.name: recording.sha256 for recording in self.campaign.recordings}
+
+    @cached_property
+    def problem(self) -> CalibrationProblem:
+        """What is to be fitted to which recordings. Raises CampaignError."""
+        return calibration_problem(self.campaign, quality=self.settings.quality)
+
+    @cached_property
+    def calibration(self) -> Calibration:
+        """Both methods from every start."""
+        return calibrate(
+            self.problem,
+            journal=self.journal,
+            subject={
+                "software": version("epv-valve"),
+                "recordings": {r.name: r.digest() for r in self.campaign.recordings},
+            },
+            settings=self.settings.calibration,
+            seed=self.seed,
+        )
+
+    @cached_property
+    def confidence(self) -> Confidence:
+        """Intervals and joint region."""
+        return assess_confidence(self.calibration, seed=self.seed, settings=self.settings.confidence)
+
+    @property
+    def parameters(self) -> Parameters:
+        """The estimate that goes on [SI]."""
+        return self.calibration.parameters(ESTIMATOR)

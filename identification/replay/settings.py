@@ -1,0 +1,28 @@
+"""What the replay smooths inputs with, and steps and batches its simulations by."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReplaySettings:
+    """Judgements of the replay of recordings."""
+
+    smoothing_window: float = 0.01
+    """Window in which p2 is smoothed before the air drawn from the supply is read off p2 [s]."""
+    block: float = 0.02
+    """Length of the blocks over which what remains of a signal must average out [s]."""
+    white_probability: float = 1e-4
+    """Probability, as white noise, of what remains of a signal below which the signal is not replaced
+    by a simple course."""
+    pressure_step: float = 1e3
+    """Change of the start's circuit pressure by which its influence is measured [Pa]."""
+    relative_step: float = 1e-4
+    """Change of a scaled parameter for a finite difference."""
+    failed_residual: float = 1e3
+    """Residual, in units of its weight, of samples of a candidate that cannot be integrated."""
+    largest_batch: int = 1_500_000
+    """Samples times valves that are simulated at once: about 200 MB."""
+
+
+REPLAY = ReplaySettings()
+"""The default settings."""
