@@ -10,7 +10,7 @@ PACKAGES := epv_env identification controllers training
 
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help venv train test test-oldest identify gap blind real-bench circle pictures bench tune tradeoff results robustness export gif docs lint check format wheel clean
+.PHONY: help venv train test test-oldest identify gap blind real-bench circle pictures bench tune tradeoff results robustness export gif lint check format wheel clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z][a-z-]*\):.*## /\1	/p' Makefile | while IFS='	' read -r name text; do \
@@ -103,6 +103,7 @@ pictures: $(VENV)/.installed ## draw the figures of docs/identification.md
 gif: $(VENV)/.installed ## film the valve for the README
 	SDL_VIDEODRIVER=dummy $(PY) docs/film.py --out docs/images/valve.gif $(ARGS)
 
+.PHONY: docs # a folder has the same name
 docs: $(VENV)/.installed ## build the documentation into site/ (strict: broken links and undocumented names fail)
 	NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --strict $(ARGS)
 
