@@ -104,6 +104,7 @@ pictures: $(VENV)/.installed ## draw the figures of docs/identification.md
 gif: $(VENV)/.installed ## film the valve for the README
 	SDL_VIDEODRIVER=dummy $(PY) docs/scripts/film.py --out docs/images/valve.gif $(ARGS)
 
+.PHONY: docs # a folder has the same name
 docs: $(VENV)/.installed ## build the documentation into site/ (strict: broken links and undocumented names fail)
 	NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --strict $(ARGS)
 
