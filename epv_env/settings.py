@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from epv_env.common.units import BAR
 from epv_env.plant.consumption import MIXED, Scenario, check_scenario
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
-from epv_env.plant.supply import BAR, Supply
+from epv_env.plant.supply import Supply
 from epv_env.reward import RewardWeights
 
 Range = tuple[float, float]

@@ -11,14 +11,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.common.units import BAR
 from epv_env.observation import HISTORY, LONGEST_WAIT, P2_LAGS, P3_LAGS, encode
+from epv_env.plant.channels import CHANNEL
 from epv_env.plant.consumption import Profile, Profiles, draw_profile
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.readings import MEASURED
-from epv_env.plant.sensors import SENSORS
 from epv_env.plant.simulate import energised
-from epv_env.plant.supply import BAR, Supply
+from epv_env.plant.supply import Supply
 from epv_env.plant.valves import Valves
 from epv_env.reward import BAND_BAR, RewardTerms, reward_terms
 from epv_env.settings import EMPTY_CIRCUIT_BAR, Settings
@@ -280,8 +281,7 @@ class LimitingTask:
                 self._noise_block[i] = self.settings.sensor_noise * drawn
         normal = self._noise_block[where, place]
         true = {name: value[where] for name, value in self.valves.readings().items()}
-        units = {name: BAR if name in PRESSURES else 1.0 for name in MEASURED}
         return {
-            name: SENSORS[name].measure(true[name] / units[name], normal[:, k])
+            name: CHANNEL[name].sensor.measure(true[name] / CHANNEL[name].scale, normal[:, k])
             for k, name in enumerate(MEASURED)
         }

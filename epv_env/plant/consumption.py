@@ -11,7 +11,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-GRAM = 1e-3
+from epv_env.common.units import GRAM
+
 APPLICATIONS = 128
 """Applications drawn per episode; one that outlasts them meets them again from the first."""
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-BAR = 1e5
+from epv_env.common.units import BAR
 
 
 @dataclass(frozen=True, kw_only=True)

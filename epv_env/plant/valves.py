@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from epv_env.common.units import BAR
 from epv_env.plant import integrate
 from epv_env.plant.coefficients import coefficients, effect_sizes, has_effects
 from epv_env.plant.delay import delayed_inputs
@@ -47,7 +48,7 @@ class Valves:
         self._coefficients = np.repeat(coefficients(calibrated), lanes, axis=1)
         self._effects = np.repeat(effect_sizes(calibrated), lanes, axis=1)
         self._state = np.zeros((N_STATE, lanes))
-        State(*self._state).p1[:] = State(*self._state).p2[:] = State(*self._state).p3[:] = 1e5
+        State(*self._state).p1[:] = State(*self._state).p2[:] = State(*self._state).p3[:] = BAR
         self._inputs = np.zeros((N_INPUT, lanes))
         self._duration = np.zeros(lanes)
         self._lowest = np.full(lanes, np.inf)

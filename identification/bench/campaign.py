@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.plant.channels import MEASURED_CHANNELS
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.readings import readings
@@ -23,10 +24,10 @@ RESERVOIR = 0.08
 RTOL = 1e-8
 """Relative tolerance of the bench's solver: errors below 0.1 mbar, a thirtieth of an ADC step."""
 
-OFFSETS = {"p1": 0.000909, "p2": -0.00728, "p3": -0.003112, "I": -0.000235, "U": 0.001837}
+OFFSETS = {channel.name: channel.sensor.offset for channel in MEASURED_CHANNELS}
 """Reading less truth at the start of a recording (Table 2; pressures less 1 bar) [bar, A, V]."""
 
-TRENDS = {"p1": 7.9e-5, "p2": -1.16e-4, "p3": -8.2e-5, "I": -6e-6, "U": 5.8e-5}
+TRENDS = {channel.name: channel.sensor.trend for channel in MEASURED_CHANNELS}
 """Drift of the readings (Table 2) [bar/s, A/s, V/s]."""
 
 

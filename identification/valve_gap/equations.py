@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.common.units import GRAM, MILLIGRAM
 from epv_env.plant.equations import Inputs
 from epv_env.plant.readings import readings
 from epv_env.plant.simulate import Trajectory, energised, simulate
@@ -12,8 +13,6 @@ from epv_env.plant.valves import Valves
 from identification.gap.model.grey_box import Equation
 from identification.recordings.recording import OUTPUTS
 from identification.replay.drive import Drive
-
-GRAM, MILLIGRAM = 1e-3, 1e-6
 
 EQUATIONS = (
     Equation(name="f1", state="p2", component="output_chamber", unit="g/s", scale=GRAM, step=1e-5),
