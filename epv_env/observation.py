@@ -29,10 +29,15 @@ class Quantity:
     """One entry of the observation: (value - centre) / scale, clipped to ±limit."""
 
     name: str
+    """Name of the entry; part of the contract."""
     unit: str
+    """Unit of `centre` and `scale`; "1" for none."""
     centre: float
+    """Value that is encoded as 0 [unit]."""
     scale: float
+    """Change that is encoded as 1 [unit]."""
     limit: float
+    """Largest magnitude of the encoded value [-]."""
 
 
 def _layout() -> tuple[Quantity, ...]:
@@ -69,13 +74,13 @@ def observation_space() -> gymnasium.spaces.Box:
 
 
 def encode(values: dict[str, NDArray]) -> NDArray:
-    """Observations (n, entries) float32 from physical values (n,) by name, in bar, A and s."""
+    """Observations (n, entries) float32 [-] from physical values (n,) by entry name [bar, A, s]."""
     columns = np.stack([values[quantity.name] for quantity in LAYOUT], axis=-1)
     return np.clip((columns - _CENTRE) / _SCALE, -_LIMIT, _LIMIT).astype(np.float32)
 
 
 def decode(observations: NDArray, name: str) -> NDArray:
-    """One entry of observations (n, entries) in its unit, (n,)."""
+    """One entry of observations (n, entries) [-] in its unit, (n,) [bar, A, s]; KeyError if unknown."""
     row = INDEX[name]
     return observations[..., row] * LAYOUT[row].scale + LAYOUT[row].centre
 

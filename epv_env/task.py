@@ -25,6 +25,7 @@ from epv_env.reward import BAND_BAR, RewardTerms, reward_terms
 from epv_env.settings import EMPTY_CIRCUIT_BAR, Settings
 
 PRESSURES = ("p1", "p2", "p3")
+"""Pressures with which an episode begins."""
 NOISE_BLOCK = 256
 """Samples of noise drawn at a time for each episode."""
 
@@ -35,13 +36,17 @@ class StepResult(NamedTuple):
     observation: NDArray
     """(n, entries) float32."""
     reward: NDArray
+    """Sum of the terms [-]."""
     terms: RewardTerms
+    """Contribution of each weight [-]."""
     failed: NDArray
     """The circuit is empty, or the plant left what can be integrated: what ends an episode."""
     deviation_bar: NDArray
     """p2 - target of largest magnitude within the period."""
     switchings: NDArray
+    """Switchings of the coil within the period."""
     vented_kg: NDArray
+    """Air blown off within the period [kg]."""
     consumption: NDArray
     """Mean consumption of the period [kg/s]."""
     succeeded: NDArray
@@ -113,7 +118,7 @@ class LimitingTask:
         self._reading = {name: np.zeros(n) for name in MEASURED}
 
     def time(self) -> NDArray:
-        """Time since each episode's start [s]."""
+        """Time since each episode's start, (n,) [s]."""
         return self.steps * self.period
 
     def begin(

@@ -6,15 +6,22 @@ from numpy.typing import NDArray
 from epv_env.plant.equations import Inputs
 
 U_ROW = Inputs._fields.index("U")
+"""Row of the voltage in a table of inputs."""
 
 
 def delayed_inputs(table: NDArray, duration: NDArray, delay: NDArray) -> tuple[NDArray, NDArray]:
-    """Inputs whose voltage acts later: every period parts into what still sees the former voltage, and
-    the rest.
+    """Inputs whose voltage acts later, and the durations for which they hold.
 
-    table: [period, row of Inputs, lane]; duration: [period, lane] in s, the same for all periods of a
-    lane but where it is 0; delay: [lane] in s. The first voltage is taken to have acted before. Returns
-    both with twice the periods; every second one ends where a period of the original ends.
+    Every period is split in two: the first part still has the former voltage. The first voltage is
+    taken to have acted before.
+
+    Args:
+        table: inputs (periods, rows of Inputs, lanes) [SI].
+        duration: (periods, lanes) [s]; the same in all periods of a lane, or 0.
+        delay: (lanes,) [s].
+
+    Returns:
+        Both with twice the periods; every second one ends where a period of the original ends.
     """
     longest = np.max(duration, axis=0)
     whole = np.floor(delay / np.where(longest > 0, longest, np.inf) + 1e-9).astype(int)

@@ -19,6 +19,7 @@ FORMAT = "epv-plant/1"
 """Version of the file, in its field `format`."""
 
 REMEDY = "the file is not of the form that docs/data.md describes; write it anew"
+"""What to do about a file with a wrong field; ends a message."""
 
 
 class PlantFileError(ValueError):
@@ -30,9 +31,11 @@ class Plant:
     """A calibrated plant: its best parameters and, if identification found it, its joint region."""
 
     parameters: Parameters
+    """Best parameters [SI]."""
     region: Region
     """What the calibration leaves uncertain; Table 14's intervals where nothing better is known."""
     name: str = "calibrated"
+    """Name in reports and plots."""
     provenance: dict[str, Any] = field(default_factory=dict)
     """Where the values come from (recordings, hashes, versions); free-form."""
 

@@ -87,7 +87,11 @@ class Valves:
     def set_parameters(
         self, where: NDArray, p: Mapping[str, ArrayLike], reservoir_volume: ArrayLike = np.inf
     ) -> None:
-        """Give the valves at the indices `where` (m,) the values p (scalars or arrays (m,))."""
+        """Set the parameters of the valves at the indices `where`, (m,).
+
+        p: values by symbol, scalars or arrays (m,) [SI]. reservoir_volume: V1, scalar or (m,) [m^3];
+        infinite for a supply that does not sag.
+        """
         self._coefficients[:, where] = coefficients(p, reservoir_volume)
         self._effects[:, where] = effect_sizes(p)
         self._with_effects = has_effects(self._effects)

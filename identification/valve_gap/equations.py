@@ -46,7 +46,10 @@ def modelled(drive: Drive, p: Mapping[str, float]) -> Trajectory:
 
 
 def forced_changes(drive: Drive, p: Mapping[str, float], equation: Equation, edges: NDArray) -> NDArray:
-    """`GreyBox.forced` on one recording; p: every parameter by symbol [SI]."""
+    """`GreyBox.forced` on one recording: changes (3, samples, windows) of OUTPUTS [Pa, Pa, A].
+
+    p: every parameter by symbol [SI]. edges: samples (windows + 1,) between which the forcing acts.
+    """
     m, steps = len(edges) - 1, len(drive.U) - 1
     name, sign = FORCINGS[equation.name]
     window = np.searchsorted(edges, np.arange(steps), side="right")[:, None] - 1

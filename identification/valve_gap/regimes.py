@@ -20,7 +20,10 @@ AJAR, MOVING = 1e-3, 2e-3
 
 
 def regimes(answer: Trajectory, p: Mapping[str, float], energised: NDArray) -> dict[str, NDArray]:
-    """Boolean (samples,) by regime; p: parameters by symbol; energised: whether the coil is on."""
+    """Boolean (samples,) by regime.
+
+    p: parameters by symbol [SI]. energised: whether the coil is on, boolean (samples,).
+    """
     q = answer.state
     current, greatest = np.abs(q.I), np.max(np.abs(q.I))
     settled = answer.U / p["R"]
