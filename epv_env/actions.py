@@ -17,6 +17,7 @@ class OnOff:
     """Discrete(2): the coil is off (0, the PV opens) or on (1, it shuts) for the whole period."""
 
     default_period: ClassVar[float] = 5e-3
+    """Control period where none is given [s]."""
     period: float
     """Control period [s]."""
 
@@ -40,6 +41,7 @@ class PWM:
     """
 
     default_period: ClassVar[float] = 20e-3
+    """PWM period where none is given [s]."""
     resolution: ClassVar[float] = 0.5e-3
     """Duty is realised in steps of this time [s]."""
     period: float

@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.actions import PWM, OnOff
+from epv_env.common.units import BAR, GRAM
 from epv_env.infos import single_info
 from epv_env.observation import observation_space
-from epv_env.plant.consumption import GRAM
 from epv_env.plant.plantfile import load_plant
-from epv_env.plant.supply import BAR
 from epv_env.render import Renderer, Snapshot
 from epv_env.settings import make_settings, with_options
 from epv_env.task import LimitingTask

@@ -11,6 +11,8 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.plant.channels import CURRENT, P1, P2, P3
+
 P2_LAGS = (1, 2, 4, 8)
 """Control periods over which changes of the measured p2 are observed."""
 P3_LAGS = (1, 4)
@@ -27,10 +29,15 @@ class Quantity:
     """One entry of the observation: (value - centre) / scale, clipped to ±limit."""
 
     name: str
+    """Name of the entry; part of the contract."""
     unit: str
+    """Unit of `centre` and `scale`; "1" for none."""
     centre: float
+    """Value that is encoded as 0 [unit]."""
     scale: float
+    """Change that is encoded as 1 [unit]."""
     limit: float
+    """Largest magnitude of the encoded value [-]."""
 
 
 def _layout() -> tuple[Quantity, ...]:
@@ -38,15 +45,15 @@ def _layout() -> tuple[Quantity, ...]:
         return Quantity(name=name, unit=unit, centre=centre, scale=scale, limit=limit)
 
     return (
-        quantity("p2_error", "bar", 0.0, 0.5, 32.0),
-        quantity("target", "bar", 8.0, 4.0, 2.5),
-        quantity("p1", "bar", 10.0, 4.0, 2.5),
-        quantity("p3", "bar", 8.0, 4.0, 2.5),
-        quantity("I", "A", 0.3, 0.3, 5.0),
+        quantity("p2_error", P2.unit, 0.0, 0.5, 32.0),
+        quantity("target", P2.unit, 8.0, 4.0, 2.5),
+        quantity("p1", P1.unit, 10.0, 4.0, 2.5),
+        quantity("p3", P3.unit, 8.0, 4.0, 2.5),
+        quantity("I", CURRENT.unit, 0.3, 0.3, 5.0),
         quantity("action", "1", 0.5, 0.5, 1.0),
         quantity("since_switching", "s", LONGEST_WAIT / 2, LONGEST_WAIT / 2, 1.0),
-        *(quantity(f"p2_change_{lag}", "bar", 0.0, 0.1, 160.0) for lag in P2_LAGS),
-        *(quantity(f"p3_change_{lag}", "bar", 0.0, 0.5, 32.0) for lag in P3_LAGS),
+        *(quantity(f"p2_change_{lag}", P2.unit, 0.0, 0.1, 160.0) for lag in P2_LAGS),
+        *(quantity(f"p3_change_{lag}", P3.unit, 0.0, 0.5, 32.0) for lag in P3_LAGS),
     )
 
 
@@ -67,13 +74,13 @@ def observation_space() -> gymnasium.spaces.Box:
 
 
 def encode(values: dict[str, NDArray]) -> NDArray:
-    """Observations (n, entries) float32 from physical values (n,) by name, in bar, A and s."""
+    """Observations (n, entries) float32 [-] from physical values (n,) by entry name [bar, A, s]."""
     columns = np.stack([values[quantity.name] for quantity in LAYOUT], axis=-1)
     return np.clip((columns - _CENTRE) / _SCALE, -_LIMIT, _LIMIT).astype(np.float32)
 
 
 def decode(observations: NDArray, name: str) -> NDArray:
-    """One entry of observations (n, entries) in its unit, (n,)."""
+    """One entry of observations (n, entries) [-] in its unit, (n,) [bar, A, s]; KeyError if unknown."""
     row = INDEX[name]
     return observations[..., row] * LAYOUT[row].scale + LAYOUT[row].centre
 

@@ -43,14 +43,20 @@ class RewardTerms(NamedTuple):
     """What each weight contributed, already weighted and negative; arrays of shape (n,)."""
 
     band: NDArray
+    """Deviation outside the band."""
     tracking: NDArray
+    """Distance from the target at the end of the period."""
     breakdown: NDArray
+    """Shortfall below the target."""
     switching: NDArray
+    """Switchings of the coil."""
     vented_air: NDArray
+    """Air blown off."""
     failure: NDArray
+    """End of the episode by an empty circuit."""
 
     def total(self) -> NDArray:
-        """The reward (n,)."""
+        """The reward, the sum of all terms, (n,) [-]."""
         return (
             self.band + self.tracking + self.breakdown + self.switching + self.vented_air
             + self.failure
@@ -68,10 +74,17 @@ def reward_terms(
     vented_kg: NDArray,
     failed: NDArray,
 ) -> RewardTerms:
-    """Reward terms of one control period; every array has the shape (n,).
+    """Reward terms of one control period, each (n,) [-].
 
-    error_bar: p2 - target at its end; highest/lowest_error_bar: its extremes within the period [bar].
-    switchings: coil switchings; vented_kg: air blown off [kg]; failed: whether the circuit is empty.
+    Args:
+        weights: weights of the terms and the band.
+        period: control period [s].
+        error_bar: p2 - target at the end of the period, (n,) [bar].
+        highest_error_bar: its greatest value within the period, (n,) [bar].
+        lowest_error_bar: its least value within the period, (n,) [bar].
+        switchings: switchings of the coil, (n,).
+        vented_kg: air blown off, (n,) [kg].
+        failed: whether the circuit is empty, boolean (n,).
     """
     scale = period / REFERENCE_PERIOD
     outside = np.maximum(highest_error_bar, -lowest_error_bar) > weights.band_bar

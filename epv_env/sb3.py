@@ -37,7 +37,7 @@ class SB3VectorEnv(VecEnv):
         super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
 
     def reset(self) -> np.ndarray:
-        """First observations (num_envs, entries) of new episodes, with the seeds and options given."""
+        """Start all episodes anew. Returns observations (n, entries) [-]."""
         seeds: Any = list(self._seeds)  # Gymnasium's base class knows of one seed only
         options = self._options
         if any(options):
@@ -52,11 +52,15 @@ class SB3VectorEnv(VecEnv):
         return observation
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Keep actions (num_envs, ...) for `step_wait`."""
+        """Keep the actions, (n,) or (n, 1) [-], for `step_wait`."""
         self._actions = actions
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """Observations (num_envs, entries), rewards and ends (num_envs,), and infos of the step."""
+        """Advance by one control period.
+
+        Returns observations (n, entries) [-], rewards (n,) [-], whether an episode ended (n,), and one
+        dictionary per environment; an episode that ended begins anew.
+        """
         observation, reward, terminated, truncated, self.last_infos = self.env.step(self._actions)
         done = terminated | truncated
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
@@ -68,7 +72,7 @@ class SB3VectorEnv(VecEnv):
         return observation, reward.astype(np.float32), done, infos
 
     def close(self) -> None:
-        """Free what the vector environment holds."""
+        """Release what the vector environment holds."""
         self.env.close()
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
@@ -90,11 +94,11 @@ class SB3VectorEnv(VecEnv):
     def env_is_wrapped(
         self, wrapper_class: type[gymnasium.Wrapper], indices: VecEnvIndices = None
     ) -> list[bool]:
-        """False for every index: no sub-environment has a wrapper of its own."""
+        """False for every index: the batch has no sub-environments to wrap."""
         return [False for _ in self._get_indices(indices)]
 
     def get_images(self) -> Sequence[np.ndarray | None]:
-        """None for every sub-environment: a batch is not rendered."""
+        """None for every environment: a batch is not drawn."""
         return [None for _ in range(self.num_envs)]
 
     def _require_all(self, indices: VecEnvIndices) -> None:

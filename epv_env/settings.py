@@ -6,14 +6,16 @@ from typing import Any
 
 import numpy as np
 
+from epv_env.common.units import BAR
 from epv_env.plant.consumption import MIXED, Scenario, check_scenario
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
-from epv_env.plant.supply import BAR, Supply
+from epv_env.plant.supply import Supply
 from epv_env.reward import RewardWeights
 
 Range = tuple[float, float]
+"""Least and greatest value."""
 
 PRESSURE_LIMITS_BAR = (1.0, 16.0)
 """Range of the pressure sensors (Table 1), bar absolute."""
@@ -74,16 +76,21 @@ class Settings:
     """Everything that defines the task; units in the names, ranges drawn uniformly per episode."""
 
     region: Region
+    """Region from which the plant's parameters are drawn."""
     control_period: float
     """Time between decisions [s]."""
     supply: Supply = field(default_factory=Supply.reservoirs)
+    """Supply of the input chamber."""
     scenario: str | Scenario = MIXED
+    """Consumption: a name, or a scenario of one's own."""
     target_bar: Range = (6.0, 9.5)
+    """Target pressure [bar absolute]."""
     p2_bar: Range | None = None
     """First circuit pressure; None: `drop_bar` below the target (an excess could not be undone)."""
     p3_bar: Range | None = None
     """First control pressure; None: p1, the energised steady state."""
     drop_bar: Range = (0.0, 2.0)
+    """How far the first circuit pressure lies below the target [bar]."""
     supply_voltage: float = 24.0
     """Solenoid voltage when on [V]."""
     settling_time: float = 0.5
@@ -91,6 +98,7 @@ class Settings:
     sensor_noise: float = 1.0
     """Standard deviations of the sensors' noise relative to Table 3's; True is 1, False is 0."""
     weights: RewardWeights = field(default_factory=RewardWeights)
+    """Weights of the reward."""
 
     def __post_init__(self) -> None:
         check_scenario(self.scenario)

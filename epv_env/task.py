@@ -11,19 +11,21 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.common.units import BAR
 from epv_env.observation import HISTORY, LONGEST_WAIT, P2_LAGS, P3_LAGS, encode
+from epv_env.plant.channels import CHANNEL
 from epv_env.plant.consumption import Profile, Profiles, draw_profile
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.readings import MEASURED
-from epv_env.plant.sensors import SENSORS
 from epv_env.plant.simulate import energised
-from epv_env.plant.supply import BAR, Supply
+from epv_env.plant.supply import Supply
 from epv_env.plant.valves import Valves
 from epv_env.reward import BAND_BAR, RewardTerms, reward_terms
 from epv_env.settings import EMPTY_CIRCUIT_BAR, Settings
 
 PRESSURES = ("p1", "p2", "p3")
+"""Pressures with which an episode begins."""
 NOISE_BLOCK = 256
 """Samples of noise drawn at a time for each episode."""
 
@@ -34,13 +36,17 @@ class StepResult(NamedTuple):
     observation: NDArray
     """(n, entries) float32."""
     reward: NDArray
+    """Sum of the terms [-]."""
     terms: RewardTerms
+    """Contribution of each weight [-]."""
     failed: NDArray
     """The circuit is empty, or the plant left what can be integrated: what ends an episode."""
     deviation_bar: NDArray
     """p2 - target of largest magnitude within the period."""
     switchings: NDArray
+    """Switchings of the coil within the period."""
     vented_kg: NDArray
+    """Air blown off within the period [kg]."""
     consumption: NDArray
     """Mean consumption of the period [kg/s]."""
     succeeded: NDArray
@@ -280,8 +286,7 @@ class LimitingTask:
                 self._noise_block[i] = self.settings.sensor_noise * drawn
         normal = self._noise_block[where, place]
         true = {name: value[where] for name, value in self.valves.readings().items()}
-        units = {name: BAR if name in PRESSURES else 1.0 for name in MEASURED}
         return {
-            name: SENSORS[name].measure(true[name] / units[name], normal[:, k])
+            name: CHANNEL[name].sensor.measure(true[name] / CHANNEL[name].scale, normal[:, k])
             for k, name in enumerate(MEASURED)
         }

@@ -5,3 +5,12 @@ BAR = 1e5
 
 MILLISECOND = 1e-3
 """One millisecond [s]."""
+
+GRAM = 1e-3
+"""One gram [kg]."""
+
+MILLIGRAM = 1e-6
+"""One milligram [kg]."""
+
+MILLIMETRE = 1e-3
+"""One millimetre [m]."""

@@ -11,7 +11,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-GRAM = 1e-3
+from epv_env.common.units import GRAM
+
 APPLICATIONS = 128
 """Applications drawn per episode; one that outlasts them meets them again from the first."""
 
@@ -23,6 +24,7 @@ class Scenario:
     """How consumption is drawn for an episode. Ranges are uniform; flows in g/s, times in s."""
 
     meaning: str
+    """What the consumers do, in a line for tables."""
     leak: tuple[float, float] = (0.0, 0.0)
     """Constant flow [g/s]."""
     flow: tuple[float, float] = (0.0, 0.0)
@@ -30,8 +32,11 @@ class Scenario:
     pause: tuple[float, float] = (1.0, 3.0)
     """From the end of one application to the start of the next [s]."""
     rise: tuple[float, float] = (0.0, 0.0)
+    """Time in which the flow of an application rises [s]."""
     hold: tuple[float, float] = (0.0, 0.0)
+    """Time for which it stays at its height [s]."""
     fall: tuple[float, float] = (0.0, 0.0)
+    """Time in which it falls to zero [s]."""
     first: tuple[float, float] = (0.6, 1.5)
     """Start of the first application [s]."""
 
@@ -55,6 +60,7 @@ class Profile:
     """Consumption over time: a leak and a sequence of trapezoids. SI units."""
 
     leak: float
+    """Constant flow [kg/s]."""
     applications: NDArray
     """Rows start, rise, hold, fall [s], flow [kg/s]; shape (5, APPLICATIONS), in order of time."""
     span: float

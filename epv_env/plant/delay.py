@@ -6,18 +6,22 @@ from numpy.typing import NDArray
 from epv_env.plant.equations import Inputs
 
 U_ROW = Inputs._fields.index("U")
+"""Row of the voltage in a table of inputs."""
 
 
 def delayed_inputs(table: NDArray, duration: NDArray, delay: NDArray) -> tuple[NDArray, NDArray]:
-    """Inputs whose voltage acts later: each period splits at the change.
+    """Inputs whose voltage acts later, and the durations for which they hold.
+
+    Every period is split in two: the first part still has the former voltage. The first voltage is
+    taken to have acted before.
 
     Args:
-        table: (periods, rows of Inputs, lanes) [SI].
-        duration: (periods, lanes) [s], the same for all periods of a lane but where it is 0.
+        table: inputs (periods, rows of Inputs, lanes) [SI].
+        duration: (periods, lanes) [s]; the same in all periods of a lane, or 0.
         delay: (lanes,) [s].
 
-    The first voltage is taken to have acted before. Returns both with twice the periods; every second
-    period ends where a period of the original ends.
+    Returns:
+        Both with twice the periods; every second one ends where a period of the original ends.
     """
     longest = np.max(duration, axis=0)
     whole = np.floor(delay / np.where(longest > 0, longest, np.inf) + 1e-9).astype(int)

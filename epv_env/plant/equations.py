@@ -96,9 +96,13 @@ class Coefficients(NamedTuple):
     """Parameters as the equations use them: report symbols, and products folded once per valve."""
 
     cPV: Value
+    """Stiffness of the PV spring [N/m]."""
     xPV0: Value
+    """Preload stroke of the PV spring [m]."""
     kPV: Value
+    """Damping of the piston [N s/m]."""
     xPVmax: Value
+    """Stroke of the piston [m]."""
     ePV: Value
     """Coefficient of restitution of the piston's stops [-]."""
     piston_area: Value
@@ -110,9 +114,13 @@ class Coefficients(NamedTuple):
     curtain_PV: Value
     """alphaPV pi d2: effective opening per stroke [m]."""
     cMV: Value
+    """Stiffness of the MV spring [N/m]."""
     xMV0: Value
+    """Preload stroke of the MV spring [m]."""
     kMV: Value
+    """Damping of the armature [N s/m]."""
     xMVmax: Value
+    """Stroke of the armature [m]."""
     eMV: Value
     """Coefficient of restitution of the armature's stops [-]."""
     mMV_inverse: Value
@@ -130,12 +138,15 @@ class Coefficients(NamedTuple):
     kink_exh: Value
     """Stroke below which the exhaust's bore is the smaller area [m]."""
     R: Value
+    """Resistance of the cold winding [Ohm]."""
     RML: Value
+    """Reluctance of the iron [A/(V s)]."""
     gap_reluctance: Value
     """1/(mu0 A_MB): reluctance per metre of air gap [A/(V s m)]."""
     N_squared: Value
     """Turns squared [-]."""
     N_squared_inverse: Value
+    """Reciprocal of the squared turns [-]."""
     RT_V2: Value
     """R T_env / V2 [Pa/kg]."""
     RT_V3: Value
@@ -145,6 +156,7 @@ class Coefficients(NamedTuple):
     inverse_sqrt_RT: Value
     """1/sqrt(R T_env) [s/m]."""
     p_env: Value
+    """Ambient pressure [Pa absolute]."""
 
 
 _with_supply = replacing(State, "p1")

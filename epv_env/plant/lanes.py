@@ -14,20 +14,28 @@ LANES = 16
 """Valves per block. LLVM vectorises a loop of this known length without run-time checks."""
 
 N_STATE = len(State._fields)
+"""Rows of a state."""
 N_COEFFICIENT = len(Coefficients._fields)
+"""Rows of the coefficients."""
 N_EFFECT = len(Effects._fields)
+"""Rows of the effects' constants."""
 N_INPUT = len(Inputs._fields)
+"""Rows of the inputs."""
 
 STATE = 0
 """First row of the state; the next groups follow."""
 TRIAL = STATE + N_STATE
 """First row of the state after the step on trial."""
 COEFFICIENT = TRIAL + N_STATE
+"""First row of the coefficients."""
 EFFECT = COEFFICIENT + N_COEFFICIENT
+"""First row of the effects' constants."""
 INPUT = EFFECT + N_EFFECT
+"""First row of the inputs."""
 FORCE = INPUT + N_INPUT
 """Forces on the piston at the start, middle and end of the step, then on the armature [N]."""
 N_FORCE = 6
+"""Rows of the forces."""
 REMAINING = FORCE + N_FORCE
 """Time left in the period [s]."""
 HINT = REMAINING + 1
@@ -41,6 +49,7 @@ LOWEST = GIVEN_UP + 1
 HIGHEST = LOWEST + 1
 """Greatest p2 so far [Pa]."""
 N_ROW = HIGHEST + 1
+"""Rows of the workspace."""
 
 
 @inlined
@@ -61,9 +70,13 @@ def _per_field(expression: str) -> str:
 
 
 state_at = _reader(State)
+"""The State (table, first row, lane)."""
 coefficients_at = _reader(Coefficients)
+"""The Coefficients (table, first row, lane)."""
 effects_at = _reader(Effects)
+"""The Effects (table, first row, lane)."""
 inputs_at = _reader(Inputs)
+"""The Inputs (table, first row, lane)."""
 
 
 def _writer(fields):

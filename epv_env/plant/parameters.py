@@ -23,8 +23,11 @@ class Parameter:
     """One row of the report's parameter tables. Units are SI."""
 
     symbol: str
+    """Symbol of docs/model.md."""
     unit: str
+    """SI unit; "1" for none."""
     value: float
+    """Nominal value [unit]."""
     domain: tuple[float, float] | None
     """Expected range (Tables 6, 7); None for a physical constant."""
     group: str
@@ -32,7 +35,9 @@ class Parameter:
     sensitive: bool
     """Whether Tables 8 and 9 class the model as sensitive to it."""
     source: str
+    """Table or equation of the report, or the effect."""
     meaning: str
+    """What the parameter is, in a line."""
 
 
 @cache

@@ -6,14 +6,20 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from epv_env.common.files import write_text
+from epv_env.common.json_files import JSONFileError, checked
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import ParameterError, Parameters
 from epv_env.plant.region import Region
 
 FORMAT = "epv-plant/1"
+"""Version of the file, in its field `format`."""
+
+REMEDY = "the file is not of the form that docs/data.md describes; write it anew"
+"""What to do about a file with a wrong field; ends a message."""
 
 
 class PlantFileError(ValueError):
@@ -25,9 +31,11 @@ class Plant:
     """A calibrated plant: its best parameters and, if identification found it, its joint region."""
 
     parameters: Parameters
+    """Best parameters [SI]."""
     region: Region
     """What the calibration leaves uncertain; Table 14's intervals where nothing better is known."""
     name: str = "calibrated"
+    """Name in reports and plots."""
     provenance: dict[str, Any] = field(default_factory=dict)
     """Where the values come from (recordings, hashes, versions); free-form."""
 
@@ -42,6 +50,31 @@ class Plant:
         )
 
 
+class _JointFields(msgspec.Struct):
+    """Field `region.joint`: parameters that are uncertain together."""
+
+    symbols: tuple[str, ...]
+    covariance: list[list[float]]
+    chi_square: float
+
+
+class _RegionFields(msgspec.Struct):
+    """Field `region`."""
+
+    boxes: dict[str, tuple[float, float]] = {}
+    joint: _JointFields | None = None
+
+
+class _PlantFile(msgspec.Struct):
+    """A plant file; values of parameters are checked by `Parameters`, which names their domains."""
+
+    parameters: Any
+    effects: dict[str, dict[str, Any]] = {}
+    region: _RegionFields = msgspec.field(default_factory=_RegionFields)
+    name: str = "unnamed"
+    provenance: dict[str, Any] = {}
+
+
 def load_plant(source: "Plant | str | PathLike[str] | None") -> Plant:
     """A Plant from itself, a plant file, or (None) the report's calibration.
 
@@ -53,30 +86,30 @@ def load_plant(source: "Plant | str | PathLike[str] | None") -> Plant:
     if source is None:
         return Plant.calibrated()
     path = Path(source)
+    return _plant(_content(path), f"plant file {path}")
+
+
+def _content(path: Path) -> _PlantFile:
+    """The file's content, its fields and their types checked. Raises PlantFileError."""
     try:
+        # Not msgspec's decoder: a NaN is refused with the parameter's name, by `Parameters`.
         content = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise PlantFileError(
             f"cannot read plant file {path}: {error.strerror}; give the path of a plant.json"
         ) from None
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise PlantFileError(f"plant file {path} is not JSON ({error}); write it anew") from None
-    found = content.get("format") if isinstance(content, dict) else None
-    if found != FORMAT:
+    version = content.get("format") if isinstance(content, dict) else None
+    if version != FORMAT:
         raise PlantFileError(
-            f"plant file {path} has format {found!r}, this version reads {FORMAT!r}: write it anew "
+            f"plant file {path} has format {version!r}, this version reads {FORMAT!r}: write it anew "
             "with this version's identification"
         )
     try:
-        return _decode(content)
-    except ParameterError as error:
-        raise PlantFileError(f"plant file {path}: {error}") from None
-    except KeyError as error:
-        raise PlantFileError(f"plant file {path}: field {error} is missing: add it") from None
-    except (TypeError, ValueError, AttributeError) as error:
-        raise PlantFileError(
-            f"plant file {path} is not of the form that docs/data.md describes ({error})"
-        ) from None
+        return checked(content, _PlantFile, where=f"plant file {path}: content", remedy=REMEDY)
+    except JSONFileError as error:
+        raise PlantFileError(str(error)) from None
 
 
 def save_plant(plant: Plant, path: str | PathLike[str]) -> None:
@@ -103,35 +136,44 @@ def save_plant(plant: Plant, path: str | PathLike[str]) -> None:
     write_text(Path(path), json.dumps(content, indent=1) + "\n")
 
 
-def _decode(content: dict[str, Any]) -> Plant:
-    given = content["parameters"]
-    if not isinstance(given, dict):
+def _plant(content: _PlantFile, place: str) -> Plant:
+    """The plant that a file describes; place: how messages begin. Raises PlantFileError."""
+    try:
+        parameters = Parameters.calibrated().replace(**_values(content))
+        return Plant(
+            parameters=parameters,
+            region=_region(content.region, parameters),
+            name=content.name,
+            provenance=content.provenance,
+        )
+    except ParameterError as error:
+        raise PlantFileError(f"{place}: {error}") from None
+    except ValueError as error:
+        raise PlantFileError(f"{place}: {error}: {REMEDY}") from None
+
+
+def _values(content: _PlantFile) -> dict[str, Any]:
+    """Values by symbol, those of effects included. Raises ParameterError."""
+    if not isinstance(content.parameters, dict):
         raise ParameterError("parameters must be an object of values by symbol")
-    for name, sizes in content.get("effects", {}).items():
+    values = dict(content.parameters)
+    for name, sizes in content.effects.items():
         if name not in CATALOGUE:
             raise ParameterError(f"unknown effect {name!r}: known are {', '.join(CATALOGUE)}")
         if not set(sizes) <= set(CATALOGUE[name]):
             raise ParameterError(f"effect {name} is sized by {', '.join(CATALOGUE[name])} only")
-        given = {**given, **sizes}
-    parameters = Parameters.calibrated().replace(**given)
-    region = content.get("region", {})
-    boxes = {
-        symbol: (float(low), float(high)) for symbol, (low, high) in region.get("boxes", {}).items()
-    }
-    joint = region.get("joint")
-    if joint is None:
-        decoded = Region(centre=parameters, boxes=boxes)
-    else:
-        decoded = Region(
-            centre=parameters,
-            boxes=boxes,
-            symbols=tuple(joint["symbols"]),
-            covariance=np.array(joint["covariance"], dtype=float),
-            chi_square=float(joint["chi_square"]),
-        )
-    return Plant(
-        parameters=parameters,
-        region=decoded,
-        name=str(content.get("name", "unnamed")),
-        provenance=dict(content.get("provenance", {})),
+        values |= sizes
+    return values
+
+
+def _region(region: _RegionFields, centre: Parameters) -> Region:
+    """The confidence region around the plant's parameters. Raises ParameterError and ValueError."""
+    if region.joint is None:
+        return Region(centre=centre, boxes=region.boxes)
+    return Region(
+        centre=centre,
+        boxes=region.boxes,
+        symbols=region.joint.symbols,
+        covariance=np.array(region.joint.covariance, dtype=float),
+        chi_square=region.joint.chi_square,
     )

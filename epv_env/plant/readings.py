@@ -2,24 +2,25 @@
 
 from collections.abc import Mapping
 
+from epv_env.plant.channels import MEASURED_CHANNELS
 from epv_env.plant.equations import State
 from epv_env.plant.values import Value
 
-MEASURED = ("p1", "p2", "p3", "I")
-"""Quantities that the bench and the environment measure."""
+MEASURED = tuple(channel.name for channel in MEASURED_CHANNELS if channel.observed)
+"""Quantities that the environment measures; the bench measures them, too."""
 
-SENSOR_SYMBOLS = ("b_p2", "b_p3", "g_I")
+SENSOR_SYMBOLS = tuple(symbol for channel in MEASURED_CHANNELS for symbol in channel.symbols)
 """Parameters of the sensors that are not in the plant's equations."""
 
 
 def readings(state: State, p: Mapping[str, Value]) -> dict[str, Value]:
-    """Values before noise and rounding, by name [Pa, A]; as the state but for effects of sensors.
+    """Values before noise and rounding, by channel [SI]; as the state but for effects of sensors.
 
-    state: fields of any shape. p: SENSOR_SYMBOLS, numbers or arrays that broadcast to it.
+    state: fields of any shape. p: SENSOR_SYMBOLS, numbers or arrays that broadcast to it. A channel that
+    is an input of the bench (the voltage) has no reading here.
     """
     return {
-        "p1": state.p1,
-        "p2": state.p2 + state.lag_2 + p["b_p2"],
-        "p3": state.p3 + state.lag_3 + p["b_p3"],
-        "I": state.I_coil * (1.0 + p["g_I"]),
+        channel.name: channel.reading(state, p)
+        for channel in MEASURED_CHANNELS
+        if channel.reading is not None
     }

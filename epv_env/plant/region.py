@@ -28,6 +28,7 @@ class Region:
     """Plants around a centre. Empty boxes and covariance: the centre alone."""
 
     centre: Parameters
+    """Parameters in the middle of the region [SI]."""
     boxes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """Symbols that vary on their own, uniformly between two ends (SI units)."""
     symbols: tuple[str, ...] = ()

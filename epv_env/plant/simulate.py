@@ -26,8 +26,11 @@ class Trajectory:
     """A simulated run; every array has shape (samples,) or, for n valves, (samples, n). SI units."""
 
     time: NDArray
+    """Times of the samples, (samples,) [s]."""
     U: NDArray
+    """Solenoid voltage [V]."""
     state: State
+    """States; fields of the shape above [SI]."""
 
 
 def energised(p: Mapping[str, Value], *, p1: Value, p2: Value, U: Value) -> State:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-BAR = 1e5
+from epv_env.common.units import BAR
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,7 +71,11 @@ class Supply:
 
     @classmethod
     def recorded(cls, time_s: NDArray, pressure_bar: NDArray) -> "Supply":
-        """A measured p1 [bar absolute] at times [s], both (samples,), linear between its samples."""
+        """A measured p1, linear between its samples.
+
+        time_s: increasing times (samples,) [s]. pressure_bar: p1 (samples,) [bar absolute]. Raises
+        ValueError for times that do not increase and pressures that are not positive.
+        """
         time, pressure = np.asarray(time_s, float), np.asarray(pressure_bar, float) * BAR
         shaped = time.ndim == 1 and time.size > 0 and time.shape == pressure.shape
         if not shaped or not np.all(np.isfinite(time)) or np.any(np.diff(time) <= 0):
@@ -86,14 +90,14 @@ class Supply:
         return float(rng.uniform(*self.pressure))
 
     def slope(self, time: NDArray, period: float) -> NDArray:
-        """Imposed dp1/dt over the period that starts at `time` [Pa/s], shape of time."""
+        """Imposed dp1/dt, (n,) [Pa/s], over the period [s] that starts at each `time`, (n,) [s]."""
         if self.recording is None:
             return np.zeros_like(time)
         return (np.interp(time + period, *self.recording) - np.interp(time, *self.recording)) / period
 
     def compressor_runs(self, p1: NDArray, ran: NDArray) -> NDArray:
-        """Whether the compressor runs now, boolean (n,): two-point control with memory.
+        """Whether the compressor runs now, boolean (n,), by two-point control with memory.
 
-        p1: (n,) [Pa]; ran: whether it ran before, boolean (n,).
+        p1: supply pressure (n,) [Pa absolute]. ran: whether it ran before, boolean (n,).
         """
         return (p1 < self.cut_in) | (ran & (p1 < self.cut_out))

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from epv_env.common.units import BAR
 from epv_env.plant import integrate
 from epv_env.plant.coefficients import coefficients
 from epv_env.plant.delay import delayed_inputs
@@ -48,7 +49,7 @@ class Valves:
         self._coefficients = np.repeat(coefficients(calibrated), lanes, axis=1)
         self._effects = np.repeat(effect_constants(calibrated), lanes, axis=1)
         self._state = np.zeros((N_STATE, lanes))
-        State(*self._state).p1[:] = State(*self._state).p2[:] = State(*self._state).p3[:] = 1e5
+        State(*self._state).p1[:] = State(*self._state).p2[:] = State(*self._state).p3[:] = BAR
         self._inputs = np.zeros((N_INPUT, lanes))
         self._duration = np.zeros(lanes)
         self._lowest = np.full(lanes, np.inf)
@@ -87,7 +88,11 @@ class Valves:
     def set_parameters(
         self, where: NDArray, p: Mapping[str, ArrayLike], reservoir_volume: ArrayLike = np.inf
     ) -> None:
-        """Give the valves at the indices `where` (m,) the values p (scalars or arrays (m,))."""
+        """Set the parameters of the valves at the indices `where`, (m,).
+
+        p: values by symbol, scalars or arrays (m,) [SI]. reservoir_volume: V1, scalar or (m,) [m^3];
+        infinite for a supply that does not sag.
+        """
         self._coefficients[:, where] = coefficients(p, reservoir_volume)
         self._effects[:, where] = effect_constants(p)
         self._with_effects = has_effects(self._effects)

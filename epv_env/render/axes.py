@@ -12,23 +12,30 @@ from epv_env.render.palette import CARD, GRID, MUTED, Colour, mix
 SPACING = 19.0
 """Least distance between two labels at the ends of lines [px]."""
 MOST_TICKS = 7
+"""Largest number of numbered grid lines."""
 
 Array = NDArray[np.float64]
+"""An array of floats."""
 
 
 class Label(NamedTuple):
     """Words at the end of a line, and the height at which they should stand [px]."""
 
     y: float
+    """Height of the words [px]."""
     words: str
+    """The text."""
     colour: Colour
+    """Colour of the text."""
 
 
 class Axis(NamedTuple):
     """A panel's vertical axis: 0 at its lower edge, `top` at its upper one."""
 
     box: Box
+    """Left, upper, right and lower edge [px]."""
     top: float
+    """Value at the upper edge."""
 
     def y(self, value: float) -> float:
         """Height of a value [px]."""
@@ -64,7 +71,7 @@ def draw_steps(canvas: Canvas, x: Array, axis: Axis, values: Array, colour: Colo
 
 
 def run_ends(values: Array) -> NDArray[np.intp]:
-    """Indices (ends,) at which a run of equal values (samples,) begins or ends: all that is drawn."""
+    """Indices (k,) at which a run of equal values begins or ends; values: (n,), any unit."""
     changes = np.flatnonzero(np.diff(values))
     return np.unique(np.concatenate([[0], changes, changes + 1, [len(values) - 1]]))
 

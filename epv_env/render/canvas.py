@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     import pygame
 
 Point = tuple[float, float]
+"""Place from the left and from above [px]."""
 Box = tuple[float, float, float, float]
 """Left, top, right, bottom [px]."""
 
@@ -67,7 +68,7 @@ class Canvas:
         self._drawing.set_clip(None if box is None else self._rect(box))
 
     def image(self) -> NDArray[np.uint8]:
-        """The frame, shape (height, width, 3), red green blue."""
+        """The frame, uint8 (height, width, 3): red, green, blue."""
         width, height = self._drawing.get_size()
         # The view locks the surface, so it must not outlive this call.
         memory = np.frombuffer(self._drawing.get_buffer(), np.uint8)

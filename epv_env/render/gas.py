@@ -8,6 +8,7 @@ from epv_env.render.palette import CARD, INK, OUTLINE, Colour, mix, pressure_col
 from epv_env.render.snapshot import Snapshot
 
 AMBIENT_BAR = 1.0
+"""Ambient pressure [bar absolute]."""
 CHOKED = 0.47
 """Pressure drop over upstream pressure from which the flow no longer grows [-]."""
 WIDEST_G_PER_S = 5.0
@@ -20,8 +21,11 @@ class Flows(NamedTuple):
     """How strongly each passage flows, -1..1; positive in the direction of its name."""
 
     input_to_output: float
+    """Through the seat of the PV."""
     input_to_control: float
+    """Through the inlet of the MV."""
     control_to_ambient: float
+    """Through the exhaust of the MV."""
 
 
 def strength(opening: float, upstream_bar: float, downstream_bar: float) -> float:

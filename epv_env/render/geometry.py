@@ -14,10 +14,13 @@ MV = 190.0
 TUBE = 27.0
 """Half width of the tube in which the armature moves."""
 ARMATURE = 22.0
+"""Half width of the armature."""
 NOSE = 11.0
 """Half width of the armature's nose, which shuts the exhaust."""
 NOSE_LENGTH = 26.0
+"""Length of the nose."""
 ARMATURE_LENGTH = 94.0
+"""Length of the armature, its nose included."""
 BORE = 5.5
 """Half width of the exhaust bore and of the riser to the inlet."""
 CORE_TIP = 236.0
@@ -25,8 +28,10 @@ CORE_TIP = 236.0
 INLET_TIP = 354.0
 """Height of the inlet seat."""
 MV_CHAMBER: Box = (130, 320, 250, 386)
+"""Chamber around the inlet nozzle."""
 COIL_TOP, COIL_BOTTOM = 182.0, 308.0
 STROKE_MV = INLET_TIP - CORE_TIP - ARMATURE_LENGTH
+"""Drawn stroke of the armature."""
 
 # Protection valve, right: from above the control chamber, the piston, the seat, the output chamber.
 PV = 438.0
@@ -34,6 +39,7 @@ PV = 438.0
 PISTON = 90.0
 """Half width of the piston."""
 PISTON_LENGTH = 60.0
+"""Height of the piston."""
 BOSS_LENGTH = 18.0
 """Boss on the piston's back, which meets the stop."""
 CEILING = 184.0
@@ -45,10 +51,14 @@ SEAT_INNER, LIP, SEAT_OUTER = 50.0, 56.0, 64.0
 FLOOR = 470.0
 """Bottom of the ring chamber around the seat."""
 STROKE_PV = 48.0
+"""Drawn stroke of the piston."""
 
 INPUT: Box = (96, 424, 314, 600)
+"""Input chamber."""
 NECK: Box = (313, 424, PV - PISTON, FLOOR)
+"""Passage from the input chamber to the ring around the seat."""
 OUTPUT: Box = (PV - 74, 508, 590, 602)
+"""Output chamber."""
 DUCT: tuple[Box, ...] = ((249, 360, 306, 374), (292, 196, 306, 374), (292, 196, 349, 210))
 """From the magnet valve's chamber to the control chamber."""
 
@@ -57,9 +67,13 @@ class Movers(NamedTuple):
     """Heights of the moving parts."""
 
     armature_top: float
+    """Upper end of the armature [px]."""
     armature_bottom: float
+    """Lower end of the armature [px]."""
     piston_top: float
+    """Back of the piston [px]."""
     piston_bottom: float
+    """Sealing face of the piston [px]."""
 
 
 def movers(snapshot: Snapshot) -> Movers:

@@ -37,8 +37,11 @@ from epv_env.render.snapshot import Snapshot
 LEFT, RIGHT = 730.0, 1150.0
 """Ends of the time axis [px]."""
 PRESSURES: Box = (LEFT, 112, RIGHT, 428)
+"""Panel of the pressures [px]."""
 COMMAND: Box = (LEFT, 474, RIGHT, 512)
+"""Panel of the coil's command [px]."""
 CONSUMED: Box = (LEFT, 558, RIGHT, 650)
+"""Panel of the consumption [px]."""
 
 
 class Samples(NamedTuple):
@@ -47,10 +50,15 @@ class Samples(NamedTuple):
     time: Array
     """[s]; once drawn: its place [px]."""
     p1: Array
+    """Supply pressure [bar absolute]."""
     p2: Array
+    """Circuit pressure [bar absolute]."""
     p3: Array
+    """Control pressure [bar absolute]."""
     target: Array
+    """Target pressure [bar absolute]."""
     coil: Array
+    """1 where the coil is on, else 0 [-]."""
     consumption: Array
     """[g/s]."""
 

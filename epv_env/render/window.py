@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 WIDTH, HEIGHT = 1280, 720
 """Size of the frame [px]."""
 SECTION_CARD = (20, 68, 664, 704)
+"""Card behind the section of the valve [px]."""
 STRIP_CARD = (680, 68, 1260, 704)
+"""Card behind the chart [px]."""
 MOVING_BOXES: tuple[Box, ...] = (
     (16, 16, 700, 52),
     (896, 16, 1264, 52),

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.plant.channels import MEASURED_CHANNELS
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.readings import readings
@@ -21,10 +22,10 @@ from identification.report_2003.cases import SAMPLING_RATE
 RESERVOIR_VOLUME = 0.08
 """The bench's two reservoirs of 40 litres (section 3) [m^3]; air drawn from them lowers p1."""
 
-SENSOR_OFFSETS = {"p1": 0.000909, "p2": -0.00728, "p3": -0.003112, "I": -0.000235, "U": 0.001837}
+SENSOR_OFFSETS = {channel.name: channel.sensor.offset for channel in MEASURED_CHANNELS}
 """Reading less truth at the start of a recording (Table 2; pressures less 1 bar) [bar, A, V]."""
 
-SENSOR_TRENDS = {"p1": 7.9e-5, "p2": -1.16e-4, "p3": -8.2e-5, "I": -6e-6, "U": 5.8e-5}
+SENSOR_TRENDS = {channel.name: channel.sensor.trend for channel in MEASURED_CHANNELS}
 """Drift of the readings (Table 2) [bar/s, A/s, V/s]."""
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from epv_env.common.files import write_text
 from epv_env.common.units import BAR
+from epv_env.plant.channels import CHANNEL, MEASURED_CHANNELS, MeasuredChannel
 from identification.recordings.columns import CONSUMPTION_COLUMN, TIME_COLUMN, read_columns
 from identification.recordings.manifest import (
     FILE_NAME,
@@ -19,13 +20,15 @@ from identification.recordings.manifest import (
     manifest_content,
     read_manifest,
 )
-from identification.recordings.recording import Campaign, CampaignError, Recording
+from identification.recordings.recording import CHANNELS, Campaign, CampaignError, Recording
 from identification.recordings.recording_checks import check_recording
 from identification.recordings.rules import RULES, RecordingRules
 
 DECIMALS = {
-    TIME_COLUMN: 9, "I_A": 6, "U_V": 5, "p1_bar": 5, "p2_bar": 5, "p3_bar": 5, CONSUMPTION_COLUMN: 9
-}  # fmt: skip
+    TIME_COLUMN: 9,
+    **{channel.columns[0]: channel.decimals for channel in MEASURED_CHANNELS},
+    CONSUMPTION_COLUMN: 9,
+}
 """Decimals written: a hundredth of an ADC step or less, and any rate's times as uniform."""
 
 
@@ -80,31 +83,27 @@ def _read_recording(path: Path, role: str, ambient: float, rules: RecordingRules
         ) from None
     columns = read_columns(str(path), content)
     period = check_recording(str(path), columns, role=role, ambient_bar=ambient / BAR, rules=rules)
-    supply = [columns[name] for name in ("p1_bar", "p1a_bar", "p1b_bar") if name in columns]
+    signals = {channel.name: _signal(channel, columns) for channel in MEASURED_CHANNELS}
     return Recording(
         name=path.stem,
         role=role,
         period=period,
-        I=columns["I_A"],
-        U=columns["U_V"],
-        p1=np.mean(supply, axis=0) * BAR,
-        p2=columns["p2_bar"] * BAR,
-        p3=columns["p3_bar"] * BAR,
         sigma_S=columns.get(CONSUMPTION_COLUMN, np.zeros_like(columns["U_V"])),
         sha256=hashlib.sha256(content).hexdigest(),
+        **signals,
     )
+
+
+def _signal(channel: MeasuredChannel, columns: Mapping[str, NDArray]) -> NDArray:
+    """One channel's signal (samples,) [SI]: the mean of its columns in the file."""
+    return np.mean([columns[n] for n in channel.columns if n in columns], axis=0) * channel.scale
 
 
 def _columns(recording: Recording) -> dict[str, NDArray]:
     """A recording's columns as they are written: units of the file, rounded."""
-    columns = {
-        TIME_COLUMN: recording.time,
-        "I_A": recording.I,
-        "U_V": recording.U,
-        "p1_bar": recording.p1 / BAR,
-        "p2_bar": recording.p2 / BAR,
-        "p3_bar": recording.p3 / BAR,
-    }
+    columns = {TIME_COLUMN: recording.time}
+    for name in CHANNELS:
+        columns[CHANNEL[name].columns[0]] = recording.channel(name) / CHANNEL[name].scale
     if np.any(recording.sigma_S):
         columns[CONSUMPTION_COLUMN] = recording.sigma_S
     return {name: np.round(values, DECIMALS[name]) for name, values in columns.items()}

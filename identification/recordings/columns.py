@@ -8,26 +8,22 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.recordings.recording import CampaignError
+from epv_env.plant.channels import CHANNEL, P1
+from identification.recordings.recording import CHANNELS, CampaignError
 
 TIME_COLUMN, CONSUMPTION_COLUMN = "time_s", "sigmaS_kg_per_s"
 """Columns that are no channel: time [s] and consumed air [kg/s]."""
 
-CHANNEL_OF: Mapping[str, str] = {
-    "I_A": "I",
-    "U_V": "U",
-    "p1_bar": "p1",
-    "p1a_bar": "p1",
-    "p1b_bar": "p1",
-    "p2_bar": "p2",
-    "p3_bar": "p3",
-}
+CHANNEL_OF: Mapping[str, str] = {column: name for name in CHANNELS for column in CHANNEL[name].columns}
 """Measured channel (recording.CHANNELS) in each column, in the unit of its name."""
 
-REQUIRED_COLUMNS = (TIME_COLUMN, "I_A", "U_V", "p2_bar", "p3_bar")
+REQUIRED_COLUMNS = (
+    TIME_COLUMN,
+    *(CHANNEL[name].columns[0] for name in CHANNELS if len(CHANNEL[name].columns) == 1),
+)
 """Columns without which a file is refused."""
 
-SUPPLY_COLUMNS = (("p1_bar",), ("p1a_bar", "p1b_bar"))
+SUPPLY_COLUMNS = (P1.columns[:1], P1.columns[1:])
 """The two ways to give p1: one column, or the two reservoirs' sensors."""
 
 KNOWN_COLUMNS = (TIME_COLUMN, *CHANNEL_OF, CONSUMPTION_COLUMN)

@@ -7,19 +7,21 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.plant.channels import CHANNEL, MEASURED_CHANNELS
+
 ROLES = ("calibration", "validation", "quality")
 """What a recording may be used for: fitting, testing only, statistics of the noise (section 4)."""
 
-OUTPUTS = ("p2", "p3", "I")
+OUTPUTS = tuple(channel.name for channel in MEASURED_CHANNELS if channel.output)
 """Measured outputs y of the model (eq. 4)."""
 
-CHANNELS = ("I", "U", "p1", "p2", "p3")
-"""Measured signals, in the order of the report's Table 1."""
+CHANNELS = tuple(sorted(CHANNEL))
+"""Names of the measured signals, in the order of the report's Table 1, which is the alphabet's."""
 
 HOLD = 0.04
 """Recordings start in steady state, energised, for at least this long [s]."""
 
-UNITS = {"I": ("A", 1.0), "U": ("V", 1.0), "p1": ("bar", 1e5), "p2": ("bar", 1e5), "p3": ("bar", 1e5)}
+UNITS = {name: (CHANNEL[name].unit, CHANNEL[name].scale) for name in CHANNELS}
 """Unit in which people read each channel, and its size in SI units."""
 
 
@@ -73,8 +75,10 @@ class Recording:
         return digest.hexdigest()
 
     def channel(self, name: str) -> NDArray:
-        """The signal of one of CHANNELS, (samples,) [SI]."""
-        return {"I": self.I, "U": self.U, "p1": self.p1, "p2": self.p2, "p3": self.p3}[name]
+        """The signal of one of CHANNELS, (samples,) [SI]. Raises CampaignError for another name."""
+        if name not in CHANNELS:
+            raise CampaignError(f"no channel is named {name!r}: choose one of {', '.join(CHANNELS)}")
+        return getattr(self, name)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.common.units import GRAM, MILLIGRAM
 from epv_env.plant.equations import Inputs
 from epv_env.plant.readings import readings
 from epv_env.plant.simulate import Trajectory, energised, simulate
@@ -12,8 +13,6 @@ from epv_env.plant.valves import Valves
 from identification.gap.model.state_equation import StateEquation
 from identification.recordings.recording import OUTPUTS
 from identification.replay.model_inputs import ModelInputs
-
-GRAM, MILLIGRAM = 1e-3, 1e-6
 
 EQUATIONS = (
     StateEquation(name="f1", state="p2", component="output_chamber", unit="g/s", scale=GRAM, step=1e-5),
@@ -49,7 +48,10 @@ def modelled(drive: ModelInputs, p: Mapping[str, float]) -> Trajectory:
 def forced_changes(
     drive: ModelInputs, p: Mapping[str, float], equation: StateEquation, edges: NDArray
 ) -> NDArray:
-    """`GreyBox.forced` on one recording; p: every parameter by symbol [SI]."""
+    """`GreyBox.forced` on one recording: changes (3, samples, windows) of OUTPUTS [Pa, Pa, A].
+
+    p: every parameter by symbol [SI]. edges: samples (windows + 1,) between which the forcing acts.
+    """
     m, steps = len(edges) - 1, len(drive.U) - 1
     name, sign = FORCINGS[equation.name]
     window = np.searchsorted(edges, np.arange(steps), side="right")[:, None] - 1

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.common.units import BAR, MILLIMETRE
 from epv_env.plant.simulate import Trajectory
 from identification.gap.model.state_equation import StateTrace
 
@@ -19,7 +20,10 @@ AJAR, MOVING = 1e-3, 2e-3
 
 
 def regimes(answer: Trajectory, p: Mapping[str, float], energised: NDArray) -> dict[str, NDArray]:
-    """Boolean (samples,) by regime; p: parameters by symbol; energised: whether the coil is on."""
+    """Boolean (samples,) by regime.
+
+    p: parameters by symbol [SI]. energised: whether the coil is on, boolean (samples,).
+    """
     q = answer.state
     current, greatest = np.abs(q.I), np.max(np.abs(q.I))
     settled = answer.U / p["R"]
@@ -42,13 +46,13 @@ def traces(answer: Trajectory) -> dict[str, StateTrace]:
     """States and the pressure differences that drive flows and forces."""
     q = answer.state
     found = {
-        "p1 - p2": ("bar", 1e5, q.p1 - q.p2),
-        "p1 - p3": ("bar", 1e5, q.p1 - q.p3),
-        "p2": ("bar", 1e5, q.p2),
-        "p3": ("bar", 1e5, q.p3),
-        "xPV": ("mm", 1e-3, q.xPV),
+        "p1 - p2": ("bar", BAR, q.p1 - q.p2),
+        "p1 - p3": ("bar", BAR, q.p1 - q.p3),
+        "p2": ("bar", BAR, q.p2),
+        "p3": ("bar", BAR, q.p3),
+        "xPV": ("mm", MILLIMETRE, q.xPV),
         "vPV": ("m/s", 1.0, q.vPV),
-        "xMV": ("mm", 1e-3, q.xMV),
+        "xMV": ("mm", MILLIMETRE, q.xMV),
         "vMV": ("m/s", 1.0, q.vMV),
         "I": ("A", 1.0, q.I),
         "U": ("V", 1.0, answer.U),

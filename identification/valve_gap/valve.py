@@ -23,9 +23,11 @@ TOLERANCE = 3e-3
 """Relative scatter of the parameters outside the four from unit to unit."""
 
 P2_START = NuisanceParameter(symbol="p2_start", sd=500.0, step=1e3)
+"""Circuit pressure at the start of a recording, less the mean of the hold [Pa]."""
 P3_ZERO = NuisanceParameter(symbol="p3_zero", sd=500.0, step=1e3)
+"""Zero of the sensor of p3 on the day of a recording [Pa]."""
 I_ZERO = NuisanceParameter(symbol="I_zero", sd=4e-4, step=1e-3)
-"""Circuit pressure at the start, less the mean of the hold, and the zeros of that day's sensors."""
+"""Zero of the current sensor on the day of a recording [A]."""
 
 
 class Valve:
@@ -59,7 +61,7 @@ class Valve:
         self.replay = Replay([model_inputs(r, self.base) for r in self.recordings], self.base)
 
     def outputs(self, values: Mapping[str, NDArray], runs: Sequence[int]) -> list[NDArray]:
-        """`GreyBox.outputs`."""
+        """`GreyBox.outputs`: per run an array (3, samples, n) of OUTPUTS [Pa, Pa, A]."""
         plant = {s: v for s, v in values.items() if s in self.base}
         n = max(np.shape(v)[0] for v in values.values())
         start = {s.symbol: np.zeros((n, len(self.runs))) for s in self.run_offsets}
@@ -77,18 +79,18 @@ class Valve:
         return found
 
     def states(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, StateTrace]:
-        """`GreyBox.states`."""
+        """`GreyBox.states`: traces by name, values (samples,) [SI]."""
         return traces(modelled(self.replay.drives[run], self._one(values, run)))
 
     def regimes(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, NDArray]:
-        """`GreyBox.regimes`."""
+        """`GreyBox.regimes`: boolean (samples,) by regime; values: (n,) or (n, runs) by symbol [SI]."""
         p = self._one(values, run)
         return regimes(modelled(self.replay.drives[run], p), p, self.recordings[run].energised)
 
     def forced(
         self, values: Mapping[str, NDArray], equation: StateEquation, run: int, edges: NDArray
     ) -> NDArray:
-        """`GreyBox.forced`."""
+        """`GreyBox.forced`: changes (3, samples, windows) of OUTPUTS [Pa, Pa, A]; edges: samples."""
         return forced_changes(self.replay.drives[run], self._one(values, run), equation, edges)
 
     def _one(self, values: Mapping[str, NDArray], run: int) -> dict[str, float]:
@@ -98,6 +100,7 @@ class Valve:
 
 
 def as_run(recording: Recording) -> Run:
+    """A recording as the grey-box protocol has it: signals (3, samples) of OUTPUTS [Pa, Pa, A]."""
     measured = measured_outputs(recording)
     trusted = np.ones(measured.shape, dtype=bool)
     switched = np.flatnonzero(np.diff(recording.energised)) + 1

@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from epv_env.common.units import BAR, MILLIMETRE
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised, simulate
 
 FOLDER = Path(__file__).parents[3] / "shared" / "reference"
 RUNS = ("test1", "test2", "test3", "test4", "validation", "consumption")
-BAR, MILLIMETRE = 1e5, 1e-3
 
 pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason=f"the reference runs are not at {FOLDER}")
 

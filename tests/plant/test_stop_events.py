@@ -2,12 +2,11 @@
 
 import pytest
 
+from epv_env.common.units import BAR
 from identification.bench.automaton import simulate_reference
 from tests.benchmarks.eventless_integrators import STROKES, final_p2
 from tests.benchmarks.workloads import CALIBRATED
 from tests.reference.schedule import plant_states, report_tests
-
-BAR = 1e5
 
 
 def test_an_integrator_without_stop_events_is_wrong_and_the_plant_is_not():

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from epv_env.common.units import BAR
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised
-from epv_env.plant.supply import BAR, Supply
+from epv_env.plant.supply import Supply
 from epv_env.plant.valves import Valves
 
 P = Parameters.calibrated()
