@@ -98,7 +98,7 @@ real-bench: $(VENV)/.installed ## ask which effects give the report's printed er
 sim-to-real: $(VENV)/.installed ## train, deploy on a bench, diagnose, retrain, deploy again (5 minutes)
 	$(PY) training/sim_to_real.py --out runs/sim-to-real --images docs/images $(ARGS)
 
-pictures: $(VENV)/.installed ## draw the figures of docs/identification.md
+pictures: $(VENV)/.installed ## draw the figures of docs/explanation/identification.md
 	$(PY) docs/scripts/identification_figures.py --out docs/images --coverage runs/coverage $(ARGS)
 
 gif: $(VENV)/.installed ## film the valve for the README

@@ -25,7 +25,8 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
     default period. info: see `epv_env.infos`.
 
     Arguments, all optional:
-        plant: path of a plant file (docs/data.md), a Plant, or None for the report's calibration.
+        plant: path of a plant file (docs/reference/files.md), a Plant, or None for the report's
+            calibration.
         parameters: "exact" (the plant's own), the name of a region ("confidence", "ten_percent",
             "sensitive_ten_percent", "domain"), or {symbol: value or (low, high)} in SI units.
         supply: None for two reservoirs that sag, a constant pressure [bar absolute], or a Supply.

@@ -13,7 +13,9 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     """The command line's options, checked; its `run` is the function of the chosen command."""
     parser = argparse.ArgumentParser(
         prog="python -m identification",
-        description="Identify the valve from a campaign of recordings (docs/identification.md).",
+        description=(
+            "Identify the valve from a campaign of recordings (docs/explanation/identification.md)."
+        ),
     )
     parsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for command in COMMANDS:

@@ -85,7 +85,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     )
     parser.add_argument(
         "--effect", default="pressure_sensor_lag=0.02,0", metavar="NAME=SIZE",
-        help="effect of the bench's valve, withheld from training and diagnosis (docs/effects.md)",
+        help="effect of the bench's valve, withheld from the diagnosis (docs/explanation/effects.md)",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, default=0, help="of both trainings, sensors, diagnosis")
     parser.add_argument("--timesteps", type=int, default=1_200_000, help="steps of each training")

@@ -1,4 +1,4 @@
-"""Draw the figures of docs/identification.md from a virtual bench.
+"""Draw the figures of docs/explanation/identification.md from a virtual bench.
 
 python docs/scripts/identification_figures.py --out docs/images --coverage runs/coverage
 """
@@ -44,7 +44,9 @@ def identification_figures(coverage: Path, campaigns: int) -> dict[str, Figure]:
 
 def main() -> int:
     """Draw and write; returns the exit status."""
-    parser = argparse.ArgumentParser(description="Draw the figures of docs/identification.md.")
+    parser = argparse.ArgumentParser(
+        description="Draw the figures of docs/explanation/identification.md."
+    )
     parser.add_argument("--out", type=writable_folder, required=True, help="folder of the pictures")
     parser.add_argument(
         "--coverage", type=writable_folder, required=True, help="folder of a coverage study, resumed"

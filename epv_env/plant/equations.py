@@ -1,8 +1,10 @@
-"""The state equations of the valve, each once (report eqs 5-16 as corrected in docs/model.md).
+"""The state equations of the valve, each once (report eqs 5-16, corrected).
+
+Corrections and symbols: docs/explanation/plant-model.md.
 
 Everything else - simulation, calibration, environment, diagnosis, SciPy reference - calls these.
-SI units; symbols are those of docs/model.md. Functions take named tuples of numbers (one valve) and
-are inlined into the kernels of integrate.py.
+SI units. Functions take named tuples of numbers (one valve) and are inlined into the kernels of
+integrate.py.
 """
 
 import math
@@ -208,7 +210,7 @@ def armature_force(q, c, inverse_Rm, effects, extended):
 
 @inlined
 def current_rate(q, u, c, inverse_Rm, effects, extended):
-    """dI/dt [A/s] (eq. 12 with the sign of docs/model.md, correction 6)."""
+    """dI/dt [A/s] (eq. 12 with the sign of docs/explanation/plant-model.md, correction 6)."""
     current, per_inductance = q.I, c.N_squared_inverse / inverse_Rm
     if extended:
         current = q.I + effects.I_rem

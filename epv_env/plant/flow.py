@@ -1,6 +1,6 @@
 """Mass flux of air through an orifice: subcritical, choked and reversed, in one branch-free form.
 
-The isentropic flux (report eqs 13, 14 with m1/V1 = p1/(R T1), see docs/model.md) is
+The isentropic flux (report eqs 13, 14 with m1/V1 = p1/(R T1), see docs/explanation/plant-model.md) is
 
     flux = pu * sqrt(2 k / ((k - 1) R T) * (r^(2/k) - r^((k+1)/k)))      [kg/(s m^2)],  r = pd/pu
 

@@ -5,7 +5,7 @@ A step that would pass a stop, let a held mover go, or cross the stroke where th
 valve seat exceeds its bore (a kink of the flow area) is not accepted: the instant is located on the
 step's own interpolant and the step is taken again up to it. Between such instants the right-hand side
 is smooth but for the seam of the laminar region, where pressures have all but met; so the classical
-Runge-Kutta method keeps its fourth order (docs/model.md, Integration).
+Runge-Kutta method keeps its fourth order (docs/explanation/numerical-integration.md).
 
 Every valve, alone or in a batch of thousands, runs through the same instructions in a block of
 sixteen; so its trajectory does not depend, to the bit, on its companions or on the number of threads.

@@ -23,7 +23,7 @@ class Parameter:
     """One row of the report's parameter tables. Units are SI."""
 
     symbol: str
-    """Symbol of docs/model.md."""
+    """Symbol of docs/explanation/plant-model.md."""
     unit: str
     """SI unit; "1" for none."""
     value: float

@@ -1,4 +1,4 @@
-"""The plant file: parameters, effects and confidence region as versioned JSON (docs/data.md)."""
+"""The plant file: parameters, effects and region as versioned JSON (docs/reference/files.md)."""
 
 import json
 from dataclasses import dataclass, field
@@ -18,7 +18,7 @@ from epv_env.plant.region import Region
 FORMAT = "epv-plant/1"
 """Version of the file, in its field `format`."""
 
-REMEDY = "the file is not of the form that docs/data.md describes; write it anew"
+REMEDY = "the file is not of the form that docs/reference/files.md describes; write it anew"
 """What to do about a file with a wrong field; ends a message."""
 
 

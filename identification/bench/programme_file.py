@@ -36,7 +36,7 @@ def save_programmes(programmes: Sequence[Programme], path: str | PathLike[str]) 
 
 
 def load_programmes(path: str | PathLike[str]) -> tuple[Programme, ...]:
-    """The programmes of a file (docs/data.md), every rule checked. Raises ProgrammeError."""
+    """The programmes of a file (docs/reference/files.md), every rule checked. Raises ProgrammeError."""
     try:
         content = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
@@ -86,7 +86,7 @@ def _decode(path: str, content: Any) -> tuple[Programme, ...]:
 
 def _programme(place: str, entry: Any) -> Programme:
     if not isinstance(entry, dict):
-        raise ProgrammeError(f"{place} is not an object: give its fields as in docs/data.md")
+        raise ProgrammeError(f"{place} is not an object: give its fields as in docs/reference/files.md")
     role = _text(place, entry, "role")
     if role not in ROLES:
         raise ProgrammeError(f"{place}: unknown role {role!r}: choose one of {', '.join(ROLES)}")
@@ -142,7 +142,9 @@ def _file_name(place: str, entry: dict[str, Any]) -> str:
 def _text(place: str, entry: dict[str, Any], field: str) -> str:
     value = entry.get(field)
     if not isinstance(value, str):
-        raise ProgrammeError(f"{place}: {field} is missing or not text: give it as in docs/data.md")
+        raise ProgrammeError(
+            f"{place}: {field} is missing or not text: give it as in docs/reference/files.md"
+        )
     return value
 
 

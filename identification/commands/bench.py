@@ -28,7 +28,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--set", action="append", default=[], metavar="SYMBOL=VALUE", help="another true value [SI]"
     )
     parser.add_argument(
-        "--effect", action="append", default=[], metavar="NAME=SIZE", help="an effect (docs/effects.md)"
+        "--effect",
+        action="append",
+        default=[],
+        metavar="NAME=SIZE",
+        help="an effect (docs/explanation/effects.md)",
     )
     parser.add_argument("--truth", type=Path, default=None, help="plant file to write the truth to")
 

@@ -14,7 +14,9 @@ JOURNAL = "searches.jsonl"
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the campaign, the folder of results, the seed and the number of starts."""
-    parser.add_argument("campaign", help="folder with campaign.json and the recordings (docs/data.md)")
+    parser.add_argument(
+        "campaign", help="folder with campaign.json and the recordings (docs/reference/files.md)"
+    )
     add_out(parser)
     add_seed(parser, help="of starts, draws and resampling")
     add_count(parser, "--starts", default=CALIBRATION.starts, help="searches of each method")

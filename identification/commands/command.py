@@ -22,7 +22,7 @@ class Command:
     run: Callable[[argparse.Namespace], None]
     """Runs the command with the parsed options. Raises ValueError or OSError with one sentence."""
     guide: str = ""
-    """Page of the documentation, such as "docs/gap.md"."""
+    """Page of the documentation, such as "docs/explanation/diagnosis.md"."""
 
     @property
     def description(self) -> str:

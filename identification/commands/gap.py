@@ -18,7 +18,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add what is diagnosed, the nominal model, the catalogue, and where the results go."""
     subject = parser.add_mutually_exclusive_group(required=True)
     subject.add_argument(
-        "campaign", nargs="?", type=Path, help="folder with campaign.json (docs/data.md)"
+        "campaign", nargs="?", type=Path, help="folder with campaign.json (docs/reference/files.md)"
     )
     subject.add_argument("--tables", action="store_true", help="diagnose Tables 11, 13 and 15 instead")
     add_out(parser)
@@ -63,7 +63,7 @@ def _diagnose_campaign(chosen: argparse.Namespace) -> None:
 GAP = Command(
     name="gap",
     help="which effect causes the gap between model and recordings",
-    guide="docs/gap.md",
+    guide="docs/how-to/diagnose-a-gap.md",
     add_options=add_options,
     run=run,
 )

@@ -1,4 +1,4 @@
-"""Campaigns as files: campaign.json and one CSV per recording (docs/data.md)."""
+"""Campaigns as files: campaign.json and one CSV per recording (docs/reference/files.md)."""
 
 import hashlib
 import json
@@ -33,7 +33,7 @@ DECIMALS = {
 
 
 def read_campaign(folder: str | PathLike[str], rules: RecordingRules = RULES) -> Campaign:
-    """The campaign in a folder, every rule of docs/data.md checked. Raises CampaignError."""
+    """The campaign in a folder, every rule of docs/reference/files.md checked. Raises CampaignError."""
     folder = Path(folder)
     manifest = read_manifest(folder)
     return Campaign(

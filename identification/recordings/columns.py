@@ -79,7 +79,7 @@ def _check_names(place: str, names: Sequence[str]) -> None:
     if missing:
         raise CampaignError(
             f"{place}: missing {', '.join(missing)} in the header {','.join(names)[:120]!r}: "
-            "name these columns as docs/data.md does, separated by commas"
+            "name these columns as docs/reference/files.md does, separated by commas"
         )
     given = tuple(name for way in SUPPLY_COLUMNS for name in way if name in names)
     if given not in SUPPLY_COLUMNS:

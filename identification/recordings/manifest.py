@@ -121,7 +121,9 @@ def _field(place: str, content: Any, name: str, *kinds: type) -> Any:
     value = content.get(name) if isinstance(content, dict) else None
     if type(value) not in kinds:
         expected = {str: "text", dict: "an object", list: "a list", float: "a number"}[kinds[-1]]
-        raise CampaignError(f"{place}: {name} is missing or not {expected}: give it as in docs/data.md")
+        raise CampaignError(
+            f"{place}: {name} is missing or not {expected}: give it as in docs/reference/files.md"
+        )
     return value
 
 

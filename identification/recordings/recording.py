@@ -26,7 +26,7 @@ UNITS = {name: (CHANNEL[name].unit, CHANNEL[name].scale) for name in CHANNELS}
 
 
 class CampaignError(ValueError):
-    """A campaign breaks a rule of docs/data.md: the message says what, where, the rule, the remedy."""
+    """A campaign breaks a rule of docs/reference/files.md: what, where, the rule, the remedy."""
 
 
 @dataclass(frozen=True, kw_only=True)

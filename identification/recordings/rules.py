@@ -1,4 +1,4 @@
-"""The limits by which a recording is refused or its noise is read (docs/data.md)."""
+"""The limits by which a recording is refused or its noise is read (docs/reference/files.md)."""
 
 from dataclasses import dataclass
 
@@ -40,4 +40,4 @@ class RecordingRules:
 
 
 RULES = RecordingRules()
-"""The rules of docs/data.md."""
+"""The rules of docs/reference/files.md."""

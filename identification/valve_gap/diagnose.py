@@ -74,7 +74,8 @@ def _report(found: Diagnosis, valve: Valve, name: str, out: Path, steps: Callabl
     save_plant(refitted_plant(found, valve, name), out / PLANT)
     steps("report")
     title = f"Gap between model and recordings: {name}"
-    footer = f"Written by epv-valve {version('epv-valve')}. Figures and fields: docs/gap.md."
+    guide = "docs/explanation/diagnosis.md"
+    footer = f"Written by epv-valve {version('epv-valve')}. Figures and fields: {guide}."
     pages = sections(found, experiment.text)
     write_page(out / REPORT, title=title, sections=pages, footer=footer)
     return experiment.text

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.bench.programmes import BAR, Programme
+from epv_env.common.units import BAR
+from identification.bench.programmes import Programme
 from identification.gap.design.expected_information import expected_information
 from identification.gap.design.information_gain import InformationGain, odds_text
 from identification.gap.design.rivals import Rivals, select_rivals

@@ -148,10 +148,10 @@ def test_missing_parameters_are_refused(tmp_path):
 @pytest.mark.parametrize(
     ("region", "message"),
     [
-        (None, "is not of the form that docs/data.md describes"),
-        ([], "is not of the form that docs/data.md describes"),
-        ({"boxes": []}, "is not of the form that docs/data.md describes"),
-        ({"boxes": {"R": 40}}, "is not of the form that docs/data.md describes"),
+        (None, "is not of the form that docs/reference/files.md describes"),
+        ([], "is not of the form that docs/reference/files.md describes"),
+        ({"boxes": []}, "is not of the form that docs/reference/files.md describes"),
+        ({"boxes": {"R": 40}}, "is not of the form that docs/reference/files.md describes"),
         (
             {"joint": {"symbols": ["x"], "covariance": [[1]], "chi_square": 1}},
             "unknown parameter 'x'",

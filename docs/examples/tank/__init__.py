@@ -1,4 +1,4 @@
-"""A second plant for the diagnosis of a gap (docs/gap.md): a tank that may leak.
+"""A second plant for the diagnosis of a gap (docs/explanation/diagnosis.md): a tank that may leak.
 
 python -m docs.examples.tank --out DIR, from the repository's root.
 

@@ -1,4 +1,4 @@
-"""Forms and sizes of effects compared with public measurements of components (docs/component-data.md).
+"""Effects compared with public measurements of components (docs/results/component-data.md).
 
 python -m docs.scripts.component_data --data FOLDER --out docs/images, from the repository's root.
 

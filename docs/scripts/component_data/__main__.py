@@ -1,4 +1,4 @@
-"""Compute, print and draw the results of docs/component-data.md."""
+"""Compute, print and draw the results of docs/results/component-data.md."""
 
 import argparse
 import sys
@@ -12,7 +12,7 @@ from epv_env.common.command_line import fail_clearly, writable_folder
 
 def main() -> int:
     """Compute, print and draw; returns the exit status."""
-    parser = argparse.ArgumentParser(description="Draw the figure of docs/component-data.md.")
+    parser = argparse.ArgumentParser(description="Draw the figure of docs/results/component-data.md.")
     parser.add_argument("--data", type=Path, required=True, help="folder of the measured data")
     parser.add_argument("--out", type=writable_folder, required=True, help="folder of the picture")
     chosen = parser.parse_args()

@@ -1,4 +1,4 @@
-"""The figure of docs/component-data.md."""
+"""The figure of docs/results/component-data.md."""
 
 import numpy as np
 from matplotlib.axes import Axes

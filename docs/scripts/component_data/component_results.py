@@ -1,4 +1,4 @@
-"""All figures of docs/component-data.md, computed from the folder of the measured data."""
+"""All figures of docs/results/component-data.md, computed from the folder of the measured data."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,7 +38,7 @@ from docs.scripts.component_data.solenoids import (
 
 @dataclass(frozen=True, kw_only=True)
 class ComponentResults:
-    """All figures of docs/component-data.md."""
+    """All figures of docs/results/component-data.md."""
 
     loops: dict[tuple[str, int], FrictionLoop]
     """By seal and gauge pressure [bar]."""

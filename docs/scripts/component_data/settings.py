@@ -61,4 +61,4 @@ class ComponentSettings:
 
 
 DEFAULTS = ComponentSettings()
-"""The settings of docs/component-data.md."""
+"""The settings of docs/results/component-data.md."""

@@ -3,7 +3,7 @@
 Where the form of a cause errs, any second cause improves the fit. Evidence that treats every segment as
 independent soon becomes certain of the second cause, since errors of form persist. So the odds of a pair
 against its stronger member are limited by experience from the blind trials of seeds 2027 and 2028
-(docs/gap.md).
+(docs/explanation/diagnosis-settings.md).
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""The diagnosis as JSON: format epv-gap/1, described in docs/gap.md."""
+"""The diagnosis as JSON: format epv-gap/1, described in docs/reference/gap-json.md."""
 
 import re
 from typing import Any

@@ -3,7 +3,7 @@
 If the data were made with the forms that the diagnosis fits, the check would be too easy. Here each size
 depends on the state as it may in a real valve; at d = 0 the forms are the plant's.
 
-| Effect | Form here, relative to that of docs/effects.md | Why |
+| Effect | Form here, relative to that of docs/explanation/effects.md | Why |
 |---|---|---|
 | coil_heating | part of the heat flows on into the iron, rate d/(1 s) | the winding is not alone |
 | eddy_current | G (1 + d o_MV) | a closed iron path links the shorted turn better |

@@ -1,4 +1,4 @@
-"""How large a drawn effect is: a physically sensible part of its range (docs/effects.md).
+"""How large a drawn effect is: a physically sensible part of its range (docs/explanation/effects.md).
 
 From about a tenth of the top to the top, log-uniform: small ones show where detection ends.
 """

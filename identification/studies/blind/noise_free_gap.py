@@ -1,7 +1,7 @@
 """What there is to explain: how far a model stays from the truth without its noise.
 
-The gap is that of docs/gap.md with the noise-free outputs instead of the readings: the root of 1 + the
-mean square of (model - truth)/noise over the held-out recordings. Its floor is 1.
+The gap is that of docs/explanation/diagnosis.md with noise-free outputs for readings: the root of 1 +
+the mean square of (model - truth)/noise over the held-out recordings. Its floor is 1.
 """
 
 from collections.abc import Mapping, Sequence

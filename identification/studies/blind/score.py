@@ -99,7 +99,7 @@ def score_trial(
 
     Args:
         label: content of sealed.json.
-        diagnosis: content of gap.json (docs/gap.md); None: there is no diagnosis.
+        diagnosis: content of gap.json (docs/reference/gap-json.md); None: there is no diagnosis.
         gap_reduction: of `true_gap_reduction`.
         distance: of `rival_distance` [noise deviations].
     """

@@ -88,4 +88,4 @@ class BlindSettings:
 
 
 DEFAULTS = BlindSettings()
-"""The settings of docs/gap.md."""
+"""The settings of docs/results/blind-diagnosis.md."""

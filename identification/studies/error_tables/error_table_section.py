@@ -25,7 +25,7 @@ METHOD = (
     "tests with the sensors' noise are compared with Tables 13 and 15. A typical factor of 1.2 means "
     "that predicted errors are off by 20 % on average (root mean square of logarithms). Test conditions "
     "that the report does not print are drawn; intervals hold 80 % of the draws. Ranges of sizes: "
-    "docs/effects.md."
+    "docs/explanation/effects.md."
 )
 INFERENCE = (
     "All of this is inference from 27 printed figures: the recordings were never published. A cause "

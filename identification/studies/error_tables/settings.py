@@ -125,4 +125,4 @@ class ErrorTableSettings:
 
 
 DEFAULTS = ErrorTableSettings()
-"""The settings of docs/real-bench.md."""
+"""The settings of docs/results/error-tables.md."""
