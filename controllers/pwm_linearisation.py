@@ -15,8 +15,8 @@ from scipy.optimize import root_scalar
 
 from epv_env.plant.coefficients import coefficients
 from epv_env.plant.equations import Coefficients
-from epv_env.plant.flow import mass_flux
 from epv_env.plant.parameters import Parameters
+from epv_env.plant.primitives.flow import mass_flux
 from epv_env.plant.simulate import energised, simulate
 
 QUARTER_PI = np.pi / 4

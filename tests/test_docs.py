@@ -20,6 +20,7 @@ import griffe  # noqa: E402
 from markdown.extensions.toc import slugify_unicode  # noqa: E402
 
 from docs.scripts.command_lines import parser_of, subparsers  # noqa: E402
+from docs.scripts.effects_table import effects_table  # noqa: E402
 from docs.scripts.public_names import undocumented  # noqa: E402
 
 ROOT = Path(__file__).parents[1]
@@ -228,3 +229,8 @@ def test_the_pictures_of_the_identification_in_their_shortest_form(tmp_path):
     names = {path.name for path in tmp_path.glob("*.png")}
     assert names == {"calibration.png", "region.png", "coverage.png"}
     assert names <= {path.name for path in (ROOT / "docs/images").iterdir()}
+
+
+def test_the_table_of_effects_is_that_of_the_records():
+    """Written by `python docs/scripts/effects_table.py`."""
+    assert effects_table() in text("docs/explanation/effects.md")

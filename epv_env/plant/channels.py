@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from epv_env.common.units import BAR
 from epv_env.plant.data_acquisition import Sensor
 from epv_env.plant.equations import State
-from epv_env.plant.values import Value
+from epv_env.plant.primitives.values import Value
 
 Reading = Callable[[State, Mapping[str, Value]], Value]
 """From the state and the sensors' parameters by symbol, of any shape, to the reading of that shape."""

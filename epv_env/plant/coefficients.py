@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from epv_env.plant.constants import QUARTER_PI
 from epv_env.plant.equations import Coefficients
+from epv_env.plant.primitives.constants import QUARTER_PI
 
 
 def coefficients(p: Mapping[str, ArrayLike], reservoir_volume: ArrayLike = np.inf) -> NDArray:

@@ -10,8 +10,6 @@ integrate.py.
 import math
 from typing import NamedTuple
 
-from epv_env.plant.compiled import inlined, replacing
-from epv_env.plant.constants import QUARTER_PI
 from epv_env.plant.effects.chambers import chamber_rates, pipe_rate
 from epv_env.plant.effects.coil import coil_current, flux_rate, heated, heating_rate
 from epv_env.plant.effects.flows import discharge, effective_seat_diameter, supply_drop_rate
@@ -19,8 +17,10 @@ from epv_env.plant.effects.friction import SLIDING_SPEED_MV, SLIDING_SPEED_PV, f
 from epv_env.plant.effects.magnet import saturated_force, saturation_level
 from epv_env.plant.effects.measurement import lag_rate
 from epv_env.plant.effects.seats import opened
-from epv_env.plant.flow import mass_flux
-from epv_env.plant.values import Value
+from epv_env.plant.primitives.compiled import inlined, replacing
+from epv_env.plant.primitives.constants import QUARTER_PI
+from epv_env.plant.primitives.flow import mass_flux
+from epv_env.plant.primitives.values import Value
 
 
 class State(NamedTuple):

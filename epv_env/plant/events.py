@@ -5,7 +5,7 @@ Scalar and rarely called: only for the few lanes whose trial step passed an even
 
 import numba
 
-from epv_env.plant.compiled import FLAGS, inlined
+from epv_env.plant.primitives.compiled import FLAGS, inlined
 
 BISECTIONS = 24
 """Halvings of the step: 250 us / 2^24 is far below the clock of anything here."""

@@ -14,7 +14,6 @@ sixteen; so its trajectory does not depend, to the bit, on its companions or on 
 import numba
 import numpy as np
 
-from epv_env.plant.compiled import FLAGS, inlined, replacing, source_digest
 from epv_env.plant.effects.coil import coil_current
 from epv_env.plant.effects.step_limits import longest_step
 from epv_env.plant.equations import State, derivative
@@ -47,6 +46,7 @@ from epv_env.plant.lanes import (
     store_nominal,
     store_state,
 )
+from epv_env.plant.primitives.compiled import FLAGS, inlined, replacing, source_digest
 from epv_env.plant.runge_kutta import held_still, is_held, remaining_stages
 
 DEFAULT_STEP = 250e-6

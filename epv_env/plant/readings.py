@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from epv_env.plant.channels import MEASURED_CHANNELS
 from epv_env.plant.equations import State
-from epv_env.plant.values import Value
+from epv_env.plant.primitives.values import Value
 
 MEASURED = tuple(channel.name for channel in MEASURED_CHANNELS if channel.observed)
 """Quantities that the environment measures; the bench measures them, too."""

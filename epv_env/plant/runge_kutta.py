@@ -1,8 +1,8 @@
 """One classical Runge-Kutta step of the whole state, with the movers that a stop holds kept still."""
 
-from epv_env.plant.compiled import inlined, replacing
 from epv_env.plant.equations import State, derivative
 from epv_env.plant.lanes import moved
+from epv_env.plant.primitives.compiled import inlined, replacing
 
 _with_motion = replacing(State, "xPV", "vPV", "xMV", "vMV")
 

@@ -6,10 +6,10 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.plant.compiled import FLAGS
 from epv_env.plant.effects.coil import coil_current
 from epv_env.plant.equations import derivative
 from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at, store_state
+from epv_env.plant.primitives.compiled import FLAGS
 
 RightHandSide = Callable[[NDArray, NDArray, NDArray, NDArray, float, float], NDArray]
 """(state, inputs, coefficients, effects, free_PV, free_MV) -> rates and both forces."""

@@ -9,7 +9,7 @@ from identification.quality.correlation_tests import PairCorrelation, assess_cor
 from identification.quality.settings import QUALITY, QualitySettings
 from identification.recordings.recording import CHANNELS, UNITS, CampaignError, Recording
 
-PRESSURES = ("p1", "p2", "p3")
+PRESSURES = tuple(name for name in CHANNELS if UNITS[name][0] == "bar")
 """Channels whose rest value is the ambient pressure."""
 
 

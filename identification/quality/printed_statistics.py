@@ -3,8 +3,10 @@
 from itertools import combinations
 
 from identification.quality.statistics import DescriptiveStatistics
-from identification.recordings.recording import CHANNELS
 from identification.report_2003.printed_values import correlation_matrix
+
+REPORT_CHANNELS = ("I", "U", "p1", "p2", "p3")
+"""Channels of the report's bench, in the order of Table 1."""
 
 STATISTIC_NAMES = {
     "arithmetic_mean": "arithmetic mean",
@@ -19,7 +21,7 @@ STATISTIC_NAMES = {
     "kurtosis": "kurtosis",
     "skewness": "skewness",
 }
-"""Rows of Table 3, by field of Description."""
+"""Rows of Table 3, by field of DescriptiveStatistics."""
 
 TREND_SLOPES = {"I": -6e-6, "U": 5.8e-5, "p1": 7.9e-5, "p2": -1.16e-4, "p3": -8.2e-5}
 """Table 2 [unit/s]."""
@@ -42,8 +44,8 @@ STATISTICS = {
 """Table 3 by channel."""
 
 CORRELATIONS = {
-    (CHANNELS[row], CHANNELS[column]): correlation_matrix()[row][column]
-    for row, column in combinations(range(len(CHANNELS)), 2)
+    (REPORT_CHANNELS[row], REPORT_CHANNELS[column]): correlation_matrix()[row][column]
+    for row, column in combinations(range(len(REPORT_CHANNELS)), 2)
 }
 """Table 4, above the diagonal."""
 

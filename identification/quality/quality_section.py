@@ -1,6 +1,7 @@
 """Section 4 of the report for one recording: verdicts, Tables 2 to 4 and Figures 4 to 9."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import fields
 
 from identification.quality import printed_statistics as reported
@@ -11,6 +12,9 @@ from identification.quality.statistics import DescriptiveStatistics
 from identification.quality.verdicts import CHECKS, channel_verdict, check_results, worst_status
 from identification.recordings.recording import CHANNELS, UNITS
 from identification.report.page import Picture, Section, Table, Text
+
+NOT_PRINTED = "–"
+"""Stands where the report has no value."""
 
 UNIT_COLUMNS = [f"{name} [{UNITS[name][0]}]" for name in CHANNELS]
 """Headings of a table with a column per channel."""
@@ -65,12 +69,23 @@ def _trends(quality: QualityAssessment) -> Table:
         columns=["Parameter", *UNIT_COLUMNS],
         rows=[
             ["factor [unit/s]", *(_estimate(trend.factor, trend.factor_error) for trend in trends)],
-            ["  the report's", *(f"{reported.TREND_SLOPES[name]:.6f}" for name in CHANNELS)],
+            ["  the report's", *_printed_trends(reported.TREND_SLOPES)],
             ["offset [unit]", *(_estimate(trend.offset, trend.offset_error) for trend in trends)],
-            ["  the report's", *(f"{reported.TREND_OFFSETS[name]:.6f}" for name in CHANNELS)],
+            ["  the report's", *_printed_trends(reported.TREND_OFFSETS)],
         ],
         caption="Signal offset and trend check (Table 2), ± one standard error.",
     )
+
+
+def _printed_trends(values: Mapping[str, float]) -> list[str]:
+    """The report's value for each channel, NOT_PRINTED for one that its bench does not have."""
+    return [f"{values[name]:.6f}" if name in values else NOT_PRINTED for name in CHANNELS]
+
+
+def _printed_statistics(field: str) -> list[str]:
+    """A row of Table 3 for each channel."""
+    printed = reported.STATISTICS
+    return [_cell(printed[name], field) if name in printed else NOT_PRINTED for name in CHANNELS]
 
 
 def _estimate(value: float, error: float) -> str:
@@ -83,8 +98,7 @@ def _statistics(quality: QualityAssessment) -> Table:
     for field in fields(DescriptiveStatistics):
         label = reported.STATISTIC_NAMES[field.name]
         rows.append([label, *(_cell(statistics[name], field.name) for name in CHANNELS)])
-        report = (_cell(reported.STATISTICS[name], field.name) for name in CHANNELS)
-        rows.append(["  the report's", *report])
+        rows.append(["  the report's", *_printed_statistics(field.name)])
     return Table(
         columns=["Parameter", *UNIT_COLUMNS],
         rows=rows,
@@ -99,6 +113,12 @@ def _cell(description: DescriptiveStatistics, name: str) -> str:
     return f"{value:.2f}" if name == "signal_to_noise" else f"{value:z.4f}"
 
 
+def _printed_correlation(first: str, second: str) -> str:
+    """The report's correlation of two channels (Table 4)."""
+    printed = reported.CORRELATIONS.get((first, second))
+    return NOT_PRINTED if printed is None else f"{printed:.4f}"
+
+
 def _correlations(quality: QualityAssessment) -> Table:
     rows = [
         [
@@ -107,7 +127,7 @@ def _correlations(quality: QualityAssessment) -> Table:
             f"{quality.adjusted[first, second]:.2g}",
             f"{pair.peak:.4f}",
             f"{1e3 * quality.period * pair.peak_lag:.3g}",
-            f"{reported.CORRELATIONS[first, second]:.4f}",
+            _printed_correlation(first, second),
         ]
         for (first, second), pair in quality.pairs.items()
     ]

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from epv_env.plant.coefficients import coefficients
-from epv_env.plant.compiled import FLAGS, inlined, replacing, source_digest
 from epv_env.plant.effects.registry import effect_constants
 from epv_env.plant.equations import (
     Inputs,
@@ -32,6 +31,7 @@ from epv_env.plant.lanes import (
     state_at,
     store_state,
 )
+from epv_env.plant.primitives.compiled import FLAGS, inlined, replacing, source_digest
 from epv_env.plant.simulate import SimulationError, Trajectory
 
 STAGES = np.array(

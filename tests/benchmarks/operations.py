@@ -64,9 +64,10 @@ def main() -> None:
     """Count one pass of `_try_steps` over a block of valves in the middle of an opening."""
     import numpy as np
 
-    from epv_env.plant import flow, integrate, lanes
+    from epv_env.plant import integrate, lanes
     from epv_env.plant.coefficients import coefficients
     from epv_env.plant.parameters import Parameters
+    from epv_env.plant.primitives import flow
     from epv_env.plant.simulate import energised
 
     flow.math = SimpleNamespace(sqrt=_square_root)  # type: ignore[assignment]

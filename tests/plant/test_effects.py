@@ -20,8 +20,8 @@ from epv_env.plant.equations import (
     current_rate,
     reluctance_inverse,
 )
-from epv_env.plant.flow import CRITICAL_RATIO, KAPPA, mass_flux
 from epv_env.plant.parameters import Parameters, table
+from epv_env.plant.primitives.flow import CRITICAL_RATIO, KAPPA, mass_flux
 from epv_env.plant.readings import readings
 from epv_env.plant.simulate import energised, simulate
 from epv_env.plant.valves import Valves

@@ -4,8 +4,8 @@ import numba
 import numpy as np
 import pytest
 
-from epv_env.plant import flow
 from epv_env.plant.parameters import table
+from epv_env.plant.primitives import flow
 
 INVERSE_SQRT_RT = 1 / np.sqrt(287.14 * 293.0)
 P_UP = 10e5

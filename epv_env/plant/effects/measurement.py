@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from epv_env.plant.compiled import inlined
 from epv_env.plant.effects.record import Constant, Effect, Size
 from epv_env.plant.effects.time_constants import rate
+from epv_env.plant.primitives.compiled import inlined
 
 
 def _lag_constants(number: int) -> tuple[Constant, ...]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from numpy.typing import NDArray
 
-from epv_env.plant.values import Value
+from epv_env.plant.primitives.values import Value
 
 COMPONENTS = (
     "solenoid", "armature", "control_chamber", "protection_valve", "flow", "output_chamber", "supply",

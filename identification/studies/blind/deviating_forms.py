@@ -42,7 +42,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.common.units import BAR
-from epv_env.plant.compiled import FLAGS, inlined, replacing, source_digest
 from epv_env.plant.effects.coil import OFF_VOLTAGE, coil_current, heated
 from epv_env.plant.effects.registry import Effects
 from epv_env.plant.equations import (
@@ -54,6 +53,7 @@ from epv_env.plant.equations import (
     reluctance_inverse,
 )
 from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at, store_state
+from epv_env.plant.primitives.compiled import FLAGS, inlined, replacing, source_digest
 from identification.bench.right_hand_side import RightHandSide
 
 FILM_THICKNESS = 20e-6

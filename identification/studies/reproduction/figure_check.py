@@ -59,7 +59,8 @@ def numeric_check(
 
     Args:
         where: table and quantity, with the unit.
-        printed, recomputed: the two numbers.
+        printed: the report's number.
+        recomputed: the number that the report's other figures give, in the same unit.
         tolerance: what the rounding of the figures behind them allows, in the same unit.
         digits: decimals that are shown.
         remark: what rule the recomputation uses.

@@ -4,8 +4,13 @@ import numpy as np
 from scipy import stats
 
 from epv_env.plant.sensors import SENSORS
-from identification.quality.printed_statistics import SAMPLES, STATISTICS, TREND_OFFSETS
-from identification.recordings.recording import CHANNELS, UNITS
+from identification.quality.printed_statistics import (
+    REPORT_CHANNELS,
+    SAMPLES,
+    STATISTICS,
+    TREND_OFFSETS,
+)
+from identification.recordings.recording import UNITS
 from identification.report_2003.printed_values import correlation_matrix
 from identification.studies.reproduction.figure_check import (
     CHECK_DEFAULTS,
@@ -32,11 +37,11 @@ def noise_checks(settings: CheckSettings = CHECK_DEFAULTS) -> list[FigureCheck]:
     """All checks of sections 3 and 4."""
     return [
         _samples(),
-        *(_signal_to_noise(name) for name in CHANNELS),
+        *(_signal_to_noise(name) for name in REPORT_CHANNELS),
         _claimed_signal_to_noise(),
-        *(_outlier_factor(name) for name in CHANNELS),
-        *(_interquartile_range(name) for name in CHANNELS),
-        *(_median(name, settings) for name in CHANNELS),
+        *(_outlier_factor(name) for name in REPORT_CHANNELS),
+        *(_interquartile_range(name) for name in REPORT_CHANNELS),
+        *(_median(name, settings) for name in REPORT_CHANNELS),
         _kurtosis(settings),
         _skewness(settings),
         _sensor_range(),
@@ -83,7 +88,9 @@ def _signal_to_noise(name: str) -> FigureCheck:
 
 
 def _claimed_signal_to_noise() -> FigureCheck:
-    found = {name: signal_to_noise(name, STATISTICS[name].standard_deviation) for name in CHANNELS}
+    found = {
+        name: signal_to_noise(name, STATISTICS[name].standard_deviation) for name in REPORT_CHANNELS
+    }
     least = min(found, key=lambda name: found[name])
     return FigureCheck(
         where="Section 4.1, SNR 'over 62 dB in all cases' [dB]",
@@ -139,12 +146,12 @@ def _median(name: str, settings: CheckSettings) -> FigureCheck:
 
 
 def _kurtosis(settings: CheckSettings) -> FigureCheck:
-    excess = {name: STATISTICS[name].kurtosis - 3 for name in CHANNELS}
+    excess = {name: STATISTICS[name].kurtosis - 3 for name in REPORT_CHANNELS}
     return _beyond_normal("kurtosis", excess, np.sqrt(24 / SAMPLES), settings)
 
 
 def _skewness(settings: CheckSettings) -> FigureCheck:
-    excess = {name: STATISTICS[name].skewness for name in CHANNELS}
+    excess = {name: STATISTICS[name].skewness for name in REPORT_CHANNELS}
     return _beyond_normal("skewness", excess, np.sqrt(6 / SAMPLES), settings)
 
 
@@ -167,7 +174,7 @@ def _beyond_normal(
 
 
 def _sensor_range() -> FigureCheck:
-    outside = [name for name in CHANNELS if TREND_OFFSETS[name] < SENSORS[name].low]
+    outside = [name for name in REPORT_CHANNELS if TREND_OFFSETS[name] < SENSORS[name].low]
     return FigureCheck(
         where="Table 2 against Table 1, pressures at rest [bar]",
         printed=", ".join(f"{name} {TREND_OFFSETS[name]:.4f}" for name in outside) or "inside",
@@ -191,12 +198,12 @@ def _symmetry() -> FigureCheck:
 def _correlations(settings: CheckSettings) -> FigureCheck:
     matrix = np.array(correlation_matrix())
     band = float(stats.norm.ppf(0.5 + settings.confidence / 2) / np.sqrt(SAMPLES))
-    pairs = [(i, j) for i in range(len(CHANNELS)) for j in range(i) if abs(matrix[i, j]) > band]
+    pairs = [(i, j) for i in range(len(REPORT_CHANNELS)) for j in range(i) if abs(matrix[i, j]) > band]
     return FigureCheck(
         where="Table 4, 'shows non-correlated data'",
         printed="no pair correlated",
         recomputed=f"{len(pairs)} of 10 pairs beyond ±{band:.4f}: "
-        + ", ".join(f"{CHANNELS[j]}-{CHANNELS[i]} {matrix[i, j]:+.4f}" for i, j in pairs),
+        + ", ".join(f"{REPORT_CHANNELS[j]}-{REPORT_CHANNELS[i]} {matrix[i, j]:+.4f}" for i, j in pairs),
         status=ERRATUM if len(pairs) > 1 else HOLDS,
         remark=f"95 % band of independent white signals of {SAMPLES} samples; 1 in 20 may lie outside",
     )

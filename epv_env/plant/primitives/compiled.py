@@ -41,6 +41,6 @@ def source_digest() -> str:
     digest is compiled anew when any equation it inlines has changed.
     """
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.rglob("*.py")):
+    for path in sorted(Path(__file__).parents[1].rglob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()

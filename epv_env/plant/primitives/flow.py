@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.polynomial import Polynomial, chebyshev
 
-from epv_env.plant.compiled import inlined
+from epv_env.plant.primitives.compiled import inlined
 
 KAPPA = 1.4
 """Adiabatic exponent of air (Table 5)."""

@@ -1,0 +1,51 @@
+"""The table of effects in docs/explanation/effects.md, from the effects' records.
+
+    python docs/scripts/effects_table.py
+
+writes the part between the page's markers.
+"""
+
+import sys
+from pathlib import Path
+
+from epv_env.common.command_line import fail_clearly
+from epv_env.plant.effects.record import Size
+from epv_env.plant.effects.registry import EFFECTS
+from epv_env.plant.parameters import table
+from training.studies.generated_pages import fill, markdown
+
+PAGE = Path(__file__).parents[1] / "explanation" / "effects.md"
+PART = "effects"
+
+
+def effects_table() -> str:
+    """One row for each effect: name, component, sizes with unit and range, form, source."""
+    rows = [
+        [
+            f"`{effect.name}`",
+            effect.component.replace("_", " "),
+            ", ".join(_size(size) for size in effect.sizes),
+            effect.form,
+            effect.source,
+        ]
+        for effect in EFFECTS
+    ]
+    return markdown(["Effect", "Component", "Size, range, unit", "Form", "Source"], rows)
+
+
+def _size(size: Size) -> str:
+    """Symbol, range and unit of a size."""
+    row = table()[size.symbol]
+    low, high = row.domain or (0.0, 0.0)
+    unit = "" if row.unit == "1" else f" {row.unit}"
+    return f"`{size.symbol}` {low:g} to {high:g}{unit}"
+
+
+def main() -> int:
+    """Write the table into the page."""
+    fill(PAGE, {PART: effects_table()})
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(fail_clearly(main))
