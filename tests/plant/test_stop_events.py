@@ -3,7 +3,7 @@
 import pytest
 
 from epv_env.common.units import BAR
-from identification.bench.automaton import simulate_reference
+from identification.bench.reference_simulation import simulate_reference
 from tests.benchmarks.eventless_integrators import STROKES, final_p2
 from tests.benchmarks.workloads import CALIBRATED
 from tests.reference.schedule import plant_states, report_tests

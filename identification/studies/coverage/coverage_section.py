@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.confidence.printed_interval import PROBABILITY
+from identification.confidence.settings import CONFIDENCE
 from identification.report.page import Picture, Section, Table, Verdict
 from identification.studies.coverage.coverage import Coverage
 from identification.studies.coverage.coverage_figure import distance_quantiles
@@ -60,7 +60,7 @@ def _joint_region_verdict(coverage: Coverage) -> Verdict:
     joint, low, high = _with_interval(Proportion.count(coverage.joint))
     printed = np.mean(coverage.report_inside)
     return Verdict(
-        status="good" if low <= PROBABILITY <= high else "bad",
+        status="good" if low <= CONFIDENCE.probability <= high else "bad",
         text=f"The joint 95 % region holds the truth in {100 * joint:.1f} % of the campaigns (95 % "
         f"interval of this share: {100 * low:.1f} to {100 * high:.1f} %); the report's intervals (eq. "
         f"23) hold their parameter in {100 * printed:.1f} % of the cases.",
