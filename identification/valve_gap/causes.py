@@ -8,6 +8,7 @@ from epv_env.plant.parameters import table
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.gap.model.cause import Cause
 from identification.gap.model.free_parameter import FreeParameter, NuisanceParameter
+from identification.valve_gap.settings import VALVE, ValveSettings
 
 PARAMETER_COMPONENTS = {
     "cMV": "armature", "dMB": "solenoid", "mMV": "armature", "N": "solenoid", "xMV0": "armature",
@@ -18,19 +19,10 @@ PARAMETER_COMPONENTS = {
 }  # fmt: skip
 """Component of each parameter outside the four, all of Tables 6 and 7 but the cone model's."""
 
-OFF_BY = (1.03, 0.97)
-"""Factors on a parameter's value to begin a search from."""
 
-FARTHEST_OFF = 0.1
-"""Share by which a parameter that is not calibrated may be off: Tables 8 and 9 vary them so far."""
-
-PARAMETER_PRIOR = 0.5
-"""Prior probability of a parameter off its table value, relative to that of an effect."""
-
-
-def catalogue(without: Sequence[str] = ()) -> tuple[Cause, ...]:
+def catalogue(without: Sequence[str] = (), settings: ValveSettings = VALVE) -> tuple[Cause, ...]:
     """All causes but those named. Raises ValueError for a name that none has."""
-    every = effects() + parameters()
+    every = effects() + parameters(settings)
     unknown = set(without) - {cause.name for cause in every}
     if unknown:
         known = ", ".join(dict.fromkeys(cause.name for cause in every))
@@ -54,14 +46,14 @@ def effects() -> list[Cause]:
     ]
 
 
-def parameters() -> list[Cause]:
+def parameters(settings: ValveSettings = VALVE) -> list[Cause]:
     """Causes `parameter:<symbol>`: a parameter outside the four off its table value."""
     return [
         Cause(
             name=f"parameter:{symbol}",
             component=component,
-            parameters=(parameter_size(symbol),),
-            prior=PARAMETER_PRIOR,
+            parameters=(parameter_size(symbol, settings),),
+            prior=settings.parameter_prior,
             exact_form=True,
         )
         for symbol, component in PARAMETER_COMPONENTS.items()
@@ -87,17 +79,17 @@ def _run_parameter(size: Size) -> NuisanceParameter:
     return NuisanceParameter(symbol=size.symbol, sd=size.scatter or 0.0, step=size.difference or 0.0)
 
 
-def parameter_size(symbol: str) -> FreeParameter:
+def parameter_size(symbol: str, settings: ValveSettings = VALVE) -> FreeParameter:
     """A parameter that is not off by itself; its scale is its table value."""
     row = table()[symbol]
     low, high = row.domain or (row.value, row.value)
     return FreeParameter(
         symbol=symbol,
         unit=row.unit,
-        low=max(low, row.value * (1 - FARTHEST_OFF)),
-        high=min(high, row.value * (1 + FARTHEST_OFF)),
+        low=max(low, row.value * (1 - settings.parameter_range)),
+        high=min(high, row.value * (1 + settings.parameter_range)),
         nominal=row.value,
-        trials=tuple(row.value * factor for factor in OFF_BY),
+        trials=tuple(row.value * factor for factor in settings.parameter_trials),
         scale=row.value,
     )
 

@@ -29,11 +29,8 @@ from identification.valve_gap.valve import Valve
 
 GAP, REPORT, PLANT, JOURNAL = "gap.json", "report.html", "plant.json", "fits.jsonl"
 
-JOINT = 0.95
-"""Probability that the plant file's region holds."""
-
-STEPS = 18
-"""Of a diagnosis with pairs; without, two of them are left out."""
+STEP_COUNT = 18
+"""Steps of a diagnosis with pairs; without, two of them are left out."""
 
 
 def diagnose_campaign(
@@ -101,7 +98,7 @@ def refitted_plant(found: Diagnosis, valve: Valve, name: str) -> Plant:
             centre=parameters,
             symbols=symbols,
             covariance=covariance * inflation,
-            chi_square=float(chi2.ppf(JOINT, len(symbols))),
+            chi_square=float(chi2.ppf(valve.settings.region_probability, len(symbols))),
         ),
         name=f"{name} with {hypothesis_label(best)}" if named else f"{name}, recalibrated",
         provenance={
@@ -128,7 +125,9 @@ class Steps:
     def __call__(self, step: str) -> None:
         elapsed = perf_counter() - self.began
         left = (
-            f", about {elapsed * (STEPS - self.number) / self.number:.0f} s left" if self.number else ""
+            f", about {elapsed * (STEP_COUNT - self.number) / self.number:.0f} s left"
+            if self.number
+            else ""
         )
         self.number += 1
         print(f"[{self.number}] {step} ({elapsed:.0f} s{left})", file=sys.stderr)

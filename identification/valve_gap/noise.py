@@ -10,34 +10,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.recordings.recording import Recording
-
-BLOCK = 0.02
-"""Length of the stretches of which each has its own estimate [s]."""
-
-TRANSIENT = 0.02
-"""Time after a switching that is left out [s]."""
+from identification.valve_gap.settings import VALVE, ValveSettings
 
 
-def noise_of(recordings: Sequence[Recording], channel: str) -> float:
+def noise_of(recordings: Sequence[Recording], channel: str, settings: ValveSettings = VALVE) -> float:
     """Standard deviation of a channel's readings about a smooth course [SI].
 
     Half the variance of first differences (Rice 1984), which a slope does not enter; the median over
     blocks, which a few lively ones do not move, made the mean of a chi-square variable.
     """
-    found = [_block_variances(recording, channel) for recording in recordings]
-    variances = np.concatenate([part for part, _ in found])
-    length = min(length for _, length in found)
+    estimates = [_block_variances(recording, channel, settings) for recording in recordings]
+    variances = np.concatenate([part for part, _ in estimates])
+    length = min(length for _, length in estimates)
     freedom = 2.0 * length / 3.0  # differences of white noise are correlated by -1/2
     return float(np.sqrt(np.median(variances) / (1.0 - 2.0 / (9.0 * freedom)) ** 3))
 
 
-def _block_variances(recording: Recording, channel: str) -> tuple[NDArray, int]:
+def _block_variances(recording: Recording, channel: str, settings: ValveSettings) -> tuple[NDArray, int]:
     """Variance of the noise in each quiet block, and the block's length [samples]."""
     changes = np.diff(recording.channel(channel))
-    length = min(max(4, round(BLOCK / recording.period)), len(changes))
+    length = min(max(4, round(settings.noise_block / recording.period)), len(changes))
+    transient = round(settings.switching_transient / recording.period)
     lively = np.zeros(len(changes), dtype=bool)
     for switching in np.flatnonzero(np.diff(recording.energised)):
-        lively[switching : switching + round(TRANSIENT / recording.period)] = True
+        lively[switching : switching + transient] = True
     count = len(changes) // length
     blocks = changes[: count * length].reshape(count, length)
     quiet = ~np.any(lively[: count * length].reshape(count, length), axis=1)

@@ -13,10 +13,11 @@ from identification.gap.design.information_gain import InformationGain, odds_tex
 from identification.gap.design.rivals import Rivals, select_rivals
 from identification.gap.design.settings import DesignSettings
 from identification.gap.rank.ranking import Ranking
-from identification.recordings.recording import Recording
+from identification.recordings.recording import CHANNELS, Recording
 from identification.replay.batch_simulation import Replay
 from identification.replay.model_inputs import ModelInputs
 from identification.report_2003.cases import Case
+from identification.valve_gap.settings import VALVE
 from identification.valve_gap.valve import Valve, as_run
 
 CASES = (
@@ -55,13 +56,6 @@ CANDIDATES = tuple(
     for p1, p2, U_on in CONDITIONS
 )
 """Every case under every condition."""
-
-SPLITS = 0.5
-"""An experiment splits rivals if it leaves at most this share of the doubt about the best of them."""
-
-SURE = 0.95
-"""Probability of the best rival above which no further experiment is needed."""
-
 
 FILE_NAME = "next.json"
 RUN = f"bench --programme {FILE_NAME}"
@@ -113,10 +107,11 @@ def next_experiment(
     options = [Option(programme=p, information=i) for p, i in zip(programmes, found, strict=True)]
     options.sort(key=lambda option: option.information.sort_key)
     best = options[0]
-    splits = 1.0 - best.information.expected_best <= SPLITS * (1.0 - rivals.probability[0])
+    doubt = valve.settings.separating_share * (1.0 - rivals.probability[0])
+    splits = 1.0 - best.information.expected_best <= doubt
     return NextExperiment(
         programme=best.programme,
-        text=sentence(best, rivals, splits),
+        text=sentence(best, rivals, splits, valve.settings.certain),
         rivals=rivals.names,
         before=rivals.probability,
         after=best.information.expected_probability,
@@ -142,13 +137,16 @@ def planned(valve: Valve, programmes: Sequence[Programme]) -> Valve:
     return plan
 
 
-def sentence(option: Option, rivals: Rivals, splits: bool) -> str:
-    """What to record, and the expected odds."""
+def sentence(option: Option, rivals: Rivals, splits: bool, certain: float = VALVE.certain) -> str:
+    """What to record, and the expected odds.
+
+    certain: probability of the best rival above which no further experiment is needed.
+    """
     names = _listed(rivals.names)
     before = ":".join(f"{100 * p:.0f}" for p in rivals.probability)
     after = odds_text(option.information.expected_best)
     record = described(option.programme)
-    if rivals.probability[0] > SURE:
+    if rivals.probability[0] > certain:
         return (
             f"None is needed ({rivals.names[0]}: {odds_text(rivals.probability[0])}); {record} would "
             f"tell {names} apart best ({RUN})"
@@ -200,10 +198,9 @@ def _expected(programme: Programme, period: float) -> Recording:
     """The recording of a programme as far as it is known before."""
     U = programme.case.voltage(programme.U_on, 1.0 / period)
     zero = np.zeros_like(U)
-    return Recording(
-        name=programme.name, role=programme.role, period=period, I=zero, U=U, p1=zero + programme.p1,
-        p2=zero + programme.p2, p3=zero, sigma_S=zero,
-    )  # fmt: skip
+    imposed = {"U": U, "p1": zero + programme.p1, "p2": zero + programme.p2}
+    signals = {name: imposed.get(name, zero) for name in CHANNELS}
+    return Recording(name=programme.name, role=programme.role, period=period, sigma_S=zero, **signals)
 
 
 def _drive(programme: Programme, recording: Recording) -> ModelInputs:

@@ -8,36 +8,38 @@ from numpy.typing import NDArray
 from epv_env.common.units import BAR, MILLIMETRE
 from epv_env.plant.simulate import Trajectory
 from identification.gap.model.state_equation import StateTrace
-
-SETTLED = 0.02
-"""A current closer than this to its end value, relative to the greatest, is past its transient."""
-
-PRESSURE_RATE = 1e6
-"""The control chamber fills or vents where its pressure changes faster than this [Pa/s]."""
-
-AJAR, MOVING = 1e-3, 2e-3
-"""Stroke, relative to the whole, beyond which a mover is off its seat; least speed of a piston [m/s]."""
+from identification.valve_gap.settings import VALVE, ValveSettings
 
 
-def regimes(answer: Trajectory, p: Mapping[str, float], energised: NDArray) -> dict[str, NDArray]:
+def regimes(
+    answer: Trajectory,
+    p: Mapping[str, float],
+    energised: NDArray,
+    settings: ValveSettings = VALVE,
+) -> dict[str, NDArray]:
     """Boolean (samples,) by regime.
 
-    p: parameters by symbol [SI]. energised: whether the coil is on, boolean (samples,).
+    Args:
+        answer: the model's trajectory.
+        p: parameters by symbol [SI].
+        energised: whether the coil is on, boolean (samples,).
+        settings: where a transient ends, and from when on something flows or moves.
     """
     q = answer.state
     current, greatest = np.abs(q.I), np.max(np.abs(q.I))
     settled = answer.U / p["R"]
-    stroke_MV, open_PV = np.asarray(q.xMV) / p["xMVmax"], q.xPV > AJAR * p["xPVmax"]
+    unseated = settings.unseated_stroke
+    stroke_MV, open_PV = np.asarray(q.xMV) / p["xMVmax"], q.xPV > unseated * p["xPVmax"]
     rate = np.gradient(q.p3, answer.time)
     moving = {
-        "coil_rise": energised & (settled - current > SETTLED * greatest),
-        "armature_flight": _widened((stroke_MV > AJAR) & (stroke_MV < 1 - AJAR)),
-        "coil_decay": ~energised & (current > SETTLED * greatest),
-        "filling": rate > PRESSURE_RATE,
-        "venting": rate < -PRESSURE_RATE,
-        "pv_opening": open_PV & (q.vPV > MOVING),
-        "pv_open": open_PV & (np.abs(q.vPV) <= MOVING),
-        "pv_shutting": open_PV & (q.vPV < -MOVING),
+        "coil_rise": energised & (settled - current > settings.settled_current * greatest),
+        "armature_flight": _widened((stroke_MV > unseated) & (stroke_MV < 1 - unseated)),
+        "coil_decay": ~energised & (current > settings.settled_current * greatest),
+        "filling": rate > settings.flowing_rate,
+        "venting": rate < -settings.flowing_rate,
+        "pv_opening": open_PV & (q.vPV > settings.moving_speed),
+        "pv_open": open_PV & (np.abs(q.vPV) <= settings.moving_speed),
+        "pv_shutting": open_PV & (q.vPV < -settings.moving_speed),
     }
     return {**moving, "shut": ~np.any(list(moving.values()), axis=0)}
 

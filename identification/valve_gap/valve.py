@@ -18,9 +18,7 @@ from identification.valve_gap import causes
 from identification.valve_gap.equations import EQUATIONS, forced_changes, modelled
 from identification.valve_gap.noise import noise_of
 from identification.valve_gap.regimes import regimes, traces
-
-TOLERANCE = 3e-3
-"""Relative scatter of the parameters outside the four from unit to unit."""
+from identification.valve_gap.settings import VALVE, ValveSettings
 
 P2_START = NuisanceParameter(symbol="p2_start", sd=500.0, step=1e3)
 """Circuit pressure at the start of a recording, less the mean of the hold [Pa]."""
@@ -34,12 +32,24 @@ class Valve:
     """`GreyBox` for a campaign."""
 
     def __init__(
-        self, campaign: Campaign, nominal: Parameters | None = None, without: Sequence[str] = ()
+        self,
+        campaign: Campaign,
+        nominal: Parameters | None = None,
+        without: Sequence[str] = (),
+        settings: ValveSettings = VALVE,
     ):
-        """nominal: the parameters as given (None: Table 10). without: names of causes to leave out.
+        """Prepare a campaign for the diagnosis.
 
-        Raises ValueError for a cause that the catalogue does not have.
+        Args:
+            campaign: its calibration and validation recordings.
+            nominal: the parameters as given; None: Table 10.
+            without: names of causes to leave out.
+            settings: judgements about the valve.
+
+        Raises:
+            ValueError: the catalogue does not have a cause of `without`.
         """
+        self.settings = settings
         problem = calibration_problem(campaign, start=nominal)
         self.base = problem.vector.reference
         self.recordings = (*problem.calibration, *problem.validation)
@@ -48,14 +58,17 @@ class Valve:
                 name=name,
                 unit=UNITS[name][0],
                 scale=UNITS[name][1],
-                noise=noise_of(self.recordings, name),
+                noise=noise_of(self.recordings, name, settings),
             )
             for name in OUTPUTS
         )
         self.runs = tuple(as_run(recording) for recording in self.recordings)
         self.parameters = tuple(causes.calibrated(dict(self.base)))
-        self.causes = causes.catalogue(without)
-        self.tolerances = tuple(_tolerance(symbol, self.base) for symbol in causes.PARAMETER_COMPONENTS)
+        self.causes = causes.catalogue(without, settings)
+        self.tolerances = tuple(
+            _tolerance(symbol, self.base, settings.parameter_scatter)
+            for symbol in causes.PARAMETER_COMPONENTS
+        )
         self.run_offsets = (P2_START, P3_ZERO, I_ZERO)
         self.equations = EQUATIONS
         self.replay = Replay([model_inputs(r, self.base) for r in self.recordings], self.base)
@@ -85,7 +98,8 @@ class Valve:
     def regimes(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, NDArray]:
         """`GreyBox.regimes`: boolean (samples,) by regime; values: (n,) or (n, runs) by symbol [SI]."""
         p = self._one(values, run)
-        return regimes(modelled(self.replay.drives[run], p), p, self.recordings[run].energised)
+        energised = self.recordings[run].energised
+        return regimes(modelled(self.replay.drives[run], p), p, energised, self.settings)
 
     def forced(
         self, values: Mapping[str, NDArray], equation: StateEquation, run: int, edges: NDArray
@@ -116,6 +130,6 @@ def as_run(recording: Recording) -> Run:
     )
 
 
-def _tolerance(symbol: str, base: Parameters) -> NuisanceParameter:
+def _tolerance(symbol: str, base: Parameters, scatter: float) -> NuisanceParameter:
     value = base[symbol]
-    return NuisanceParameter(symbol=symbol, sd=TOLERANCE * value, centre=value, step=TOLERANCE * value)
+    return NuisanceParameter(symbol=symbol, sd=scatter * value, centre=value, step=scatter * value)
