@@ -89,7 +89,7 @@ gap: $(VENV)/.installed ## say which effect a virtual bench has that the model l
 	$(PY) -m identification bench --suite diagnosis --effect eddy_current=0.004 --out runs/gap-bench
 	$(PY) -m identification gap runs/gap-bench --out runs/gap $(ARGS)
 
-blind: $(VENV)/.installed ## how often the diagnosis is right on 300 sealed campaigns (an hour)
+blind: $(VENV)/.installed ## how often the diagnosis is right on 300 campaigns with hidden causes (an hour)
 	$(PY) -m identification blind --trials 300 --seed 2030 --out runs/blind --images docs/images $(ARGS)
 
 real-bench: $(VENV)/.installed ## ask which effects give the report's printed errors (3 minutes)
