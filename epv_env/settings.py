@@ -1,4 +1,4 @@
-"""What an environment can be told: at construction, and per episode through reset(options=...)."""
+"""What configures an environment: at construction, and per episode through reset(options=...)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

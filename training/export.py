@@ -127,7 +127,7 @@ def verify(
 
 
 def write_texts(folder: Path, files: dict[str, str]) -> None:
-    """Write texts into a folder that nobody else sees."""
+    """Write texts into a private folder."""
     for name, text in files.items():
         (folder / name).write_text(text, encoding="utf-8")
 

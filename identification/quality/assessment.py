@@ -96,7 +96,7 @@ def assess_recording(
 def sensor_offsets(quality: QualityAssessment) -> dict[str, SensorOffset]:
     """Offset of each channel, which a calibration may subtract.
 
-    Empty unless the record is at rest: elsewhere an offset cannot be told from the signal.
+    Empty unless the record is at rest: elsewhere nothing separates an offset from the signal.
     """
     if not quality.at_rest:
         return {}

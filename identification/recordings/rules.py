@@ -13,7 +13,7 @@ class RecordingRules:
     """Part of a period by which a sample may be off; the steepest signal then moves by less than "
     "noise."""
     most_digits: int = 9
-    """Decimals of a second beyond which nobody prints times."""
+    """Most decimals of a second with which files print times."""
     least_rest: float = 0.5
     """Least duration of a quality recording [s]; statistics of less mean little."""
     least_voltage: float = 1.0

@@ -1,4 +1,4 @@
-"""The contract of an export: all that whoever builds it in has to know, as data."""
+"""The contract of an export, as data: what an integrator of the exported policy has to know."""
 
 from typing import Any
 

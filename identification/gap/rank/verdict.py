@@ -1,4 +1,4 @@
-"""The verdict: what the probabilities amount to, and which causes the recordings cannot tell apart."""
+"""The verdict on the probabilities, and the causes that the recordings cannot separate."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
