@@ -2,10 +2,9 @@
 
 from collections.abc import Mapping
 
-import numpy as np
 from numpy.typing import NDArray
 
-QUARTER_PI = np.pi / 4
+from epv_env.plant.primitives.constants import QUARTER_PI
 
 
 def opening_pressure(p: Mapping[str, float], p1: NDArray, p2: NDArray) -> NDArray:

@@ -16,10 +16,10 @@ from scipy.optimize import root_scalar
 from epv_env.plant.coefficients import coefficients
 from epv_env.plant.equations import Coefficients
 from epv_env.plant.parameters import Parameters
+from epv_env.plant.primitives.constants import QUARTER_PI
 from epv_env.plant.primitives.flow import mass_flux
 from epv_env.plant.simulate import energised, simulate
 
-QUARTER_PI = np.pi / 4
 OPENING = 0.05
 """Share of the stroke at which the plant is linearised [1]: barely open, where the loop works."""
 

@@ -1,6 +1,5 @@
 """The tuned controllers as data (tuned.json): the values that the search found, and how it searched."""
 
-import json
 from collections.abc import Collection
 from dataclasses import asdict, dataclass
 from os import PathLike
@@ -9,8 +8,7 @@ from typing import Any
 
 from controllers.base import Controller
 from controllers.registry import registration
-from epv_env.common.files import write_text
-from epv_env.common.json_files import JSONFileError, read_json
+from epv_env.common.json_files import JSONFileError, read_json, write_json
 from epv_env.plant.parameters import Parameters
 
 FORMAT = "epv-controllers/1"
@@ -70,7 +68,7 @@ def _content(path: str | PathLike[str] | None) -> TuningsFile:
 def save_tunings(tunings: dict[str, Tuning], path: str | PathLike[str], search: dict[str, Any]) -> None:
     """Write tunings and how they were searched, whole or not at all."""
     content = {"format": FORMAT, **asdict(TuningsFile(search=search, controllers=tunings))}
-    write_text(Path(path), json.dumps(content, indent=1) + "\n")
+    write_json(path, content)
 
 
 def build(kind: str, values: dict[str, Any], parameters: Parameters) -> Controller:

@@ -22,6 +22,7 @@ from epv_env.common.command_line import (
     writable_folder,
 )
 from epv_env.common.journal import Journal
+from epv_env.common.json_files import write_json
 from epv_env.common.results_folder import check_options, write_options
 from epv_env.plant.consumption import check_scenario
 from epv_env.plant.plantfile import Plant, load_plant
@@ -31,7 +32,6 @@ from training.studies.episode_tasks import Study
 from training.studies.generated_pages import check_pages
 from training.studies.named_controllers import DEFAULT, named_controllers
 from training.studies.parallel_run import run_tasks, task_runner
-from training.studies.result_files import write_json
 from training.studies.sweeps.computing_cost import cost, episode_cpu, overhead
 from training.studies.sweeps.episode_plan import Size, cells, chosen_points, searches
 from training.studies.sweeps.experiment_designs import DESIGNS, Point

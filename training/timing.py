@@ -23,13 +23,14 @@ from controllers.base import Controller
 from controllers.tuned import load_tunings
 from epv_env.common.command_line import check_positive, fail_clearly, writable_folder
 from epv_env.common.files import write_text
+from epv_env.common.json_files import write_json
 from epv_env.plant.consumption import check_scenario
 from epv_env.plant.plantfile import load_plant
 from epv_env.reward import REFERENCE_PERIOD
 from training.evaluation.rollout import begin_episodes, make_env
 from training.evaluation.seeds import TIMING_SEED
 from training.studies.named_controllers import named_controllers
-from training.studies.result_files import records, write_json
+from training.studies.result_files import records
 
 WARM_UP_DECISIONS = 50
 """Decisions that are not counted: the first ones compile and fill caches."""

@@ -6,7 +6,6 @@ writes policy, configuration, table and figures into runs/ppo and prints the tab
 """
 
 import argparse
-import json
 import sys
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -27,6 +26,7 @@ from epv_env.common.command_line import (
     writable_folder,
 )
 from epv_env.common.files import write_text
+from epv_env.common.json_files import write_json
 from epv_env.common.results_folder import check_same, read_config, write_options
 from epv_env.plant.consumption import check_scenario
 from epv_env.plant.plantfile import Plant, load_plant
@@ -174,7 +174,7 @@ def report(comparison: Comparison, curve: list[dict[str, float]], folder: Path) 
 
     table = comparison.table
     write_text(folder / "table.csv", table.to_csv(index=False))
-    write_text(folder / "table.json", json.dumps(table.to_dict(orient="records"), indent=1) + "\n")
+    write_json(folder / "table.json", table.to_dict(orient="records"))
     plots.learning_curve(curve, folder / "learning_curve.png")
     plots.episode_overlay(comparison.traces, folder / "episode.png")
     plots.excursion_distribution(comparison, folder / "excursions.png")

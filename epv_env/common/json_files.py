@@ -1,5 +1,6 @@
-"""Reading versioned JSON files: one sentence for each way in which a file can be wrong."""
+"""JSON files: written whole; read with one sentence for each way in which a file can be wrong."""
 
+import json
 import re
 from os import PathLike
 from pathlib import Path
@@ -7,11 +8,21 @@ from typing import Any, TypeVar
 
 import msgspec
 
+from epv_env.common.files import write_text
+
 Shape = TypeVar("Shape")
 
 
 class JSONFileError(ValueError):
     """A JSON file cannot be used: the message names the file, the place, the rule and the remedy."""
+
+
+def write_json(path: str | PathLike[str], content: Any, *, allow_nan: bool = True) -> None:
+    """Write content as indented JSON, whole or not at all.
+
+    Raises ValueError for a number that is not finite, unless `allow_nan`.
+    """
+    write_text(Path(path), json.dumps(content, indent=1, allow_nan=allow_nan) + "\n")
 
 
 def read_json(path: str | PathLike[str], shape: type[Shape], *, version: str, remedy: str) -> Shape:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from epv_env.common.files import write_text
+from epv_env.common.json_files import write_json
 
 CONFIG = "config.json"
 
@@ -56,4 +56,4 @@ def read_config(folder: Path) -> dict[str, Any] | None:
 
 def write_options(folder: Path, options: Mapping[str, Any]) -> None:
     """Write down what the folder's results depend on."""
-    write_text(folder / CONFIG, json.dumps(options, indent=1) + "\n")
+    write_json(folder / CONFIG, options)

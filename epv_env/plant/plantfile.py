@@ -9,8 +9,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from epv_env.common.files import write_text
-from epv_env.common.json_files import JSONFileError, checked
+from epv_env.common.json_files import JSONFileError, checked, write_json
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import ParameterError, Parameters
 from epv_env.plant.region import Region
@@ -133,7 +132,7 @@ def save_plant(plant: Plant, path: str | PathLike[str]) -> None:
             "covariance": plant.region.covariance.tolist(),
             "chi_square": plant.region.chi_square,
         }
-    write_text(Path(path), json.dumps(content, indent=1) + "\n")
+    write_json(path, content)
 
 
 def _plant(content: _PlantFile, place: str) -> Plant:

@@ -6,7 +6,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from epv_env.common.files import write_text
+from epv_env.common.json_files import write_json
 from epv_env.common.units import BAR
 from epv_env.plant.sensors import SENSORS
 from identification.bench.programmes import Programme
@@ -32,7 +32,7 @@ def save_programmes(programmes: Sequence[Programme], path: str | PathLike[str]) 
     """
     content = {"format": FORMAT, "programmes": [_content(programme) for programme in programmes]}
     _decode(str(path), content)
-    write_text(Path(path), json.dumps(content, indent=1) + "\n")
+    write_json(path, content)
 
 
 def load_programmes(path: str | PathLike[str]) -> tuple[Programme, ...]:

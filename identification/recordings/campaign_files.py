@@ -1,7 +1,6 @@
 """Campaigns as files: campaign.json and one CSV per recording (docs/reference/files.md)."""
 
 import hashlib
-import json
 import os
 from collections.abc import Mapping
 from os import PathLike
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.common.files import write_text
+from epv_env.common.json_files import write_json
 from epv_env.common.units import BAR
 from epv_env.plant.channels import CHANNEL, MEASURED_CHANNELS, MeasuredChannel
 from identification.recordings.columns import CONSUMPTION_COLUMN, TIME_COLUMN, read_columns
@@ -71,7 +71,7 @@ def write_campaign(
         _check_writable(folder / f"{recording.name}.csv", recording, campaign.pressure, rules)
     for recording in campaign.recordings:
         write_text(folder / f"{recording.name}.csv", _csv(_columns(recording)))
-    write_text(folder / FILE_NAME, json.dumps(content, indent=1) + "\n")
+    write_json(folder / FILE_NAME, content)
 
 
 def _read_recording(path: Path, role: str, ambient: float, rules: RecordingRules) -> Recording:

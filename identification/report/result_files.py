@@ -1,12 +1,11 @@
 """Writing the results of a command: a page to read and a file to compute with."""
 
-import json
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from epv_env.common.files import write_text
+from epv_env.common.json_files import write_json
 from identification.report.page import Section, write_page
 
 
@@ -14,7 +13,7 @@ def write_results(
     out: Path, name: str, *, title: str, sections: Sequence[Section], content: Mapping[str, Any]
 ) -> None:
     """Write `out/name.json` and the self-contained `out/name.html`, each whole or not at all."""
-    write_text(out / f"{name}.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
+    write_json(out / f"{name}.json", content, allow_nan=False)
     footer = (
         f"Written by epv-valve {version('epv-valve')}. Sections and tables are those of SCL-001/2003."
     )

@@ -1,6 +1,5 @@
 """From a campaign's folder to gap.json, report and a plant file with the cause."""
 
-import json
 import sys
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
@@ -9,8 +8,8 @@ from time import perf_counter
 
 from scipy.stats import chi2
 
-from epv_env.common.files import write_text
 from epv_env.common.journal import Journal
+from epv_env.common.json_files import write_json
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from epv_env.plant.region import Region
@@ -57,7 +56,7 @@ def diagnose_campaign(
     found = diagnose(valve, seed=seed, cache=FitCache(valve, journal, steps))
     text = _report(found, valve, recorded.name, out, steps) if report else ""
     content = {**as_json(found, text), "seconds": perf_counter() - began}
-    write_text(out / GAP, json.dumps(content, indent=1, allow_nan=False) + "\n")
+    write_json(out / GAP, content, allow_nan=False)
     return found
 
 

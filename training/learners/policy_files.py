@@ -1,6 +1,5 @@
 """Writing a policy as safetensors and a contract, which others can load without running code."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,8 @@ from safetensors.numpy import save
 from stable_baselines3 import PPO
 
 from controllers.learned import CONTRACT_FILE, FORMAT, WEIGHTS_FILE, LearnedPolicy
-from epv_env.common.files import write_bytes, write_text
+from epv_env.common.files import write_bytes
+from epv_env.common.json_files import write_json
 from epv_env.observation import contract
 
 
@@ -63,7 +63,7 @@ def save_policy(
         "provenance": provenance,
     }
     write_bytes(folder / WEIGHTS_FILE, save(arrays))
-    write_text(folder / CONTRACT_FILE, json.dumps(content, indent=1) + "\n")
+    write_json(folder / CONTRACT_FILE, content)
 
 
 def _linear_layers(model: PPO) -> list[torch.nn.Linear]:

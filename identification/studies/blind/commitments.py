@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from epv_env.common.files import write_bytes, write_text
+from epv_env.common.files import write_bytes
+from epv_env.common.json_files import write_json
 from identification.bench.measurement import TrueSignals
 from identification.recordings.recording import OUTPUTS
 from identification.studies.blind.kinds import NOMINAL, TWO_EFFECTS
@@ -97,7 +98,7 @@ def truth_label(
 def write_truth(folder: Path, label: Mapping[str, Any], recordings: bytes) -> None:
     """Write the label and the noise-free held-out recordings of one trial."""
     write_bytes(folder / RECORDINGS_FILE, recordings)
-    write_text(folder / LABEL_FILE, json.dumps(label, indent=1, allow_nan=False) + "\n")
+    write_json(folder / LABEL_FILE, label, allow_nan=False)
 
 
 def commitment(folder: Path) -> str:

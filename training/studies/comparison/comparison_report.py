@@ -9,6 +9,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from epv_env.common.files import write_bytes, write_text
+from epv_env.common.json_files import write_json
 from training.evaluation import plots
 from training.evaluation.controller_table import PLANTS, Comparison
 from training.evaluation.rollout import Trace
@@ -17,7 +18,7 @@ from training.studies.comparison.acceptance_criteria import Criterion, criteria,
 from training.studies.comparison.contenders import TRADE_OFF_ON, Contender
 from training.studies.comparison.score_tables import ComparisonResults
 from training.studies.generated_pages import fill
-from training.studies.result_files import records, write_json
+from training.studies.result_files import records
 
 RESULTS_FILE, TABLES_FILE = "results.json", "tables.md"
 

@@ -1,12 +1,11 @@
 """The results of the sim-to-real loop: sim-to-real.json, sim-to-real.png and the printed tables."""
 
-import json
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from epv_env.common.files import write_text
+from epv_env.common.json_files import write_json
 from training.studies.sim_to_real.performance_tables import as_markdown, gap_table, performance_table
 
 
@@ -39,7 +38,7 @@ def report(
         "aims": aims.to_dict(orient="records"),
         "gaps": differences.to_dict(orient="records"),
     }
-    write_text(folder / "sim-to-real.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
+    write_json(folder / "sim-to-real.json", content, allow_nan=False)
     save_figure(performance_figure(aims), (images or folder) / "sim-to-real.png")
     return f"{diagnosis_text(diagnosis, withheld)}\n\n{as_markdown(aims, differences)}"
 

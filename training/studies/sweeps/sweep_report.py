@@ -9,11 +9,12 @@ from typing import Any
 import pandas as pd
 
 from epv_env.common.files import write_text
+from epv_env.common.json_files import write_json
 from training.evaluation.rollout import Trace
 from training.studies.episode_tasks import Study
 from training.studies.generated_pages import fill
 from training.studies.parallel_run import Outcome
-from training.studies.result_files import records, write_json
+from training.studies.result_files import records
 from training.studies.sweeps.computing_cost import SETTINGS as COST_SETTINGS
 from training.studies.sweeps.episode_plan import SweepCell
 from training.studies.sweeps.markdown_tables import (
