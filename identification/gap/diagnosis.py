@@ -7,11 +7,11 @@ from identification.gap.fit.hypothesis import Estimate, Hypothesis
 from identification.gap.locate.fault_localisation import Localisation, locate
 from identification.gap.model.grey_box import GreyBox
 from identification.gap.rank.evidence import EvaluatedHypothesis
-from identification.gap.rank.predictive_check import check_predictively
 from identification.gap.rank.ranking import Ranking, rank_hypotheses
 from identification.gap.rank.verdict import (
     AMBIGUOUS,
     KNOWN,
+    PARTIAL,
     UNKNOWN,
     Conclusion,
     RankedCause,
@@ -35,7 +35,7 @@ class Diagnosis:
     localisation: Localisation
     """Where the gap lies that recalibration leaves."""
     remaining: Localisation | None
-    """Where the gap lies that the best cause leaves; None unless the verdict is unknown."""
+    """Where the gap lies that the best cause leaves; None unless something is left to name."""
     reduction: DiscrepancyReduction
     nominal: Estimate
     """The nominal model."""
@@ -48,7 +48,7 @@ class Diagnosis:
     @property
     def best(self) -> RankedCause | None:
         """The cause that the verdict names, or the nearest one; None where none is needed."""
-        named = self.conclusion.verdict in (KNOWN, AMBIGUOUS, UNKNOWN)
+        named = self.conclusion.verdict in (KNOWN, AMBIGUOUS, PARTIAL, UNKNOWN)
         return self.judged[0] if named and self.judged else None
 
 
@@ -85,10 +85,7 @@ def diagnose(
     cache.announce("where")
     localisation = _locate(ranking, ranking.recalibrated, seed, settings)
     cache.announce("how far it shrinks")
-    diagnosis = _judge(ranking, localisation, seed, settings)
-    unexplained = diagnosis.reduction.unexplained
-    checked = check_predictively(ranking, diagnosis.conclusion.verdict, unexplained)
-    return diagnosis if checked is ranking else _judge(checked, localisation, seed, settings)
+    return _judge(ranking, localisation, seed, settings)
 
 
 def _locate(
@@ -113,7 +110,7 @@ def _judge(
     conclusion = conclude(ranking, localisation)
     judged = _judged_causes(conclusion, settings.report.judged_runners_up)
     remaining = None
-    if conclusion.verdict == UNKNOWN and judged:
+    if conclusion.verdict in (PARTIAL, UNKNOWN) and judged:
         remaining = _locate(ranking, judged[0].hypothesis, seed, settings)
     nominal = problem.start(Hypothesis(causes=()), {})
     estimates = {NOMINAL: nominal, RECALIBRATED: recalibrated.estimate}

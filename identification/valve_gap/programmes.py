@@ -103,7 +103,7 @@ def next_experiment(
     if ranking.unknown > 0.5:
         return _none_can_be_chosen(rivals)
     plan = planned(valve, programmes)
-    found = expected_information(ranking.problem, plan, rivals, settings, ranking.settings)
+    found = expected_information(ranking.problem, plan, rivals, settings)
     options = [Option(programme=p, information=i) for p, i in zip(programmes, found, strict=True)]
     options.sort(key=lambda option: option.information.sort_key)
     best = options[0]

@@ -23,7 +23,6 @@ from identification.gap.fit.hypothesis import Estimate, cause_places, nominal_ve
 from identification.gap.fit.linearisation import linearise, nuisance_slopes
 from identification.gap.fit.variable_projection import LinearisedRun
 from identification.gap.model.grey_box import GreyBox
-from identification.gap.rank.settings import RankingSettings
 
 
 def expected_information(
@@ -31,7 +30,6 @@ def expected_information(
     plan: GreyBox,
     rivals: Rivals,
     settings: DesignSettings | None = None,
-    ranking: RankingSettings | None = None,
 ) -> list[InformationGain]:
     """Expected information of each run of a plan; none where a rival cannot simulate the run.
 
@@ -40,9 +38,8 @@ def expected_information(
         plan: the campaign's plant with the experiments as its runs; their readings are not used.
         rivals: hypotheses between which the experiment is to decide.
         settings: judgement of the design; None: the defaults.
-        ranking: errors of form; None: the defaults.
     """
-    settings, ranking = settings or DesignSettings(), ranking or RankingSettings()
+    settings = settings or DesignSettings()
     posteriors = parameter_posteriors(problem, rivals.estimates)
     planned, estimates = _planned_problem(problem, plan, rivals.estimates)
     predictions = linearise(planned, estimates, planned.all_runs)
@@ -55,7 +52,7 @@ def expected_information(
         else:
             channels, period = run.measured.shape[0], float(run.time[1])
             means, covariances = outcome_distributions(
-                own, posteriors, effects[r], channels, period, settings, ranking
+                own, posteriors, effects[r], channels, period, settings
             )
         gains.append(information_gain(means, covariances, rivals.probability, settings.outcomes))
     return gains
@@ -84,8 +81,8 @@ def _simulated_effects(
 ) -> list[NDArray]:
     """Effects of all rivals' causes of uncertain form, per run (values, causes) [noise deviations].
 
-    Each effect is the difference between simulations with and without the cause. The linear
-    `rank.misfit.cause_effects` holds near the campaign; a planned run may drive the plant beyond it.
+    Each effect is the difference between simulations with and without the cause. A
+    linear effect holds near the campaign; a planned run may drive the plant beyond it.
     """
     without, rivals = [], []
     for index, estimate in enumerate(estimates):

@@ -5,11 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.gap.design.form_errors import explained_by_form_errors
 from identification.gap.design.parameter_posterior import ParameterPosterior
 from identification.gap.design.settings import DesignSettings
 from identification.gap.fit.variable_projection import LinearisedRun, tolerances_as_slopes
-from identification.gap.rank.misfit import explained_by_form_errors
-from identification.gap.rank.settings import RankingSettings
 
 
 def outcome_distributions(
@@ -19,7 +18,6 @@ def outcome_distributions(
     channels: int,
     period: float,
     settings: DesignSettings,
-    ranking: RankingSettings,
 ) -> tuple[NDArray, NDArray]:
     """Each rival's Gaussian of the outcome of one run.
 
@@ -32,8 +30,7 @@ def outcome_distributions(
         effects: effects of all rivals' causes of uncertain form, (values, causes) [noise deviations].
         channels: number of channels.
         period: of sampling [s].
-        settings: directions that count.
-        ranking: size and segments of errors of form.
+        settings: directions that count, size and segments of errors of form.
 
     Returns:
         Means (rivals, d) and covariances (rivals, d, d) [1].
@@ -52,8 +49,8 @@ def outcome_distributions(
     columns = np.column_stack([means, *spreads])
     gram = columns.T @ columns
     if effects.shape[1]:
-        errors = max(ranking.form_errors) / np.sqrt(n) * effects
-        gram -= explained_by_form_errors(columns, errors, channels, period, ranking.segment_duration)
+        errors = settings.form_error / np.sqrt(n) * effects
+        gram -= explained_by_form_errors(columns, errors, channels, period, settings.segment_duration)
     coordinates = _coordinates(gram, settings.least_variance)
     ends = np.cumsum([n, *(spread.shape[1] for spread in spreads)])
     own = np.split(coordinates, ends[:-1], axis=1)

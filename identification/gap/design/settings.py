@@ -20,3 +20,10 @@ class DesignSettings:
     outcomes: int = 1000
     """Number of simulated outcomes of each rival over which an experiment is averaged: expected
     probabilities are then known to 0.02 or better."""
+
+    form_error: float = 0.1
+    """Relative standard deviation by which a cause's effect may differ from our form in one segment [1]:
+    textbook forms are accurate to some percent."""
+
+    segment_duration: float = 5e-3
+    """Time over which the error of a form is taken as constant [s]: about one transient of the valve."""

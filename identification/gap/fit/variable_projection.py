@@ -85,10 +85,10 @@ def normal_equations(runs: Sequence[LinearisedRun], largest_deviation: float) ->
 
     Args:
         runs: the same hypothesis linearised in each of them.
-        largest_deviation: bound of the tolerances [standard deviations].
+        largest_deviation: bound of the nuisance parameters [standard deviations].
     """
     k, m = runs[0].slopes.shape[1], runs[0].tolerance_slopes.shape[1]
-    gram = np.sum([_gram_without_run_nuisances(run) for run in runs], axis=0)
+    gram = np.sum([_gram_without_run_nuisances(run, largest_deviation) for run in runs], axis=0)
     # Columns: residual, slopes, tolerance slopes.
     tolerances = np.arange(1 + k, 1 + k + m)
     gram[tolerances, tolerances] += 1.0
@@ -181,8 +181,12 @@ def _eliminated(gram: NDArray, columns: NDArray, kept: NDArray) -> NDArray:
     return gram[np.ix_(kept, kept)] - cross.T @ np.linalg.solve(own, cross)
 
 
-def _gram_without_run_nuisances(run: LinearisedRun) -> NDArray:
-    """Gram matrix of residual, slopes and tolerance slopes, the run's own nuisances minimised over."""
+def _gram_without_run_nuisances(run: LinearisedRun, largest_deviation: float) -> NDArray:
+    """Gram matrix of residual, slopes and tolerance slopes, the run's own nuisances minimised over.
+
+    A nuisance that the residual drives to its bound stays there, and what it cannot reach stays in the
+    residual, as in `without_run_nuisances`.
+    """
     columns = np.column_stack([run.residual, run.slopes, run.tolerance_slopes, run.run_slopes])
     gram = columns.T @ columns
     own, count = len(run.run_sd), len(gram) - len(run.run_sd)
@@ -192,4 +196,8 @@ def _gram_without_run_nuisances(run: LinearisedRun) -> NDArray:
     # Unknowns become the nuisances' distances from their centres instead of steps from present values.
     gram = _shifted(gram, nuisances, -run.run_values)
     gram[nuisances, nuisances] += 1.0 / run.run_sd**2
-    return _eliminated(gram, nuisances, np.arange(count))
+    bound = largest_deviation * run.run_sd
+    best = _bounded_minimiser(gram[np.ix_(nuisances, nuisances)], gram[nuisances, 0], -bound, bound)
+    at_bound = np.abs(best) >= bound
+    held = _shifted(gram, nuisances[at_bound], best[at_bound])
+    return _eliminated(held, nuisances[~at_bound], np.arange(count))

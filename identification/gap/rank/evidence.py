@@ -1,8 +1,6 @@
-"""Evidence: how well a refitted hypothesis explains the recordings, its form possibly inexact.
+"""What a refitted hypothesis leaves of the recordings, and the price of its parameters.
 
-The true form of a cause never equals ours exactly. So a hypothesis may miss the recordings in every
-short segment by a share of the cause's effect there. The recordings determine the share, up to a tenth;
-a larger miss counts in full. The price of each fitted parameter is Laplace's (MacKay 1992).
+The price of each fitted parameter is Laplace's (MacKay 1992).
 """
 
 from collections.abc import Sequence
@@ -10,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
 
 from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.fit.hypothesis import Estimate
@@ -21,30 +18,25 @@ from identification.gap.fit.variable_projection import (
     normal_equations,
     without_run_nuisances,
 )
-from identification.gap.rank.misfit import (
-    cause_effects,
-    form_error_misfits,
-    generic_misfit_log_evidence,
-)
 from identification.gap.rank.settings import RankingSettings
 
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluatedHypothesis:
-    """A refitted hypothesis with its residuals and its evidence."""
+    """A refitted hypothesis with its residuals on all runs."""
 
     estimate: Estimate
     residuals: list[NDArray]
     """Per run (channels, samples) [noise deviations], nuisance parameters accounted for; 0 at untrusted
     readings."""
-    log_evidence: float
-    """With errors of form; natural logarithm, but for a constant of the recordings."""
-    log_evidence_with_misfit: float
-    """The same with a generic misfit instead of errors of form."""
+    squares: NDArray
+    """Sums of squared residuals over all runs, (channels,) [1]."""
+    nuisance_penalty: float
+    """Half the squared deviations of all nuisance parameters from their centres [nats]."""
     tolerances: NDArray
     """Tolerances that the fitted runs determine, (m,) [standard deviations from the centres]."""
     covariance: NDArray
-    """Of calibrated parameters and parameters of causes, all else free, (k, k) [SI]."""
+    """Of calibrated parameters and parameters of causes for white noise, all else free, (k, k) [SI]."""
     at_bound: bool
     """Whether a parameter of a cause lies at a bound: the recordings ask for what cannot be."""
 
@@ -54,20 +46,26 @@ class EvaluatedHypothesis:
         return self.estimate.converged
 
     @property
-    def excess(self) -> float:
-        """Sum of squares beyond that of noise [1]."""
-        return sum(float(np.sum(r**2) - np.count_nonzero(r)) for r in self.residuals)
-
-    @property
     def labels(self) -> tuple[str, ...]:
         """Labels of the causes."""
         return self.estimate.hypothesis.labels
+
+    def occam_price(self, inflation: float) -> float:
+        """Log of each cause parameter's range over the part that the data leave (Laplace) [nats].
+
+        inflation: of the parameters' variance by correlated readings and by discrepancy [1].
+        """
+        parameters = self.estimate.hypothesis.parameters
+        variances = np.diag(self.covariance)[len(self.covariance) - len(parameters) :]
+        widths = np.array([abs(p.high - p.low) for p in parameters])
+        left = np.minimum(np.sqrt(2 * np.pi * inflation * variances), widths)
+        return float(np.sum(np.log(widths / np.maximum(left, np.finfo(float).tiny))))
 
 
 def evaluate(
     problem: FittingProblem, estimates: Sequence[Estimate], settings: RankingSettings
 ) -> list[EvaluatedHypothesis]:
-    """Evidence of each estimate on all runs.
+    """Each estimate on all runs.
 
     The vector has seen the fitted runs only; nuisance parameters, which have priors, adapt to every run.
     """
@@ -86,34 +84,24 @@ def evaluate_linearised(
     runs: Sequence[LinearisedRun],
     settings: RankingSettings,
 ) -> EvaluatedHypothesis:
-    """Evidence of an estimate from all runs, linearised."""
+    """An estimate on all runs, linearised."""
     bound = problem.settings.largest_deviation
     tolerances = normal_equations(runs, bound).tolerances
     freed = [without_run_nuisances(run, tolerances, bound) for run in runs]
-    misfits = np.sum(
-        [
-            form_error_misfits(problem.plant, r, residual, cause_effects(estimate, run), settings)
-            for r, ((residual, _), run) in enumerate(zip(freed, runs, strict=True))
-        ],
-        axis=0,
-    )
     residuals = [
         residual.reshape(run.measured.shape)
         for (residual, _), run in zip(freed, problem.plant.runs, strict=True)
     ]
     fitted = normal_equations([runs[r] for r in problem.fitted_runs], bound)
-    covariance = _covariance(fitted, settings.smallest_eigenvalue)
     scales = [parameter.scale for parameter in problem.parameters(estimate)]
     deviations = _squared_deviations(runs, [step for _, step in freed], tolerances)
-    price = _occam_price(estimate, np.sqrt(np.diag(covariance))) + 0.5 * deviations
-    generic = generic_misfit_log_evidence(problem.plant, residuals, settings)
     return EvaluatedHypothesis(
         estimate=estimate,
         residuals=residuals,
-        log_evidence=float(logsumexp(-0.5 * misfits) - np.log(len(misfits))) - price,
-        log_evidence_with_misfit=generic - price,
+        squares=np.sum([np.sum(residual**2, axis=1) for residual in residuals], axis=0),
+        nuisance_penalty=0.5 * deviations,
         tolerances=fitted.tolerances,
-        covariance=covariance * np.outer(scales, scales),
+        covariance=_covariance(fitted, settings.smallest_eigenvalue) * np.outer(scales, scales),
         at_bound=_at_bound(estimate, settings.bound_margin),
     )
 
@@ -133,17 +121,6 @@ def _covariance(equations: NormalEquations, smallest_eigenvalue: float) -> NDArr
     size = np.sqrt(np.diag(equations.hessian) + 1e-9)  # a parameter may have no effect at all
     values, vectors = np.linalg.eigh(equations.hessian / np.outer(size, size))
     return (vectors / np.maximum(values, smallest_eigenvalue)) @ vectors.T / np.outer(size, size)
-
-
-def _occam_price(estimate: Estimate, sd: NDArray) -> float:
-    """Log of each cause parameter's range over the part that the data leave (Laplace), never negative.
-
-    sd: standard deviations of the scaled vector, (k,) [1].
-    """
-    parameters = estimate.hypothesis.parameters
-    widths = np.array([abs(p.high - p.low) / p.scale for p in parameters])
-    left = np.minimum(np.sqrt(2 * np.pi) * sd[len(sd) - len(parameters) :], widths)
-    return float(np.sum(np.log(widths / left)))
 
 
 def _at_bound(estimate: Estimate, margin_share: float) -> bool:

@@ -1,6 +1,6 @@
-"""Screening: which causes are worth a refit, from the signature of each, linearised once."""
+"""Screening: which causes are worth a refit, and from which values, by simulation."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,9 +22,14 @@ class ScreenedCause:
 
     cause: Cause
     values: tuple[float, ...]
-    """Predicted values of the cause's parameters, within their ranges [SI]."""
+    """Values of the cause's parameters from which a refit begins, within their ranges [SI]."""
     chi_square: float
-    """Predicted sum of squares on the fitted runs [1]."""
+    """Sum of squares that they leave on the fitted runs [1]."""
+
+    @property
+    def by_symbol(self) -> dict[str, float]:
+        """The values by symbol [SI]."""
+        return {p.symbol: v for p, v in zip(self.cause.parameters, self.values, strict=True)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,13 +48,21 @@ def trial_estimates(
 ) -> list[tuple[Cause, Estimate]]:
     """The base estimate with each cause added at each of its trial values."""
     trials = []
-    values = problem.values(base)
     for cause in causes:
-        joint = Hypothesis(causes=(*base.hypothesis.causes, cause))
         for trial in range(max(len(p.trials) for p in cause.parameters)):
             at = {p.symbol: p.trials[min(trial, len(p.trials) - 1)] for p in cause.parameters}
-            trials.append((cause, problem.start(joint, {**values, **at})))
+            trials.append((cause, with_cause(problem, base, cause, at)))
     return trials
+
+
+def with_cause(
+    problem: FittingProblem, base: Estimate, cause: Cause, values: Mapping[str, float]
+) -> Estimate:
+    """The base estimate with another cause, whose parameters have these values [SI] by symbol."""
+    joint = Hypothesis(causes=(*base.hypothesis.causes, cause))
+    start = problem.start(joint, {**problem.values(base), **values})
+    start.run_values[:, : base.run_values.shape[1]] = base.run_values
+    return replace(start, slopes=base.slopes)
 
 
 def simulate_signatures(
@@ -69,33 +82,94 @@ def simulate_signatures(
 
 
 def screen_causes(
+    problem: FittingProblem,
+    base: Estimate,
     base_runs: Sequence[LinearisedRun],
     signatures: Sequence[CauseSignature],
-    largest_deviation: float,
 ) -> list[ScreenedCause]:
-    """The best trial of every cause beside the base estimate, the most promising cause first.
+    """The best start of every cause beside the base estimate, the most promising cause first.
 
-    The signature is taken as proportional to the cause's parameters, with either sign. It is fitted to
-    the residual of the base together with the calibrated parameters and all nuisance parameters.
+    A start is a trial value, or what one linear step from a trial predicts. Both are simulated,
+    as a cause with a threshold is far from linear; calibrated and nuisance parameters adapt linearly.
 
     Args:
+        problem: readings and settings.
+        base: the estimate to which the causes are added.
         base_runs: the base estimate linearised in the fitted runs.
         signatures: from `simulate_signatures` beside the same base.
-        largest_deviation: bound of nuisance parameters [standard deviations].
     """
-    best: dict[str, ScreenedCause] = {}
-    for signature in signatures:
-        screened = _screened(base_runs, signature, largest_deviation)
-        label = signature.cause.label
-        if label not in best or screened.chi_square < best[label].chi_square:
-            best[label] = screened
+    bound = problem.settings.largest_deviation
+    tried = [_at_trial(base_runs, signature, bound) for signature in signatures]
+    predicted = [_predicted(base_runs, signature, bound) for signature in signatures]
+    stepped = _simulated(problem, base, base_runs, list(_best_of_each(predicted).values()))
+    best = _best_of_each([*tried, *stepped])
     return sorted(best.values(), key=lambda screened: screened.chi_square)
 
 
-def _screened(
+def _best_of_each(screened: Sequence[ScreenedCause]) -> dict[str, ScreenedCause]:
+    """The start with the least chi-square by label of the cause."""
+    best: dict[str, ScreenedCause] = {}
+    for each in screened:
+        label = each.cause.label
+        if label not in best or each.chi_square < best[label].chi_square:
+            best[label] = each
+    return best
+
+
+def _simulated(
+    problem: FittingProblem,
+    base: Estimate,
+    base_runs: Sequence[LinearisedRun],
+    starts: Sequence[ScreenedCause],
+) -> list[ScreenedCause]:
+    """Starts with the chi-square that their simulation leaves."""
+    estimates = [with_cause(problem, base, start.cause, start.by_symbol) for start in starts]
+    residuals = problem.residuals([base, *estimates], problem.fitted_runs)
+    bound = problem.settings.largest_deviation
+    return [
+        replace(
+            start,
+            chi_square=_chi_square(
+                base_runs, [block[:, 0] - block[:, 1 + k] for block in residuals], bound
+            ),
+        )
+        for k, start in enumerate(starts)
+    ]
+
+
+def _at_trial(
     base_runs: Sequence[LinearisedRun], signature: CauseSignature, largest_deviation: float
 ) -> ScreenedCause:
-    """One signature fitted to the base's residual."""
+    """A cause at its trial values."""
+    parameters, vector = signature.cause.parameters, signature.estimate.vector
+    values = vector[len(vector) - len(parameters) :] * [p.scale for p in parameters]
+    return ScreenedCause(
+        cause=signature.cause,
+        values=tuple(values.tolist()),
+        chi_square=_chi_square(base_runs, signature.changes, largest_deviation),
+    )
+
+
+def _chi_square(
+    base_runs: Sequence[LinearisedRun], changes: Sequence[NDArray], largest_deviation: float
+) -> float:
+    """Sum of squares that a change of the outputs leaves, calibrated parameters adapted linearly [1].
+
+    changes: per run (values,) [noise deviations].
+    """
+    runs = [
+        replace(run, residual=run.residual - change)
+        for run, change in zip(base_runs, changes, strict=True)
+    ]
+    equations = normal_equations(runs, largest_deviation)
+    hessian = equations.hessian + 1e-9 * np.eye(len(equations.gradient))
+    return equations.least - float(equations.gradient @ np.linalg.solve(hessian, equations.gradient))
+
+
+def _predicted(
+    base_runs: Sequence[LinearisedRun], signature: CauseSignature, largest_deviation: float
+) -> ScreenedCause:
+    """One signature, proportional to the cause's parameters with either sign, fitted to the residual."""
     runs = [
         replace(run, slopes=np.column_stack([run.slopes, change]))
         for run, change in zip(base_runs, signature.changes, strict=True)

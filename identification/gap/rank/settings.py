@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class RankingSettings:
-    """Judgement in screening, refits, evidence, probabilities, the verdict and the predictive check.
+    """Judgement in screening, search, discrepancy, probabilities and the verdict.
 
-    Log evidences are natural logarithms; a sum of squares is in noise variances.
+    Logarithms are natural; a sum of squares is in noise variances.
     """
 
     # Screening and separability
@@ -28,39 +28,77 @@ class RankingSettings:
     """Length of a signature [noise deviations] below which the recordings do not show a cause at its
     usual size; an announcement only, except that such a cause resembles no other."""
 
-    # Refinement of the finalists
+    # Search
 
-    finalists: tuple[int, int] = (14, 5)
-    """Number of causes refined with nuisance slopes of their own, in the first and the second round;
-    half as many pairs. Computing time."""
+    finalists: tuple[int, int] = (8, 4)
+    """Number of single causes refined with nuisance slopes of their own, in the first and the second
+    round. Computing time."""
 
-    finalist_lag: float = 250.0
-    """Log evidence by which the best fit may lead a fit that is refined; computing time. Nuisance slopes
-    taken elsewhere cost a good hypothesis some of its evidence."""
+    set_finalists: int = 3
+    """Number of sets of causes of one size that are refined so; computing time."""
 
-    finalist_lag_share: float = 0.5
-    """The same as a share of what the best fit gains on the recalibrated model [1]; the larger one
-    holds."""
+    finalist_lag: float = 12.0
+    """Score by which the best fit may lead a fit that is refined [nats]; computing time."""
 
-    # Evidence
+    most_causes: int = 4
+    """Largest number of causes that are taken to act together."""
 
-    form_errors: tuple[float, ...] = (0.0, 0.003, 0.01, 0.02, 0.05, 0.1)
-    """Relative standard deviations by which a cause's effect may differ from our form in one segment
-    [1], all equally likely before the data: textbook forms are accurate to some percent."""
+    bases: int = 2
+    """Number of the best sets of one size to which another cause is added; computing time."""
 
-    segment_duration: float = 5e-3
-    """Time over which the error of a form is taken as constant [s]: about one transient of the valve."""
+    partners: int = 8
+    """Number of causes tried beside a set that leaves a large misfit; computing time."""
 
-    misfit_durations: tuple[float, ...] = (1.5e-3, 5e-3, 20e-3)
-    """Times over which a generic misfit may be constant [s]: from the armature's flight to the filling
-    of the chambers."""
+    partners_of_small_misfit: int = 3
+    """Number of causes tried beside a set that leaves a small misfit; computing time."""
 
-    misfit_decades: tuple[float, float] = (-4.0, 3.0)
-    """Decimal logarithms of the smallest and the largest variance of a generic misfit [noise variances]:
-    far below and far above what the recordings can show."""
+    small_misfit: float = 30.0
+    """Misfit beyond noise [nats] up to which a set leaves little: another cause can hardly be seen."""
 
-    misfit_variances: int = 29
-    """Number of these variances, four per decade."""
+    exhaustive_pairs: int = 30
+    """Most pairs of a catalogue that are all refitted: causes may help together that do not help alone.
+    Computing time."""
+
+    screened_pairs: int = 4
+    """Number of pairs of a larger catalogue that are refitted because they promise most together, though
+    neither member is among the best; computing time."""
+
+    last_gain: float = 1.0
+    """Gain in score that another cause must bring for the search to go on [nats]."""
+
+    # Noise and discrepancy
+
+    longest_correlation: float = 0.5
+    """Longest lag at which residuals are correlated, as a share of the longest run [1]: beyond, there
+    are too few pairs."""
+
+    least_correlation: float = 0.05
+    """Autocorrelation below which the sum of autocorrelations ends [1]: what follows is chance."""
+
+    seen_autocorrelation: float = 3.0
+    """Autocorrelation from which a discrepancy is reported, in standard deviations of the
+    autocorrelation of white noise [1]."""
+
+    block_readings: int = 20
+    """Fewest readings of a block of which the mean square is taken."""
+
+    block_correlations: float = 10.0
+    """Length of such a block in correlated readings [1]: its mean square must not scatter much."""
+
+    fewest_blocks: int = 8
+    """Fewest blocks in all runs together of which a quantile is taken."""
+
+    disturbed_floor: float = 1.3
+    """Ratio of the quieter blocks' mean square to the white variance [1] above which a disturbance
+    beside white noise is there at all times."""
+
+    quiet_share: float = 0.25
+    """Quantile of the blocks' mean squares that counts as quiet [1]: a wrong form shows in motion only,
+    noise and disturbances are always there."""
+
+    form_readings: float = 20.0
+    """Degrees of freedom of Student's t: number of independent readings that the variance of a
+    discrepancy is worth [1]. Chosen on opened blind trials of seeds 4001 and 4002."""
 
     bound_margin: float = 1e-4
     """Share of a range [1] within which a parameter counts as lying at the bound: rounding."""
@@ -68,88 +106,54 @@ class RankingSettings:
     smallest_eigenvalue: float = 1e-12
     """Eigenvalue of a correlation matrix below which it is rounding [1]."""
 
-    # Pairs of causes
-
-    least_single_gain: float = 10.0
-    """Log evidence of the best cause against none from which a second cause is sought: only beside a
-    first one that is certain."""
-
-    large_residual: float = 200.0
-    """Sum of squares beyond noise, or predictable, above which a cause leaves a large residual [1]: less
-    may be noise and chance."""
-
-    partners: int = 8
-    """Number of causes tried beside each of the best two, where the best leaves a large residual;
-    computing time."""
-
-    partners_of_small_residual: int = 4
-    """Number of causes tried beside the best, where it leaves a small residual; computing time."""
-
-    second_base_ratio: float = 3.0
-    """Multiple of the residual of the best cause [1] up to which partners are sought beside the second
-    best cause as well; computing time."""
-
-    even_odds_gain: float = 7.5e-3
-    """Gain of a pair on its stronger member in log evidence with a generic misfit, per reading [1], at
-    which a second cause is as likely as an error of form; the odds grow with its square. Opened blind
-    trials of seeds 2027 and 2028, 59,000 readings each: of 53 gains between 15 and 400 four were true,
-    of 7 between 400 and 1000 five, of 38 larger ones 37."""
-
-    faint_cause_odds: float = 0.12
-    """Least odds of a pair that gains more than chance [1]; the same trials, and a cautious value:
-    beside a strong cause a faint one gains little."""
-
-    chance_gain: float = 15.0
-    """Such a gain in log evidence up to which a second cause is chance; the same trials."""
-
-    chance_odds: float = 1e-6
-    """Odds of a pair that gains no more than chance [1]."""
-
-    explained_pair_share: float = 0.6
-    """A pair confirms its stronger member if it leaves at most this share of the member's residual [1]:
-    where both leave more, what they miss may have no name."""
-
     # Probabilities
 
     prior_no_cause: float = 0.4
     """Probability before any data that no cause acts, as likely as one cause."""
 
-    prior_single: float = 0.4
-    """Probability before any data that one cause of the catalogue acts, as likely as none."""
+    prior_by_number: tuple[float, ...] = (0.4, 0.1, 0.04, 0.02)
+    """Probability before any data that one, two, three, four causes of the catalogue act together."""
 
-    prior_pair: float = 0.1
-    """Probability before any data that two causes of the catalogue act, which is rarer than one."""
+    prior_unknown: float = 1e-3
+    """Probability before any data of something outside the catalogue that no cause resembles, times the
+    price of a form of its own [1]."""
 
-    prior_unknown: float = 0.1
-    """Probability before any data that something outside the catalogue acts, as rare as two causes."""
+    no_cause_credit: float = 2.0
+    """Log evidence that a cause must have before no cause is doubted [nats]: a false alarm costs more
+    than missing a faint cause."""
 
-    misfit_share: float = 0.025
-    """Share of the recalibrated model's excess chi-square [1] that a cause may leave and still be ranked
-    beside a generic misfit: an error of its form of some 16 % in amplitude."""
+    floor_tolerance: float = 0.1
+    """Relative uncertainty of a channel's floor [1]: a mean square within it may be noise."""
+
+    even_share_left: float = 0.14
+    """Share of the misfit [1] that the nearest of `even_share_causes` causes leaves with even odds of
+    being the true one. Chosen on the same trials."""
+
+    even_share_causes: float = 45.0
+    """Number of causes for which `even_share_left` was chosen [1]."""
+
+    credibility_slope: float = 2.3
+    """Exponent by which the odds of a cause fall with the share that it leaves [1]; the same trials."""
+
+    floor_scatter: float = 0.01
+    """Relative error of a channel's floor [1] that counts as nothing left: noise estimated from
+    differences of readings is known to a percent."""
+
+    least_misfit: float = 10.0
+    """Misfit of the recalibrated model [nats] below which shares of it are not taken."""
 
     # Verdict
 
     no_cause_doubt: float = 0.001
     """Probability of no cause above which no cause is named: a false alarm costs more than missing a
-    faint cause. Of 120 opened campaigns without a cause, the most certain one left 0.0026 to no
-    cause."""
+    faint cause."""
+
+    noticed_remainder: float = 0.04
+    """Share of the misfit [1] beyond which a named cause leaves a part of the gap that is missing still:
+    a fifth of the gap. Less is an error of the cause's form."""
 
     ambiguity_share: float = 0.9
     """Share of the probability of all causes that the ambiguity set holds."""
 
-    # Predictive check
-
-    near_floor_share: float = 0.12
-    """Share of the explainable gap [1] that a cause may leave and still count as near the floor. This
-    limit and the next three were chosen on opened blind trials of seeds 2027 to 2029."""
-
-    unpredictable_p_value: float = 0.5
-    """p-value of the black box's prediction from which nothing predictable is left."""
-
-    contradicted_unknown: float = 0.9
-    """Probability of an unknown cause after a named cause leaves too much that is predictable: five
-    named causes of those trials did, and all five were wrong."""
-
-    confirmed_unknown: float = 0.3
-    """Probability of an unknown cause after a cause that was not named leaves little, and nothing
-    predictable: four unknown verdicts of those trials did, and all four were wrong."""
+    sure_inclusion: float = 0.9
+    """Probability that an effect is part of the gap from which it is held (contract: gap.json)."""

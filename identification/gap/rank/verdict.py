@@ -7,7 +7,8 @@ from identification.gap.locate.fault_localisation import Localisation
 from identification.gap.rank.evidence import EvaluatedHypothesis
 from identification.gap.rank.ranking import Ranking
 
-NO_GAP, KNOWN, AMBIGUOUS, UNKNOWN = "no_gap", "known", "ambiguous", "unknown"
+NO_GAP, KNOWN, AMBIGUOUS = "no_gap", "known", "ambiguous"
+PARTIAL, UNKNOWN = "partial", "unknown"
 """Verdicts as gap.json has them."""
 
 
@@ -28,30 +29,40 @@ class Conclusion:
     """What a diagnosis concludes about the cause."""
 
     verdict: str
-    """NO_GAP, KNOWN, AMBIGUOUS or UNKNOWN."""
+    """NO_GAP, KNOWN, AMBIGUOUS, PARTIAL or UNKNOWN."""
     causes: list[RankedCause]
     """All causes, the most probable first."""
     ambiguity_set: list[RankedCause]
     """The fewest causes that hold the required share of the probability of all causes; empty where no
     cause is named."""
+    held: tuple[str, ...]
+    """Effects that are surely part of the gap, by falling probability."""
     component_probabilities: dict[str, float]
-    """Probability that a component is at fault, by component; a pair may have two components."""
+    """Probability that a component is at fault, by component; a set may have several components."""
 
 
 def conclude(ranking: Ranking, localisation: Localisation) -> Conclusion:
     """The verdict on the probabilities, and the components that they point at."""
     causes = causes_by_name(ranking)
+    settings = ranking.settings
     verdict = _verdict(ranking)
-    share = ranking.settings.ambiguity_share
-    ambiguity_set = smallest_set(causes, share) if verdict == KNOWN else []
-    if len(ambiguity_set) > 1:
+    named = verdict in (KNOWN, PARTIAL)
+    ambiguity_set = smallest_set(causes, settings.ambiguity_share) if named else []
+    if verdict == KNOWN and len(ambiguity_set) > 1:
         verdict = AMBIGUOUS
     return Conclusion(
         verdict=verdict,
         causes=causes,
         ambiguity_set=ambiguity_set,
+        held=_held(ranking) if named else (),
         component_probabilities=component_probabilities(ranking, localisation),
     )
+
+
+def _held(ranking: Ranking) -> tuple[str, ...]:
+    """Effects whose inclusion is sure."""
+    sure = ranking.settings.sure_inclusion
+    return tuple(name for name, probability in ranking.inclusion.items() if probability >= sure)
 
 
 def causes_by_name(ranking: Ranking) -> list[RankedCause]:
@@ -115,7 +126,11 @@ def _localised_shares(localisation: Localisation) -> Mapping[str, float]:
 
 
 def _verdict(ranking: Ranking) -> str:
-    """NO_GAP, KNOWN or UNKNOWN by the probabilities."""
-    if ranking.no_cause > ranking.settings.no_cause_doubt:
+    """NO_GAP, UNKNOWN, PARTIAL or KNOWN by the probabilities."""
+    settings = ranking.settings
+    if ranking.no_cause > settings.no_cause_doubt:
         return NO_GAP
-    return UNKNOWN if ranking.unknown > sum(ranking.probabilities) else KNOWN
+    if ranking.unknown > sum(ranking.probabilities):
+        return UNKNOWN
+    remains = ranking.shares_left[0] > settings.noticed_remainder
+    return PARTIAL if remains and _held(ranking) else KNOWN

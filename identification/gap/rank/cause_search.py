@@ -1,0 +1,185 @@
+"""Search for the causes: singles, then sets grown by one cause at a time and pruned again."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
+
+from identification.gap.fit.gauss_newton import fit
+from identification.gap.fit.hypothesis import Estimate, Hypothesis
+from identification.gap.fit.linearisation import linearise
+from identification.gap.fit.variable_projection import LinearisedRun
+from identification.gap.rank.evidence import EvaluatedHypothesis
+from identification.gap.rank.hypothesis_pool import HypothesisPool
+from identification.gap.rank.pair_screening import promising_pairs
+from identification.gap.rank.posterior import misfit_beyond_noise
+from identification.gap.rank.refinement import refit_with_causes
+from identification.gap.rank.screening import (
+    CauseSignature,
+    ScreenedCause,
+    screen_causes,
+    simulate_signatures,
+    with_cause,
+)
+from identification.gap.rank.separability import Separability
+
+
+def search_causes(
+    pool: HypothesisPool,
+    base: Estimate,
+    base_runs: Sequence[LinearisedRun],
+    signatures: Sequence[CauseSignature],
+    separability: Separability,
+) -> None:
+    """Refit the promising sets of causes into the pool.
+
+    Args:
+        pool: begins without causes.
+        base: the recalibrated model.
+        base_runs: the same linearised in the fitted runs.
+        signatures: of all causes beside it.
+        separability: of these signatures.
+    """
+    screened = screen_causes(pool.problem, base, base_runs, signatures)
+    _fit_singles(pool, base, screened, separability)
+    for number in range(2, pool.settings.most_causes + 1):
+        if not _another_cause_may_act(pool, number):
+            break
+        _add_a_cause(pool, number)
+        if number == 2:
+            _fit_promising_pairs(pool, base, base_runs, signatures, screened)
+        _refine_best(pool, number, pool.settings.set_finalists, f"sets of {number}")
+    _leave_causes_out(pool)
+
+
+def _fit_singles(
+    pool: HypothesisPool,
+    base: Estimate,
+    screened: Sequence[ScreenedCause],
+    separability: Separability,
+) -> None:
+    """Single causes: the promising ones, those that look like the best, and the best refined."""
+    settings, problem = pool.settings, pool.problem
+    first, others = screened[: settings.refitted_causes], screened[settings.refitted_causes :]
+    pool.add(pool.cache("single causes", lambda: refit_with_causes(problem, base, first)))
+    best = [each.labels[0] for each, _ in pool.ranked(1)[: settings.finalists[1]]]
+    least = settings.alike_correlation
+    resembling = {label for own in best for label in separability.alike(own, least)}
+    alike = [each for each in others if each.cause.label in resembling]
+    if alike:
+        pool.add(pool.cache("causes like the best", lambda: refit_with_causes(problem, base, alike)))
+    for number, most in enumerate(settings.finalists, start=1):
+        _refine_best(pool, 1, most, f"single causes, round {number}")
+
+
+def _refine_best(pool: HypothesisPool, number: int, most: int, name: str) -> None:
+    """Refine the best sets of a number of causes."""
+    ranked = pool.ranked(number)[:most]
+    if ranked:
+        best = ranked[0][1]
+        near = [each for each, score in ranked if best - score <= pool.settings.finalist_lag]
+        pool.refine(near, f"{name}: own nuisances")
+
+
+def _another_cause_may_act(pool: HypothesisPool, number: int) -> bool:
+    """Whether sets of `number` causes are worth a search: something is there, and the last cause helped."""
+    found = pool.posterior()[1]
+    if found.no_cause > pool.settings.no_cause_doubt:
+        return False
+    if number == 2:
+        return True
+    larger, smaller = pool.ranked(number - 1), pool.ranked(number - 2)
+    return bool(larger and larger[0][1] > smaller[0][1] + pool.settings.last_gain)
+
+
+def _add_a_cause(pool: HypothesisPool, number: int) -> None:
+    """Refit the best smaller sets with each of the causes that promise most beside them."""
+    settings = pool.settings
+    ranked = pool.ranked(number - 1)
+    left = misfit_beyond_noise(ranked[0][0], pool.posterior()[1].discrepancies) if ranked else 0.0
+    small = left <= settings.small_misfit
+    partners = settings.partners_of_small_misfit if small else settings.partners
+    for smaller, _ in ranked[: 1 if small else settings.bases]:
+        pool.add(_fits_with_another(pool, smaller, partners))
+
+
+def _fits_with_another(
+    pool: HypothesisPool, smaller: EvaluatedHypothesis, partners: int
+) -> list[Estimate]:
+    """Fits of a set with each of the most promising further causes."""
+    problem = pool.problem
+    base = pool.first_fits[frozenset(smaller.labels)]
+    own = {cause.name for cause in base.hypothesis.causes}
+    others = [
+        cause
+        for cause in problem.plant.causes
+        if cause.name not in own and frozenset((*smaller.labels, cause.label)) not in pool
+    ]
+
+    def refit() -> list[Estimate]:
+        signatures = simulate_signatures(problem, base, others)
+        base_runs = linearise(problem, [base], problem.fitted_runs)[0]
+        screened = screen_causes(problem, base, base_runs, signatures)
+        return refit_with_causes(problem, base, screened[:partners])
+
+    return pool.cache(f"beside {' and '.join(smaller.labels)}", refit) if others else []
+
+
+def _fit_promising_pairs(
+    pool: HypothesisPool,
+    base: Estimate,
+    base_runs: Sequence[LinearisedRun],
+    signatures: Sequence[CauseSignature],
+    screened: Sequence[ScreenedCause],
+) -> None:
+    """Pairs that promise much together; all pairs of a small catalogue."""
+    settings, problem = pool.settings, pool.problem
+    pairs = [
+        (first, second)
+        for first, second in combinations(screened, 2)
+        if first.cause.name != second.cause.name
+        and frozenset((first.cause.label, second.cause.label)) not in pool
+    ]
+    if len(pairs) > settings.exhaustive_pairs:
+        labels = promising_pairs(base_runs, signatures, problem.settings.largest_deviation)
+        wanted = [own for own in labels if own not in pool][: settings.screened_pairs]
+        pairs = [
+            pair for pair in pairs if frozenset((pair[0].cause.label, pair[1].cause.label)) in wanted
+        ]
+    starts = [
+        with_cause(
+            problem,
+            with_cause(problem, base, first.cause, first.by_symbol),
+            second.cause,
+            second.by_symbol,
+        )
+        for first, second in pairs
+    ]
+    fitted = pool.cache("pairs", lambda: fit(problem, starts, base.chi_square)) if starts else []
+    pool.add(estimate for estimate in fitted if not estimate.given_up)
+
+
+def _leave_causes_out(pool: HypothesisPool) -> None:
+    """Refit the best set without each of its causes, from its estimate, while that is better.
+
+    Far from its true value a cause may get stuck where a larger set does not.
+    """
+    problem = pool.problem
+    for _ in range(pool.settings.most_causes - 1):
+        ranked = pool.ranked()
+        if not ranked or len(ranked[0][0].labels) < 2:
+            return
+        best = ranked[0][0]
+        values = problem.values(best.estimate)
+        causes = best.estimate.hypothesis.causes
+        starts = [
+            replace(problem.start(Hypothesis(causes=tuple(kept)), values), slopes=best.estimate.slopes)
+            for kept in combinations(causes, len(causes) - 1)
+        ]
+        name = f"without one of {' and '.join(best.labels)}"
+        fitted = pool.cache(name, lambda starts=starts: fit(problem, starts))
+        pool.add(
+            replace(estimate, slopes=best.estimate.slopes)  # a journal keeps no slopes
+            for estimate in fitted
+        )
+        if pool.ranked()[0][0].labels == best.labels:
+            return

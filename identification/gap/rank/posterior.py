@@ -1,0 +1,161 @@
+"""Probabilities of hypotheses under noise and model discrepancy.
+
+The variance of a channel's residual is not known: noise and discrepancy add to it. Marginalised over that
+variance, the likelihood of a hypothesis is Student's t instead of Gaussian: small differences of the
+sums of squares count as under noise alone, large ones by the logarithm of their ratio, so that no name
+becomes certain because another form errs a little less.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln, softmax
+
+from identification.gap.fit.fitting_problem import FittingProblem
+from identification.gap.rank.discrepancy import ChannelDiscrepancy, channel_discrepancies
+from identification.gap.rank.evidence import EvaluatedHypothesis
+from identification.gap.rank.settings import RankingSettings
+
+
+@dataclass(frozen=True, kw_only=True)
+class Posterior:
+    """Probabilities of n hypotheses with causes, in the order given, and of the others."""
+
+    probabilities: list[float]
+    """Of each hypothesis, (n,); with the two following they sum to 1."""
+    no_cause: float
+    """Probability that no cause acts."""
+    unknown: float
+    """Probability that what acts has no name in the catalogue."""
+    scores: list[float]
+    """Log probabilities before the doubt about a remainder, but for a constant, (n,)."""
+    shares_left: list[float]
+    """Share of the recalibrated model's misfit beyond noise that each hypothesis leaves, (n,) [1]."""
+    discrepancies: list[ChannelDiscrepancy]
+    """By channel, under the best hypothesis."""
+
+
+def posterior(
+    problem: FittingProblem,
+    recalibrated: EvaluatedHypothesis,
+    hypotheses: Sequence[EvaluatedHypothesis],
+    settings: RankingSettings,
+) -> Posterior:
+    """Probabilities of hypotheses with causes, of no cause and of an unknown one."""
+    every = [recalibrated, *hypotheses]
+    best = min(every, key=lambda each: float(np.sum(np.log(np.maximum(each.squares, 1e-300)))))
+    discrepancies = channel_discrepancies(problem.plant, best.residuals, settings)
+    misfits = np.array([misfit_beyond_noise(each, discrepancies) for each in every])
+    misfits = misfits - min(float(np.min(misfits)), 0.0)
+    scores = np.array(
+        [
+            _score(problem, each, float(misfit), discrepancies, settings)
+            for each, misfit in zip(every, misfits, strict=True)
+        ]
+    )
+    scores[0] = _no_cause_score(misfits, discrepancies, settings)
+    unknown = _robust(float(misfits[0]), settings) + np.log(settings.prior_unknown)
+    weights = softmax([*scores, unknown])[:-1]
+    left = _shares_left(misfits, discrepancies, settings)
+    credible = credibility(left, len({cause.name for cause in problem.plant.causes}), settings)
+    named = weights[1:] * credible[1:]
+    return Posterior(
+        probabilities=named.tolist(),
+        no_cause=float(weights[0]),
+        unknown=float(max(1.0 - weights[0] - np.sum(named), 0.0)),
+        scores=scores[1:].tolist(),
+        shares_left=left[1:].tolist(),
+        discrepancies=discrepancies,
+    )
+
+
+def _no_cause_score(
+    misfits: NDArray, discrepancies: Sequence[ChannelDiscrepancy], settings: RankingSettings
+) -> float:
+    """Log posterior of no cause, but for a constant.
+
+    No cause has no form that could err. So the whole difference to the nearest hypothesis counts, and
+    what the floor, known to some percent, cannot be.
+
+    misfits: of no cause and of each hypothesis, (1 + n,) [nats].
+    """
+    nearest = float(np.min(misfits))
+    uncertain = sum(0.5 * settings.floor_tolerance * d.readings / d.inflation for d in discrepancies)
+    against = max(float(misfits[0]) - nearest, float(misfits[0]) - uncertain)
+    credit = settings.no_cause_credit + float(np.log(settings.prior_no_cause))
+    return credit + _robust(nearest, settings) - against
+
+
+def credibility(left: NDArray, causes: int, settings: RankingSettings) -> NDArray:
+    """Probability that a hypothesis is right and not merely the nearest of those tried, (n,).
+
+    left: share of the misfit that it leaves, (n,) [1]. causes: number of causes in the catalogue; the
+    more are tried, the more a wrong one removes by chance.
+    """
+    even = settings.even_share_left * np.sqrt(settings.even_share_causes / max(causes, 1))
+    return 1.0 / (1.0 + (left / even) ** settings.credibility_slope)
+
+
+def misfit_beyond_noise(each: EvaluatedHypothesis, discrepancies: Sequence[ChannelDiscrepancy]) -> float:
+    """Half the sum of squares beyond the floors, in their variances, and of nuisances [nats]."""
+    return each.nuisance_penalty + sum(
+        (float(squares) / d.floor - d.readings) / (2.0 * d.inflation)
+        for squares, d in zip(each.squares, discrepancies, strict=True)
+    )
+
+
+def _robust(misfit: float, settings: RankingSettings) -> float:
+    """Log likelihood of a misfit [nats] by Student's t, but for a constant."""
+    freedom = settings.form_readings
+    return float(-0.5 * freedom * np.log1p(2.0 * misfit / freedom))
+
+
+def _score(
+    problem: FittingProblem,
+    each: EvaluatedHypothesis,
+    misfit: float,
+    discrepancies: Sequence[ChannelDiscrepancy],
+    settings: RankingSettings,
+) -> float:
+    """Log posterior of a hypothesis, but for a constant; misfit: beyond noise [nats]."""
+    count = len(each.labels)
+    if count and each.at_bound:
+        return -np.inf
+    price = each.occam_price(variance_inflation(each, discrepancies)) if count else 0.0
+    return _robust(misfit, settings) - price + _log_prior(problem, each, settings)
+
+
+def variance_inflation(each: EvaluatedHypothesis, discrepancies: Sequence[ChannelDiscrepancy]) -> float:
+    """Variance of a parameter relative to that under white noise of the channels' size [1], at least 1.
+
+    Noise and discrepancy together count, and readings that are correlated tell less.
+    """
+    correlations = np.array([d.autocorrelation for d in discrepancies])
+    readings = sum(d.readings for d in discrepancies)
+    return max(float(np.sum(correlations * each.squares)) / max(readings, 1), 1.0)
+
+
+def _log_prior(problem: FittingProblem, each: EvaluatedHypothesis, settings: RankingSettings) -> float:
+    """Log probability of a set of causes before any data."""
+    causes = each.estimate.hypothesis.causes
+    if not causes:
+        return float(np.log(settings.prior_no_cause))
+    total = sum(cause.prior for cause in problem.plant.causes)
+    shares = [cause.prior / total for cause in causes]
+    priors = settings.prior_by_number
+    of_number = priors[min(len(causes), len(priors)) - 1]
+    return float(np.log(of_number) + gammaln(len(causes) + 1) + np.sum(np.log(shares)))
+
+
+def _shares_left(
+    misfits: NDArray, discrepancies: Sequence[ChannelDiscrepancy], settings: RankingSettings
+) -> NDArray:
+    """Share of the misfit of the recalibrated model (first) that each leaves, (n,) [1].
+
+    What the scatter of a sum of squares and of the floor may be, counts as nothing left.
+    """
+    independent = sum(d.readings / d.inflation for d in discrepancies)
+    scatter = 0.5 * settings.floor_scatter * independent + np.sqrt(0.5 * independent)
+    return np.maximum(misfits - scatter, 0.0) / max(float(misfits[0]), settings.least_misfit)
