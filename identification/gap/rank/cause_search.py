@@ -39,7 +39,7 @@ def search_causes(
         signatures: of all causes beside it.
         separability: of these signatures.
     """
-    screened = screen_causes(pool.problem, base, base_runs, signatures)
+    screened = screen_causes(pool.problem, base, base_runs, signatures, every_start=_is_small(pool))
     _fit_singles(pool, base, screened, separability)
     for number in range(2, pool.settings.most_causes + 1):
         if not _another_cause_may_act(pool, number):
@@ -51,6 +51,11 @@ def search_causes(
     _leave_causes_out(pool)
 
 
+def _is_small(pool: HypothesisPool) -> bool:
+    """Whether the catalogue is small enough to begin at every trial value."""
+    return len(pool.problem.plant.causes) <= pool.settings.multi_start_causes
+
+
 def _fit_singles(
     pool: HypothesisPool,
     base: Estimate,
@@ -59,7 +64,8 @@ def _fit_singles(
 ) -> None:
     """Single causes: the promising ones, those that look like the best, and the best refined."""
     settings, problem = pool.settings, pool.problem
-    first, others = screened[: settings.refitted_causes], screened[settings.refitted_causes :]
+    most = len(screened) if _is_small(pool) else settings.refitted_causes
+    first, others = screened[:most], screened[most:]
     pool.add(pool.cache("single causes", lambda: refit_with_causes(problem, base, first)))
     best = [each.labels[0] for each, _ in pool.ranked(1)[: settings.finalists[1]]]
     least = settings.alike_correlation
@@ -81,7 +87,7 @@ def _refine_best(pool: HypothesisPool, number: int, most: int, name: str) -> Non
 
 
 def _another_cause_may_act(pool: HypothesisPool, number: int) -> bool:
-    """Whether sets of `number` causes are worth a search: something is there, and the last cause helped."""
+    """Whether sets of `number` causes are worth a search: the last cause helped."""
     found = pool.posterior()[1]
     if found.no_cause > pool.settings.no_cause_doubt:
         return False
@@ -118,8 +124,9 @@ def _fits_with_another(
     def refit() -> list[Estimate]:
         signatures = simulate_signatures(problem, base, others)
         base_runs = linearise(problem, [base], problem.fitted_runs)[0]
-        screened = screen_causes(problem, base, base_runs, signatures)
-        return refit_with_causes(problem, base, screened[:partners])
+        screened = screen_causes(problem, base, base_runs, signatures, every_start=_is_small(pool))
+        kept = screened if _is_small(pool) else screened[:partners]
+        return refit_with_causes(problem, base, kept)
 
     return pool.cache(f"beside {' and '.join(smaller.labels)}", refit) if others else []
 
@@ -139,7 +146,7 @@ def _fit_promising_pairs(
         if first.cause.name != second.cause.name
         and frozenset((first.cause.label, second.cause.label)) not in pool
     ]
-    if len(pairs) > settings.exhaustive_pairs:
+    if not _is_small(pool):
         labels = promising_pairs(base_runs, signatures, problem.settings.largest_deviation)
         wanted = [own for own in labels if own not in pool][: settings.screened_pairs]
         pairs = [

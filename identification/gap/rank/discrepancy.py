@@ -1,8 +1,8 @@
 """Noise and discrepancy of each channel: what remains of the residual under the best hypothesis.
 
-Residual = sensor noise + what the causes explain + a discrepancy of the model (Kennedy and O'Hagan 2001).
-The discrepancy is a stationary process with its own amplitude and time scale in each channel. Both come
-from the autocovariance of the residual; neither is asked for.
+Residual = sensor noise + what the causes explain + a discrepancy (Kennedy and O'Hagan 2001). The
+discrepancy is a stationary process with its own amplitude and time scale in each channel. Both come from
+the autocovariance of the residual; neither is asked for.
 """
 
 from collections.abc import Sequence
@@ -22,6 +22,8 @@ class ChannelDiscrepancy:
 
     readings: int
     """Number of trusted readings."""
+    mean_square: float
+    """Of the residual: noise and discrepancy [1]."""
     floor: float
     """Mean square that no cause can remove: noise, and disturbances that are there at all times [1]."""
     inflation: float
@@ -63,16 +65,32 @@ def _discrepancy(series: Sequence[Series], settings: RankingSettings) -> Channel
     count = sum(len(own) for own in readings)
     if count < 3:
         return ChannelDiscrepancy(
-            readings=count, floor=1.0, inflation=1.0, autocorrelation=1.0, sd=0.0, time_scale=0.0
+            readings=count,
+            mean_square=1.0,
+            floor=1.0,
+            inflation=1.0,
+            autocorrelation=1.0,
+            sd=0.0,
+            time_scale=0.0,
         )
     covariance = autocovariance(readings, settings.longest_correlation)
     correlated, white = _inflation(covariance, settings), white_variance(covariance)
     quiet = _quiet_mean_square(readings, correlated, settings)
-    disturbed = quiet is not None and quiet > settings.disturbed_floor * white
+    mean_square = float(covariance[0])
+    disturbed = (
+        quiet is not None
+        and quiet > settings.disturbed_floor * white
+        and quiet > settings.disturbed_share * mean_square
+    )
     sd, time_scale = _coloured_part(series, covariance, white, correlated, settings)
     return ChannelDiscrepancy(
         readings=count,
-        floor=max(min(quiet if disturbed and quiet else white, float(covariance[0])), LEAST),
+        mean_square=mean_square,
+        floor=max(
+            min(quiet if disturbed and quiet else white, mean_square),
+            settings.least_floor_share * mean_square,
+            LEAST,
+        ),
         inflation=correlated if disturbed else 1.0,
         autocorrelation=correlated,
         sd=sd,

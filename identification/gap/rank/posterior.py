@@ -1,9 +1,9 @@
 """Probabilities of hypotheses under noise and model discrepancy.
 
-The variance of a channel's residual is not known: noise and discrepancy add to it. Marginalised over that
-variance, the likelihood of a hypothesis is Student's t instead of Gaussian: small differences of the
-sums of squares count as under noise alone, large ones by the logarithm of their ratio, so that no name
-becomes certain because another form errs a little less.
+The variance of a residual is not known: noise and discrepancy add to it. Marginalised over that
+variance, the likelihood of a hypothesis is Student's t instead of Gaussian: small differences of the sums of
+squares count as under noise alone, large ones by the logarithm of their ratio, so that no name becomes
+certain because another form errs a little less.
 """
 
 from collections.abc import Sequence
@@ -55,7 +55,7 @@ def posterior(
             for each, misfit in zip(every, misfits, strict=True)
         ]
     )
-    scores[0] = _no_cause_score(misfits, discrepancies, settings)
+    scores[0] = _no_cause_score(every, misfits, discrepancies, settings)
     unknown = _robust(float(misfits[0]), settings) + np.log(settings.prior_unknown)
     weights = softmax([*scores, unknown])[:-1]
     left = _shares_left(misfits, discrepancies, settings)
@@ -72,20 +72,27 @@ def posterior(
 
 
 def _no_cause_score(
-    misfits: NDArray, discrepancies: Sequence[ChannelDiscrepancy], settings: RankingSettings
+    every: Sequence[EvaluatedHypothesis],
+    misfits: NDArray,
+    discrepancies: Sequence[ChannelDiscrepancy],
+    settings: RankingSettings,
 ) -> float:
     """Log posterior of no cause, but for a constant.
 
-    No cause has no form that could err. So the whole difference to the nearest hypothesis counts, and
-    what the floor, known to some percent, cannot be.
+    No cause has no form that could err. So the whole difference to the nearest hypothesis counts, in
+    variances of all that remains, and what the floor, known to some percent, cannot be.
 
-    misfits: of no cause and of each hypothesis, (1 + n,) [nats].
+    every: no cause and each hypothesis. misfits: of these, (1 + n,) [nats].
     """
-    nearest = float(np.min(misfits))
-    uncertain = sum(0.5 * settings.floor_tolerance * d.readings / d.inflation for d in discrepancies)
-    against = max(float(misfits[0]) - nearest, float(misfits[0]) - uncertain)
+    nearest = every[int(np.argmin(misfits))]
+    gained = every[0].nuisance_penalty - nearest.nuisance_penalty
+    beyond = 0.0
+    for own, best, d in zip(every[0].squares, nearest.squares, discrepancies, strict=True):
+        gained += float(own - best) / (2.0 * d.mean_square * d.autocorrelation)
+        noise = (1.0 + settings.floor_tolerance) * d.floor * d.readings
+        beyond += max(float(own) - noise, 0.0) / (2.0 * d.floor * d.inflation)
     credit = settings.no_cause_credit + float(np.log(settings.prior_no_cause))
-    return credit + _robust(nearest, settings) - against
+    return credit + _robust(float(np.min(misfits)), settings) - max(gained, beyond)
 
 
 def credibility(left: NDArray, causes: int, settings: RankingSettings) -> NDArray:
@@ -123,7 +130,8 @@ def _score(
     count = len(each.labels)
     if count and each.at_bound:
         return -np.inf
-    price = each.occam_price(variance_inflation(each, discrepancies)) if count else 0.0
+    inflation = variance_inflation(each, discrepancies)
+    price = max(each.occam_price(inflation), settings.least_price * count) if count else 0.0
     return _robust(misfit, settings) - price + _log_prior(problem, each, settings)
 
 

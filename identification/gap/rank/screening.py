@@ -86,6 +86,7 @@ def screen_causes(
     base: Estimate,
     base_runs: Sequence[LinearisedRun],
     signatures: Sequence[CauseSignature],
+    every_start: bool = False,
 ) -> list[ScreenedCause]:
     """The best start of every cause beside the base estimate, the most promising cause first.
 
@@ -97,13 +98,15 @@ def screen_causes(
         base: the estimate to which the causes are added.
         base_runs: the base estimate linearised in the fitted runs.
         signatures: from `simulate_signatures` beside the same base.
+        every_start: return all starts of each cause, not only the best.
     """
     bound = problem.settings.largest_deviation
     tried = [_at_trial(base_runs, signature, bound) for signature in signatures]
     predicted = [_predicted(base_runs, signature, bound) for signature in signatures]
     stepped = _simulated(problem, base, base_runs, list(_best_of_each(predicted).values()))
-    best = _best_of_each([*tried, *stepped])
-    return sorted(best.values(), key=lambda screened: screened.chi_square)
+    starts = [*tried, *stepped]
+    kept = starts if every_start else _best_of_each(starts).values()
+    return sorted(kept, key=lambda screened: screened.chi_square)
 
 
 def _best_of_each(screened: Sequence[ScreenedCause]) -> dict[str, ScreenedCause]:
