@@ -9,10 +9,14 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from epv_env.plant.sensors import SENSORS
-from identification.recordings.recording import CHANNELS, UNITS, Campaign, CampaignError, Recording
-
-PRESSURES = tuple(name for name in CHANNELS if UNITS[name][0] == "bar")
-"""Channels that `round_pressures` rounds."""
+from identification.recordings.recording import (
+    CHANNELS,
+    PRESSURES,
+    UNITS,
+    Campaign,
+    CampaignError,
+    Recording,
+)
 
 
 def add_ripple(

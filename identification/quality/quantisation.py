@@ -1,25 +1,8 @@
-"""The converter's step, as the readings show it, and readings that stop moving."""
+"""Readings that stop moving: how long one lasts, and how long chance allows."""
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
-
-from identification.quality.settings import QUALITY, QualitySettings
-
-
-def converter_step(readings: NDArray, settings: QualitySettings = QUALITY) -> float:
-    """Step of the converter [unit]: the least step between distinct readings, (samples,).
-
-    The few digits of a file make equal steps unequal, so the step is the slope of the line through
-    the distinct readings over their codes. 0.0: fewer than two distinct readings, or no grid.
-    """
-    distinct = np.unique(readings)
-    if len(distinct) < 2 or len(distinct) > settings.distinct_share * len(readings):
-        return 0.0
-    steps = np.diff(distinct)
-    steps = steps[steps > 1e-3 * np.median(steps)]  # the same reading but for rounding in sums
-    least = float(np.median(steps[steps < 1.5 * np.min(steps)]))
-    return float(np.polyfit(np.rint((distinct - distinct[0]) / least), distinct, 1)[0])
 
 
 def longest_run(readings: NDArray) -> int:
