@@ -102,8 +102,13 @@ class ChannelAssessment:
     @property
     def outlier_limit(self) -> float:
         """Outlier factor that normal noise stays below in a share `outlier_confidence` of records."""
-        confidence = self.settings.outlier_confidence
-        return outlier_limit(len(self.readings), rounding=self.rounding, confidence=confidence)
+        sigma = self.description.standard_deviation
+        return outlier_limit(
+            len(self.readings),
+            rounding=self.rounding,
+            confidence=self.settings.outlier_confidence,
+            hidden=max(1.0, self.normality.standard_deviation / sigma) if sigma else 1.0,
+        )
 
 
 def assess_channel(

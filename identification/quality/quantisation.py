@@ -17,10 +17,11 @@ def run_limit(readings: NDArray, *, rounding: float, significance: float) -> int
     A run of L readings starts at one of n samples with probability p^L, so the limit solves
     n p^L = significance, a probability. p is the share of the commonest reading, or what normal noise
     about that reading gives it if that is more, as under a drift. rounding: step over sigma. The limit
-    is n for readings that never change.
+    is n for readings that never change, and at most n.
     """
-    share = np.max(np.unique(readings, return_counts=True)[1]) / len(readings)
-    if share == 1.0:
-        return len(readings)
+    samples = len(readings)
+    share = np.max(np.unique(readings, return_counts=True)[1]) / samples
     share = max(share, 1 - 2 * stats.norm.sf(rounding / 2))
-    return int(np.ceil(np.log(significance / len(readings)) / np.log(share)))
+    if share == 1.0:
+        return samples
+    return min(samples, int(np.ceil(np.log(significance / samples) / np.log(share))))
