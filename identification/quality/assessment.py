@@ -120,8 +120,9 @@ def _offset(channel: ChannelAssessment) -> SensorOffset:
     """
     size = UNITS[channel.name][1]
     value = channel.trend.offset - channel.rest
+    scatter = 0.0 if channel.whiteness is None else channel.trend.offset_error
     lasting = 0.0 if channel.dithered else rounding_error(channel.quantum)
-    return SensorOffset(value=value * size, error=math.hypot(channel.trend.offset_error, lasting) * size)
+    return SensorOffset(value=value * size, error=math.hypot(scatter, lasting) * size)
 
 
 def greatest_lag(samples: int, period: float, settings: QualitySettings = QUALITY) -> int:

@@ -111,3 +111,9 @@ def test_rounding_is_the_least_noise():
     for name in ("p2", "p3"):
         assert noise[name] >= 5e3 / np.sqrt(12)
     assert noise["I"] == pytest.approx(pooled_noise(good_campaign())["I"], rel=0.3)
+
+
+def test_readings_of_another_grid_do_not_borrow_the_step():
+    """p1 between the others' steps is no reading of theirs."""
+    campaign = coarse(lambda r: {"p1": 12e5 + 2e3 * (np.arange(len(r)) % 2)})
+    assert "p1" not in campaign_steps(campaign.recordings[:2])
