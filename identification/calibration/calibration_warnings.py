@@ -9,6 +9,7 @@ from identification.calibration.multi_start import METHODS, best_search, reached
 from identification.calibration.problem import CalibrationProblem
 from identification.calibration.search_methods import SearchResult
 from identification.calibration.settings import CALIBRATION, CalibrationSettings
+from identification.recordings.reading_steps import coarse_step_warnings
 
 
 def calibration_warnings(
@@ -17,7 +18,7 @@ def calibration_warnings(
     settings: CalibrationSettings = CALIBRATION,
 ) -> list[str]:
     """Every reason for doubt, as a sentence with its figures and what to do; fits: by method."""
-    warnings = []
+    warnings = coarse_step_warnings(problem.steps)
     for method in METHODS:
         best = best_search(fits[method])
         warnings += _not_converged(method, best)

@@ -8,6 +8,7 @@ from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.quality.assessment import SensorOffset, assess_recording, sensor_offsets
 from identification.quality.settings import QUALITY, QualitySettings
 from identification.recordings.noise_estimation import pooled_noise
+from identification.recordings.reading_steps import campaign_steps
 from identification.recordings.recording import Campaign, CampaignError, Recording
 from identification.replay.model_inputs import without_offsets
 from identification.replay.parameter_vector import ParameterVector
@@ -24,6 +25,8 @@ class CalibrationProblem:
     """Standard deviation of each channel's noise [SI units]."""
     offsets: Mapping[str, SensorOffset]
     """What was subtracted from each channel; empty without a record at rest."""
+    steps: Mapping[str, float]
+    """Coarse steps of the readings by channel [SI]; empty on a bench whose noise moves every reading."""
     vector: ParameterVector
     """Its reference is where the calibration starts."""
 
@@ -58,13 +61,15 @@ def calibration_problem(
         T_env=campaign.temperature, p_env=campaign.pressure
     )
     _check_fitted(symbols, start)
-    offsets = _offsets(campaign, quality)
+    steps = campaign_steps(campaign.recordings)
+    offsets = _offsets(campaign, quality, steps)
     values = {name: offset.value for name, offset in offsets.items()}
     return CalibrationProblem(
         calibration=tuple(without_offsets(r, values) for r in campaign.with_role("calibration")),
         validation=tuple(without_offsets(r, values) for r in campaign.with_role("validation")),
         noise=pooled_noise(campaign),
         offsets=offsets,
+        steps=steps,
         vector=ParameterVector(symbols=tuple(symbols), reference=start),
     )
 
@@ -82,10 +87,12 @@ def _check_fitted(symbols: Sequence[str], start: Parameters) -> None:
         )
 
 
-def _offsets(campaign: Campaign, quality: QualitySettings) -> dict[str, SensorOffset]:
+def _offsets(
+    campaign: Campaign, quality: QualitySettings, steps: Mapping[str, float]
+) -> dict[str, SensorOffset]:
     """The sensors' offsets from the first quality recording that shows them."""
     for recording in campaign.with_role("quality"):
-        offsets = sensor_offsets(assess_recording(recording, campaign.pressure, quality))
+        offsets = sensor_offsets(assess_recording(recording, campaign.pressure, quality, steps))
         if offsets:
             return offsets
     return {}

@@ -10,6 +10,7 @@ from identification.pipeline.identification import Identification
 from identification.quality import quality_export
 from identification.quality.assessment import assess_recording
 from identification.quality.quality_section import quality_section
+from identification.recordings.reading_steps import campaign_steps
 from identification.recordings.recording import CampaignError
 from identification.report.page import Section, Verdict
 from identification.sensitivity import sensitivity_export
@@ -55,7 +56,8 @@ def quality(identification: Identification) -> Result:
             "about 5 s at rest, coil off and exhausted, and list it in campaign.json"
         )
     settings, pressure = identification.settings.quality, identification.campaign.pressure
-    assessments = [assess_recording(recording, pressure, settings) for recording in recordings]
+    steps = campaign_steps(identification.campaign.recordings)
+    assessments = [assess_recording(recording, pressure, settings, steps) for recording in recordings]
     return Result(
         sections=[quality_section(assessment) for assessment in assessments],
         content={"quality": [quality_export.as_json(assessment) for assessment in assessments]},

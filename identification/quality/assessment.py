@@ -1,16 +1,19 @@
 """Section 4 for one recording: `assess_recording`, and the offsets that a calibration may subtract."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
+from types import MappingProxyType
 
 from identification.quality.channel import ChannelAssessment, assess_channel
 from identification.quality.correlation_tests import PairCorrelation, assess_correlation
 from identification.quality.settings import QUALITY, QualitySettings
-from identification.recordings.recording import CHANNELS, UNITS, CampaignError, Recording
+from identification.recordings.reading_steps import rounding_error
+from identification.recordings.recording import CHANNELS, PRESSURES, UNITS, CampaignError, Recording
 
-PRESSURES = tuple(name for name in CHANNELS if UNITS[name][0] == "bar")
-"""Channels whose rest value is the ambient pressure."""
+FINE: Mapping[str, float] = MappingProxyType({})
+"""Steps of a campaign without coarse ones."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,11 +72,15 @@ class QualityAssessment:
 
 
 def assess_recording(
-    recording: Recording, environment_pressure: float, settings: QualitySettings = QUALITY
+    recording: Recording,
+    environment_pressure: float,
+    settings: QualitySettings = QUALITY,
+    steps: Mapping[str, float] = FINE,
 ) -> QualityAssessment:
     """Statistics of a steady recording.
 
-    environment_pressure: p_env [Pa absolute]. Raises CampaignError for a record of fewer than
+    environment_pressure: p_env [Pa absolute]. steps: coarse steps of the campaign's readings by channel
+    [SI], which a record at rest may not show. Raises CampaignError for a record of fewer than
     `settings.least_samples`.
     """
     if len(recording) < settings.least_samples:
@@ -81,7 +88,10 @@ def assess_recording(
             f"{recording.name}: {len(recording)} samples; the statistics of section 4 need "
             f"{settings.least_samples} or more: record 5 s of steady state"
         )
-    channels = {name: _channel(recording, name, environment_pressure, settings) for name in CHANNELS}
+    channels = {
+        name: _channel(recording, name, environment_pressure, settings, steps.get(name, 0.0))
+        for name in CHANNELS
+    }
     pairs = _pairs(channels, greatest_lag(len(recording), recording.period, settings))
     return QualityAssessment(
         name=recording.name,
@@ -104,10 +114,15 @@ def sensor_offsets(quality: QualityAssessment) -> dict[str, SensorOffset]:
 
 
 def _offset(channel: ChannelAssessment) -> SensorOffset:
-    """Of the trend's line at time 0, since a drift starts with the recording."""
+    """Of the trend's line at time 0, since a drift starts with the recording.
+
+    Rounding errors that noise does not average out count as error of the offset.
+    """
     size = UNITS[channel.name][1]
     value = channel.trend.offset - channel.rest
-    return SensorOffset(value=value * size, error=channel.trend.offset_error * size)
+    scatter = 0.0 if channel.whiteness is None else channel.trend.offset_error
+    lasting = 0.0 if channel.dithered else rounding_error(channel.quantum)
+    return SensorOffset(value=value * size, error=math.hypot(scatter, lasting) * size)
 
 
 def greatest_lag(samples: int, period: float, settings: QualitySettings = QUALITY) -> int:
@@ -116,7 +131,11 @@ def greatest_lag(samples: int, period: float, settings: QualitySettings = QUALIT
 
 
 def _channel(
-    recording: Recording, name: str, environment_pressure: float, settings: QualitySettings
+    recording: Recording,
+    name: str,
+    environment_pressure: float,
+    settings: QualitySettings,
+    step: float,
 ) -> ChannelAssessment:
     size = UNITS[name][1]
     return assess_channel(
@@ -125,6 +144,7 @@ def _channel(
         period=recording.period,
         rest=environment_pressure / size if name in PRESSURES else 0.0,
         lags=greatest_lag(len(recording), recording.period, settings),
+        step=step / size,
         settings=settings,
     )
 

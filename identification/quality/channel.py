@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from epv_env.plant.sensors import SENSORS, Sensor
 from identification.quality.correlation_tests import WhitenessTest, assess_whiteness
 from identification.quality.normality import UNTESTED, Normality, assess_normality
-from identification.quality.quantisation import converter_step, longest_run, run_limit
+from identification.quality.quantisation import longest_run, run_limit
 from identification.quality.settings import QUALITY, QualitySettings
 from identification.quality.statistics import (
     DescriptiveStatistics,
@@ -17,6 +17,7 @@ from identification.quality.statistics import (
     fit_trend,
     outlier_limit,
 )
+from identification.recordings.reading_steps import reading_step
 from identification.recordings.recording import UNITS
 
 
@@ -37,7 +38,7 @@ class ChannelAssessment:
     trend: Trend
     description: DescriptiveStatistics
     quantum: float
-    """Step of the converter as the readings show it; 0.0 without a grid."""
+    """Step of the readings: as they show it, otherwise as the campaign does; 0.0 without a grid."""
     rounding: float
     """The step over the standard deviation; 0.0 for a signal that never changes."""
     longest_run: int
@@ -94,10 +95,20 @@ class ChannelAssessment:
         return self.within_accuracy and abs(self.drift) < self.settings.drift_levels[0] * self.accuracy
 
     @property
+    def dithered(self) -> bool:
+        """Whether noise moves the readings across steps enough for rounding errors to average out."""
+        return self.normality.standard_deviation >= self.settings.least_dither * self.quantum
+
+    @property
     def outlier_limit(self) -> float:
         """Outlier factor that normal noise stays below in a share `outlier_confidence` of records."""
-        confidence = self.settings.outlier_confidence
-        return outlier_limit(len(self.readings), rounding=self.rounding, confidence=confidence)
+        sigma = self.description.standard_deviation
+        return outlier_limit(
+            len(self.readings),
+            rounding=self.rounding,
+            confidence=self.settings.outlier_confidence,
+            hidden=max(1.0, self.normality.standard_deviation / sigma) if sigma else 1.0,
+        )
 
 
 def assess_channel(
@@ -107,6 +118,7 @@ def assess_channel(
     period: float,
     rest: float,
     lags: int,
+    step: float = 0.0,
     settings: QualitySettings = QUALITY,
 ) -> ChannelAssessment:
     """Statistics of one channel.
@@ -117,13 +129,14 @@ def assess_channel(
         period: time between samples [s].
         rest: what a perfect sensor reads at rest [A, V or bar].
         lags: greatest lag of the autocorrelation [samples].
+        step: of the readings, where a record that hardly moves cannot show it [A, V or bar].
     """
     time = np.arange(len(readings)) * period
     trend = fit_trend(time, readings)
     moves = bool(np.ptp(readings) > 0)
     residual = readings - trend.at(time) if moves else np.zeros_like(readings)
     description = descriptive_statistics(residual, greatest=SENSORS[name].high)
-    step = converter_step(readings, settings)
+    step = reading_step(readings) or step
     rounding = step / description.standard_deviation if moves else 0.0
     return ChannelAssessment(
         name=name,

@@ -65,9 +65,13 @@ def assess_normality(
     positions = _positions(line, sigma, settings)
     shift, deviation = _fit(edges, counts, positions, sigma)
     expected = len(readings) * _probabilities(edges, positions + shift, deviation)
+    with np.errstate(
+        divide="ignore"
+    ):  # a reading so far out that its probability is 0 in double precision
+        anderson_darling = float(normal_ad(readings - line)[1])
     return Normality(
         standard_deviation=deviation,
-        naive_anderson_darling=float(normal_ad(readings - line)[1]),
+        naive_anderson_darling=anderson_darling,
         naive_jarque_bera=float(jarque_bera(readings - line)[1]),
         **_chi_square(*_merged(counts, expected, settings.least_expected)),
     )

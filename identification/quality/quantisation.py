@@ -1,25 +1,8 @@
-"""The converter's step, as the readings show it, and readings that stop moving."""
+"""Readings that stop moving: how long one lasts, and how long chance allows."""
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
-
-from identification.quality.settings import QUALITY, QualitySettings
-
-
-def converter_step(readings: NDArray, settings: QualitySettings = QUALITY) -> float:
-    """Step of the converter [unit]: the least step between distinct readings, (samples,).
-
-    The few digits of a file make equal steps unequal, so the step is the slope of the line through
-    the distinct readings over their codes. 0.0: fewer than two distinct readings, or no grid.
-    """
-    distinct = np.unique(readings)
-    if len(distinct) < 2 or len(distinct) > settings.distinct_share * len(readings):
-        return 0.0
-    steps = np.diff(distinct)
-    steps = steps[steps > 1e-3 * np.median(steps)]  # the same reading but for rounding in sums
-    least = float(np.median(steps[steps < 1.5 * np.min(steps)]))
-    return float(np.polyfit(np.rint((distinct - distinct[0]) / least), distinct, 1)[0])
 
 
 def longest_run(readings: NDArray) -> int:
@@ -34,10 +17,11 @@ def run_limit(readings: NDArray, *, rounding: float, significance: float) -> int
     A run of L readings starts at one of n samples with probability p^L, so the limit solves
     n p^L = significance, a probability. p is the share of the commonest reading, or what normal noise
     about that reading gives it if that is more, as under a drift. rounding: step over sigma. The limit
-    is n for readings that never change.
+    is n for readings that never change, and at most n.
     """
-    share = np.max(np.unique(readings, return_counts=True)[1]) / len(readings)
-    if share == 1.0:
-        return len(readings)
+    samples = len(readings)
+    share = np.max(np.unique(readings, return_counts=True)[1]) / samples
     share = max(share, 1 - 2 * stats.norm.sf(rounding / 2))
-    return int(np.ceil(np.log(significance / len(readings)) / np.log(share)))
+    if share == 1.0:
+        return samples
+    return min(samples, int(np.ceil(np.log(significance / samples) / np.log(share))))

@@ -7,9 +7,10 @@ the first alone would condemn every real bench.
 import numpy as np
 from scipy import stats
 
-from identification.quality.assessment import PRESSURES, QualityAssessment
+from identification.quality.assessment import QualityAssessment
 from identification.quality.channel import ChannelAssessment
 from identification.quality.judgements import Judgement, graded_status, judgement_of, milli_text
+from identification.recordings.recording import PRESSURES
 
 
 def check_offset(quality: QualityAssessment, channel: ChannelAssessment) -> Judgement:
@@ -57,6 +58,13 @@ def check_noise(quality: QualityAssessment, channel: ChannelAssessment) -> Judge
 
 def check_resolution(quality: QualityAssessment, channel: ChannelAssessment) -> Judgement:
     """Do the readings move, in steps no coarser than Table 1's range in twelve bits?"""
+    if channel.whiteness is None and channel.quantum:
+        return judgement_of(
+            "doubt",
+            f"every sample reads {channel.readings[0]:.6g} {channel.unit}, in steps of "
+            f"{milli_text(channel, channel.quantum)}, which may hide the noise of a live sensor",
+            "record with finer steps, since a dead sensor would read the same",
+        )
     if channel.whiteness is None:
         figures = f"every sample reads {channel.readings[0]:.6g} {channel.unit}"
         return judgement_of("bad", figures, "check the sensor's cable and the acquisition")
@@ -65,9 +73,7 @@ def check_resolution(quality: QualityAssessment, channel: ChannelAssessment) -> 
     ratio = channel.quantum / channel.sensor.resolution
     steps = channel.normality.standard_deviation / channel.quantum if channel.quantum else np.inf
     return judgement_of(
-        "doubt"
-        if ratio > channel.settings.coarse_step or steps < channel.settings.least_dither
-        else "good",
+        "doubt" if ratio > channel.settings.coarse_step or not channel.dithered else "good",
         f"one step is {milli_text(channel, channel.quantum)}, {ratio:.2f} times Table 1's range in 12 "
         f"bits, and the noise is {steps:.2g} steps",
         "check the converter's range and bits, since rounding errors do not average out",

@@ -31,8 +31,6 @@ class QualitySettings:
     """Points along the trend, a quarter of sigma apart, over which a code's probability is averaged."""
     cells_per_sigma: float = 3.0
     """Codes finer than sigma over this number are merged, or the chi-square test loses its power."""
-    distinct_share: float = 0.2
-    """Distinct readings per sample above which the readings are taken for continuous (no grid)."""
     drift_levels: tuple[float, float] = (0.1, 1.0)
     """Drift over the record, relative to Table 1's accuracy, from which it is in doubt, and bad."""
     noise_levels: tuple[float, float] = (1.5, 4.0)

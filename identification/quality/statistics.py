@@ -90,11 +90,14 @@ def descriptive_statistics(residual: NDArray, *, greatest: float) -> Descriptive
     )
 
 
-def outlier_limit(samples: int, *, rounding: float, confidence: float = 0.999) -> float:
+def outlier_limit(
+    samples: int, *, rounding: float, confidence: float = 0.999, hidden: float = 1.0
+) -> float:
     """Outlier factor (eq. 18) that normal noise of n samples stays below with a given confidence.
 
     From the distribution of the greatest of n independent |y|/sigma, (2 Phi(z) - 1)^n = confidence.
-    Rounding may move a reading outwards by half a step: `rounding` is the step over sigma.
+    Rounding may move a reading outwards by half a step: `rounding` is the step over sigma. hidden: the
+    noise before rounding over sigma, where coarse steps hide most of it; at least 1.
     """
     exceeds = -np.expm1(np.log(confidence) / samples)
-    return float(stats.norm.isf(exceeds / 2) + rounding / 2)
+    return float(hidden * stats.norm.isf(exceeds / 2) + rounding / 2)

@@ -20,6 +20,7 @@ from identification.recordings.manifest import (
     manifest_content,
     read_manifest,
 )
+from identification.recordings.reading_steps import column_steps
 from identification.recordings.recording import CHANNELS, Campaign, CampaignError, Recording
 from identification.recordings.recording_checks import check_recording
 from identification.recordings.rules import RULES, RecordingRules
@@ -36,12 +37,14 @@ def read_campaign(folder: str | PathLike[str], rules: RecordingRules = RULES) ->
     """The campaign in a folder, every rule of docs/reference/files.md checked. Raises CampaignError."""
     folder = Path(folder)
     manifest = read_manifest(folder)
+    files = {path: _read_file(path) for path in manifest.roles}
+    steps = column_steps([columns for _, columns in files.values()], rules)
     return Campaign(
         name=manifest.name,
         temperature=manifest.temperature,
         pressure=manifest.pressure,
         recordings=tuple(
-            _read_recording(path, role, manifest.pressure, rules)
+            _recording(path, *files[path], role, manifest.pressure, steps, rules)
             for path, role in manifest.roles.items()
         ),
         folder=folder,
@@ -67,29 +70,51 @@ def write_campaign(
     check_vacant(folder)
     content = manifest_content(campaign)
     check_manifest(folder, content)
-    for recording in campaign.recordings:
-        _check_writable(folder / f"{recording.name}.csv", recording, campaign.pressure, rules)
-    for recording in campaign.recordings:
-        write_text(folder / f"{recording.name}.csv", _csv(_columns(recording)))
+    written = [(recording, _columns(recording)) for recording in campaign.recordings]
+    for recording, columns in written:
+        _check_writable(folder / f"{recording.name}.csv", recording, columns)
+    steps = column_steps([columns for _, columns in written], rules)
+    for recording, columns in written:
+        path, ambient = str(folder / f"{recording.name}.csv"), campaign.pressure / BAR
+        check_recording(
+            path, columns, role=recording.role, ambient_bar=ambient, steps=steps, rules=rules
+        )
+    for recording, columns in written:
+        write_text(folder / f"{recording.name}.csv", _csv(columns))
     write_json(folder / FILE_NAME, content)
 
 
-def _read_recording(path: Path, role: str, ambient: float, rules: RecordingRules) -> Recording:
+def _read_file(path: Path) -> tuple[str, dict[str, NDArray]]:
+    """SHA-256 of a file, and its columns by name, each (samples,) in the unit of the name."""
     try:
         content = path.read_bytes()
     except OSError as error:
         raise CampaignError(
             f"{path} cannot be read ({error.strerror}): add the file, or take it out of {FILE_NAME}"
         ) from None
-    columns = read_columns(str(path), content)
-    period = check_recording(str(path), columns, role=role, ambient_bar=ambient / BAR, rules=rules)
+    return hashlib.sha256(content).hexdigest(), read_columns(str(path), content)
+
+
+def _recording(
+    path: Path,
+    sha256: str,
+    columns: Mapping[str, NDArray],
+    role: str,
+    ambient: float,
+    steps: Mapping[str, float],
+    rules: RecordingRules,
+) -> Recording:
+    """Check and convert a file's columns; steps: coarse ones by column [bar]."""
+    period = check_recording(
+        str(path), columns, role=role, ambient_bar=ambient / BAR, steps=steps, rules=rules
+    )
     signals = {channel.name: _signal(channel, columns) for channel in MEASURED_CHANNELS}
     return Recording(
         name=path.stem,
         role=role,
         period=period,
         sigma_S=columns.get(CONSUMPTION_COLUMN, np.zeros_like(columns["U_V"])),
-        sha256=hashlib.sha256(content).hexdigest(),
+        sha256=sha256,
         **signals,
     )
 
@@ -116,16 +141,14 @@ def _csv(columns: Mapping[str, NDArray]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _check_writable(path: Path, recording: Recording, ambient: float, rules: RecordingRules) -> None:
+def _check_writable(path: Path, recording: Recording, columns: Mapping[str, NDArray]) -> None:
     if path.stem != recording.name:
         raise CampaignError(
             f"recording {recording.name!r} does not name a file: give it a name without folders"
         )
-    columns = _columns(recording)
     for name, values in columns.items():
         if values.shape != (len(recording),) or not np.all(np.isfinite(values)):
             raise CampaignError(
                 f"{path}: {name} has shape {values.shape} or a value that is not finite: give "
                 f"{len(recording)} finite samples"
             )
-    check_recording(str(path), columns, role=recording.role, ambient_bar=ambient / BAR, rules=rules)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.sensors import SENSORS
+from identification.recordings.reading_steps import campaign_steps, rounding_error
 from identification.recordings.recording import CHANNELS, HOLD, UNITS, Campaign, CampaignError, Recording
 from identification.recordings.rules import RULES, RecordingRules
 
@@ -20,13 +21,13 @@ def pooled_noise(campaign: Campaign, rules: RecordingRules = RULES) -> dict[str,
     stretches = [(r, len(r)) for r in steady] or [
         (r, energised_start_length(r)) for r in campaign.recordings
     ]
-    return {name: _pooled(name, stretches, rules.noise_block) for name in CHANNELS}
+    return _pooled(campaign.recordings, stretches, rules)
 
 
 def noise_of_energised_start(recording: Recording, rules: RecordingRules = RULES) -> dict[str, float]:
     """As `pooled_noise`, from the energised steady start of one recording [A, V, Pa]."""
     stretch = (recording, energised_start_length(recording))
-    return {name: _pooled(name, [stretch], rules.noise_block) for name in CHANNELS}
+    return _pooled([recording], [stretch], rules)
 
 
 def energised_start_length(recording: Recording) -> int:
@@ -41,14 +42,26 @@ def energised_start_length(recording: Recording) -> int:
     return samples
 
 
-def _pooled(name: str, stretches: Sequence[tuple[Recording, int]], block: float) -> float:
-    """Root of the summed squares over the summed degrees of freedom, at least the rounding error."""
+def _pooled(
+    recordings: Sequence[Recording], stretches: Sequence[tuple[Recording, int]], rules: RecordingRules
+) -> dict[str, float]:
+    """The noise by channel [SI] in stretches, at least the error by which the recordings are rounded."""
+    coarse = campaign_steps(recordings, rules)
+    least = {name: coarse.get(name, SENSORS[name].resolution * UNITS[name][1]) for name in CHANNELS}
+    return {
+        name: max(_deviation(name, stretches, rules.noise_block), rounding_error(least[name]))
+        for name in CHANNELS
+    }
+
+
+def _deviation(name: str, stretches: Sequence[tuple[Recording, int]], block: float) -> float:
+    """Root of the summed squares over the summed degrees of freedom [SI]."""
     parts = [
         _about_lines(recording.channel(name)[:samples], recording.period, block)
         for recording, samples in stretches
     ]
     variance = sum(squares for squares, _ in parts) / sum(degrees for _, degrees in parts)
-    return max(float(np.sqrt(variance)), _rounding_error(name))
+    return float(np.sqrt(variance))
 
 
 def _about_lines(signal: NDArray, period: float, block: float) -> tuple[float, int]:
@@ -61,8 +74,3 @@ def _squares(block: NDArray) -> float:
     time = np.arange(len(block)) - (len(block) - 1) / 2
     slope = time @ block / (time @ time)
     return float(np.sum((block - np.mean(block) - slope * time) ** 2))
-
-
-def _rounding_error(name: str) -> float:
-    """Standard deviation of the rounding to Table 1's twelve bits [A, V, Pa]."""
-    return SENSORS[name].resolution / np.sqrt(12) * UNITS[name][1]

@@ -68,6 +68,9 @@ def check_discharge(
 def check_against_supply(file: str, name: str, p1: NDArray, p3: NDArray) -> None:
     """In the steady start p3 equals p1: p1 is not lower by more than both accuracies.
 
+    Nor is it higher, if it stands still: a supply may lose pressure on its way, a dead sensor may not
+    pass for one in coarse steps.
+
     p1, p3: of the steady start, (samples,) [bar]. Raises CampaignError.
     """
     difference = float(np.mean(p1) - np.mean(p3))
@@ -76,6 +79,12 @@ def check_against_supply(file: str, name: str, p1: NDArray, p3: NDArray) -> None
             f"{file}, lines {line_number(0)} to {line_number(len(p1) - 1)}: {name} is "
             f"{-difference:.2f} bar less than "
             f"p3_bar, to which the energised valve joins it, which {REMEDY}"
+        )
+    if np.ptp(p1) == 0 and difference > 2 * MARGIN:
+        raise CampaignError(
+            f"{file}, lines {line_number(0)} to {line_number(len(p1) - 1)}: {name} is {p1[0]:g} "
+            f"without noise and {difference:.2f} bar more than p3_bar, to which the energised valve "
+            "joins it: check its sensor"
         )
 
 

@@ -18,11 +18,14 @@ OUTPUTS = tuple(channel.name for channel in MEASURED_CHANNELS if channel.output)
 CHANNELS = tuple(sorted(CHANNEL))
 """Names of the measured signals, in the order of the report's Table 1, which is the alphabet's."""
 
-HOLD = 0.04
-"""Recordings start in steady state, energised, for at least this long [s]."""
-
 UNITS = {name: (CHANNEL[name].unit, CHANNEL[name].scale) for name in CHANNELS}
 """Unit in which people read each channel, and its size in SI units."""
+
+PRESSURES = tuple(name for name in CHANNELS if UNITS[name][0] == "bar")
+"""Channels that are pressures: vented, they read the ambient pressure; one device rounds them alike."""
+
+HOLD = 0.04
+"""Recordings start in steady state, energised, for at least this long [s]."""
 
 
 class CampaignError(ValueError):

@@ -28,6 +28,7 @@ def check_recording(
     *,
     role: str,
     ambient_bar: float,
+    steps: Mapping[str, float] | None = None,
     rules: RecordingRules = RULES,
 ) -> float:
     """Apply every rule to a recording's columns; returns the sampling period [s].
@@ -37,6 +38,7 @@ def check_recording(
         columns: by the file's column names, each (samples,) in the unit of the name.
         role: one of recording.ROLES.
         ambient_bar: p_env [bar absolute].
+        steps: coarse steps of the campaign's readings by column [bar]; None: there are none.
 
     Raises CampaignError at the first rule that is broken.
     """
@@ -44,7 +46,12 @@ def check_recording(
     check_length(file, columns, role, period, rules)
     for name, channel in CHANNEL_OF.items():
         if name in columns:
-            _check_channel(file, name, columns[name], SENSORS[channel], period, ambient_bar, rules)
+            coarse = (steps or {}).get(name, 0.0)
+            if name != "U_V":  # a voltage may be fed back without noise
+                check_alive(file, name, columns[name], may_rest=_may_rest(coarse, channel, role))
+            _check_channel(
+                file, name, columns[name], SENSORS[channel], period, ambient_bar, coarse, rules
+            )
     if role != "quality":
         check_switching(file, columns["U_V"], rules)
         check_energised_start(file, columns["U_V"], period)
@@ -60,15 +67,15 @@ def _check_channel(
     sensor: Sensor,
     period: float,
     ambient_bar: float,
+    coarse: float,
     rules: RecordingRules,
 ) -> None:
-    if name != "U_V":  # a voltage may be fed back without noise
-        check_alive(file, name, values)
     if name.startswith("p"):
         check_unit(file, name, values, rules)
         check_above_ambient(file, name, values, ambient_bar)
     check_range(file, name, values, sensor)
-    check_rail(file, name, values, sensor, period, rules)
+    vented = coarse > 0 and abs(ambient_bar - sensor.low) <= _margin(sensor)
+    check_rail(file, name, values, sensor, period, rules, low_end=not vented)
 
 
 def check_length(
@@ -88,9 +95,12 @@ def check_length(
         )
 
 
-def check_alive(file: str, name: str, values: NDArray) -> None:
-    """Noise and the ADC's steps move every channel, (samples,) [A, V or bar], that is connected."""
-    if np.min(values) == np.max(values):
+def check_alive(file: str, name: str, values: NDArray, *, may_rest: bool = False) -> None:
+    """Noise and the ADC's steps move every channel, (samples,) [A, V or bar], that is connected.
+
+    may_rest: whether the readings' step is so coarse that a live channel may read the same throughout.
+    """
+    if np.min(values) == np.max(values) and not may_rest:
         raise CampaignError(
             f"{file}, {_lines(0, len(values))}: {name} is {values[0]:g} throughout, and noise moves "
             "every live channel: check its sensor, or give simulated data the sensors' noise"
@@ -123,10 +133,20 @@ def check_range(file: str, name: str, values: NDArray, sensor: Sensor) -> None:
 
 
 def check_rail(
-    file: str, name: str, values: NDArray, sensor: Sensor, period: float, rules: RecordingRules
+    file: str,
+    name: str,
+    values: NDArray,
+    sensor: Sensor,
+    period: float,
+    rules: RecordingRules,
+    *,
+    low_end: bool = True,
 ) -> None:
-    """No reading (samples,) [A, V, bar] stays at an end of the range, or where the ADC saturates."""
-    at_end = (values <= sensor.low) | (values >= sensor.high - sensor.resolution)
+    """No reading (samples,) [A, V, bar] stays at an end of the range, or where the ADC saturates.
+
+    low_end: whether the range's low end counts; a vented chamber in coarse steps stays there.
+    """
+    at_end = (low_end & (values <= sensor.low)) | (values >= sensor.high - sensor.resolution)
     first, length = _longest_run(at_end[1:] & (values[1:] == values[:-1]))
     if length >= max(_samples(rules.stuck_time, period), rules.stuck_samples):
         raise CampaignError(
@@ -192,6 +212,14 @@ def check_pressures(
         if name in columns and channel == "p1":
             check_against_supply(file, name, columns[name][start], columns["p3_bar"][start])
     check_discharge(file, columns["U_V"], columns["p3_bar"], period, ambient_bar, rules)
+
+
+def _may_rest(coarse: float, channel: str, role: str) -> bool:
+    """Whether a live channel may read the same throughout, in coarse steps [bar]; 0 for fine ones.
+
+    The supply may, and any pressure of a steady record; p2 and p3 move when the coil switches.
+    """
+    return coarse > 0 and (channel == "p1" or role == "quality")
 
 
 def _margin(sensor: Sensor) -> float:

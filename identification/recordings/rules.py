@@ -35,6 +35,15 @@ class RecordingRules:
     gauge_likeness: float = 0.3
     """Part of the ambient pressure within which a discharge that ends at minus that pressure meets "
     "it."""
+    distinct_share: float = 0.2
+    """Distinct readings per sample above which the readings are taken for continuous (no grid)."""
+    least_codes: int = 10
+    """Distinct readings that show a step; the least distance of a few may be several steps."""
+    grid_error: float = 0.1
+    """Distance from a grid, in its steps, within which a reading lies on it; digits are few."""
+    coarse_step: float = 2.0
+    """Step over Table 3's noise above which a live channel may read the same throughout: a sensor
+    that is somewhat quieter than Table 3's then rarely leaves a code."""
     noise_block: float = 0.05
     """Time over which a drift passes for straight when the noise is read [s]."""
 

@@ -14,6 +14,7 @@ from scipy.interpolate import make_smoothing_spline
 from scipy.signal import savgol_filter
 from scipy.stats import chi2
 
+from identification.recordings.reading_steps import reading_step, rounding_error
 from identification.recordings.recording import HOLD, Recording
 from identification.replay.settings import REPLAY, ReplaySettings
 
@@ -73,11 +74,12 @@ def smooth_supply(
     """p1 without its noise [Pa], (samples,).
 
     Reservoirs lose the air that is drawn from them, by which p1 falls in proportion (R T / V1). Where
-    this leaves more than white noise, because the supply has a life of its own, a smoothing spline
-    (generalised cross-validation) takes its place.
+    this leaves more than white noise and more than the rounding of coarse readings, because the supply
+    has a life of its own, a smoothing spline (generalised cross-validation) takes its place.
     """
     fitted = _air_balance(recording, p, settings.smoothing_window)
-    if _is_white(recording.p1 - fitted, recording.period, settings):
+    residual = recording.p1 - fitted
+    if _is_white(residual, recording.period, settings) or _is_rounding(residual, recording.p1, settings):
         return fitted
     return _spline(recording, settings.block)
 
@@ -117,6 +119,12 @@ def _is_white(residual: NDArray, period: float, settings: ReplaySettings) -> boo
     variance = 0.5 * np.mean(np.diff(residual) ** 2)
     statistic = length * np.sum(np.mean(blocks, axis=1) ** 2)
     return bool(statistic <= variance * chi2.isf(settings.white_probability, len(blocks)))
+
+
+def _is_rounding(residual: NDArray, readings: NDArray, settings: ReplaySettings) -> bool:
+    """Whether a residual scatters no more than the rounding of readings, (samples,), explains."""
+    explained = settings.rounding_margin * rounding_error(reading_step(readings))
+    return bool(np.sqrt(np.mean(residual**2)) <= explained)
 
 
 def _spline(recording: Recording, block: float) -> NDArray:

@@ -14,6 +14,9 @@ class ReplaySettings:
     white_probability: float = 1e-4
     """Probability, as white noise, of what remains of a signal below which the signal is not replaced
     by a simple course."""
+    rounding_margin: float = 1.4
+    """Scatter over a rounding error up to which rounding explains what remains of a signal: readings
+    that waver between two codes reach 1.7, and the noise of fine steps lies far beyond."""
     pressure_step: float = 1e3
     """Change of the start's circuit pressure by which its influence is measured [Pa]."""
     relative_step: float = 1e-4

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
@@ -53,6 +54,7 @@ def diagnose_campaign(
     journal = Journal(out / JOURNAL, _subject(valve, without))
     steps = Steps(began) if report else _silent
     found = diagnose(valve, seed=seed, cache=FitCache(valve, journal, steps))
+    found = replace(found, warnings=[*valve.warnings, *found.warnings])
     text = _report(found, valve, recorded.name, out, steps) if report else ""
     content = {**as_json(found, text), "seconds": perf_counter() - began}
     write_json(out / GAP, content, allow_nan=False)

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.recordings.reading_steps import reliable_step, rounding_error
 from identification.recordings.recording import Recording
 from identification.valve_gap.settings import VALVE, ValveSettings
 
@@ -17,13 +18,17 @@ def noise_of(recordings: Sequence[Recording], channel: str, settings: ValveSetti
     """Standard deviation of a channel's readings about a smooth course [SI].
 
     Half the variance of first differences (Rice 1984), which a slope does not enter; the median over
-    blocks, which a few lively ones do not move, made the mean of a chi-square variable.
+    blocks, which a few lively ones do not move, made the mean of a chi-square variable. A slow ripple
+    hardly enters: what neighbours share is no noise. Readings in coarse steps hardly differ between
+    neighbours, so their rounding error is the least.
     """
     estimates = [_block_variances(recording, channel, settings) for recording in recordings]
     variances = np.concatenate([part for part, _ in estimates])
     length = min(length for _, length in estimates)
     freedom = 2.0 * length / 3.0  # differences of white noise are correlated by -1/2
-    return float(np.sqrt(np.median(variances) / (1.0 - 2.0 / (9.0 * freedom)) ** 3))
+    found = float(np.sqrt(np.median(variances) / (1.0 - 2.0 / (9.0 * freedom)) ** 3))
+    step = reliable_step(np.concatenate([recording.channel(channel) for recording in recordings]))
+    return max(found, rounding_error(step))
 
 
 def _block_variances(recording: Recording, channel: str, settings: ValveSettings) -> tuple[NDArray, int]:

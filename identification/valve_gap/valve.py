@@ -1,6 +1,7 @@
 """The valve behind the grey-box protocol: replayed recordings, and what may be wrong with the model."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from identification.calibration.problem import calibration_problem
 from identification.gap.model.free_parameter import NuisanceParameter
 from identification.gap.model.recorded_run import Channel, Run
 from identification.gap.model.state_equation import StateEquation, StateTrace
+from identification.recordings.reading_steps import coarse_step_warnings, rounding_error
 from identification.recordings.recording import OUTPUTS, UNITS, Campaign, Recording
 from identification.replay.batch_simulation import Replay
 from identification.replay.model_inputs import model_inputs
@@ -69,7 +71,8 @@ class Valve:
             _tolerance(symbol, self.base, settings.parameter_scatter)
             for symbol in causes.PARAMETER_COMPONENTS
         )
-        self.run_offsets = (P2_START, P3_ZERO, I_ZERO)
+        self.warnings = coarse_step_warnings(problem.steps)
+        self.run_offsets = (_rounded(P2_START, problem.steps.get("p2", 0.0)), P3_ZERO, I_ZERO)
         self.equations = EQUATIONS
         self.replay = Replay([model_inputs(r, self.base) for r in self.recordings], self.base)
 
@@ -128,6 +131,11 @@ def as_run(recording: Recording) -> Run:
         trusted=trusted,
         inputs={"U": recording.U, "p1": recording.p1, "sigma_S": recording.sigma_S},
     )
+
+
+def _rounded(start: NuisanceParameter, step: float) -> NuisanceParameter:
+    """A start that was read in coarse steps [SI], which the mean of a hold does not average out."""
+    return replace(start, sd=float(np.hypot(start.sd, rounding_error(step))))
 
 
 def _tolerance(symbol: str, base: Parameters, scatter: float) -> NuisanceParameter:

@@ -105,3 +105,10 @@ def test_the_json_holds_estimates_searches_and_warnings():
         s: calibration().parameters("least squares")[s] for s in problem().vector.symbols
     }
     assert len(content["searches"]["Nelder-Mead"]) == 1
+
+
+def test_coarse_steps_are_said():
+    """Their sentence comes first; the rest of the campaign is as good as before."""
+    coarse = replace(problem(), steps={"p1": 5e3})
+    (warning,) = calibration_warnings(coarse, calibration().fits)
+    assert "p1 50 mbar" in warning

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from identification.quality.quantisation import converter_step, longest_run, run_limit
+from identification.quality.quantisation import longest_run, run_limit
 from identification.quality.statistics import descriptive_statistics, fit_trend, outlier_limit
 
 TIME = np.arange(10_000) / 2000
@@ -70,25 +70,6 @@ def test_999_of_1000_normal_records_stay_below_the_outlier_limit(rounding):
 
 def test_the_report_s_limit_of_four_would_fail_every_second_normal_record():
     assert outlier_limit(10_000, rounding=0.0, confidence=0.53) == pytest.approx(4.0, abs=0.01)
-
-
-@pytest.mark.parametrize("digits", [None, 5])
-def test_the_step_is_found_though_codes_are_missing_and_digits_are_few(digits):
-    step = 15 / 4096
-    codes = np.array([0, 1, 2, 5, 6, 40] * 100)
-    readings = 1.0 + step * codes
-    readings = readings if digits is None else np.round(readings, digits)
-    assert converter_step(readings) == pytest.approx(step, rel=1e-4)
-
-
-def test_rounding_in_sums_is_no_step():
-    readings = np.array([0.1 + 0.2, 0.3, 0.4, 0.5] * 100)
-    assert converter_step(readings) == pytest.approx(0.1, rel=1e-6)
-
-
-def test_continuous_readings_have_no_step():
-    assert converter_step(np.random.default_rng(0).standard_normal(1000)) == 0.0
-    assert converter_step(np.ones(1000)) == 0.0
 
 
 def test_runs():

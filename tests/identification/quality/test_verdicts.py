@@ -171,6 +171,25 @@ def test_a_stuck_code():
     assert not any("p3" in pair for pair in quality.pairs)
 
 
+def test_a_reading_that_coarse_steps_hold_is_in_doubt_and_not_bad():
+    record = with_channel(rest_record(0), "p3", np.ones(SAMPLES))
+    quality = assess_recording(record, AMBIENT, steps={"p3": 5e3})
+    assert statuses(quality, "p3") == {"offset": "good", "resolution": "doubt"}
+    assert sensor_offsets(quality)["p3"].error == pytest.approx(5e3 / np.sqrt(12))
+
+
+def test_noise_that_rarely_leaves_a_code_is_no_outlier():
+    """Steps of 50 mbar, 7.4 deviations: a few readings of 10 000 lie one step off."""
+    coarse = 0.05 * np.rint(rest_record(0).p1 / 1e5 / 0.05)
+    assert 1 < np.sum(coarse != 1.0) < 50
+    quality = assess_recording(with_channel(rest_record(0), "p1", coarse), AMBIENT)
+    assert statuses(quality, "p1") == {
+        **dict.fromkeys(CHECKS, "good"),
+        "resolution": "doubt",
+        "normality": "note",
+    }
+
+
 def test_a_code_that_sticks_for_a_while():
     record = rest_record(0)
     record.p3[4000:4300] = record.p3[4000]

@@ -1,9 +1,13 @@
 """The noise of readings about a course that moves."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from identification.recordings.recording import Recording
+from epv_env.plant.sensors import SENSORS
+from identification.bench.disturbances import add_ripple
+from identification.recordings.recording import Campaign, Recording
 from identification.valve_gap.noise import noise_of
 
 
@@ -29,3 +33,19 @@ def test_noise_is_found_whatever_the_course(steps):
 
 def test_more_noise_is_more():
     assert noise_of([recording(600.0, 0)], "p2") > 1.8 * noise_of([recording(300.0, 0)], "p2")
+
+
+@pytest.mark.parametrize("noise", [0.0, 300.0])
+def test_rounding_is_the_least_noise(noise):
+    """Readings in coarse steps hardly differ between neighbours, and err all the same."""
+    fine = recording(noise, 0)
+    coarse = replace(fine, p2=5e3 * np.rint(fine.p2 / 5e3))
+    assert 5e3 / np.sqrt(12) <= noise_of([coarse], "p2") * (1 + 1e-9) < 1.3 * 5e3 / np.sqrt(12)
+
+
+def test_a_slow_ripple_is_no_noise():
+    """20 ms and twice the noise, as a supply's pulsation: the white part alone is found."""
+    fine = recording(SENSORS["p2"].noise * 1e5, 0)
+    campaign = Campaign(name="x", temperature=293.0, pressure=1e5, recordings=(fine,))
+    rippled = add_ripple(campaign, sd={"p2": 2 * SENSORS["p2"].noise}, correlation_time=0.02, seed=0)
+    assert noise_of(rippled.recordings, "p2") == pytest.approx(noise_of([fine], "p2"), rel=0.1)

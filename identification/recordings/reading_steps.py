@@ -1,0 +1,102 @@
+"""The steps in which readings come, as the readings show them, and what coarse ones mean.
+
+A converter, a file's few digits or a vehicle's bus rounds readings. Where the step is coarse against the
+sensor's noise, a live channel may read the same throughout, and rounding is the noise.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epv_env.plant.channels import CHANNEL
+from epv_env.plant.sensors import SENSORS
+from identification.recordings.recording import PRESSURES, UNITS, Recording
+from identification.recordings.rules import RULES, RecordingRules
+
+
+def reading_step(readings: NDArray, rules: RecordingRules = RULES) -> float:
+    """Step of the readings [their unit]: the least step between distinct readings, (samples,).
+
+    The few digits of a file make equal steps unequal, so the step is the slope of the line through
+    the distinct readings over their codes. 0.0: fewer than two distinct readings, or no grid.
+    """
+    distinct = np.unique(readings)
+    if len(distinct) < 2 or len(distinct) > rules.distinct_share * len(readings):
+        return 0.0
+    steps = np.diff(distinct)
+    steps = steps[steps > 1e-3 * np.median(steps)]  # the same reading but for rounding in sums
+    least = float(np.median(steps[steps < 1.5 * np.min(steps)]))
+    return float(np.polyfit(np.rint((distinct - distinct[0]) / least), distinct, 1)[0])
+
+
+def reliable_step(readings: NDArray, rules: RecordingRules = RULES) -> float:
+    """`reading_step` of readings (samples,) [unit]; 0.0 where too few are distinct to trust it."""
+    if len(np.unique(readings)) < rules.least_codes:
+        return 0.0
+    return reading_step(readings, rules)
+
+
+def coarse_steps(
+    pressures: Mapping[str, NDArray], sizes: Mapping[str, float], rules: RecordingRules = RULES
+) -> dict[str, float]:
+    """Steps of those pressures whose noise need not move the reading, by name [unit of the pressures].
+
+    A pressure that takes few values only, such as a steady supply, has the coarsest step of the others.
+
+    pressures: all readings of a campaign by name, each (samples,). sizes: the sensors' noise by name,
+    in the same unit.
+    """
+    own = {name: reliable_step(readings, rules) for name, readings in pressures.items()}
+    coarsest = max(own.values(), default=0.0)
+    steps = {name: step or _shared(pressures[name], coarsest, rules) for name, step in own.items()}
+    return {name: step for name, step in steps.items() if step > rules.coarse_step * sizes[name]}
+
+
+def column_steps(
+    recordings: Sequence[Mapping[str, NDArray]], rules: RecordingRules = RULES
+) -> dict[str, float]:
+    """`coarse_steps` of a campaign's files by column [bar]; recordings: columns by name, (samples,)."""
+    columns = {column: name for name in PRESSURES for column in CHANNEL[name].columns}
+    readings = {
+        column: np.concatenate([r[column] for r in recordings if column in r])
+        for column in columns
+        if any(column in r for r in recordings)
+    }
+    return coarse_steps(readings, {c: SENSORS[columns[c]].noise for c in readings}, rules)
+
+
+def campaign_steps(recordings: Iterable[Recording], rules: RecordingRules = RULES) -> dict[str, float]:
+    """`coarse_steps` of recordings by channel [Pa]; empty on a bench of fine steps."""
+    recordings = tuple(recordings)
+    if not recordings:
+        return {}
+    pressures = {
+        name: np.concatenate([recording.channel(name) for recording in recordings]) for name in PRESSURES
+    }
+    noise = {name: SENSORS[name].noise * UNITS[name][1] for name in PRESSURES}
+    return coarse_steps(pressures, noise, rules)
+
+
+def rounding_error(step: float) -> float:
+    """Standard deviation of the rounding to a step, in the step's unit."""
+    return float(step / np.sqrt(12.0))
+
+
+def coarse_step_warnings(steps: Mapping[str, float]) -> list[str]:
+    """What coarse steps, by channel [Pa], cost: a sentence, or none for fine readings."""
+    if not steps:
+        return []
+    named = ", ".join(f"{name} {1e3 * step / UNITS[name][1]:.3g} mbar" for name, step in steps.items())
+    return [
+        f"pressures come in coarse steps ({named}): rounding counts as noise, a change below half a "
+        "step does not show, and a steady pressure cannot be told from a dead sensor; record with finer "
+        "steps where you can"
+    ]
+
+
+def _shared(readings: NDArray, coarsest: float, rules: RecordingRules) -> float:
+    """The others' step, if the few distinct readings (samples,) lie on its grid; otherwise 0.0."""
+    codes = np.unique(readings) / coarsest if coarsest else np.array([])
+    off_grid = np.abs(codes - codes[:1] - np.rint(codes - codes[:1]))
+    return coarsest if codes.size and np.max(off_grid) < rules.grid_error else 0.0

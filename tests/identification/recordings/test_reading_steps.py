@@ -1,0 +1,119 @@
+"""The step of readings is found as they show it, and a coarse one makes a steady pressure credible."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.bench.disturbances import round_pressures
+from identification.recordings.campaign_files import read_campaign, write_campaign
+from identification.recordings.noise_estimation import pooled_noise
+from identification.recordings.reading_steps import (
+    campaign_steps,
+    coarse_step_warnings,
+    reading_step,
+    reliable_step,
+)
+from identification.recordings.recording import CampaignError
+from tests.identification.recordings.good_campaign import good_campaign
+
+STEP = 0.05
+"""Of a vehicle's bus [bar]."""
+
+
+def coarse(change=None, which=0):
+    """The good campaign in coarse steps, with other signals in one recording [SI]."""
+    campaign = round_pressures(good_campaign(), STEP)
+    recordings = list(campaign.recordings)
+    if change:
+        recordings[which] = replace(recordings[which], **change(recordings[which]))
+    return replace(campaign, recordings=tuple(recordings))
+
+
+def held(name, value):
+    """Puts one value [SI] into a whole channel."""
+    return lambda recording: {name: np.full(len(recording), value)}
+
+
+@pytest.mark.parametrize("digits", [None, 5])
+def test_the_step_is_found_though_codes_are_missing_and_digits_are_few(digits):
+    step = 15 / 4096
+    codes = np.array([0, 1, 2, 5, 6, 40] * 100)
+    readings = 1.0 + step * codes
+    readings = readings if digits is None else np.round(readings, digits)
+    assert reading_step(readings) == pytest.approx(step, rel=1e-4)
+
+
+def test_rounding_in_sums_is_no_step():
+    readings = np.array([0.1 + 0.2, 0.3, 0.4, 0.5] * 100)
+    assert reading_step(readings) == pytest.approx(0.1, rel=1e-6)
+
+
+def test_continuous_readings_have_no_step():
+    assert reading_step(np.random.default_rng(0).standard_normal(1000)) == 0.0
+    assert reading_step(np.ones(1000)) == 0.0
+
+
+def test_two_readings_do_not_show_a_step():
+    assert reliable_step(np.array([9.0, 12.0] * 100)) == 0.0
+
+
+def test_fine_readings_have_no_coarse_step():
+    assert campaign_steps(good_campaign().recordings) == {}
+    assert coarse_step_warnings({}) == []
+
+
+def test_the_steps_of_a_bus_are_found_and_said():
+    steps = campaign_steps(coarse(held("p1", 12e5)).recordings)
+    assert steps == pytest.approx({"p1": 5e3, "p2": 5e3, "p3": 5e3})
+    (sentence,) = coarse_step_warnings(steps)
+    assert "p1 50 mbar" in sentence
+    assert "dead sensor" in sentence
+
+
+@pytest.mark.parametrize("supply", [None, held("p1", 12e5)])
+def test_a_campaign_in_coarse_steps_is_accepted(tmp_path, supply):
+    write_campaign(coarse(supply), tmp_path)
+    assert len(read_campaign(tmp_path).recordings) == 3
+
+
+def test_a_record_at_rest_may_read_the_same_throughout(tmp_path):
+    write_campaign(
+        coarse(lambda r: {name: np.full(len(r), 1e5) for name in ("p1", "p2", "p3")}, 2), tmp_path
+    )
+    assert np.ptp(read_campaign(tmp_path).recordings[2].p3) == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (held("p2", 7e5), "p2_bar is 7 throughout.*: check its sensor"),
+        (held("p3", 12e5), "p3_bar is 12 throughout.*: check its sensor"),
+        (held("I", 0.5), "I_A is 0.5 throughout.*: check its sensor"),
+        (
+            held("p1", 15e5),
+            "p1_bar is 15 without noise and 3.0. bar more than p3_bar.*: check its sensor",
+        ),
+        (held("p1", 9e5), "p1_bar is 3.0. bar less than p3_bar"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_coarse_steps_too(tmp_path, change, message):
+    with pytest.raises(CampaignError) as caught:
+        write_campaign(coarse(change), tmp_path)
+    assert re.search(message, str(caught.value))
+    assert not any(tmp_path.iterdir())
+
+
+def test_rounding_is_the_least_noise():
+    """The holds read the same throughout: their deviation is 0."""
+    noise = pooled_noise(replace(coarse(), recordings=coarse().recordings[:2]))
+    for name in ("p2", "p3"):
+        assert noise[name] >= 5e3 / np.sqrt(12)
+    assert noise["I"] == pytest.approx(pooled_noise(good_campaign())["I"], rel=0.3)
+
+
+def test_readings_of_another_grid_do_not_borrow_the_step():
+    """p1 between the others' steps is no reading of theirs."""
+    campaign = coarse(lambda r: {"p1": 12e5 + 2e3 * (np.arange(len(r)) % 2)})
+    assert "p1" not in campaign_steps(campaign.recordings[:2])
