@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.fit.hypothesis import Estimate
 from identification.gap.fit.prediction import Prediction, percentage_errors, predict
+from identification.gap.model.time_scale import time_scale
 from identification.gap.reduce.black_box import Learner, predict_residuals, ridge_learner
 from identification.gap.reduce.block_bootstrap import Interval
 from identification.gap.reduce.gaps import FLOOR, Gap, GapDraws
@@ -79,12 +80,13 @@ def measure_discrepancy_reduction(
     predictions = {label: predict(problem, estimate) for label, estimate in estimates.items()}
     causes = [label for label in estimates if label not in (NOMINAL, RECALIBRATED)]
     best = (*causes, RECALIBRATED)[0]
+    scale = time_scale(plant)
     boxes = {
-        label: predict_residuals(plant, predictions[label], learner, seed, settings)
+        label: predict_residuals(plant, predictions[label], learner, seed, settings, scale)
         for label in {RECALIBRATED, best}
     }
-    draws = GapDraws(plant, _all_residuals(predictions, boxes), seed, settings)
-    significance = p_value(plant, predictions[best].residuals, boxes[best], seed, settings)
+    draws = GapDraws(plant, _all_residuals(predictions, boxes), seed, settings, scale)
+    significance = p_value(plant, predictions[best].residuals, boxes[best], seed, settings, scale)
     ratios = zip(plant.channels, draws.noise[0], strict=True)
     return DiscrepancyReduction(
         gaps={

@@ -43,6 +43,7 @@ class GapDraws:
         residuals: Mapping[str, Sequence[NDArray]],
         seed: int,
         settings: ReductionSettings,
+        scale: float,
     ):
         """Sum squares over blocks of the held-out runs.
 
@@ -51,11 +52,13 @@ class GapDraws:
             residuals: by model, per run (channels, samples) [noise deviations].
             seed: of the bootstrap.
             settings: of the bootstrap and the noise floor.
+            scale: the plant's time scale [s].
         """
         self.plant = plant
         self.settings = settings
+        self._scale = scale
         held_out = [run for run in plant.runs if run.held_out]
-        blocks = [len(block_starts(len(run.time), run.time[1], settings)) for run in held_out]
+        blocks = [len(block_starts(len(run.time), scale / run.time[1], settings)) for run in held_out]
         self._weights = block_weights(blocks, seed, settings)
         self._readings = self._sums([run.trusted for run in plant.runs])
         squares = {label: self._sums([np.square(y) for y in own]) for label, own in residuals.items()}
@@ -112,7 +115,7 @@ class GapDraws:
     def _sums(self, series: Sequence[NDArray]) -> NDArray:
         """Sums of series, per run (channels, samples), over the held-out runs, (1 + draws, channels)."""
         blocks = [
-            block_sums(np.asarray(y, float), run.time[1], self.settings)
+            block_sums(np.asarray(y, float), self._scale / run.time[1], self.settings)
             for y, run in zip(series, self.plant.runs, strict=True)
             if run.held_out
         ]
