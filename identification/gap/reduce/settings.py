@@ -39,10 +39,20 @@ class ReductionSettings:
     """Most iterations of the limit of jumps, which usually settles earlier."""
 
     white_noise_tolerance: float = 0.1
-    """Relative distance from the channel's noise up to which noise is taken for white [1]."""
+    """Relative growth of squared differences, from one to four readings, up to which the residual is
+    taken for white [1]: then it is less than 3 % of the noise."""
 
     white_noise_deviations: float = 3.0
-    """The same in standard deviations of the estimate, where the readings tell less."""
+    """The same in standard deviations of the growth, where the readings tell less."""
+
+    least_slow_growth: float = 1.0
+    """Growth from two to four readings, relative to that from one to two [1], from which a slow course
+    lies over white noise: between twice of a rough course and half of noise correlated over two
+    readings."""
+
+    least_white_share: float = 0.5
+    """Share of white noise in the squared differences of neighbours [1] below which it is not told from
+    what else changes."""
 
     share_steps: int = 1000
     """Number of steps between 0 and 1 in which the interval of a share is searched."""

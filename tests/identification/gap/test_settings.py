@@ -23,7 +23,7 @@ from tests.identification.gap.tanks import without_gap
 from tests.identification.gap.test_expected_information import Gauge, diagnosed, two
 
 FOLDER = Path(identification.gap.__file__).parent
-DEFINITIONS = {"FLOOR", "MEDIAN_TO_SD", "PREFIXES", "POWER_PREFIXES"}
+DEFINITIONS = {"FLOOR", "LAGS", "MEDIAN_TO_SD", "PREFIXES", "POWER_PREFIXES"}
 """Numbers that are definitions, and no judgement."""
 
 STAGES = (
