@@ -16,7 +16,7 @@ from identification.gap.locate.forcing_processes import (
     average_log_evidence,
     fit_processes,
 )
-from identification.gap.locate.regime_gaps import RegimeGap, regime_gaps
+from identification.gap.locate.regime_gaps import RegimeGap, regime_gaps, regimes_of
 from identification.gap.locate.settings import LocalisationSettings
 from identification.gap.locate.windows import Window, most_misfitting_runs
 from identification.gap.model.state_equation import StateEquation
@@ -103,7 +103,7 @@ def locate(
     """
     settings, bootstrap = settings or LocalisationSettings(), bootstrap or ReductionSettings()
     plant, values = problem.plant, problem.candidate(estimate)
-    masks = [plant.regimes(values, r) for r in problem.all_runs]
+    masks = [regimes_of(plant, values, r) for r in problem.all_runs]
     runs = most_misfitting_runs(problem, residuals, settings.samples)
     scale = time_scale(plant)
     design, forms = quadratic_forms(problem, estimate, runs, scale, settings)

@@ -11,6 +11,9 @@ from identification.gap.model.grey_box import GreyBox
 from identification.gap.reduce.block_bootstrap import block_weights, interval
 from identification.gap.reduce.settings import ReductionSettings
 
+WHOLE = "the_whole_recording"
+"""The one regime of a plant that tells none apart."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class RegimeGap:
@@ -28,6 +31,14 @@ class RegimeGap:
     """True where held-out runs alone give the gap; False where the regime is too rare in them."""
 
 
+def regimes_of(plant: GreyBox, values: Mapping[str, NDArray], run: int) -> Mapping[str, NDArray]:
+    """Samples of each regime, boolean (samples,) by name; all of them where the plant has no regimes.
+
+    values: one candidate's values by symbol, (1,) or (1, runs) [SI]. run: index of the run.
+    """
+    return plant.regimes(values, run) or {WHOLE: np.ones(len(plant.runs[run].time), dtype=bool)}
+
+
 def regime_gaps(
     plant: GreyBox,
     masks: Sequence[Mapping[str, NDArray]],
@@ -37,7 +48,7 @@ def regime_gaps(
     bootstrap: ReductionSettings,
     scale: float,
 ) -> list[RegimeGap]:
-    """The gap of every channel in every regime that occurs; of none where the plant has no regimes.
+    """The gap of every channel in every regime that occurs.
 
     The bootstrap draws whole occurrences of a regime, cut into blocks where they are long.
 

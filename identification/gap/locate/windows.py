@@ -106,8 +106,13 @@ def _motion(traces: Mapping[str, StateTrace]) -> list[NDArray]:
 
 
 def _typical_length(edges: NDArray, traces: Mapping[str, StateTrace]) -> float:
-    """Length of a window [samples] such that half of the motion lies in shorter ones; 0 at rest."""
+    """Length of a window [samples] such that half of the motion lies in shorter ones; 0 at rest.
+
+    Where the plant names no states any motion is possible at any time.
+    """
     motion = _motion(traces)
+    if not traces:
+        return float(np.median(np.diff(edges)))
     if not motion:
         return 0.0
     lengths, inside = np.diff(edges), np.add.reduceat(np.sum(motion, axis=0), edges[:-1])
