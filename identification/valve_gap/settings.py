@@ -7,6 +7,8 @@ from dataclasses import dataclass
 class ValveSettings:
     """How the valve's recordings, regimes, parameters and experiments are judged."""
 
+    time_scale: float = 5e-3
+    """How long the fastest transients last [s]: the armature's flight, the decay of the current."""
     noise_block: float = 0.02
     """Length of the stretches of which each has its own estimate of the noise [s]: 40 samples."""
     switching_transient: float = 0.02

@@ -52,6 +52,7 @@ class Valve:
             ValueError: the catalogue does not have a cause of `without`.
         """
         self.settings = settings
+        self.time_scale = settings.time_scale
         problem = calibration_problem(campaign, start=nominal)
         self.base = problem.vector.reference
         self.recordings = (*problem.calibration, *problem.validation)

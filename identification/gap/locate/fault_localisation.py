@@ -16,10 +16,11 @@ from identification.gap.locate.forcing_processes import (
     average_log_evidence,
     fit_processes,
 )
-from identification.gap.locate.regime_gaps import RegimeGap, regime_gaps
+from identification.gap.locate.regime_gaps import RegimeGap, regime_gaps, regimes_of
 from identification.gap.locate.settings import LocalisationSettings
 from identification.gap.locate.windows import Window, most_misfitting_runs
 from identification.gap.model.state_equation import StateEquation
+from identification.gap.model.time_scale import time_scale
 from identification.gap.reduce.settings import ReductionSettings
 
 
@@ -102,9 +103,10 @@ def locate(
     """
     settings, bootstrap = settings or LocalisationSettings(), bootstrap or ReductionSettings()
     plant, values = problem.plant, problem.candidate(estimate)
-    masks = [plant.regimes(values, r) for r in problem.all_runs]
+    masks = [regimes_of(plant, values, r) for r in problem.all_runs]
     runs = most_misfitting_runs(problem, residuals, settings.samples)
-    design, forms = quadratic_forms(problem, estimate, runs, settings)
+    scale = time_scale(plant)
+    design, forms = quadratic_forms(problem, estimate, runs, scale, settings)
     fits = fit_processes(forms, design, settings)
     evidence = np.array([average_log_evidence(own) for own in fits])
     priors = [1.0 if form.windows else settings.prior_reading for form in forms]
@@ -114,7 +116,7 @@ def locate(
     missing = weights[-1] < np.max(weights[:-1])
     return Localisation(
         channel_gaps=_channel_gaps(problem, residuals),
-        regime_gaps=regime_gaps(plant, masks, residuals, seed, settings, bootstrap),
+        regime_gaps=regime_gaps(plant, masks, residuals, seed, settings, bootstrap, scale),
         equation_probabilities={equation.name: 0.0 for equation in plant.equations}
         | {form.equation.name: float(w) for form, w in zip(forms, weights[:-1], strict=True)},
         nothing_missing=float(weights[-1]),

@@ -17,8 +17,8 @@ from identification.gap.fit.linearisation import linearise
 from identification.gap.locate.nuisance_elimination import NuisanceElimination
 from identification.gap.locate.sensor_faults import physical_forms, reading_faults
 from identification.gap.locate.settings import LocalisationSettings
-from identification.gap.locate.windows import Window, window_edges, windows_of
-from identification.gap.model.grey_box import noise_weighted
+from identification.gap.locate.windows import Window, most_windows, resolving_edges, windows_of
+from identification.gap.model.grey_box import GreyBox, noise_weighted
 from identification.gap.model.state_equation import StateEquation
 
 
@@ -51,7 +51,11 @@ class LocalisationDesign:
 
 
 def quadratic_forms(
-    problem: FittingProblem, estimate: Estimate, runs: Sequence[int], settings: LocalisationSettings
+    problem: FittingProblem,
+    estimate: Estimate,
+    runs: Sequence[int],
+    scale: float,
+    settings: LocalisationSettings,
 ) -> tuple[LocalisationDesign, list[QuadraticForm]]:
     """Quadratic form of every equation that can lack something, and of every fault of the readings.
 
@@ -59,19 +63,24 @@ def quadratic_forms(
         problem: the plant with its readings.
         estimate: the model whose residual is to be explained.
         runs: indices of the runs.
+        scale: the plant's time scale [s].
         settings: windows and forms of faults.
     """
     plant, values = problem.plant, problem.candidate(estimate)
     traces = [plant.states(values, r) for r in runs]
     times = [plant.runs[r].time for r in runs]
-    edges = [window_edges(t, own, settings) for t, own in zip(times, traces, strict=True)]
+    most = most_windows(len(runs), len(plant.channels) * max(len(t) for t in times), settings)
+    edges = [
+        resolving_edges(t, own, scale, most, settings) for t, own in zip(times, traces, strict=True)
+    ]
     windows = [
         window
         for r, time, ends, own in zip(runs, times, edges, traces, strict=True)
         for window in windows_of(r, time, ends, own)
     ]
     linearised = linearise(problem, [estimate], runs)[0]
-    elimination = NuisanceElimination(linearised, settings.regularisation)
+    counted = [_counted(plant, r, ends) for r, ends in zip(runs, edges, strict=True)]
+    elimination = NuisanceElimination(linearised, counted, settings.regularisation)
     forms = []
     for equation in plant.equations:
         if equation.step:
@@ -83,9 +92,17 @@ def quadratic_forms(
     design = LocalisationDesign(
         units={name: (trace.unit, trace.scale) for name, trace in traces[0].items()},
         chi_square=elimination.chi_square,
-        readings=int(sum(np.sum(plant.runs[r].trusted) for r in runs)),
+        readings=int(sum(np.sum(own) for own in counted)),
     )
     return design, [*forms, *_fault_forms(problem, values, runs, elimination, settings)]
+
+
+def _counted(plant: GreyBox, run: int, edges: NDArray) -> NDArray:
+    """Trusted readings that the windows cover, boolean (values,)."""
+    counted = plant.runs[run].trusted.copy()
+    if edges[-1] < counted.shape[1] - 1:
+        counted[:, edges[-1] :] = False
+    return counted.ravel()
 
 
 def _forced_changes(

@@ -11,6 +11,9 @@ from identification.gap.model.grey_box import GreyBox
 from identification.gap.reduce.block_bootstrap import block_weights, interval
 from identification.gap.reduce.settings import ReductionSettings
 
+WHOLE = "the_whole_recording"
+"""The one regime of a plant that tells none apart."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class RegimeGap:
@@ -28,6 +31,14 @@ class RegimeGap:
     """True where held-out runs alone give the gap; False where the regime is too rare in them."""
 
 
+def regimes_of(plant: GreyBox, values: Mapping[str, NDArray], run: int) -> Mapping[str, NDArray]:
+    """Samples of each regime, boolean (samples,) by name; all of them where the plant has no regimes.
+
+    values: one candidate's values by symbol, (1,) or (1, runs) [SI]. run: index of the run.
+    """
+    return plant.regimes(values, run) or {WHOLE: np.ones(len(plant.runs[run].time), dtype=bool)}
+
+
 def regime_gaps(
     plant: GreyBox,
     masks: Sequence[Mapping[str, NDArray]],
@@ -35,6 +46,7 @@ def regime_gaps(
     seed: int,
     settings: LocalisationSettings,
     bootstrap: ReductionSettings,
+    scale: float,
 ) -> list[RegimeGap]:
     """The gap of every channel in every regime that occurs.
 
@@ -47,11 +59,14 @@ def regime_gaps(
         seed: of the bootstrap.
         settings: length and least number of the parts of a regime.
         bootstrap: number of draws, and level of the intervals.
+        scale: the plant's time scale [s].
     """
+    shortest = min(float(run.time[-1]) for run in plant.runs)
+    block = min(settings.regime_block * scale, settings.regime_block_share * shortest)
     gaps = []
     for regime in masks[0]:
         own = [mask[regime] for mask in masks]
-        squares, counts, held_out = _sums(plant, own, residuals, settings)
+        squares, counts, held_out = _sums(plant, own, residuals, block, settings.fewest_parts)
         parts = squares.shape[1]
         weights = block_weights([parts], seed, bootstrap) if parts >= settings.fewest_parts else None
         for channel, square, count in zip(plant.channels, squares, counts, strict=True):
@@ -74,15 +89,17 @@ def _sums(
     plant: GreyBox,
     masks: Sequence[NDArray],
     residuals: Sequence[NDArray],
-    settings: LocalisationSettings,
+    block: float,
+    fewest: int,
 ) -> tuple[NDArray, NDArray, bool]:
-    """Sums over parts of held-out runs, or of all runs where those are too few, and which."""
-    each = [
-        _part_sums(plant, r, mask, residuals[r], settings.regime_block) for r, mask in enumerate(masks)
-    ]
+    """Sums over parts of held-out runs, or of all runs where those are fewer than `fewest`, and which.
+
+    block: longest part [s].
+    """
+    each = [_part_sums(plant, r, mask, residuals[r], block) for r, mask in enumerate(masks)]
     squares, counts = (np.concatenate(parts, axis=1) for parts in zip(*each, strict=True))
     own = np.repeat([run.held_out for run in plant.runs], [part[0].shape[1] for part in each])
-    if np.sum(own) >= settings.fewest_parts:
+    if np.sum(own) >= fewest:
         return squares[:, own], counts[:, own], True
     return squares, counts, False
 

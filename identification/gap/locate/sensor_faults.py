@@ -112,4 +112,4 @@ def _lag_change(y: NDArray, lag: float) -> NDArray:
 def _delay_change(y: NDArray, delay: int) -> NDArray:
     """Change of series (channels, samples) by a delay of `delay` samples."""
     held = np.repeat(y[:, :1], delay, axis=1)
-    return np.concatenate([held, y[:, :-delay]], axis=1) - y
+    return np.concatenate([held, y], axis=1)[:, : y.shape[1]] - y

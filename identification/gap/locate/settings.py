@@ -10,7 +10,23 @@ class LocalisationSettings:
     # Windows and runs
 
     windows: int = 80
-    """Most windows of a run in which a forcing is constant; computing time."""
+    """Windows of a run in which a forcing is constant, where they follow its motion; computing time."""
+
+    longest_window: float = 1.5
+    """Length of a window, half of the motion lying in shorter ones, up to which windows follow the
+    motion [time scales]: a third of a period at most."""
+
+    resolved_window: float = 0.5
+    """The same length where more windows are needed [time scales]: ten in a period."""
+
+    most_windows: int = 400
+    """Most windows of a run; where they are too few, only the first part of the run counts."""
+
+    windows_together: int = 1200
+    """Most windows of all runs where they are more than usual: time for matrices of this size."""
+
+    most_values: int = 8_000_000
+    """Most changes of a run's readings by its windows: 64 MB, of which three copies exist at a time."""
 
     uniform_share: float = 0.3
     """Share of the windows spread uniformly in time [1]; the others follow the states' motion."""
@@ -70,8 +86,12 @@ class LocalisationSettings:
 
     # Regimes
 
-    regime_block: float = 0.02
-    """Longest part of a regime that the bootstrap draws as one [s]: longer than residuals correlate."""
+    regime_block: float = 4.0
+    """Longest part of a regime that the bootstrap draws as one [time scales]: longer than residuals
+    correlate."""
+
+    regime_block_share: float = 0.05
+    """The same relative to the shortest run [1], where that is less: enough parts in slow plants."""
 
     fewest_parts: int = 5
     """Fewest parts of a regime. With fewer on held-out runs all runs count; with fewer on all runs the

@@ -1,7 +1,7 @@
 """Windows of the runs in which a forcing is constant."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,21 +43,82 @@ def most_misfitting_runs(
     return sorted(chosen)
 
 
+def resolving_edges(
+    time: NDArray,
+    traces: Mapping[str, StateTrace],
+    scale: float,
+    most: int,
+    settings: LocalisationSettings,
+) -> NDArray:
+    """Edges of windows that follow the motion: more than usual, and of the run's first part, if need be.
+
+    Args:
+        time: sampling instants, (samples,) [s].
+        traces: states of the run by name.
+        scale: the plant's time scale [s].
+        most: most windows.
+        settings: usual number and length of windows.
+
+    Returns:
+        First sample of each window, and the end of the last one, (windows + 1,).
+    """
+    edges = window_edges(time, traces, settings.windows, settings)
+    typical = _typical_length(edges, traces) * (time[1] - time[0]) / scale
+    if typical <= settings.longest_window:
+        return edges
+    needed = int(np.ceil(settings.windows * typical / settings.resolved_window))
+    if needed > most:
+        covered = max(settings.windows, int(len(time) * most / needed))
+        time, needed = time[:covered], most
+        traces = {name: replace(trace, values=trace.values[:covered]) for name, trace in traces.items()}
+    return window_edges(time, traces, needed, settings)
+
+
+def most_windows(runs: int, values: int, settings: LocalisationSettings) -> int:
+    """Most windows of one of several runs.
+
+    runs: number of runs. values: number of readings of the longest one, over all channels.
+    """
+    most = min(settings.most_windows, settings.windows_together // runs, settings.most_values // values)
+    return max(settings.windows, most)
+
+
 def window_edges(
-    time: NDArray, traces: Mapping[str, StateTrace], settings: LocalisationSettings
+    time: NDArray, traces: Mapping[str, StateTrace], windows: int, settings: LocalisationSettings
 ) -> NDArray:
     """First sample of each window and the end of the last one, dense where states move, (windows + 1,).
 
-    time: (samples,) [s]. traces: states of the run by name. No window is empty.
+    time: (samples,) [s]. traces: states of the run by name. windows: most windows. No window is empty.
     """
-    changes = [np.abs(np.diff(trace.values)) for trace in traces.values()]
-    motion = [change / np.sum(change) for change in changes if np.any(change)]
     uniform = np.full(len(time) - 1, 1.0 / (len(time) - 1))
     share = settings.uniform_share
-    density = share * uniform + (1 - share) * np.mean([*motion, uniform], axis=0)
+    density = share * uniform + (1 - share) * np.mean([*_motion(traces), uniform], axis=0)
     progress = np.concatenate([[0.0], np.cumsum(density)]) / np.sum(density)
-    ends = np.searchsorted(progress, np.linspace(0.0, 1.0, settings.windows + 1)[1:-1])
+    ends = np.searchsorted(progress, np.linspace(0.0, 1.0, windows + 1)[1:-1])
     return np.unique([0, *ends, len(time) - 1])
+
+
+def _motion(traces: Mapping[str, StateTrace]) -> list[NDArray]:
+    """Share of its path that each state covers between samples, (samples - 1,) [1]; of those that
+    move."""
+    changes = [np.abs(np.diff(trace.values)) for trace in traces.values()]
+    return [change / np.sum(change) for change in changes if np.any(change)]
+
+
+def _typical_length(edges: NDArray, traces: Mapping[str, StateTrace]) -> float:
+    """Length of a window [samples] such that half of the motion lies in shorter ones; 0 at rest.
+
+    Where the plant names no states any motion is possible at any time.
+    """
+    motion = _motion(traces)
+    if not traces:
+        return float(np.median(np.diff(edges)))
+    if not motion:
+        return 0.0
+    lengths, inside = np.diff(edges), np.add.reduceat(np.sum(motion, axis=0), edges[:-1])
+    order = np.argsort(lengths)
+    moved = np.cumsum(inside[order])
+    return float(lengths[order][np.searchsorted(moved, 0.5 * moved[-1])])
 
 
 def windows_of(

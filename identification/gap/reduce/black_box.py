@@ -46,7 +46,12 @@ def ridge_learner(settings: ReductionSettings) -> Learner:
 
 
 def predict_residuals(
-    plant: GreyBox, model: Prediction, learner: Learner, seed: int, settings: ReductionSettings
+    plant: GreyBox,
+    model: Prediction,
+    learner: Learner,
+    seed: int,
+    settings: ReductionSettings,
+    scale: float,
 ) -> list[NDArray]:
     """A model's residuals of the held-out runs as the black box predicts them.
 
@@ -56,15 +61,22 @@ def predict_residuals(
         learner: the black box.
         seed: of its random features.
         settings: of the features.
+        scale: the plant's time scale [s].
 
     Returns:
         Per run (channels, samples) [noise deviations]; zero in the fitted runs, which are not judged.
     """
-    features = [history_features(plant, r, y, settings) for r, y in enumerate(model.outputs)]
+    features = [history_features(plant, r, y, scale, settings) for r, y in enumerate(model.outputs)]
+    fitted = [r for r, run in enumerate(plant.runs) if not run.held_out]
+    samples = sum(len(features[r]) for r in fitted)
+    longest = max(1, samples // settings.fewest_learning_samples)
     learning = [
-        _thinned(features[r], model.residuals[r], history_stride(plant, r, settings))
-        for r, run in enumerate(plant.runs)
-        if not run.held_out
+        _thinned(
+            features[r],
+            model.residuals[r],
+            min(longest, history_stride(plant, r, scale, settings)),
+        )
+        for r in fitted
     ]
     held_out = [features[r] for r, run in enumerate(plant.runs) if run.held_out]
     predictions = iter(learner(learning, held_out, seed))

@@ -25,22 +25,22 @@ class Interval:
     high: float
 
 
-def block_starts(samples: int, period: float, settings: ReductionSettings) -> NDArray:
+def block_starts(samples: int, scale: float, settings: ReductionSettings) -> NDArray:
     """First samples of a run's blocks, (blocks,) with 2 or more; a shorter rest joins the last block.
 
-    samples: of the run. period: of sampling [s].
+    samples: of the run. scale: the plant's time scale [samples].
     """
-    duration = max(settings.least_block_samples, round(settings.block_duration / period))
-    length = min(duration, samples // 2)
+    duration = min(settings.block_duration * scale, settings.block_share * samples)
+    length = min(max(settings.least_block_samples, round(duration)), samples // 2)
     return np.arange(samples // length) * length
 
 
-def block_sums(series: NDArray, period: float, settings: ReductionSettings) -> NDArray:
+def block_sums(series: NDArray, scale: float, settings: ReductionSettings) -> NDArray:
     """Sums over the blocks of a run: series (..., samples) of any unit become sums (blocks, ...).
 
-    period: of sampling [s].
+    scale: the plant's time scale [samples].
     """
-    starts = block_starts(series.shape[-1], period, settings)
+    starts = block_starts(series.shape[-1], scale, settings)
     return np.moveaxis(np.add.reduceat(series, starts, axis=-1), -1, 0)
 
 

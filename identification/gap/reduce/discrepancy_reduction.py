@@ -5,14 +5,17 @@ offsets, the same bootstrap draws. A run offset may follow what a model lacks. S
 also holds the share with nominal run offsets.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from numpy.typing import NDArray
 
 from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.fit.hypothesis import Estimate
 from identification.gap.fit.prediction import Prediction, percentage_errors, predict
+from identification.gap.model.grey_box import GreyBox
+from identification.gap.model.time_scale import time_scale
 from identification.gap.reduce.black_box import Learner, predict_residuals, ridge_learner
 from identification.gap.reduce.block_bootstrap import Interval
 from identification.gap.reduce.gaps import FLOOR, Gap, GapDraws
@@ -46,7 +49,9 @@ class DiscrepancyReduction:
     shares_closed: Mapping[str, Interval]
     """By cause: share of the explainable gap, recalibrated less floor, in 0 to 1."""
     black_box: Gap
-    """The recalibrated model with the black box on top."""
+    """The recalibrated model with the black box on top; without it where it does not help."""
+    black_box_helps: bool
+    """False where the recalibrated model comes nearer to the held-out runs without the black box."""
     unexplained: Unexplained
     """By the best cause; by the recalibrated model where there is none."""
     noise_ratios: Mapping[str, float]
@@ -79,12 +84,14 @@ def measure_discrepancy_reduction(
     predictions = {label: predict(problem, estimate) for label, estimate in estimates.items()}
     causes = [label for label in estimates if label not in (NOMINAL, RECALIBRATED)]
     best = (*causes, RECALIBRATED)[0]
+    scale = time_scale(plant)
     boxes = {
-        label: predict_residuals(plant, predictions[label], learner, seed, settings)
+        label: predict_residuals(plant, predictions[label], learner, seed, settings, scale)
         for label in {RECALIBRATED, best}
     }
-    draws = GapDraws(plant, _all_residuals(predictions, boxes), seed, settings)
-    significance = p_value(plant, predictions[best].residuals, boxes[best], seed, settings)
+    boxes = {label: _helpful(predictions[label].residuals, box, plant) for label, box in boxes.items()}
+    draws = GapDraws(plant, _all_residuals(predictions, boxes), seed, settings, scale)
+    significance = p_value(plant, predictions[best].residuals, boxes[best], seed, settings, scale)
     ratios = zip(plant.channels, draws.noise[0], strict=True)
     return DiscrepancyReduction(
         gaps={
@@ -98,9 +105,23 @@ def measure_discrepancy_reduction(
             for label in causes
         },
         black_box=draws.gap(_boxed(RECALIBRATED)),
+        black_box_helps=any(np.any(block) for block in boxes[RECALIBRATED]),
         unexplained=_unexplained(draws, best, significance),
         noise_ratios={channel.name: float(ratio) for channel, ratio in ratios},
     )
+
+
+def _helpful(
+    residuals: Sequence[NDArray], predicted: Sequence[NDArray], plant: GreyBox
+) -> list[NDArray]:
+    """A black box's prediction, or none where it makes the held-out residuals larger.
+
+    residuals, predicted: per run (channels, samples) [noise deviations].
+    """
+    held_out = [r for r, run in enumerate(plant.runs) if run.held_out]
+    before = sum(np.sum(residuals[r] ** 2) for r in held_out)
+    after = sum(np.sum((residuals[r] - predicted[r]) ** 2) for r in held_out)
+    return [block if after < before else np.zeros_like(block) for block in predicted]
 
 
 def _all_residuals(

@@ -14,7 +14,7 @@ from identification.gap.reduce.block_bootstrap import (
     block_weights,
     interval,
 )
-from identification.gap.reduce.noise_floor import noise_ratios, squared_differences
+from identification.gap.reduce.noise_floor import LAGS, noise_ratios, squared_differences
 from identification.gap.reduce.settings import ReductionSettings
 
 FLOOR = 1.0
@@ -43,6 +43,7 @@ class GapDraws:
         residuals: Mapping[str, Sequence[NDArray]],
         seed: int,
         settings: ReductionSettings,
+        scale: float,
     ):
         """Sum squares over blocks of the held-out runs.
 
@@ -51,18 +52,22 @@ class GapDraws:
             residuals: by model, per run (channels, samples) [noise deviations].
             seed: of the bootstrap.
             settings: of the bootstrap and the noise floor.
+            scale: the plant's time scale [s].
         """
         self.plant = plant
         self.settings = settings
+        self._scale = scale
         held_out = [run for run in plant.runs if run.held_out]
-        blocks = [len(block_starts(len(run.time), run.time[1], settings)) for run in held_out]
+        blocks = [len(block_starts(len(run.time), scale / run.time[1], settings)) for run in held_out]
         self._weights = block_weights(blocks, seed, settings)
-        self._readings = self._sums([run.trusted for run in plant.runs])
+        # A channel without a reading has no squares: any number will do.
+        self._readings = np.maximum(
+            self._sums([run.trusted for run in plant.runs]), np.finfo(float).tiny
+        )
         squares = {label: self._sums([np.square(y) for y in own]) for label, own in residuals.items()}
         best = min(squares, key=lambda label: np.sum(squares[label][0]))
-        differences = squared_differences(plant, residuals[best], settings)
-        changes, count = [self._sums(own) for own in differences]
-        self.noise = noise_ratios(changes / count, squares[best] / self._readings, settings)
+        variograms = np.array([self._variogram(residuals[best], lag) for lag in LAGS])
+        self.noise = noise_ratios(variograms, squares[best] / self._readings, settings)
         """Noise deviation relative to the channel's, (1 + draws, channels) [1]."""
         self._squares = {label: own / self.noise**2 for label, own in squares.items()}
 
@@ -109,10 +114,19 @@ class GapDraws:
         low, high = np.clip([min(kept) - grid[1], max(kept) + grid[1]], 0, 1)
         return Interval(value=value, low=float(low), high=float(high))
 
+    def _variogram(self, residuals: Sequence[NDArray], lag: int) -> NDArray:
+        """Half the mean squared differences over a lag [readings], (1 + draws, channels) [variances].
+
+        residuals: per run (channels, samples) [noise deviations].
+        """
+        differences = squared_differences(self.plant, residuals, lag, self.settings)
+        changes, count = [self._sums(own) for own in differences]
+        return 0.5 * changes / np.maximum(count, np.finfo(float).tiny)
+
     def _sums(self, series: Sequence[NDArray]) -> NDArray:
         """Sums of series, per run (channels, samples), over the held-out runs, (1 + draws, channels)."""
         blocks = [
-            block_sums(np.asarray(y, float), run.time[1], self.settings)
+            block_sums(np.asarray(y, float), self._scale / run.time[1], self.settings)
             for y, run in zip(series, self.plant.runs, strict=True)
             if run.held_out
         ]

@@ -16,6 +16,7 @@ def p_value(
     predicted: Sequence[NDArray],
     seed: int,
     settings: ReductionSettings,
+    scale: float,
 ) -> float:
     """Probability that blocks of the residual in random order agree as well with the prediction.
 
@@ -28,6 +29,7 @@ def p_value(
         predicted: per run (channels, samples) [noise deviations].
         seed: of the permutations.
         settings: number of permutations and length of blocks.
+        scale: the plant's time scale [s].
 
     Returns:
         1 where nothing is predicted.
@@ -38,7 +40,7 @@ def p_value(
     for run, residual, prediction in zip(plant.runs, residuals, predicted, strict=True):
         if not run.held_out:
             continue
-        blocks = [_blocks(series, run.time[1], settings) for series in (prediction, residual)]
+        blocks = [_blocks(series, scale / run.time[1], settings) for series in (prediction, residual)]
         products = blocks[0] @ blocks[1].T
         order = np.arange(len(products))
         agreement[0] += np.trace(products)
@@ -48,8 +50,11 @@ def p_value(
     return float(np.mean(agreement >= agreement[0]))
 
 
-def _blocks(series: NDArray, period: float, settings: ReductionSettings) -> NDArray:
-    """Series (channels, samples) as (blocks, channels x length), all as long as the shortest block."""
-    starts = block_starts(series.shape[1], period, settings)
+def _blocks(series: NDArray, scale: float, settings: ReductionSettings) -> NDArray:
+    """Series (channels, samples) as (blocks, channels x length), all as long as the shortest block.
+
+    scale: the plant's time scale [samples].
+    """
+    starts = block_starts(series.shape[1], scale, settings)
     length = starts[1] if len(starts) > 1 else series.shape[1]
     return np.stack([series[:, start : start + length].ravel() for start in starts])

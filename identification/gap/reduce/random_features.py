@@ -9,29 +9,32 @@ from identification.gap.model.grey_box import GreyBox
 from identification.gap.reduce.settings import ReductionSettings
 
 
-def history_features(plant: GreyBox, run: int, outputs: NDArray, settings: ReductionSettings) -> NDArray:
+def history_features(
+    plant: GreyBox, run: int, outputs: NDArray, scale: float, settings: ReductionSettings
+) -> NDArray:
     """Inputs and model outputs at every instant, and their changes over each lag.
 
     Args:
         plant: the plant with its recordings.
         run: index of the run.
         outputs: model outputs, (channels, samples) [SI].
+        scale: the plant's time scale [s].
         settings: the lags.
 
     Returns:
         (samples, signals x (1 + lags)) [SI], signals being inputs and channels.
     """
     series = np.vstack([*plant.runs[run].inputs.values(), np.nan_to_num(outputs)])
-    stride = history_stride(plant, run, settings)
+    stride = history_stride(plant, run, scale, settings)
     past = [np.roll(series, lag * stride, axis=1) for lag in settings.history_lags]
     for lag, rolled in zip(settings.history_lags, past, strict=True):
         rolled[:, : lag * stride] = series[:, :1]
     return np.vstack([series, *(series - rolled for rolled in past)]).T
 
 
-def history_stride(plant: GreyBox, run: int, settings: ReductionSettings) -> int:
-    """Number of samples in the history unit, at least one."""
-    return max(1, round(settings.history_unit / plant.runs[run].time[1]))
+def history_stride(plant: GreyBox, run: int, scale: float, settings: ReductionSettings) -> int:
+    """Number of samples in the history unit, at least one; scale: the plant's time scale [s]."""
+    return max(1, round(settings.history_unit * scale / plant.runs[run].time[1]))
 
 
 def random_fourier_features(

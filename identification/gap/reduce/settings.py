@@ -9,8 +9,11 @@ class ReductionSettings:
 
     # Block bootstrap
 
-    block_duration: float = 0.03
-    """Length of a bootstrap block [s]: longer than the valve's transients."""
+    block_duration: float = 6.0
+    """Length of a bootstrap block [time scales]: longer than a transient."""
+
+    block_share: float = 0.05
+    """The same relative to the run [1], where that is less: enough blocks in slow plants."""
 
     least_block_samples: int = 20
     """Length of the shortest block [samples], for plants with a long sampling period."""
@@ -36,23 +39,37 @@ class ReductionSettings:
     """Most iterations of the limit of jumps, which usually settles earlier."""
 
     white_noise_tolerance: float = 0.1
-    """Relative distance from the channel's noise up to which noise is taken for white [1]."""
+    """Relative growth of squared differences, from one to four readings, up to which the residual is
+    taken for white [1]: then it is less than 3 % of the noise."""
 
     white_noise_deviations: float = 3.0
-    """The same in standard deviations of the estimate, where the readings tell less."""
+    """The same in standard deviations of the growth, where the readings tell less."""
+
+    least_slow_growth: float = 1.0
+    """Growth from two to four readings, relative to that from one to two [1], from which a slow course
+    lies over white noise: between twice of a rough course and half of noise correlated over two
+    readings."""
+
+    least_white_share: float = 0.5
+    """Share of white noise in the squared differences of neighbours [1] below which it is not told from
+    what else changes."""
 
     share_steps: int = 1000
     """Number of steps between 0 and 1 in which the interval of a share is searched."""
 
     # Black box
 
-    history_unit: float = 5e-4
-    """Unit of the lags below [s], or the sampling period if that is longer: the valve's fastest
-    transients last about as long."""
+    history_unit: float = 0.1
+    """Unit of the lags below [time scales], or the sampling period if that is longer: a transient has
+    about ten."""
 
     history_lags: tuple[int, ...] = (1, 2, 4, 10, 20, 40, 100, 400)
-    """Lags at which the black box sees inputs and outputs [history units]: 0.5 to 20 ms for transients,
-    to 200 ms for what they leave."""
+    """Lags at which the black box sees inputs and outputs [history units]: 0.1 to 4 time scales for
+    transients, to 40 for what they leave."""
+
+    fewest_learning_samples: int = 2000
+    """Samples of all learning runs together that a stride of the history unit must leave; fewer have a
+    shorter stride: one sample tells little through its noise."""
 
     random_features: int = 300
     """Number of random Fourier features; computing time."""

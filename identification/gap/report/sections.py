@@ -4,6 +4,7 @@ import numpy as np
 
 from identification.gap.diagnosis import Diagnosis, hypothesis_label
 from identification.gap.locate.fault_localisation import Localisation
+from identification.gap.locate.regime_gaps import regimes_of
 from identification.gap.rank.evidence import EvaluatedHypothesis
 from identification.gap.rank.verdict import AMBIGUOUS, KNOWN, NO_GAP
 from identification.gap.report import (
@@ -101,7 +102,7 @@ def _residual(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis, name: str) 
     recalibrated = diagnosis.ranking.recalibrated.residuals
     held_out = [r for r, run in enumerate(problem.plant.runs) if run.held_out]
     run = max(held_out, key=lambda r: np.mean(recalibrated[r] ** 2))
-    masks = problem.plant.regimes(problem.candidate(hypothesis.estimate), run)
+    masks = regimes_of(problem.plant, problem.candidate(hypothesis.estimate), run)
     level = diagnosis.settings.reduction.interval_level
     return Picture(
         figure=localisation_figures.residual_figure(

@@ -62,8 +62,14 @@ def reduction_sentence(diagnosis: Diagnosis) -> str:
         models[f"with {name}"] = gaps[name]
     models["with a black box on top of recalibration"] = diagnosis.reduction.black_box
     listed = "; ".join(f"{name} {gap_with_interval(gap.overall)}" for name, gap in models.items())
-    return (
+    text = (
         f"Gap on recordings never fitted to, in noise deviations ({FLOOR:g} is noise alone): {listed}."
+    )
+    if diagnosis.reduction.black_box_helps:
+        return text
+    return (
+        f"{text} The black box finds nothing in what recalibration leaves that holds on these "
+        "recordings: the recalibrated model itself is the floor."
     )
 
 

@@ -13,13 +13,17 @@ SETTINGS = ReductionSettings()
 @pytest.mark.parametrize("samples", [7, 40, 1301, 1349])
 def test_blocks_hold_every_sample_once(samples):
     series = np.arange(2.0 * samples).reshape(2, samples)
-    sums = block_sums(series, 5e-4, SETTINGS)
-    assert len(sums) == len(block_starts(samples, 5e-4, SETTINGS)) >= 2
+    sums = block_sums(series, 10.0, SETTINGS)
+    assert len(sums) == len(block_starts(samples, 10.0, SETTINGS)) >= 2
     np.testing.assert_allclose(sums.sum(axis=0), series.sum(axis=1))
 
 
 def test_blocks_last_as_long_at_any_rate():
-    assert len(block_starts(1200, 5e-4, SETTINGS)) == len(block_starts(6000, 1e-4, SETTINGS)) == 20
+    assert len(block_starts(1200, 10.0, SETTINGS)) == len(block_starts(6000, 50.0, SETTINGS)) == 20
+
+
+def test_a_slow_plant_has_enough_blocks():
+    assert len(block_starts(1200, 300.0, SETTINGS)) == 20
 
 
 def test_weights_of_a_run_add_up_to_its_blocks():
@@ -43,7 +47,7 @@ def test_the_interval_of_a_correlated_mean_covers_it():
     for seed in range(300):
         noise = np.asarray(signal.lfilter([1.0], [1.0, -0.8], rng.standard_normal(1400)))[200:]
         weights = block_weights([20], seed, ReductionSettings(draws=500))
-        means = weights @ block_sums(noise[None], 5e-4, SETTINGS)[:, 0] / 1200
+        means = weights @ block_sums(noise[None], 10.0, SETTINGS)[:, 0] / 1200
         found = interval(means, SETTINGS.interval_level)
         hits.append(found.low <= 0 <= found.high)
     assert np.mean(hits) == pytest.approx(0.9, abs=0.06)

@@ -57,7 +57,21 @@ def test_without_the_true_cause_the_rest_is_predictable():
     found = leaking(("lag",))
     assert found.unexplained.fraction > 0.9
     assert found.unexplained.still_predictable
+    assert found.black_box_helps
     assert found.black_box.overall.value < found.gaps["recalibrated"].overall.value
+
+
+def test_a_black_box_that_does_harm_is_left_out():
+    """It predicts the opposite of what the recalibrated model leaves."""
+    tank = Tank(virtual_recordings({"c": 0.021, "leak": 4e-3}))
+    problem, found = estimates(tank, ())
+    model = predict(problem, found["recalibrated"])
+    judged = measure_discrepancy_reduction(problem, found, lambda *_: [-model.residuals[2]])
+    assert not judged.black_box_helps
+    assert judged.black_box.overall == judged.gaps["recalibrated"].overall
+    assert judged.unexplained.predictable == 0
+    assert judged.unexplained.p_value == 1
+    assert not judged.unexplained.still_predictable
 
 
 def test_without_a_gap_nothing_is_told_of_its_shrinking():

@@ -91,13 +91,13 @@ def test_a_forcing_is_recovered_but_for_noise_and_what_calibration_absorbs():
     problem, estimate, _ = recalibrated_tank()
     plant, values = problem.plant, problem.candidate(estimate)
     equation = plant.equations[0]
-    edges = window_edges(plant.runs[0].time, plant.states(values, 0), SETTINGS)
+    edges = window_edges(plant.runs[0].time, plant.states(values, 0), 80, SETTINGS)
     truth = 20.0 * np.sin(np.linspace(0, 6, len(edges) - 1))
     change = plant.forced(values, equation, 0, edges) @ truth
     altered = FittingProblem(plant, problem.slopes)
     shift = (change / plant.channels[0].noise).ravel()
     altered.measured = [problem.measured[0] + shift, *problem.measured[1:]]
-    design, forms = quadratic_forms(altered, estimate, [0], SETTINGS)
+    design, forms = quadratic_forms(altered, estimate, [0], 100.0, SETTINGS)
     fit = fit_processes(forms, design, SETTINGS)[0][0]
     error = fit.forcing - truth
     assert error @ forms[0].precision @ error < len(truth)
@@ -105,13 +105,13 @@ def test_a_forcing_is_recovered_but_for_noise_and_what_calibration_absorbs():
 
 
 def gaps_of(problem: FittingProblem, masks: list, residuals: list, seed: int) -> list[RegimeGap]:
-    return regime_gaps(problem.plant, masks, residuals, seed, SETTINGS, BOOTSTRAP)
+    return regime_gaps(problem.plant, masks, residuals, seed, SETTINGS, BOOTSTRAP, scale=0.005)
 
 
 def test_windows_are_dense_where_states_move():
     time = np.arange(1000) * 0.1
     moving = StateTrace(unit="m", scale=1.0, values=np.clip((time - 50.0) / 5.0, 0.0, 1.0))
-    edges = window_edges(time, {"x": moving}, SETTINGS)
+    edges = window_edges(time, {"x": moving}, 80, SETTINGS)
     assert edges[0] == 0
     assert edges[-1] == len(time) - 1
     assert np.all(np.diff(edges) > 0)

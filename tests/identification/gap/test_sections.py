@@ -19,6 +19,7 @@ from identification.gap.report.sentences import (
     hidden_causes_sentence,
     look_alikes,
     parameters_at_bounds,
+    reduction_sentence,
 )
 from identification.gap.report.verdict_sentences import verdict_sentence
 from identification.report.page import Picture, Section, Table, write_page
@@ -83,6 +84,13 @@ def test_no_gap_says_so_and_what_to_do():
     assert status == "good"
     assert text.startswith("There is no gap beyond noise after recalibration")
     assert "add nothing" in text
+
+
+def test_a_black_box_that_does_not_help_is_said_to():
+    found = diagnosed("known")
+    assert "itself is the floor" not in reduction_sentence(found)
+    useless = replace(found, reduction=replace(found.reduction, black_box_helps=False))
+    assert reduction_sentence(useless).endswith("the recalibrated model itself is the floor.")
 
 
 def test_an_unknown_cause_is_sent_to_the_place_and_the_shape():

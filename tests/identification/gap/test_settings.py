@@ -14,6 +14,7 @@ from identification.gap.design.settings import DesignSettings
 from identification.gap.diagnosis import diagnose
 from identification.gap.fit.settings import FitSettings
 from identification.gap.locate.settings import LocalisationSettings
+from identification.gap.model.settings import TimeScaleSettings
 from identification.gap.rank.settings import RankingSettings
 from identification.gap.reduce.settings import ReductionSettings
 from identification.gap.report.json_export import as_json
@@ -22,10 +23,11 @@ from tests.identification.gap.tanks import without_gap
 from tests.identification.gap.test_expected_information import Gauge, diagnosed, two
 
 FOLDER = Path(identification.gap.__file__).parent
-DEFINITIONS = {"FLOOR", "MEDIAN_TO_SD", "PREFIXES", "POWER_PREFIXES"}
+DEFINITIONS = {"FLOOR", "LAGS", "MEDIAN_TO_SD", "PREFIXES", "POWER_PREFIXES"}
 """Numbers that are definitions, and no judgement."""
 
 STAGES = (
+    TimeScaleSettings,
     FitSettings,
     RankingSettings,
     LocalisationSettings,
@@ -118,7 +120,7 @@ def content(settings: DiagnosisSettings) -> dict:
         ("ranking", {"form_errors": (0.0, 0.3)}),
         ("ranking", {"no_cause_doubt": 1.0}),
         ("localisation", {"windows": 7}),
-        ("localisation", {"regime_block": 5.0}),
+        ("localisation", {"regime_block": 0.1}),
         ("reduction", {"interval_level": 0.5}),
         ("report", {"listed_causes": 1}),
         ("report", {"systematic_form_error": 0.5}),

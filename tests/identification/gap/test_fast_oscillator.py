@@ -1,0 +1,92 @@
+"""Where the gap of an oscillator lies that swings thousands of times in a recording."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from identification.gap.locate.fault_localisation import Localisation, MissingTerm, locate
+from identification.gap.locate.settings import LocalisationSettings
+from identification.gap.locate.windows import most_windows, resolving_edges
+from identification.gap.model.state_equation import StateTrace
+from identification.gap.rank.evidence import evaluate
+from identification.gap.rank.refinement import recalibrate
+from identification.gap.rank.settings import RankingSettings
+from tests.identification.gap.oscillators import swung
+
+SETTINGS = LocalisationSettings()
+
+PERIODS = 960
+"""Of the drive in a recording: twelve in each of 80 windows."""
+
+
+@cache
+def located(**truth: float) -> Localisation:
+    problem, estimate = recalibrate(swung(truth, PERIODS, samples=10))
+    residuals = evaluate(problem, [estimate], RankingSettings())[0].residuals
+    return locate(problem, estimate, residuals, seed=4)
+
+
+def drag(**truth: float) -> MissingTerm:
+    """What the equation of the speed lacks, over the speed."""
+    term = located(**truth).missing_term
+    assert term is not None
+    assert (term.equation.name, term.state) == ("f2", "v")
+    return term
+
+
+@pytest.mark.parametrize("truth", [{"coulomb": 0.1}, {"quadratic": 0.05}])
+def test_a_missing_drag_is_found_in_the_equation_of_the_speed(truth):
+    found = located(**truth)
+    assert found.equation_probabilities["f2"] > 0.99
+    assert found.forcings[0].explained > 0.9
+
+
+def test_without_a_missing_drag_nothing_is_missing():
+    assert located().nothing_missing > 0.9
+
+
+def test_coulomb_friction_has_the_shape_of_a_step():
+    term = drag(coulomb=0.1)
+    fast = np.abs(term.x) > 0.15
+    np.testing.assert_allclose(term.y[fast], -0.1 * np.sign(term.x[fast]), atol=0.06)
+    assert np.mean(term.y[fast] * np.sign(term.x[fast])) == pytest.approx(-0.1, abs=0.01)
+
+
+def test_quadratic_drag_has_the_shape_of_a_parabola():
+    term = drag(quadratic=0.05)
+    error = (term.y + 0.05 * term.x * np.abs(term.x)) / term.sd
+    assert np.sqrt(np.mean(error**2)) < 2
+    assert term.explained > 0.9
+
+
+def sine(periods: int) -> tuple[np.ndarray, dict[str, StateTrace]]:
+    """Time and trace of an oscillation of 1 s, a fifth of which is the time scale."""
+    time = np.arange(20 * periods) / 20
+    return time, {"x": StateTrace(unit="m", scale=1.0, values=np.sin(2 * np.pi * time))}
+
+
+def test_a_motion_that_usual_windows_follow_has_usual_windows():
+    edges = resolving_edges(*sine(15), 0.19, 400, SETTINGS)
+    assert len(edges) - 1 <= SETTINGS.windows
+    assert edges[-1] == 20 * 15 - 1
+
+
+def test_a_faster_motion_has_more_windows_over_the_whole_run():
+    edges = resolving_edges(*sine(35), 0.19, 400, SETTINGS)
+    assert np.median(np.diff(edges)) <= 2
+    assert edges[-1] == 20 * 35 - 1
+
+
+def test_of_a_run_that_is_too_long_the_first_part_counts():
+    edges = resolving_edges(*sine(1000), 0.19, 400, SETTINGS)
+    assert len(edges) - 1 <= 400
+    assert np.median(np.diff(edges)) <= 3
+    assert 20 * 25 < edges[-1] < 20 * 60
+
+
+def test_windows_are_few_where_runs_are_many_or_long():
+    assert most_windows(1, 10_000, SETTINGS) == SETTINGS.most_windows
+    assert most_windows(6, 10_000, SETTINGS) == SETTINGS.windows_together / 6
+    assert most_windows(50, 10_000, SETTINGS) == SETTINGS.windows
+    assert most_windows(1, 40_000, SETTINGS) == SETTINGS.most_values / 40_000
