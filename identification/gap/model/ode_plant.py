@@ -85,7 +85,7 @@ class OdePlant:
         self._records = Records(states, tuple(self.runs[0].inputs), tuple(self.nominal))
         self._start, self._regimes, self._mode = start, regimes, mode
         self._delays = dict(delays or {})
-        self._units = {name: ("", 1.0) for name in (*states, *self.runs[0].inputs)} | dict(units or {})
+        self._units = dict.fromkeys((*states, *self.runs[0].inputs), ("", 1.0)) | dict(units or {})
         self.equations = self._state_equations(components or {}, forcing_steps or {})
         count = probe(self, self._records, rate, readings, thresholds, self._delays)
         none = thresholds or (lambda x, u, p: ())

@@ -26,7 +26,7 @@ def record(kind: str, names: Sequence[str]) -> Any:
     double = sorted({name for name in names if list(names).count(name) > 1})
     if double:
         raise ValueError(f"{kind} '{double[0]}' is given twice: give every {kind} a name of its own")
-    return namedtuple(kind.replace(" ", "_"), names)  # noqa: PYI024 (fields known at run time only)
+    return namedtuple(kind.replace(" ", "_"), names)
 
 
 class Records:
