@@ -1,0 +1,91 @@
+"""What the examples with other people's recordings share: their data on disk, and their command."""
+
+import argparse
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epv_env.common.command_line import writable_folder
+from epv_env.common.files import write_text
+from identification.gap.diagnosis import diagnose
+from identification.gap.model.cause import Cause
+from identification.gap.model.free_parameter import FreeParameter
+from identification.gap.model.grey_box import GreyBox
+from identification.gap.model.recorded_run import Run
+from identification.gap.report.json_export import as_json
+from identification.gap.report.sections import sections
+from identification.gap.report.verdict_sentences import verdict_sentence
+from identification.report.page import write_page
+
+
+def found(path: Path, source: str) -> Path:
+    """The path. Raises FileNotFoundError with the data's source where it does not exist."""
+    if not path.exists():
+        raise FileNotFoundError(f"{path} does not exist: get the recordings from {source}")
+    return path
+
+
+def run_of(
+    name: str,
+    period: float,
+    measured: NDArray,
+    inputs: dict[str, NDArray],
+    held_out: bool,
+    begin: int = 0,
+) -> Run:
+    """A recording whose readings (channels, samples) count from the sample `begin` on.
+
+    period: of sampling [s]. inputs: by name, (samples,).
+    """
+    trusted = np.isfinite(measured)
+    trusted[:, :begin] = False
+    return Run(
+        name=name,
+        held_out=held_out,
+        time=period * np.arange(measured.shape[1]),
+        measured=measured,
+        trusted=trusted,
+        inputs=inputs,
+    )
+
+
+def cause(
+    name: str,
+    component: str,
+    unit: str,
+    trials: tuple[float, ...],
+    ends: tuple[float, float],
+    nominal: float = 0.0,
+    prior: float = 1.0,
+) -> Cause:
+    """A cause with one size of the same name, which is `nominal` where the cause does not act."""
+    low, high = ends
+    size = FreeParameter(
+        symbol=name,
+        unit=unit,
+        low=low,
+        high=high,
+        nominal=nominal,
+        trials=trials,
+        scale=abs(trials[0] - nominal),
+    )
+    return Cause(name=name, component=component, parameters=(size,), prior=prior)
+
+
+def command(title: str, plant_of: Callable[[Path], GreyBox]) -> int:
+    """Diagnose the recordings in --data: gap.json, report.html and the verdict; returns the status."""
+    parser = argparse.ArgumentParser(description=f"Why a model of {title} misses its recordings.")
+    parser.add_argument("--data", type=Path, required=True, help="folder of the recordings")
+    parser.add_argument("--out", type=writable_folder, required=True, help="folder of results")
+    parser.add_argument("--seed", type=int, default=0, help="of resampling")
+    chosen = parser.parse_args()
+    diagnosis = diagnose(plant_of(chosen.data), seed=chosen.seed)
+    content = json.dumps(as_json(diagnosis), indent=1, allow_nan=False) + "\n"
+    write_text(chosen.out / "gap.json", content)
+    heading = f"Gap between model and recordings: {title}"
+    write_page(chosen.out / "report.html", title=heading, sections=sections(diagnosis))
+    print(verdict_sentence(diagnosis, "")[1])
+    return 0

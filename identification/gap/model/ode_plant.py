@@ -1,0 +1,221 @@
+"""A plant for the diagnosis from plain differential equations: x' = rate(x, u, p)."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.gap.model.cause import Cause
+from identification.gap.model.free_parameter import FreeParameter, NuisanceParameter
+from identification.gap.model.ode_checks import checked_runs, nominal_values, probe
+from identification.gap.model.recorded_run import Channel, Run
+from identification.gap.model.state_equation import StateEquation, StateTrace
+from identification.gap.ode.records import Records
+from identification.gap.ode.settings import OdeSettings
+from identification.gap.ode.simulation import Job
+from identification.gap.ode.simulator import simulator
+
+
+class OdePlant:
+    """`GreyBox` for a user's functions of records: `x.v` a state, `u.force` an input, `p.mass` a symbol.
+
+    Classical Runge-Kutta steps of fixed length; an input is held from its sample to the next one.
+    A candidate whose states are no longer finite is NaN from there on.
+    """
+
+    def __init__(
+        self,
+        *,
+        runs: Sequence[Run],
+        channels: Sequence[Channel],
+        states: Sequence[str],
+        rate: Callable[[Any, Any, Any], Sequence[Any]],
+        readings: Callable[[Any, Any, Any], Sequence[Any]],
+        start: Callable[[Run, Any], Sequence[Any]],
+        parameters: Sequence[FreeParameter],
+        causes: Sequence[Cause],
+        run_offsets: Sequence[NuisanceParameter] = (),
+        tolerances: Sequence[NuisanceParameter] = (),
+        components: Mapping[str, str] | None = None,
+        units: Mapping[str, tuple[str, float]] | None = None,
+        forcing_steps: Mapping[str, float] | None = None,
+        regimes: Callable[[Any, Any, Any], Mapping[str, NDArray]] | None = None,
+        thresholds: Callable[[Any, Any, Any], Sequence[Any]] | None = None,
+        delays: Mapping[str, str] | None = None,
+        steps_per_sample: int | None = None,
+        mode: str = "numpy",
+        settings: OdeSettings | None = None,
+    ):
+        """Describe the plant.
+
+        Args:
+            runs: recordings, all with the same inputs.
+            channels: what is measured, in the order of `readings`.
+            states: names of the states.
+            rate: (x, u, p) to the derivative of each state [SI/s], a tuple. `u.t` is the time [s].
+            readings: (x, u, p) to the reading of each channel [SI], a tuple.
+            start: (run, p) to the states at the first sample [SI], a tuple.
+            parameters: what calibration fits.
+            causes: what may be wrong with the model.
+            run_offsets: nuisance parameters with a value per run.
+            tolerances: nuisance parameters of the unit.
+            components: component in which each state lies; None: each state is its own.
+            units: unit and its size in SI, by state and input; left out: SI, without a name.
+            forcing_steps: change of a rate [SI/s] with a small but clear effect, by state; a state
+                that is left out lacks nothing (x' = v).
+            regimes: (x, u, p) to boolean (samples,) by name, where x and u hold (samples,) arrays.
+            thresholds: (x, u, p) to numbers, a tuple; where one changes its sign, the rate may jump.
+                The integrator stops there, and it stays where both sides push back (sticking).
+            delays: by input the symbol [s] by which it acts late.
+            steps_per_sample: Runge-Kutta steps in a sampling period; None: halved until readings at
+                the nominal values and at all trials settle.
+            mode: "numpy": rate, readings, start and thresholds take arrays, one value per candidate.
+                "python": they take numbers, slowly. "compiled": numba compiles all but `start`, which
+                takes numbers; it is the fastest, after some seconds.
+            settings: accuracy; None: the defaults.
+
+        Raises:
+            ValueError: for names, numbers of results or a mode that do not fit.
+        """
+        self.runs, self.channels = checked_runs(runs, channels), tuple(channels)
+        self.parameters, self.causes = tuple(parameters), tuple(causes)
+        self.run_offsets, self.tolerances = tuple(run_offsets), tuple(tolerances)
+        self.nominal = nominal_values(parameters, causes, (*run_offsets, *tolerances))
+        self._records = Records(states, tuple(self.runs[0].inputs), tuple(self.nominal))
+        self._start, self._regimes, self._mode = start, regimes, mode
+        self._delays = dict(delays or {})
+        self._units = dict.fromkeys((*states, *self.runs[0].inputs), ("", 1.0)) | dict(units or {})
+        self.equations = self._state_equations(components or {}, forcing_steps or {})
+        count = probe(self, self._records, rate, readings, thresholds, self._delays)
+        none = thresholds or (lambda x, u, p: ())
+        functions = (rate, len(states)), (readings, len(channels)), (none, count)
+        self._simulate = simulator(self._records, functions, mode, settings or OdeSettings())
+        self.steps_per_sample = steps_per_sample or self._settled(settings or OdeSettings())
+
+    def outputs(self, values: Mapping[str, NDArray], runs: Sequence[int]) -> list[NDArray]:
+        """`GreyBox.outputs`: per run (channels, samples, n) [SI]."""
+        return [self._run(values, r)[0] for r in runs]
+
+    def states(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, StateTrace]:
+        """`GreyBox.states`: states and inputs, values (samples,) [SI]."""
+        x = self._run(_first(values), run)[1][..., 0]
+        traces = dict(zip(self._records.states, x, strict=True)) | dict(self.runs[run].inputs)
+        return {
+            name: StateTrace(unit=self._units[name][0], scale=self._units[name][1], values=trace)
+            for name, trace in traces.items()
+        }
+
+    def regimes(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, NDArray]:
+        """`GreyBox.regimes`: boolean (samples,) by name; values: (n,) or (n, runs) by symbol [SI]."""
+        if self._regimes is None:
+            return {}
+        x = self._run(_first(values), run)[1][..., 0]
+        own = self.runs[run]
+        p = self._records.p(*self._parameters(_first(values), run)[:, 0])
+        return self._regimes(self._records.x(*x), self._records.u(own.time, *own.inputs.values()), p)
+
+    def forced(
+        self, values: Mapping[str, NDArray], equation: StateEquation, run: int, edges: NDArray
+    ) -> NDArray:
+        """`GreyBox.forced`: change (channels, samples, windows) [SI]; edges: samples (windows + 1,)."""
+        windows = len(edges) - 1
+        push = np.zeros((len(self._records.states), windows + 1))
+        push[self._records.states.index(equation.state), 1:] = equation.step
+        acting = np.array([[0, *edges[:-1]], [0, *edges[1:]]])
+        copies = {symbol: np.repeat(v[:1], windows + 1, axis=0) for symbol, v in values.items()}
+        copies = copies or {symbol: np.full(windows + 1, v) for symbol, v in self.nominal.items()}
+        read = self._run(copies, run, push=push, acting=acting)[0]
+        return read[..., 1:] - read[..., :1]
+
+    def _run(
+        self,
+        values: Mapping[str, NDArray],
+        run: int,
+        push: NDArray | None = None,
+        acting: NDArray | None = None,
+        steps: int | None = None,
+    ) -> tuple[NDArray, NDArray]:
+        """Readings (channels, samples, n) and states (states, samples, n) of a run [SI]."""
+        p = self._parameters(values, run)
+        n, own, names = p.shape[1], self.runs[run], self._records
+        delays = np.zeros((len(names.inputs), n))
+        for name, symbol in self._delays.items():
+            delays[names.inputs.index(name)] = p[names.symbols.index(symbol)]
+        job = Job(
+            start=self._starts(own, p),
+            inputs=np.array([*own.inputs.values()], dtype=float).reshape(-1, len(own.time)).T.copy(),
+            delays=delays,
+            parameters=p,
+            period=float(own.time[1] - own.time[0]),
+            steps=steps or self.steps_per_sample,
+            acting=np.zeros((2, n), dtype=int) if acting is None else acting,
+            push=np.zeros((len(names.states), n)) if push is None else push,
+        )
+        with np.errstate(all="ignore"):
+            return self._simulate(job)
+
+    def _parameters(self, values: Mapping[str, NDArray], run: int) -> NDArray:
+        """Values of all symbols in a run, (symbols, n) [SI]."""
+        n = max((np.shape(v)[0] for v in values.values()), default=1)
+        p = np.repeat(np.array([*self.nominal.values()], dtype=float)[:, None], n, axis=1)
+        for i, symbol in enumerate(self._records.symbols):
+            if symbol in values:
+                given = np.asarray(values[symbol])
+                p[i] = given[:, run] if given.ndim == 2 else given
+        return p
+
+    def _starts(self, run: Run, p: NDArray) -> NDArray:
+        """States at the first sample, (states, n) [SI]."""
+        if self._mode == "numpy":
+            begun = self._start(run, self._records.p(*p))
+            return np.array([np.broadcast_to(b, p.shape[1:]) for b in begun], dtype=float)
+        return np.array([self._start(run, self._records.p(*own)) for own in p.T], dtype=float).T.copy()
+
+    def _state_equations(
+        self, components: Mapping[str, str], forcing_steps: Mapping[str, float]
+    ) -> tuple[StateEquation, ...]:
+        """One equation for each state."""
+        return tuple(
+            StateEquation(
+                name=f"d{name}/dt",
+                state=name,
+                component=components.get(name, name),
+                unit=f"{self._units[name][0] or '1'}/s",
+                scale=self._units[name][1],
+                step=forcing_steps.get(name, 0.0),
+            )
+            for name in self._records.states
+        )
+
+    def _settled(self, settings: OdeSettings) -> int:
+        """Sub-steps whose halving changes no reading noticeably, nominal or at a trial of a cause."""
+        trials = [
+            {parameter.symbol: trial}
+            for cause in self.causes
+            for parameter in cause.parameters
+            for trial in parameter.trials
+        ]
+        candidates = [self.nominal | changed for changed in [{}, *trials]]
+        values = {symbol: np.array([own[symbol] for own in candidates]) for symbol in self.nominal}
+        noise = np.array([channel.noise for channel in self.channels])[:, None, None]
+        steps, coarse = 1, None
+        while steps <= settings.most_steps_per_sample:
+            fine = [self._run(values, r, steps=steps)[0] / noise for r in range(len(self.runs))]
+            if coarse is not None and _largest_change(coarse, fine) <= settings.step_error:
+                return steps // 2
+            steps, coarse = 2 * steps, fine
+        return steps // 2
+
+
+def _largest_change(coarse: Sequence[NDArray], fine: Sequence[NDArray]) -> float:
+    """Largest difference of readings [noise deviations]; infinity where only the fine one is finite."""
+    changes = [
+        np.where(np.isfinite(b), np.nan_to_num(np.abs(b - a), nan=np.inf), 0.0)
+        for a, b in zip(coarse, fine, strict=True)
+    ]
+    return float(max(np.max(change) for change in changes))
+
+
+def _first(values: Mapping[str, NDArray]) -> dict[str, NDArray]:
+    return {symbol: np.asarray(v)[:1] for symbol, v in values.items()}

@@ -1,0 +1,1 @@
+"""Simulation of a plant from its plain ordinary differential equations."""
