@@ -1,11 +1,13 @@
 """The whole diagnosis of a grey-box plant: which cause, where, and how far the gap is reduced."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from identification.gap.fit.fit_cache import FitCache
 from identification.gap.fit.hypothesis import Estimate, Hypothesis
 from identification.gap.locate.fault_localisation import Localisation, locate
+from identification.gap.model.checks import check
 from identification.gap.model.grey_box import GreyBox
+from identification.gap.model.prepared_plant import prepared
 from identification.gap.rank.evidence import EvaluatedHypothesis
 from identification.gap.rank.ranking import Ranking, rank_hypotheses
 from identification.gap.rank.verdict import (
@@ -42,7 +44,7 @@ class Diagnosis:
     judged: list[RankedCause]
     """Causes whose discrepancy reduction was measured, the most probable first."""
     warnings: list[str]
-    """Fits that did not converge, in sentences."""
+    """Doubts about the plant's description and fits that did not converge, in sentences."""
     settings: DiagnosisSettings
 
     @property
@@ -73,19 +75,17 @@ def diagnose(
         cache: runs the fits and may keep them; None keeps nothing.
 
     Raises:
-        ValueError: where no run is held out.
+        PlantError: something is wrong with the plant or its recordings; each finding is one line.
     """
-    if not any(run.held_out for run in plant.runs):
-        raise ValueError(
-            "no recording is held out: a gap is judged on recordings never fitted to; give one the role "
-            "'validation'"
-        )
     settings, cache = settings or DiagnosisSettings(), cache or FitCache(plant)
+    warnings = check(plant, settings.preparation)
+    plant = prepared(plant, settings.preparation)
     ranking = rank_hypotheses(plant, cache, settings.ranking, settings.fit)
     cache.announce("where")
     localisation = _locate(ranking, ranking.recalibrated, seed, settings)
     cache.announce("how far it shrinks")
-    return _judge(ranking, localisation, seed, settings)
+    diagnosis = _judge(ranking, localisation, seed, settings)
+    return replace(diagnosis, warnings=[*warnings, *diagnosis.warnings])
 
 
 def _locate(

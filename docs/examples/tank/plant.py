@@ -70,7 +70,7 @@ class Tank:
 
     def _inflow(self, run: int) -> tuple[NDArray, float]:
         """And the sampling period."""
-        return self.runs[run].inputs["q"], float(self.runs[run].time[1])
+        return self.runs[run].inputs["q"], float(self.runs[run].time[1] - self.runs[run].time[0])
 
 
 def _cause(name: str, component: str, unit: str, *, trial: float, high: float) -> Cause:

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import trapezoid
 
 from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.fit.hypothesis import Estimate
@@ -106,11 +105,15 @@ def percentage_errors(plant: GreyBox, outputs: Sequence[NDArray]) -> Mapping[str
         outputs: model outputs, per run (channels, samples) [SI].
 
     Returns:
-        Errors by channel and 'overall' [%]; None where the time mean of a channel, by which eq. 19
-        divides, vanishes.
+        Errors by channel and 'overall' [%]; None where a channel changes its sign or stays at 0: eq. 19
+        divides by its time mean, which then says nothing of its size.
     """
     held_out = [(run, y) for run, y in zip(plant.runs, outputs, strict=True) if run.held_out]
-    if any(_mean_vanishes(run.measured, run.time) for run, _ in held_out):
+    if not all(
+        _keeps_sign(readings, channel.noise)
+        for run, _ in held_out
+        for channel, readings in zip(plant.channels, run.measured, strict=True)
+    ):
         return None
     errors = np.array(
         [
@@ -128,7 +131,7 @@ def percentage_errors(plant: GreyBox, outputs: Sequence[NDArray]) -> Mapping[str
     return {name: 100 * error for name, error in {**by_channel, "overall": float(overall)}.items()}
 
 
-def _mean_vanishes(measured: NDArray, time: NDArray) -> bool:
-    """Whether the time mean of a channel of readings (channels, samples) is zero but for rounding."""
-    means = trapezoid(measured, time) / (time[-1] - time[0])
-    return bool(np.any(np.abs(means) <= 1e-6 * np.max(np.abs(measured), axis=1)))
+def _keeps_sign(measured: NDArray, noise: float | None) -> bool:
+    """Whether readings (samples,) [SI] lie on one side of 0, and their mean off 0, but for noise."""
+    positive, negative = np.mean(np.maximum(measured, 0.0)), np.mean(np.maximum(-measured, 0.0))
+    return bool(min(positive, negative) <= (noise or 0.0) < abs(positive - negative))

@@ -1,5 +1,6 @@
 """Numbers of the model that are not known exactly: fitted parameters and nuisance parameters."""
 
+import math
 from dataclasses import dataclass
 
 
@@ -18,8 +19,22 @@ class FreeParameter:
     trials: tuple[float, ...] = ()
     """Values [SI] from which the search for a cause begins; () for a calibrated parameter, whose search
     begins at `nominal`."""
-    scale: float = 1.0
-    """Usual size [SI]; the optimiser works with value/scale."""
+    scale: float = math.nan
+    """Usual size [SI], not 0; the optimiser works with value/scale. Left out: `usual_size`."""
+
+    def __post_init__(self):
+        """Give a parameter without a scale its usual size, so that every scale is a number."""
+        if math.isnan(self.scale):
+            object.__setattr__(self, "scale", self.usual_size)
+
+    @property
+    def usual_size(self) -> float:
+        """Magnitude of the nominal value; else of the first trial; else a tenth of the range [SI].
+
+        Never 0: the optimiser divides by it.
+        """
+        first_trial = abs(self.trials[0] - self.nominal) if self.trials else 0.0
+        return abs(self.nominal) or first_trial or abs(self.high - self.low) / 10 or 1.0
 
 
 @dataclass(frozen=True, kw_only=True)

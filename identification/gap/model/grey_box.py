@@ -98,7 +98,24 @@ class GreyBox(Protocol):
 
 
 def noise_weighted(plant: GreyBox, run: int, values: NDArray) -> NDArray:
-    """Values (channels, samples, ...) [SI] in noise standard deviations, 0 at untrusted readings."""
-    noise = np.array([channel.noise for channel in plant.channels])
-    mask = plant.runs[run].trusted / noise[:, None]
-    return values * mask.reshape(*mask.shape, *[1] * (values.ndim - 2))
+    """Values (channels, samples, ...) [SI] in noise standard deviations, 0 at untrusted readings.
+
+    Raises ValueError where the noise of a channel is not known: see `prepared`.
+    """
+    trusted = plant.runs[run].trusted
+    mask = trusted / _noise(plant)[:, None]
+    weighted = values * mask.reshape(*mask.shape, *[1] * (values.ndim - 2))
+    weighted[~trusted] = 0.0  # NaN times 0 is NaN
+    return weighted
+
+
+def _noise(plant: GreyBox) -> NDArray:
+    """Noise of every channel, (channels,) [SI]."""
+    noise = [channel.noise for channel in plant.channels]
+    if None in noise:
+        name = plant.channels[noise.index(None)].name
+        raise ValueError(
+            f"channel {name}: its noise is None, but residuals are weighed by it: call prepared(plant), "
+            "which estimates it"
+        )
+    return np.array(noise)

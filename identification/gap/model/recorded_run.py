@@ -15,8 +15,11 @@ class Channel:
     """Unit in which reports show the channel."""
     scale: float
     """Size of that unit in SI."""
-    noise: float
-    """Standard deviation of the readings about the true value [SI], estimated from the recordings."""
+    noise: float | None = None
+    """Standard deviation of the readings about the true value [SI]; None where nobody knows it: the
+    readings then show it."""
+    resolution: float = 0.0
+    """Step between the values that a reading can take (encoder, converter, bus) [SI]; 0 for none."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,10 +30,11 @@ class Run:
     held_out: bool
     """No fit uses a held-out run: the gap and its reduction are judged on these runs."""
     time: NDArray
-    """Sampling instants, uniform from 0, (samples,) [s]."""
+    """Sampling instants, uniform, (samples,) [s]; they need not begin at 0."""
     measured: NDArray
     """Readings, (channels, samples) [SI]."""
     trusted: NDArray
-    """Readings that count, boolean, (channels, samples); a reading at a switching instant does not."""
+    """Readings that count, boolean, (channels, samples); a reading at a switching instant does not, nor
+    one that a slower channel lacks. What does not count may be NaN."""
     inputs: Mapping[str, NDArray]
     """Signals that act on the plant, by name, (samples,) [SI], for figures and the black box."""

@@ -1,72 +1,195 @@
-"""A simulator of which only inputs and outputs are known: no equations, states or regimes."""
+"""Simulators of one candidate at a time: a function, and an FMU."""
 
-from functools import cache
+import pickle
+import shutil
+import sys
+from collections.abc import Mapping
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import virtual_recordings
+from docs.examples.tank.simulator import START, levels, readings
 from identification.gap.diagnosis import Diagnosis, diagnose
-from identification.gap.locate.regime_gaps import WHOLE
-from identification.gap.locate.sensor_faults import reading_faults
-from identification.gap.locate.settings import LocalisationSettings
+from identification.gap.model.black_box_plant import BlackBoxPlant, Regimes
+from identification.gap.model.checks import check
+from identification.gap.model.fmu_simulator import FmuSimulator, fmu_simulator
+from identification.gap.model.free_parameter import NuisanceParameter
+from identification.gap.model.plant_error import PlantError
+from identification.gap.model.recorded_run import Run
 from identification.gap.report.json_export import as_json
 from identification.gap.report.sections import sections
-from identification.report.page import Picture
+from tests.identification.gap.tank_fmu import build_tank_fmu, can_build
+
+TANK = Tank(virtual_recordings({"c": 0.021, "leak": 4e-3}))
 
 
-class ClosedTank(Tank):
-    """A tank that gives levels for inflows and shows nothing else."""
-
-    def __init__(self, **truth: float):
-        super().__init__(virtual_recordings(truth))
-        self.equations = ()
-
-    def states(self, values, run):
-        """None is known."""
-        return {}
-
-    def regimes(self, values, run):
-        """None are told apart."""
-        return {}
-
-    def forced(self, values, equation, run, edges):
-        """There is no equation to force."""
-        raise AssertionError
+def one_tank(values: Mapping[str, float], run: Run) -> NDArray:
+    """Level of one tank, (1, samples) [m]; a tank cannot leak backwards."""
+    if values["leak"] < 0:
+        raise FloatingPointError("the leak is negative")
+    arrays = {symbol: np.array([value]) for symbol, value in values.items()}
+    period = float(run.time[1] - run.time[0])
+    return readings(arrays, levels(arrays, run.inputs["q"], period), period).T
 
 
-@cache
+def filling(run: Run, outputs: NDArray) -> Mapping[str, NDArray]:
+    """A regime from inputs and outputs."""
+    return {"filling": run.inputs["q"] > np.mean(outputs)}
+
+
+def black_box(simulate=one_tank, regimes: Regimes | None = None, **changes) -> BlackBoxPlant:
+    """The leaking tank, whose equation is not known."""
+    members = {
+        "channels": TANK.channels,
+        "runs": TANK.runs,
+        "parameters": TANK.parameters,
+        "causes": TANK.causes,
+        "run_offsets": TANK.run_offsets,
+    }
+    return BlackBoxPlant(simulate, **{**members, **changes}, regimes=regimes)
+
+
+VALUES = {"c": np.array([0.02, 0.03]), "start": np.array([[0.0, 0.1, 0.2], [0.2, 0.1, 0.0]])}
+
+
+def test_candidates_and_runs_keep_their_places():
+    plant = black_box()
+    for run, outputs in zip((2, 0), plant.outputs(VALUES, [2, 0]), strict=True):
+        assert outputs.shape == (1, 240, 2)
+        for i in range(2):
+            values = {"c": VALUES["c"][[i]], "start": VALUES["start"][i, [run]]}
+            (expected,) = TANK.outputs(values, [run])
+            np.testing.assert_allclose(outputs[..., [i]], expected)
+
+
+@pytest.mark.parametrize("pool", [ThreadPoolExecutor, ProcessPoolExecutor])
+def test_a_pool_gives_the_same_outputs(pool):
+    with pool(2) as executor:
+        found = black_box(executor=executor).outputs(VALUES, [0, 1])
+    np.testing.assert_array_equal(found, black_box().outputs(VALUES, [0, 1]))
+
+
+def test_the_function_sees_every_symbol():
+    seen = {}
+
+    def watched(values, run):
+        seen.update(values)
+        return one_tank(values, run)
+
+    width = NuisanceParameter(symbol="width", sd=0.1, centre=2.0, step=0.1)
+    black_box(watched, tolerances=(width,)).outputs({"c": np.array([0.03])}, [0])
+    expected = {"c": 0.03, "leak": 0.0, "lag": 0.0, "evaporation": 0.0}
+    assert seen == {**expected, "start": 0.0, "zero": 0.0, "width": 2.0}
+
+
+def test_a_candidate_that_fails_is_nan_and_leaves_the_others():
+    (outputs,) = black_box().outputs({"leak": np.array([-1.0, 0.0])}, [0])
+    assert np.all(np.isnan(outputs[..., 0]))
+    assert np.all(np.isfinite(outputs[..., 1]))
+
+
+def test_outputs_of_another_shape_are_named():
+    plant = black_box(lambda values, run: one_tank(values, run)[0])
+    with pytest.raises(PlantError, match=r"run test_1: the simulator returns the shape \(240,\), not"):
+        check(plant)
+
+
+def test_inputs_and_outputs_stand_for_states():
+    plant = black_box(regimes=filling)
+    states = plant.states({}, 0)
+    assert set(states) == {"q", "h"}
+    np.testing.assert_array_equal(states["h"].values, one_tank(plant_values(), TANK.runs[0])[0])
+    assert plant.regimes({}, 0)["filling"].dtype == bool
+    assert black_box().regimes({}, 0) == {}
+
+
+def plant_values() -> dict[str, float]:
+    """Nominal values of the tank."""
+    return {"c": 0.02, "leak": 0.0, "lag": 0.0, "evaporation": 0.0, "start": 0.0, "zero": 0.0}
+
+
+@pytest.fixture(scope="module")
 def diagnosed() -> Diagnosis:
-    return diagnose(ClosedTank(c=0.021, lag=5.0))
+    """The leaking tank, without its equation, with unknown noise and a catalogue of two."""
+    channel = replace(TANK.channels[0], noise=None)
+    return diagnose(black_box(channels=(channel,), causes=TANK.causes[:2]))
 
 
-def test_sensors_and_clock_are_the_places_of_its_gap():
-    found = diagnosed().localisation
-    assert set(found.equation_probabilities) <= {"reading h", "timing"}
-    assert found.likeliest.equation.name == "reading h"
-    assert found.missing_term is None
-    assert sum(found.equation_probabilities.values()) + found.nothing_missing == pytest.approx(1)
+def test_a_plant_without_equations_is_diagnosed(diagnosed):
+    assert diagnosed.conclusion.verdict == "known"
+    best = diagnosed.conclusion.ambiguity_set[0].hypothesis
+    assert best.labels == ("leak",)
+    assert diagnosed.ranking.problem.values(best.estimate)["leak"] == pytest.approx(4e-3, rel=0.15)
 
 
-def test_the_whole_recording_is_its_regime():
-    (gap,) = diagnosed().localisation.regime_gaps
-    assert (gap.channel, gap.regime) == ("h", WHOLE)
-    assert gap.gap > 2
+def test_a_plant_without_equations_is_reported(diagnosed):
+    content = as_json(diagnosed)
+    assert "f1" not in content["where"]["equation"]
+    assert sections(diagnosed)
 
 
-def test_its_report_and_its_json_are_written():
-    found = sections(diagnosed())
-    assert "during the whole recording" in " ".join(v.text for s in found for v in s.verdicts)
-    for section in found:
-        for block in section.blocks:
-            if isinstance(block, Picture):
-                block.figure.canvas.draw()
-    assert list(as_json(diagnosed())["where"]["equation"]) == ["reading h", "timing"]
+def test_an_fmu_without_fmpy_says_what_to_install(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "fmpy", None)
+    with pytest.raises(ImportError, match=r"an FMU needs FMPy.*pip install '.\[fmu\]'"):
+        fmu_simulator(tmp_path / "tank.fmu", {}, ["h"], {})
 
 
-def test_recordings_shorter_than_the_longest_delay_are_examined():
-    tank = ClosedTank()
-    settings = LocalisationSettings(delays=(1, 300))
-    for fault in reading_faults(tank, {"c": np.array([0.02])}, [0], settings):
-        assert np.all(np.isfinite(fault.changes[0]))
+def start_level(run: Run) -> Mapping[str, float]:
+    """Level at the beginning of a recording."""
+    return {"h_start": START}
+
+
+@pytest.fixture(scope="module")
+def tank_fmu(tmp_path_factory) -> Path:
+    """The tank as an FMU."""
+    pytest.importorskip("fmpy", reason="FMPy is not installed")
+    if not (can_build() and shutil.which("cc")):
+        pytest.skip("no C compiler for an FMU of this machine")
+    return build_tank_fmu(tmp_path_factory.mktemp("fmu"))
+
+
+@pytest.fixture(scope="module")
+def fmu(tank_fmu) -> FmuSimulator:
+    """The simulator of the tank's FMU."""
+    return fmu_simulator(tank_fmu, {"q": "q"}, ["h"], {"c": "c", "leak": "leak"}, start_level)
+
+
+def test_an_fmu_simulates_the_tank(fmu):
+    plant = black_box(fmu, causes=TANK.causes[:1], run_offsets=())
+    values = {"c": np.array([0.02, 0.025]), "leak": np.array([0.0, 4e-3])}
+    (found,) = plant.outputs(values, [0])
+    (expected,) = TANK.outputs(values, [0])
+    np.testing.assert_allclose(found, expected, atol=2e-3)  # another step, inputs between samples
+    assert np.max(np.abs(expected[..., 0] - expected[..., 1])) > 0.05
+    assert check(plant) == []
+
+
+def test_an_fmu_that_stops_gives_nan(fmu):
+    plant = black_box(fmu, causes=TANK.causes[:1], run_offsets=())
+    (found,) = plant.outputs({"leak": np.array([2.0, 0.0])}, [0])
+    assert np.all(np.isnan(found[..., 0]))
+    assert np.all(np.isfinite(found[..., 1]))
+
+
+def test_an_fmu_can_be_sent_to_a_process(fmu):
+    again = pickle.loads(pickle.dumps(fmu))
+    values = {"c": 0.02, "leak": 0.0}
+    np.testing.assert_array_equal(again(values, TANK.runs[0]), fmu(values, TANK.runs[0]))
+
+
+def test_a_variable_that_the_fmu_lacks_is_named(tank_fmu):
+    with pytest.raises(ValueError, match="the FMU has no variable depth: take names from its modelDesc"):
+        fmu_simulator(tank_fmu, {"q": "q"}, ["depth"], {"c": "c"})
+
+
+def test_a_file_that_is_no_fmu_is_named(tank_fmu, tmp_path):
+    path = tmp_path / "broken.fmu"
+    path.write_text("nothing")
+    with pytest.raises(ValueError, match=r"broken.fmu cannot be read as an FMU: .*: export it again"):
+        fmu_simulator(path, {}, ["h"], {})

@@ -112,7 +112,7 @@ def test_held_out_readings_move_no_model():
     np.testing.assert_array_equal(before.residuals[0], after.residuals[0])
 
 
-def test_percent_is_eq_19_and_none_where_a_mean_vanishes():
+def test_percent_is_eq_19():
     tank = Tank(virtual_recordings({}))
     scaled = [1.02 * run.measured for run in tank.runs]
     mean = np.mean(tank.runs[2].measured)
@@ -120,8 +120,24 @@ def test_percent_is_eq_19_and_none_where_a_mean_vanishes():
     found = percentage_errors(tank, scaled)
     assert found is not None
     assert found["overall"] == found["h"] == pytest.approx(2 * rms / mean, rel=0.01)
-    tank.runs[2].measured[:] = np.sin(2 * np.pi * np.arange(240) / 239)
-    assert percentage_errors(tank, scaled) is None
+
+
+@pytest.mark.parametrize(
+    ("offset", "amplitude", "has_percent"),
+    [
+        (0.0, 1.0, False),  # a voltage about 0
+        (0.3, 1.0, False),  # its mean is not 0, but says nothing of its size
+        (0.0, 0.0, False),  # a channel at rest at 0
+        (1.0, 0.9, True),
+        (-1.0, 0.9, True),
+        (1.0, 1.0 + 0.5 * NOISE, True),  # on one side of 0 but for noise
+    ],
+)
+def test_only_a_channel_that_keeps_its_sign_has_a_percentage(offset, amplitude, has_percent):
+    tank = Tank(virtual_recordings({}))
+    tank.runs[2].measured[:] = offset + amplitude * np.sin(2 * np.pi * np.arange(240) / 239)
+    found = percentage_errors(tank, [run.measured for run in tank.runs])
+    assert (found is not None) == has_percent
 
 
 def test_the_same_seed_gives_the_same_figures():

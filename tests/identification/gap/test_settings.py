@@ -14,7 +14,7 @@ from identification.gap.design.settings import DesignSettings
 from identification.gap.diagnosis import diagnose
 from identification.gap.fit.settings import FitSettings
 from identification.gap.locate.settings import LocalisationSettings
-from identification.gap.model.settings import TimeScaleSettings
+from identification.gap.model.settings import PreparationSettings, TimeScaleSettings
 from identification.gap.rank.settings import RankingSettings
 from identification.gap.reduce.settings import ReductionSettings
 from identification.gap.report.json_export import as_json
@@ -23,10 +23,11 @@ from tests.identification.gap.tanks import without_gap
 from tests.identification.gap.test_expected_information import Gauge, diagnosed, two
 
 FOLDER = Path(identification.gap.__file__).parent
-DEFINITIONS = {"FLOOR", "LAGS", "MEDIAN_TO_SD", "PREFIXES", "POWER_PREFIXES"}
+DEFINITIONS = {"FLOOR", "LAGS", "LEAST", "MEDIAN_TO_SD", "STEP_TO_SD", "PREFIXES", "POWER_PREFIXES"}
 """Numbers that are definitions, and no judgement."""
 
 STAGES = (
+    PreparationSettings,
     TimeScaleSettings,
     FitSettings,
     RankingSettings,

@@ -1,0 +1,72 @@
+"""A simulator of which only inputs and outputs are known: no equations, states or regimes."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from docs.examples.tank.plant import Tank
+from docs.examples.tank.recordings import virtual_recordings
+from identification.gap.diagnosis import Diagnosis, diagnose
+from identification.gap.locate.regime_gaps import WHOLE
+from identification.gap.locate.sensor_faults import reading_faults
+from identification.gap.locate.settings import LocalisationSettings
+from identification.gap.report.json_export import as_json
+from identification.gap.report.sections import sections
+from identification.report.page import Picture
+
+
+class ClosedTank(Tank):
+    """A tank that gives levels for inflows and shows nothing else."""
+
+    def __init__(self, **truth: float):
+        super().__init__(virtual_recordings(truth))
+        self.equations = ()
+
+    def states(self, values, run):
+        """None is known."""
+        return {}
+
+    def regimes(self, values, run):
+        """None are told apart."""
+        return {}
+
+    def forced(self, values, equation, run, edges):
+        """There is no equation to force."""
+        raise AssertionError
+
+
+@cache
+def diagnosed() -> Diagnosis:
+    return diagnose(ClosedTank(c=0.021, lag=5.0))
+
+
+def test_sensors_and_clock_are_the_places_of_its_gap():
+    found = diagnosed().localisation
+    assert set(found.equation_probabilities) <= {"reading h", "timing"}
+    assert found.likeliest.equation.name == "reading h"
+    assert found.missing_term is None
+    assert sum(found.equation_probabilities.values()) + found.nothing_missing == pytest.approx(1)
+
+
+def test_the_whole_recording_is_its_regime():
+    (gap,) = diagnosed().localisation.regime_gaps
+    assert (gap.channel, gap.regime) == ("h", WHOLE)
+    assert gap.gap > 2
+
+
+def test_its_report_and_its_json_are_written():
+    found = sections(diagnosed())
+    assert "during the whole recording" in " ".join(v.text for s in found for v in s.verdicts)
+    for section in found:
+        for block in section.blocks:
+            if isinstance(block, Picture):
+                block.figure.canvas.draw()
+    assert list(as_json(diagnosed())["where"]["equation"]) == ["reading h", "timing"]
+
+
+def test_recordings_shorter_than_the_longest_delay_are_examined():
+    tank = ClosedTank()
+    settings = LocalisationSettings(delays=(1, 300))
+    for fault in reading_faults(tank, {"c": np.array([0.02])}, [0], settings):
+        assert np.all(np.isfinite(fault.changes[0]))
