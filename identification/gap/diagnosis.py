@@ -80,7 +80,7 @@ def diagnose(
     settings, cache = settings or DiagnosisSettings(), cache or FitCache(plant)
     warnings = check(plant, settings.preparation)
     plant = prepared(plant, settings.preparation)
-    ranking = rank_hypotheses(plant, cache, settings.ranking, settings.fit)
+    ranking = rank_hypotheses(plant, cache, settings.ranking, settings.fit, settings.reduction)
     cache.announce("where")
     localisation = _locate(ranking, ranking.recalibrated, seed, settings)
     cache.announce("how far it shrinks")

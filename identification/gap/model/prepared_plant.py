@@ -1,6 +1,7 @@
 """A plant as the stages of the diagnosis need it: noise known, time from 0, every reading a number."""
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from typing import Literal
 
@@ -47,7 +48,24 @@ class PreparedPlant:
             channel.name: source for channel, (_, source) in zip(plant.channels, noise, strict=True)
         }
         """Where the noise of each channel comes from."""
+        self.time_scale: float | None = getattr(plant, "time_scale", None)
+        """Of the plant [s]; None: its readings show it."""
         self.runs: tuple[Run, ...] = tuple(_prepared_run(run) for run in plant.runs)
+
+    def with_noise(self, ratios: Sequence[float]) -> "PreparedPlant":
+        """The plant whose channels have their noise times a ratio each, as residuals show it [1]."""
+        corrected = copy(self)
+        corrected.channels = tuple(
+            replace(channel, noise=ratio * (channel.noise or 0.0))
+            for channel, ratio in zip(self.channels, ratios, strict=True)
+        )
+        corrected.noise_source = {
+            channel.name: source if ratio == 1 else "estimated"
+            for (channel, ratio), source in zip(
+                zip(self.channels, ratios, strict=True), self.noise_source.values(), strict=True
+            )
+        }
+        return corrected
 
     def outputs(self, values: Mapping[str, NDArray], runs: Sequence[int]) -> list[NDArray]:
         """`GreyBox.outputs`: (channels, samples, n) [SI] of each run."""

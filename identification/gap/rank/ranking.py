@@ -8,15 +8,18 @@ from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.fit.linearisation import linearise
 from identification.gap.fit.settings import FitSettings
 from identification.gap.model.grey_box import GreyBox
+from identification.gap.model.prepared_plant import prepared
 from identification.gap.rank.cause_search import search_causes
 from identification.gap.rank.discrepancy import ChannelDiscrepancy
 from identification.gap.rank.evidence import EvaluatedHypothesis, evaluate_linearised
 from identification.gap.rank.hypothesis_pool import HypothesisPool
+from identification.gap.rank.noise_correction import with_seen_noise
 from identification.gap.rank.posterior import Posterior, variance_inflation
 from identification.gap.rank.refinement import recalibrate, with_own_nuisances
 from identification.gap.rank.screening import simulate_signatures
 from identification.gap.rank.separability import Separability, assess_separability
 from identification.gap.rank.settings import RankingSettings
+from identification.gap.reduce.settings import ReductionSettings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,6 +66,7 @@ def rank_hypotheses(
     cache: FitCache | None = None,
     settings: RankingSettings | None = None,
     fit_settings: FitSettings | None = None,
+    floor: ReductionSettings | None = None,
 ) -> Ranking:
     """Refit the promising hypotheses and weigh them; a fit that does not converge is weighed as it is.
 
@@ -71,12 +75,16 @@ def rank_hypotheses(
         cache: runs the fits; None keeps nothing.
         settings: judgement of the ranking; None: the defaults.
         fit_settings: judgement of the fits; None: the defaults.
+        floor: how noise is seen in residuals; None: the defaults.
     """
-    settings, cache = settings or RankingSettings(), cache or FitCache(plant)
+    settings, cache, plant = settings or RankingSettings(), cache or FitCache(plant), prepared(plant)
     problem, base = recalibrate(plant, cache, fit_settings)
+    corrected = with_seen_noise(problem, base, settings, floor or ReductionSettings())
+    if corrected is not plant:
+        problem, base = recalibrate(corrected, cache, fit_settings, "with the noise seen: ")
     runs = linearise(problem, [base], problem.all_runs)[0]
     base_runs = [runs[r] for r in problem.fitted_runs]
-    signatures = simulate_signatures(problem, base, plant.causes)
+    signatures = simulate_signatures(problem, base, problem.plant.causes)
     separability = assess_separability(
         base_runs, signatures, problem.settings.largest_deviation, settings
     )

@@ -19,7 +19,10 @@ from identification.gap.rank.settings import RankingSettings
 
 
 def recalibrate(
-    plant: GreyBox, cache: FitCache | None = None, settings: FitSettings | None = None
+    plant: GreyBox,
+    cache: FitCache | None = None,
+    settings: FitSettings | None = None,
+    prefix: str = "",
 ) -> tuple[FittingProblem, Estimate]:
     """The nominal model with its calibrated parameters refitted, and the problem with its nuisances.
 
@@ -27,14 +30,15 @@ def recalibrate(
         plant: the model and its recordings.
         cache: runs the fits; None keeps nothing.
         settings: judgement of the fits; None: the defaults.
+        prefix: of the names of both fits in the journal.
     """
     cache = cache or FitCache(plant)
     rough = FittingProblem(plant, settings=settings)
     start = rough.start(Hypothesis(causes=()), {})
-    calibrated = cache("calibration", lambda: fit(rough, [start]))[0]
+    calibrated = cache(f"{prefix}calibration", lambda: fit(rough, [start]))[0]
     slopes = nuisance_slopes(rough, [calibrated], [np.zeros(len(plant.tolerances))])[0]
     problem = FittingProblem(plant, slopes, settings)
-    base = cache("recalibration", lambda: fit(problem, [restarted(calibrated)]))[0]
+    base = cache(f"{prefix}recalibration", lambda: fit(problem, [restarted(calibrated)]))[0]
     return problem, base
 
 

@@ -69,6 +69,10 @@ class RankingSettings:
 
     # Noise and discrepancy
 
+    wrong_noise_ratio: float = 1.25
+    """Ratio of the noise that the residuals show to the stated noise, or its inverse, above which the
+    stated noise is corrected [1]: less changes no judgement."""
+
     longest_correlation: float = 0.5
     """Longest lag at which residuals are correlated, as a share of the longest run [1]: beyond, there
     are too few pairs."""

@@ -1,0 +1,46 @@
+"""The channels' noise as the recalibrated model's residuals show it, where it was stated wrongly.
+
+A judgement must not hinge on the noise that somebody states: fits would end too early or too late, and
+channels would have wrong weights.
+"""
+
+import numpy as np
+
+from identification.gap.fit.fitting_problem import FittingProblem
+from identification.gap.fit.hypothesis import Estimate
+from identification.gap.fit.prediction import predict
+from identification.gap.model.prepared_plant import PreparedPlant, prepared
+from identification.gap.rank.settings import RankingSettings
+from identification.gap.reduce.noise_floor import LAGS, noise_ratios, squared_differences
+from identification.gap.reduce.settings import ReductionSettings
+
+
+def with_seen_noise(
+    problem: FittingProblem, base: Estimate, settings: RankingSettings, floor: ReductionSettings
+) -> PreparedPlant:
+    """The plant with the noise that the residuals show; the same object where that is near the stated.
+
+    Args:
+        problem: readings weighted by the stated noise.
+        base: the recalibrated model.
+        settings: which ratio is near.
+        floor: how noise is seen in residuals.
+    """
+    plant = prepared(problem.plant)
+    residuals = predict(problem, base).residuals
+    squares = np.sum([np.sum(r**2, axis=1) for r in residuals], axis=0)
+    counts = np.sum([np.sum(run.trusted, axis=1) for run in plant.runs], axis=0)
+    variograms = []
+    for lag in LAGS:
+        changes, kept = squared_differences(plant, residuals, lag, floor)
+        total = np.sum([np.sum(change, axis=1) for change in changes], axis=0)
+        number = np.sum([np.sum(keep, axis=1) for keep in kept], axis=0)
+        variograms.append(0.5 * total / np.maximum(number, 1))
+    ratios = noise_ratios(np.array(variograms)[:, None], (squares / np.maximum(counts, 1))[None], floor)[
+        0
+    ]
+    limit = settings.wrong_noise_ratio
+    wrong = (ratios > limit) | (ratios < 1.0 / limit)
+    if not np.any(wrong):
+        return plant
+    return plant.with_noise(np.where(wrong, ratios, 1.0).tolist())
