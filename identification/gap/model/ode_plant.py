@@ -16,6 +16,7 @@ from identification.gap.ode.records import Records
 from identification.gap.ode.settings import OdeSettings
 from identification.gap.ode.simulation import Job
 from identification.gap.ode.simulator import simulator
+from identification.gap.ode.sub_steps import settled_steps
 
 
 class OdePlant:
@@ -198,23 +199,12 @@ class OdePlant:
         candidates = [self.nominal | changed for changed in [{}, *trials]]
         values = {symbol: np.array([own[symbol] for own in candidates]) for symbol in self.nominal}
         noise = np.array([channel.noise for channel in self.channels])[:, None, None]
-        steps, coarse = 1, None
-        while steps <= settings.most_steps_per_sample:
+
+        def read(steps: int) -> list[NDArray]:
             jobs = [self._job(values, r, steps) for r in range(len(self.runs))]
-            fine = [read / noise for read, _ in self._simulated(jobs)]
-            if coarse is not None and _largest_change(coarse, fine) <= settings.step_error:
-                return steps // 2
-            steps, coarse = 2 * steps, fine
-        return steps // 2
+            return [reading / noise for reading, _ in self._simulated(jobs)]
 
-
-def _largest_change(coarse: Sequence[NDArray], fine: Sequence[NDArray]) -> float:
-    """Largest difference of readings [noise deviations]; infinity where only the fine one is finite."""
-    changes = [
-        np.where(np.isfinite(b), np.nan_to_num(np.abs(b - a), nan=np.inf), 0.0)
-        for a, b in zip(coarse, fine, strict=True)
-    ]
-    return float(max(np.max(change) for change in changes))
+        return settled_steps(read, settings)
 
 
 def _first(values: Mapping[str, NDArray]) -> dict[str, NDArray]:
