@@ -21,6 +21,9 @@ SOURCE = f"github.com/dynamicslab/MultiArm-Pendulum (MIT): ParameterEstimation/S
 PERIOD, EVERY = 1e-3, 10
 """Sampling period of the recording [s]; every tenth sample is used."""
 
+NOISE = 4e-5
+"""Scatter of the angle about a smooth curve over 0.1 s [rad]; the makers have filtered it."""
+
 BEGINNING = 100
 """Recorded samples from which the angle and the speed at the start are taken."""
 
@@ -63,7 +66,7 @@ def pendulum(folder: Path) -> OdePlant:
     return OdePlant(
         mode="compiled",
         runs=runs,
-        channels=[Channel(name="angle", unit="rad", scale=1.0, noise=2e-3)],
+        channels=[Channel(name="angle", unit="rad", scale=1.0, noise=NOISE)],
         states=("angle", "speed", "read"),
         rate=rate,
         readings=readings,
@@ -88,7 +91,7 @@ def pendulum(folder: Path) -> OdePlant:
         components={"angle": "bob", "speed": "bob", "read": "sensor"},
         units={"angle": ("rad", 1.0), "speed": ("rad/s", 1.0), "read": ("rad", 1.0)},
         forcing_steps={"speed": 0.01},
-        steps_per_sample=1,
+        steps_per_sample=2,
     )
 
 

@@ -47,6 +47,17 @@ def nominal_values(
     return values
 
 
+def checked_names(records: Records, given: Mapping[str, Mapping[str, Any] | None]) -> None:
+    """Raises ValueError where a member by state has a name that is no state."""
+    for member, by_state in given.items():
+        for name in by_state or {}:
+            if name not in records.states:
+                raise ValueError(
+                    f"{member} has '{name}', which is none of the states {list(records.states)}: "
+                    "correct the name"
+                )
+
+
 def probe(
     plant: Any,
     records: Records,

@@ -1,6 +1,7 @@
 """A plant for the diagnosis from plain differential equations: x' = rate(x, u, p)."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,13 +9,14 @@ from numpy.typing import NDArray
 
 from identification.gap.model.cause import Cause
 from identification.gap.model.free_parameter import FreeParameter, NuisanceParameter
-from identification.gap.model.ode_checks import checked_runs, nominal_values, probe
+from identification.gap.model.ode_checks import checked_names, checked_runs, nominal_values, probe
 from identification.gap.model.recorded_run import Channel, Run
 from identification.gap.model.state_equation import StateEquation, StateTrace
 from identification.gap.ode.records import Records
 from identification.gap.ode.settings import OdeSettings
 from identification.gap.ode.simulation import Job
 from identification.gap.ode.simulator import simulator
+from identification.gap.ode.sub_steps import settled_steps
 
 
 class OdePlant:
@@ -86,6 +88,7 @@ class OdePlant:
         self._start, self._regimes, self._mode = start, regimes, mode
         self._delays = dict(delays or {})
         self._units = dict.fromkeys((*states, *self.runs[0].inputs), ("", 1.0)) | dict(units or {})
+        checked_names(self._records, {"components": components, "forcing_steps": forcing_steps})
         self.equations = self._state_equations(components or {}, forcing_steps or {})
         count = probe(self, self._records, rate, readings, thresholds, self._delays)
         none = thresholds or (lambda x, u, p: ())
@@ -95,11 +98,11 @@ class OdePlant:
 
     def outputs(self, values: Mapping[str, NDArray], runs: Sequence[int]) -> list[NDArray]:
         """`GreyBox.outputs`: per run (channels, samples, n) [SI]."""
-        return [self._run(values, r)[0] for r in runs]
+        return [read for read, _ in self._simulated([self._job(values, r) for r in runs])]
 
     def states(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, StateTrace]:
         """`GreyBox.states`: states and inputs, values (samples,) [SI]."""
-        x = self._run(_first(values), run)[1][..., 0]
+        x = self._simulated([self._job(_first(values), run)])[0][1][..., 0]
         traces = dict(zip(self._records.states, x, strict=True)) | dict(self.runs[run].inputs)
         return {
             name: StateTrace(unit=self._units[name][0], scale=self._units[name][1], values=trace)
@@ -110,7 +113,7 @@ class OdePlant:
         """`GreyBox.regimes`: boolean (samples,) by name; values: (n,) or (n, runs) by symbol [SI]."""
         if self._regimes is None:
             return {}
-        x = self._run(_first(values), run)[1][..., 0]
+        x = self._simulated([self._job(_first(values), run)])[0][1][..., 0]
         own = self.runs[run]
         p = self._records.p(*self._parameters(_first(values), run)[:, 0])
         return self._regimes(self._records.x(*x), self._records.u(own.time, *own.inputs.values()), p)
@@ -125,35 +128,32 @@ class OdePlant:
         acting = np.array([[0, *edges[:-1]], [0, *edges[1:]]])
         copies = {symbol: np.repeat(v[:1], windows + 1, axis=0) for symbol, v in values.items()}
         copies = copies or {symbol: np.full(windows + 1, v) for symbol, v in self.nominal.items()}
-        read = self._run(copies, run, push=push, acting=acting)[0]
+        job = replace(self._job(copies, run), push=push, acting=acting)
+        read = self._simulated([job])[0][0]
         return read[..., 1:] - read[..., :1]
 
-    def _run(
-        self,
-        values: Mapping[str, NDArray],
-        run: int,
-        push: NDArray | None = None,
-        acting: NDArray | None = None,
-        steps: int | None = None,
-    ) -> tuple[NDArray, NDArray]:
-        """Readings (channels, samples, n) and states (states, samples, n) of a run [SI]."""
+    def _simulated(self, jobs: Sequence[Job]) -> list[tuple[NDArray, NDArray]]:
+        """Readings (channels, samples, n) and states (states, samples, n) of each job [SI]."""
+        with np.errstate(all="ignore"):
+            return self._simulate(jobs)
+
+    def _job(self, values: Mapping[str, NDArray], run: int, steps: int | None = None) -> Job:
+        """A run to be simulated, without forcing."""
         p = self._parameters(values, run)
         n, own, names = p.shape[1], self.runs[run], self._records
         delays = np.zeros((len(names.inputs), n))
         for name, symbol in self._delays.items():
             delays[names.inputs.index(name)] = p[names.symbols.index(symbol)]
-        job = Job(
+        return Job(
             start=self._starts(own, p),
             inputs=np.array([*own.inputs.values()], dtype=float).reshape(-1, len(own.time)).T.copy(),
             delays=delays,
             parameters=p,
             period=float(own.time[1] - own.time[0]),
             steps=steps or self.steps_per_sample,
-            acting=np.zeros((2, n), dtype=int) if acting is None else acting,
-            push=np.zeros((len(names.states), n)) if push is None else push,
+            acting=np.zeros((2, n), dtype=int),
+            push=np.zeros((len(names.states), n)),
         )
-        with np.errstate(all="ignore"):
-            return self._simulate(job)
 
     def _parameters(self, values: Mapping[str, NDArray], run: int) -> NDArray:
         """Values of all symbols in a run, (symbols, n) [SI]."""
@@ -199,22 +199,12 @@ class OdePlant:
         candidates = [self.nominal | changed for changed in [{}, *trials]]
         values = {symbol: np.array([own[symbol] for own in candidates]) for symbol in self.nominal}
         noise = np.array([channel.noise for channel in self.channels])[:, None, None]
-        steps, coarse = 1, None
-        while steps <= settings.most_steps_per_sample:
-            fine = [self._run(values, r, steps=steps)[0] / noise for r in range(len(self.runs))]
-            if coarse is not None and _largest_change(coarse, fine) <= settings.step_error:
-                return steps // 2
-            steps, coarse = 2 * steps, fine
-        return steps // 2
 
+        def read(steps: int) -> list[NDArray]:
+            jobs = [self._job(values, r, steps) for r in range(len(self.runs))]
+            return [reading / noise for reading, _ in self._simulated(jobs)]
 
-def _largest_change(coarse: Sequence[NDArray], fine: Sequence[NDArray]) -> float:
-    """Largest difference of readings [noise deviations]; infinity where only the fine one is finite."""
-    changes = [
-        np.where(np.isfinite(b), np.nan_to_num(np.abs(b - a), nan=np.inf), 0.0)
-        for a, b in zip(coarse, fine, strict=True)
-    ]
-    return float(max(np.max(change) for change in changes))
+        return settled_steps(read, settings)
 
 
 def _first(values: Mapping[str, NDArray]) -> dict[str, NDArray]:

@@ -2,18 +2,21 @@
 
 from collections.abc import Callable, Sequence
 
+from numba.core.errors import NumbaError
+
 from identification.gap.ode.records import Records, compiled
 from identification.gap.ode.settings import OdeSettings
-from identification.gap.ode.simulation import alone, together
-from identification.gap.ode.stepping import stepping
+from identification.gap.ode.side_by_side import together
+from identification.gap.ode.simulation import Job, Simulation, alone
+from identification.gap.ode.stepping import advancing
 
 MODES = ("numpy", "python", "compiled")
 
 
 def simulator(
     records: Records, functions: Sequence[tuple[Callable, int]], mode: str, settings: OdeSettings
-) -> Callable:
-    """A function of a `Job` that gives readings and states.
+) -> Simulation:
+    """The simulation of a plant.
 
     Args:
         records: the plant's names.
@@ -22,18 +25,36 @@ def simulator(
         settings: accuracy.
 
     Raises:
-        ValueError: for another mode.
+        ValueError: for another mode, and at the first simulation for functions that numba refuses.
     """
     if mode not in MODES:
         raise ValueError(f"mode '{mode}' is none of {', '.join(MODES)}: choose one of them")
-    (_, channels), (_, count) = functions[1:]
-    if mode == "compiled":
-        flat = [compiled(records.flat(compiled(f), results)) for f, results in functions]
-    else:
-        flat = [records.flat(f, results) for f, results in functions]
-    rate, read, thresholds = flat
-    wrap = compiled if mode == "compiled" else (lambda function: function)
-    steps = stepping(rate, thresholds, count, settings, wrap)
+    own = compiled if mode == "compiled" else _as_it_is
+    rate, read, thresholds = (own(records.flat(own(f), results)) for f, results in functions)
+    channels, count = functions[1][1], functions[2][1]
+    advance = advancing(rate, thresholds, count, settings, own)
     if mode == "numpy":
-        return together(steps, read, channels, count)
-    return alone(steps, read, channels, compile_loop=mode == "compiled")
+        return together(rate, read, thresholds, (channels, count), advance)
+    simulation = alone(advance, read, channels, own)
+    return _explained(simulation) if mode == "compiled" else simulation
+
+
+def _explained(simulation: Simulation) -> Simulation:
+    """The simulation, whose refusal by numba becomes one sentence."""
+
+    def simulate(jobs: Sequence[Job]):
+        try:
+            return simulation(jobs)
+        except NumbaError as error:
+            lines = [line for line in str(error).splitlines() if "File" not in line and line.strip()]
+            reason = next((line for line in lines if "Failed in" not in line), lines[0])
+            raise ValueError(
+                f"rate, readings or thresholds cannot be compiled by numba ({reason}): let them use "
+                "numbers, numpy and functions under numba.njit only, or choose mode='numpy'"
+            ) from error
+
+    return simulate
+
+
+def _as_it_is(function: Callable) -> Callable:
+    return function

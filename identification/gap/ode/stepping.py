@@ -1,10 +1,11 @@
-"""One step of the classical Runge-Kutta method that stops at thresholds.
+"""Steps of the classical Runge-Kutta method, for one candidate with stops at thresholds, or for many.
 
-The functions are written once, for numbers, for arrays of candidates, and for numba.
+A step counts only where no stage of it lies beyond a threshold, so that its order is kept. Otherwise it
+is shortened until the threshold is near enough to be passed in one tiny step. A state that both sides of
+a threshold push back slides along it, to first order, and exactly where it sticks.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,21 +13,12 @@ from numpy.typing import NDArray
 from identification.gap.ode.settings import OdeSettings
 
 
-class Steps(NamedTuple):
-    """Functions that advance a plant; arrays are (states,), or (states, candidates) for `runge_kutta`."""
-
-    runge_kutta: Callable[..., tuple[NDArray, NDArray]]
-    """(x, t, h, u, p, push): the state after h [s], and the thresholds at the stages."""
-    levels: Callable[..., NDArray]
-    """(x, t, u, p): the threshold functions; a change of sign marks a threshold."""
-    advance: Callable[..., NDArray]
-    """(x, t, h, u, p, push): the state (states,) after h [s], with stops at thresholds."""
-
-
-def stepping(
+def advancing(
     rate: Callable, thresholds: Callable, count: int, settings: OdeSettings, wrap: Callable
-) -> Steps:
-    """Functions that advance a plant.
+) -> Callable:
+    """A function (x, t, h, u, p, push, work) that advances one candidate's states x (states,) by h [s].
+
+    push: forcing of the rates, (states,). work: scratch of `workspace`, (rows, states).
 
     Args:
         rate: derivatives of the states, as `Records.flat` makes it.
@@ -38,79 +30,113 @@ def stepping(
     factor, shortest, most = settings.approach_factor, settings.shortest_step, settings.most_event_steps
 
     @wrap
-    def derivative(x, t, u, p, push):
-        return rate(x, t, u, p, np.empty_like(x)) + push
+    def slope(x, t, u, p, push, out):
+        rate(x, t, u, p, out)
+        for i in range(len(x)):
+            out[i] += push[i]
 
     @wrap
-    def levels(x, t, u, p):
-        return thresholds(x, t, u, p, np.empty((count,) + x.shape[1:]))
-
-    @wrap
-    def runge_kutta(x, t, h, u, p, push):
-        stages = np.zeros((4, count) + x.shape[1:])
-        k1 = derivative(x, t, u, p, push)
-        x2 = x + 0.5 * h * k1
-        k2 = derivative(x2, t + 0.5 * h, u, p, push)
-        x3 = x + 0.5 * h * k2
-        k3 = derivative(x3, t + 0.5 * h, u, p, push)
-        x4 = x + h * k3
-        end = x + (h / 6.0) * (k1 + 2.0 * k2 + 2.0 * k3 + derivative(x4, t + h, u, p, push))
+    def passed(x, t, u, p, before, level):
+        """Index of a threshold that lies between x and where `before` was taken; -1 for none."""
         if count > 0:
-            stages[0] = levels(x2, t + 0.5 * h, u, p)
-            stages[1] = levels(x3, t + 0.5 * h, u, p)
-            stages[2] = levels(x4, t + h, u, p)
-            stages[3] = levels(end, t + h, u, p)
-        return end, stages
+            thresholds(x, t, u, p, level)
+            for i in range(count):
+                if before[i] * level[i] < 0.0:
+                    return i
+        return -1
 
     @wrap
-    def passes(before, stages):
-        for stage in stages:
-            for i in range(count):
-                if before[i] * stage[i] < 0.0:
-                    return True
+    def try_step(x, t, h, u, p, push, before, level, work):
+        """A step into work[5]; returns whether no stage has passed a threshold."""
+        slope(x, t, u, p, push, work[0])
+        for stage in range(1, 4):
+            part = h if stage == 3 else 0.5 * h
+            for i in range(len(x)):
+                work[4, i] = x[i] + part * work[stage - 1, i]
+            if passed(work[4], t + part, u, p, before, level) >= 0:
+                return False
+            slope(work[4], t + part, u, p, push, work[stage])
+        for i in range(len(x)):
+            inner = work[0, i] + 2.0 * work[1, i] + 2.0 * work[2, i] + work[3, i]
+            work[5, i] = x[i] + h / 6.0 * inner
+        return passed(work[5], t + h, u, p, before, level) < 0
+
+    @wrap
+    def pass_threshold(x, t, tiny, left, u, p, push, before, level, work):
+        """Pass a threshold by a tiny step, or stay on it where both sides push back (Filippov)."""
+        slope(x, t, u, p, push, work[0])
+        work[4] = x + tiny * work[0]
+        i = passed(work[4], t, u, p, before, level)
+        if i >= 0:
+            old, new = before[i], level[i]
+            slope(work[4], t, u, p, push, work[1])
+            work[5] = work[4] + tiny * work[1]
+            thresholds(work[5], t, u, p, level)
+            if new * level[i] < 0.0:
+                share = (new - old) / ((new - old) - (level[i] - new))
+                x += left * (work[0] + share * (work[1] - work[0]))
+                return True
+        x[:] = work[4]
         return False
 
     @wrap
-    def held(x, slope, after, after_slope, before_level, t, tiny, left, u, p):
-        """Slide along a threshold where both sides push towards it (Filippov); else the state after."""
-        level = levels(after, t, u, p)
-        beyond = levels(after + tiny * after_slope, t, u, p)
-        for i in range(count):
-            if before_level[i] * level[i] < 0.0 and level[i] * beyond[i] < 0.0:
-                towards, back = level[i] - before_level[i], beyond[i] - level[i]
-                share = towards / (towards - back)
-                return x + left * (slope + share * (after_slope - slope)), True
-        return after, False
-
-    @wrap
-    def advance(x, t, h, u, p, push):
+    def advance_past_thresholds(x, t, h, u, p, push, work):
         tiny, left, size = shortest * h, h, h
-        before = levels(x, t, u, p)
+        before, level = np.empty(count), np.empty(count)
+        thresholds(x, t, u, p, before)
         if np.any(before == 0.0):
             # On a threshold the sign is open: the rate decides to which side the state leaves it.
-            x = x + tiny * derivative(x, t, u, p, push)
-            before = levels(x, t, u, p)
+            slope(x, t, u, p, push, work[0])
+            x += tiny * work[0]
+            thresholds(x, t, u, p, before)
         for _ in range(most):
             size = min(size, left)
-            end, stages = runge_kutta(x, t, size, u, p, push)
-            if not passes(before, stages):
-                # No stage has seen the rate beyond the threshold: the step keeps its order.
-                x, t, left = end, t + size, left - size
-                before = stages[3].copy()
+            if try_step(x, t, size, u, p, push, before, level, work):
+                x[:] = work[5]
+                t, left = t + size, left - size
             elif size > tiny:
                 size = max(size / factor, tiny)
                 continue
+            elif pass_threshold(x, t, tiny, left, u, p, push, before, level, work):
+                return
             else:
-                slope = derivative(x, t, u, p, push)
-                after = x + tiny * slope
-                after_slope = derivative(after, t, u, p, push)
-                x, holds = held(x, slope, after, after_slope, before, t, tiny, left, u, p)
-                if holds:
-                    return x
-                t, left, size = t + tiny, left - tiny, left
-                before = levels(x, t, u, p)
+                t, left = t + tiny, left - tiny
+                size = left
             if left <= tiny:
-                return x
-        return runge_kutta(x, t, left, u, p, push)[0]
+                return
+            thresholds(x, t, u, p, before)
 
-    return Steps(runge_kutta, levels, advance)
+    @wrap
+    def advance(x, t, h, u, p, push, work):
+        if count > 0:
+            advance_past_thresholds(x, t, h, u, p, push, work)
+        else:
+            try_step(x, t, h, u, p, push, push, push, work)
+            x[:] = work[5]
+
+    return advance
+
+
+def workspace(states: int) -> NDArray:
+    """Scratch of a step: four slopes, a stage and the end, (6, states)."""
+    return np.empty((6, states))
+
+
+def together_step(
+    rate: Callable, x: NDArray, t: float, h: float, u: NDArray, p: NDArray, push: NDArray
+) -> tuple[NDArray, list[NDArray]]:
+    """A step of many candidates: the states after h [s], (states, n), and its three stages likewise.
+
+    The arguments are those of `advancing`, with an axis of candidates.
+    """
+
+    def slope(y: NDArray, time: float) -> NDArray:
+        return rate(y, time, u, p, np.empty_like(y)) + push
+
+    k1 = slope(x, t)
+    x2 = x + 0.5 * h * k1
+    k2 = slope(x2, t + 0.5 * h)
+    x3 = x + 0.5 * h * k2
+    k3 = slope(x3, t + 0.5 * h)
+    x4 = x + h * k3
+    return x + (h / 6.0) * (k1 + 2.0 * (k2 + k3) + slope(x4, t + h)), [x2, x3, x4]

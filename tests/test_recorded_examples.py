@@ -1,0 +1,109 @@
+"""The plants that others recorded: direct fits by hand reach the errors that are known for them."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from docs.examples.pendulum.plant import pendulum
+from docs.examples.thermal_lab.plant import thermal_lab
+from docs.examples.toy_car.plant import toy_car
+from identification.gap.model.ode_plant import OdePlant
+
+ROOT = Path(__file__).parents[1]
+RECORDED = ROOT.parent / "shared" / "recorded"
+PLANTS: dict[str, tuple[Callable[[Path], OdePlant], Path]] = {
+    "thermal_lab": (thermal_lab, RECORDED / "tclab"),
+    "toy_car": (toy_car, RECORDED / "dart_car" / "20_step_input_data_rubbery_floor"),
+    "pendulum": (pendulum, RECORDED / "pendulum_free"),
+}
+MADE: dict[str, OdePlant] = {}
+
+
+def plant(name: str) -> OdePlant:
+    made, folder = PLANTS[name]
+    if not folder.exists():
+        pytest.skip(f"{folder} is absent: the recordings of others are no part of the project")
+    if name not in MADE:
+        MADE[name] = made(folder)
+    return MADE[name]
+
+
+def held_out_error(own: OdePlant, effects: tuple[str, ...]) -> float:
+    """Root mean square error on held-out readings after a direct fit that begins at the first trials."""
+    sizes = {s.symbol: s for s in own.parameters}
+    begin = {s: p.nominal for s, p in sizes.items()}
+    for cause in own.causes:
+        if cause.name in effects:
+            sizes |= {s.symbol: s for s in cause.parameters}
+            begin |= {s.symbol: s.trials[0] for s in cause.parameters}
+    low, high, scale = (
+        np.array([getattr(p, field) for p in sizes.values()]) for field in ("low", "high", "scale")
+    )
+
+    def errors(vector, held_out: bool):
+        runs = [r for r, run in enumerate(own.runs) if run.held_out == held_out]
+        values = {s: np.array([v]) for s, v in zip(sizes, vector * scale, strict=True)}
+        simulated = zip(runs, own.outputs(values, runs), strict=True)
+        return np.concatenate(
+            [(y[..., 0] - own.runs[r].measured)[own.runs[r].trusted] for r, y in simulated]
+        )
+
+    found = least_squares(
+        errors,
+        np.array(list(begin.values())) / scale,
+        bounds=(low / scale, high / scale),
+        args=(False,),
+        diff_step=1e-5,
+    )
+    return float(np.sqrt(np.mean(errors(found.x, True) ** 2)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "effects", "known"),
+    [
+        ("thermal_lab", (), 5.40),
+        ("thermal_lab", ("heater_coupling",), 4.22),
+        ("thermal_lab", ("sensor_lag",), 4.29),
+        ("thermal_lab", ("heater_coupling", "sensor_lag"), 1.05),
+        ("toy_car", (), 0.378),
+        ("toy_car", ("dead_zone",), 0.172),
+        ("toy_car", ("rolling_friction",), 0.211),
+        ("toy_car", ("dead_zone", "rolling_friction"), 0.092),
+        ("pendulum", (), 0.0485),
+        ("pendulum", ("coulomb_friction", "quadratic_drag"), 0.0261),
+    ],
+)
+def test_a_direct_fit_reaches_the_known_error(name, effects, known):
+    assert held_out_error(plant(name), effects) == pytest.approx(known, rel=0.06)
+
+
+@pytest.mark.parametrize("name", PLANTS)
+def test_every_cause_acts_at_its_trials_and_not_at_its_nominal_value(name):
+    own = plant(name)
+    base = own.outputs({}, [0])[0]
+    assert np.all(np.isfinite(base))
+    for cause in own.causes:
+        (size,) = cause.parameters
+        values = np.array([size.nominal, *size.trials])
+        assert np.all((values >= size.low) & (values <= size.high)), cause.name
+        found = own.outputs({size.symbol: values}, [0])[0]
+        np.testing.assert_array_equal(found[..., :1], base, err_msg=cause.name)
+        noise = own.channels[0].noise
+        assert np.min(np.max(np.abs(found[..., 1:] - base), axis=(0, 1))) > noise, cause.name
+
+
+@pytest.mark.parametrize("name", PLANTS)
+def test_a_missing_folder_is_told_with_the_source_of_the_data(name, tmp_path):
+    command = (sys.executable, "-m", f"docs.examples.{name}", "--data", str(tmp_path / "none"))
+    done = subprocess.run(
+        (*command, "--out", str(tmp_path / "out")), cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode != 0
+    assert "does not exist: get the recordings from github.com/" in done.stderr
+    assert "Traceback" not in done.stderr
