@@ -15,6 +15,7 @@ from identification.gap.locate.forcing_processes import fit_processes
 from identification.gap.locate.regime_gaps import RegimeGap, regime_gaps
 from identification.gap.locate.settings import LocalisationSettings
 from identification.gap.locate.windows import window_edges
+from identification.gap.model.grey_box import noise_weighted
 from identification.gap.model.state_equation import StateTrace
 from identification.gap.rank.evidence import evaluate
 from identification.gap.rank.refinement import recalibrate
@@ -95,7 +96,7 @@ def test_a_forcing_is_recovered_but_for_noise_and_what_calibration_absorbs():
     truth = 20.0 * np.sin(np.linspace(0, 6, len(edges) - 1))
     change = plant.forced(values, equation, 0, edges) @ truth
     altered = FittingProblem(plant, problem.slopes)
-    shift = (change / plant.channels[0].noise).ravel()
+    shift = noise_weighted(plant, 0, change).ravel()
     altered.measured = [problem.measured[0] + shift, *problem.measured[1:]]
     design, forms = quadratic_forms(altered, estimate, [0], 100.0, SETTINGS)
     fit = fit_processes(forms, design, SETTINGS)[0][0]
