@@ -1,6 +1,6 @@
 """Settings of the blind check."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from identification.studies.blind.kinds import EXCLUDED_EFFECT, NOMINAL, ONE_CAUSE, TWO_EFFECTS
 
@@ -8,6 +8,9 @@ from identification.studies.blind.kinds import EXCLUDED_EFFECT, NOMINAL, ONE_CAU
 @dataclass(frozen=True, kw_only=True)
 class BlindSettings:
     """Judgements of the blind check, by the stage that uses them."""
+
+    forms: str = "usual"
+    """Name of the study's forms in FORMS; a folder holds trials of one study only."""
 
     # Draw of the truths. How large a drawn effect is: effect_draws.py.
     kind_counts: tuple[tuple[str, int], ...] = (
@@ -28,6 +31,14 @@ class BlindSettings:
     form_deviation: tuple[float, float] = (0.03, 0.15)
     """Least and largest deviation of an effect's form from the fitted form, relative to the effect [-]
     (deviating_forms.py)."""
+    other_form_share: float = 0.5
+    """Probability that an effect has its other form, where it has one (other_forms.py) [-]: as often as
+    not, since nobody knows which curve a real valve follows."""
+    top_effects: tuple[str, ...] = ("armature_bounce", "supply_restriction", "magnetic_saturation")
+    """Effects that are also drawn at the top of their range. Log-uniform draws seldom come near it, and
+    there these three were missed on campaigns of another simulator."""
+    top_share: float = 0.3
+    """Probability that such an effect is drawn at its top [-]: about two trials each of 300."""
 
     # The bench of the blind check.
     omitted_programmes: tuple[str, ...] = ("rest", "high_voltage")
@@ -89,3 +100,9 @@ class BlindSettings:
 
 DEFAULTS = BlindSettings()
 """The settings of docs/results/blind-diagnosis.md."""
+
+STRONG = replace(DEFAULTS, forms="strong", form_deviation=(0.20, 0.50))
+"""The second study: forms so far from the fitted ones that probabilities must say so."""
+
+FORMS = {settings.forms: settings for settings in (DEFAULTS, STRONG)}
+"""The settings of each study by the name of its forms."""
