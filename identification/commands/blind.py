@@ -8,6 +8,7 @@ from identification.commands.command import Command
 from identification.commands.options import add_count, add_out, add_seed, add_workers
 from identification.report.result_files import as_text
 from identification.studies.blind.blind_study import blind_check
+from identification.studies.blind.settings import DEFAULTS, FORMS
 from identification.valve_gap.diagnose import diagnose_campaign
 
 TRIALS = 300
@@ -20,11 +21,23 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_count(parser, "--trials", default=TRIALS, help="number of campaigns")
     add_seed(parser, help="of truths and noise")
     add_workers(parser)
+    parser.add_argument(
+        "--forms",
+        choices=FORMS,
+        default=DEFAULTS.forms,
+        help=f"how far the effects' forms are from the fitted ones: {_deviations()}",
+    )
     parser.add_argument("--images", type=writable_folder, default=None, help="folder of its figures")
 
 
+def _deviations() -> str:
+    """The deviations of each study's forms, ready to read."""
+    ranges = {name: [100.0 * end for end in s.form_deviation] for name, s in FORMS.items()}
+    return "; ".join(f"{name} {low:.0f} to {high:.0f} %%" for name, (low, high) in ranges.items())
+
+
 def run(chosen: argparse.Namespace) -> None:
-    """Run the study. Raises ValueError for a folder of another study."""
+    """Run the study. Raises ValueError for a folder of another seed or other forms."""
     section = blind_check(
         chosen.out,
         trials=chosen.trials,
@@ -32,6 +45,7 @@ def run(chosen: argparse.Namespace) -> None:
         workers=chosen.workers or available_cores(),
         diagnosis=diagnose_campaign,
         images=chosen.images,
+        settings=FORMS[chosen.forms],
     )
     print(as_text([section]))
     print(f"\nwritten: {chosen.out}/results.json and results.html")

@@ -17,7 +17,7 @@ from identification.studies.blind.score import (
 from identification.studies.blind.settings import DEFAULTS, BlindSettings
 from identification.studies.blind.trials import (
     DiagnosisFunction,
-    check_seed,
+    check_study,
     commit,
     diagnose,
     generate,
@@ -51,9 +51,10 @@ def blind_check(
         settings: of the check.
 
     Raises:
-        ValueError: the folder holds trials of another seed, or a committed truth was changed.
+        ValueError: the folder holds trials of another seed or of other forms, or a committed truth was
+            changed.
     """
-    check_seed(out, seed)
+    check_study(out, seed=seed, forms=settings.forms)
     generate(out, trials=trials, seed=seed, workers=workers, settings=settings)
     committed = commit(out, trials)
     diagnose(out, trials=trials, workers=workers, diagnosis=diagnosis)

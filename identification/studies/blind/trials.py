@@ -56,16 +56,24 @@ def trial_folder(out: Path, number: int) -> Path:
     return out / "trials" / f"{number:04d}"
 
 
-def check_seed(out: Path, seed: int) -> None:
-    """Note the seed of a folder. Raises ValueError if the folder holds trials of another seed."""
+def check_study(out: Path, *, seed: int, forms: str) -> None:
+    """Note the seed and the forms of a folder's trials.
+
+    Raises:
+        ValueError: the folder holds trials of another seed or of other forms.
+    """
     path = out / STUDY_FILE
+    study = {"seed": seed, "forms": forms}
     if path.exists():
-        earlier = json.loads(path.read_text(encoding="utf-8"))["seed"]
-        if earlier != seed:
-            raise ValueError(
-                f"{out} holds trials of seed {earlier}: give --seed {earlier}, or another --out"
-            )
-    write_text(path, json.dumps({"seed": seed}) + "\n")
+        # A study from before there was a choice has no entry for its forms.
+        earlier = {"forms": DEFAULTS.forms, **json.loads(path.read_text(encoding="utf-8"))}
+        for name, given in study.items():
+            if earlier[name] != given:
+                raise ValueError(
+                    f"{out} holds trials of {name} {earlier[name]}: give --{name} {earlier[name]}, or "
+                    "another --out"
+                )
+    write_text(path, json.dumps(study) + "\n")
 
 
 def generate(

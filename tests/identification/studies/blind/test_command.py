@@ -6,6 +6,7 @@ import pytest
 
 from identification.__main__ import main
 from identification.commands import blind as command
+from identification.studies.blind.settings import STRONG
 
 
 def parsed(*arguments):
@@ -23,11 +24,12 @@ def test_the_command_passes_what_is_chosen(monkeypatch, tmp_path):
 
     monkeypatch.setattr(command, "blind_check", check)
     arguments = ["--out", str(tmp_path), "--trials", "3", "--seed", "5", "--workers", "2"]
+    arguments += ["--forms", "strong"]
     with pytest.raises(ValueError, match="stop here"):
         command.run(parsed(*arguments))
     assert seen == {
         "out": tmp_path, "trials": 3, "seed": 5, "workers": 2, "diagnosis": command.diagnose_campaign,
-        "images": None,
+        "images": None, "settings": STRONG,
     }  # fmt: skip
 
 
@@ -35,3 +37,13 @@ def test_no_trial_is_refused(tmp_path, capsys):
     with pytest.raises(SystemExit):
         main(["blind", "--out", str(tmp_path), "--trials", "0"])
     assert "--trials must be at least 1" in capsys.readouterr().err
+
+
+def test_forms_are_usual_or_strong(tmp_path, capsys):
+    assert parsed("--out", str(tmp_path)).forms == "usual"
+    with pytest.raises(SystemExit):
+        parsed("--out", str(tmp_path), "--forms", "weak")
+    assert "choose from" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        parsed("--help")
+    assert "strong 20 to 50 %" in " ".join(capsys.readouterr().out.split())
