@@ -8,12 +8,8 @@ from identification.report.result_files import write_results
 from identification.studies.blind.blind_figures import FIGURES
 from identification.studies.blind.blind_section import blind_json, blind_section
 from identification.studies.blind.commitments import open_commitment
-from identification.studies.blind.score import (
-    TrialScore,
-    rival_distance,
-    score_trial,
-    true_gap_reduction,
-)
+from identification.studies.blind.gap_reduction import rival_distance, true_gap_reduction
+from identification.studies.blind.score import TrialScore, score_trial
 from identification.studies.blind.settings import DEFAULTS, BlindSettings
 from identification.studies.blind.trials import (
     DiagnosisFunction,
@@ -76,4 +72,5 @@ def _opened_and_scored(out: Path, number: int, committed: str, settings: BlindSe
     diagnosis = read_diagnosis(folder)
     label, truth = open_commitment(folder, committed)
     distance = rival_distance(label, diagnosis, truth, settings)
-    return score_trial(label, diagnosis, true_gap_reduction(diagnosis, truth, settings), distance)
+    reduction = true_gap_reduction(diagnosis, truth, settings)
+    return score_trial(label, diagnosis, reduction, distance, settings)

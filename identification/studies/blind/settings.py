@@ -84,6 +84,11 @@ class BlindSettings:
     """Tolerance of the fitted winding temperature [K]."""
 
     # Scores.
+    held_probability: float = 0.9
+    """Probability of being part of the truth from which an effect counts as held, and is named by the
+    verdict `partial` [-]: the contract's."""
+    tie_margin: float = 1e-3
+    """Difference of probability up to which two causes are tied [-]: no one acts on less."""
     smallest_gap: float = 0.02
     """Gap above the floor of 1 below which its reduction is not scored [-]."""
     distinguishable_distance: float = 1.0
@@ -91,6 +96,19 @@ class BlindSettings:
     [noise deviations]."""
     gap_bins: tuple[float, ...] = (1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 1e3)
     """Edges of the bins of the explainable gap above the floor of 1 [-]."""
+
+    # Calibration of the probabilities.
+    calibration_bins: int = 10
+    """Bins of a reliability diagram [-]: with 300 answers the fullest ones still have narrow
+    intervals."""
+    least_inclusion: float = 0.01
+    """Least probability of an effect that counts as a statement about it [-]: below lie thousands of
+    effects that nobody would look at, whose truth would drown the rest."""
+    bootstrap_draws: int = 2000
+    """Draws of trials for the interval of a calibration error [-]: its ends are then stable to some
+    percent of its width."""
+    bootstrap_seed: int = 0
+    """Seed of these draws: the same trials give the same interval."""
 
     @property
     def scatter_reach(self) -> float:

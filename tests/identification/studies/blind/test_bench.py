@@ -17,13 +17,13 @@ from identification.studies.blind.commitments import (
     unpacked_recordings,
 )
 from identification.studies.blind.effect_draws import top_sizes
+from identification.studies.blind.gap_reduction import true_gap_reduction
 from identification.studies.blind.kinds import NOMINAL, ONE_CAUSE
 from identification.studies.blind.noise_free_gap import (
     held_out_gap,
     hypothesis_distance,
     recalibrated_parameters,
 )
-from identification.studies.blind.score import true_gap_reduction
 from identification.studies.blind.truth import Trial, draw_trial
 
 SUITE = blind_suite()
