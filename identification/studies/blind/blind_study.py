@@ -8,16 +8,14 @@ from identification.report.result_files import write_results
 from identification.studies.blind.blind_figures import FIGURES
 from identification.studies.blind.blind_section import blind_json, blind_section
 from identification.studies.blind.commitments import open_commitment
+from identification.studies.blind.diagnoses import DiagnosisFunction, diagnose, read_diagnosis
 from identification.studies.blind.gap_reduction import rival_distance, true_gap_reduction
 from identification.studies.blind.score import TrialScore, score_trial
 from identification.studies.blind.settings import DEFAULTS, BlindSettings
 from identification.studies.blind.trials import (
-    DiagnosisFunction,
     check_study,
     commit,
-    diagnose,
     generate,
-    read_diagnosis,
     trial_folder,
 )
 

@@ -57,6 +57,8 @@ class TrialScore:
     """Sum over the correct causes [-]."""
     false_held: tuple[str, ...]
     """Effects that are held as surely present and are not part of the truth."""
+    first_listed: tuple[str, ...]
+    """Effects of the first cause of the list, whatever the verdict; () for an empty list."""
     listed: Answer | None
     """The first cause of the list, whatever the verdict; None for an empty list."""
     inclusions: tuple[Answer, ...]
@@ -112,6 +114,7 @@ def score_trial(
         set_size=len(set_),
         probability=sum(cause["probability"] for cause in correct),
         false_held=tuple(effect for effect in held if effect not in label["effects"]),
+        first_listed=tuple(causes[0]["effects"]) if causes else (),
         listed=_listed(label, causes[0]) if causes else None,
         inclusions=_inclusions(label, said, settings),
         component=component,

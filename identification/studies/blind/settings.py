@@ -83,6 +83,16 @@ class BlindSettings:
     temperature_tolerance: float = 0.01
     """Tolerance of the fitted winding temperature [K]."""
 
+    # Disturbances under which a study is diagnosed again.
+    ripple_channels: tuple[str, ...] = ("p2", "p3")
+    """Channels with a slow ripple: the pressures that a supply's pulsation reaches."""
+    ripple_size: float = 2.0
+    """Standard deviation of the ripple [sensor noises]: large enough to be seen in a recording."""
+    ripple_time: float = 0.02
+    """Correlation time of the ripple [s]: as long as the valve's transients, which it imitates."""
+    pressure_step: float = 0.05
+    """Step of coarse pressures [bar]: the resolution of a vehicle's bus."""
+
     # Scores.
     held_probability: float = 0.9
     """Probability of being part of the truth from which an effect counts as held, and is named by the

@@ -6,7 +6,8 @@ import pytest
 
 from identification.__main__ import main
 from identification.commands import blind as command
-from identification.studies.blind.settings import STRONG
+from identification.report.page import Section
+from identification.studies.blind.settings import DEFAULTS, STRONG
 
 
 def parsed(*arguments):
@@ -37,6 +38,26 @@ def test_no_trial_is_refused(tmp_path, capsys):
     with pytest.raises(SystemExit):
         main(["blind", "--out", str(tmp_path), "--trials", "0"])
     assert "--trials must be at least 1" in capsys.readouterr().err
+
+
+def test_disturbances_are_passed_one_after_another(monkeypatch, tmp_path, capsys):
+    seen = []
+
+    def check(out, disturbance, **chosen):
+        seen.append((out, disturbance, chosen["trials"], chosen["seed"], chosen["settings"]))
+        return Section(title=f"under {disturbance}", verdicts=[], blocks=[])
+
+    monkeypatch.setattr(command, "robustness_check", check)
+    arguments = ["--out", str(tmp_path), "--trials", "60", "--seed", "5"]
+    command.run(parsed(*arguments, "--disturb", "ripple", "--disturb", "sigma=3"))
+    assert seen == [(tmp_path, name, 60, 5, DEFAULTS) for name in ("ripple", "sigma=3")]
+    assert f"{tmp_path}/robustness-sigma=3.json" in capsys.readouterr().out
+
+
+def test_an_unknown_disturbance_is_refused(tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        parsed("--out", str(tmp_path), "--disturb", "storm")
+    assert "choose from" in capsys.readouterr().err
 
 
 def test_forms_are_usual_or_strong(tmp_path, capsys):
