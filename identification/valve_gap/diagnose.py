@@ -1,7 +1,7 @@
 """From a campaign's folder to gap.json, report and a plant file with the cause."""
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -40,18 +40,20 @@ def diagnose_campaign(
     without: Sequence[str] = (),
     seed: int = 0,
     report: bool = True,
+    noise: Mapping[str, float] | None = None,
 ) -> Diagnosis:
     """Diagnose a campaign; write gap.json, and unless `report` is False report, plan and plant file.
 
     plant: plant file of the nominal parameters, None for Table 10. without: causes to leave out of the
-    catalogue. Finished fits are kept in `out` and taken up again. Raises CampaignError for recordings
-    that cannot be used, ValueError for an unknown cause or a plant file that is none.
+    catalogue. noise: standard deviation of the readings by channel [Pa, A], where it is not to be
+    estimated. Finished fits are kept in `out` and taken up again. Raises CampaignError for recordings
+    that cannot be used, ValueError for an unknown cause, a wrong noise or a plant file that is none.
     """
     began = perf_counter()
     recorded = read_campaign(campaign)
     nominal = load_plant(plant).parameters if plant else None
-    valve = Valve(recorded, nominal, without=without)
-    journal = Journal(out / JOURNAL, _subject(valve, without))
+    valve = Valve(recorded, nominal, without=without, noise=noise)
+    journal = Journal(out / JOURNAL, _subject(valve, without, noise or {}))
     steps = Steps(began) if report else _silent
     found = diagnose(valve, seed=seed, cache=FitCache(valve, journal, steps))
     found = replace(found, warnings=[*valve.warnings, *found.warnings])
@@ -131,11 +133,12 @@ class Steps:
         print(f"[{self.number}] {step} ({elapsed:.0f} s{left})", file=sys.stderr)
 
 
-def _subject(valve: Valve, without: Sequence[str]) -> dict:
+def _subject(valve: Valve, without: Sequence[str], noise: Mapping[str, float]) -> dict:
     """What the fits depend on."""
     return {
         "software": version("epv-valve"),
         "recordings": {r.name: [r.role, r.digest()] for r in valve.recordings},
         "nominal": {p.symbol: p.nominal for p in valve.parameters},
         "without": sorted(without),
+        "noise": dict(noise),
     }

@@ -39,6 +39,7 @@ class Valve:
         nominal: Parameters | None = None,
         without: Sequence[str] = (),
         settings: ValveSettings = VALVE,
+        noise: Mapping[str, float] | None = None,
     ):
         """Prepare a campaign for the diagnosis.
 
@@ -47,12 +48,16 @@ class Valve:
             nominal: the parameters as given; None: Table 10.
             without: names of causes to leave out.
             settings: judgements about the valve.
+            noise: standard deviation of the readings by channel [Pa, A], where it is known better than
+                from the recordings; the others are estimated from them.
 
         Raises:
-            ValueError: the catalogue does not have a cause of `without`.
+            ValueError: the catalogue does not have a cause of `without`, or `noise` has another channel
+                or a value that is not positive.
         """
         self.settings = settings
         self.time_scale = settings.time_scale
+        given = _checked_noise(noise or {})
         problem = calibration_problem(campaign, start=nominal)
         self.base = problem.vector.reference
         self.recordings = (*problem.calibration, *problem.validation)
@@ -61,7 +66,7 @@ class Valve:
                 name=name,
                 unit=UNITS[name][0],
                 scale=UNITS[name][1],
-                noise=noise_of(self.recordings, name, settings),
+                noise=given.get(name) or noise_of(self.recordings, name, settings),
             )
             for name in OUTPUTS
         )
@@ -137,6 +142,17 @@ def as_run(recording: Recording) -> Run:
 def _rounded(start: NuisanceParameter, step: float) -> NuisanceParameter:
     """A start that was read in coarse steps [SI], which the mean of a hold does not average out."""
     return replace(start, sd=float(np.hypot(start.sd, rounding_error(step))))
+
+
+def _checked_noise(noise: Mapping[str, float]) -> Mapping[str, float]:
+    """The noise [SI] by channel as given. Raises ValueError for what is no noise of a channel."""
+    for name, deviation in noise.items():
+        if name not in OUTPUTS or not 0 < deviation < np.inf:
+            raise ValueError(
+                f"noise: {deviation:g} for {name!r}: give a positive standard deviation [Pa, A] for "
+                f"channels among {', '.join(OUTPUTS)}"
+            )
+    return noise
 
 
 def _tolerance(symbol: str, base: Parameters, scatter: float) -> NuisanceParameter:

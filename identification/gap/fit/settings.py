@@ -43,7 +43,7 @@ class FitSettings:
     converged_decrease: float = 0.3
     """Predicted decrease of chi-square [1] below which a fit has converged: less changes no odds."""
 
-    converged_excess_share: float = 3e-3
+    converged_excess_share: float = 0.01
     """Predicted decrease below which a fit has converged, as a share of the excess, chi-square beyond
     one per reading [1]: a cause that leaves a large residual need not be fitted to the last digit."""
 
@@ -51,7 +51,7 @@ class FitSettings:
     """Multiple of the predicted decrease [1] that a fit may still gain, before it is given up: steps of
     a nonlinear model gain more than they predict at first."""
 
-    hopeless_excess_ratio: float = 4.0
+    hopeless_excess_ratio: float = 3.0
     """A fit is given up if its excess stays above this multiple of its best rival's excess [1], for
     computing time."""
 

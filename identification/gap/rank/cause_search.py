@@ -104,7 +104,9 @@ def _add_a_cause(pool: HypothesisPool, number: int) -> None:
     left = misfit_beyond_noise(ranked[0][0], pool.posterior()[1].discrepancies) if ranked else 0.0
     small = left <= settings.small_misfit
     partners = settings.partners_of_small_misfit if small else settings.partners
-    for smaller, _ in ranked[: 1 if small else settings.bases]:
+    for smaller, score in ranked[: 1 if small else settings.bases]:
+        if ranked[0][1] - score > settings.finalist_lag and not _is_small(pool):
+            break
         pool.add(_fits_with_another(pool, smaller, partners))
 
 

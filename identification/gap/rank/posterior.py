@@ -101,7 +101,8 @@ def credibility(left: NDArray, causes: int, settings: RankingSettings) -> NDArra
     left: share of the misfit that it leaves, (n,) [1]. causes: number of causes in the catalogue; the
     more are tried, the more a wrong one removes by chance.
     """
-    even = settings.even_share_left * np.sqrt(settings.even_share_causes / max(causes, 1))
+    ratio = settings.even_share_causes / max(causes, 1)
+    even = settings.even_share_left * ratio**settings.even_share_power
     return 1.0 / (1.0 + (left / even) ** settings.credibility_slope)
 
 

@@ -1,5 +1,6 @@
 """The blind check's bench: a trial's true recordings, with forms and solver that no fit uses."""
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -18,10 +19,11 @@ from identification.bench.measurement import (
 )
 from identification.bench.programmes import DIAGNOSIS_SUITE, Programme
 from identification.bench.reference_simulation import simulate_reference
+from identification.bench.right_hand_side import RightHandSide
 from identification.bench.schedule import Schedule, piecewise_schedule
 from identification.recordings.recording import Campaign
 from identification.report_2003.cases import SAMPLING_RATE
-from identification.studies.blind.deviating_forms import right_hand_side, terminal_currents
+from identification.studies.blind.bench_rates import right_hand_side, terminal_currents
 from identification.studies.blind.settings import DEFAULTS, BlindSettings
 from identification.studies.blind.truth import Trial
 
@@ -54,6 +56,7 @@ def true_recordings(trial: Trial, seed: int, settings: BlindSettings = DEFAULTS)
             trial.parameters.replace(theta_coil=_start_temperature(trial, index, seed, settings)),
             programme,
             form_deviation=trial.form_deviation,
+            other_forms=trial.other_forms,
             rng=np.random.default_rng([seed, trial.number, index, 2]),
             settings=settings,
         )
@@ -74,6 +77,7 @@ def run_programme(
     *,
     form_deviation: float,
     rng: np.random.Generator,
+    other_forms: Collection[str] = (),
     settings: BlindSettings = DEFAULTS,
 ) -> TrueSignals:
     """One recording of a valve whose effects deviate in form; at deviation 0 the forms are the plant's.
@@ -83,17 +87,21 @@ def run_programme(
         programme: inputs and start.
         form_deviation: relative deviation of the forms [-].
         rng: of the jitter of delays.
+        other_forms: effects that have their other form.
         settings: the solvers.
 
     Raises:
         RuntimeError: no solver follows the valve.
+        ValueError: an effect has no other form.
     """
     U = programme.case.voltage(programme.U_on, SAMPLING_RATE)
     time = np.arange(len(U)) / SAMPLING_RATE
     start = initial_state(parameters, programme)
     schedule = piecewise_schedule(parameters, start, time, U=U[:-1], reservoir_volume=RESERVOIR_VOLUME)
     schedule = _delayed(schedule, parameters["t_delay"], form_deviation, rng)
-    state = _simulated(schedule, time, form_deviation, settings)
+    rates = right_hand_side(form_deviation, other_forms)
+    state = _simulated(schedule, time, rates, settings)
+    state = state._replace(I_coil=_terminal_currents(state, schedule, time, form_deviation))
     return TrueSignals(
         programme=programme,
         period=1.0 / SAMPLING_RATE,
@@ -124,21 +132,20 @@ def _delayed(
 
 
 def _simulated(
-    schedule: Schedule, time: NDArray, form_deviation: float, settings: BlindSettings
+    schedule: Schedule, time: NDArray, rates: RightHandSide, settings: BlindSettings
 ) -> State:
     """States at the times [s], (samples,), by the first solver that succeeds."""
     failures = []
     for method, rtol in settings.solvers:
         try:
-            state = simulate_reference(
+            return simulate_reference(
                 schedule,
                 time,
                 method=method,
                 rtol=rtol,
-                right_hand_side=right_hand_side(form_deviation),
+                right_hand_side=rates,
                 most_evaluations=settings.solver_evaluations,
             ).state
-            return state._replace(I_coil=_terminal_currents(state, schedule, time, form_deviation))
         except (ValueError, RuntimeError) as error:
             failures.append(f"{method} at {rtol:g}: {error}")
     raise RuntimeError(f"no solver followed the bench's valve: {'; '.join(failures)}")

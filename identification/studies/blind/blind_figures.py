@@ -9,14 +9,16 @@ from numpy.typing import NDArray
 
 from epv_env.plant.effects.record import COMPONENTS
 from epv_env.plant.effects.registry import CATALOGUE
+from identification.studies.blind.calibration_figure import reliability_figure
+from identification.studies.blind.detection import detection_by_gap
 from identification.studies.blind.kinds import ABSORBED, NOMINAL, ONE_CAUSE, PARAMETER
 from identification.studies.blind.score import TrialScore, component_of
 from identification.studies.blind.settings import DEFAULTS, BlindSettings
-from identification.studies.blind.summary import confusion_matrix, detection_by_gap
+from identification.studies.blind.summary import confusion_matrix
 from identification.studies.proportion import Proportion
 from identification.valve_gap.causes import PARAMETER_COMPONENTS
 
-NO_GAP, UNKNOWN, TWO_NAMED, NO_TRUE_CAUSE = "no gap", "unknown", "two effects", "nothing"
+NO_GAP, UNKNOWN, SEVERAL, NO_TRUE_CAUSE = "no gap", "unknown", "several", "nothing"
 """Labels of rows and columns that are no cause."""
 
 
@@ -40,7 +42,7 @@ def cause_figure(trials: Sequence[TrialScore]) -> Figure:
     pairs = [
         (_true_label(trial, str), _diagnosed_label(trial)) for trial in _with_one_cause_at_most(trials)
     ]
-    rows, columns = [NO_TRUE_CAUSE, *names], [NO_GAP, *names, TWO_NAMED, UNKNOWN]
+    rows, columns = [NO_TRUE_CAUSE, *names], [NO_GAP, *names, SEVERAL, UNKNOWN]
     return _matrix_figure(confusion_matrix(pairs, rows, columns), rows, columns, size=(13, 12))
 
 
@@ -74,6 +76,7 @@ FIGURES: dict[str, Callable[[Sequence[TrialScore]], Figure]] = {
     "blind-detection": detection_figure,
     "blind-components": component_figure,
     "blind-causes": cause_figure,
+    "blind-reliability": reliability_figure,
 }
 """Figures for documents by file name."""
 
@@ -105,7 +108,7 @@ def _diagnosed_label(trial: TrialScore) -> str:
         return NO_GAP
     if not trial.first_cause:
         return UNKNOWN
-    return trial.first_cause[0] if len(trial.first_cause) == 1 else TWO_NAMED
+    return trial.first_cause[0] if len(trial.first_cause) == 1 else SEVERAL
 
 
 def _matrix_figure(

@@ -1,20 +1,23 @@
 """The results of a blind check, for the report and as numbers."""
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
 from identification.report.page import Picture, Section, Table, Text, Verdict
-from identification.studies.blind.acceptance import ACCEPTANCE_CRITERIA, AcceptanceCriterion
+from identification.studies.blind.acceptance import CRITERIA_OF_FORMS, AcceptanceCriterion
+from identification.studies.blind.answers import VERDICTS
 from identification.studies.blind.blind_figures import (
     cause_figure,
     component_figure,
     detection_figure,
 )
+from identification.studies.blind.calibration_section import calibration_blocks, calibration_json
+from identification.studies.blind.detection import detection_by_gap
 from identification.studies.blind.kinds import KIND_TITLES
-from identification.studies.blind.score import VERDICTS, TrialScore
+from identification.studies.blind.score import TrialScore
 from identification.studies.blind.settings import DEFAULTS, BlindSettings
 from identification.studies.blind.summary import (
-    detection_by_gap,
     is_well_judged,
     means,
     named_values,
@@ -29,7 +32,8 @@ METHOD = (
     "fitted ones. A trial has nothing to explain if its noise-free gap falls below {threshold:g} when "
     "the four parameters are recalibrated and the others vary within their scatter: no_gap is correct "
     "there. A cause is correct if it names all of the truth that exceeds this threshold, and nothing "
-    "that is untrue."
+    "that is untrue. The verdict `partial` names the effects whose probability of being part of the "
+    "truth is {held:g} or more (held). Causes whose probabilities differ by {tie:g} or less are tied."
 )
 
 
@@ -37,18 +41,26 @@ def blind_section(trials: Sequence[TrialScore], settings: BlindSettings = DEFAUL
     """Acceptance criteria, the matrix of verdicts, confusion and detection."""
     values = named_values(trials, settings)
     return Section(
-        title=f"Blind check over {len(trials)} trials",
+        title=f"Blind check over {len(trials)} trials, {settings.forms} forms",
         verdicts=[
-            _criterion_verdict(criterion, values[criterion.name]) for criterion in ACCEPTANCE_CRITERIA
+            _criterion_verdict(criterion, values[criterion.name])
+            for criterion in CRITERIA_OF_FORMS[settings.forms]
         ],
         blocks=[
-            Text(text=METHOD.format(threshold=settings.explainable_threshold)),
+            Text(
+                text=METHOD.format(
+                    threshold=settings.explainable_threshold,
+                    held=settings.held_probability,
+                    tie=settings.tie_margin,
+                )
+            ),
             _verdict_table(trials),
             _value_table(trials, settings),
             Picture(
                 figure=detection_figure(trials, settings),
                 caption="Detection against the explainable gap; error bars: exact 95 % intervals.",
             ),
+            *calibration_blocks(trials, settings),
             Picture(figure=component_figure(trials), caption="Components of single causes."),
             Picture(figure=cause_figure(trials), caption="Single causes, and the first one named."),
             _misjudged_table(trials),
@@ -64,13 +76,17 @@ def blind_json(
     verdicts = zip(KIND_TITLES, verdict_matrix(trials).tolist(), strict=True)
     return {
         "seed": seed,
+        "forms": settings.forms,
         "trials": len(trials),
         "bars": {
-            criterion.name: criterion.is_met(values[criterion.name]) for criterion in ACCEPTANCE_CRITERIA
+            criterion.name: criterion.is_met(values[criterion.name])
+            for criterion in CRITERIA_OF_FORMS[settings.forms]
         },
         "shares": {name: found.as_json() for name, found in proportions(trials, settings).items()},
         "means": means(trials),
         "verdicts": {kind: dict(zip(VERDICTS, counts, strict=True)) for kind, counts in verdicts},
+        "calibration": calibration_json(trials, settings),
+        "false_held": dict(Counter(t.kind for t in trials for _ in t.false_held)),
         "detection": [
             {
                 "low": bin_.low,
@@ -139,6 +155,8 @@ def _trial_json(trial: TrialScore) -> dict[str, Any]:
         "verdict": trial.verdict,
         "first": trial.first_cause,
         "first_right": trial.first_cause_correct,
+        "tied": trial.tied,
+        "false_held": trial.false_held,
         "in_set": trial.truth_in_set,
         "set_size": trial.set_size,
         "probability": trial.probability,

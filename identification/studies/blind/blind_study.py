@@ -8,20 +8,14 @@ from identification.report.result_files import write_results
 from identification.studies.blind.blind_figures import FIGURES
 from identification.studies.blind.blind_section import blind_json, blind_section
 from identification.studies.blind.commitments import open_commitment
-from identification.studies.blind.score import (
-    TrialScore,
-    rival_distance,
-    score_trial,
-    true_gap_reduction,
-)
+from identification.studies.blind.diagnoses import DiagnosisFunction, diagnose, read_diagnosis
+from identification.studies.blind.gap_reduction import rival_distance, true_gap_reduction
+from identification.studies.blind.score import TrialScore, score_trial
 from identification.studies.blind.settings import DEFAULTS, BlindSettings
 from identification.studies.blind.trials import (
-    DiagnosisFunction,
-    check_seed,
+    check_study,
     commit,
-    diagnose,
     generate,
-    read_diagnosis,
     trial_folder,
 )
 
@@ -51,9 +45,10 @@ def blind_check(
         settings: of the check.
 
     Raises:
-        ValueError: the folder holds trials of another seed, or a committed truth was changed.
+        ValueError: the folder holds trials of another seed or of other forms, or a committed truth was
+            changed.
     """
-    check_seed(out, seed)
+    check_study(out, seed=seed, forms=settings.forms)
     generate(out, trials=trials, seed=seed, workers=workers, settings=settings)
     committed = commit(out, trials)
     diagnose(out, trials=trials, workers=workers, diagnosis=diagnosis)
@@ -75,4 +70,5 @@ def _opened_and_scored(out: Path, number: int, committed: str, settings: BlindSe
     diagnosis = read_diagnosis(folder)
     label, truth = open_commitment(folder, committed)
     distance = rival_distance(label, diagnosis, truth, settings)
-    return score_trial(label, diagnosis, true_gap_reduction(diagnosis, truth, settings), distance)
+    reduction = true_gap_reduction(diagnosis, truth, settings)
+    return score_trial(label, diagnosis, reduction, distance, settings)

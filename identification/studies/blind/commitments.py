@@ -22,7 +22,7 @@ from identification.studies.blind.noise_free_gap import (
 from identification.studies.blind.settings import DEFAULTS, BlindSettings
 from identification.studies.blind.truth import Trial
 
-FORMAT = "epv-blind/1"
+FORMAT = "epv-blind/2"
 LABEL_FILE, RECORDINGS_FILE = "sealed.json", "truth.npz"
 MODEL_CHANNELS = ("U", "p1", *OUTPUTS)
 """Channels that a comparison with the model needs."""
@@ -86,6 +86,7 @@ def truth_label(
         "struck": list(trial.excluded),
         "sizes": trial.sizes,
         "deviation": trial.form_deviation,
+        "other_forms": list(trial.other_forms),
         "warmest_K": trial.winding_temperature_rise,
         "parameters": dict(trial.parameters),
         "gap": dict(gap),

@@ -1,7 +1,8 @@
 """The bench's own forms of the effects: each deviates from the fitted form by a share `d` of itself.
 
 If the data were made with the forms that the diagnosis fits, the check would be too easy. Here each size
-depends on the state as it may in a real valve; at d = 0 the forms are the plant's.
+depends on the state as it may in a real valve; at d = 0 the forms are the plant's. Some effects also
+have another form (other_forms.py).
 
 | Effect | Form here, relative to that of docs/explanation/effects.md | Why |
 |---|---|---|
@@ -37,24 +38,17 @@ o_MV, o_PV = 2 x/x_max - 1: -1 shut, 1 open. w: flow. v, I, drops: absolute valu
 
 import math
 
-import numba
-import numpy as np
-from numpy.typing import NDArray
-
 from epv_env.common.units import BAR
-from epv_env.plant.effects.coil import OFF_VOLTAGE, coil_current, heated
+from epv_env.plant.effects.coil import OFF_VOLTAGE, heated
 from epv_env.plant.effects.registry import Effects
 from epv_env.plant.equations import (
     State,
-    derivative,
     flow_exhaust,
     flow_inlet,
     flow_PV,
     reluctance_inverse,
 )
-from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at, store_state
-from epv_env.plant.primitives.compiled import FLAGS, inlined, replacing, source_digest
-from identification.bench.right_hand_side import RightHandSide
+from epv_env.plant.primitives.compiled import inlined, replacing
 
 FILM_THICKNESS = 20e-6
 """Thickness of the air film that an armature squeezes out as it lands [m]."""
@@ -77,7 +71,6 @@ _with_piston = replacing(
     Effects, "discharge_slope", "friction_PV", "flow_force", "a1", "a2", "lag_2_rate", "lag_3_rate"
 )
 _with_supply = replacing(State, "p1")
-_with_rates = replacing(State, "vMV", "coil_heat")
 
 
 @inlined
@@ -152,64 +145,8 @@ def deviating_sizes(q, u, c, e, d):
 
 
 @inlined
-def _film_rate(q, c):
+def film_rate(q, c):
     """Rate at which the squeezed film slows a bouncing armature, relative to its speed [1/s]."""
     low = math.exp(-max(q.xMV, 0.0) / FILM_THICKNESS)
     high = math.exp(-max(c.xMVmax - q.xMV, 0.0) / FILM_THICKNESS)
     return c.eMV * FILM_SPEED / FILM_THICKNESS * (low + high)
-
-
-_DIGEST = source_digest()
-
-
-@numba.njit(cache=True, **FLAGS)
-def _rates_and_forces(y, u, c, e, free_PV, free_MV, d):
-    out = np.empty(y.size + 2)
-    if _DIGEST == "":  # a change of the plant's sources compiles this anew (compiled.source_digest)
-        return out
-    q, inputs = state_at(y.reshape(-1, 1), 0, 0), inputs_at(u.reshape(-1, 1), 0, 0)
-    valve = coefficients_at(c, 0, 0)
-    sizes = deviating_sizes(q, inputs, valve, effects_at(e, 0, 0), d)
-    rates, force_PV, force_MV = derivative(q, inputs, valve, sizes, free_PV, free_MV, True)
-    slowed = rates.vMV - d * _film_rate(q, valve) * q.vMV * free_MV
-    cooled = rates.coil_heat - d * q.coil_heat / IRON_TIME_CONSTANT
-    store_state(out.reshape(-1, 1), 0, 0, _with_rates(rates, slowed, cooled))
-    out[-2], out[-1] = force_PV, force_MV
-    return out
-
-
-@numba.njit(cache=True, **FLAGS)
-def _terminal_currents(states, u, c, e, d):
-    out = np.empty(states.shape[1])
-    if _DIGEST == "":
-        return out
-    valve, sizes = coefficients_at(c, 0, 0), effects_at(e, 0, 0)
-    for k in range(out.size):
-        q, inputs = state_at(states, 0, k), inputs_at(u, 0, k)
-        now = deviating_sizes(q, inputs, valve, sizes, d)
-        out[k] = coil_current(inputs.U, q.I, valve.R, q.coil_heat, now)
-    return out
-
-
-def right_hand_side(form_deviation: float) -> RightHandSide:
-    """The plant with effects whose forms deviate by this share [-], for `simulate_reference`."""
-
-    def rates_and_forces(y, u, c, e, free_PV, free_MV):
-        return _rates_and_forces(y, u, c, e, free_PV, free_MV, form_deviation)
-
-    return rates_and_forces
-
-
-def terminal_currents(
-    states: NDArray, inputs: NDArray, c: NDArray, e: NDArray, form_deviation: float
-) -> NDArray:
-    """Currents at the coil's terminals [A], (samples,), where eddy currents deviate as well.
-
-    Args:
-        states: fields of State [SI], (fields, samples).
-        inputs: fields of Inputs [SI], (fields, samples).
-        c: coefficients of one valve, as `coefficients` gives them.
-        e: sizes of its effects, as `effect_constants` gives them.
-        form_deviation: relative deviation of the forms [-].
-    """
-    return _terminal_currents(states, inputs, c, e, form_deviation)

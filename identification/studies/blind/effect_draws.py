@@ -22,6 +22,11 @@ def draw_sizes(name: str, rng: np.random.Generator) -> dict[str, float]:
     return {size.symbol: _draw(size, rng) for size in chosen}
 
 
+def top_sizes(name: str) -> dict[str, float]:
+    """Sizes of an effect at the top of what is drawn, by symbol [SI]. Raises EffectError."""
+    return {size.symbol: (size.drawn or (0.0, 0.0))[1] for size in effect(name).drawn[0]}
+
+
 def _draw(size: Size, rng: np.random.Generator) -> float:
     """One size [SI], log-uniform in its drawn range."""
     low, high = size.drawn or (0.0, 0.0)

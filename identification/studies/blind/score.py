@@ -1,54 +1,34 @@
 """One diagnosis scored against its label: what is correct. Functions of both files' contents."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from epv_env.plant.effects.registry import effect
-from epv_env.plant.parameters import Parameters
-from identification.studies.blind.kinds import ABSORBED, NOMINAL, PARAMETER
-from identification.studies.blind.noise_free_gap import (
-    NoiseFreeRecording,
-    held_out_gap,
-    hypothesis_distance,
+from identification.studies.blind.answers import (
+    held_effects,
+    inclusion,
+    is_correct,
+    is_tied,
+    is_true,
+    named_cause,
+    named_set,
 )
+from identification.studies.blind.gap_reduction import GapReduction
+from identification.studies.blind.kinds import ABSORBED, NOMINAL, PARAMETER
 from identification.studies.blind.settings import DEFAULTS, BlindSettings
+from identification.studies.blind.size_estimates import SizeEstimate, size_estimates
 from identification.valve_gap.causes import PARAMETER_COMPONENTS
 
-VERDICTS = ("no_gap", "known", "ambiguous", "unknown", "failed")
-"""Verdicts of gap.json, and `failed` for a diagnosis that gave none."""
-
-NAMING_VERDICTS = ("known", "ambiguous")
-"""Verdicts that name a cause."""
-
 
 @dataclass(frozen=True, kw_only=True)
-class SizeEstimate:
-    """One diagnosed size of a correct cause."""
+class Answer:
+    """One statement with its probability, and what was true."""
 
-    symbol: str
-    """Of the parameter that holds the size."""
-    error: float
-    """|diagnosed - true| over |true - value of the nominal model| [-]."""
-    inside: bool
-    """Whether the diagnosed interval holds the true size."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class GapReduction:
-    """The share of the gap that the diagnosed cause removes."""
-
-    true: float
-    """By replay of the reported parameters on the noise-free held-out recordings [-]."""
-    low: float
-    """Lower end of the diagnosed interval [-]."""
-    high: float
-    """Upper end of the diagnosed interval [-]."""
-
-    @property
-    def inside(self) -> bool:
-        """Whether the diagnosed interval holds the true share."""
-        return self.low <= self.true <= self.high
+    probability: float
+    """As stated [-]."""
+    right: bool
+    """Whether the statement is true."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,15 +44,25 @@ class TrialScore:
     verdict: str
     """One of VERDICTS."""
     first_cause: tuple[str, ...]
-    """Effects of the most probable cause; () where none is named."""
+    """Effects that the verdict names (`answers.named_cause`); () where none is named."""
     first_cause_correct: bool
     """Whether a cause is named and the most probable one is correct."""
+    tied: bool
+    """Whether a wrong cause is as probable as the first one (`answers.is_tied`)."""
     truth_in_set: bool
     """Whether the ambiguity set holds a correct cause."""
     set_size: int
     """Causes in the ambiguity set [-]; 0 where no cause is named."""
     probability: float
     """Sum over the correct causes [-]."""
+    false_held: tuple[str, ...]
+    """Effects that are held as surely present and are not part of the truth."""
+    first_listed: tuple[str, ...]
+    """Effects of the first cause of the list, whatever the verdict; () for an empty list."""
+    listed: Answer | None
+    """The first cause of the list, whatever the verdict; None for an empty list."""
+    inclusions: tuple[Answer, ...]
+    """Whether each effect is part of the truth, from `least_inclusion` up."""
     component: str
     """The most probable component; '' where none is named."""
     component_correct: bool
@@ -94,6 +84,7 @@ def score_trial(
     diagnosis: Mapping[str, Any] | None,
     gap_reduction: GapReduction | None,
     distance: float | None = None,
+    settings: BlindSettings = DEFAULTS,
 ) -> TrialScore:
     """The score of one trial.
 
@@ -102,41 +93,38 @@ def score_trial(
         diagnosis: content of gap.json (docs/reference/gap-json.md); None: there is no diagnosis.
         gap_reduction: of `true_gap_reduction`.
         distance: of `rival_distance` [noise deviations].
+        settings: which effects are held, and what a tie is.
     """
     said = diagnosis or {"verdict": "failed"}
     causes = said.get("causes", [])
-    named = said["verdict"] in NAMING_VERDICTS
     correct = [cause for cause in causes if is_correct(label, cause["effects"])]
+    named, set_ = named_cause(said, settings), named_set(said, settings)
+    held = held_effects(said, settings)
     component = _most_probable_component(said)
     kind = label["kind"]
-    ambiguity_set = said.get("ambiguity_set", []) if named else []
     return TrialScore(
         number=label["trial"],
         kind=kind if kind == NOMINAL or label["visible"] else ABSORBED,
         causes=tuple(label["effects"]),
         verdict=said["verdict"],
-        first_cause=tuple(causes[0]["effects"]) if named and causes else (),
-        first_cause_correct=named and bool(causes) and is_correct(label, causes[0]["effects"]),
-        truth_in_set=any(is_correct(label, effects) for effects in ambiguity_set),
-        set_size=len(ambiguity_set),
+        first_cause=named,
+        first_cause_correct=is_correct(label, named),
+        tied=is_tied(label, said, settings),
+        truth_in_set=any(is_correct(label, effects) for effects in set_),
+        set_size=len(set_),
         probability=sum(cause["probability"] for cause in correct),
+        false_held=tuple(effect for effect in held if effect not in label["effects"]),
+        first_listed=tuple(causes[0]["effects"]) if causes else (),
+        listed=_listed(label, causes[0]) if causes else None,
+        inclusions=_inclusions(label, said, settings),
         component=component,
         component_correct=component in {component_of(cause) for cause in label["visible"]},
         rival_distance=distance,
         explainable_gap=label["gap"]["explainable"],
-        size_estimates=tuple(_size_estimates(label, correct[0])) if correct and named else (),
+        size_estimates=tuple(size_estimates(label, correct[0])) if correct and named else (),
         gap_reduction=gap_reduction,
         seconds=said.get("seconds"),
     )
-
-
-def is_correct(label: Mapping[str, Any], effects: Sequence[str]) -> bool:
-    """Whether a cause names all visible causes of the truth, and nothing that is untrue.
-
-    A cause may name or omit an effect of a pair that recalibration absorbs. The order does not matter.
-    """
-    visible, true = set(label["visible"]), set(label["effects"])
-    return bool(visible) and visible <= set(effects) <= true
 
 
 def component_of(cause: str) -> str:
@@ -146,86 +134,20 @@ def component_of(cause: str) -> str:
     return effect(cause).component
 
 
-def true_gap_reduction(
-    diagnosis: Mapping[str, Any] | None,
-    truth: Sequence[NoiseFreeRecording],
-    settings: BlindSettings = DEFAULTS,
-) -> GapReduction | None:
-    """Share of the recalibrated gap that the first cause removes, on noise-free held-out recordings.
-
-    Both gaps are those of the reported parameters, replayed. None where no cause is named with an
-    interval, or where recalibration leaves too small a gap.
-    """
-    if diagnosis is None or diagnosis["verdict"] not in NAMING_VERDICTS or not diagnosis["causes"]:
-        return None
-    cause = diagnosis["causes"][0]
-    said, parameters = cause.get("shrink") or {}, diagnosis.get("parameters", {})
-    if said.get("low") is None or said.get("high") is None or not parameters.get("with_cause"):
-        return None
-    before = held_out_gap(truth, _plant_values(parameters["recalibrated"]), settings)
-    if before - 1.0 < settings.smallest_gap:
-        return None
-    with_cause = {**_estimated_sizes(cause), **parameters["with_cause"]}
-    after = held_out_gap(truth, _plant_values(with_cause), settings)
-    return GapReduction(true=(before - after) / (before - 1.0), low=said["low"], high=said["high"])
+def _listed(label: Mapping[str, Any], cause: Mapping[str, Any]) -> Answer:
+    return Answer(probability=cause["probability"], right=is_true(label, cause["effects"]))
 
 
-def rival_distance(
-    label: Mapping[str, Any],
-    diagnosis: Mapping[str, Any] | None,
-    truth: Sequence[NoiseFreeRecording],
-    settings: BlindSettings = DEFAULTS,
-) -> float | None:
-    """Distance of the nearest wrong cause in the truth's ambiguity set [noise deviations].
-
-    A cause that holds all of the truth is no rival: with its other effects at zero it equals the truth.
-    None where the set does not hold the truth, or has no rival.
-    """
-    if diagnosis is None or diagnosis["verdict"] != "ambiguous":
-        return None
-    ambiguity_set = diagnosis["ambiguity_set"]
-    members = [cause for cause in diagnosis["causes"] if cause["effects"] in ambiguity_set]
-    if not any(is_correct(label, cause["effects"]) for cause in members):
-        return None
-    rivals = [cause for cause in members if not set(label["visible"]) <= set(cause["effects"])]
-    starts = [_estimated_sizes(cause) for cause in rivals]
-    distances = (hypothesis_distance(truth, start, settings) for start in starts if all(start.values()))
-    return min(distances, default=None)
+def _inclusions(
+    label: Mapping[str, Any], diagnosis: Mapping[str, Any], settings: BlindSettings
+) -> tuple[Answer, ...]:
+    return tuple(
+        Answer(probability=probability, right=name in label["effects"])
+        for name, probability in inclusion(diagnosis).items()
+        if probability >= settings.least_inclusion
+    )
 
 
 def _most_probable_component(diagnosis: Mapping[str, Any]) -> str:
     components = diagnosis.get("where", {}).get("component", {})
     return max(components, key=components.get) if any(components.values()) else ""
-
-
-def _size_estimates(label: Mapping[str, Any], cause: Mapping[str, Any]) -> list[SizeEstimate]:
-    estimates = []
-    nominal = Parameters.calibrated()
-    for symbol, (value, low, high) in _size_intervals(cause).items():
-        if symbol in label["sizes"]:
-            true = label["sizes"][symbol]
-            error = abs(value - true) / abs(true - nominal[symbol])
-            inside = low <= true <= high
-            estimates.append(SizeEstimate(symbol=symbol, error=error, inside=inside))
-    return estimates
-
-
-def _estimated_sizes(cause: Mapping[str, Any]) -> dict[str, float]:
-    """Estimated sizes of a cause by symbol [SI]."""
-    return {symbol: interval[0] for symbol, interval in _size_intervals(cause).items()}
-
-
-def _size_intervals(cause: Mapping[str, Any]) -> dict[str, Any]:
-    """Estimate, low and high end of each size of a cause by symbol; gap.json has symbol_unit."""
-    symbols = sorted(Parameters.calibrated(), key=len)
-    intervals = {}
-    for name, interval in cause.get("magnitude", {}).items():
-        matching = [symbol for symbol in symbols if f"{name}_".startswith(f"{symbol}_")]
-        if matching:
-            intervals[matching[-1]] = interval
-    return intervals
-
-
-def _plant_values(values: Mapping[str, Any]) -> dict[str, float]:
-    """Values of the plant's own parameters [SI]; a diagnosis may report more."""
-    return {symbol: float(values[symbol]) for symbol in Parameters.calibrated() if symbol in values}

@@ -1,6 +1,6 @@
 """Settings of the blind check."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from identification.studies.blind.kinds import EXCLUDED_EFFECT, NOMINAL, ONE_CAUSE, TWO_EFFECTS
 
@@ -8,6 +8,9 @@ from identification.studies.blind.kinds import EXCLUDED_EFFECT, NOMINAL, ONE_CAU
 @dataclass(frozen=True, kw_only=True)
 class BlindSettings:
     """Judgements of the blind check, by the stage that uses them."""
+
+    forms: str = "usual"
+    """Name of the study's forms in FORMS; a folder holds trials of one study only."""
 
     # Draw of the truths. How large a drawn effect is: effect_draws.py.
     kind_counts: tuple[tuple[str, int], ...] = (
@@ -28,6 +31,14 @@ class BlindSettings:
     form_deviation: tuple[float, float] = (0.03, 0.15)
     """Least and largest deviation of an effect's form from the fitted form, relative to the effect [-]
     (deviating_forms.py)."""
+    other_form_share: float = 0.5
+    """Probability that an effect has its other form, where it has one (other_forms.py) [-]: as often as
+    not, since nobody knows which curve a real valve follows."""
+    top_effects: tuple[str, ...] = ("armature_bounce", "supply_restriction", "magnetic_saturation")
+    """Effects that are also drawn at the top of their range. Log-uniform draws seldom come near it, and
+    there these three were missed on campaigns of another simulator."""
+    top_share: float = 0.3
+    """Probability that such an effect is drawn at its top [-]: about two trials each of 300."""
 
     # The bench of the blind check.
     omitted_programmes: tuple[str, ...] = ("rest", "high_voltage")
@@ -72,7 +83,22 @@ class BlindSettings:
     temperature_tolerance: float = 0.01
     """Tolerance of the fitted winding temperature [K]."""
 
+    # Disturbances under which a study is diagnosed again.
+    ripple_channels: tuple[str, ...] = ("p2", "p3")
+    """Channels with a slow ripple: the pressures that a supply's pulsation reaches."""
+    ripple_size: float = 2.0
+    """Standard deviation of the ripple [sensor noises]: large enough to be seen in a recording."""
+    ripple_time: float = 0.02
+    """Correlation time of the ripple [s]: as long as the valve's transients, which it imitates."""
+    pressure_step: float = 0.05
+    """Step of coarse pressures [bar]: the resolution of a vehicle's bus."""
+
     # Scores.
+    held_probability: float = 0.9
+    """Probability of being part of the truth from which an effect counts as held, and is named by the
+    verdict `partial` [-]: the contract's."""
+    tie_margin: float = 1e-3
+    """Difference of probability up to which two causes are tied [-]: no one acts on less."""
     smallest_gap: float = 0.02
     """Gap above the floor of 1 below which its reduction is not scored [-]."""
     distinguishable_distance: float = 1.0
@@ -80,6 +106,19 @@ class BlindSettings:
     [noise deviations]."""
     gap_bins: tuple[float, ...] = (1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 1e3)
     """Edges of the bins of the explainable gap above the floor of 1 [-]."""
+
+    # Calibration of the probabilities.
+    calibration_bins: int = 10
+    """Bins of a reliability diagram [-]: with 300 answers the fullest ones still have narrow
+    intervals."""
+    least_inclusion: float = 0.01
+    """Least probability of an effect that counts as a statement about it [-]: below lie thousands of
+    effects that nobody would look at, whose truth would drown the rest."""
+    bootstrap_draws: int = 2000
+    """Draws of trials for the interval of a calibration error [-]: its ends are then stable to some
+    percent of its width."""
+    bootstrap_seed: int = 0
+    """Seed of these draws: the same trials give the same interval."""
 
     @property
     def scatter_reach(self) -> float:
@@ -89,3 +128,9 @@ class BlindSettings:
 
 DEFAULTS = BlindSettings()
 """The settings of docs/results/blind-diagnosis.md."""
+
+STRONG = replace(DEFAULTS, forms="strong", form_deviation=(0.20, 0.50))
+"""The second study: forms so far from the fitted ones that probabilities must say so."""
+
+FORMS = {settings.forms: settings for settings in (DEFAULTS, STRONG)}
+"""The settings of each study by the name of its forms."""

@@ -1,13 +1,18 @@
-"""All trials together: proportions with exact intervals, means, and detection by size of the gap."""
+"""All trials together: proportions with exact intervals, and means."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.studies.blind.answers import NAMING_VERDICTS, VERDICTS
+from identification.studies.blind.calibration import (
+    EQUAL_WIDTH,
+    FIRST,
+    answers_by_trial,
+    calibration_errors,
+)
 from identification.studies.blind.kinds import (
     ABSORBED,
     EXCLUDED_EFFECT,
@@ -16,23 +21,9 @@ from identification.studies.blind.kinds import (
     ONE_CAUSE,
     TWO_EFFECTS,
 )
-from identification.studies.blind.score import VERDICTS, TrialScore
+from identification.studies.blind.score import TrialScore
 from identification.studies.blind.settings import DEFAULTS, BlindSettings
 from identification.studies.proportion import Proportion
-
-
-@dataclass(frozen=True, kw_only=True)
-class DetectionBin:
-    """Trials with similar explainable gaps."""
-
-    low: float
-    """Least gap above the floor of 1 [-]."""
-    high: float
-    """Largest gap above the floor of 1 [-]."""
-    detected: Proportion
-    """Trials in which the diagnosis finds a gap."""
-    first_cause_correct: Proportion
-    """Trials in which the most probable cause is correct."""
 
 
 def proportions(
@@ -42,19 +33,18 @@ def proportions(
 
     Detection and cause are judged where there is something to explain.
     """
-    caused, excluded = _of_kind(trials, ONE_CAUSE, TWO_EFFECTS), _of_kind(trials, EXCLUDED_EFFECT)
+    caused, excluded = of_kind(trials, ONE_CAUSE, TWO_EFFECTS), of_kind(trials, EXCLUDED_EFFECT)
     return {
-        "false alarms without an effect": Proportion.count(_of_kind(trials, NOMINAL), _alarmed),
-        **_absorbed_proportions(_of_kind(trials, ABSORBED)),
-        "detected": Proportion.count([*caused, *excluded], _alarmed),
+        "false alarms without an effect": Proportion.count(of_kind(trials, NOMINAL), is_alarmed),
+        **_absorbed_proportions(of_kind(trials, ABSORBED)),
+        "detected": Proportion.count([*caused, *excluded], is_alarmed),
         **_cause_proportions(caused, settings),
         "component right": Proportion.count(caused, lambda t: t.component_correct),
         "component right where the effect is struck": Proportion.count(
             excluded, lambda t: t.component_correct
         ),
-        "unknown where the effect is struck": Proportion.count(
-            excluded, lambda t: t.verdict == "unknown"
-        ),
+        "unknown where the effect is struck": Proportion.count(excluded, _names_nothing_false),
+        **_false_effect_proportions(trials),
         "size inside its interval": Proportion.count(
             [estimate for trial in caused for estimate in trial.size_estimates], lambda e: e.inside
         ),
@@ -67,7 +57,7 @@ def proportions(
 
 def means(trials: Sequence[TrialScore]) -> dict[str, float | None]:
     """Means, a median and a maximum over the trials; names as in results.json."""
-    caused = _of_kind(trials, ONE_CAUSE, TWO_EFFECTS)
+    caused = of_kind(trials, ONE_CAUSE, TWO_EFFECTS)
     sets = [trial.set_size for trial in caused if trial.set_size]
     errors = [estimate.error for trial in caused for estimate in trial.size_estimates]
     seconds = [trial.seconds for trial in trials if trial.seconds is not None]
@@ -83,39 +73,17 @@ def means(trials: Sequence[TrialScore]) -> dict[str, float | None]:
 def named_values(
     trials: Sequence[TrialScore], settings: BlindSettings = DEFAULTS
 ) -> dict[str, float | None]:
-    """Every proportion and mean by name; None where there is nothing to count."""
+    """Every proportion, mean and criterion by name; None where there is nothing to count."""
     values = {name: found.value for name, found in proportions(trials, settings).items()}
-    return values | means(trials)
+    errors = calibration_errors(answers_by_trial(trials)[FIRST], settings)
+    error = errors[EQUAL_WIDTH].value if errors else None
+    return values | means(trials) | {"calibration error of the first cause": error}
 
 
 def verdict_matrix(trials: Sequence[TrialScore]) -> NDArray:
     """Number of trials of each kind (rows, as KIND_TITLES) and verdict (columns, as VERDICTS)."""
     pairs = ((trial.kind, trial.verdict) for trial in trials)
     return confusion_matrix(pairs, tuple(KIND_TITLES), VERDICTS)
-
-
-def detection_by_gap(
-    trials: Sequence[TrialScore], settings: BlindSettings = DEFAULTS
-) -> list[DetectionBin]:
-    """Detection by explainable gap, for trials with one cause or two effects.
-
-    Absorbed trials are included: below the threshold the diagnosis should find nothing.
-    """
-    caused = _of_kind(trials, ONE_CAUSE, TWO_EFFECTS, ABSORBED)
-    edges = settings.gap_bins
-    indices = np.digitize([max(t.explainable_gap - 1.0, edges[0]) for t in caused], edges)
-    bins = []
-    for index, (low, high) in enumerate(pairwise(edges), start=1):
-        inside = [trial for trial, bin_ in zip(caused, indices, strict=True) if bin_ == index]
-        bins.append(
-            DetectionBin(
-                low=low,
-                high=high,
-                detected=Proportion.count(inside, _alarmed),
-                first_cause_correct=Proportion.count(inside, lambda t: t.first_cause_correct),
-            )
-        )
-    return bins
 
 
 def confusion_matrix(
@@ -133,7 +101,7 @@ def is_well_judged(trial: TrialScore) -> bool:
     if trial.kind in (NOMINAL, ABSORBED):
         return trial.verdict == "no_gap"
     if trial.kind == EXCLUDED_EFFECT:
-        return trial.verdict == "unknown"
+        return _names_nothing_false(trial)
     return trial.first_cause_correct
 
 
@@ -141,8 +109,17 @@ def _absorbed_proportions(absorbed: Sequence[TrialScore]) -> dict[str, Proportio
     return {
         "no gap where the four absorb it": Proportion.count(absorbed, lambda t: t.verdict == "no_gap"),
         "false cause where the four absorb it": Proportion.count(
-            absorbed, lambda t: _alarmed(t) and not set(t.first_cause) <= set(t.causes)
+            absorbed, lambda t: is_alarmed(t) and not set(t.first_cause) <= set(t.causes)
         ),
+    }
+
+
+def _false_effect_proportions(trials: Sequence[TrialScore]) -> dict[str, Proportion]:
+    """Trials with an effect that is held and is not part of the truth, all and by kind."""
+    groups = {"": trials} | {f", {KIND_TITLES[kind]}": of_kind(trials, kind) for kind in KIND_TITLES}
+    return {
+        f"false effect held{name}": Proportion.count(group, lambda t: bool(t.false_held))
+        for name, group in groups.items()
     }
 
 
@@ -153,8 +130,8 @@ def _cause_proportions(caused: Sequence[TrialScore], settings: BlindSettings) ->
         "first cause right, where data can tell": [
             trial for trial in caused if trial.rival_distance is None or trial.rival_distance >= limit
         ],
-        "first cause right, one cause": _of_kind(caused, ONE_CAUSE),
-        "first cause right, two effects": _of_kind(caused, TWO_EFFECTS),
+        "first cause right, one cause": of_kind(caused, ONE_CAUSE),
+        "first cause right, two effects": of_kind(caused, TWO_EFFECTS),
     }
     return {
         "truth in the ambiguity set": Proportion.count(caused, lambda t: t.truth_in_set),
@@ -162,15 +139,24 @@ def _cause_proportions(caused: Sequence[TrialScore], settings: BlindSettings) ->
             name: Proportion.count(group, lambda t: t.first_cause_correct)
             for name, group in groups.items()
         },
+        "first cause right, ties counted as wrong": Proportion.count(
+            caused, lambda t: t.first_cause_correct and not t.tied
+        ),
     }
 
 
-def _alarmed(trial: TrialScore) -> bool:
+def _names_nothing_false(trial: TrialScore) -> bool:
+    """Whether a verdict leaves open what it cannot know: `unknown`, or `partial` of truths."""
+    return trial.verdict == "unknown" or (trial.verdict == "partial" and not trial.false_held)
+
+
+def is_alarmed(trial: TrialScore) -> bool:
     """Whether the diagnosis finds a gap."""
-    return trial.verdict in ("known", "ambiguous", "unknown")
+    return trial.verdict in (*NAMING_VERDICTS, "unknown")
 
 
-def _of_kind(trials: Sequence[TrialScore], *kinds: str) -> list[TrialScore]:
+def of_kind(trials: Sequence[TrialScore], *kinds: str) -> list[TrialScore]:
+    """The trials of these kinds."""
     return [trial for trial in trials if trial.kind in kinds]
 
 

@@ -1,24 +1,19 @@
-"""The stages of a blind check in a folder: draw, commit, diagnose. Each trial runs once.
+"""The first stages of a blind check in a folder: draw and commit. Each trial runs once.
 
 trials/NNNN/campaign/    the campaign: all that the diagnosis gets, with ...
 trials/NNNN/request.json ... the causes excluded from its catalogue
 trials/NNNN/sealed.json, truth.npz   the truth
-trials/NNNN/diagnosis/gap.json       the diagnosis
+trials/NNNN/diagnosis/gap.json       the diagnosis (diagnoses.py)
+trials/NNNN/campaign-NAME/, diagnosis-NAME/   the same of a disturbance (robustness.py)
 commitments.sha256       hashes of the truths, written before the first diagnosis
 """
 
 import json
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Protocol
-
-from threadpoolctl import threadpool_limits
 
 from epv_env.common.files import write_text
-from epv_env.common.progress import progress
 from identification.bench.measurement import TrueSignals
 from identification.recordings.campaign_files import write_campaign
 from identification.recordings.manifest import FILE_NAME
@@ -33,22 +28,11 @@ from identification.studies.blind.commitments import (
     write_truth,
 )
 from identification.studies.blind.kinds import TWO_EFFECTS
+from identification.studies.blind.processes import run_in_processes
 from identification.studies.blind.settings import DEFAULTS, BlindSettings
 from identification.studies.blind.truth import Trial, draw_trial, trial_plan
 
-COMMITMENTS_FILE, STUDY_FILE, REQUEST_FILE, DIAGNOSIS_FILE = (
-    "commitments.sha256", "blind.json", "request.json", "gap.json",
-)  # fmt: skip
-
-
-class DiagnosisFunction(Protocol):
-    """What a trial asks of a diagnosis: read the campaign, write `out`/gap.json."""
-
-    def __call__(
-        self, campaign: Path, out: Path, *, without: Sequence[str] = (), report: bool = False
-    ) -> object:
-        """Diagnose a campaign with a catalogue that lacks the causes `without`."""
-        ...
+COMMITMENTS_FILE, STUDY_FILE, REQUEST_FILE = "commitments.sha256", "blind.json", "request.json"
 
 
 def trial_folder(out: Path, number: int) -> Path:
@@ -56,16 +40,24 @@ def trial_folder(out: Path, number: int) -> Path:
     return out / "trials" / f"{number:04d}"
 
 
-def check_seed(out: Path, seed: int) -> None:
-    """Note the seed of a folder. Raises ValueError if the folder holds trials of another seed."""
+def check_study(out: Path, *, seed: int, forms: str) -> None:
+    """Note the seed and the forms of a folder's trials.
+
+    Raises:
+        ValueError: the folder holds trials of another seed or of other forms.
+    """
     path = out / STUDY_FILE
+    study = {"seed": seed, "forms": forms}
     if path.exists():
-        earlier = json.loads(path.read_text(encoding="utf-8"))["seed"]
-        if earlier != seed:
-            raise ValueError(
-                f"{out} holds trials of seed {earlier}: give --seed {earlier}, or another --out"
-            )
-    write_text(path, json.dumps({"seed": seed}) + "\n")
+        # A study from before there was a choice has no entry for its forms.
+        earlier = {"forms": DEFAULTS.forms, **json.loads(path.read_text(encoding="utf-8"))}
+        for name, given in study.items():
+            if earlier[name] != given:
+                raise ValueError(
+                    f"{out} holds trials of {name} {earlier[name]}: give --{name} {earlier[name]}, or "
+                    "another --out"
+                )
+    write_text(path, json.dumps(study) + "\n")
 
 
 def generate(
@@ -132,56 +124,6 @@ def read_commitments(path: Path) -> dict[int, str]:
     return {int(number): digest for digest, number in pairs}
 
 
-def diagnose(out: Path, *, trials: int, workers: int, diagnosis: DiagnosisFunction) -> None:
-    """Diagnose every trial that has no diagnosis yet, in processes that get the campaign only."""
-    folders = [trial_folder(out, number) for number in range(trials)]
-    jobs = [
-        (diagnosis, folder / "campaign", folder / "diagnosis", _excluded_causes(folder))
-        for folder in folders
-        if not (folder / "diagnosis" / DIAGNOSIS_FILE).exists()
-    ]
-    for failure in run_in_processes(diagnose_trial, jobs, workers=workers, label="blind: diagnoses"):
-        if failure:
-            print(failure, file=sys.stderr, flush=True)
-
-
-def diagnose_trial(
-    diagnosis: DiagnosisFunction, campaign: Path, out: Path, without: Sequence[str]
-) -> str | None:
-    """Run one diagnosis. Returns a message if the diagnosis fails: the trial then has none."""
-    try:
-        diagnosis(campaign, out, without=without, report=False)
-    except Exception as error:  # one failure must not end the study; it is shown and scored
-        return f"{campaign}: the diagnosis failed: {type(error).__name__}: {error}"
-    return None
-
-
-def read_diagnosis(folder: Path) -> dict[str, Any] | None:
-    """Content of a trial's gap.json; None without one."""
-    path = folder / "diagnosis" / DIAGNOSIS_FILE
-    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else None
-
-
-def run_in_processes(
-    function: Callable[..., Any], jobs: Sequence[tuple], *, workers: int, label: str
-) -> Iterator[Any]:
-    """Results of a function for the arguments of each job, in the order of completion.
-
-    label: of the progress display.
-    """
-    if not jobs:
-        return
-    pool = ProcessPoolExecutor(
-        min(workers, len(jobs)), get_context("spawn"), initializer=threadpool_limits, initargs=(1,)
-    )
-    try:
-        futures = [pool.submit(function, *job) for job in jobs]
-        for future in progress(as_completed(futures), what=label, total=len(jobs)):
-            yield future.result()
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-
-
 def _drawn_and_recorded(
     seed: int, number: int, kind: str, causes: Sequence[str], settings: BlindSettings
 ) -> tuple[Trial, list[TrueSignals], dict[str, float]]:
@@ -206,7 +148,3 @@ def _single_gaps(trial: Trial, seed: int, settings: BlindSettings) -> dict[str, 
         recordings = noise_free_recordings(true_recordings(single, seed, settings))
         gaps[effect] = explainable_gap(single, recordings, settings)["explainable"]
     return gaps
-
-
-def _excluded_causes(folder: Path) -> tuple[str, ...]:
-    return tuple(json.loads((folder / REQUEST_FILE).read_text(encoding="utf-8"))["without"])

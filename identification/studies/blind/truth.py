@@ -1,6 +1,6 @@
 """The truth of a trial: the valve as built, the causes of its gap, and how their forms deviate."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from typing import TypeVar
@@ -11,7 +11,12 @@ from scipy.stats import truncnorm
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import CALIBRATED_SYMBOLS
-from identification.studies.blind.effect_draws import WARMEST, draw_parameter, draw_sizes
+from identification.studies.blind.effect_draws import (
+    WARMEST,
+    draw_parameter,
+    draw_sizes,
+    top_sizes,
+)
 from identification.studies.blind.kinds import (
     EXCLUDED_EFFECT,
     NOMINAL,
@@ -19,6 +24,7 @@ from identification.studies.blind.kinds import (
     PARAMETER,
     TWO_EFFECTS,
 )
+from identification.studies.blind.other_forms import OTHER_FORMS
 from identification.studies.blind.settings import DEFAULTS, BlindSettings
 from identification.valve_gap.causes import PARAMETER_COMPONENTS
 
@@ -45,6 +51,8 @@ class Trial:
     """Deviation of the effects' forms from the fitted ones [-]; 0 without effects."""
     winding_temperature_rise: float = 0.0
     """Rise of the winding's temperature over the session, where the winding heats [K]."""
+    other_forms: tuple[str, ...] = ()
+    """Effects that have their other form (other_forms.py)."""
 
     @property
     def parameters(self) -> Parameters:
@@ -67,6 +75,7 @@ class Trial:
             unit=self.unit,
             form_deviation=self.form_deviation,
             winding_temperature_rise=self.winding_temperature_rise if "h_coil" in sizes else 0.0,
+            other_forms=tuple(name for name in self.other_forms if name == effect),
         )
 
 
@@ -118,6 +127,10 @@ def draw_trial(
             sizes[symbol] = draw_parameter(Parameters.calibrated()[symbol], rng)
     deviation = rng.uniform(*settings.form_deviation)
     temperature_rise = np.exp(rng.uniform(*np.log(WARMEST)))
+    # Drawn last: the draws above stay those of a study without other forms.
+    other_forms = _some(causes, OTHER_FORMS, settings.other_form_share, rng)
+    for name in _some(causes, settings.top_effects, settings.top_share, rng):
+        sizes |= top_sizes(name)
     return Trial(
         number=number,
         kind=kind,
@@ -126,6 +139,7 @@ def draw_trial(
         unit=unit,
         form_deviation=float(deviation) if set(causes) & set(CATALOGUE) else 0.0,
         winding_temperature_rise=float(temperature_rise) if "h_coil" in sizes else 0.0,
+        other_forms=other_forms,
     )
 
 
@@ -142,6 +156,13 @@ def draw_unit(rng: np.random.Generator, settings: BlindSettings = DEFAULTS) -> P
     scattered = 1.0 + settings.unit_scatter * np.asarray(others)
     factors |= dict(zip(PARAMETER_COMPONENTS, scattered, strict=True))
     return centre.replace(**{s: float(centre[s] * factor) for s, factor in factors.items()})
+
+
+def _some(
+    causes: Sequence[str], among: Collection[str], share: float, rng: np.random.Generator
+) -> tuple[str, ...]:
+    """Those of the causes that are among others, each with this probability [-]."""
+    return tuple(cause for cause in causes if cause in among and rng.uniform() < share)
 
 
 def _dealt(deck: Sequence[Card], rng: np.random.Generator) -> Iterator[Card]:

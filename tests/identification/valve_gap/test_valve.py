@@ -44,6 +44,19 @@ def test_outputs_are_the_replay_s():
         np.testing.assert_array_equal(answer.model, output[:, :, 0])
 
 
+def test_a_noise_that_is_told_counts_and_the_others_are_estimated():
+    estimated, told = Valve(campaign()), Valve(campaign(), noise={"p3": 7e3})
+    assert {c.name: c.noise for c in told.channels} == {
+        c.name: 7e3 if c.name == "p3" else c.noise for c in estimated.channels
+    }
+
+
+@pytest.mark.parametrize("noise", [{"p3": 0.0}, {"p3": float("nan")}, {"p1": 1e3}])
+def test_what_is_no_noise_of_an_output_is_refused(noise):
+    with pytest.raises(ValueError, match="give a positive standard deviation"):
+        Valve(campaign(), noise=noise)
+
+
 def test_numbers_of_one_run_leave_the_others_alone():
     valve = Valve(campaign())
     own = np.zeros((2, 4))

@@ -11,17 +11,18 @@ NO_GAP = {
 }  # fmt: skip
 
 
-def says_no_gap(campaign: Path, out: Path, *, without=(), report=False) -> None:
+def says_no_gap(campaign: Path, out: Path, *, without=(), report=False, noise=None) -> None:
     """Finds nothing, and leaves a note of what it was told."""
     seen = {
         "campaign": sorted(path.name for path in campaign.iterdir()),
         "without": list(without),
         "report": report,
+        "noise": noise,
     }
     write_text(out / "seen.json", json.dumps(seen))
     write_text(out / "gap.json", json.dumps(NO_GAP))
 
 
-def fails(campaign: Path, out: Path, *, without=(), report=False) -> None:
+def fails(campaign: Path, out: Path, *, without=(), report=False, noise=None) -> None:
     """Does not get through."""
     raise RuntimeError("it did not converge")

@@ -16,13 +16,14 @@ from identification.studies.blind.commitments import (
     packed_recordings,
     unpacked_recordings,
 )
+from identification.studies.blind.effect_draws import top_sizes
+from identification.studies.blind.gap_reduction import true_gap_reduction
 from identification.studies.blind.kinds import NOMINAL, ONE_CAUSE
 from identification.studies.blind.noise_free_gap import (
     held_out_gap,
     hypothesis_distance,
     recalibrated_parameters,
 )
-from identification.studies.blind.score import true_gap_reduction
 from identification.studies.blind.truth import Trial, draw_trial
 
 SUITE = blind_suite()
@@ -55,6 +56,24 @@ def test_without_an_effect_the_bench_is_the_nominal_plant():
     found = run_programme(unit, SHORT, form_deviation=0.0, rng=np.random.default_rng(0)).channels
     for name, least in (("p1", 50.0), ("p2", 50.0), ("p3", 50.0), ("I", 5e-5)):
         np.testing.assert_allclose(found[name], nominal[name], atol=least)
+
+
+@pytest.mark.parametrize(
+    ("effect", "channel", "least"),
+    [("supply_restriction", "p2", 1e3), ("magnetic_saturation", "I", 1e-3)],
+)
+def test_other_forms_are_the_plant_without_the_effect_and_another_with_it(effect, channel, least):
+    """The deviations of the recordings: within the solver's tolerance without, well above noise with."""
+    top = trial().unit.replace(**top_sizes(effect))
+    for valve, same in ((trial().unit, True), (top, False)):
+        fitted, other = (
+            run_programme(
+                valve, SHORT, form_deviation=0.0, rng=np.random.default_rng(0), other_forms=forms
+            ).channels[channel]
+            for forms in ((), (effect,))
+        )
+        apart = np.max(np.abs(other - fitted))
+        assert apart < 0.05 * least if same else apart > least
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,11 @@ from identification.studies.blind import trials
 from identification.studies.blind.bench import blind_suite
 from identification.studies.blind.blind_study import blind_check
 from identification.studies.blind.commitments import LABEL_FILE, RECORDINGS_FILE, open_commitment
+from identification.studies.blind.settings import STRONG
 from identification.studies.blind.trials import (
     COMMITMENTS_FILE,
+    STUDY_FILE,
+    check_study,
     generate_trial,
     read_commitments,
     trial_folder,
@@ -96,6 +99,17 @@ def test_a_trial_is_the_same_whoever_makes_it(study, tmp_path):
 def test_another_seed_is_refused(study):
     with pytest.raises(ValueError, match=f"trials of seed {SEED}"):
         check(study, seed=SEED + 1)
+
+
+def test_other_forms_are_refused(study):
+    with pytest.raises(ValueError, match="holds trials of forms usual: give --forms usual"):
+        blind_check(study, trials=N, seed=SEED, workers=1, diagnosis=stubs.says_no_gap, settings=STRONG)
+
+
+def test_a_study_from_before_there_were_strong_forms_goes_on(tmp_path):
+    (tmp_path / STUDY_FILE).write_text('{"seed": 3}\n')
+    check_study(tmp_path, seed=3, forms="usual")
+    assert json.loads((tmp_path / STUDY_FILE).read_text()) == {"seed": 3, "forms": "usual"}
 
 
 @pytest.mark.parametrize("name", [LABEL_FILE, RECORDINGS_FILE])

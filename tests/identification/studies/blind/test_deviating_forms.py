@@ -9,7 +9,7 @@ from epv_env.plant.effects.registry import effect, effect_constants
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.parameters import Parameters
 from identification.bench.right_hand_side import COMPILED_RIGHT_HAND_SIDES
-from identification.studies.blind.deviating_forms import right_hand_side, terminal_currents
+from identification.studies.blind.bench_rates import right_hand_side, terminal_currents
 from identification.studies.blind.truth import EFFECTS
 
 BESIDE_THE_STATE = {"pressure_sensor_bias", "current_sensor_gain", "command_delay"}

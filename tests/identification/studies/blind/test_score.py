@@ -5,46 +5,21 @@ import json
 import pytest
 
 from identification.studies.blind.acceptance import ACCEPTANCE_CRITERIA
+from identification.studies.blind.answers import is_correct
 from identification.studies.blind.blind_section import blind_json, blind_section
+from identification.studies.blind.detection import detection_by_gap
+from identification.studies.blind.gap_reduction import GapReduction, rival_distance
 from identification.studies.blind.kinds import ABSORBED
-from identification.studies.blind.score import GapReduction, is_correct, rival_distance, score_trial
+from identification.studies.blind.score import score_trial
+from identification.studies.blind.settings import STRONG
 from identification.studies.blind.summary import (
-    detection_by_gap,
     is_well_judged,
     means,
     proportions,
     verdict_matrix,
 )
 from identification.studies.proportion import Proportion
-
-
-def label(kind="one", effects=("eddy_current",), visible=None, explainable=2.0, sizes=None, trial=0):
-    return {
-        "trial": trial, "kind": kind, "effects": list(effects),
-        "visible": list(effects if visible is None else visible),
-        "sizes": sizes or {}, "gap": {"explainable": explainable, "recalibrated": explainable},
-    }  # fmt: skip
-
-
-NOTHING = label("none", (), explainable=1.0)
-
-
-def answer(verdict="known", *causes, component="solenoid", named=1, seconds=10.0):
-    """causes: (effects, probability, magnitude) in order; the first `named` are the ambiguity set."""
-    return {
-        "verdict": verdict,
-        "where": {"component": {component: 0.9, "flow": 0.1} if component else {}},
-        "causes": [
-            {"effects": list(effects), "probability": probability, "magnitude": magnitude}
-            for effects, probability, magnitude in causes
-        ],
-        "ambiguity_set": [list(effects) for effects, *_ in causes[:named]],
-        "seconds": seconds,
-    }
-
-
-EDDY = (["eddy_current"], 0.9, {"G_eddy_S": [2.2e-3, 1.9e-3, 2.5e-3]})
-CLAMP = (["flyback_voltage"], 0.08, {"U_clamp_V": [1.0, 0.5, 1.5]})
+from tests.identification.studies.blind.hand_made import CLAMP, EDDY, NOTHING, answer, label
 
 
 def score(label, answer, reduction=None, rival=None):
@@ -170,10 +145,27 @@ def test_shares_and_means_of_a_study():
 
 def test_acceptance_criteria_are_met_or_not():
     found = blind_json(study(), seed=0)["bars"]
-    assert found["first cause right"] is True
+    assert found["first cause right, ties counted as wrong"] is True
     assert found["truth in the ambiguity set"] is False
     assert found["false alarms without an effect"] is None
     assert set(found) == {criterion.name for criterion in ACCEPTANCE_CRITERIA}
+
+
+def test_strong_forms_are_asked_for_calibration_alone():
+    """Nine right answers of 0.9 each: the error is 0.1."""
+    found = blind_json(study(), seed=0, settings=STRONG)
+    assert found["bars"] == {"calibration error of the first cause": False}
+    assert found["calibration"]["first cause"]["ece"]["equal width"]["value"] == pytest.approx(0.1)
+    assert found["forms"] == "strong"
+
+
+def test_the_bars_are_those_of_the_best_study_or_above():
+    bars = {criterion.name: (criterion.least, criterion.most) for criterion in ACCEPTANCE_CRITERIA}
+    assert bars["false alarms without an effect"][1] == 0
+    assert bars["truth in the ambiguity set"][0] == 0.96
+    assert bars["first cause right, ties counted as wrong"][0] == 0.90
+    assert bars["unknown where the effect is struck"][0] == 0.87
+    assert bars["calibration error of the first cause"][1] == 0.05
 
 
 def test_detection_is_counted_by_size_of_the_gap():

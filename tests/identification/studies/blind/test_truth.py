@@ -1,6 +1,7 @@
 """The drawn truths: reproducible, every effect as often, within its physical range."""
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,8 +10,9 @@ from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.effects.registry import EFFECTS as RECORDS
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import CALIBRATED_SYMBOLS
+from identification.studies.blind.commitments import truth_label
 from identification.studies.blind.kinds import EXCLUDED_EFFECT, NOMINAL, ONE_CAUSE, TWO_EFFECTS
-from identification.studies.blind.settings import DEFAULTS
+from identification.studies.blind.settings import DEFAULTS, STRONG
 from identification.studies.blind.truth import (
     EFFECTS,
     draw_trial,
@@ -78,6 +80,52 @@ def test_sizes_are_those_of_the_effect_and_in_its_domain(effect):
         assert trial.form_deviation > 0
 
 
+def drawn(effect, settings=DEFAULTS, trials=200):
+    return [draw_trial(0, number, ONE_CAUSE, [effect], settings=settings) for number in range(trials)]
+
+
+@pytest.mark.parametrize("effect", ["supply_restriction", "magnetic_saturation"])
+def test_some_trials_have_the_other_form_and_their_label_says_so(effect):
+    having = [trial.other_forms for trial in drawn(effect)]
+    assert set(having) == {(), (effect,)}
+    assert 0.4 < np.mean([bool(forms) for forms in having]) < 0.6
+    label = truth_label(
+        next(trial for trial in drawn(effect) if trial.other_forms),
+        {"recalibrated": 2.0, "explainable": 2.0}, {}, recordings=b"", seed=0,
+    )  # fmt: skip
+    assert label["other_forms"] == [effect]
+
+
+def test_an_effect_without_another_form_has_the_fitted_law():
+    assert not any(trial.other_forms for trial in drawn("flow_force"))
+
+
+@pytest.mark.parametrize(
+    ("effect", "sizes"),
+    [
+        ("armature_bounce", {"eMV": 0.75}),
+        ("supply_restriction", {"z_supply": 5e4}),
+        ("magnetic_saturation", {"sMV": 8e3}),
+        ("flow_force", None),
+    ],
+)
+def test_some_trials_are_at_the_top_of_what_is_drawn(effect, sizes):
+    share = np.mean([trial.sizes == sizes for trial in drawn(effect)])
+    assert share == pytest.approx(DEFAULTS.top_share, abs=0.08) if sizes else share == 0
+
+
+def test_other_forms_and_tops_leave_the_other_draws_as_they_are():
+    plain = replace(DEFAULTS, other_form_share=0.0, top_share=0.0)
+    for one, other in zip(drawn("armature_bounce"), drawn("armature_bounce", plain), strict=True):
+        assert (one.unit, one.form_deviation) == (other.unit, other.form_deviation)
+
+
+def test_strong_forms_deviate_by_a_fifth_to_a_half():
+    deviations = [trial.form_deviation for trial in drawn("flow_force", STRONG)]
+    assert 0.20 <= min(deviations) < 0.22
+    assert 0.48 < max(deviations) <= 0.50
+
+
 def test_a_parameter_that_is_off_is_off_by_more_than_scatter():
     for number in range(20):
         trial = draw_trial(0, number, ONE_CAUSE, ["parameter:d1"])
@@ -111,4 +159,8 @@ def test_half_of_a_pair_is_the_same_valve_with_that_effect():
     assert half.unit is trial.unit
     heating = trial.with_only("coil_heating")
     assert half.winding_temperature_rise == 0.0
+    restricted = draw_trial(0, 1, TWO_EFFECTS, ["supply_restriction", "seat_leak"])
+    restricted = replace(restricted, other_forms=("supply_restriction",))
+    assert restricted.with_only("supply_restriction").other_forms == ("supply_restriction",)
+    assert restricted.with_only("seat_leak").other_forms == ()
     assert heating.winding_temperature_rise == trial.winding_temperature_rise
