@@ -27,6 +27,8 @@ def fit(
         starts: where the fits begin.
         rival_chi_square: least chi-square of earlier fits against which these compete [1].
     """
+    if not starts:
+        return []
     searches = [_Search(problem, start) for start in starts]
     active = searches
     for _ in range(problem.settings.iterations + 1):

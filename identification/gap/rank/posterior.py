@@ -1,8 +1,8 @@
 """Probabilities of hypotheses under noise and model discrepancy.
 
 The variance of a residual is not known: noise and discrepancy add to it. Marginalised over that
-variance, the likelihood of a hypothesis is Student's t instead of Gaussian: small differences of the sums of
-squares count as under noise alone, large ones by the logarithm of their ratio, so that no name becomes
+variance, the likelihood of a hypothesis is Student's t instead of Gaussian. Small differences of the
+sums of squares count as under noise alone, large ones by the logarithm of their ratio. So no name becomes
 certain because another form errs a little less.
 """
 
