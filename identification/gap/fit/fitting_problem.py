@@ -86,6 +86,13 @@ class FittingProblem:
                 columns.setdefault(tolerance.symbol, centre)[i] += deviation * tolerance.sd
         return columns
 
+    def ends(self, estimate: Estimate) -> tuple[NDArray, NDArray]:
+        """Steps of the scaled vector to both ends of the ranges, (k,) each [1]; never across zero."""
+        parameters, vector = self.parameters(estimate), estimate.vector
+        low = np.array([min(p.low / p.scale, p.high / p.scale) for p in parameters])
+        high = np.array([max(p.low / p.scale, p.high / p.scale) for p in parameters])
+        return np.minimum(low - vector, 0.0), np.maximum(high - vector, 0.0)
+
     def slopes_of(self, estimate: Estimate) -> NuisanceSlopes:
         """Nuisance slopes that hold for an estimate."""
         return estimate.slopes or self.slopes

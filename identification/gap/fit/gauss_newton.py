@@ -92,12 +92,9 @@ class _Search:
 
     def _step(self, equations: NormalEquations) -> tuple[Estimate, float]:
         """The next trial, within the ranges, and the decrease of chi-square that it promises."""
-        parameters, vector = self.problem.parameters(self.best), self.best.vector
-        low = np.array([min(p.low / p.scale, p.high / p.scale) for p in parameters])
-        high = np.array([max(p.low / p.scale, p.high / p.scale) for p in parameters])
-        ends = np.minimum(low - vector, 0.0), np.maximum(high - vector, 0.0)
+        ends = self.problem.ends(self.best)
         step, decrease = equations.step(*ends, self.damping)
-        return replace(self.best, vector=vector + step), decrease
+        return replace(self.best, vector=self.best.vector + step), decrease
 
     def _decide(self, decrease: float, rival_chi_square: float) -> None:
         """Mark the fit as converged or given up."""

@@ -1,6 +1,6 @@
 """Settings of the joint fits."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,9 +43,15 @@ class FitSettings:
     converged_decrease: float = 0.3
     """Predicted decrease of chi-square [1] below which a fit has converged: less changes no odds."""
 
-    converged_excess_share: float = 0.01
+    converged_excess_share: float = 3e-3
     """Predicted decrease below which a fit has converged, as a share of the excess, chi-square beyond
     one per reading [1]: a cause that leaves a large residual need not be fitted to the last digit."""
+
+    thorough_iterations: int = 40
+    """The number of iterations for plants with a small catalogue, whose fits cost little."""
+
+    thorough_excess_share: float = 1e-4
+    """The converged share of the excess for such plants [1]: a flat valley is followed to its end."""
 
     promised_decreases: float = 3.0
     """Multiple of the predicted decrease [1] that a fit may still gain, before it is given up: steps of
@@ -65,3 +71,12 @@ class FitSettings:
     prediction_iterations: int = 3
     """Gauss-Newton steps for a cause's run parameters when a run is predicted; the outputs are nearly
     linear in them, so that three suffice."""
+
+    @property
+    def thorough(self) -> "FitSettings":
+        """The settings for plants with a small catalogue."""
+        return replace(
+            self,
+            iterations=self.thorough_iterations,
+            converged_excess_share=self.thorough_excess_share,
+        )

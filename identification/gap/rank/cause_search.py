@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
 
+from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.fit.gauss_newton import fit
 from identification.gap.fit.hypothesis import Estimate, Hypothesis
 from identification.gap.fit.linearisation import linearise
@@ -12,12 +13,14 @@ from identification.gap.rank.evidence import EvaluatedHypothesis
 from identification.gap.rank.hypothesis_pool import HypothesisPool
 from identification.gap.rank.pair_screening import promising_pairs
 from identification.gap.rank.posterior import misfit_beyond_noise
-from identification.gap.rank.refinement import refit_with_causes
+from identification.gap.rank.refinement import refit
 from identification.gap.rank.screening import (
     CauseSignature,
-    ScreenedCause,
+    Start,
+    best_start_of_each,
     screen_causes,
     simulate_signatures,
+    simulated_starts,
     with_cause,
 )
 from identification.gap.rank.separability import Separability
@@ -59,20 +62,20 @@ def _is_small(pool: HypothesisPool) -> bool:
 def _fit_singles(
     pool: HypothesisPool,
     base: Estimate,
-    screened: Sequence[ScreenedCause],
+    screened: Sequence[Start],
     separability: Separability,
 ) -> None:
     """Single causes: the promising ones, those that look like the best, and the best refined."""
     settings, problem = pool.settings, pool.problem
     most = len(screened) if _is_small(pool) else settings.refitted_causes
     first, others = screened[:most], screened[most:]
-    pool.add(pool.cache("single causes", lambda: refit_with_causes(problem, base, first)))
+    pool.add(pool.cache("single causes", lambda: refit(problem, base, first)))
     best = [each.labels[0] for each, _ in pool.ranked(1)[: settings.finalists[1]]]
     least = settings.alike_correlation
     resembling = {label for own in best for label in separability.alike(own, least)}
     alike = [each for each in others if each.cause.label in resembling]
     if alike:
-        pool.add(pool.cache("causes like the best", lambda: refit_with_causes(problem, base, alike)))
+        pool.add(pool.cache("causes like the best", lambda: refit(problem, base, alike)))
     for number, most in enumerate(settings.finalists, start=1):
         _refine_best(pool, 1, most, f"single causes, round {number}")
 
@@ -123,14 +126,14 @@ def _fits_with_another(
         if cause.name not in own and frozenset((*smaller.labels, cause.label)) not in pool
     ]
 
-    def refit() -> list[Estimate]:
+    def fits() -> list[Estimate]:
         signatures = simulate_signatures(problem, base, others)
         base_runs = linearise(problem, [base], problem.fitted_runs)[0]
         screened = screen_causes(problem, base, base_runs, signatures, every_start=_is_small(pool))
         kept = screened if _is_small(pool) else screened[:partners]
-        return refit_with_causes(problem, base, kept)
+        return refit(problem, base, kept)
 
-    return pool.cache(f"beside {' and '.join(smaller.labels)}", refit) if others else []
+    return pool.cache(f"beside {' and '.join(smaller.labels)}", fits) if others else []
 
 
 def _fit_promising_pairs(
@@ -138,33 +141,47 @@ def _fit_promising_pairs(
     base: Estimate,
     base_runs: Sequence[LinearisedRun],
     signatures: Sequence[CauseSignature],
-    screened: Sequence[ScreenedCause],
+    screened: Sequence[Start],
 ) -> None:
     """Pairs that promise much together; all pairs of a small catalogue."""
     settings, problem = pool.settings, pool.problem
-    pairs = [
-        (first, second)
-        for first, second in combinations(screened, 2)
-        if first.cause.name != second.cause.name
-        and frozenset((first.cause.label, second.cause.label)) not in pool
-    ]
+    wanted: list[frozenset[str]] | None = None
     if not _is_small(pool):
         labels = promising_pairs(base_runs, signatures, problem.settings.largest_deviation)
         wanted = [own for own in labels if own not in pool][: settings.screened_pairs]
-        pairs = [
-            pair for pair in pairs if frozenset((pair[0].cause.label, pair[1].cause.label)) in wanted
-        ]
-    starts = [
-        with_cause(
-            problem,
-            with_cause(problem, base, first.cause, first.by_symbol),
-            second.cause,
-            second.by_symbol,
-        )
-        for first, second in pairs
+    together = [
+        _both(problem, base, first, second)
+        for first, second in combinations(screened, 2)
+        if first.cause.name != second.cause.name
+        and (wanted is None or frozenset((*first.labels, *second.labels)) in wanted)
     ]
-    fitted = pool.cache("pairs", lambda: fit(problem, starts, base.chi_square)) if starts else []
-    pool.add(estimate for estimate in fitted if not estimate.given_up)
+
+    def fits() -> list[Estimate]:
+        starts = simulated_starts(problem, base, base_runs, together)
+        return refit(problem, base, _best_starts(starts, settings.starts_of_a_pair))
+
+    pool.add(pool.cache("pairs", fits))
+
+
+def _both(problem: FittingProblem, base: Estimate, first: Start, second: Start) -> Estimate:
+    """The base with the causes of two starts at their values there."""
+    joint = base
+    for start in (first, second):
+        values, parameters = problem.values(start.estimate), start.cause.parameters
+        joint = with_cause(problem, joint, start.cause, {p.symbol: values[p.symbol] for p in parameters})
+    return joint
+
+
+def _best_starts(starts: Sequence[Start], most: int) -> list[Start]:
+    """The best starts of each set of causes, up to a number."""
+    kept: list[Start] = []
+    left = list(starts)
+    for _ in range(most):
+        best = best_start_of_each(left)
+        kept += best
+        taken = {id(start) for start in best}
+        left = [start for start in left if id(start) not in taken]
+    return kept
 
 
 def _leave_causes_out(pool: HypothesisPool) -> None:

@@ -2,8 +2,8 @@
 
 The variance of a residual is not known: noise and discrepancy add to it. Marginalised over that
 variance, the likelihood of a hypothesis is Student's t instead of Gaussian. Small differences of the
-sums of squares count as under noise alone, large ones by the logarithm of their ratio. So no name becomes
-certain because another form errs a little less.
+sums of squares count as under noise alone, large ones by the logarithm of their ratio. So no name
+becomes certain because another form errs a little less.
 """
 
 from collections.abc import Sequence
@@ -102,7 +102,7 @@ def credibility(left: NDArray, causes: int, settings: RankingSettings) -> NDArra
     more are tried, the more a wrong one removes by chance.
     """
     ratio = settings.even_share_causes / max(causes, 1)
-    even = settings.even_share_left * ratio**settings.even_share_power
+    even = min(settings.even_share_left * ratio**settings.even_share_power, settings.largest_even_share)
     return 1.0 / (1.0 + (left / even) ** settings.credibility_slope)
 
 

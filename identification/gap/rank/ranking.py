@@ -78,6 +78,9 @@ def rank_hypotheses(
         floor: how noise is seen in residuals; None: the defaults.
     """
     settings, cache, plant = settings or RankingSettings(), cache or FitCache(plant), prepared(plant)
+    fit_settings = fit_settings or FitSettings()
+    if len(plant.causes) <= settings.multi_start_causes:
+        fit_settings = fit_settings.thorough
     problem, base = recalibrate(plant, cache, fit_settings)
     corrected = with_seen_noise(problem, base, settings, floor or ReductionSettings())
     if corrected is not plant:

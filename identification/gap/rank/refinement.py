@@ -14,7 +14,7 @@ from identification.gap.fit.linearisation import nuisance_slopes
 from identification.gap.fit.settings import FitSettings
 from identification.gap.model.grey_box import GreyBox
 from identification.gap.rank.evidence import EvaluatedHypothesis, evaluate
-from identification.gap.rank.screening import ScreenedCause, with_cause
+from identification.gap.rank.screening import Start
 from identification.gap.rank.settings import RankingSettings
 
 
@@ -47,12 +47,10 @@ def restarted(estimate: Estimate) -> Estimate:
     return replace(estimate, chi_square=np.inf, converged=False, given_up=False)
 
 
-def refit_with_causes(
-    problem: FittingProblem, base: Estimate, causes: Sequence[ScreenedCause]
-) -> list[Estimate]:
-    """Each screened cause added to the base and refitted; fits that were given up are left out."""
-    starts = [with_cause(problem, base, screened.cause, screened.by_symbol) for screened in causes]
-    return [estimate for estimate in fit(problem, starts, base.chi_square) if not estimate.given_up]
+def refit(problem: FittingProblem, base: Estimate, starts: Sequence[Start]) -> list[Estimate]:
+    """Fits from starts beside a base; those that were given up are left out."""
+    fitted = fit(problem, [start.estimate for start in starts], base.chi_square)
+    return [estimate for estimate in fitted if not estimate.given_up]
 
 
 def with_own_nuisances(

@@ -17,19 +17,24 @@ from identification.gap.model.cause import Cause
 
 
 @dataclass(frozen=True, kw_only=True)
-class ScreenedCause:
-    """A cause at its most promising trial values."""
+class Start:
+    """Where the refit of a set of causes begins."""
 
-    cause: Cause
-    values: tuple[float, ...]
-    """Values of the cause's parameters from which a refit begins, within their ranges [SI]."""
+    estimate: Estimate
+    """The causes at trial or predicted values, calibrated parameters adapted to them."""
     chi_square: float
-    """Sum of squares that they leave on the fitted runs [1]."""
+    """Sum of squares that it leaves on the fitted runs, but for the calibrated parameters' curvature
+    [1]."""
 
     @property
-    def by_symbol(self) -> dict[str, float]:
-        """The values by symbol [SI]."""
-        return {p.symbol: v for p, v in zip(self.cause.parameters, self.values, strict=True)}
+    def labels(self) -> frozenset[str]:
+        """Labels of the causes."""
+        return frozenset(self.estimate.hypothesis.labels)
+
+    @property
+    def cause(self) -> Cause:
+        """The cause that was added last."""
+        return self.estimate.hypothesis.causes[-1]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,11 +92,11 @@ def screen_causes(
     base_runs: Sequence[LinearisedRun],
     signatures: Sequence[CauseSignature],
     every_start: bool = False,
-) -> list[ScreenedCause]:
+) -> list[Start]:
     """The best start of every cause beside the base estimate, the most promising cause first.
 
-    A start is a trial value, or what one linear step from a trial predicts. Both are simulated,
-    as a cause with a threshold is far from linear; calibrated and nuisance parameters adapt linearly.
+    A start is a trial value, or what one linear step from a trial predicts. Both are simulated, as a
+    cause with a threshold is far from linear; calibrated and nuisance parameters adapt linearly.
 
     Args:
         problem: readings and settings.
@@ -100,84 +105,88 @@ def screen_causes(
         signatures: from `simulate_signatures` beside the same base.
         every_start: return all starts of each cause, not only the best.
     """
-    bound = problem.settings.largest_deviation
-    tried = [_at_trial(base_runs, signature, bound) for signature in signatures]
-    predicted = [_predicted(base_runs, signature, bound) for signature in signatures]
-    stepped = _simulated(problem, base, base_runs, list(_best_of_each(predicted).values()))
-    starts = [*tried, *stepped]
-    kept = starts if every_start else _best_of_each(starts).values()
-    return sorted(kept, key=lambda screened: screened.chi_square)
+    tried = [
+        adapted(problem, base, base_runs, signature.estimate, signature.changes)
+        for signature in signatures
+    ]
+    nearest: dict[str, tuple[float, Estimate]] = {}
+    for signature in signatures:
+        chi_square, values = _predicted(problem, base_runs, signature)
+        label = signature.cause.label
+        if label not in nearest or chi_square < nearest[label][0]:
+            nearest[label] = chi_square, with_cause(problem, base, signature.cause, values)
+    predicted = [estimate for _, estimate in nearest.values()]
+    starts = [*tried, *simulated_starts(problem, base, base_runs, predicted)]
+    kept = starts if every_start else best_start_of_each(starts)
+    return sorted(kept, key=lambda start: start.chi_square)
 
 
-def _best_of_each(screened: Sequence[ScreenedCause]) -> dict[str, ScreenedCause]:
-    """The start with the least chi-square by label of the cause."""
-    best: dict[str, ScreenedCause] = {}
-    for each in screened:
-        label = each.cause.label
-        if label not in best or each.chi_square < best[label].chi_square:
-            best[label] = each
-    return best
+def best_start_of_each(starts: Sequence[Start]) -> list[Start]:
+    """The start with the least chi-square of each set of causes."""
+    best: dict[frozenset[str], Start] = {}
+    for each in starts:
+        if each.labels not in best or each.chi_square < best[each.labels].chi_square:
+            best[each.labels] = each
+    return list(best.values())
 
 
-def _simulated(
+def simulated_starts(
     problem: FittingProblem,
     base: Estimate,
     base_runs: Sequence[LinearisedRun],
-    starts: Sequence[ScreenedCause],
-) -> list[ScreenedCause]:
-    """Starts with the chi-square that their simulation leaves."""
-    estimates = [with_cause(problem, base, start.cause, start.by_symbol) for start in starts]
+    estimates: Sequence[Estimate],
+) -> list[Start]:
+    """Starts at estimates that add causes to the base; all are simulated side by side."""
+    if not estimates:
+        return []
     residuals = problem.residuals([base, *estimates], problem.fitted_runs)
-    bound = problem.settings.largest_deviation
     return [
-        replace(
-            start,
-            chi_square=_chi_square(
-                base_runs, [block[:, 0] - block[:, 1 + k] for block in residuals], bound
-            ),
+        adapted(
+            problem, base, base_runs, estimate, [block[:, 0] - block[:, 1 + k] for block in residuals]
         )
-        for k, start in enumerate(starts)
+        for k, estimate in enumerate(estimates)
     ]
 
 
-def _at_trial(
-    base_runs: Sequence[LinearisedRun], signature: CauseSignature, largest_deviation: float
-) -> ScreenedCause:
-    """A cause at its trial values."""
-    parameters, vector = signature.cause.parameters, signature.estimate.vector
-    values = vector[len(vector) - len(parameters) :] * [p.scale for p in parameters]
-    return ScreenedCause(
-        cause=signature.cause,
-        values=tuple(values.tolist()),
-        chi_square=_chi_square(base_runs, signature.changes, largest_deviation),
-    )
+def adapted(
+    problem: FittingProblem,
+    base: Estimate,
+    base_runs: Sequence[LinearisedRun],
+    estimate: Estimate,
+    changes: Sequence[NDArray],
+) -> Start:
+    """An estimate that adds causes to the base, the base's own parameters adapted by one linear step.
 
-
-def _chi_square(
-    base_runs: Sequence[LinearisedRun], changes: Sequence[NDArray], largest_deviation: float
-) -> float:
-    """Sum of squares that a change of the outputs leaves, calibrated parameters adapted linearly [1].
-
-    changes: per run (values,) [noise deviations].
+    Args:
+        problem: readings and settings.
+        base: the estimate without the causes.
+        base_runs: the same linearised in the fitted runs.
+        estimate: the base's parameters and the causes' values.
+        changes: of the outputs by the causes, per fitted run (values,) [noise deviations].
     """
     runs = [
         replace(run, residual=run.residual - change)
         for run, change in zip(base_runs, changes, strict=True)
     ]
-    equations = normal_equations(runs, largest_deviation)
-    hessian = equations.hessian + 1e-9 * np.eye(len(equations.gradient))
-    return equations.least - float(equations.gradient @ np.linalg.solve(hessian, equations.gradient))
+    equations = normal_equations(runs, problem.settings.largest_deviation)
+    step, decrease = equations.step(*problem.ends(base), damping=0.0)
+    vector = estimate.vector.copy()
+    vector[: len(step)] += step
+    return Start(estimate=replace(estimate, vector=vector), chi_square=equations.chi_square - decrease)
 
 
 def _predicted(
-    base_runs: Sequence[LinearisedRun], signature: CauseSignature, largest_deviation: float
-) -> ScreenedCause:
-    """One signature, proportional to the cause's parameters with either sign, fitted to the residual."""
+    problem: FittingProblem, base_runs: Sequence[LinearisedRun], signature: CauseSignature
+) -> tuple[float, dict[str, float]]:
+    """Predicted chi-square [1] of a signature that is fitted to the residual, and values by symbol [SI].
+
+    The signature is taken as proportional to the cause's parameters, with either sign.
+    """
     runs = [
         replace(run, slopes=np.column_stack([run.slopes, change]))
         for run, change in zip(base_runs, signature.changes, strict=True)
     ]
-    equations = normal_equations(runs, largest_deviation)
+    equations = normal_equations(runs, problem.settings.largest_deviation)
     parameters, vector = signature.cause.parameters, signature.estimate.vector
     trial = vector[len(vector) - len(parameters) :] * [p.scale for p in parameters]
     nominal = np.array([p.nominal for p in parameters])
@@ -185,8 +194,8 @@ def _predicted(
     shares = ends / (trial - nominal)[:, None]
     low, high = np.max(np.min(shares, axis=1)), np.min(np.max(shares, axis=1))
     share, chi_square = _bounded_last_step(equations, low, high)
-    values = tuple((nominal + share * (trial - nominal)).tolist())
-    return ScreenedCause(cause=signature.cause, values=values, chi_square=chi_square)
+    values = (nominal + share * (trial - nominal)).tolist()
+    return chi_square, {p.symbol: v for p, v in zip(parameters, values, strict=True)}
 
 
 def _bounded_last_step(equations: NormalEquations, low: float, high: float) -> tuple[float, float]:

@@ -60,6 +60,10 @@ class RankingSettings:
     larger one are refitted from the most promising value. All pairs of a small one are refitted:
     causes may help together that do not help alone. Computing time."""
 
+    starts_of_a_pair: int = 2
+    """Number of starts from which a pair is refitted, the most promising of all combinations of trial
+    values; computing time."""
+
     screened_pairs: int = 2
     """Number of pairs of a larger catalogue that are refitted because they promise most together, though
     neither member is among the best; computing time."""
@@ -152,7 +156,11 @@ class RankingSettings:
     """Power of the number of causes by which that share falls [1]. Of the wrong causes in struck trials
     of those seeds, 0.3 % left less than 0.2, 1.3 % less than 0.5, 5 % less than 0.9."""
 
-    credibility_slope: float = 2.3
+    largest_even_share: float = 0.5
+    """Upper bound of that share [1], for a catalogue of few causes: the only candidate need not be the
+    right one."""
+
+    credibility_slope: float = 3.0
     """Exponent by which the odds of a cause fall with the share that it leaves [1]; the same trials."""
 
     floor_scatter: float = 0.01
