@@ -13,6 +13,10 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 
+ACTIVE_SET_ITERATIONS = 4
+"""Most changes of the set of nuisances at their bounds; later ones no longer matter."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class LinearisedRun:
     """A hypothesis linearised in one run; values are weighted readings, 0 where they do not count.
@@ -36,23 +40,54 @@ class LinearisedRun:
 
 
 @dataclass(frozen=True, kw_only=True)
+class RunProducts:
+    """Products of the columns of one run: residual, slopes, tolerance slopes, run nuisances."""
+
+    gram: NDArray
+    """Gram matrix with the priors of the run nuisances, which count from their centres,
+    (1 + k + m + l, 1 + k + m + l) [1]."""
+    bound: NDArray
+    """Bounds of the run nuisances, (l,) [SI]."""
+
+    def at(self, numbers: NDArray) -> NDArray:
+        """Unbounded run nuisances (l,) [SI] beside numbers (k + m,) of slopes and tolerances."""
+        count = len(self.gram) - len(self.bound)
+        moment = self.gram[count:, 0] - self.gram[count:, 1:count] @ numbers
+        return np.linalg.solve(self.gram[count:, count:], moment)
+
+    def reduced(self, held: NDArray) -> NDArray:
+        """Gram matrix of the other columns, (1 + k + m, 1 + k + m) [1].
+
+        held: values of run nuisances that stay there, (l,) [SI]; NaN: minimised over.
+        """
+        count = len(self.gram) - len(self.bound)
+        if not len(self.bound):
+            return self.gram
+        nuisances = np.arange(count, len(self.gram))
+        fixed = np.isfinite(held)
+        gram = _shifted(self.gram, nuisances[fixed], held[fixed]) if np.any(fixed) else self.gram
+        return _eliminated(gram, nuisances[~fixed], np.arange(count))
+
+
+@dataclass(frozen=True, kw_only=True)
 class NormalEquations:
     """Least squares in steps d of the vector; nuisance parameters are minimised over.
 
-    For unbounded tolerances the sum of squares is d' hessian d - 2 gradient d + least.
+    For unbounded nuisances the sum of squares is d' hessian d - 2 gradient d + least.
     """
 
-    gram: NDArray
-    """Gram matrix of residual, slopes and tolerance slopes, with the priors of the tolerances,
-    (1 + k + m, 1 + k + m) [1]."""
+    runs: list[RunProducts]
+    """Of each run."""
+    steps: int
+    """Number k of parameters."""
     hessian: NDArray
     """Gauss-Newton Hessian of half the sum of squares, (k, k) [1]."""
     gradient: NDArray
     """Its negative gradient at no step, (k,) [1]."""
     least: float
-    """Sum of squares at no step, with unbounded tolerances [1]."""
+    """Sum of squares at no step, with unbounded nuisances [1]."""
     chi_square: float
-    """Sum of squares at no step, with bounded tolerances [1]."""
+    """Sum of squares at no step, with bounded nuisances [1]."""
     tolerances: NDArray
     """The tolerances that minimise `chi_square`, (m,) [standard deviations]."""
     largest_deviation: float
@@ -67,17 +102,13 @@ class NormalEquations:
             damping: of Levenberg and Marquardt, relative to the diagonal [1].
 
         Returns:
-            The step (k,) [1], with tolerances within their bounds, and the predicted decrease [1].
+            The step (k,) [1], with nuisances within their bounds, and the predicted decrease [1].
         """
-        k, m = len(low), len(self.tolerances)
-        matrix = self.gram[1:, 1:].copy()
-        damped = np.arange(k)
-        matrix[damped, damped] *= 1.0 + damping
-        matrix[damped, damped] += 1e-9
+        m = len(self.tolerances)
         bound = np.full(m, self.largest_deviation)
         ends = np.concatenate([low, -bound]), np.concatenate([high, bound])
-        best = _bounded_minimiser(matrix, self.gram[1:, 0], *ends)
-        return best[:k], self.chi_square - _sum_of_squares(self.gram, best)
+        best, squares = _bounded_solution(self.runs, self.steps, ends, damping)
+        return best[: self.steps], self.chi_square - squares
 
 
 def normal_equations(runs: Sequence[LinearisedRun], largest_deviation: float) -> NormalEquations:
@@ -88,23 +119,62 @@ def normal_equations(runs: Sequence[LinearisedRun], largest_deviation: float) ->
         largest_deviation: bound of the nuisance parameters [standard deviations].
     """
     k, m = runs[0].slopes.shape[1], runs[0].tolerance_slopes.shape[1]
-    gram = np.sum([_gram_without_run_nuisances(run, largest_deviation) for run in runs], axis=0)
-    # Columns: residual, slopes, tolerance slopes.
-    tolerances = np.arange(1 + k, 1 + k + m)
-    gram[tolerances, tolerances] += 1.0
-    free = _eliminated(gram, tolerances, np.arange(1 + k))
-    bound = np.full(m, largest_deviation)
-    own = gram[np.ix_(tolerances, tolerances)]
-    best = _bounded_minimiser(own, gram[tolerances, 0], -bound, bound)
+    products = [_products(run, largest_deviation) for run in runs]
+    gram = _together(products, k, [np.full(len(run.bound), np.nan) for run in products])
+    free = _eliminated(gram, np.arange(1 + k, 1 + k + m), np.arange(1 + k))
+    none, bound = np.zeros(k), np.full(m, largest_deviation)
+    ends = np.concatenate([none, -bound]), np.concatenate([none, bound])
+    best, chi_square = _bounded_solution(products, k, ends, 0.0)
     return NormalEquations(
-        gram=gram,
+        runs=products,
+        steps=k,
         hessian=free[1:, 1:],
         gradient=free[1:, 0],
         least=float(free[0, 0]),
-        chi_square=_sum_of_squares(gram, np.concatenate([np.zeros(k), best])),
-        tolerances=best,
+        chi_square=chi_square,
+        tolerances=best[k:],
         largest_deviation=largest_deviation,
     )
+
+
+def _bounded_solution(
+    runs: Sequence[RunProducts], k: int, ends: tuple[NDArray, NDArray], damping: float
+) -> tuple[NDArray, float]:
+    """Numbers (k + m,) within their ends that minimise the sum of squares, and that sum [1].
+
+    Run nuisances beyond their bounds are held there, and the rest is solved again (active sets).
+    """
+    held = [np.full(len(run.bound), np.nan) for run in runs]
+    free = ends[1] > ends[0]
+    best, gram = np.zeros(len(free)), np.zeros((1 + len(free), 1 + len(free)))
+    for _ in range(ACTIVE_SET_ITERATIONS):
+        gram = _together(runs, k, held)
+        matrix = gram[1:, 1:].copy()
+        damped = np.arange(k)
+        matrix[damped, damped] *= 1.0 + damping
+        matrix[damped, damped] += 1e-9
+        own = np.ix_(free, free)
+        best[free] = _bounded_minimiser(matrix[own], gram[1:, 0][free], ends[0][free], ends[1][free])
+        found = [run.at(best) for run in runs]
+        beyond = [
+            np.where(np.abs(y) > run.bound, np.sign(y) * run.bound, np.nan)
+            for y, run in zip(found, runs, strict=True)
+        ]
+        if all(np.array_equal(a, b, equal_nan=True) for a, b in zip(held, beyond, strict=True)):
+            break
+        held = beyond
+    return best, _sum_of_squares(gram, best)
+
+
+def _together(runs: Sequence[RunProducts], k: int, held: Sequence[NDArray]) -> NDArray:
+    """Gram matrix of residual, slopes and tolerance slopes of all runs, with the tolerances' priors.
+
+    held: of each run, as `RunProducts.reduced` takes it. Returns (1 + k + m, 1 + k + m) [1].
+    """
+    gram = np.sum([run.reduced(own) for run, own in zip(runs, held, strict=True)], axis=0)
+    tolerances = np.arange(1 + k, len(gram))
+    gram[tolerances, tolerances] += 1.0
+    return gram
 
 
 def without_run_nuisances(
@@ -181,23 +251,14 @@ def _eliminated(gram: NDArray, columns: NDArray, kept: NDArray) -> NDArray:
     return gram[np.ix_(kept, kept)] - cross.T @ np.linalg.solve(own, cross)
 
 
-def _gram_without_run_nuisances(run: LinearisedRun, largest_deviation: float) -> NDArray:
-    """Gram matrix of residual, slopes and tolerance slopes, the run's own nuisances minimised over.
-
-    A nuisance that the residual drives to its bound stays there, and what it cannot reach stays in the
-    residual, as in `without_run_nuisances`.
-    """
+def _products(run: LinearisedRun, largest_deviation: float) -> RunProducts:
+    """Products of a run's columns."""
     columns = np.column_stack([run.residual, run.slopes, run.tolerance_slopes, run.run_slopes])
     gram = columns.T @ columns
-    own, count = len(run.run_sd), len(gram) - len(run.run_sd)
-    if not own:
-        return gram
-    nuisances = np.arange(count, count + own)
-    # Unknowns become the nuisances' distances from their centres instead of steps from present values.
-    gram = _shifted(gram, nuisances, -run.run_values)
-    gram[nuisances, nuisances] += 1.0 / run.run_sd**2
-    bound = largest_deviation * run.run_sd
-    best = _bounded_minimiser(gram[np.ix_(nuisances, nuisances)], gram[nuisances, 0], -bound, bound)
-    at_bound = np.abs(best) >= bound
-    held = _shifted(gram, nuisances[at_bound], best[at_bound])
-    return _eliminated(held, nuisances[~at_bound], np.arange(count))
+    own = len(run.run_sd)
+    if own:
+        nuisances = np.arange(len(gram) - own, len(gram))
+        # Unknowns become the nuisances' distances from their centres, not steps from present values.
+        gram = _shifted(gram, nuisances, -run.run_values)
+        gram[nuisances, nuisances] += 1.0 / run.run_sd**2
+    return RunProducts(gram=gram, bound=largest_deviation * run.run_sd)

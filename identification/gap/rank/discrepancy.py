@@ -74,7 +74,10 @@ def _discrepancy(series: Sequence[Series], settings: RankingSettings) -> Channel
             time_scale=0.0,
         )
     covariance = autocovariance(readings, settings.longest_correlation)
-    correlated, white = _inflation(covariance, settings), white_variance(covariance)
+    correlated, white = (
+        _inflation(covariance, settings),
+        white_variance(covariance, settings.steepest_decay),
+    )
     quiet = _quiet_mean_square(readings, correlated, settings)
     mean_square = float(covariance[0])
     disturbed = (
@@ -136,19 +139,19 @@ def autocovariance(readings: Sequence[NDArray], longest_share: float) -> NDArray
     return total / np.maximum(count, 1)
 
 
-def white_variance(covariance: NDArray) -> float:
+def white_variance(covariance: NDArray, steepest: float) -> float:
     """Variance of the white part [1]: what the first lags, continued to lag 0, do not reach.
 
-    covariance: by lag, (at least 3,) [1]. The continuation is geometric where both lags are positive,
-    as for an Ornstein-Uhlenbeck process, and never above the variance.
+    Args:
+        covariance: by lag, (at least 3,) [1].
+        steepest: largest ratio of the coloured part at two successive lags [1]; a course that decays
+            faster cannot be told from white noise.
     """
     variance, first, second = (float(value) for value in covariance[:3])
     if first <= 0:
         return variance
-    ratio = first / second if second > 0 else np.inf
-    continued = first * min(max(ratio, 1.0), variance / first)
-    least = 0.5 * max(variance - first, 0.0)
-    return max(variance - continued, least, np.finfo(float).tiny)
+    ratio = min(max(first / second, 1.0), steepest) if second > 0 else steepest
+    return max(variance - ratio * first, 0.5 * max(variance - first, 0.0), LEAST)
 
 
 def _inflation(covariance: NDArray, settings: RankingSettings) -> float:

@@ -51,12 +51,12 @@ def posterior(
     misfits = misfits - min(float(np.min(misfits)), 0.0)
     scores = np.array(
         [
-            _score(problem, each, float(misfit), discrepancies, settings)
+            _score(problem, each, (float(misfit), float(misfits[0])), discrepancies, settings)
             for each, misfit in zip(every, misfits, strict=True)
         ]
     )
     scores[0] = _no_cause_score(every, misfits, discrepancies, settings)
-    unknown = _robust(float(misfits[0]), settings) + np.log(settings.prior_unknown)
+    unknown = _robust(float(misfits[0]), float(misfits[0]), settings) + np.log(settings.prior_unknown)
     weights = softmax([*scores, unknown])[:-1]
     left = _shares_left(misfits, discrepancies, settings)
     credible = credibility(left, len({cause.name for cause in problem.plant.causes}), settings)
@@ -92,7 +92,7 @@ def _no_cause_score(
         noise = (1.0 + settings.floor_tolerance) * d.floor * d.readings
         beyond += max(float(own) - noise, 0.0) / (2.0 * d.floor * d.inflation)
     credit = settings.no_cause_credit + float(np.log(settings.prior_no_cause))
-    return credit + _robust(float(np.min(misfits)), settings) - max(gained, beyond)
+    return credit + _robust(float(np.min(misfits)), float(misfits[0]), settings) - max(gained, beyond)
 
 
 def credibility(left: NDArray, causes: int, settings: RankingSettings) -> NDArray:
@@ -114,26 +114,32 @@ def misfit_beyond_noise(each: EvaluatedHypothesis, discrepancies: Sequence[Chann
     )
 
 
-def _robust(misfit: float, settings: RankingSettings) -> float:
-    """Log likelihood of a misfit [nats] by Student's t, but for a constant."""
-    freedom = settings.form_readings
-    return float(-0.5 * freedom * np.log1p(2.0 * misfit / freedom))
+def _robust(misfit: float, explainable: float, settings: RankingSettings) -> float:
+    """Log likelihood of a misfit [nats] by Student's t, but for a constant.
+
+    explainable: misfit of the recalibrated model [nats].
+    """
+    half = 0.5 * settings.form_readings
+    return float(-half * np.log1p(misfit / (half + settings.form_error_share * explainable)))
 
 
 def _score(
     problem: FittingProblem,
     each: EvaluatedHypothesis,
-    misfit: float,
+    misfits: tuple[float, float],
     discrepancies: Sequence[ChannelDiscrepancy],
     settings: RankingSettings,
 ) -> float:
-    """Log posterior of a hypothesis, but for a constant; misfit: beyond noise [nats]."""
+    """Log posterior of a hypothesis, but for a constant.
+
+    misfits: of the hypothesis and of the recalibrated model, beyond noise [nats].
+    """
     count = len(each.labels)
     if count and each.at_bound:
         return -np.inf
     inflation = variance_inflation(each, discrepancies)
     price = max(each.occam_price(inflation), settings.least_price * count) if count else 0.0
-    return _robust(misfit, settings) - price + _log_prior(problem, each, settings)
+    return _robust(*misfits, settings) - price + _log_prior(problem, each, settings)
 
 
 def variance_inflation(each: EvaluatedHypothesis, discrepancies: Sequence[ChannelDiscrepancy]) -> float:

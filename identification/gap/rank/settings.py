@@ -81,6 +81,10 @@ class RankingSettings:
     """Longest lag at which residuals are correlated, as a share of the longest run [1]: beyond, there
     are too few pairs."""
 
+    steepest_decay: float = 2.0
+    """Largest ratio of the discrepancy's autocovariances at two successive readings [1]: a discrepancy
+    that decays faster counts as noise."""
+
     least_correlation: float = 0.05
     """Autocorrelation below which the sum of autocorrelations ends [1]: what follows is chance."""
 
@@ -119,6 +123,10 @@ class RankingSettings:
     form_readings: float = 20.0
     """Degrees of freedom of Student's t: number of independent readings that the variance of a
     discrepancy is worth [1]. Chosen on opened blind trials of seeds 4001 and 4002."""
+
+    form_error_share: float = 2e-3
+    """Share of the recalibrated model's misfit [1] that an error of a cause's form may leave without
+    any doubt: 4 % in amplitude. Textbook forms are accurate to some percent."""
 
     bound_margin: float = 1e-4
     """Share of a range [1] within which a parameter counts as lying at the bound: rounding."""
