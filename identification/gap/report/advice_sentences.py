@@ -3,15 +3,15 @@
 from identification.gap.diagnosis import Diagnosis, hypothesis_label
 from identification.gap.rank.verdict import RankedCause
 from identification.gap.reduce.discrepancy_reduction import RECALIBRATED
-from identification.gap.report.quantities import gap_text, probability_text
+from identification.gap.report.quantities import gap_text, listed, probability_text
 from identification.gap.report.sentences import share_closed
 
 
 def add_or_not(diagnosis: Diagnosis, cause: RankedCause) -> str:
     """The advice on a cause that the verdict names."""
-    them = "it" if len(cause.effects) == 1 else "them"
     if diagnosis.surely_helps(cause):
-        return f"add {them}"
+        return f"add {listed(cause.hypothesis.labels)}"
+    them = "it" if len(cause.effects) == 1 else "them"
     return f"that this helps on recordings never fitted to is not sure, so do not add {them} yet"
 
 
