@@ -143,7 +143,9 @@ def _remainder(diagnosis: Diagnosis) -> Section:
         name = hypothesis_label(diagnosis.best.hypothesis)
         blocks += missing_term(diagnosis, diagnosis.remaining, f"The model with {name}")
         blocks.append(residual(diagnosis, diagnosis.best.hypothesis, f"Residual with {name}"))
-    text = f"{remainder_sentence(diagnosis)} {disturbance_sentence(diagnosis)}".strip()
+    text = remainder_sentence(diagnosis)
+    if not diagnosis.remaining:
+        text = f"{text} {disturbance_sentence(diagnosis)}".strip()
     return Section(
         title="What remains",
         verdicts=[Verdict(status="note", text=text)],

@@ -73,7 +73,8 @@ def _partial(diagnosis: Diagnosis) -> str:
     ]
     together = f" together with {listed(faint)}, less sure," if faint else ""
     left = remainder(diagnosis)
-    look = ", and look at the missing term" if left.term else ""
+    drawn = left.location and left.location.missing_term
+    look = ", and look at the missing term" if drawn else ""
     return (
         f"{listed(held)} {are} part of the gap ({chances}): adding {them}{together} with "
         f"{sizes_text(diagnosis, best)} closes {share_closed(diagnosis, best)} of it on recordings "
