@@ -16,7 +16,7 @@ from epv_env.plant.region import Region
 from identification.bench.programme_file import save_programmes
 from identification.gap.diagnosis import Diagnosis, diagnose, hypothesis_label
 from identification.gap.fit.fit_cache import FitCache
-from identification.gap.report.parameter_intervals import covariance_with_form_errors, fitted_values
+from identification.gap.report.parameter_intervals import fitted_values, parameter_covariance
 from identification.gap.report.result_files import write_results
 from identification.gap.report.sections import sections
 from identification.recordings.campaign_files import read_campaign
@@ -96,13 +96,12 @@ def refitted_plant(found: Diagnosis, valve: Valve, name: str) -> Plant:
     parameters = Parameters({**valve.base, **fitted_values(found, best)})
     problem = found.ranking.problem
     symbols = tuple(p.symbol for p in problem.parameters(best.estimate))
-    covariance = covariance_with_form_errors(best, found.settings.report.systematic_form_error)
     return Plant(
         parameters=parameters,
         region=Region(
             centre=parameters,
             symbols=symbols,
-            covariance=covariance * found.ranking.inflation,
+            covariance=parameter_covariance(found, best),
             chi_square=float(chi2.ppf(valve.settings.region_probability, len(symbols))),
         ),
         name=f"{name} with {hypothesis_label(best)}" if named else f"{name}, recalibrated",

@@ -11,10 +11,12 @@ import pytest
 from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import virtual_recordings
 from identification.gap.diagnosis import Diagnosis, diagnose, hypothesis_label
+from identification.gap.rank.posterior import variance_inflation
 from identification.gap.rank.verdict import NO_GAP, PARTIAL, UNKNOWN
 from identification.gap.reduce.block_bootstrap import Interval
 from identification.gap.reduce.discrepancy_reduction import RECALIBRATED
 from identification.gap.report.json_export import as_json
+from identification.gap.report.parameter_intervals import parameter_covariance
 from identification.gap.report.remainder import remainder, term_table
 from identification.gap.report.result_files import GAP, TERM, write_results
 from identification.gap.report.sections import sections
@@ -238,3 +240,17 @@ def test_without_a_percentage_no_column_of_percent_is_shown():
     (models,) = tables(page[3].blocks, "Model")
     assert not any("%" in column for column in models.columns)
     assert {len(row) for row in models.rows} == {len(models.columns)}
+
+
+def test_an_interval_is_as_wide_as_what_remains_is_large_and_correlated():
+    """Errors of the cause's form count once: no correlation of residuals makes them larger."""
+    found = partial()
+    hypothesis = found.judged[0].hypothesis
+    covariance = parameter_covariance(found, hypothesis)
+    inflation = variance_inflation(hypothesis, found.ranking.discrepancies)
+    assert inflation > 10
+    form = covariance - inflation * hypothesis.covariance
+    size = hypothesis.estimate.hypothesis.parameters[0]
+    acting = hypothesis.estimate.cause_vector[0] * size.scale
+    share = found.settings.report.systematic_form_error
+    np.testing.assert_allclose(np.diag(form), [0.0, (share * acting) ** 2], atol=1e-12)
