@@ -28,7 +28,6 @@ from identification.gap.model.cause import Cause
 from identification.gap.model.free_parameter import FreeParameter, NuisanceParameter
 from identification.gap.model.recorded_run import Channel, Run
 from identification.gap.rank.ranking import Ranking, rank_hypotheses
-from identification.gap.rank.settings import RankingSettings
 
 NOISE, SAMPLES, PERIOD = 0.02, 40, 1e-3
 SUPPLIES = (12.0, 10.0, 8.0, 6.0, 4.0)
@@ -194,7 +193,7 @@ def test_predictions_are_those_of_the_whole_covariances():
     effects = 20 * rng.normal(size=(n, 2))
     number = np.concatenate([np.arange(samples) // 5, 100 + np.arange(samples) // 5])
     noise = np.eye(n)
-    for effect in effects.T * max(RankingSettings().form_errors):
+    for effect in effects.T * DesignSettings().form_error:
         noise += np.outer(effect, effect) * (number[:, None] == number) / 3
     whole = []
     means = []
@@ -206,7 +205,7 @@ def test_predictions_are_those_of_the_whole_covariances():
         whole.append(np.linalg.cholesky(noise + columns @ columns.T + local @ local.T))
     expected = kullback_leibler_divergences(np.stack(means), np.stack(whole))
     own_means, covariances = outcome_distributions(
-        runs, known, effects, channels, period, DesignSettings(), RankingSettings()
+        runs, known, effects, channels, period, DesignSettings()
     )
     found = kullback_leibler_divergences(own_means, np.linalg.cholesky(covariances))
     np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-8)
