@@ -1,7 +1,6 @@
 """What the examples with other people's recordings share: their data on disk, and their command."""
 
 import argparse
-import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,13 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.common.command_line import writable_folder
-from epv_env.common.files import write_text
 from identification.gap.diagnosis import diagnose
 from identification.gap.model.cause import Cause
 from identification.gap.model.free_parameter import FreeParameter
 from identification.gap.model.grey_box import GreyBox
 from identification.gap.model.recorded_run import Run
-from identification.gap.report.json_export import as_json
+from identification.gap.report.result_files import write_results
 from identification.gap.report.sections import sections
 from identification.gap.report.verdict_sentences import verdict_sentence
 from identification.report.page import write_page
@@ -83,8 +81,7 @@ def command(title: str, plant_of: Callable[[Path], GreyBox]) -> int:
     parser.add_argument("--seed", type=int, default=0, help="of resampling")
     chosen = parser.parse_args()
     diagnosis = diagnose(plant_of(chosen.data), seed=chosen.seed)
-    content = json.dumps(as_json(diagnosis), indent=1, allow_nan=False) + "\n"
-    write_text(chosen.out / "gap.json", content)
+    write_results(diagnosis, chosen.out)
     heading = f"Gap between model and recordings: {title}"
     write_page(chosen.out / "report.html", title=heading, sections=sections(diagnosis))
     print(verdict_sentence(diagnosis, "")[1])

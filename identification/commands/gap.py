@@ -7,6 +7,7 @@ from pathlib import Path
 from epv_env.common.command_line import writable_folder
 from identification.commands.command import Command
 from identification.commands.options import add_out, add_seed
+from identification.gap.report import result_files
 from identification.gap.report.verdict_sentences import verdict_sentence
 from identification.report.result_files import as_text
 from identification.studies.error_tables.error_table_study import error_table_study
@@ -54,9 +55,9 @@ def _diagnose_campaign(chosen: argparse.Namespace) -> None:
     diagnosis = diagnose_campaign(
         chosen.campaign, chosen.out, plant=chosen.plant, without=chosen.without, seed=chosen.seed
     )
-    content = json.loads((chosen.out / diagnose.GAP).read_text(encoding="utf-8"))
+    content = json.loads((chosen.out / result_files.GAP).read_text(encoding="utf-8"))
     print(verdict_sentence(diagnosis, content["next_experiment"])[1])
-    written = (diagnose.REPORT, diagnose.GAP, diagnose.PLANT)
+    written = (diagnose.REPORT, result_files.GAP, diagnose.PLANT)
     print(f"written: {', '.join(str(chosen.out / name) for name in written)}")
 
 

@@ -19,6 +19,7 @@ from identification.gap.rank.verdict import (
     RankedCause,
     conclude,
 )
+from identification.gap.reduce.block_bootstrap import Interval
 from identification.gap.reduce.discrepancy_reduction import (
     NOMINAL,
     RECALIBRATED,
@@ -37,7 +38,7 @@ class Diagnosis:
     localisation: Localisation
     """Where the gap lies that recalibration leaves."""
     remaining: Localisation | None
-    """Where the gap lies that the best cause leaves; None unless something is left to name."""
+    """Where the gap lies that the best cause leaves; None where nothing predictable is left."""
     reduction: DiscrepancyReduction
     nominal: Estimate
     """The nominal model."""
@@ -52,6 +53,22 @@ class Diagnosis:
         """The cause that the verdict names, or the nearest one; None where none is needed."""
         named = self.conclusion.verdict in (KNOWN, AMBIGUOUS, PARTIAL, UNKNOWN)
         return self.judged[0] if named and self.judged else None
+
+    @property
+    def named(self) -> RankedCause | None:
+        """The most probable cause of those that the verdict names; None where it names none."""
+        return next(iter(self.conclusion.ambiguity_set), None)
+
+    def share_closed(self, cause: RankedCause) -> Interval:
+        """Share of the gap on held-out recordings that a judged cause closes [1].
+
+        Raises KeyError for a cause whose reduction was not measured.
+        """
+        return self.reduction.shares_closed[hypothesis_label(cause.hypothesis)]
+
+    def surely_helps(self, cause: RankedCause) -> bool:
+        """Whether adding a judged cause surely reduces the gap on held-out recordings."""
+        return self.share_closed(cause).low > 0.0
 
 
 def hypothesis_label(hypothesis: EvaluatedHypothesis) -> str:
@@ -109,13 +126,14 @@ def _judge(
     problem, recalibrated = ranking.problem, ranking.recalibrated
     conclusion = conclude(ranking, localisation)
     judged = _judged_causes(conclusion, settings.report.judged_runners_up)
-    remaining = None
-    if conclusion.verdict in (PARTIAL, UNKNOWN) and judged:
-        remaining = _locate(ranking, judged[0].hypothesis, seed, settings)
     nominal = problem.start(Hypothesis(causes=()), {})
     estimates = {NOMINAL: nominal, RECALIBRATED: recalibrated.estimate}
     estimates |= {hypothesis_label(c.hypothesis): c.hypothesis.estimate for c in judged}
     reduction = measure_discrepancy_reduction(problem, estimates, seed=seed, settings=settings.reduction)
+    left = conclusion.verdict in (PARTIAL, UNKNOWN) or (
+        conclusion.verdict in (KNOWN, AMBIGUOUS) and reduction.unexplained.still_predictable
+    )
+    remaining = _locate(ranking, judged[0].hypothesis, seed, settings) if left and judged else None
     return Diagnosis(
         ranking=ranking,
         conclusion=conclusion,

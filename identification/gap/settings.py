@@ -34,6 +34,13 @@ class ReportSettings:
     mentioned_probability: float = 0.01
     """Probability from which the report mentions a cause."""
 
+    listed_inclusion: float = 0.001
+    """Probability that an effect is part of the gap from which gap.json lists it (contract)."""
+
+    mentioned_discrepancy: float = 0.3
+    """Standard deviation of a disturbance [noise deviations] from which the verdict mentions it: less
+    adds under 5 % to the readings' scatter."""
+
     drawn_term_share: float = 0.2
     """Share of the missing term that a state must explain [1] for the term to be drawn over it."""
 

@@ -10,15 +10,14 @@ from time import perf_counter
 from scipy.stats import chi2
 
 from epv_env.common.journal import Journal
-from epv_env.common.json_files import write_json
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from epv_env.plant.region import Region
 from identification.bench.programme_file import save_programmes
 from identification.gap.diagnosis import Diagnosis, diagnose, hypothesis_label
 from identification.gap.fit.fit_cache import FitCache
-from identification.gap.report.json_export import as_json
-from identification.gap.report.parameter_intervals import covariance_with_form_errors, fitted_values
+from identification.gap.report.parameter_intervals import fitted_values, parameter_covariance
+from identification.gap.report.result_files import write_results
 from identification.gap.report.sections import sections
 from identification.recordings.campaign_files import read_campaign
 from identification.report.page import write_page
@@ -26,7 +25,7 @@ from identification.valve_gap.programmes import FILE_NAME as PROGRAMME
 from identification.valve_gap.programmes import next_experiment
 from identification.valve_gap.valve import Valve
 
-GAP, REPORT, PLANT, JOURNAL = "gap.json", "report.html", "plant.json", "fits.jsonl"
+REPORT, PLANT, JOURNAL = "report.html", "plant.json", "fits.jsonl"
 
 STEP_COUNT = 18
 """Steps of a diagnosis with pairs; without, two of them are left out."""
@@ -44,6 +43,8 @@ def diagnose_campaign(
 ) -> Diagnosis:
     """Diagnose a campaign; write gap.json, and unless `report` is False report, plan and plant file.
 
+    What remains is modelled in missing_term.json where a state explains it.
+
     plant: plant file of the nominal parameters, None for Table 10. without: causes to leave out of the
     catalogue. noise: standard deviation of the readings by channel [Pa, A], where it is not to be
     estimated. Finished fits are kept in `out` and taken up again. Raises CampaignError for recordings
@@ -58,15 +59,16 @@ def diagnose_campaign(
     found = diagnose(valve, seed=seed, cache=FitCache(valve, journal, steps))
     found = replace(found, warnings=[*valve.warnings, *found.warnings])
     text = _report(found, valve, recorded.name, out, steps) if report else ""
-    content = {**as_json(found, text), "seconds": perf_counter() - began}
-    write_json(out / GAP, content, allow_nan=False)
+    write_results(found, out, text, seconds=perf_counter() - began)
     return found
 
 
 def _report(found: Diagnosis, valve: Valve, name: str, out: Path, steps: Callable[[str], None]) -> str:
     """Write what people use of it; returns what to record next."""
     steps("next experiment")
-    experiment = next_experiment(found.ranking, valve, settings=found.settings.design)
+    experiment = next_experiment(
+        found.ranking, valve, settings=found.settings.design, verdict=found.conclusion.verdict
+    )
     (out / PROGRAMME).unlink(missing_ok=True)
     if experiment.programme:
         save_programmes([experiment.programme], out / PROGRAMME)
@@ -81,23 +83,25 @@ def _report(found: Diagnosis, valve: Valve, name: str, out: Path, steps: Callabl
 
 
 def refitted_plant(found: Diagnosis, valve: Valve, name: str) -> Plant:
-    """The plant refitted together with the cause that the verdict names, else recalibrated.
+    """The plant refitted together with the cause to add, else recalibrated.
+
+    To be added is what the verdict names, whether it explains all or a part, and what surely reduces the
+    gap on held-out recordings.
 
     Its region is where the recordings leave the four parameters and the sizes, jointly; autocorrelated
     residuals widen it.
     """
-    named = found.conclusion.ambiguity_set[:1]
-    best = named[0].hypothesis if named else found.ranking.recalibrated
+    named = found.named if found.named and found.surely_helps(found.named) else None
+    best = named.hypothesis if named else found.ranking.recalibrated
     parameters = Parameters({**valve.base, **fitted_values(found, best)})
     problem = found.ranking.problem
     symbols = tuple(p.symbol for p in problem.parameters(best.estimate))
-    covariance = covariance_with_form_errors(best, found.settings.report.systematic_form_error)
     return Plant(
         parameters=parameters,
         region=Region(
             centre=parameters,
             symbols=symbols,
-            covariance=covariance * found.ranking.inflation,
+            covariance=parameter_covariance(found, best),
             chi_square=float(chi2.ppf(valve.settings.region_probability, len(symbols))),
         ),
         name=f"{name} with {hypothesis_label(best)}" if named else f"{name}, recalibrated",

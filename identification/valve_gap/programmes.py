@@ -13,6 +13,7 @@ from identification.gap.design.information_gain import InformationGain, odds_tex
 from identification.gap.design.rivals import Rivals, select_rivals
 from identification.gap.design.settings import DesignSettings
 from identification.gap.rank.ranking import Ranking
+from identification.gap.rank.verdict import PARTIAL, UNKNOWN
 from identification.recordings.recording import CHANNELS, Recording
 from identification.replay.batch_simulation import Replay
 from identification.replay.model_inputs import ModelInputs
@@ -62,6 +63,17 @@ RUN = f"bench --programme {FILE_NAME}"
 """Where the programme is kept, and how the bench runs it."""
 
 
+NOTHING_EXPLAINS = (
+    "No cause of the catalogue explains the recordings, so none can say which programme would tell "
+    "more: look at the shape of the missing term first"
+)
+REST_WITHOUT_NAME = (
+    "{} needs no further experiment, and what remains beside it has no name that a programme could "
+    "test: look at the shape of the missing term first"
+)
+"""Why no programme can be chosen."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Option:
     """A programme and what it promises."""
@@ -97,11 +109,24 @@ def next_experiment(
     valve: Valve,
     programmes: Sequence[Programme] = CANDIDATES,
     settings: DesignSettings | None = None,
+    verdict: str | None = None,
 ) -> NextExperiment:
-    """The programme after which the least doubt between the most probable hypotheses is expected."""
+    """The programme after which the least doubt between the most probable hypotheses is expected.
+
+    Args:
+        ranking: the hypotheses and their probabilities.
+        valve: the campaign that was diagnosed.
+        programmes: candidates.
+        settings: judgement of the design; None: the defaults.
+        verdict: of the diagnosis; None: unknown where that is more probable than all causes together.
+            No programme can separate hypotheses that are not there: where the cause is unknown, or known
+            but for a remainder without a name, the shape of the missing term comes first.
+    """
     rivals = select_rivals(ranking, settings)
-    if ranking.unknown > 0.5:
-        return _none_can_be_chosen(rivals)
+    if verdict == UNKNOWN or (verdict is None and ranking.unknown > sum(ranking.probabilities)):
+        return _none_can_be_chosen(rivals, NOTHING_EXPLAINS)
+    if verdict == PARTIAL and rivals.probability[0] > valve.settings.certain:
+        return _none_can_be_chosen(rivals, REST_WITHOUT_NAME.format(rivals.names[0]))
     plan = planned(valve, programmes)
     found = expected_information(ranking.problem, plan, rivals, settings)
     options = [Option(programme=p, information=i) for p, i in zip(programmes, found, strict=True)]
@@ -178,13 +203,10 @@ def _listed(words: Sequence[str]) -> str:
     return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0]
 
 
-def _none_can_be_chosen(rivals: Rivals) -> NextExperiment:
+def _none_can_be_chosen(rivals: Rivals, text: str) -> NextExperiment:
     return NextExperiment(
         programme=None,
-        text=(
-            "No cause of the catalogue explains the recordings, so none can say which programme would "
-            "tell more: look at the shape of the missing term first"
-        ),
+        text=text,
         rivals=rivals.names,
         before=rivals.probability,
         after=rivals.probability,

@@ -1,17 +1,15 @@
 """Diagnose a tank's recordings: your own, or those of a virtual tank with a leak."""
 
 import argparse
-import json
 import sys
 from pathlib import Path
 
 from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import read_runs, virtual_recordings, write_runs
 from epv_env.common.command_line import fail_clearly, writable_folder
-from epv_env.common.files import write_text
 from identification.gap.diagnosis import diagnose
-from identification.gap.report.json_export import as_json
 from identification.gap.report.localisation_figures import missing_term_figure
+from identification.gap.report.result_files import write_results
 from identification.gap.report.sections import sections
 from identification.gap.report.verdict_sentences import verdict_sentence
 from identification.report.page import write_page
@@ -33,8 +31,7 @@ def main() -> int:
         folder = chosen.out / "recordings"
         write_runs(virtual_recordings(LEAKING, chosen.seed), folder)
     diagnosis = diagnose(Tank(read_runs(folder)), seed=chosen.seed)
-    content = json.dumps(as_json(diagnosis), indent=1, allow_nan=False) + "\n"
-    write_text(chosen.out / "gap.json", content)
+    write_results(diagnosis, chosen.out)
     title = f"Gap between model and recordings: {folder}"
     write_page(chosen.out / "report.html", title=title, sections=sections(diagnosis))
     term, level = diagnosis.localisation.missing_term, diagnosis.settings.reduction.interval_level

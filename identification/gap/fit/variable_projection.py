@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 
-ACTIVE_SET_ITERATIONS = 4
-"""Most changes of the set of nuisances at their bounds; later ones no longer matter."""
+ACTIVE_SET_ITERATIONS = 12
+"""Most changes of the set of nuisances at their bounds. In the second half none leaves the set again, so
+that sets do not follow each other in a circle."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,11 +50,18 @@ class RunProducts:
     bound: NDArray
     """Bounds of the run nuisances, (l,) [SI]."""
 
-    def at(self, numbers: NDArray) -> NDArray:
-        """Unbounded run nuisances (l,) [SI] beside numbers (k + m,) of slopes and tolerances."""
+    def held(self, numbers: NDArray) -> NDArray:
+        """Values of the run nuisances that end at a bound (l,) [SI]; NaN for those between.
+
+        numbers: of slopes and tolerances, (k + m,) [1].
+        """
         count = len(self.gram) - len(self.bound)
         moment = self.gram[count:, 0] - self.gram[count:, 1:count] @ numbers
-        return np.linalg.solve(self.gram[count:, count:], moment)
+        own = self.gram[count:, count:]
+        value = np.linalg.solve(own, moment)
+        if np.any(np.abs(value) > self.bound):
+            value = _bounded_minimiser(own, moment, -self.bound, self.bound)
+        return np.where(np.abs(value) >= self.bound, np.sign(value) * self.bound, np.nan)
 
     def reduced(self, held: NDArray) -> NDArray:
         """Gram matrix of the other columns, (1 + k + m, 1 + k + m) [1].
@@ -147,7 +155,7 @@ def _bounded_solution(
     held = [np.full(len(run.bound), np.nan) for run in runs]
     free = ends[1] > ends[0]
     best, gram = np.zeros(len(free)), np.zeros((1 + len(free), 1 + len(free)))
-    for _ in range(ACTIVE_SET_ITERATIONS):
+    for iteration in range(ACTIVE_SET_ITERATIONS):
         gram = _together(runs, k, held)
         matrix = gram[1:, 1:].copy()
         damped = np.arange(k)
@@ -155,11 +163,9 @@ def _bounded_solution(
         matrix[damped, damped] += 1e-9
         own = np.ix_(free, free)
         best[free] = _bounded_minimiser(matrix[own], gram[1:, 0][free], ends[0][free], ends[1][free])
-        found = [run.at(best) for run in runs]
-        beyond = [
-            np.where(np.abs(y) > run.bound, np.sign(y) * run.bound, np.nan)
-            for y, run in zip(found, runs, strict=True)
-        ]
+        beyond = [run.held(best) for run in runs]
+        if iteration >= ACTIVE_SET_ITERATIONS // 2:
+            beyond = [np.where(np.isfinite(a), a, b) for a, b in zip(held, beyond, strict=True)]
         if all(np.array_equal(a, b, equal_nan=True) for a, b in zip(held, beyond, strict=True)):
             break
         held = beyond

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.gap.fit.fitting_problem import FittingProblem
-from identification.gap.fit.hypothesis import Estimate
+from identification.gap.fit.hypothesis import Estimate, cause_places
 from identification.gap.fit.linearisation import linearise
 from identification.gap.fit.variable_projection import (
     LinearisedRun,
@@ -50,16 +50,17 @@ class EvaluatedHypothesis:
         """Labels of the causes."""
         return self.estimate.hypothesis.labels
 
-    def occam_price(self, inflation: float) -> float:
-        """Log of each cause parameter's range over the part that the data leave (Laplace) [nats].
+    def occam_prices(self, inflation: float) -> list[float]:
+        """Price of each cause: log of its parameters' ranges over what the data leave (Laplace) [nats].
 
         inflation: of the parameters' variance by correlated readings and by discrepancy [1].
         """
-        parameters = self.estimate.hypothesis.parameters
-        variances = np.diag(self.covariance)[len(self.covariance) - len(parameters) :]
-        widths = np.array([abs(p.high - p.low) for p in parameters])
-        left = np.minimum(np.sqrt(2 * np.pi * inflation * variances), widths)
-        return float(np.sum(np.log(widths / np.maximum(left, np.finfo(float).tiny))))
+        variances, prices = np.diag(self.covariance), []
+        for cause, place, _ in cause_places(self.estimate):
+            widths = np.array([abs(p.high - p.low) for p in cause.parameters])
+            left = np.minimum(np.sqrt(2 * np.pi * inflation * variances[place]), widths)
+            prices.append(float(np.sum(np.log(widths / np.maximum(left, np.finfo(float).tiny)))))
+        return prices
 
 
 def evaluate(

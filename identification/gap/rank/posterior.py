@@ -138,7 +138,7 @@ def _score(
     if count and each.at_bound:
         return -np.inf
     inflation = variance_inflation(each, discrepancies)
-    price = max(each.occam_price(inflation), settings.least_price * count) if count else 0.0
+    price = sum(max(own, settings.least_price) for own in each.occam_prices(inflation))
     return _robust(*misfits, settings) - price + _log_prior(problem, each, settings)
 
 

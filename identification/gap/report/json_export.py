@@ -1,4 +1,4 @@
-"""The diagnosis as JSON: format epv-gap/1, described in docs/reference/gap-json.md."""
+"""The diagnosis as JSON: format epv-gap/2, described in docs/reference/gap-json.md."""
 
 import re
 from typing import Any
@@ -10,21 +10,31 @@ from identification.gap.rank.verdict import RankedCause
 from identification.gap.reduce.discrepancy_reduction import NOMINAL, RECALIBRATED
 from identification.gap.reduce.gaps import FLOOR
 from identification.gap.report.parameter_intervals import fitted_values, parameter_intervals
+from identification.gap.report.remainder import remainder
 
 
-def as_json(diagnosis: Diagnosis, next_experiment: str = "") -> dict[str, Any]:
-    """The content of gap.json; next_experiment: a sentence, empty where none was sought."""
+def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = None) -> dict[str, Any]:
+    """The content of gap.json.
+
+    Args:
+        diagnosis: what to write.
+        next_experiment: a sentence, empty where none was sought.
+        term: name of the file beside gap.json that holds the missing term; None where none was written.
+    """
     conclusion = diagnosis.conclusion
     causes = conclusion.causes[: diagnosis.settings.report.listed_causes]
     separability = diagnosis.ranking.separability
     return {
-        "format": "epv-gap/1",
+        "format": "epv-gap/2",
         "verdict": conclusion.verdict,
         "where": _where(diagnosis),
         "causes": [_cause(diagnosis, cause) for cause in causes],
         "ambiguity_set": [list(cause.effects) for cause in conclusion.ambiguity_set],
         "gap": _gap(diagnosis),
         "unexplained": _unexplained(diagnosis),
+        "inclusion": inclusion(diagnosis),
+        "remainder": _remainder(diagnosis, term),
+        "discrepancy": discrepancy(diagnosis),
         "parameters": _parameters(diagnosis),
         "next_experiment": next_experiment,
         "probability": {
@@ -39,6 +49,29 @@ def as_json(diagnosis: Diagnosis, next_experiment: str = "") -> dict[str, Any]:
         },
         "absorbed": list(separability.absorbed),
         "warnings": diagnosis.warnings,
+    }
+
+
+def inclusion(diagnosis: Diagnosis) -> dict[str, float]:
+    """Probability that each effect is part of the gap, of effects with a noticeable one."""
+    least = diagnosis.settings.report.listed_inclusion
+    found = diagnosis.ranking.inclusion.items()
+    return {name: min(float(probability), 1.0) for name, probability in found if probability >= least}
+
+
+def discrepancy(diagnosis: Diagnosis) -> dict[str, dict[str, float]]:
+    """By channel: what model and recordings differ by beyond noise, and how long it is correlated.
+
+    Its standard deviation [unit of the channel] and its time scale [s]; 0 where nothing is seen.
+    """
+    ranking = diagnosis.ranking
+    channels = zip(ranking.problem.plant.channels, ranking.discrepancies, strict=True)
+    return {
+        channel.name: {
+            "sd": float(seen.sd * (channel.noise or 0.0) / channel.scale),
+            "time_scale_s": float(seen.time_scale),
+        }
+        for channel, seen in channels
     }
 
 
@@ -73,6 +106,18 @@ def _unexplained(diagnosis: Diagnosis) -> dict[str, Any]:
         "still_predictable": unexplained.still_predictable,
         "p_value": unexplained.p_value,
         "location": remaining_location(diagnosis),
+    }
+
+
+def _remainder(diagnosis: Diagnosis, term: str | None) -> dict[str, Any]:
+    found = remainder(diagnosis)
+    return {
+        "fraction": found.share.value,
+        "low": found.share.low,
+        "high": found.share.high,
+        "component": dict(found.component),
+        "equation": dict(found.equation),
+        "term": term,
     }
 
 

@@ -6,6 +6,7 @@ from scipy.stats import norm
 
 from identification.gap.diagnosis import Diagnosis
 from identification.gap.rank.evidence import EvaluatedHypothesis
+from identification.gap.rank.posterior import variance_inflation
 
 
 def fitted_values(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis) -> dict[str, float]:
@@ -31,8 +32,7 @@ def parameter_intervals(
     """
     quantile = norm.ppf(0.5 + diagnosis.settings.reduction.interval_level / 2)
     estimate = hypothesis.estimate
-    systematic = diagnosis.settings.report.systematic_form_error
-    covariance = covariance_with_form_errors(hypothesis, systematic)
+    covariance = parameter_covariance(diagnosis, hypothesis)
     deviations = np.sqrt(np.diag(covariance))[estimate.cause_start :]
     intervals = []
     for p, scaled, sd in zip(
@@ -44,15 +44,14 @@ def parameter_intervals(
     return intervals
 
 
-def covariance_with_form_errors(
-    hypothesis: EvaluatedHypothesis, systematic_form_error: float
-) -> NDArray:
+def parameter_covariance(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis) -> NDArray:
     """Covariance of calibrated parameters and parameters of causes, (k, k) [SI].
 
-    Includes errors of form that no recording shows.
-
-    systematic_form_error: their relative standard deviation [1].
+    Noise and discrepancy of the readings, as large and as correlated as they are, and errors of form
+    that no recording shows.
     """
+    systematic_form_error = diagnosis.settings.report.systematic_form_error
+    inflation = variance_inflation(hypothesis, diagnosis.ranking.discrepancies)
     estimate = hypothesis.estimate
     deviations = np.zeros(len(estimate.vector))
     exact = [cause.exact_form for cause in estimate.hypothesis.causes for _ in cause.parameters]
@@ -60,4 +59,4 @@ def covariance_with_form_errors(
     for i, (p, known) in enumerate(pairs, start=estimate.cause_start):
         acting = estimate.vector[i] * p.scale - p.nominal
         deviations[i] = 0.0 if known else systematic_form_error * acting
-    return hypothesis.covariance + np.diag(deviations**2)
+    return inflation * hypothesis.covariance + np.diag(deviations**2)

@@ -1,6 +1,7 @@
 """Numbers in reports: with prefixed units, probabilities, and gaps with their intervals."""
 
 import re
+from collections.abc import Sequence
 
 from identification.gap.reduce.block_bootstrap import Interval
 
@@ -9,7 +10,27 @@ POWER_PREFIXES = {"": 1.0, "d": 1e-1, "c": 1e-2, "m": 1e-3, "u": 1e-6}
 """Prefixes of units, and of units with a power of two or three."""
 
 PREFIXED = frozenset(
-    ("A", "C", "F", "H", "Hz", "J", "K", "N", "Ohm", "Pa", "S", "T", "V", "W", "g", "m", "rad", "s")
+    (
+        "A",
+        "C",
+        "F",
+        "H",
+        "Hz",
+        "J",
+        "K",
+        "N",
+        "Ohm",
+        "Pa",
+        "S",
+        "T",
+        "V",
+        "W",
+        "bar",
+        "g",
+        "m",
+        "rad",
+        "s",
+    )
 )
 """Units that take a prefix."""
 
@@ -50,6 +71,11 @@ def readable_unit(unit: str, size: float) -> tuple[str, float]:
         if abs(size) >= least * factor**power:
             return prefix + unit, factor**power
     return unit, 1.0
+
+
+def listed(words: Sequence[str]) -> str:
+    """Words in a sentence: a, b and c."""
+    return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else "".join(words)
 
 
 def probability_text(probability: float) -> str:

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from identification.gap.diagnosis import Diagnosis, hypothesis_label
 from identification.gap.model.free_parameter import FreeParameter
+from identification.gap.report.labels import row_height, wrapped
 from identification.gap.report.parameter_intervals import parameter_intervals
 from identification.gap.report.quantities import (
     probability_text,
@@ -29,8 +30,8 @@ def ranking_figure(diagnosis: Diagnosis) -> Figure:
     named = [hypothesis_label(c.hypothesis) for c in diagnosis.conclusion.ambiguity_set]
     rest = {NO_CAUSE: diagnosis.ranking.no_cause, UNKNOWN_CAUSE: diagnosis.ranking.unknown}
     colours = [NAMED if name in named else OTHER for name in causes] + [NO_NAME] * len(rest)
-    figure = Figure(figsize=(7.5, 0.9 + 0.32 * len(colours)), layout="constrained")
-    _bars(figure.subplots(), causes | rest, colours)
+    figure = Figure(figsize=(7.5, 0.9 + 0.32 * row_height(causes) * len(colours)), layout="constrained")
+    _bars(figure.subplots(), {wrapped(name): share for name, share in (causes | rest).items()}, colours)
     return figure
 
 
@@ -64,11 +65,15 @@ def size_figure(diagnosis: Diagnosis) -> Figure:
             strict=True,
         )
     ]
-    figure = Figure(figsize=(9.5, 0.7 + 0.62 * len(rows)), layout="constrained")
+    figure = Figure(
+        figsize=(9.5, 0.7 + 0.62 * row_height(name for name, _, _ in rows) * len(rows)),
+        layout="constrained",
+    )
     axes = figure.subplots()
     for row, (_, parameter, interval) in enumerate(rows):
         _draw_in_range(axes, row, parameter, interval)
-    axes.set_yticks(range(len(rows)), [f"{name}\n{p.symbol}" for name, p, _ in rows], fontsize=8)
+    names = [f"{wrapped(name)}\n{p.symbol}" for name, p, _ in rows]
+    axes.set_yticks(range(len(rows)), names, fontsize=8)
     axes.set_ylim(len(rows) - 0.4, -0.6)
     axes.set_xlim(-0.03, 1.03)
     axes.set_xticks([])
@@ -79,27 +84,33 @@ def size_figure(diagnosis: Diagnosis) -> Figure:
 
 
 def parameter_change_figure(diagnosis: Diagnosis) -> Figure:
-    """How far the calibrated parameters moved from where they began [%]."""
+    """How far the calibrated parameters moved from their nominal values [%]."""
     problem = diagnosis.ranking.problem
     estimates = {"recalibrated": diagnosis.ranking.recalibrated.estimate}
     if diagnosis.best:
         best = diagnosis.best.hypothesis
         estimates[f"with {hypothesis_label(best)}"] = best.estimate
-    symbols = [p.symbol for p in problem.plant.parameters]
+    parameters = problem.plant.parameters
+    symbols = [p.symbol for p in parameters]
     begin = problem.values(diagnosis.nominal)
     figure = Figure(figsize=(7.5, 1.1 + 0.35 * len(symbols)), layout="constrained")
     axes = figure.subplots()
     for shift, (name, estimate) in zip((-0.15, 0.15), estimates.items(), strict=False):
         values = problem.values(estimate)
-        change = [100 * (values[symbol] / begin[symbol] - 1) for symbol in symbols]
+        change = [100 * (values[p.symbol] - begin[p.symbol]) / _reference(p) for p in parameters]
         axes.plot(change, shift + np.arange(len(symbols)), "o", label=name)
     axes.axvline(0.0, color="black", linewidth=0.8)
     axes.set_yticks(range(len(symbols)), symbols)
     axes.set_ylim(len(symbols) - 0.5, -0.5)
-    axes.set_xlabel("change from the nominal value [%]")
+    axes.set_xlabel("change from the nominal value [% of it, or of the usual size where it is 0]")
     axes.grid(alpha=0.3)
     figure.legend(loc="outside upper center", ncols=2, fontsize="small")
     return figure
+
+
+def _reference(parameter: FreeParameter) -> float:
+    """What a change is a share of [SI]: the nominal value, or the usual size where that is 0."""
+    return abs(parameter.nominal) or abs(parameter.scale)
 
 
 def _draw_in_range(

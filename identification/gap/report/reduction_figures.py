@@ -7,13 +7,14 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from identification.gap.reduce.block_bootstrap import Interval
 from identification.gap.reduce.discrepancy_reduction import DiscrepancyReduction
 from identification.gap.reduce.gaps import FLOOR, Gap
+from identification.gap.report.labels import row_height, wrapped
 
 
 def gap_figure(reduction: DiscrepancyReduction) -> Figure:
     """Gap of every model on held-out runs, overall and by channel, with 90 % intervals."""
     models = {**reduction.gaps, "black box": reduction.black_box}
     panels = ["overall", *reduction.noise_ratios]
-    figure = Figure(figsize=(10, 1.4 + 0.32 * len(models)), layout="constrained")
+    figure = Figure(figsize=(10, 1.4 + 0.32 * row_height(models) * len(models)), layout="constrained")
     axes = figure.subplots(1, len(panels), sharey=True)
     for own, panel in zip(axes, panels, strict=True):
         _bars(own, [_interval(gap, panel) for gap in models.values()])
@@ -24,17 +25,18 @@ def gap_figure(reduction: DiscrepancyReduction) -> Figure:
         own.xaxis.set_major_formatter("{x:g}")
         own.xaxis.set_minor_formatter(NullFormatter())
         own.set_xlabel("gap [noise deviations]")
-    axes[0].set_yticks(range(len(models)), list(models))
+    axes[0].set_yticks(range(len(models)), [wrapped(name) for name in models])
     axes[0].invert_yaxis()
     return figure
 
 
 def share_figure(reduction: DiscrepancyReduction) -> Figure:
     """Share of the explainable gap that each cause closes, with 90 % intervals."""
-    figure = Figure(figsize=(7, 1.2 + 0.32 * len(reduction.shares_closed)), layout="constrained")
+    names = list(reduction.shares_closed)
+    figure = Figure(figsize=(7, 1.2 + 0.32 * row_height(names) * len(names)), layout="constrained")
     axes = figure.subplots()
     _bars(axes, [_percent(share) for share in reduction.shares_closed.values()])
-    axes.set_yticks(range(len(reduction.shares_closed)), list(reduction.shares_closed))
+    axes.set_yticks(range(len(names)), [wrapped(name) for name in names])
     axes.invert_yaxis()
     axes.set_xlim(0, 100)
     axes.set_xlabel("share of the explainable gap that is closed [%]")

@@ -1,11 +1,6 @@
 """The report of a diagnosis as sections of the HTML page."""
 
-import numpy as np
-
 from identification.gap.diagnosis import Diagnosis, hypothesis_label
-from identification.gap.locate.fault_localisation import Localisation
-from identification.gap.locate.regime_gaps import regimes_of
-from identification.gap.rank.evidence import EvaluatedHypothesis
 from identification.gap.rank.verdict import AMBIGUOUS, KNOWN, NO_GAP
 from identification.gap.report import (
     localisation_figures,
@@ -14,12 +9,19 @@ from identification.gap.report import (
     sentences,
     tables,
 )
+from identification.gap.report.localisation_blocks import (
+    level_text,
+    missing_term,
+    percent,
+    residual,
+)
+from identification.gap.report.remainder_sentences import disturbance_sentence, remainder_sentence
 from identification.gap.report.verdict_sentences import verdict_sentence
 from identification.report.page import Block, Picture, Section, Text, Verdict
 
 
 def sections(diagnosis: Diagnosis, next_experiment: str = "") -> list[Section]:
-    """The whole report: verdict, localisation, ranking, reduction, next experiment, warnings.
+    """The whole report: verdict, localisation, ranking, reduction, remainder, next experiment, warnings.
 
     next_experiment: a sentence or two; empty where none was sought.
     """
@@ -28,6 +30,7 @@ def sections(diagnosis: Diagnosis, next_experiment: str = "") -> list[Section]:
         _localisation(diagnosis),
         _ranking(diagnosis),
         _reduction(diagnosis),
+        _remainder(diagnosis),
     ]
     if next_experiment:
         plan = Verdict(status="note", text=next_experiment)
@@ -41,7 +44,7 @@ def _verdict(diagnosis: Diagnosis, next_experiment: str) -> Section:
         "The gap is the root mean square of (model - measured)/noise on recordings that were never "
         "fitted to: 1 is noise alone. The nominal model has the parameters as given. The recalibrated "
         "model has its calibrated parameters refitted. With a cause, both are refitted together. "
-        f"Intervals hold {_level(diagnosis)}."
+        f"Intervals hold {level_text(diagnosis)}."
     )
     return Section(
         title="Verdict",
@@ -58,7 +61,7 @@ def _localisation(diagnosis: Diagnosis) -> Section:
             figure=localisation_figures.heat_map(localisation.regime_gaps, largest),
             caption="Gap after recalibration, by channel and regime; regimes may overlap.",
         ),
-        _residual(diagnosis, diagnosis.ranking.recalibrated, "Residual after recalibration"),
+        residual(diagnosis, diagnosis.ranking.recalibrated, "Residual after recalibration"),
         Picture(
             figure=ranking_figures.location_figure(diagnosis),
             caption="Left: the equation or reading in which something is missing, from the residual "
@@ -68,49 +71,8 @@ def _localisation(diagnosis: Diagnosis) -> Section:
     ]
     verdicts = [Verdict(status="note", text=sentences.location_sentence(diagnosis))]
     if localisation.missing_term:
-        blocks += _missing_term(diagnosis, localisation, "The recalibrated model")
-    remaining = diagnosis.remaining
-    if remaining and remaining.missing_term:
-        text = sentences.remaining_sentence(diagnosis, remaining)
-        verdicts.append(Verdict(status="note", text=text))
-        blocks += _missing_term(diagnosis, remaining, "The model with the nearest cause")
+        blocks += missing_term(diagnosis, localisation, "The recalibrated model")
     return Section(title="Where the gap lies", verdicts=verdicts, blocks=blocks)
-
-
-def _missing_term(diagnosis: Diagnosis, localisation: Localisation, model: str) -> list[Block]:
-    """The missing term over time, and over a state where one explains it."""
-    forcing, level = localisation.likeliest, diagnosis.settings.reduction.interval_level
-    plant = diagnosis.ranking.problem.plant
-    blocks: list[Block] = [
-        Picture(
-            figure=localisation_figures.forcing_figure(plant, forcing, level),
-            caption=f"{model} lacks this term in {forcing.equation.name}: the forcing with which it "
-            "meets the recordings.",
-        )
-    ]
-    term, least = localisation.missing_term, diagnosis.settings.report.drawn_term_share
-    if term and term.explained >= least:
-        picture = localisation_figures.missing_term_figure(term, level)
-        caption = "The missing term over the state that explains it best."
-        blocks.append(Picture(figure=picture, caption=caption))
-    return blocks
-
-
-def _residual(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis, name: str) -> Picture:
-    """Residual of the held-out run that recalibration misses most."""
-    problem = diagnosis.ranking.problem
-    recalibrated = diagnosis.ranking.recalibrated.residuals
-    held_out = [r for r, run in enumerate(problem.plant.runs) if run.held_out]
-    run = max(held_out, key=lambda r: np.mean(recalibrated[r] ** 2))
-    masks = regimes_of(problem.plant, problem.candidate(hypothesis.estimate), run)
-    level = diagnosis.settings.reduction.interval_level
-    return Picture(
-        figure=localisation_figures.residual_figure(
-            problem.plant, run, hypothesis.residuals[run], masks, level
-        ),
-        caption=f"{name}, on the held-out recording that recalibration misses most. Grey: where "
-        f"{_level(diagnosis)} of the noise lies.",
-    )
 
 
 def _ranking(diagnosis: Diagnosis) -> Section:
@@ -118,7 +80,7 @@ def _ranking(diagnosis: Diagnosis) -> Section:
     verdicts = [Verdict(status="note", text=sentences.hidden_causes_sentence(diagnosis))]
     if ambiguity_set:
         names = ", ".join(hypothesis_label(cause.hypothesis) for cause in ambiguity_set)
-        share = _percent(diagnosis.ranking.settings.ambiguity_share)
+        share = percent(diagnosis.ranking.settings.ambiguity_share)
         text = f"The fewest causes that hold {share} of the probability of all causes: {names}."
         status = "good" if len(ambiguity_set) == 1 else "doubt"
         verdicts.insert(0, Verdict(status=status, text=text))
@@ -130,10 +92,11 @@ def _ranking(diagnosis: Diagnosis) -> Section:
     ]
     if diagnosis.judged:
         blocks += [
+            tables.inclusion_table(diagnosis),
             tables.ranking_table(diagnosis),
             Picture(
                 figure=ranking_figures.size_figure(diagnosis),
-                caption=f"Fitted sizes with {_level(diagnosis)} intervals in their physical range.",
+                caption=f"Fitted sizes with {level_text(diagnosis)} intervals in their physical range.",
             ),
         ]
     return Section(title="Which cause it is", verdicts=verdicts, blocks=blocks)
@@ -145,7 +108,7 @@ def _reduction(diagnosis: Diagnosis) -> Section:
         Picture(
             figure=reduction_figures.gap_figure(reduction),
             caption="Gap of every model on held-out recordings with "
-            f"{_level(diagnosis)} intervals; red: noise alone.",
+            f"{level_text(diagnosis)} intervals; red: noise alone.",
         )
     ]
     if reduction.shares_closed and diagnosis.conclusion.verdict != NO_GAP:
@@ -158,7 +121,7 @@ def _reduction(diagnosis: Diagnosis) -> Section:
     blocks.append(tables.gap_table(diagnosis))
     if diagnosis.best and diagnosis.conclusion.verdict in (KNOWN, AMBIGUOUS):
         best = diagnosis.best.hypothesis
-        blocks.append(_residual(diagnosis, best, f"Residual with {hypothesis_label(best)}"))
+        blocks.append(residual(diagnosis, best, f"Residual with {hypothesis_label(best)}"))
     blocks += [
         Picture(
             figure=ranking_figures.parameter_change_figure(diagnosis),
@@ -173,6 +136,23 @@ def _reduction(diagnosis: Diagnosis) -> Section:
     )
 
 
+def _remainder(diagnosis: Diagnosis) -> Section:
+    """What no named cause explains: how much, where, of which shape, and what is only disturbance."""
+    blocks: list[Block] = []
+    if diagnosis.remaining and diagnosis.best:
+        name = hypothesis_label(diagnosis.best.hypothesis)
+        blocks += missing_term(diagnosis, diagnosis.remaining, f"The model with {name}")
+        blocks.append(residual(diagnosis, diagnosis.best.hypothesis, f"Residual with {name}"))
+    text = remainder_sentence(diagnosis)
+    if not diagnosis.remaining:
+        text = f"{text} {disturbance_sentence(diagnosis)}".strip()
+    return Section(
+        title="What remains",
+        verdicts=[Verdict(status="note", text=text)],
+        blocks=[*blocks, tables.discrepancy_table(diagnosis)],
+    )
+
+
 def _warnings(diagnosis: Diagnosis) -> Section:
     texts = [*diagnosis.warnings, *sentences.parameters_at_bounds(diagnosis)]
     verdicts = [Verdict(status="doubt", text=f"{text}.") for text in texts]
@@ -180,12 +160,3 @@ def _warnings(diagnosis: Diagnosis) -> Section:
         text = "Every relevant fit has converged, and no fitted parameter is at an end of its range."
         verdicts = [Verdict(status="good", text=text)]
     return Section(title="Warnings", verdicts=verdicts, blocks=[])
-
-
-def _level(diagnosis: Diagnosis) -> str:
-    """Probability within the intervals."""
-    return _percent(diagnosis.settings.reduction.interval_level)
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:g} %"

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 from identification.gap.diagnosis import Diagnosis, hypothesis_label
-from identification.gap.locate.fault_localisation import Localisation
 from identification.gap.rank.verdict import NO_GAP, RankedCause
 from identification.gap.reduce.discrepancy_reduction import NOMINAL, RECALIBRATED
 from identification.gap.reduce.gaps import FLOOR
@@ -43,14 +42,6 @@ def location_sentence(diagnosis: Diagnosis) -> str:
     if diagnosis.conclusion.verdict == NO_GAP:
         return text
     return f"{text} Most likely at fault: {component_at_fault(diagnosis)}."
-
-
-def remaining_sentence(diagnosis: Diagnosis, remaining: Localisation) -> str:
-    """What the nearest cause leaves, where that cause does not suffice."""
-    best = diagnosis.best
-    name = hypothesis_label(best.hypothesis) if best else RECALIBRATED
-    equation, probability = max(remaining.equation_probabilities.items(), key=lambda item: item[1])
-    return f"Even with {name}, something is missing in {equation} ({probability_text(probability)})."
 
 
 def reduction_sentence(diagnosis: Diagnosis) -> str:
@@ -122,7 +113,7 @@ def mentioned_causes(diagnosis: Diagnosis) -> Sequence[RankedCause]:
 
 def share_closed(diagnosis: Diagnosis, cause: RankedCause) -> str:
     """The share of the gap that a cause closes, with its interval."""
-    return share_text(diagnosis.reduction.shares_closed[hypothesis_label(cause.hypothesis)])
+    return share_text(diagnosis.share_closed(cause))
 
 
 def sizes_with_intervals(diagnosis: Diagnosis, cause: RankedCause) -> list[str]:

@@ -3,6 +3,7 @@
 from identification.gap.diagnosis import Diagnosis, hypothesis_label
 from identification.gap.reduce.gaps import FLOOR, Gap
 from identification.gap.report import sentences
+from identification.gap.report.json_export import discrepancy, inclusion
 from identification.gap.report.quantities import (
     gap_text,
     gap_with_interval,
@@ -34,19 +35,67 @@ def ranking_table(diagnosis: Diagnosis) -> Table:
     )
 
 
+def inclusion_table(diagnosis: Diagnosis) -> Table:
+    """Probability that each effect is part of the gap, alone or beside others."""
+    components = {cause.name: cause.component for cause in diagnosis.ranking.problem.plant.causes}
+    least = diagnosis.settings.report.mentioned_probability
+    rows = [
+        [
+            name,
+            components[name].replace("_", " "),
+            probability_text(probability),
+            "yes" if name in diagnosis.conclusion.held else "-",
+        ]
+        for name, probability in inclusion(diagnosis).items()
+        if probability >= least
+    ]
+    sure = diagnosis.ranking.settings.sure_inclusion
+    return Table(
+        columns=["Effect", "component", "part of the gap", "held"],
+        rows=rows or [["none", "-", "-", "-"]],
+        caption="Probability that an effect is part of the gap, alone or beside others, so that the "
+        f"figures need not add to 100 %. Held: {100 * sure:g} % or more, and the verdict names causes.",
+    )
+
+
+def discrepancy_table(diagnosis: Diagnosis) -> Table:
+    """What model and recordings differ by beyond noise under the best hypothesis, by channel."""
+    channels = {channel.name: channel for channel in diagnosis.ranking.problem.plant.channels}
+    return Table(
+        columns=["Channel", "noise", "discrepancy", "correlated over"],
+        rows=[
+            [
+                name,
+                quantity((channels[name].noise or 0.0) / channels[name].scale, channels[name].unit),
+                quantity(seen["sd"], channels[name].unit) if seen["sd"] else "none seen",
+                quantity(seen["time_scale_s"], "s") if seen["sd"] else "-",
+            ]
+            for name, seen in discrepancy(diagnosis).items()
+        ],
+        caption="Standard deviations of the sensor noise and of what differs beyond it under the best "
+        "hypothesis: errors of its form, and disturbances.",
+    )
+
+
 def gap_table(diagnosis: Diagnosis) -> Table:
-    """Gap of every model in noise deviations and in the 2003 report's percent."""
+    """Gap of every model in noise deviations, and in the 2003 report's percent where defined."""
     models = {**diagnosis.reduction.gaps, "black box": diagnosis.reduction.black_box}
     channels = list(diagnosis.reduction.noise_ratios)
     columns = ["overall", *channels]
+    shown = columns if any(model.percent for model in models.values()) else []
+    caption = f"Noise deviations; {FLOOR:g} is noise alone."
+    if shown:
+        caption = (
+            f"Left: noise deviations, {FLOOR:g} is noise alone. Right: the report's error (eqs 19-21), "
+            "every run with nominal offsets."
+        )
     return Table(
-        columns=["Model", *(f"{c} [noise]" for c in columns), *(f"{c} [%]" for c in columns)],
+        columns=["Model", *(f"{c} [noise]" for c in columns), *(f"{c} [%]" for c in shown)],
         rows=[
-            [name, *_noise_units(model, channels), *_percent(model, columns)]
+            [name, *_noise_units(model, channels), *_percent(model, shown)]
             for name, model in models.items()
         ],
-        caption=f"Left: noise deviations, {FLOOR:g} is noise alone. Right: the report's error "
-        "(eqs 19-21), every run with nominal offsets.",
+        caption=caption,
     )
 
 

@@ -1,10 +1,19 @@
 """The verdict of a diagnosis in sentences that a project leader can act on."""
 
 from identification.gap.diagnosis import Diagnosis, hypothesis_label
-from identification.gap.rank.verdict import AMBIGUOUS, KNOWN, NO_GAP
+from identification.gap.rank.verdict import AMBIGUOUS, KNOWN, NO_GAP, PARTIAL
 from identification.gap.reduce.discrepancy_reduction import NOMINAL, RECALIBRATED
 from identification.gap.reduce.gaps import FLOOR
-from identification.gap.report.quantities import gap_text, gap_with_interval, probability_text
+from identification.gap.report.advice_sentences import add_or_not, nearest_cause
+from identification.gap.report.quantities import (
+    gap_text,
+    gap_with_interval,
+    listed,
+    probability_text,
+    share_text,
+)
+from identification.gap.report.remainder import remainder
+from identification.gap.report.remainder_sentences import disturbance_sentence, remainder_place
 from identification.gap.report.sentences import component_at_fault, share_closed, sizes_text
 
 
@@ -19,9 +28,12 @@ def verdict_sentence(diagnosis: Diagnosis, next_experiment: str) -> tuple[str, s
         return ("good" if likely and no_warning else "doubt"), _no_gap(diagnosis)
     if conclusion.verdict == KNOWN:
         complete = not diagnosis.reduction.unexplained.still_predictable
-        return ("good" if complete and no_warning else "doubt"), _known(diagnosis)
+        helps = diagnosis.surely_helps(diagnosis.judged[0])
+        return ("good" if complete and helps and no_warning else "doubt"), _known(diagnosis)
     if conclusion.verdict == AMBIGUOUS:
         return "doubt", f"{_ambiguous(diagnosis)} {_with_full_stop(next_experiment)}".strip()
+    if conclusion.verdict == PARTIAL:
+        return "doubt", _partial(diagnosis)
     return "bad", _unknown(diagnosis)
 
 
@@ -29,21 +41,45 @@ def _known(diagnosis: Diagnosis) -> str:
     best = diagnosis.conclusion.ambiguity_set[0]
     single = len(best.effects) == 1
     explain, them = ("explains", "it") if single else ("together explain", "them")
-    return (
-        f"{' and '.join(best.hypothesis.labels)} {explain} the gap "
+    text = (
+        f"{listed(best.hypothesis.labels)} {explain} the gap "
         f"({probability_text(best.probability)}): adding {them} with {sizes_text(diagnosis, best)} "
-        f"closes {share_closed(diagnosis, best)} of the gap on recordings never fitted to; "
-        f"{_remainder(diagnosis)}."
+        f"closes {share_closed(diagnosis, best)} of the gap on recordings never fitted to"
+    )
+    if not diagnosis.surely_helps(best):
+        return f"{text}: {add_or_not(diagnosis, best)}."
+    return f"{text}; {_rest(diagnosis)}."
+
+
+def _rest(diagnosis: Diagnosis) -> str:
+    """What a known cause leaves."""
+    if not diagnosis.reduction.unexplained.still_predictable:
+        return "nothing predictable is left"
+    left = remainder(diagnosis)
+    return (
+        f"{share_text(left.share)} of the gap is left and still predictable{remainder_place(left)}, so "
+        "something smaller is missing too"
     )
 
 
-def _remainder(diagnosis: Diagnosis) -> str:
-    unexplained = diagnosis.reduction.unexplained
-    if not unexplained.still_predictable:
-        return "nothing predictable is left"
+def _partial(diagnosis: Diagnosis) -> str:
+    """Effects that are surely there, what they close, and what remains."""
+    best, held = diagnosis.conclusion.ambiguity_set[0], diagnosis.conclusion.held
+    inclusion = diagnosis.ranking.inclusion
+    chances = ", ".join(probability_text(inclusion[name]) for name in held)
+    are, them = ("is", "it") if len(held) == 1 else ("are", "them")
+    faint = [
+        f"{name} ({probability_text(inclusion[name])})" for name in best.effects if name not in held
+    ]
+    together = f" together with {listed(faint)}, less sure," if faint else ""
+    left = remainder(diagnosis)
+    drawn = left.location and left.location.missing_term
+    look = ", and look at the missing term" if drawn else ""
     return (
-        f"{100 * unexplained.fraction:.0f} % of the gap is left and still predictable, so something "
-        "smaller is missing too"
+        f"{listed(held)} {are} part of the gap ({chances}): adding {them}{together} with "
+        f"{sizes_text(diagnosis, best)} closes {share_closed(diagnosis, best)} of it on recordings "
+        f"never fitted to. {share_text(left.share)} remains{remainder_place(left)}: "
+        f"{add_or_not(diagnosis, best)}{look}."
     )
 
 
@@ -56,27 +92,32 @@ def _ambiguous(diagnosis: Diagnosis) -> str:
         f"{rest or 'nothing else'} ({probability_text(cause.probability)})"
         for rest, cause in zip(rests, rivals, strict=True)
     )
-    together = f"{' and '.join(common)} together with " if common else ""
+    together = f"{listed(common)} together with " if common else ""
     shares = " or ".join(dict.fromkeys(share_closed(diagnosis, cause) for cause in rivals))
     doubt = "which" if all(rests) else "whether another cause acts or the form of the first one errs"
-    return (
+    text = (
         f"{together}{names} explains the gap and closes {shares} of it; these recordings cannot tell "
         f"{doubt}."
     )
+    if any(diagnosis.surely_helps(cause) for cause in rivals):
+        return text
+    return f"{text} None of them surely helps on recordings never fitted to: add none yet."
 
 
 def _no_gap(diagnosis: Diagnosis) -> str:
     gaps, settings = diagnosis.reduction.gaps, diagnosis.settings
     recalibrated = gaps[RECALIBRATED].overall
-    text = (
-        "There is no gap beyond noise after recalibration"
-        if recalibrated.low <= FLOOR + settings.reduction.least_gap_closed
-        else "Recalibration leaves a small gap of which no cause can be named"
-    )
+    disturbance = disturbance_sentence(diagnosis)
+    if disturbance:
+        text = "There is no gap beyond noise and disturbances after recalibration"
+    elif recalibrated.low <= FLOOR + settings.reduction.least_gap_closed:
+        text = "There is no gap beyond noise after recalibration"
+    else:
+        text = "Recalibration leaves a small gap of which no cause can be named"
     text += (
         f": on recordings never fitted to, the gap is {gap_with_interval(recalibrated)} noise "
-        f"deviations, and {gap_text(gaps[NOMINAL].overall.value)} before. Use the recalibrated "
-        "parameters and add nothing."
+        f"deviations, and {gap_text(gaps[NOMINAL].overall.value)} before. {disturbance}Use the "
+        "recalibrated parameters and add nothing."
     )
     likely = diagnosis.ranking.no_cause > settings.report.likely_probability
     return text if likely else f"{text} {_possible_cause(diagnosis)}"
@@ -102,11 +143,7 @@ def _unknown(diagnosis: Diagnosis) -> str:
         f"something is missing, most likely in {component_at_fault(diagnosis)}"
         f"{', see its shape' if diagnosis.localisation.missing_term else ''}."
     )
-    if not diagnosis.best:
-        return text
-    name = hypothesis_label(diagnosis.best.hypothesis)
-    share = share_closed(diagnosis, diagnosis.best)
-    return f"{text} The nearest cause, {name}, closes only {share} of the gap: do not add it."
+    return f"{text} {nearest_cause(diagnosis, diagnosis.best)}" if diagnosis.best else text
 
 
 def _with_full_stop(text: str) -> str:

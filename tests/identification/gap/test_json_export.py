@@ -16,7 +16,7 @@ from tests.identification.gap.tanks import TANKS, diagnosed
 
 KEYS = {
     "format", "verdict", "where", "causes", "ambiguity_set", "gap", "unexplained", "parameters",
-    "next_experiment",
+    "next_experiment", "inclusion", "remainder", "discrepancy",
 }  # fmt: skip
 GAPS = {"floor", "nominal", "recalibrated", "with_cause", "black_box_floor", "report_metric_percent"}
 MODELS = {"nominal", "recalibrated", "with_cause"}
@@ -26,7 +26,7 @@ MODELS = {"nominal", "recalibrated", "with_cause"}
 def test_every_verdict_has_all_fields_of_the_format(verdict):
     content = json.loads(json.dumps(as_json(diagnosed(verdict), "Wait."), allow_nan=False))
     assert set(content) >= KEYS
-    assert content["format"] == "epv-gap/1"
+    assert content["format"] == "epv-gap/2"
     assert content["verdict"] == verdict
     assert content["next_experiment"] == "Wait."
     assert set(content["where"]) >= {"component", "equation", "channel", "regimes"}
@@ -35,6 +35,10 @@ def test_every_verdict_has_all_fields_of_the_format(verdict):
     assert set(content["gap"]["report_metric_percent"]) == MODELS
     assert set(content["parameters"]) == MODELS
     assert set(content["unexplained"]) >= {"fraction", "still_predictable", "location"}
+    remainder = content["remainder"]
+    assert set(remainder) == {"fraction", "low", "high", "component", "equation", "term"}
+    assert 0 <= remainder["low"] <= remainder["fraction"] <= remainder["high"] <= 1
+    assert set(content["discrepancy"]) == set(content["where"]["channel"])
     judged = content["causes"][0]
     assert set(judged) >= {"effects", "probability", "magnitude", "shrink", "gap"}
 

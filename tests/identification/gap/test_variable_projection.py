@@ -78,7 +78,8 @@ def test_a_bounded_step_is_that_of_the_whole_bounded_problem():
     ends = np.full(matrix.shape[1], np.inf)
     ends[:2], ends[2:5] = (0.05, 0.5), FARTHEST
     ends[5:] = FARTHEST * np.tile(SD, len(given))
-    expected = lsq_linear(matrix, right, (-ends, ends), method="bvls")
+    present = np.concatenate([np.zeros(5), *(run.run_values for run in given)])
+    expected = lsq_linear(matrix, right, (-ends - present, ends - present), method="bvls")
     step, gain = found.step(-ends[:2], ends[:2], damping=0.0)
     np.testing.assert_allclose(step, expected.x[:2], atol=1e-8)
     assert np.any(np.abs(expected.x[2:5]) >= FARTHEST)

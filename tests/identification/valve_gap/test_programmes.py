@@ -13,6 +13,7 @@ from identification.bench.programme_file import load_programmes, save_programmes
 from identification.bench.programmes import DIAGNOSIS_SUITE, Programme
 from identification.gap.design.rivals import Rivals
 from identification.gap.rank.ranking import Ranking, rank_hypotheses
+from identification.gap.rank.verdict import PARTIAL
 from identification.report_2003.cases import Case
 from identification.valve_gap.programmes import (
     CANDIDATES,
@@ -28,19 +29,18 @@ CONFUSED = ("seat_leak", "circuit_leak")
 
 
 @cache
-def diagnosed() -> Ranking:
+def valve() -> Valve:
     """A leaking seat, recorded by one opening."""
     truth = Parameters.calibrated().replace(A_PV=2e-8)
     programmes = [p for p in DIAGNOSIS_SUITE if p.name in ("test1", "rest")]
-    valve = Valve(measured_campaign([run_programme(truth, p) for p in programmes], truth, seed=3))
-    valve.causes = tuple(cause for cause in valve.causes if cause.name in CONFUSED)
-    return rank_hypotheses(valve)
-
-
-def valve() -> Valve:
-    plant = diagnosed().problem.plant
-    assert isinstance(plant, Valve)
+    plant = Valve(measured_campaign([run_programme(truth, p) for p in programmes], truth, seed=3))
+    plant.causes = tuple(cause for cause in plant.causes if cause.name in CONFUSED)
     return plant
+
+
+@cache
+def diagnosed() -> Ranking:
+    return rank_hypotheses(valve())
 
 
 def programme(name: str, p1: float, p2: float, *openings: float) -> Programme:
@@ -100,6 +100,15 @@ def test_what_nothing_explains_asks_for_no_programme():
     assert found.programme is None
     assert not found.splits
     assert found.text.startswith("No cause of the catalogue explains")
+
+
+def test_what_is_named_but_for_a_remainder_asks_for_no_programme():
+    """Programmes tell hypotheses apart; what remains has no hypothesis."""
+    sure = replace(diagnosed(), probabilities=[1.0, *[0.0] * (len(diagnosed().probabilities) - 1)])
+    found = next_experiment(sure, valve(), CANDIDATES[:1], verdict=PARTIAL)
+    assert found.programme is None
+    assert "what remains beside it has no name" in found.text
+    assert "shape of the missing term" in found.text
 
 
 def test_the_sentence_tells_splitting_from_not_splitting():

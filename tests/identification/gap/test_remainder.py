@@ -1,0 +1,256 @@
+"""What remains beside named causes: verdict partial, advice by held-out benefit, disturbances."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from docs.examples.tank.plant import Tank
+from docs.examples.tank.recordings import virtual_recordings
+from identification.gap.diagnosis import Diagnosis, diagnose, hypothesis_label
+from identification.gap.rank.posterior import variance_inflation
+from identification.gap.rank.verdict import NO_GAP, PARTIAL, UNKNOWN
+from identification.gap.reduce.block_bootstrap import Interval
+from identification.gap.reduce.discrepancy_reduction import RECALIBRATED
+from identification.gap.report.json_export import as_json
+from identification.gap.report.parameter_intervals import parameter_covariance
+from identification.gap.report.remainder import remainder, term_table
+from identification.gap.report.result_files import GAP, TERM, write_results
+from identification.gap.report.sections import sections
+from identification.gap.report.verdict_sentences import verdict_sentence
+from identification.report.page import Picture, Table
+
+
+@cache
+def leaking_and_disturbed() -> Diagnosis:
+    """A leak, and beside it something that no cause of the catalogue makes."""
+    tank = Tank(virtual_recordings({"c": 0.021, "leak": 4e-3}))
+    for run in tank.runs:
+        run.measured[:] += 0.006 * np.sin(run.time / 3.0)
+    return diagnose(tank)
+
+
+def partial() -> Diagnosis:
+    """The same, with what a judge has to say of it set by hand: no test of the judge."""
+    found = leaking_and_disturbed()
+    first = next(c for c in found.judged if c.effects == ("leak",))
+    conclusion = replace(found.conclusion, verdict=PARTIAL, ambiguity_set=[first], held=("leak",))
+    return replace(found, conclusion=conclusion, judged=[first], remaining=found.localisation)
+
+
+def unknown() -> Diagnosis:
+    """The same where the leak is not believed to be the cause."""
+    found = partial()
+    conclusion = replace(found.conclusion, verdict=UNKNOWN, ambiguity_set=[], held=())
+    return replace(found, conclusion=conclusion)
+
+
+def closing(found: Diagnosis, low: float, value: float, high: float) -> Diagnosis:
+    """The diagnosis with another share closed by its first cause."""
+    label = hypothesis_label(found.judged[0].hypothesis)
+    shares = {**found.reduction.shares_closed, label: Interval(value=value, low=low, high=high)}
+    left = replace(found.reduction.unexplained, fraction=1.0 - value)
+    return replace(found, reduction=replace(found.reduction, shares_closed=shares, unexplained=left))
+
+
+def test_a_leak_beside_a_disturbance_is_part_of_the_gap():
+    found = leaking_and_disturbed()
+    assert found.conclusion.verdict == PARTIAL
+    assert found.conclusion.held == ("leak",)
+    content = json.loads(json.dumps(as_json(found), allow_nan=False))
+    assert content["inclusion"]["leak"] > 0.9
+    assert 0.02 < content["remainder"]["fraction"] < 0.3
+    assert content["remainder"]["component"], "what remains is located"
+
+
+def test_the_remainder_is_what_the_named_causes_do_not_close():
+    left = as_json(closing(partial(), 0.70, 0.76, 0.81))["remainder"]
+    assert left["fraction"] == pytest.approx(0.24)
+    assert (left["low"], left["high"]) == (pytest.approx(0.19), pytest.approx(0.30))
+    equation, component = left["equation"], left["component"]
+    assert sum(component.values()) == pytest.approx(sum(equation.values()))
+    assert sum(equation.values()) <= 1.0 + 1e-9
+
+
+def test_without_a_named_cause_the_whole_gap_remains():
+    assert as_json(unknown())["remainder"]["fraction"] == 1.0
+
+
+def test_where_there_is_no_gap_nothing_remains():
+    found = partial()
+    gap = found.reduction.gaps[RECALIBRATED]
+    floor = replace(gap, overall=Interval(value=1.0, low=0.95, high=1.05))
+    gaps = {**found.reduction.gaps, RECALIBRATED: floor}
+    none = replace(
+        found,
+        conclusion=replace(found.conclusion, verdict=NO_GAP, ambiguity_set=[], held=()),
+        reduction=replace(found.reduction, gaps=gaps),
+    )
+    left = remainder(none)
+    assert left.share.value == left.share.high == 0.0
+    assert left.location is None
+
+
+def test_partial_says_what_to_add_what_it_closes_and_what_remains():
+    status, text = verdict_sentence(closing(partial(), 0.70, 0.76, 0.81), "")
+    assert status == "doubt"
+    assert text.startswith("leak is part of the gap (")
+    assert "closes 76 % (70 to 81 %) of it on recordings never fitted to" in text
+    assert "24 % (19 to 30 %) remains, most likely in f1 of tank (" in text
+    assert text.endswith(": add leak, and look at the missing term.")
+
+
+def test_a_sure_effect_beside_a_less_sure_one_is_told_apart():
+    found = partial()
+    lag = next(c for c in found.ranking.problem.plant.causes if c.name == "lag")
+    first = found.judged[0]
+    estimate = first.hypothesis.estimate
+    both = replace(
+        estimate, hypothesis=replace(estimate.hypothesis, causes=(*estimate.hypothesis.causes, lag))
+    )
+    pair = replace(
+        first,
+        effects=("leak", "lag"),
+        hypothesis=replace(
+            first.hypothesis, estimate=replace(both, vector=np.append(estimate.vector, 1.0))
+        ),
+    )
+    label = hypothesis_label(pair.hypothesis)
+    shares = {**found.reduction.shares_closed, label: Interval(value=0.8, low=0.7, high=0.9)}
+    changed = replace(
+        found,
+        judged=[pair],
+        conclusion=replace(found.conclusion, ambiguity_set=[pair]),
+        reduction=replace(found.reduction, shares_closed=shares),
+    )
+    text = verdict_sentence(changed, "")[1]
+    assert text.startswith("leak is part of the gap (")
+    assert "together with lag (" in text
+    assert "less sure" in text
+    assert ": add leak and lag" in text
+
+
+@pytest.mark.parametrize("of", [partial, unknown])
+def test_what_may_not_help_is_not_to_be_added(of):
+    text = verdict_sentence(closing(of(), 0.0, 0.1, 0.3), "")[1]
+    assert "do not add" in text
+
+
+def test_a_nearest_cause_that_surely_helps_is_never_forbidden():
+    """Today's worst: 'closes 74 % of the gap only: do not add it'."""
+    text = verdict_sentence(closing(unknown(), 0.70, 0.74, 0.80), "")[1]
+    assert "do not add" not in text
+    assert "Adding leak would reduce the gap on recordings never fitted to by 74 % (70 to 80 %)" in text
+    assert "that it is the true cause is doubtful (" in text
+
+
+def test_a_nearest_cause_that_harms_is_said_to():
+    found = closing(unknown(), 0.0, 0.0, 0.1)
+    gap = found.reduction.gaps[RECALIBRATED]
+    worse = Interval(value=2 * gap.overall.value, low=1.0, high=99.0)
+    gaps = {**found.reduction.gaps, "leak": replace(gap, overall=worse)}
+    text = verdict_sentence(replace(found, reduction=replace(found.reduction, gaps=gaps)), "")[1]
+    assert "makes recordings never fitted to worse" in text
+    assert "do not add it" in text
+
+
+@pytest.mark.parametrize("of", [partial, unknown])
+def test_no_name_is_certain_in_words(of):
+    text = verdict_sentence(of(), "")[1]
+    assert "(100 %)" not in text
+
+
+def with_disturbance(found: Diagnosis, sd: float) -> Diagnosis:
+    """No gap, with a disturbance [noise deviations] that is correlated over 20 ms."""
+    seen = [replace(d, sd=sd, time_scale=0.02) for d in found.ranking.discrepancies]
+    conclusion = replace(found.conclusion, verdict=NO_GAP, ambiguity_set=[], held=())
+    ranking = replace(found.ranking, discrepancies=seen, no_cause=0.99)
+    return replace(found, conclusion=conclusion, ranking=ranking, remaining=None)
+
+
+def test_no_gap_says_what_a_disturbance_is():
+    found = partial()
+    channel = found.ranking.problem.plant.channels[0]
+    assert channel.noise is not None
+    text = verdict_sentence(with_disturbance(found, 2.0), "")[1]
+    size = 2.0 * channel.noise / channel.scale
+    assert f"a disturbance of {size:#.3g} mm in h, correlated over 20.0 ms" in text
+    assert "no model input explains" in text
+    assert "add nothing" in text
+    assert "disturbance" not in verdict_sentence(with_disturbance(found, 0.05), "")[1]
+
+
+def test_the_discrepancy_is_in_the_channel_s_unit():
+    found = partial()
+    channel = found.ranking.problem.plant.channels[0]
+    content = as_json(with_disturbance(found, 2.0))["discrepancy"][channel.name]
+    assert channel.noise is not None
+    assert content == {"sd": pytest.approx(2.0 * channel.noise / 1e-3), "time_scale_s": 0.02}
+    assert as_json(with_disturbance(found, 0.0))["discrepancy"][channel.name]["sd"] == 0.0
+
+
+def test_the_missing_term_is_a_file_beside_the_answer(tmp_path):
+    found = partial()
+    term = found.localisation.missing_term
+    assert term is not None
+    shown = replace(
+        found, remaining=replace(found.localisation, missing_term=replace(term, explained=0.9))
+    )
+    content = write_results(shown, tmp_path)
+    assert json.loads((tmp_path / GAP).read_text(encoding="utf-8")) == content
+    assert content["remainder"]["term"] == TERM
+    table = json.loads((tmp_path / TERM).read_text(encoding="utf-8"))
+    assert table == term_table(replace(term, explained=0.9))
+    assert table["state"] in ("h", "q")
+    columns = table["columns"]
+    assert columns["state"] == sorted(columns["state"])
+    assert {len(column) for column in columns.values()} == {len(term.x)}
+
+
+def test_a_term_of_an_earlier_diagnosis_is_removed(tmp_path):
+    (tmp_path / TERM).write_text("{}", encoding="utf-8")
+    found = replace(partial(), remaining=None)
+    assert write_results(found, tmp_path)["remainder"]["term"] is None
+    assert not (tmp_path / TERM).exists()
+
+
+def tables(blocks: Sequence[object], first: str) -> list[Table]:
+    return [block for block in blocks if isinstance(block, Table) and block.columns[0] == first]
+
+
+def test_the_page_shows_inclusion_remainder_and_discrepancy():
+    by_title = {section.title: section for section in sections(partial())}
+    (inclusion,) = tables(by_title["Which cause it is"].blocks, "Effect")
+    assert inclusion.rows[0][0] == "leak"
+    assert inclusion.rows[0][-1] == "yes"
+    rest = by_title["What remains"]
+    assert any(isinstance(block, Picture) for block in rest.blocks)
+    (discrepancy,) = tables(rest.blocks, "Channel")
+    assert discrepancy.rows[0][0] == "h"
+    assert "leak leaves" in rest.verdicts[0].text
+
+
+def test_without_a_percentage_no_column_of_percent_is_shown():
+    found = partial()
+    gaps = {label: replace(gap, percent=None) for label, gap in found.reduction.gaps.items()}
+    page = sections(replace(found, reduction=replace(found.reduction, gaps=gaps)))
+    (models,) = tables(page[3].blocks, "Model")
+    assert not any("%" in column for column in models.columns)
+    assert {len(row) for row in models.rows} == {len(models.columns)}
+
+
+def test_an_interval_is_as_wide_as_what_remains_is_large_and_correlated():
+    """Errors of the cause's form count once: no correlation of residuals makes them larger."""
+    found = partial()
+    hypothesis = found.judged[0].hypothesis
+    covariance = parameter_covariance(found, hypothesis)
+    inflation = variance_inflation(hypothesis, found.ranking.discrepancies)
+    assert inflation > 10
+    form = covariance - inflation * hypothesis.covariance
+    size = hypothesis.estimate.hypothesis.parameters[0]
+    acting = hypothesis.estimate.cause_vector[0] * size.scale
+    share = found.settings.report.systematic_form_error
+    np.testing.assert_allclose(np.diag(form), [0.0, (share * acting) ** 2], atol=1e-12)
