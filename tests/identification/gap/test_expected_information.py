@@ -105,6 +105,12 @@ def two(found: Ranking) -> Rivals:
     return Rivals(estimates=(estimates["offset",], estimates["bend",]), probability=(0.55, 0.45))
 
 
+def three(found: Ranking) -> Rivals:
+    """The two causes and none, as if the campaign had left them open."""
+    estimates = (*two(found).estimates, found.recalibrated.estimate)
+    return Rivals(estimates=estimates, probability=(0.4, 0.35, 0.25))
+
+
 def test_causes_that_differ_under_a_low_supply_only_are_split_there():
     found = diagnosed(exact=False)
     rivals = two(found)
@@ -120,8 +126,7 @@ def test_causes_that_differ_under_a_low_supply_only_are_split_there():
 def test_the_odds_come_true(supply):
     """Recordings by plants drawn from each rival's posterior, with noise, judged with the campaign."""
     found = diagnosed(exact=True)
-    rivals = select_rivals(found)
-    assert set(rivals.names) == {"offset", "bend", "no cause"}
+    rivals = three(found)
     plan = Gauge((supply,), exact=True)
     promised = expected_information(found.problem, plan, rivals)[0]
     counted = judged(found.problem, plan, rivals, count=300)
@@ -173,7 +178,7 @@ def log_evidence(runs: Sequence[LinearisedRun]) -> float:
     k = runs[0].slopes.shape[1]
     hessian = found.hessian + np.diag([0.0] * k + [1.0] * (len(found.hessian) - k))
     gain = found.gradient @ np.linalg.solve(hessian, found.gradient)
-    return float(-0.5 * (found.chi_square - gain + np.linalg.slogdet(hessian)[1]))
+    return float(-0.5 * (found.least - gain + np.linalg.slogdet(hessian)[1]))
 
 
 def test_predictions_are_those_of_the_whole_covariances():
