@@ -103,19 +103,8 @@ def noise_weighted(plant: GreyBox, run: int, values: NDArray) -> NDArray:
     Raises ValueError where the noise of a channel is not known: see `prepared`.
     """
     trusted = plant.runs[run].trusted
-    mask = trusted / _noise(plant)[:, None]
+    noise = np.array([channel.known_noise for channel in plant.channels])
+    mask = trusted / noise[:, None]
     weighted = values * mask.reshape(*mask.shape, *[1] * (values.ndim - 2))
     weighted[~trusted] = 0.0  # NaN times 0 is NaN
     return weighted
-
-
-def _noise(plant: GreyBox) -> NDArray:
-    """Noise of every channel, (channels,) [SI]."""
-    noise = [channel.noise for channel in plant.channels]
-    if None in noise:
-        name = plant.channels[noise.index(None)].name
-        raise ValueError(
-            f"channel {name}: its noise is None, but residuals are weighed by it: call prepared(plant), "
-            "which estimates it"
-        )
-    return np.array(noise)

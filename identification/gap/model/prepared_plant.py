@@ -56,7 +56,7 @@ class PreparedPlant:
         """The plant whose channels have their noise times a ratio each, as residuals show it [1]."""
         corrected = copy(self)
         corrected.channels = tuple(
-            replace(channel, noise=ratio * (channel.noise or 0.0))
+            replace(channel, noise=ratio * channel.known_noise)
             for channel, ratio in zip(self.channels, ratios, strict=True)
         )
         corrected.noise_source = {

@@ -21,6 +21,19 @@ class Channel:
     resolution: float = 0.0
     """Step between the values that a reading can take (encoder, converter, bus) [SI]; 0 for none."""
 
+    @property
+    def known_noise(self) -> float:
+        """`noise`, where it must be known [SI]: a `prepared` plant knows it of every channel.
+
+        Raises ValueError where it is None.
+        """
+        if self.noise is None:
+            raise ValueError(
+                f"channel {self.name}: its noise is None, but residuals are weighed by it: call "
+                "prepared(plant), which estimates it"
+            )
+        return self.noise
+
 
 @dataclass(frozen=True, kw_only=True)
 class Run:

@@ -57,7 +57,7 @@ def _channel_scale(plant: GreyBox, channel: int, settings: TimeScaleSettings) ->
             period = max(period, float(run.time[1] - run.time[0]))
     if not series:
         return None
-    noise = min(plant.channels[channel].noise, _apparent_noise(series))
+    noise = min(plant.channels[channel].known_noise, _apparent_noise(series))
     lag = _correlation_lag(series, noise, settings)
     return None if lag is None else lag * period * float(np.median(np.concatenate(spacings)))
 

@@ -1,22 +1,45 @@
-"""What the recordings leave open of a fit's numbers."""
+"""What the recordings leave open of a fit's numbers, and what a cause costs."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from identification.gap.fit.variable_projection import NormalEquations
-from identification.gap.rank.evidence import _covariance
+from identification.gap.fit.variable_projection import LinearisedRun, normal_equations
+from identification.gap.rank.evidence import EvaluatedHypothesis, _covariance
 from identification.gap.rank.settings import RankingSettings
+from tests.identification.gap.tanks import diagnosed
+
+ALONG = np.array([1.0, 1.0])
 
 
 def test_what_no_reading_tells_is_wide_but_known_to_be():
     """A hessian that rounding has made indefinite still gives variances."""
-    along = np.array([1.0, 1.0])
-    hessian = 1e8 * np.outer(along, along) - 1e-7 * np.eye(2)
+    hessian = 1e8 * np.outer(ALONG, ALONG) - 1e-7 * np.eye(2)
     assert np.min(np.linalg.eigvalsh(hessian)) <= 0
-    equations = NormalEquations(
-        gram=np.zeros((3, 3)), hessian=hessian, gradient=np.zeros(2), least=0.0, chi_square=0.0,
-        tolerances=np.zeros(0), largest_deviation=3.0,
+    none = np.zeros((3, 0))
+    run = LinearisedRun(
+        residual=np.zeros(3), slopes=np.eye(3)[:, :2], run_slopes=none, run_values=np.zeros(0),
+        run_sd=np.zeros(0), tolerance_slopes=none,
     )  # fmt: skip
+    equations = replace(normal_equations([run], 3.0), hessian=hessian)
     found = _covariance(equations, RankingSettings().smallest_eigenvalue)
     assert np.all(np.diag(found) > 1.0)
-    assert along @ found @ along == pytest.approx(1e-8, rel=1e-3)
+    assert ALONG @ found @ ALONG == pytest.approx(1e-8, rel=1e-3)
+
+
+def leaking() -> EvaluatedHypothesis:
+    hypothesis = diagnosed("known").ranking.hypotheses[0]
+    assert hypothesis.labels == ("leak",)
+    return hypothesis
+
+
+def test_a_cause_costs_the_log_of_its_range_over_what_the_data_leave():
+    found = leaking()
+    sd = np.sqrt(found.covariance[1, 1])
+    assert found.occam_prices(1.0) == [pytest.approx(np.log(0.05 / (np.sqrt(2 * np.pi) * sd)))]
+    assert found.occam_prices(4.0) == [pytest.approx(found.occam_prices(1.0)[0] - np.log(2.0))]
+
+
+def test_a_cause_of_which_the_data_say_nothing_costs_nothing():
+    assert leaking().occam_prices(1e12) == [0.0]

@@ -118,7 +118,7 @@ def content(settings: DiagnosisSettings) -> dict:
         ("fit", {"difference_step": 1e-2}),
         ("fit", {"iterations": 0}),
         ("ranking", {"prior_no_cause": 1e-3}),
-        ("ranking", {"form_errors": (0.0, 0.3)}),
+        ("ranking", {"form_readings": 5.0}),
         ("ranking", {"no_cause_doubt": 1.0}),
         ("localisation", {"windows": 7}),
         ("localisation", {"regime_block": 0.1}),
@@ -141,9 +141,9 @@ def test_changed_settings_change_the_next_experiment():
     found = diagnosed(exact=False)
     plan = Gauge((4.0,), exact=False)
 
-    def entropy(*settings) -> float:
-        (gain,) = expected_information(found.problem, plan, two(found), *settings)
+    def entropy(settings: DesignSettings) -> float:
+        (gain,) = expected_information(found.problem, plan, two(found), settings)
         return gain.expected_entropy
 
     assert entropy(DesignSettings(outcomes=20)) != entropy(DesignSettings())
-    assert entropy(DesignSettings(), RankingSettings(form_errors=(0.5,))) != entropy(DesignSettings())
+    assert entropy(DesignSettings(form_error=0.5)) != entropy(DesignSettings())

@@ -16,6 +16,7 @@ from identification.gap.rank.verdict import (
     AMBIGUOUS,
     KNOWN,
     NO_GAP,
+    PARTIAL,
     UNKNOWN,
     RankedCause,
     causes_by_name,
@@ -33,20 +34,28 @@ FAST, SLOW = (Cause(name="lag", component="sensor", parameters=(), variant=v) fo
 
 SOUND = diagnosed("no_gap")
 
+NEITHER = (0.0, 0.0, 0.0)
+"""Probabilities of no cause and of an unknown one, and the share that each hypothesis leaves."""
+BOTH_OR_ONE = [("leak", "lag"), ("leak",)]
+
 
 def evaluated(*causes: Cause) -> EvaluatedHypothesis:
     recalibrated = SOUND.ranking.recalibrated
     estimate = replace(recalibrated.estimate, hypothesis=Hypothesis(causes=causes))
-    return replace(recalibrated, estimate=estimate, log_evidence=0.0, log_evidence_with_misfit=0.0)
+    return replace(recalibrated, estimate=estimate)
 
 
-def ranking(found: list[tuple[tuple[Cause, ...], float]], no_cause=0.0, unknown=0.0) -> Ranking:
+def ranking(
+    found: list[tuple[tuple[Cause, ...], float]], no_cause=0.0, unknown=0.0, left=0.0
+) -> Ranking:
+    """Hypotheses with their probabilities; left: share of the misfit that each of them leaves."""
     return replace(
         SOUND.ranking,
         hypotheses=[evaluated(*causes) for causes, _ in found],
         probabilities=[probability for _, probability in found],
         no_cause=no_cause,
         unknown=unknown,
+        shares_left=[left] * len(found),
     )
 
 
@@ -121,16 +130,28 @@ def test_a_pair_points_at_each_of_its_components_once():
 
 
 @pytest.mark.parametrize(
-    ("found", "no_cause", "unknown", "verdict", "names"),
+    ("found", "others", "verdict", "names", "held"),
     [
-        ([((LEAK,), 0.9795), ((LAG,), 0.02)], 0.0005, 0.0, KNOWN, [("leak",)]),
-        ([((LEAK,), 0.55), ((LAG,), 0.45)], 0.0, 0.0, AMBIGUOUS, [("leak",), ("lag",)]),
-        ([((LEAK,), 0.3), ((LAG,), 0.01)], 0.0, 0.69, UNKNOWN, []),
-        ([((LEAK,), 0.99)], 0.01, 0.0, NO_GAP, []),
-        ([], 1.0, 0.0, NO_GAP, []),
+        ([((LEAK,), 0.9795), ((LAG,), 0.02)], NEITHER, KNOWN, [("leak",)], ("leak",)),
+        ([((LEAK,), 0.55), ((LAG,), 0.45)], NEITHER, AMBIGUOUS, [("leak",), ("lag",)], ()),
+        ([((LEAK,), 0.3), ((LAG,), 0.01)], (0.0, 0.69, 0.0), UNKNOWN, [], ()),
+        ([((LEAK,), 0.99)], (0.01, 0.0, 0.0), NO_GAP, [], ()),
+        ([], (1.0, 0.0, 0.0), NO_GAP, [], ()),
+        ([((LEAK,), 0.97)], (0.0, 0.03, 0.1), PARTIAL, [("leak",)], ("leak",)),
+        ([((LEAK, LAG), 0.55), ((LEAK,), 0.42)], (0.0, 0.03, 0.1), PARTIAL, BOTH_OR_ONE, ("leak",)),
+        ([((LEAK, LAG), 0.55), ((LEAK,), 0.42)], (0.0, 0.03, 0.0), AMBIGUOUS, BOTH_OR_ONE, ("leak",)),
+        ([((LEAK,), 0.55), ((LAG,), 0.4)], (0.0, 0.05, 0.1), AMBIGUOUS, [("leak",), ("lag",)], ()),
     ],
 )
-def test_verdicts(found, no_cause, unknown, verdict, names):
-    conclusion = conclude(ranking(found, no_cause, unknown), localisation(tank=1.0))
+def test_verdicts(found, others, verdict, names, held):
+    no_cause, unknown, left = others
+    conclusion = conclude(ranking(found, no_cause, unknown, left), localisation(tank=1.0))
     assert conclusion.verdict == verdict
     assert [cause.effects for cause in conclusion.ambiguity_set] == names
+    assert conclusion.held == held
+
+
+def test_an_effect_is_included_wherever_it_takes_part():
+    found = ranking([((LEAK, FAST), 0.5), ((SLOW,), 0.3), ((STEAM,), 0.1)], unknown=0.1).inclusion
+    assert list(found) == ["lag", "leak", "evaporation"]
+    assert found == {"lag": pytest.approx(0.8), "leak": pytest.approx(0.5), "evaporation": 0.1}

@@ -18,5 +18,5 @@ def test_coarse_steps_warn_and_widen_what_is_read_off_the_hold():
 
 
 def test_every_pressure_has_at_least_the_rounding_as_noise():
-    noise = {c.name: c.noise for c in Valve(round_pressures(twin(), 0.05)).channels}
+    noise = {c.name: c.known_noise for c in Valve(round_pressures(twin(), 0.05)).channels}
     assert min(noise["p2"], noise["p3"]) >= 5e3 / np.sqrt(12) * (1 - 1e-9)
