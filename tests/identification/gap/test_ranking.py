@@ -51,7 +51,8 @@ def test_two_causes_are_found_together():
 
 def stating(tank: Tank, factor: float) -> Tank:
     """The tank with its noise stated as a multiple of the true one."""
-    tank.channels = tuple(replace(own, noise=factor * own.known_noise) for own in tank.channels)
+    (channel,) = tank.channels
+    tank.channels = (replace(channel, noise=factor * channel.known_noise),)
     return tank
 
 
