@@ -37,7 +37,7 @@ SHORTEST_LAG = 0.03
 
 def rate(x: Any, u: Any, p: Any) -> Sequence[Any]:
     """Rates of speed [m/s^2] and of the lagging throttle [1/s]."""
-    command = max(u.throttle - p.dead_zone, 0.0) ** p.throttle_curve
+    command = max(u.throttle - p.dead_zone, 0.0)
     share = min(p.drive_lag / SHORTEST_LAG, 1.0)
     throttle = command + share * (x.drive - command)
     driving = (p.a - p.b * x.v) * throttle
@@ -76,7 +76,6 @@ def toy_car(folder: Path) -> OdePlant:
             cause("rolling_friction", "wheels", "N", (0.5, 0.1, 2.0), (0.0, 10.0)),
             cause("drive_lag", "drive", "s", (0.1, 0.03, 0.3), (0.0, 2.0)),
             cause("air_drag", "body", "N s²/m²", (0.1, 0.02, 0.5), (0.0, 5.0)),
-            cause("throttle_curve", "drive", "1", (1.5, 0.7, 2.5), (0.3, 4.0), nominal=1.0),
             cause("encoder_scale", "sensor", "1", (1.1, 0.9, 1.3), (0.5, 2.0), nominal=1.0),
             cause("command_delay", "drive", "s", (0.1, 0.03, 0.3), (0.0, 1.0)),
             cause("slope", "body", "N", (0.2, -0.2, 1.0, -1.0), (-3.0, 3.0)),

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-
 ACTIVE_SET_ITERATIONS = 12
 """Most changes of the set of nuisances at their bounds. In the second half none leaves the set again, so
 that sets do not follow each other in a circle."""

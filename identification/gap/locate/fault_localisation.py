@@ -104,7 +104,7 @@ def locate(
     settings, bootstrap = settings or LocalisationSettings(), bootstrap or ReductionSettings()
     plant, values = problem.plant, problem.candidate(estimate)
     masks = [regimes_of(plant, values, r) for r in problem.all_runs]
-    runs = most_misfitting_runs(problem, residuals, settings.samples)
+    runs = most_misfitting_runs(problem, residuals, settings)
     scale = time_scale(plant)
     design, forms = quadratic_forms(problem, estimate, runs, scale, settings)
     fits = fit_processes(forms, design, settings)

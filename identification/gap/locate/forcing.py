@@ -70,8 +70,10 @@ def quadratic_forms(
     traces = [plant.states(values, r) for r in runs]
     times = [plant.runs[r].time for r in runs]
     most = most_windows(len(runs), len(plant.channels) * max(len(t) for t in times), settings)
+    first = [int(np.argmax(np.any(plant.runs[r].trusted, axis=0))) for r in runs]
     edges = [
-        resolving_edges(t, own, scale, most, settings) for t, own in zip(times, traces, strict=True)
+        resolving_edges(t, own, scale, most, begin, settings)
+        for t, own, begin in zip(times, traces, first, strict=True)
     ]
     windows = [
         window

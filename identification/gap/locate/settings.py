@@ -34,6 +34,10 @@ class LocalisationSettings:
     samples: int = 8000
     """Most samples of the runs that are examined together, for time and memory; one run at least."""
 
+    late_readings: float = 0.1
+    """Share of a run before its first reading that counts [1], beyond which the run is examined only
+    where there is no other."""
+
     # Faults of the readings
 
     lags: tuple[int, ...] = (1, 3, 10, 30)

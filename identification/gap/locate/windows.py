@@ -26,15 +26,23 @@ class Window:
 
 
 def most_misfitting_runs(
-    problem: FittingProblem, residuals: Sequence[NDArray], samples: int
+    problem: FittingProblem, residuals: Sequence[NDArray], settings: LocalisationSettings
 ) -> list[int]:
     """Indices of the runs with the largest mean square residual, up to a number of samples together.
 
+    A run whose readings count late only is taken where there is no other: what the model lacked before
+    them shows in them, too, but not where it acted.
+
     residuals: per run (channels, samples) [noise deviations].
     """
-    lengths = np.array([len(run.time) for run in problem.plant.runs])
+    runs, samples = problem.plant.runs, settings.samples
+    lengths = np.array([len(run.time) for run in runs])
     misfit = np.array([np.sum(residual**2) for residual in residuals]) / lengths
-    first, *others = np.argsort(-misfit, kind="stable").tolist()
+    begins = np.array([np.argmax(np.any(run.trusted, axis=0)) for run in runs]) / lengths
+    late = begins > settings.late_readings
+    if not np.all(late):
+        misfit = np.where(late, -1.0, misfit)
+    first, *others = [run for run in np.argsort(-misfit, kind="stable").tolist() if misfit[run] >= 0]
     chosen, left = [first], samples - lengths[first]
     for run in others:
         if lengths[run] <= left:
@@ -48,15 +56,17 @@ def resolving_edges(
     traces: Mapping[str, StateTrace],
     scale: float,
     most: int,
+    first: int,
     settings: LocalisationSettings,
 ) -> NDArray:
-    """Edges of windows that follow the motion: more than usual, and of the run's first part, if need be.
+    """Edges of windows that follow the motion: more than usual, and of a part of the run, if need be.
 
     Args:
         time: sampling instants, (samples,) [s].
         traces: states of the run by name.
         scale: the plant's time scale [s].
         most: most windows.
+        first: sample at which such a part begins, with the first reading that counts.
         settings: usual number and length of windows.
 
     Returns:
@@ -68,9 +78,9 @@ def resolving_edges(
         return edges
     needed = int(np.ceil(settings.windows * typical / settings.resolved_window))
     if needed > most:
-        covered = max(settings.windows, int(len(time) * most / needed))
-        time, needed = time[:covered], most
-        traces = {name: replace(trace, values=trace.values[:covered]) for name, trace in traces.items()}
+        part = slice(first, first + max(settings.windows, int(len(time) * most / needed)))
+        traces = {name: replace(trace, values=trace.values[part]) for name, trace in traces.items()}
+        return first + window_edges(time[part], traces, most, settings)
     return window_edges(time, traces, needed, settings)
 
 
