@@ -78,8 +78,7 @@ def test_a_cause_that_has_become_superfluous_is_left_out():
 def test_a_useless_cause_makes_a_set_less_probable():
     found = rank_hypotheses(Drive(THREE))
     by_set = {
-        frozenset(each.labels): p
-        for each, p in zip(found.hypotheses, found.probabilities, strict=True)
+        frozenset(each.labels): p for each, p in zip(found.hypotheses, found.probabilities, strict=True)
     }
     true = frozenset(THREE)
     larger = [own for own in by_set if own > true]

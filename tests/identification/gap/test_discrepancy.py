@@ -31,8 +31,9 @@ class Recorded(Drive):
 def seen(residuals: list[NDArray], trusted: NDArray | None = None) -> list[ChannelDiscrepancy]:
     """residuals: per run (channels, samples) [noise deviations]; trusted: (channels, samples)."""
     counted = np.ones(residuals[0].shape, dtype=bool) if trusted is None else trusted
+    numbers = range(len(counted))
     plant = Recorded(
-        channels=tuple(Channel(name=str(c), unit="1", scale=1.0, noise=1.0) for c in range(len(counted))),
+        channels=tuple(Channel(name=str(c), unit="1", scale=1.0, noise=1.0) for c in numbers),
         runs=tuple(
             Run(
                 name=str(r), held_out=False, time=PERIOD * np.arange(own.shape[1]), measured=own,
@@ -53,7 +54,7 @@ def coloured(rng: np.random.Generator, time_scale: float, samples: int = SAMPLES
     memory = np.exp(-PERIOD / time_scale)
     drive = np.sqrt(1.0 - memory**2) * white(rng, samples)
     drive[0, 0] /= np.sqrt(1.0 - memory**2)
-    return lfilter([1.0], [1.0, -memory], drive)
+    return np.asarray(lfilter([1.0], [1.0, -memory], drive))
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -67,19 +67,19 @@ def sine(periods: int) -> tuple[np.ndarray, dict[str, StateTrace]]:
 
 
 def test_a_motion_that_usual_windows_follow_has_usual_windows():
-    edges = resolving_edges(*sine(15), 0.19, 400, SETTINGS)
+    edges = resolving_edges(*sine(15), 0.19, 400, 0, SETTINGS)
     assert len(edges) - 1 <= SETTINGS.windows
     assert edges[-1] == 20 * 15 - 1
 
 
 def test_a_faster_motion_has_more_windows_over_the_whole_run():
-    edges = resolving_edges(*sine(35), 0.19, 400, SETTINGS)
+    edges = resolving_edges(*sine(35), 0.19, 400, 0, SETTINGS)
     assert np.median(np.diff(edges)) <= 2
     assert edges[-1] == 20 * 35 - 1
 
 
 def test_of_a_run_that_is_too_long_the_first_part_counts():
-    edges = resolving_edges(*sine(1000), 0.19, 400, SETTINGS)
+    edges = resolving_edges(*sine(1000), 0.19, 400, 0, SETTINGS)
     assert len(edges) - 1 <= 400
     assert np.median(np.diff(edges)) <= 3
     assert 20 * 25 < edges[-1] < 20 * 60

@@ -67,7 +67,7 @@ def test_calibrated_parameters_are_adapted_to_a_start():
     """Recalibration has lowered the gain for the limit; with the limit it rises again."""
     start = next(start for start in screened() if start.cause.name == "limit")
     assert start.estimate.vector[0] > 0.98
-    problem, base = recalibrate(Drive({"limit": 0.8}))
+    _, base = recalibrate(Drive({"limit": 0.8}))
     assert base.vector[0] < 0.96
 
 
@@ -75,9 +75,7 @@ def runs_and_signatures(seed: int) -> tuple[list[LinearisedRun], list[CauseSigna
     """Four causes: the first two differ in little, and that little is what the readings show."""
     rng = np.random.default_rng(seed)
     causes = [Cause(name=name, component="", parameters=()) for name in "abcd"]
-    none = Estimate(
-        hypothesis=Hypothesis(causes=()), vector=np.zeros(0), run_values=np.zeros((2, 0))
-    )
+    none = Estimate(hypothesis=Hypothesis(causes=()), vector=np.zeros(0), run_values=np.zeros((2, 0)))
     runs, changes = [], []
     for _ in range(2):
         shared, little = 10 * rng.normal(size=60), rng.normal(size=60)
