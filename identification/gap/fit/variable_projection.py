@@ -60,7 +60,8 @@ class RunProducts:
         value = np.linalg.solve(own, moment)
         if np.any(np.abs(value) > self.bound):
             value = _bounded_minimiser(own, moment, -self.bound, self.bound)
-        return np.where(np.abs(value) >= self.bound, np.sign(value) * self.bound, np.nan)
+        ended = np.abs(value) >= (1.0 - 1e-9) * self.bound  # but for rounding
+        return np.where(ended, np.sign(value) * self.bound, np.nan)
 
     def reduced(self, held: NDArray) -> NDArray:
         """Gram matrix of the other columns, (1 + k + m, 1 + k + m) [1].

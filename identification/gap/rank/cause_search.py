@@ -90,14 +90,22 @@ def _refine_best(pool: HypothesisPool, number: int, most: int, name: str) -> Non
 
 
 def _another_cause_may_act(pool: HypothesisPool, number: int) -> bool:
-    """Whether sets of `number` causes are worth a search: the last cause helped."""
+    """Whether sets of `number` causes are worth a search: the last cause helped, or much is left.
+
+    Where four causes act, the second one alone may hardly pay; a small catalogue is searched on.
+    """
     found = pool.posterior()[1]
     if found.no_cause > pool.settings.no_cause_doubt:
         return False
     if number == 2:
         return True
     larger, smaller = pool.ranked(number - 1), pool.ranked(number - 2)
-    return bool(larger and larger[0][1] > smaller[0][1] + pool.settings.last_gain)
+    if not larger:
+        return False
+    left = misfit_beyond_noise(larger[0][0], found.discrepancies)
+    if _is_small(pool) and left > pool.settings.small_misfit:
+        return True
+    return larger[0][1] > smaller[0][1] + pool.settings.last_gain
 
 
 def _add_a_cause(pool: HypothesisPool, number: int) -> None:

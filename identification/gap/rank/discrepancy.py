@@ -74,18 +74,18 @@ def _discrepancy(series: Sequence[Series], settings: RankingSettings) -> Channel
             time_scale=0.0,
         )
     covariance = autocovariance(readings, settings.longest_correlation)
-    correlated, white = (
-        _inflation(covariance, settings),
-        white_variance(covariance, settings.steepest_decay),
-    )
+    correlated, mean_square = _inflation(covariance, settings), float(covariance[0])
+    # White noise of n readings has autocorrelations of 1/sqrt(n): less is no discrepancy.
+    chance = settings.seen_autocorrelation * mean_square / np.sqrt(count)
+    coloured = covariance[1] > chance
+    white = white_variance(covariance, settings.steepest_decay) if coloured else mean_square
     quiet = _quiet_mean_square(readings, correlated, settings)
-    mean_square = float(covariance[0])
     disturbed = (
         quiet is not None
         and quiet > settings.disturbed_floor * white
         and quiet > settings.disturbed_share * mean_square
     )
-    sd, time_scale = _coloured_part(series, covariance, white, correlated, settings)
+    sd, time_scale = _coloured_part(series, mean_square, white, correlated)
     return ChannelDiscrepancy(
         readings=count,
         mean_square=mean_square,
@@ -102,22 +102,23 @@ def _discrepancy(series: Sequence[Series], settings: RankingSettings) -> Channel
 
 
 def _coloured_part(
-    series: Sequence[Series],
-    covariance: NDArray,
-    white: float,
-    correlated: float,
-    settings: RankingSettings,
+    series: Sequence[Series], mean_square: float, white: float, correlated: float
 ) -> tuple[float, float]:
-    """Standard deviation [noise deviations] and time scale [s] of what is not white; 0 where unseen."""
-    mean_square = float(covariance[0])
+    """Standard deviation [noise deviations] and time scale [s] of what is not white; 0 where unseen.
+
+    Args:
+        series: of each run.
+        mean_square: of all residuals [1].
+        white: variance of the white part [1].
+        correlated: sum of the autocorrelations, as `_inflation` has it [1].
+    """
     coloured = mean_square - white
-    counts = [np.count_nonzero(trusted) for _, trusted, _ in series]
-    # White noise of n readings has autocorrelations of 1/sqrt(n).
-    if coloured <= settings.seen_autocorrelation * mean_square / np.sqrt(sum(counts)):
+    if coloured <= 0.0:
         return 0.0, 0.0
+    counts = [np.count_nonzero(trusted) for _, trusted, _ in series]
     # Readings may be sparser than samples.
     durations = [len(trusted) * period for _, trusted, period in series]
-    period = sum(durations) / sum(counts)
+    period = float(sum(durations) / sum(counts))
     return float(np.sqrt(coloured)), 0.5 * (correlated - 1.0) * mean_square / coloured * period
 
 

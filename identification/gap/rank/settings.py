@@ -89,8 +89,8 @@ class RankingSettings:
     """Autocorrelation below which the sum of autocorrelations ends [1]: what follows is chance."""
 
     seen_autocorrelation: float = 3.0
-    """Autocorrelation from which a discrepancy is reported, in standard deviations of the
-    autocorrelation of white noise [1]."""
+    """Autocorrelation of successive readings from which a discrepancy is seen, in standard deviations of
+    the autocorrelation of white noise [1]; less is chance and belongs to the noise."""
 
     block_readings: int = 20
     """Fewest readings of a block of which the mean square is taken."""

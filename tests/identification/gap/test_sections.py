@@ -13,7 +13,7 @@ from matplotlib.patches import Rectangle
 from identification.gap.diagnosis import Diagnosis
 from identification.gap.report import ranking_figures
 from identification.gap.report.json_export import as_json
-from identification.gap.report.quantities import quantity
+from identification.gap.report.quantities import probability_text, quantity
 from identification.gap.report.sections import sections
 from identification.gap.report.sentences import (
     hidden_causes_sentence,
@@ -74,7 +74,8 @@ def test_a_known_cause_is_named_with_its_size_and_what_it_closes():
     status, text = verdict_sentence(diagnosed("known"), NEXT)
     cause = as_json(diagnosed("known"))["causes"][0]
     assert status == "good"
-    assert text.startswith("leak explains the gap (> 99 %): adding it with leak = 0.00")
+    probability = probability_text(cause["probability"])
+    assert text.startswith(f"leak explains the gap ({probability}): adding it with leak = 0.00")
     assert f"closes {100 * cause['shrink']['fraction']:.0f} % (" in text
     assert "nothing predictable is left" in text
 
@@ -97,7 +98,8 @@ def test_an_unknown_cause_is_sent_to_the_place_and_the_shape():
     found = diagnosed("unknown")
     status, text = verdict_sentence(found, NEXT)
     assert status == "bad"
-    assert text.startswith("Nothing in the catalogue explains the gap (> 99 %)")
+    unknown = probability_text(found.ranking.unknown)
+    assert text.startswith(f"Nothing in the catalogue explains the gap ({unknown})")
     component = max(
         found.conclusion.component_probabilities,
         key=found.conclusion.component_probabilities.__getitem__,
@@ -109,7 +111,10 @@ def test_an_unknown_cause_is_sent_to_the_place_and_the_shape():
 def test_rivals_are_named_together_with_what_would_decide():
     status, text = verdict_sentence(diagnosed("ambiguous"), NEXT)
     assert status == "doubt"
-    assert re.match(r"leak \(50 %\) or seep \(50 %\) explains the gap", text)
+    match = re.match(r"(leak|seep) \((\d+) %\) or (leak|seep) \((\d+) %\) explains the gap", text)
+    assert match
+    assert {match[1], match[3]} == {"leak", "seep"}
+    assert match[2] == match[4]
     assert "cannot tell which" in text
     assert text.endswith(f"{NEXT}.")
 
@@ -211,10 +216,13 @@ def test_a_warning_puts_the_verdict_in_doubt():
     assert "the recalibration did not converge." in texts([sections(found)[-1]])
 
 
-def test_the_ranking_shows_every_hypothesis_and_marks_the_ambiguity_set():
+def test_the_ranking_shows_every_judged_cause_and_marks_the_ambiguity_set():
     found = diagnosed("ambiguous")
     (axes,) = ranking_figures.ranking_figure(found).axes
-    assert sum(widths(axes)) == pytest.approx(1.0, abs=1e-6)
+    judged = [cause.probability for cause in found.judged]
+    shown = [*judged, found.ranking.no_cause, found.ranking.unknown]
+    assert sum(widths(axes)) == pytest.approx(sum(shown), abs=1e-6)
+    assert 0.9 < sum(shown) <= 1.0 + 1e-9
     named = [bar.get_facecolor() for bar in axes.patches[: len(found.conclusion.ambiguity_set)]]
     assert len(set(named)) == 1
     assert axes.patches[len(named)].get_facecolor() not in named

@@ -1,0 +1,86 @@
+"""Nuisances stay within their bounds in the fit as in the judgement, and nothing jumps there."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+
+from docs.examples.tank.plant import Tank
+from docs.examples.tank.recordings import virtual_recordings
+from identification.gap.fit.fitting_problem import FittingProblem
+from identification.gap.fit.hypothesis import Estimate
+from identification.gap.fit.linearisation import linearise
+from identification.gap.fit.variable_projection import normal_equations, without_run_nuisances
+from identification.gap.rank.evidence import evaluate
+from identification.gap.rank.refinement import recalibrate
+from identification.gap.rank.settings import RankingSettings
+
+SD = 5e-4
+"""Of the gauge's zero in a run [m]."""
+
+
+@cache
+def with_zero(deviations: float) -> tuple[FittingProblem, Estimate]:
+    """A recalibrated tank whose gauge is off in the first run; deviations: in `SD` [1]."""
+    tank = Tank(virtual_recordings({"c": 0.021}))
+    tank.channels = (replace(tank.channels[0], noise=2e-3),)
+    tank.runs[0].measured[:] += deviations * SD
+    return recalibrate(tank)
+
+
+def judged(problem: FittingProblem, estimate: Estimate) -> float:
+    """Sum of squares of readings and nuisances on the fitted runs, as the judgement sees them."""
+    runs = linearise(problem, [estimate], problem.fitted_runs)[0]
+    bound, total = problem.settings.largest_deviation, 0.0
+    for run in runs:
+        residual, step = without_run_nuisances(run, np.zeros(0), bound)
+        total += residual @ residual + np.sum(((run.run_values + step) / run.run_sd) ** 2)
+    return float(total)
+
+
+@pytest.mark.parametrize("deviations", [0.0, 2.0, 10.0, -30.0])
+def test_fit_and_judgement_agree(deviations):
+    problem, estimate = with_zero(deviations)
+    assert estimate.converged
+    assert judged(problem, estimate) == pytest.approx(estimate.chi_square, rel=1e-6)
+
+
+@pytest.mark.parametrize("deviations", [20.0, -30.0])
+def test_the_fit_is_that_of_the_whole_bounded_problem(deviations):
+    """Nothing is gained by another step when all bounds are kept together."""
+    problem, estimate = with_zero(deviations)
+    runs = linearise(problem, [estimate], problem.fitted_runs)[0]
+    count, bound = 1 + 2 * len(runs), problem.settings.largest_deviation
+    rows, right = [], []
+    for r, run in enumerate(runs):
+        own = np.zeros((len(run.residual) + 2, count))
+        own[: len(run.residual), 0] = run.slopes[:, 0]
+        own[: len(run.residual), 1 + 2 * r : 3 + 2 * r] = run.run_slopes * run.run_sd
+        own[len(run.residual) :, 1 + 2 * r : 3 + 2 * r] = np.eye(2)
+        rows.append(own)
+        right.append(np.concatenate([run.residual, np.zeros(2)]))
+    ends = np.array([np.inf, *[bound] * (count - 1)])
+    solution = lsq_linear(np.vstack(rows), np.concatenate(right), (-ends, ends), method="bvls")
+    found = normal_equations(runs, bound)
+    assert np.any(np.abs(solution.x[1:]) > 0.999 * bound)
+    assert found.chi_square == pytest.approx(2 * solution.cost, abs=problem.settings.converged_decrease)
+    assert solution.x[0] == pytest.approx(0.0, abs=1e-3)
+
+
+def test_what_a_bounded_nuisance_cannot_follow_stays_in_the_residual():
+    """A gauge that is off by thirty deviations: three are its zero, the rest is a gap."""
+    problem, estimate = with_zero(30.0)
+    residual = evaluate(problem, [estimate], RankingSettings())[0].residuals[0]
+    assert np.mean(residual) > 1.0
+    sound, at_rest = with_zero(0.0)
+    assert abs(np.mean(evaluate(sound, [at_rest], RankingSettings())[0].residuals[0])) < 0.3
+
+
+def test_nothing_jumps_where_a_nuisance_reaches_its_bound():
+    """Chi-square over the gauge's zero is smooth through the bound, which lies near four deviations."""
+    zeros = np.linspace(2.0, 8.0, 25)
+    found = np.array([with_zero(zero)[1].chi_square for zero in zeros])
+    assert np.all(np.diff(found) > 0.0)
+    assert np.max(np.abs(np.diff(found, n=2))) < 0.2 * np.max(np.diff(found))

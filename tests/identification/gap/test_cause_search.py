@@ -1,0 +1,98 @@
+"""The search: sets of up to four causes are found, thresholds among them, and no more than acted."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.gap.fit.fit_cache import FitCache
+from identification.gap.fit.gauss_newton import fit
+from identification.gap.fit.hypothesis import Hypothesis
+from identification.gap.rank.cause_search import _leave_causes_out
+from identification.gap.rank.evidence import evaluate
+from identification.gap.rank.hypothesis_pool import HypothesisPool
+from identification.gap.rank.ranking import Ranking, rank_hypotheses
+from identification.gap.rank.refinement import recalibrate
+from identification.gap.rank.settings import RankingSettings
+from tests.identification.gap.drives import Drive
+
+SMALL = RankingSettings()
+LARGE = RankingSettings(multi_start_causes=0)
+"""Every catalogue counts as large."""
+
+THREE = {"dead_zone": 0.15, "lag": 0.03, "coupling": 0.1}
+THRESHOLDS = {"dead_zone": 0.15, "limit": 0.6, "coupling": 0.1, "drift": -0.05}
+FAINT_AMONG_FOUR = {**THREE, "drift": -0.05}
+"""Each cause leaves so much beside the others that the second one alone hardly pays."""
+
+
+def sizes(found: Ranking) -> dict[str, float]:
+    """Sizes of the causes of the most probable hypothesis."""
+    best = found.hypotheses[0]
+    return {name: found.problem.values(best.estimate)[name] for name in best.labels}
+
+
+@pytest.mark.parametrize(
+    ("truth", "settings"),
+    [
+        ({"limit": 0.8}, SMALL),
+        ({"limit": 0.8}, LARGE),
+        ({"dead_zone": 0.3, "drag": -0.2}, SMALL),
+        (THREE, SMALL),
+        (THREE, LARGE),
+        (THRESHOLDS, SMALL),
+        (THRESHOLDS, LARGE),
+        (FAINT_AMONG_FOUR, SMALL),
+    ],
+)
+def test_all_that_acts_is_found_and_nothing_else(truth, settings):
+    found = rank_hypotheses(Drive(truth), settings=settings)
+    assert sizes(found) == pytest.approx(truth, rel=0.1)
+    assert all((found.inclusion[name] > 0.9) == (name in truth) for name in found.inclusion)
+
+
+@pytest.mark.parametrize("truth", [{"limit": 0.8}, THREE, THRESHOLDS, FAINT_AMONG_FOUR])
+def test_no_fit_of_the_true_causes_from_their_true_sizes_is_better(truth):
+    """On held-out readings, as somebody would fit them who knows what acted."""
+    found = rank_hypotheses(Drive(truth))
+    problem = found.problem
+    causes = tuple(cause for cause in problem.plant.causes if cause.name in truth)
+    direct = fit(problem, [problem.start(Hypothesis(causes=causes), truth)])
+    by_hand = evaluate(problem, direct, found.settings)[0].residuals[2]
+    assert np.std(found.hypotheses[0].residuals[2]) < 1.05 * np.std(by_hand)
+
+
+def test_a_cause_that_has_become_superfluous_is_left_out():
+    """A pool that lacks the true cause alone: it is refitted from where a larger set has it."""
+    problem, base = recalibrate(Drive({"lag": 0.05}))
+    causes = {cause.name: cause for cause in problem.plant.causes}
+    recalibrated = evaluate(problem, [base], SMALL)[0]
+    pool = HypothesisPool(problem, recalibrated, FitCache(problem.plant), SMALL)
+    both = Hypothesis(causes=(causes["lag"], causes["drag"]))
+    pool.add(fit(problem, [problem.start(both, {"lag": 0.03, "drag": 0.1})]))
+    assert pool.ranked()[0][0].labels == ("lag", "drag")
+    _leave_causes_out(pool)
+    assert pool.ranked()[0][0].labels == ("lag",)
+
+
+def test_a_useless_cause_makes_a_set_less_probable():
+    found = rank_hypotheses(Drive(THREE))
+    by_set = {
+        frozenset(each.labels): p for each, p in zip(found.hypotheses, found.probabilities, strict=True)
+    }
+    true = frozenset(THREE)
+    larger = [own for own in by_set if own > true]
+    assert larger
+    assert all(by_set[own] < 0.1 * by_set[true] for own in larger)
+
+
+def test_a_catalogue_without_the_true_causes_names_none():
+    found = rank_hypotheses(Drive(FAINT_AMONG_FOUR, names=("limit", "drag")))
+    assert found.unknown > 0.8
+    assert max(found.inclusion.values()) < 0.2
+
+
+@pytest.mark.parametrize("most", [1, 2])
+def test_no_set_is_larger_than_the_settings_allow(most):
+    found = rank_hypotheses(Drive(THREE), settings=replace(SMALL, most_causes=most))
+    assert max(len(each.labels) for each in found.hypotheses) == most

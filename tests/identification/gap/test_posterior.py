@@ -1,0 +1,108 @@
+"""Probabilities under noise and discrepancy: for noise none, whatever its stated size."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.gap.rank.evidence import EvaluatedHypothesis
+from identification.gap.rank.posterior import Posterior, credibility, misfit_beyond_noise, posterior
+from identification.gap.rank.ranking import Ranking, rank_hypotheses
+from identification.gap.rank.settings import RankingSettings
+from tests.identification.gap.drives import Drive
+
+SETTINGS = RankingSettings()
+
+
+def ranked(truth: dict[str, float], seed: int = 0) -> Ranking:
+    return rank_hypotheses(Drive(truth, seed=seed))
+
+
+def weighed(found: Ranking, change=lambda each: each) -> Posterior:
+    """Probabilities of the same fits, each changed."""
+    every = [change(each) for each in (found.recalibrated, *found.hypotheses)]
+    return posterior(found.problem, every[0], every[1:], SETTINGS)
+
+
+def in_units_of(factor: float, each: EvaluatedHypothesis) -> EvaluatedHypothesis:
+    """A hypothesis where the channels' noise is stated `factor` times as large."""
+    return replace(
+        each,
+        residuals=[residual / factor for residual in each.residuals],
+        squares=each.squares / factor**2,
+        covariance=each.covariance * factor**2,
+    )
+
+
+def everything(found: Posterior) -> list[float]:
+    return [found.no_cause, found.unknown, *found.probabilities]
+
+
+TRUTHS = [{}, {"coupling": 0.1}, {"dead_zone": 0.15, "lag": 0.03, "coupling": 0.1}]
+
+
+@pytest.mark.parametrize("truth", TRUTHS)
+@pytest.mark.parametrize("factor", [0.3, 3.0])
+def test_the_scale_of_the_noise_does_not_matter(truth, factor):
+    """But for nuisance parameters, whose deviations do not scale and hardly count here."""
+    found = ranked(truth)
+    scaled = weighed(found, lambda each: in_units_of(factor, replace(each, nuisance_penalty=0.0)))
+    plain = weighed(found, lambda each: replace(each, nuisance_penalty=0.0))
+    assert everything(scaled) == pytest.approx(everything(plain), abs=0.02)
+
+
+@pytest.mark.parametrize("truth", TRUTHS)
+def test_probabilities_sum_to_one(truth):
+    found = weighed(ranked(truth))
+    assert sum(everything(found)) == pytest.approx(1.0)
+    assert min(everything(found)) >= 0.0
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_for_noise_no_cause_is_named(seed):
+    found = ranked({}, seed)
+    assert found.no_cause > 0.9
+    assert max(found.inclusion.values()) < 0.1
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("size", [0.5, 2.0, 8.0])
+def test_the_more_a_cause_explains_the_less_no_cause_is_believed(seed, size):
+    """Sizes in noise deviations: within noise none is named, far beyond it the cause is certain."""
+    found = ranked({"coupling": size * 0.001}, seed)
+    larger = ranked({"coupling": 4 * size * 0.001}, seed)
+    assert larger.no_cause <= found.no_cause
+
+
+def test_credibility_falls_with_what_is_left():
+    left = np.linspace(0.0, 1.0, 50)
+    found = credibility(left, 45, SETTINGS)
+    assert found[0] == 1.0
+    assert np.all(np.diff(found) < 0.0)
+    assert credibility(np.array([SETTINGS.even_share_left]), 45, SETTINGS)[0] == pytest.approx(0.5)
+
+
+def test_a_larger_catalogue_makes_the_nearest_cause_less_credible():
+    half_left = np.array([0.3])
+    by_number = [credibility(half_left, causes, SETTINGS)[0] for causes in (3, 10, 45, 100)]
+    assert by_number == sorted(by_number, reverse=True)
+    assert by_number[-1] < by_number[0]
+
+
+def test_a_cause_at_the_end_of_its_range_is_not_named():
+    found = ranked({"coupling": 0.1})
+    ended = weighed(found, lambda each: replace(each, at_bound="coupling" in each.labels))
+    for each, probability in zip(found.hypotheses, ended.probabilities, strict=True):
+        if "coupling" in each.labels:
+            assert probability == 0.0
+    assert sum(everything(ended)) == pytest.approx(1.0)
+
+
+def test_a_cause_that_removes_more_has_less_misfit_and_share():
+    found = ranked({"dead_zone": 0.15, "lag": 0.03, "coupling": 0.1})
+    shares = {frozenset(e.labels): s for e, s in zip(found.hypotheses, found.shares_left, strict=True)}
+    assert shares[frozenset({"dead_zone", "lag", "coupling"})] == 0.0
+    assert shares[frozenset({"lag", "coupling"})] > 0.05
+    misfits = [misfit_beyond_noise(each, found.discrepancies) for each in found.hypotheses]
+    order = np.argsort(misfits)
+    assert np.all(np.diff(np.array(found.shares_left)[order]) >= 0.0)

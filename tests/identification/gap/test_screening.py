@@ -1,0 +1,140 @@
+"""Screening: causes with a threshold begin where they are seen; pairs are ordered as by brute force."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+
+from identification.gap.fit.gauss_newton import fit
+from identification.gap.fit.hypothesis import Estimate, Hypothesis
+from identification.gap.fit.linearisation import linearise
+from identification.gap.fit.variable_projection import LinearisedRun
+from identification.gap.model.cause import Cause
+from identification.gap.rank.pair_screening import promising_pairs
+from identification.gap.rank.refinement import recalibrate, refit
+from identification.gap.rank.screening import (
+    CauseSignature,
+    Start,
+    _predicted,
+    screen_causes,
+    simulate_signatures,
+    with_cause,
+)
+from tests.identification.gap.drives import Drive
+
+FARTHEST = 3.0
+
+
+def screened(every_start: bool = False) -> list[Start]:
+    """A drive that is limited at 0.8, and has a limit at 0.7 as the only trial."""
+    problem, base = recalibrate(Drive({"limit": 0.8}))
+    runs = linearise(problem, [base], problem.fitted_runs)[0]
+    signatures = simulate_signatures(problem, base, problem.plant.causes)
+    return screen_causes(problem, base, runs, signatures, every_start=every_start)
+
+
+def test_a_threshold_begins_at_its_trial_where_a_linear_step_leads_to_off():
+    problem, base = recalibrate(Drive({"limit": 0.8}))
+    runs = linearise(problem, [base], problem.fitted_runs)[0]
+    (limit,) = [cause for cause in problem.plant.causes if cause.name == "limit"]
+    signatures = simulate_signatures(problem, base, [limit])
+    predicted = _predicted(problem, runs, signatures[0])[1]
+    assert predicted["limit"] > 1.0  # beyond the largest command: no effect, and no slope either
+    (stuck,) = fit(problem, [with_cause(problem, base, limit, predicted)])
+    (start,) = screen_causes(problem, base, runs, signatures)
+    (found,) = refit(problem, base, [start])
+    assert problem.values(found)["limit"] == pytest.approx(0.8, abs=0.02)
+    assert problem.values(stuck)["limit"] > 1.0
+    assert found.chi_square < 0.5 * stuck.chi_square
+
+
+def test_the_most_promising_cause_comes_first_and_each_cause_once():
+    found = screened()
+    assert [start.chi_square for start in found] == sorted(start.chi_square for start in found)
+    names = [start.cause.name for start in found]
+    assert len(names) == len(set(names)) == 6
+
+
+def test_every_start_has_all_trials_and_predictions():
+    """Seven trials and six predictions."""
+    assert len(screened(every_start=True)) == 7 + 6
+
+
+def test_calibrated_parameters_are_adapted_to_a_start():
+    """Recalibration has lowered the gain for the limit; with the limit it rises again."""
+    start = next(start for start in screened() if start.cause.name == "limit")
+    assert start.estimate.vector[0] > 0.98
+    _, base = recalibrate(Drive({"limit": 0.8}))
+    assert base.vector[0] < 0.96
+
+
+def runs_and_signatures(seed: int) -> tuple[list[LinearisedRun], list[CauseSignature]]:
+    """Four causes: the first two differ in little, and that little is what the readings show."""
+    rng = np.random.default_rng(seed)
+    causes = [Cause(name=name, component="", parameters=()) for name in "abcd"]
+    none = Estimate(hypothesis=Hypothesis(causes=()), vector=np.zeros(0), run_values=np.zeros((2, 0)))
+    runs, changes = [], []
+    for _ in range(2):
+        shared, little = 10 * rng.normal(size=60), rng.normal(size=60)
+        own = [shared + little, little - shared, *rng.normal(size=(2, 60))]
+        changes.append(own)
+        runs.append(
+            LinearisedRun(
+                residual=4 * little + own[2] + 0.5 * own[3] + rng.normal(size=60),
+                slopes=rng.normal(size=(60, 2)), run_slopes=rng.normal(size=(60, 1)),
+                run_values=np.zeros(1), run_sd=np.ones(1), tolerance_slopes=np.zeros((60, 0)),
+            )
+        )  # fmt: skip
+    signatures = [
+        CauseSignature(cause=cause, estimate=none, changes=[own[i] for own in changes])
+        for i, cause in enumerate(causes)
+    ]
+    return runs, signatures
+
+
+def squares_left(runs: Sequence[LinearisedRun], columns: Sequence[Sequence[np.ndarray]]) -> float:
+    """Least sum of squares with columns whose sizes are positive, all numbers in one problem."""
+    rows, right = [], []
+    for r, run in enumerate(runs):
+        own = np.zeros((60, len(runs)))
+        own[:, r] = run.run_slopes[:, 0]
+        rows.append(np.column_stack([*(column[r] for column in columns), run.slopes, own]))
+        right.append(run.residual)
+    prior = np.zeros((len(runs), rows[0].shape[1]))
+    prior[:, -len(runs) :] = np.eye(len(runs))
+    low = np.full(prior.shape[1], -np.inf)
+    low[: len(columns)] = 0.0
+    whole = np.vstack([*rows, prior]), np.concatenate([*right, np.zeros(len(runs))])
+    return 2 * lsq_linear(*whole, (low, np.full(len(low), np.inf)), method="bvls").cost
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_pairs_come_in_the_order_of_what_they_leave_together(seed):
+    runs, signatures = runs_and_signatures(seed)
+    own = {signature.cause.label: signature.changes for signature in signatures}
+    left = {
+        frozenset(pair): squares_left(runs, [own[label] for label in pair])
+        for pair in combinations(own, 2)
+    }
+    found = promising_pairs(runs, signatures, FARTHEST)
+    assert found == [pair for pair in sorted(left, key=lambda pair: left[pair]) if pair in found]
+    assert found[0] == min(left, key=lambda pair: left[pair]) == frozenset("ab")
+
+
+def test_the_best_pair_may_have_no_promising_member():
+    runs, signatures = runs_and_signatures(0)
+    alone = {s.cause.label: squares_left(runs, [s.changes]) for s in signatures}
+    assert min(alone["a"], alone["b"]) > alone["c"]
+    assert promising_pairs(runs, signatures, FARTHEST)[0] == frozenset("ab")
+
+
+def test_variants_of_one_cause_make_no_pair():
+    runs, signatures = runs_and_signatures(0)
+    variants = [
+        replace(s, cause=Cause(name="a", component="", parameters=(), variant=s.cause.name))
+        for s in signatures
+    ]
+    assert promising_pairs(runs, variants, FARTHEST) == []
