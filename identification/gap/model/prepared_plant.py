@@ -18,6 +18,7 @@ from identification.gap.model.state_equation import StateEquation, StateTrace
 NoiseSource = Literal["given", "estimated", "resolution"]
 """Where a channel's noise comes from: the user, the readings, or the step between possible readings."""
 
+
 class PreparedPlant:
     """`GreyBox` that adds to a plant what its owner may leave out; the plant itself still simulates."""
 

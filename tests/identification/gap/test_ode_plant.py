@@ -6,6 +6,7 @@ import pytest
 from docs.examples.tank.recordings import PERIOD
 from docs.examples.tank.simulator import AREA, START, levels
 from identification.gap.diagnosis import diagnose
+from identification.gap.locate.regime_gaps import WHOLE
 from identification.gap.model.cause import Cause
 from identification.gap.model.grey_box import GreyBox
 from identification.gap.model.recorded_run import Run
@@ -141,7 +142,7 @@ def test_the_diagnosis_takes_the_plant():
 
     found = diagnose(decay(noisy_runs(), rate=rate, causes=causes, tolerances=()))
     assert found.conclusion.causes[0].effects == ("gain",)
-    assert found.localisation.regime_gaps == []
+    assert {gap.regime for gap in found.localisation.regime_gaps} == {WHOLE}
 
 
 @pytest.mark.parametrize(

@@ -76,6 +76,22 @@ def test_the_plant_file_knows_how_sure_it_is(diagnosed):
     gymnasium.make("EPValve-v0", plant=str(diagnosed / "out" / "plant.json"), parameters="confidence")
 
 
+def assert_alike(found, expected) -> None:
+    """Equal but for rounding: sums of many numbers depend on the number of threads."""
+    if isinstance(expected, dict):
+        assert found.keys() == expected.keys()
+        for key in expected:
+            assert_alike(found[key], expected[key])
+    elif isinstance(expected, list):
+        assert len(found) == len(expected)
+        for own, other in zip(found, expected, strict=True):
+            assert_alike(own, other)
+    elif isinstance(expected, float):
+        assert found == pytest.approx(expected, rel=1e-6, abs=1e-12)
+    else:
+        assert found == expected
+
+
 def test_finished_fits_are_taken_up_again(diagnosed, monkeypatch, tmp_path):
     first = json.loads((diagnosed / "out" / "gap.json").read_text())
 
@@ -87,7 +103,7 @@ def test_finished_fits_are_taken_up_again(diagnosed, monkeypatch, tmp_path):
     again = json.loads((diagnosed / "out" / "gap.json").read_text())
     for volatile in ("seconds", "next_experiment"):
         del first[volatile], again[volatile]
-    assert again == first
+    assert_alike(again, first)
     with pytest.raises(AssertionError, match="kept fit"):
         diagnose_campaign(diagnosed / "campaign", diagnosed / "out", without=["flow_force"])
 
@@ -152,4 +168,5 @@ def test_damaged_recordings_never_give_a_confident_cause(damage, tmp_path):
 
 def test_the_journal_is_of_these_recordings(diagnosed):
     header = (diagnosed / "out" / module.JOURNAL).read_text().splitlines()[0]
-    assert {"noise", "nominal", "recordings", "software", "without"} == set(json.loads(header)["subject"])
+    subject = json.loads(header)["subject"]
+    assert set(subject) == {"noise", "nominal", "recordings", "software", "without"}
