@@ -18,10 +18,6 @@ from identification.gap.model.state_equation import StateEquation, StateTrace
 NoiseSource = Literal["given", "estimated", "resolution"]
 """Where a channel's noise comes from: the user, the readings, or the step between possible readings."""
 
-WHOLE_RUN = "whole_run"
-"""Regime of a plant that names none."""
-
-
 class PreparedPlant:
     """`GreyBox` that adds to a plant what its owner may leave out; the plant itself still simulates."""
 
@@ -76,9 +72,8 @@ class PreparedPlant:
         return self.plant.states(values, run)
 
     def regimes(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, NDArray]:
-        """`GreyBox.regimes`: boolean (samples,) by name; the whole run where the plant names none."""
-        named = self.plant.regimes(values, run)
-        return named or {WHOLE_RUN: np.ones(len(self.runs[run].time), dtype=bool)}
+        """`GreyBox.regimes`: boolean (samples,) by name."""
+        return self.plant.regimes(values, run)
 
     def forced(
         self, values: Mapping[str, NDArray], equation: StateEquation, run: int, edges: NDArray

@@ -50,17 +50,30 @@ class EvaluatedHypothesis:
         """Labels of the causes."""
         return self.estimate.hypothesis.labels
 
-    def occam_prices(self, inflation: float) -> list[float]:
-        """Price of each cause: log of its parameters' ranges over what the data leave (Laplace) [nats].
+    def price(self, inflation: float, least: float) -> float:
+        """Log of the ranges of the causes' parameters over what the data leave (Laplace) [nats].
 
-        inflation: of the parameters' variance by correlated readings and by discrepancy [1].
+        Together, or one cause after the other with at least `least` each, whichever is more.
+
+        Args:
+            inflation: of the parameters' variance by correlated readings and by discrepancy [1].
+            least: price of a cause [nats].
         """
-        variances, prices = np.diag(self.covariance), []
-        for cause, place, _ in cause_places(self.estimate):
-            widths = np.array([abs(p.high - p.low) for p in cause.parameters])
-            left = np.minimum(np.sqrt(2 * np.pi * inflation * variances[place]), widths)
-            prices.append(float(np.sum(np.log(widths / np.maximum(left, np.finfo(float).tiny)))))
-        return prices
+        parameters = self.estimate.hypothesis.parameters
+        first = len(self.covariance) - len(parameters)
+        widths = np.array([abs(p.high - p.low) for p in parameters])
+        covariance = self.covariance[first:, first:] / np.outer(widths, widths)
+        # Before the data a parameter is uniform over its range, whose variance is a twelfth.
+        precision = np.linalg.pinv(inflation * covariance) + 12.0 * np.eye(len(widths))
+        together = 0.5 * float(np.linalg.slogdet(precision / (2.0 * np.pi))[1])
+        own = -0.5 * np.log(2.0 * np.pi * np.minimum(inflation * np.diag(covariance), 1.0))
+        each = [float(np.sum(own[self._place(place)])) for _, place, _ in cause_places(self.estimate)]
+        return max(together, sum(max(alone, least) for alone in each))
+
+    def _place(self, place: slice) -> slice:
+        """Place of a cause's parameters among those of all causes."""
+        first = self.estimate.cause_start
+        return slice(place.start - first, place.stop - first)
 
 
 def evaluate(

@@ -138,7 +138,7 @@ def _score(
     if count and each.at_bound:
         return -np.inf
     inflation = variance_inflation(each, discrepancies)
-    price = sum(max(own, settings.least_price) for own in each.occam_prices(inflation))
+    price = each.price(inflation, settings.least_price) if each.labels else 0.0
     return _robust(*misfits, settings) - price + _log_prior(problem, each, settings)
 
 

@@ -22,6 +22,7 @@ NAMED, OTHER, NO_NAME = "tab:blue", "0.7", "tab:orange"
 """Colours: causes that the verdict names, other causes, hypotheses without a named cause."""
 
 NO_CAUSE, UNKNOWN_CAUSE, NOTHING = "no cause needed", "not in the catalogue", "nothing missing"
+OTHERS = "all other sets of causes"
 
 
 def ranking_figure(diagnosis: Diagnosis) -> Figure:
@@ -29,7 +30,8 @@ def ranking_figure(diagnosis: Diagnosis) -> Figure:
     causes = {hypothesis_label(c.hypothesis): c.probability for c in diagnosis.judged}
     named = [hypothesis_label(c.hypothesis) for c in diagnosis.conclusion.ambiguity_set]
     rest = {NO_CAUSE: diagnosis.ranking.no_cause, UNKNOWN_CAUSE: diagnosis.ranking.unknown}
-    colours = [NAMED if name in named else OTHER for name in causes] + [NO_NAME] * len(rest)
+    colours = [NAMED if name in named else OTHER for name in (*causes, OTHERS)] + [NO_NAME] * len(rest)
+    causes[OTHERS] = sum(diagnosis.ranking.probabilities) - sum(causes.values())
     figure = Figure(figsize=(7.5, 0.9 + 0.32 * row_height(causes) * len(colours)), layout="constrained")
     _bars(figure.subplots(), {wrapped(name): share for name, share in (causes | rest).items()}, colours)
     return figure

@@ -85,6 +85,12 @@ def test_of_a_run_that_is_too_long_the_first_part_counts():
     assert 20 * 25 < edges[-1] < 20 * 60
 
 
+def test_the_part_of_a_long_run_begins_with_its_readings():
+    edges = resolving_edges(*sine(1000), 0.19, 400, 5000, SETTINGS)
+    assert edges[0] == 5000
+    assert 5000 + 20 * 25 < edges[-1] < 5000 + 20 * 60
+
+
 def test_windows_are_few_where_runs_are_many_or_long():
     assert most_windows(1, 10_000, SETTINGS) == SETTINGS.most_windows
     assert most_windows(6, 10_000, SETTINGS) == SETTINGS.windows_together / 6

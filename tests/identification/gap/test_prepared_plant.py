@@ -111,18 +111,6 @@ def test_unknown_noise_of_the_tank_is_the_noise_that_was_added():
     assert prepared(tank()).channels[0].noise == pytest.approx(2e-3, rel=0.15)
 
 
-def test_a_plant_without_regimes_has_one():
-    class Plain(Tank):
-        def regimes(self, values, run):
-            return {}
-
-    plant = prepared(Plain(virtual_recordings({"c": 0.021})))
-    ((name, mask),) = plant.regimes({"c": np.array([0.02])}, 0).items()
-    assert name == "whole_run"
-    assert np.all(mask)
-    assert mask.shape == plant.runs[0].time.shape
-
-
 def test_runs_begin_at_0_and_the_plant_keeps_its_own_time():
     own = tank(noise=2e-3, time=100.0 + 0.5 * np.arange(240))
     plant = prepared(own)

@@ -96,7 +96,9 @@ def test_the_telling_programme_is_chosen():
 
 
 def test_what_nothing_explains_asks_for_no_programme():
-    found = next_experiment(replace(diagnosed(), unknown=0.9), valve(), CANDIDATES[:1])
+    doubtful = [0.1 * probability for probability in diagnosed().probabilities]
+    ranking = replace(diagnosed(), probabilities=doubtful, unknown=0.9)
+    found = next_experiment(ranking, valve(), CANDIDATES[:1])
     assert found.programme is None
     assert not found.splits
     assert found.text.startswith("No cause of the catalogue explains")
