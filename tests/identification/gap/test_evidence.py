@@ -37,9 +37,11 @@ def leaking() -> EvaluatedHypothesis:
 def test_a_cause_costs_the_log_of_its_range_over_what_the_data_leave():
     found = leaking()
     sd = np.sqrt(found.covariance[1, 1])
-    assert found.occam_prices(1.0) == [pytest.approx(np.log(0.05 / (np.sqrt(2 * np.pi) * sd)))]
-    assert found.occam_prices(4.0) == [pytest.approx(found.occam_prices(1.0)[0] - np.log(2.0))]
+    price = found.price(1.0, least=0.0)
+    assert price == pytest.approx(np.log(0.05 / (np.sqrt(2 * np.pi) * sd)), abs=1e-3)
+    assert found.price(4.0, least=0.0) == pytest.approx(price - np.log(2.0), abs=1e-3)
 
 
-def test_a_cause_of_which_the_data_say_nothing_costs_nothing():
-    assert leaking().occam_prices(1e12) == [0.0]
+def test_a_cause_of_which_the_data_say_nothing_costs_the_least_price():
+    assert leaking().price(1e12, least=3.0) == 3.0
+    assert leaking().price(1e12, least=0.0) < 0.5

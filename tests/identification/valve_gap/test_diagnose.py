@@ -152,4 +152,6 @@ def test_damaged_recordings_never_give_a_confident_cause(damage, tmp_path):
 
 def test_the_journal_is_of_these_recordings(diagnosed):
     header = (diagnosed / "out" / module.JOURNAL).read_text().splitlines()[0]
-    assert {"noise", "nominal", "recordings", "software", "without"} == set(json.loads(header)["subject"])
+    assert {"noise", "nominal", "recordings", "software", "without"} == set(
+        json.loads(header)["subject"]
+    )
