@@ -16,7 +16,9 @@ def together(
     """A simulation of all candidates at once; one that is near a threshold advances by itself.
 
     Args:
-        rate, read, thresholds: as `Records.flat` makes them.
+        rate: of the states, as `Records.flat` makes it.
+        read: readings, as `Records.flat` makes them.
+        thresholds: as `Records.flat` makes them.
         counts: numbers of readings and of thresholds.
         advance: of `advancing`, not compiled.
     """

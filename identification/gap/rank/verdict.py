@@ -132,5 +132,9 @@ def _verdict(ranking: Ranking) -> str:
         return NO_GAP
     if ranking.unknown > sum(ranking.probabilities):
         return UNKNOWN
-    remains = ranking.shares_left[0] > settings.noticed_remainder
-    return PARTIAL if remains and _held(ranking) else KNOWN
+    if ranking.shares_left[0] <= settings.noticed_remainder:
+        return KNOWN
+    if _held(ranking):
+        return PARTIAL
+    # Look-alikes share the probability; less than that names nothing while much is left.
+    return KNOWN if sum(ranking.probabilities) >= settings.sure_inclusion else UNKNOWN

@@ -55,4 +55,5 @@ def level_text(diagnosis: Diagnosis) -> str:
 
 
 def percent(share: float) -> str:
+    """A share [1] in percent, ready to read."""
     return f"{100 * share:g} %"
