@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import lsq_linear
+
+from identification.gap.fit.bounded_least_squares import bounded_minimiser
 
 ACTIVE_SET_ITERATIONS = 12
 """Most changes of the set of nuisances at their bounds. In the second half none leaves the set again, so
@@ -59,7 +60,7 @@ class RunProducts:
         own = self.gram[count:, count:]
         value = np.linalg.solve(own, moment)
         if np.any(np.abs(value) > self.bound):
-            value = _bounded_minimiser(own, moment, -self.bound, self.bound)
+            value = bounded_minimiser(own, moment, -self.bound, self.bound)
         ended = np.abs(value) >= (1.0 - 1e-9) * self.bound  # but for rounding
         return np.where(ended, np.sign(value) * self.bound, np.nan)
 
@@ -126,15 +127,26 @@ def normal_equations(runs: Sequence[LinearisedRun], largest_deviation: float) ->
         runs: the same hypothesis linearised in each of them.
         largest_deviation: bound of the nuisance parameters [standard deviations].
     """
-    k, m = runs[0].slopes.shape[1], runs[0].tolerance_slopes.shape[1]
-    products = [_products(run, largest_deviation) for run in runs]
+    products = [run_products(run, largest_deviation) for run in runs]
+    return equations_of(products, runs[0].slopes.shape[1], largest_deviation)
+
+
+def equations_of(products: Sequence[RunProducts], k: int, largest_deviation: float) -> NormalEquations:
+    """Normal equations from the products of several runs.
+
+    Args:
+        products: of each run, the same k slopes in all.
+        k: number of parameters.
+        largest_deviation: bound of the nuisance parameters [standard deviations].
+    """
+    m = products[0].gram.shape[0] - len(products[0].bound) - 1 - k
     gram = _together(products, k, [np.full(len(run.bound), np.nan) for run in products])
     free = _eliminated(gram, np.arange(1 + k, 1 + k + m), np.arange(1 + k))
     none, bound = np.zeros(k), np.full(m, largest_deviation)
     ends = np.concatenate([none, -bound]), np.concatenate([none, bound])
     best, chi_square = _bounded_solution(products, k, ends, 0.0)
     return NormalEquations(
-        runs=products,
+        runs=list(products),
         steps=k,
         hessian=free[1:, 1:],
         gradient=free[1:, 0],
@@ -162,7 +174,7 @@ def _bounded_solution(
         matrix[damped, damped] *= 1.0 + damping
         matrix[damped, damped] += 1e-9
         own = np.ix_(free, free)
-        best[free] = _bounded_minimiser(matrix[own], gram[1:, 0][free], ends[0][free], ends[1][free])
+        best[free] = bounded_minimiser(matrix[own], gram[1:, 0][free], ends[0][free], ends[1][free])
         beyond = [run.held(best) for run in runs]
         if iteration >= ACTIVE_SET_ITERATIONS // 2:
             beyond = [np.where(np.isfinite(a), a, b) for a, b in zip(held, beyond, strict=True)]
@@ -204,7 +216,7 @@ def without_run_nuisances(
     gram = run.run_slopes.T @ run.run_slopes
     moment = run.run_slopes.T @ residual + gram @ run.run_values
     bound = largest_deviation * run.run_sd
-    value = _bounded_minimiser(gram + np.diag(1.0 / run.run_sd**2), moment, -bound, bound)
+    value = bounded_minimiser(gram + np.diag(1.0 / run.run_sd**2), moment, -bound, bound)
     step = value - run.run_values
     return residual - run.run_slopes @ step, step
 
@@ -226,22 +238,6 @@ def _sum_of_squares(gram: NDArray, numbers: NDArray) -> float:
     return float(gram[0, 0] - 2 * numbers @ gram[1:, 0] + numbers @ gram[1:, 1:] @ numbers)
 
 
-def _bounded_minimiser(matrix: NDArray, moment: NDArray, low: NDArray, high: NDArray) -> NDArray:
-    """Minimiser (n,) of 0.5 x' matrix x - moment x between low and high (bounded least squares)."""
-    if not len(moment):
-        return np.zeros(0)
-    scale = 1.0 / np.sqrt(np.diag(matrix))
-    try:
-        root = np.linalg.cholesky(matrix * np.outer(scale, scale)).T
-    except np.linalg.LinAlgError:  # columns that are equal but for rounding
-        eigenvalues, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
-        root = np.sqrt(np.maximum(eigenvalues, 1e-14))[:, None] * vectors.T
-    target = np.linalg.solve(root.T, moment * scale)
-    widest = np.maximum(high - low, np.finfo(float).tiny)
-    solution = lsq_linear(root, target, (low / scale, (low + widest) / scale), method="bvls")
-    return np.clip(solution.x * scale, low, high)
-
-
 def _shifted(gram: NDArray, columns: NDArray, amounts: NDArray) -> NDArray:
     """Gram matrix after these columns times `amounts` are subtracted from the residual in row 0."""
     shifted = gram.copy()
@@ -257,10 +253,28 @@ def _eliminated(gram: NDArray, columns: NDArray, kept: NDArray) -> NDArray:
     return gram[np.ix_(kept, kept)] - cross.T @ np.linalg.solve(own, cross)
 
 
-def _products(run: LinearisedRun, largest_deviation: float) -> RunProducts:
-    """Products of a run's columns."""
-    columns = np.column_stack([run.residual, run.slopes, run.tolerance_slopes, run.run_slopes])
-    gram = columns.T @ columns
+def run_products(run: LinearisedRun, largest_deviation: float) -> RunProducts:
+    """Products of a run's columns.
+
+    largest_deviation: bound of the run's nuisance parameters [standard deviations].
+    """
+    columns = columns_of(run)
+    return with_priors(columns.T @ columns, run, largest_deviation)
+
+
+def columns_of(run: LinearisedRun) -> NDArray:
+    """Residual, slopes, tolerance slopes and slopes of run nuisances (values, 1 + k + m + l)."""
+    return np.column_stack([run.residual, run.slopes, run.tolerance_slopes, run.run_slopes])
+
+
+def with_priors(gram: NDArray, run: LinearisedRun, largest_deviation: float) -> RunProducts:
+    """Products with the priors of the run nuisances.
+
+    Args:
+        gram: of the columns, those of the run nuisances last, (1 + k + m + l, 1 + k + m + l) [1].
+        run: whose nuisances these are.
+        largest_deviation: bound of the run's nuisance parameters [standard deviations].
+    """
     own = len(run.run_sd)
     if own:
         nuisances = np.arange(len(gram) - own, len(gram))

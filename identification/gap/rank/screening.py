@@ -6,13 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.gap.fit.changed_run import ChangedRuns
 from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.fit.hypothesis import Estimate, Hypothesis
-from identification.gap.fit.variable_projection import (
-    LinearisedRun,
-    NormalEquations,
-    normal_equations,
-)
+from identification.gap.fit.variable_projection import LinearisedRun, NormalEquations
 from identification.gap.model.cause import Cause
 
 
@@ -105,13 +102,17 @@ def screen_causes(
         signatures: from `simulate_signatures` beside the same base.
         every_start: return all starts of each cause, not only the best.
     """
+    if not signatures:
+        return []
+    changes = [signature.changes for signature in signatures]
+    changed = ChangedRuns(base_runs, changes, problem.settings.largest_deviation)
     tried = [
-        adapted(problem, base, base_runs, signature.estimate, signature.changes)
-        for signature in signatures
+        _adapted(problem, base, signature.estimate, changed.explained(i))
+        for i, signature in enumerate(signatures)
     ]
     nearest: dict[str, tuple[float, Estimate]] = {}
-    for signature in signatures:
-        chi_square, values = _predicted(problem, base_runs, signature)
+    for i, signature in enumerate(signatures):
+        chi_square, values = _predicted(changed.with_slope(i), signature)
         label = signature.cause.label
         if label not in nearest or chi_square < nearest[label][0]:
             nearest[label] = chi_square, with_cause(problem, base, signature.cause, values)
@@ -140,53 +141,37 @@ def simulated_starts(
     if not estimates:
         return []
     residuals = problem.residuals([base, *estimates], problem.fitted_runs)
+    changes = [[block[:, 0] - block[:, 1 + k] for block in residuals] for k in range(len(estimates))]
+    changed = ChangedRuns(base_runs, changes, problem.settings.largest_deviation)
     return [
-        adapted(
-            problem, base, base_runs, estimate, [block[:, 0] - block[:, 1 + k] for block in residuals]
-        )
-        for k, estimate in enumerate(estimates)
+        _adapted(problem, base, estimate, changed.explained(k)) for k, estimate in enumerate(estimates)
     ]
 
 
-def adapted(
-    problem: FittingProblem,
-    base: Estimate,
-    base_runs: Sequence[LinearisedRun],
-    estimate: Estimate,
-    changes: Sequence[NDArray],
+def _adapted(
+    problem: FittingProblem, base: Estimate, estimate: Estimate, equations: NormalEquations
 ) -> Start:
     """An estimate that adds causes to the base, the base's own parameters adapted by one linear step.
 
     Args:
         problem: readings and settings.
         base: the estimate without the causes.
-        base_runs: the same linearised in the fitted runs.
         estimate: the base's parameters and the causes' values.
-        changes: of the outputs by the causes, per fitted run (values,) [noise deviations].
+        equations: of the base's parameters, with the causes' changes of the outputs.
     """
-    runs = [
-        replace(run, residual=run.residual - change)
-        for run, change in zip(base_runs, changes, strict=True)
-    ]
-    equations = normal_equations(runs, problem.settings.largest_deviation)
     step, decrease = equations.step(*problem.ends(base), damping=0.0)
     vector = estimate.vector.copy()
     vector[: len(step)] += step
     return Start(estimate=replace(estimate, vector=vector), chi_square=equations.chi_square - decrease)
 
 
-def _predicted(
-    problem: FittingProblem, base_runs: Sequence[LinearisedRun], signature: CauseSignature
-) -> tuple[float, dict[str, float]]:
+def _predicted(equations: NormalEquations, signature: CauseSignature) -> tuple[float, dict[str, float]]:
     """Predicted chi-square [1] of a signature that is fitted to the residual, and values by symbol [SI].
 
     The signature is taken as proportional to the cause's parameters, with either sign.
+
+    equations: with the signature's changes as the last slope.
     """
-    runs = [
-        replace(run, slopes=np.column_stack([run.slopes, change]))
-        for run, change in zip(base_runs, signature.changes, strict=True)
-    ]
-    equations = normal_equations(runs, problem.settings.largest_deviation)
     parameters, vector = signature.cause.parameters, signature.estimate.vector
     trial = vector[len(vector) - len(parameters) :] * [p.scale for p in parameters]
     nominal = np.array([p.nominal for p in parameters])
