@@ -72,7 +72,8 @@ class Replay:
         for group in self._groups(n, chosen):
             lanes = {s: _lanes(value, group) for s, value in each.items()}
             shifts = lanes.pop("")
-            answers += _simulate([self.drives[r] for r in group], {**self.base, **lanes}, shifts, n)
+            drives, p = [self.drives[r] for r in group], {**self.base, **lanes}
+            answers += _simulate(drives, p, shifts, n, self.settings.recorded_periods)
         return answers
 
     def _groups(self, n: int, chosen: Sequence[int]) -> list[list[int]]:
@@ -96,9 +97,12 @@ def _lanes(value: NDArray, recordings: Sequence[int]) -> NDArray:
 
 
 def _simulate(
-    drives: list[ModelInputs], tiled: Mapping[str, ArrayLike], shift: NDArray, n: int
+    drives: list[ModelInputs], tiled: Mapping[str, ArrayLike], shift: NDArray, n: int, together: int
 ) -> list[NDArray]:
-    """One batch: lane r n + j is candidate j on recording r. tiled, shift: by lane."""
+    """One batch: lane r n + j is candidate j on recording r.
+
+    tiled, shift: by lane. together: number of periods whose states are kept at a time.
+    """
     valves = Valves(n * len(drives))
     valves.set_parameters(np.arange(valves.n), tiled)
     p1, U, p2 = (
@@ -108,11 +112,17 @@ def _simulate(
     initial = energised(tiled, p1=p1, p2=p2 + shift, U=U)
     for field, value in zip(valves.state, initial, strict=True):
         field[:] = value
-    first = _read(State(*(field.copy()[None] for field in valves.state)), tiled)
     inputs, duration = _inputs(drives)
-    every = Inputs(**{name: np.repeat(field, n, axis=1) for name, field in inputs.items()})
-    later = valves.record(every, np.repeat(duration, n, axis=1))
-    outputs = np.concatenate([first, _read(later, tiled)], axis=1)
+    steps = len(duration)
+    outputs = np.empty((len(OUTPUTS), 1 + steps, valves.n))
+    outputs[:, 0] = _read(valves.state, tiled)
+    # A delayed voltage needs the whole record at once.
+    together = steps if np.any(tiled["t_delay"]) else together
+    for first in range(0, steps, max(together, 1)):
+        part = slice(first, first + together)
+        every = Inputs(**{name: np.repeat(field[part], n, axis=1) for name, field in inputs.items()})
+        states = valves.record(every, np.repeat(duration[part], n, axis=1))
+        outputs[:, 1 + first : 1 + first + together] = _read(states, tiled)
     return [outputs[:, : len(drive.U), r * n : (r + 1) * n] for r, drive in enumerate(drives)]
 
 

@@ -24,7 +24,9 @@ class ReplaySettings:
     failed_residual: float = 1e3
     """Residual, in units of its weight, of samples of a candidate that cannot be integrated."""
     largest_batch: int = 1_500_000
-    """Samples times valves that are simulated at once: about 200 MB."""
+    """Samples times valves that are simulated at once: about 40 MB of outputs."""
+    recorded_periods: int = 100
+    """Sampling periods whose states are kept at a time: few enough to stay in the processor's cache."""
 
 
 REPLAY = ReplaySettings()

@@ -18,6 +18,7 @@ class FitCache:
         plant: GreyBox,
         journal: Journal | None = None,
         announce: Callable[[str], None] = lambda step: None,
+        prefix: str = "",
     ):
         """Begin with the fits of a journal.
 
@@ -25,13 +26,20 @@ class FitCache:
             plant: the plant to whose causes the journal refers.
             journal: finished fits; None keeps nothing.
             announce: called with the name of every step before it begins.
+            prefix: of the names of all steps.
         """
         self.plant = plant
         self.journal = journal
         self.announce = announce
+        self.prefix = prefix
+
+    def named(self, prefix: str) -> "FitCache":
+        """The same cache for a second search: all names of steps begin with the prefix."""
+        return FitCache(self.plant, self.journal, self.announce, prefix)
 
     def __call__(self, step: str, fit: Callable[[], list[Estimate]]) -> list[Estimate]:
         """The estimates that `fit` returns, or returned in an earlier run under this step's name."""
+        step = self.prefix + step
         self.announce(step)
         if self.journal is not None and step in self.journal:
             return [self._estimate(entry) for entry in self.journal[step]]

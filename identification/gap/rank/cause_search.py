@@ -18,6 +18,7 @@ from identification.gap.rank.screening import (
     CauseSignature,
     Start,
     best_start_of_each,
+    promising_causes,
     screen_causes,
     simulate_signatures,
     simulated_starts,
@@ -47,7 +48,7 @@ def search_causes(
     for number in range(2, pool.settings.most_causes + 1):
         if not _another_cause_may_act(pool, number):
             break
-        _add_a_cause(pool, number)
+        _add_a_cause(pool, number, signatures)
         if number == 2:
             _fit_promising_pairs(pool, base, base_runs, signatures, screened)
         _refine_best(pool, number, pool.settings.set_finalists, f"sets of {number}")
@@ -108,7 +109,7 @@ def _another_cause_may_act(pool: HypothesisPool, number: int) -> bool:
     return larger[0][1] > smaller[0][1] + pool.settings.last_gain
 
 
-def _add_a_cause(pool: HypothesisPool, number: int) -> None:
+def _add_a_cause(pool: HypothesisPool, number: int, signatures: Sequence[CauseSignature]) -> None:
     """Refit the best smaller sets with each of the causes that promise most beside them."""
     settings = pool.settings
     ranked = pool.ranked(number - 1)
@@ -118,26 +119,36 @@ def _add_a_cause(pool: HypothesisPool, number: int) -> None:
     for smaller, score in ranked[: 1 if small else settings.bases]:
         if ranked[0][1] - score > settings.finalist_lag and not _is_small(pool):
             break
-        pool.add(_fits_with_another(pool, smaller, partners))
+        pool.add(_fits_with_another(pool, smaller, signatures, partners))
 
 
 def _fits_with_another(
-    pool: HypothesisPool, smaller: EvaluatedHypothesis, partners: int
+    pool: HypothesisPool,
+    smaller: EvaluatedHypothesis,
+    signatures: Sequence[CauseSignature],
+    partners: int,
 ) -> list[Estimate]:
-    """Fits of a set with each of the most promising further causes."""
-    problem = pool.problem
+    """Fits of a set with each of the most promising further causes.
+
+    In a large catalogue those are simulated beside the set whose signatures promise something there.
+    """
+    problem, settings = pool.problem, pool.settings
     base = pool.first_fits[frozenset(smaller.labels)]
     own = {cause.name for cause in base.hypothesis.causes}
     others = [
-        cause
-        for cause in problem.plant.causes
-        if cause.name not in own and frozenset((*smaller.labels, cause.label)) not in pool
+        signature
+        for signature in signatures
+        if signature.cause.name not in own
+        and frozenset((*smaller.labels, signature.cause.label)) not in pool
     ]
 
     def fits() -> list[Estimate]:
-        signatures = simulate_signatures(problem, base, others)
         base_runs = linearise(problem, [base], problem.fitted_runs)[0]
-        screened = screen_causes(problem, base, base_runs, signatures, every_start=_is_small(pool))
+        causes = promising_causes(problem, base_runs, others)
+        if not _is_small(pool):
+            causes = causes[: settings.simulated_per_partner * partners]
+        beside = simulate_signatures(problem, base, causes)
+        screened = screen_causes(problem, base, base_runs, beside, every_start=_is_small(pool))
         kept = screened if _is_small(pool) else screened[:partners]
         return refit(problem, base, kept)
 

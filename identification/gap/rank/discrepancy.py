@@ -95,7 +95,7 @@ def _discrepancy(series: Sequence[Series], settings: RankingSettings) -> Channel
             LEAST,
         ),
         inflation=correlated if disturbed else 1.0,
-        autocorrelation=correlated,
+        autocorrelation=max(correlated, _faint_inflation(readings, mean_square, settings)),
         sd=sd,
         time_scale=time_scale,
     )
@@ -163,6 +163,30 @@ def _inflation(covariance: NDArray, settings: RankingSettings) -> float:
     small = np.flatnonzero(correlation < settings.least_correlation)
     kept = correlation[: small[0]] if len(small) else correlation
     return float(1.0 + 2.0 * np.sum(kept))
+
+
+def _faint_inflation(
+    readings: Sequence[NDArray], mean_square: float, settings: RankingSettings
+) -> float:
+    """The same by means of blocks (Alexopoulos and Seila 1998): a faint correlation may last long [1].
+
+    Rounding to coarse steps leaves one: the same error as long as the reading does not move. The largest
+    of several lengths of block, each less its chance.
+    """
+    found, length = 1.0, settings.block_readings
+    while mean_square > 0:
+        means = [
+            float(np.mean(part))
+            for own in readings
+            for part in np.array_split(own, max(1, len(own) // length))
+            if len(own) >= length
+        ]
+        if len(means) < settings.fewest_means:
+            break
+        chance = 1.0 + settings.seen_autocorrelation * np.sqrt(2.0 / len(means))
+        found = max(found, float(length * np.mean(np.square(means)) / (mean_square * chance)))
+        length *= 2
+    return found
 
 
 def _quiet_mean_square(

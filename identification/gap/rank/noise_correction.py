@@ -4,12 +4,15 @@ A judgement must not hinge on the noise that somebody states: fits would end too
 channels would have wrong weights.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.fit.hypothesis import Estimate
 from identification.gap.fit.prediction import predict
 from identification.gap.model.prepared_plant import PreparedPlant, prepared
+from identification.gap.rank.discrepancy import ChannelDiscrepancy
 from identification.gap.rank.settings import RankingSettings
 from identification.gap.reduce.noise_floor import LAGS, noise_ratios, squared_differences
 from identification.gap.reduce.settings import ReductionSettings
@@ -44,3 +47,22 @@ def with_seen_noise(
     if not np.any(wrong):
         return plant
     return plant.with_noise(np.where(wrong, ratios, 1.0).tolist())
+
+
+def with_disturbance(
+    plant: PreparedPlant, discrepancies: Sequence[ChannelDiscrepancy], settings: RankingSettings
+) -> PreparedPlant:
+    """The plant whose disturbed channels weigh as much as they tell; the same object where none is.
+
+    Readings under a slow disturbance do not err independently: n of them tell as much as n/inflation.
+    Weighted as white noise, such a channel would pull the parameters after its disturbance.
+
+    Args:
+        plant: with the noise that the readings show.
+        discrepancies: of each channel, under the best hypothesis.
+        settings: which ratio of noises matters.
+    """
+    ratios = [np.sqrt(d.floor * d.inflation) if d.inflation > 1.0 else 1.0 for d in discrepancies]
+    if max(ratios) <= settings.wrong_noise_ratio:
+        return plant
+    return plant.with_noise([max(float(ratio), 1.0) for ratio in ratios])

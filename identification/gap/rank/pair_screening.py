@@ -17,6 +17,8 @@ def promising_pairs(
 ) -> list[frozenset[str]]:
     """Pairs of labels by falling decrease of chi-square, both changes taken as linear in their sizes.
 
+    A negative size is none where the range begins at off.
+
     Args:
         base_runs: the base estimate linearised in the fitted runs.
         signatures: from `simulate_signatures` beside the same base; the first of each cause counts.
@@ -26,6 +28,7 @@ def promising_pairs(
     for signature in signatures:
         first.setdefault(signature.cause.label, signature)
     labels, causes = list(first), [signature.cause for signature in first.values()]
+    least = np.array([signature.shares[0] for signature in first.values()])
     runs = [
         replace(run, slopes=np.column_stack([run.slopes, *(s.changes[r] for s in first.values())]))
         for r, run in enumerate(base_runs)
@@ -42,6 +45,7 @@ def promising_pairs(
         pair = [i, j]
         matrix = gram[np.ix_(pair, pair)] + 1e-9 * np.eye(2)
         sizes = np.linalg.solve(matrix, moment[pair])
-        if causes[i].name != causes[j].name and np.all(sizes > 0):
+        possible = np.all((sizes > 0) | (least[pair] < 0))
+        if causes[i].name != causes[j].name and possible:
             gains[frozenset((labels[i], labels[j]))] = float(sizes @ moment[pair])
     return sorted(gains, key=lambda pair: -gains[pair])

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from identification.gap.fit.fit_cache import FitCache
 from identification.gap.fit.fitting_problem import FittingProblem
+from identification.gap.fit.hypothesis import Estimate
 from identification.gap.fit.linearisation import linearise
 from identification.gap.fit.settings import FitSettings
 from identification.gap.model.grey_box import GreyBox
@@ -13,7 +14,7 @@ from identification.gap.rank.cause_search import search_causes
 from identification.gap.rank.discrepancy import ChannelDiscrepancy
 from identification.gap.rank.evidence import EvaluatedHypothesis, evaluate_linearised
 from identification.gap.rank.hypothesis_pool import HypothesisPool
-from identification.gap.rank.noise_correction import with_seen_noise
+from identification.gap.rank.noise_correction import with_disturbance, with_seen_noise
 from identification.gap.rank.posterior import Posterior, variance_inflation
 from identification.gap.rank.refinement import recalibrate, with_own_nuisances
 from identification.gap.rank.screening import simulate_signatures
@@ -85,6 +86,25 @@ def rank_hypotheses(
     corrected = with_seen_noise(problem, base, settings, floor or ReductionSettings())
     if corrected is not plant:
         problem, base = recalibrate(corrected, cache, fit_settings, "with the noise seen: ")
+    ranking = _searched(problem, base, cache, settings)
+    weighted = with_disturbance(corrected, ranking.discrepancies, settings)
+    if weighted is corrected:
+        return ranking
+    cache = cache.named("with the disturbance: ")
+    return _searched(*recalibrate(weighted, cache, fit_settings), cache, settings)
+
+
+def _searched(
+    problem: FittingProblem, base: Estimate, cache: FitCache, settings: RankingSettings
+) -> Ranking:
+    """The search for causes beside a recalibrated model, and what it found.
+
+    Args:
+        problem: readings and settings of the fits.
+        base: the recalibrated model.
+        cache: runs the fits.
+        settings: judgement.
+    """
     runs = linearise(problem, [base], problem.all_runs)[0]
     base_runs = [runs[r] for r in problem.fitted_runs]
     signatures = simulate_signatures(problem, base, problem.plant.causes)

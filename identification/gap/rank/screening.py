@@ -44,6 +44,21 @@ class CauseSignature:
     changes: list[NDArray]
     """Per fitted run, (values,) [noise deviations]."""
 
+    @property
+    def trial(self) -> NDArray:
+        """The trial values of the cause's parameters, (parameters,) [SI]."""
+        parameters, vector = self.cause.parameters, self.estimate.vector
+        return vector[len(vector) - len(parameters) :] * [p.scale for p in parameters]
+
+    @property
+    def shares(self) -> tuple[float, float]:
+        """Least and largest multiple of the trial at which no parameter leaves its range [1]."""
+        parameters = self.cause.parameters
+        nominal = np.array([p.nominal for p in parameters])
+        ends = np.array([(p.low, p.high) for p in parameters]) - nominal[:, None]
+        shares = ends / (self.trial - nominal)[:, None]
+        return float(np.max(np.min(shares, axis=1))), float(np.min(np.max(shares, axis=1)))
+
 
 def trial_estimates(
     problem: FittingProblem, base: Estimate, causes: Sequence[Cause]
@@ -122,6 +137,28 @@ def screen_causes(
     return sorted(kept, key=lambda start: start.chi_square)
 
 
+def promising_causes(
+    problem: FittingProblem, base_runs: Sequence[LinearisedRun], signatures: Sequence[CauseSignature]
+) -> list[Cause]:
+    """Causes by the chi-square that their signatures leave, as simulated or scaled, the least first.
+
+    base_runs: an estimate linearised in the fitted runs, near the one beside which the signatures were
+    simulated.
+    """
+    if not signatures:
+        return []
+    changes = [signature.changes for signature in signatures]
+    changed = ChangedRuns(base_runs, changes, problem.settings.largest_deviation)
+    least: dict[str, float] = {}
+    for i, signature in enumerate(signatures):
+        label = signature.cause.label
+        scaled = _predicted(changed.with_slope(i), signature)[0]
+        simulated = changed.explained(i).chi_square
+        least[label] = min(scaled, simulated, least.get(label, np.inf))
+    causes = {signature.cause.label: signature.cause for signature in signatures}
+    return [causes[label] for label in sorted(least, key=lambda label: least[label])]
+
+
 def best_start_of_each(starts: Sequence[Start]) -> list[Start]:
     """The start with the least chi-square of each set of causes."""
     best: dict[frozenset[str], Start] = {}
@@ -172,15 +209,13 @@ def _predicted(equations: NormalEquations, signature: CauseSignature) -> tuple[f
 
     equations: with the signature's changes as the last slope.
     """
-    parameters, vector = signature.cause.parameters, signature.estimate.vector
-    trial = vector[len(vector) - len(parameters) :] * [p.scale for p in parameters]
-    nominal = np.array([p.nominal for p in parameters])
-    ends = np.array([(p.low - n, p.high - n) for p, n in zip(parameters, nominal, strict=True)])
-    shares = ends / (trial - nominal)[:, None]
-    low, high = np.max(np.min(shares, axis=1)), np.min(np.max(shares, axis=1))
-    share, chi_square = _bounded_last_step(equations, low, high)
-    values = (nominal + share * (trial - nominal)).tolist()
-    return chi_square, {p.symbol: v for p, v in zip(parameters, values, strict=True)}
+    share, chi_square = _bounded_last_step(equations, *signature.shares)
+    parameters = signature.cause.parameters
+    values = [
+        p.nominal + share * (trial - p.nominal)
+        for p, trial in zip(parameters, signature.trial, strict=True)
+    ]
+    return chi_square, {p.symbol: float(v) for p, v in zip(parameters, values, strict=True)}
 
 
 def _bounded_last_step(equations: NormalEquations, low: float, high: float) -> tuple[float, float]:

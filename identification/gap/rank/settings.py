@@ -52,6 +52,10 @@ class RankingSettings:
     partners_of_small_misfit: int = 3
     """Number of causes tried beside a set that leaves a small misfit; computing time."""
 
+    simulated_per_partner: int = 2
+    """Number of causes that are simulated beside a set of a large catalogue for each that is refitted
+    there; computing time."""
+
     small_misfit: float = 30.0
     """Misfit beyond noise [nats] up to which a set leaves little: another cause can hardly be seen."""
 
@@ -100,6 +104,9 @@ class RankingSettings:
 
     fewest_blocks: int = 8
     """Fewest blocks in all runs together of which a quantile is taken."""
+
+    fewest_means: int = 40
+    """Fewest blocks in all runs together whose means show a faint correlation."""
 
     disturbed_floor: float = 2.0
     """Ratio of the quieter blocks' mean square to the white variance [1] above which a disturbance

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
+from identification.gap.fit.changed_run import ChangedRuns
 from identification.gap.fit.gauss_newton import fit
 from identification.gap.fit.hypothesis import Estimate, Hypothesis
 from identification.gap.fit.linearisation import linearise
 from identification.gap.fit.variable_projection import LinearisedRun
 from identification.gap.model.cause import Cause
+from identification.gap.model.free_parameter import FreeParameter
 from identification.gap.rank.pair_screening import promising_pairs
 from identification.gap.rank.refinement import recalibrate, refit
 from identification.gap.rank.screening import (
@@ -41,7 +43,8 @@ def test_a_threshold_begins_at_its_trial_where_a_linear_step_leads_to_off():
     runs = linearise(problem, [base], problem.fitted_runs)[0]
     (limit,) = [cause for cause in problem.plant.causes if cause.name == "limit"]
     signatures = simulate_signatures(problem, base, [limit])
-    predicted = _predicted(problem, runs, signatures[0])[1]
+    changed = ChangedRuns(runs, [signatures[0].changes], problem.settings.largest_deviation)
+    predicted = _predicted(changed.with_slope(0), signatures[0])[1]
     assert predicted["limit"] > 1.0  # beyond the largest command: no effect, and no slope either
     (stuck,) = fit(problem, [with_cause(problem, base, limit, predicted)])
     (start,) = screen_causes(problem, base, runs, signatures)
@@ -74,8 +77,15 @@ def test_calibrated_parameters_are_adapted_to_a_start():
 def runs_and_signatures(seed: int) -> tuple[list[LinearisedRun], list[CauseSignature]]:
     """Four causes: the first two differ in little, and that little is what the readings show."""
     rng = np.random.default_rng(seed)
-    causes = [Cause(name=name, component="", parameters=()) for name in "abcd"]
-    none = Estimate(hypothesis=Hypothesis(causes=()), vector=np.zeros(0), run_values=np.zeros((2, 0)))
+    causes = [
+        Cause(
+            name=name,
+            component="",
+            parameters=(FreeParameter(symbol=name, unit="1", low=0.0, high=9.0, trials=(1.0,)),),
+        )
+        for name in "abcd"
+    ]
+    tried = Estimate(hypothesis=Hypothesis(causes=()), vector=np.ones(1), run_values=np.zeros((2, 0)))
     runs, changes = [], []
     for _ in range(2):
         shared, little = 10 * rng.normal(size=60), rng.normal(size=60)
@@ -89,7 +99,7 @@ def runs_and_signatures(seed: int) -> tuple[list[LinearisedRun], list[CauseSigna
             )
         )  # fmt: skip
     signatures = [
-        CauseSignature(cause=cause, estimate=none, changes=[own[i] for own in changes])
+        CauseSignature(cause=cause, estimate=tried, changes=[own[i] for own in changes])
         for i, cause in enumerate(causes)
     ]
     return runs, signatures
@@ -133,8 +143,5 @@ def test_the_best_pair_may_have_no_promising_member():
 
 def test_variants_of_one_cause_make_no_pair():
     runs, signatures = runs_and_signatures(0)
-    variants = [
-        replace(s, cause=Cause(name="a", component="", parameters=(), variant=s.cause.name))
-        for s in signatures
-    ]
+    variants = [replace(s, cause=replace(s.cause, name="a", variant=s.cause.name)) for s in signatures]
     assert promising_pairs(runs, variants, FARTHEST) == []
