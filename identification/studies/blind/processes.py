@@ -35,7 +35,7 @@ def run_in_processes(
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _cores() -> list[int | None]:
+def _cores() -> Sequence[int | None]:
     """Numbers of the cores that this process may use; None where the platform does not say."""
     return sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else [None]
 
