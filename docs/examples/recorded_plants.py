@@ -1,17 +1,20 @@
 """What the examples with other people's recordings share: their data on disk, and their command."""
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from copy import copy
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from docs.examples.recorded_figures import write_figures
 from epv_env.common.command_line import writable_folder
 from identification.gap.diagnosis import diagnose
 from identification.gap.model.cause import Cause
 from identification.gap.model.free_parameter import FreeParameter
-from identification.gap.model.grey_box import GreyBox
+from identification.gap.model.ode_plant import OdePlant
 from identification.gap.model.recorded_run import Run
 from identification.gap.report.result_files import write_results
 from identification.gap.report.sections import sections
@@ -73,16 +76,51 @@ def cause(
     return Cause(name=name, component=component, parameters=(size,), prior=prior)
 
 
-def command(title: str, plant_of: Callable[[Path], GreyBox]) -> int:
-    """Diagnose the recordings in --data: gap.json, report.html and the verdict; returns the status."""
+def command(title: str, name: str, plant_of: Callable[[Path], OdePlant]) -> int:
+    """Diagnose the recordings in --data: gap.json, report.html and the verdict; returns the status.
+
+    title: of the plant, for the report. name: of its pictures. plant_of: from the folder of recordings.
+    """
     parser = argparse.ArgumentParser(description=f"Why a model of {title} misses its recordings.")
     parser.add_argument("--data", type=Path, required=True, help="folder of the recordings")
     parser.add_argument("--out", type=writable_folder, required=True, help="folder of results")
     parser.add_argument("--seed", type=int, default=0, help="of resampling")
+    parser.add_argument(
+        "--without", nargs="+", default=[], metavar="CAUSE", help="causes to leave out of the catalogue"
+    )
+    parser.add_argument(
+        "--with", nargs="+", default=[], metavar="CAUSE", dest="added",
+        help="causes to make part of the model, calibrated like the rest of it",
+    )  # fmt: skip
+    parser.add_argument("--images", type=writable_folder, help="folder of pictures for documents")
     chosen = parser.parse_args()
-    diagnosis = diagnose(plant_of(chosen.data), seed=chosen.seed)
+    plant = changed(plant_of(chosen.data), without=chosen.without, added=chosen.added)
+    diagnosis = diagnose(plant, seed=chosen.seed)
     write_results(diagnosis, chosen.out)
     heading = f"Gap between model and recordings: {title}"
     write_page(chosen.out / "report.html", title=heading, sections=sections(diagnosis))
+    if chosen.images:
+        write_figures(diagnosis, chosen.images, name)
     print(verdict_sentence(diagnosis, "")[1])
     return 0
+
+
+def changed(plant: OdePlant, *, without: Sequence[str] = (), added: Sequence[str] = ()) -> OdePlant:
+    """The plant without some causes in its catalogue, and with some as a part of its model.
+
+    Raises ValueError for a name that is no cause of it.
+    """
+    names = [cause.name for cause in plant.causes]
+    for unknown in {*without, *added} - set(names):
+        raise ValueError(f"{unknown} is no cause of this plant: choose from {', '.join(names)}")
+    parts = [
+        replace(size, nominal=size.trials[0], trials=())
+        for cause in plant.causes
+        if cause.name in added
+        for size in cause.parameters
+    ]
+    other = copy(plant)
+    other.causes = tuple(cause for cause in plant.causes if cause.name not in {*without, *added})
+    other.parameters = (*plant.parameters, *parts)
+    other.nominal = plant.nominal | {part.symbol: part.nominal for part in parts}
+    return other

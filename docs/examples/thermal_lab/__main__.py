@@ -7,4 +7,4 @@ from docs.examples.thermal_lab.plant import thermal_lab
 from epv_env.common.command_line import fail_clearly
 
 if __name__ == "__main__":
-    sys.exit(fail_clearly(lambda: command("a thermal lab", thermal_lab)))
+    sys.exit(fail_clearly(lambda: command("a thermal lab", "thermal-lab", thermal_lab)))
