@@ -142,7 +142,10 @@ def _judge(
         reduction=reduction,
         nominal=nominal,
         judged=judged,
-        warnings=_warnings(recalibrated, judged, settings.report.mentioned_probability),
+        warnings=[
+            *_disturbances(ranking),
+            *_warnings(recalibrated, judged, settings.report.mentioned_probability),
+        ],
         settings=settings,
     )
 
@@ -152,6 +155,18 @@ def _judged_causes(conclusion: Conclusion, runners_up: int) -> list[RankedCause]
     first = max(len(conclusion.ambiguity_set), 1)
     singles = [cause for cause in conclusion.causes[first:] if len(cause.effects) == 1]
     return [*conclusion.causes[:first], *singles[:runners_up]]
+
+
+def _disturbances(ranking: Ranking) -> list[str]:
+    """Channels whose readings carry a disturbance at all times, a sentence each."""
+    channels = ranking.problem.plant.channels
+    return [
+        f"{channel.name}: a disturbance of {d.sd * channel.known_noise / channel.scale:.2g} "
+        f"{channel.unit}, correlated over {d.time_scale:.2g} s, lies on the readings at all times: they "
+        "weigh less"
+        for channel, d in zip(channels, ranking.discrepancies, strict=True)
+        if d.inflation > 1.0
+    ]
 
 
 def _warnings(

@@ -28,7 +28,8 @@ from identification.valve_gap.valve import Valve
 REPORT, PLANT, JOURNAL = "report.html", "plant.json", "fits.jsonl"
 
 STEP_COUNT = 18
-"""Steps of a diagnosis with pairs; without, two of them are left out."""
+"""Steps of a diagnosis with pairs. Without pairs there are two less; more effects than two, or a
+disturbance on the readings, take more, of which no estimate is given."""
 
 
 def diagnose_campaign(
@@ -130,7 +131,7 @@ class Steps:
         elapsed = perf_counter() - self.began
         left = (
             f", about {elapsed * (STEP_COUNT - self.number) / self.number:.0f} s left"
-            if self.number
+            if 0 < self.number < STEP_COUNT
             else ""
         )
         self.number += 1

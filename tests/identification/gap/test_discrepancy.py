@@ -145,3 +145,24 @@ def test_the_white_variance_of_an_exact_covariance(share):
     covariance = (1.0 - share) * 0.8 ** np.arange(10.0)
     covariance[0] += share
     assert white_variance(covariance, 2.0) == pytest.approx(share, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_faint_but_long_correlation_lowers_what_readings_tell(seed):
+    rng = np.random.default_rng(seed)
+    share, correlated, samples = 0.05, 100.0, 40_000
+    (found,) = seen(
+        [
+            white(rng, samples) + np.sqrt(share) * coloured(rng, correlated * PERIOD, samples)
+            for _ in range(RUNS)
+        ]
+    )
+    independent = 1.0 + share / (1.0 + share) * 2.0 * correlated
+    assert 0.4 * independent < found.autocorrelation < 1.2 * independent
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_white_noise_shows_no_faint_correlation(seed):
+    rng = np.random.default_rng(seed)
+    (found,) = seen([white(rng) for _ in range(RUNS)])
+    assert found.autocorrelation < 1.1
