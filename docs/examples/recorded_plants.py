@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from docs.examples.recorded_figures import write_figures
 from epv_env.common.command_line import writable_folder
-from identification.gap.diagnosis import diagnose
+from identification.gap.diagnosis import Diagnosis, diagnose
+from identification.gap.fit.prediction import predict
 from identification.gap.model.cause import Cause
 from identification.gap.model.free_parameter import FreeParameter
 from identification.gap.model.ode_plant import OdePlant
@@ -102,7 +103,28 @@ def command(title: str, name: str, plant_of: Callable[[Path], OdePlant]) -> int:
     if chosen.images:
         write_figures(diagnosis, chosen.images, name)
     print(verdict_sentence(diagnosis, "")[1])
+    print(held_out_errors(diagnosis))
     return 0
+
+
+def held_out_errors(diagnosis: Diagnosis) -> str:
+    """Root mean square errors on recordings never fitted to, of all channels together, in a sentence."""
+    ranking, plant = diagnosis.ranking, diagnosis.ranking.problem.plant
+    models = {"nominal": diagnosis.nominal, "recalibrated": ranking.recalibrated.estimate}
+    if diagnosis.best:
+        models[" + ".join(diagnosis.best.effects)] = diagnosis.best.hypothesis.estimate
+    noise = np.array([channel.known_noise / channel.scale for channel in plant.channels])[:, None]
+    errors = []
+    for label, estimate in models.items():
+        residuals = predict(ranking.problem, estimate).residuals
+        held_out = [
+            (noise * residual)[run.trusted]
+            for residual, run in zip(residuals, plant.runs, strict=True)
+            if run.held_out
+        ]
+        error = float(np.sqrt(np.mean(np.concatenate(held_out) ** 2)))
+        errors.append(f"{label} {error:.3g} {plant.channels[0].unit}")
+    return f"held-out error: {', '.join(errors)}"
 
 
 def changed(plant: OdePlant, *, without: Sequence[str] = (), added: Sequence[str] = ()) -> OdePlant:
