@@ -10,7 +10,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from epv_env.actions import PWM, OnOff
-from epv_env.infos import batch_info
+from epv_env.infos import step_info
 from epv_env.observation import observation_space
 from epv_env.plant.plantfile import load_plant
 from epv_env.settings import OptionError, make_settings, with_options
@@ -100,7 +100,7 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
             truncated = np.zeros(self.num_envs, dtype=bool)
         else:
             truncated = self.task.steps >= self.max_episode_steps
-        infos: dict[str, Any] = batch_info(result)
+        infos: dict[str, Any] = step_info(result)
         valid = self._every.copy()
         if self.mode is AutoresetMode.NEXT_STEP and np.any(stale):
             observation = self._begin(np.flatnonzero(stale), {})
