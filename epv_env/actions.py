@@ -63,7 +63,7 @@ class PWM:
 
 def _numbers(actions: NDArray) -> NDArray:
     """Actions (n,) or (n, 1) of any type of number as float64, (n,)."""
-    return np.asarray(actions).reshape(len(actions)).astype(np.float64)
+    return np.asarray(actions, np.float64).reshape(len(actions))
 
 
 @numba.njit(cache=True)

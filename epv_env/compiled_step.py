@@ -24,7 +24,7 @@ from epv_env.plant.equations import Inputs, State
 from epv_env.plant.integrate import run_nominal
 from epv_env.plant.lanes import N_STATE, STATE, state_at
 from epv_env.plant.primitives.compiled import exact, source_digest
-from epv_env.result import CONSUMPTION, SWITCHINGS
+from epv_env.result import CONSUMPTION, FAILED, SWITCHINGS
 
 NOISE_BLOCK = 256
 """Samples of noise drawn at a time for each episode."""
@@ -60,25 +60,30 @@ def _prepare(episodes, progress, rules, state, before, inputs, duration, lowest,
 
 
 @exact
-def _restored(state, before, lowest, highest, i):
-    """Whether valve i could not be integrated; it is then put back where it was."""
-    if not np.isnan(state[_P2, i]):
-        return False
-    for row in range(N_STATE):
-        state[row, i] = before[row, i]
-    lowest[i] = highest[i] = before[_P2, i]
-    return True
+def _restore_lost(episodes, state, before, lowest, highest, figures, first, last):
+    """Put valves that could not be integrated back where they were, and mark them as failed.
+
+    A loop of its own: arrays that are handed to a function for every valve are counted every time.
+    """
+    for i in range(first, min(last, len(episodes))):
+        figures[FAILED, i] = 0.0
+        if np.isnan(state[_P2, i]):
+            figures[FAILED, i] = 1.0
+            for row in range(N_STATE):
+                state[row, i] = before[row, i]
+            lowest[i] = before[_P2, i]
+            highest[i] = before[_P2, i]
 
 
 @exact
 def _conclude(episodes, rules, noise, state, before, lowest, highest, sensors, figures, observation,
               first, last):  # fmt: skip
     """Judge the period, read the sensors and write the observations."""
+    _restore_lost(episodes, state, before, lowest, highest, figures, first, last)
     for i in range(first, min(last, len(episodes))):
         e = episodes[i]
-        lost = _restored(state, before, lowest, highest, i)
         vented = state[_VENTED, i] - before[_VENTED, i]
-        judge(e, rules[0], state[_P2, i], lowest[i], highest[i], vented, lost, figures, i)
+        judge(e, rules[0], state[_P2, i], lowest[i], highest[i], vented, figures, i)
         measure(e, state_at(state, STATE, i), sensors[i], noise[i, e.steps % NOISE_BLOCK])
         remember(e)
         observe(e, observation[i])

@@ -12,7 +12,6 @@ from epv_env.infos import step_info
 from epv_env.observation import observation_space
 from epv_env.plant.plantfile import load_plant
 from epv_env.render import Renderer, Snapshot
-from epv_env.result import single_result
 from epv_env.settings import make_settings, with_options
 from epv_env.task import LimitingTask
 
@@ -78,7 +77,7 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
         return observation, {}
 
     def step(self, action: Any) -> tuple[NDArray, SupportsFloat, bool, bool, dict[str, Any]]:
-        result = single_result(*self.task.advance(*self.action.decode(np.asarray(action)[None])))
+        result = self.task.step(*self.action.decode(np.asarray(action)[None])).single()
         self._consumption = result.consumption
         if self.render_mode == "human":
             self.render()

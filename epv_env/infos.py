@@ -2,21 +2,29 @@
 
 from typing import Any
 
-from epv_env.result import StepResult
+from epv_env.result import SUCCEEDED, StepResult
 from epv_env.reward import RewardTerms
 
-_TERMS = tuple(f"reward_{name}" for name in RewardTerms._fields)
+KEYS = (
+    *(f"reward_{name}" for name in RewardTerms._fields),
+    "deviation_bar",
+    "switchings",
+    "vented_g",
+    "consumption_g_per_s",
+    "is_success",
+)
+"""In the order of the figures of a StepResult."""
+_SHOWN = SUCCEEDED + 1
 
 
 def step_info(result: StepResult) -> dict[str, Any]:
-    """Arrays (n,) by key, or Python numbers if the result holds those of one episode.
+    """Arrays (n,) by key, or Python numbers for a single episode.
 
     "reward_NAME": each term of the reward; "deviation_bar": p2 - target of largest magnitude within
     the period; "switchings" of the coil; "vented_g": air blown off [g]; "consumption_g_per_s";
     "is_success": settled and inside ±500 mbar ever since.
     """
-    info = dict(zip(_TERMS, result.terms, strict=True))
-    info["deviation_bar"] = result.deviation_bar
+    info: dict[str, Any] = dict(zip(KEYS, result.figures[:_SHOWN], strict=True))
     info["switchings"] = result.switchings
     info["vented_g"] = 1e3 * result.vented_kg
     info["consumption_g_per_s"] = 1e3 * result.consumption

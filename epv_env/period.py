@@ -90,16 +90,17 @@ def refilled(e, p1):
 
 
 @exact
-def judge(e, rules, p2, lowest, highest, vented, lost, figures, i):
-    """End a period: reward and figures of episode i, whose switchings stand in the table.
+def judge(e, rules, p2, lowest, highest, vented, figures, i):
+    """End a period: reward and figures of episode i.
 
-    p2, lowest, highest: pressure at the end and its extremes [Pa]. vented: air blown off [kg].
-    lost: the plant could not be integrated; the episode fails, for a learner must not meet a NaN.
+    p2, lowest, highest: pressure at the end and its extremes [Pa]. vented: air blown off [kg]. Its
+    switchings stand in the table, and whether the plant could not be integrated: the episode has then
+    failed, for a learner must not meet a NaN.
     """
     e.steps += 1
     error, above, below = p2 / BAR - e.target, highest / BAR - e.target, lowest / BAR - e.target
     deviation = above if above > -below else below
-    failed = lost or p2 <= _EMPTY
+    failed = figures[FAILED, i] != 0.0 or p2 <= _EMPTY
     settled = e.steps * rules.control_period > rules.settling_time
     e.violated |= settled and abs(deviation) > BAND_BAR
     terms = _priced(

@@ -1,7 +1,7 @@
 """What a control period gave: the compiled step's table of figures, and the same by name."""
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,58 +9,57 @@ from numpy.typing import NDArray
 from epv_env.plant.primitives.values import Value
 from epv_env.reward import RewardTerms
 
-
-class StepResult(NamedTuple):
-    """One control period of every episode; arrays of shape (n,) unless said otherwise."""
-
-    observation: NDArray
-    """(n, entries) float32."""
-    reward: Value
-    """Sum of the terms [-]."""
-    terms: RewardTerms
-    """Contribution of each weight [-]."""
-    failed: Value
-    """The circuit is empty, or the plant left what can be integrated: what ends an episode."""
-    deviation_bar: Value
-    """p2 - target of largest magnitude within the period."""
-    switchings: Value
-    """Switchings of the coil within the period."""
-    vented_kg: Value
-    """Air blown off within the period [kg]."""
-    consumption: Value
-    """Mean consumption of the period [kg/s]."""
-    succeeded: Value
-    """Settled and never outside the band since."""
-
-
 N_TERM = len(RewardTerms._fields)
 """Rows of the reward's terms, which begin a table of figures."""
-REWARD, FAILED, DEVIATION, SWITCHINGS, VENTED, CONSUMPTION, SUCCEEDED = range(N_TERM, N_TERM + 7)
-"""The other rows, named as the fields of StepResult; truth values are 0 and 1."""
-N_FIGURE = SUCCEEDED + 1
+DEVIATION, SWITCHINGS, VENTED, CONSUMPTION, SUCCEEDED, REWARD, FAILED = range(N_TERM, N_TERM + 7)
+"""The other rows, named as the properties of StepResult [SI, bar]; truth values are 0 and 1."""
+N_FIGURE = FAILED + 1
 """Rows of a table of figures."""
 
 
-def batch_result(observation: NDArray, figures: NDArray) -> StepResult:
-    """Views of figures (N_FIGURE, n) for observations (n, entries)."""
-    return _named(observation, list(figures), lambda row: row.astype(np.int64))
+class StepResult(NamedTuple):
+    """One control period of every episode, or of a single one.
 
+    The properties are arrays (n,), or Python numbers for a single episode.
+    """
 
-def single_result(observation: NDArray, figures: NDArray) -> StepResult:
-    """The same for a batch of one, as Python numbers; observation (entries,)."""
-    return _named(observation[0], figures[:, 0].tolist(), int)
+    observation: NDArray
+    """(n, entries) float32 [-], or (entries,)."""
+    figures: NDArray | Sequence[float]
+    """(N_FIGURE, n) in the order of this module's rows, or a list of N_FIGURE numbers."""
 
+    @property
+    def reward(self) -> Value:
+        """Sum of the terms [-]."""
+        return self.figures[REWARD]
 
-def _named(observation: NDArray, rows: list[Any], whole: Callable[[Any], Any]) -> StepResult:
-    """Rows of figures by name; whole: makes whole numbers of a row."""
-    return StepResult(
-        observation=observation,
-        reward=rows[REWARD],
-        terms=RewardTerms(*rows[:N_TERM]),
-        failed=rows[FAILED] != 0,
-        deviation_bar=rows[DEVIATION],
-        switchings=whole(rows[SWITCHINGS]),
-        vented_kg=rows[VENTED],
-        consumption=rows[CONSUMPTION],
-        succeeded=rows[SUCCEEDED] != 0,
-    )
+    @property
+    def failed(self) -> Value:
+        """The circuit is empty, or the plant left what can be integrated: what ends an episode."""
+        return self.figures[FAILED] != 0
+
+    @property
+    def switchings(self) -> Value:
+        """Switchings of the coil within the period."""
+        found = self.figures[SWITCHINGS]
+        return int(found) if isinstance(found, float) else found.astype(np.int64)
+
+    @property
+    def vented_kg(self) -> Value:
+        """Air blown off within the period [kg]."""
+        return self.figures[VENTED]
+
+    @property
+    def consumption(self) -> Value:
+        """Mean consumption of the period [kg/s]."""
+        return self.figures[CONSUMPTION]
+
+    @property
+    def succeeded(self) -> Value:
+        """Settled and never outside the band since."""
+        return self.figures[SUCCEEDED] != 0
+
+    def single(self) -> "StepResult":
+        """The result of a batch of one as that of a single episode."""
+        assert isinstance(self.figures, np.ndarray), "a single result is single already"
+        return StepResult(self.observation[0], self.figures[:, 0].tolist())

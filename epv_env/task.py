@@ -28,7 +28,7 @@ from epv_env.plant.simulate import energised
 from epv_env.plant.supply import Supply
 from epv_env.plant.threads import share
 from epv_env.plant.valves import Valves
-from epv_env.result import N_FIGURE, StepResult, batch_result
+from epv_env.result import N_FIGURE, StepResult
 from epv_env.settings import Settings
 
 PRESSURES = ("p1", "p2", "p3")
@@ -121,12 +121,11 @@ class LimitingTask:
     def step(self, on_time: NDArray, action: NDArray) -> StepResult:
         """Energise each coil for the first `on_time` (n,) of the period [s], then switch it off.
 
-        action: (n,) the fraction that was asked for, as the next observation shows it.
+        action: (n,) the fraction that was asked for, as the next observation shows it. Raises ValueError
+        unless there is one of each for every episode.
         """
-        return batch_result(*self.advance(on_time, action))
-
-    def advance(self, on_time: NDArray, action: NDArray) -> tuple[NDArray, NDArray]:
-        """`step`, whose observations (n, entries) and figures (epv_env.result) are left in tables."""
+        if not on_time.shape == action.shape == (self.n,):
+            raise ValueError(f"got {len(on_time)} actions for {self.n} episodes: give one each")
         self._until_noise -= 1
         if self._until_noise == 0:
             self._draw_noise(np.flatnonzero((self.steps + 1) % NOISE_BLOCK == 0))
@@ -136,14 +135,14 @@ class LimitingTask:
         observation = np.empty((self.n, len(LAYOUT)), dtype=np.float32)
         figures = np.empty((N_FIGURE, self.n))
         arguments = (*self._fixed, on_time, action, figures, observation)
-        lanes, threads = len(self._duration[0]), self.valves.threads
+        lanes, threads = self._inputs.shape[2], self.valves.threads
         if self.valves.nominal:
             share(lambda first, last: step_whole(*arguments, first, last), lanes, threads=threads)
         else:
             step_prepare(*arguments, 0, lanes)
             self._drive()
             step_conclude(*arguments, 0, lanes)
-        return observation, figures
+        return StepResult(observation, figures)
 
     def _drive(self) -> None:
         """Advance valves with effects through the part with the coil on, then the part with it off."""

@@ -14,7 +14,7 @@ FLAGS = {"fastmath": {"nnan", "ninf", "nsz", "contract", "arcp"}, "error_model":
 inlined = numba.njit(forceinline=True, **FLAGS)
 """Decorator for the small functions that the kernels absorb."""
 
-exact = numba.njit(error_model="numpy")
+exact = numba.njit(forceinline=True, error_model="numpy")
 """Decorator for functions of numbers that give what NumPy gives, to the bit: nothing is contracted."""
 
 
