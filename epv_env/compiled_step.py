@@ -13,6 +13,7 @@ figures (N_FIGURE, n), observation (n, entries) float32: results.
 first, last: lanes, multiples of LANES.
 """
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numba
@@ -96,7 +97,7 @@ _DIGEST = source_digest(*Path(__file__).parent.glob("*.py"))
 def _compiled(digest):
     """The step as a whole for nominal valves, and its two ends for others."""
 
-    def compiled(function):
+    def compiled(function: Callable[..., None]) -> Callable[..., None]:
         return numba.njit(function, cache=True, nogil=True, error_model="numpy")
 
     @compiled

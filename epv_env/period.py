@@ -57,7 +57,7 @@ _true_readings = generated(
     "state, p",
     f"return ({', '.join(f'{name}(state, p) / {CHANNEL[name].scale!r}' for name in MEASURED)},)",
     decorator=exact,
-    **{name: exact(CHANNEL[name].reading) for name in MEASURED},
+    **{c.name: exact(c.reading) for c in CHANNEL.values() if c.reading is not None},
 )
 """What each sensor has before it [bar, A], from a State and a record of sensor parameters."""
 

@@ -1,6 +1,5 @@
 """What a control period gave: the compiled step's table of figures, and the same by name."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +24,7 @@ class StepResult(NamedTuple):
 
     observation: NDArray
     """(n, entries) float32 [-], or (entries,)."""
-    figures: NDArray | Sequence[float]
+    figures: Value
     """(N_FIGURE, n) in the order of this module's rows, or a list of N_FIGURE numbers."""
 
     @property
@@ -61,5 +60,4 @@ class StepResult(NamedTuple):
 
     def single(self) -> "StepResult":
         """The result of a batch of one as that of a single episode."""
-        assert isinstance(self.figures, np.ndarray), "a single result is single already"
         return StepResult(self.observation[0], self.figures[:, 0].tolist())

@@ -21,7 +21,7 @@ from epv_env.episode import EPISODE, Start
 from epv_env.observation import LAYOUT, LONGEST_WAIT
 from epv_env.period import rules_of
 from epv_env.plant.consumption import Profiles
-from epv_env.plant.lanes import N_INPUT, N_STATE
+from epv_env.plant.lanes import LANES, N_INPUT, N_STATE
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.readings import MEASURED
 from epv_env.plant.simulate import energised
@@ -154,10 +154,8 @@ class LimitingTask:
 
     def _set_plants(self, where: NDArray, starts: Sequence[Start]) -> None:
         """Give the valves at `where` their parameters and their first state."""
-        p = {
-            symbol: np.array([start.parameters[symbol] for start in starts])
-            for symbol in starts[0].parameters
-        }
+        values = np.array([list(start.parameters.values()) for start in starts])
+        p = dict(zip(starts[0].parameters, values.T, strict=True))
         volumes = np.array([start.supply.volume for start in starts])
         self.valves.set_parameters(where, p, volumes)
         p1, p2, p3 = (np.array([getattr(start, name) for start in starts]) for name in PRESSURES)
@@ -175,11 +173,16 @@ class LimitingTask:
 
     def _draw_noise(self, where: NDArray) -> None:
         """Fill the blocks of noise of the episodes `where`."""
-        for i in where.tolist():
-            rng = self._noise_of[i]
-            if rng is not None and self.settings.sensor_noise:
-                rng.standard_normal(out=self._noise[i])
-                self._noise[i] *= self.settings.sensor_noise
+
+        def draw(first: int, last: int) -> None:
+            for i in where[first:last].tolist():
+                rng = self._noise_of[i]
+                if rng is not None:
+                    rng.standard_normal(out=self._noise[i])
+                    self._noise[i] *= self.settings.sensor_noise
+
+        if self.settings.sensor_noise:
+            share(draw, -(-len(where) // LANES) * LANES, threads=self.valves.threads)
 
     def _count_to_noise(self, ahead: int = 0) -> None:
         """Find the number of steps after which some episode has used up its block of noise.

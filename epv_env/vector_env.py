@@ -16,7 +16,6 @@ from epv_env.plant.plantfile import load_plant
 from epv_env.settings import OptionError, make_settings, with_options
 from epv_env.task import LimitingTask
 
-
 _MASKS = tuple(f"_{key}" for key in KEYS)
 
 

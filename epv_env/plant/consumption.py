@@ -127,8 +127,8 @@ PROGRESS = np.dtype(
     ],
     align=True,
 )
-"""A profile and how far it has been read: leak [kg/s], applications, length of their sequence [s], number
-of the application under way, or else of the next one, and when the sequence began last [s]."""
+"""A profile and how far it has been read: leak [kg/s], applications, length of their sequence [s],
+number of the application under way, or else of the next one, and when the sequence began last [s]."""
 
 
 @exact

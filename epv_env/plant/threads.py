@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
+from itertools import pairwise
 
 from epv_env.plant.lanes import LANES
 
@@ -36,7 +37,7 @@ def share(work: Callable[[int, int], None], lanes: int, *, threads: int, periods
         work(0, lanes)
         return
     edges = [lanes // LANES * part // tasks * LANES for part in range(tasks + 1)]
-    others = [_pool(os.getpid()).submit(work, *ends) for ends in zip(edges[1:], edges[2:], strict=False)]
+    others = [_pool(os.getpid()).submit(work, *ends) for ends in pairwise(edges[1:])]
     try:
         work(edges[0], edges[1])
     finally:

@@ -19,7 +19,7 @@ from epv_env.plant.threads import available_cores, share
 
 
 class Tables(NamedTuple):
-    """Arrays of a batch as the kernels take them (`integrate.run_nominal`), and the sensors' parameters."""
+    """Arrays of a batch as the kernels (`integrate.run_nominal`) and the sensors take them."""
 
     state: NDArray
     """(N_STATE, lanes) [SI]."""
@@ -114,7 +114,9 @@ class Valves:
 
     def readings(self) -> dict[str, NDArray]:
         """What the sensors of p1, p2, p3 and I have before them [Pa, A], shape (n,)."""
-        return readings(self.state, {symbol: self._sensors[symbol][: self.n] for symbol in SENSOR_SYMBOLS})
+        return readings(
+            self.state, {symbol: self._sensors[symbol][: self.n] for symbol in SENSOR_SYMBOLS}
+        )
 
     def advance(self, duration: ArrayLike) -> None:
         """Apply `inputs` for `duration` [s], one for all or one per valve (n,).
