@@ -43,10 +43,8 @@ class Scenario:
 
     def draw(self, rng: np.random.Generator) -> "Profile":
         """One episode's consumption."""
-        rise, hold, fall, pause, flow = (
-            rng.uniform(*ends, size=APPLICATIONS)
-            for ends in (self.rise, self.hold, self.fall, self.pause, self.flow)
-        )
+        low, high = np.transpose([self.rise, self.hold, self.fall, self.pause, self.flow])[..., None]
+        rise, hold, fall, pause, flow = low + (high - low) * rng.random((5, APPLICATIONS))
         lengths = rise + hold + fall + pause
         start = rng.uniform(*self.first) + np.cumsum(lengths) - lengths
         return Profile(

@@ -104,8 +104,9 @@ class Valves:
         infinite for a supply that does not sag.
         """
         self._coefficients[:, where] = coefficients(p, reservoir_volume)
-        self._effects[:, where] = effect_constants(p)
-        self._with_effects = has_effects(self._effects)
+        constants = effect_constants(p)
+        self._effects[:, where] = constants
+        self._with_effects[where] = has_effects(constants)
         self._delay[where] = p["t_delay"]
         self._acting_U[where] = np.nan
         for symbol in SENSOR_SYMBOLS:
