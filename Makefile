@@ -51,7 +51,7 @@ test-oldest: $(OLDEST)/.installed ## run the plant and environment tests on the 
 	NUMBA_CACHE_DIR=$(CURDIR)/$(OLDEST)/numba-cache \
 		$(OLDEST)/bin/python -m pytest tests/common tests/plant tests/env -m "not training"
 
-bench: $(VENV)/.installed ## measure speed and memory of plant and identification (a quarter of an hour)
+bench: $(VENV)/.installed ## measure speed and memory (a quarter of an hour); ARGS="--against HEAD~1" pairs with a commit
 	$(PY) -m tests.benchmarks $(ARGS)
 
 tune: $(VENV)/.installed ## search the classic controllers' settings anew (minutes)

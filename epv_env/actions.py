@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import gymnasium
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,10 +28,10 @@ class OnOff:
 
     def decode(self, actions: NDArray) -> tuple[NDArray, NDArray]:
         """Time on [s] and commanded fraction for actions (n,)."""
-        on = np.asarray(actions).reshape(len(actions)) == 1
-        if not np.all(on | (np.asarray(actions).reshape(len(actions)) == 0)):
+        on_time, on, valid = _on_off(_numbers(actions), self.period)
+        if not valid:
             raise ActionError(f"actions {actions!r} are not all 0 (coil off) or 1 (coil on)")
-        return np.where(on, self.period, 0.0), on.astype(float)
+        return on_time, on
 
 
 @dataclass(frozen=True)
@@ -53,9 +54,37 @@ class PWM:
 
     def decode(self, actions: NDArray) -> tuple[NDArray, NDArray]:
         """Time on [s] and realised fraction for actions (n, 1)."""
-        if not np.all(np.isfinite(actions)):
-            raise ActionError(f"actions {actions!r} are not all finite: give numbers in [-1, 1]")
-        duty = np.clip((np.asarray(actions, float).reshape(len(actions)) + 1) / 2, 0.0, 1.0)
         slots = max(round(self.period / self.resolution), 1)
-        duty = np.rint(duty * slots) / slots
-        return np.where(duty >= 1.0, self.period, duty * self.period), duty
+        on_time, duty, valid = _modulated(_numbers(actions), self.period, slots)
+        if not valid:
+            raise ActionError(f"actions {actions!r} are not all finite: give numbers in [-1, 1]")
+        return on_time, duty
+
+
+def _numbers(actions: NDArray) -> NDArray:
+    """Actions (n,) or (n, 1) of any type of number as float64, (n,)."""
+    return np.asarray(actions, np.float64).reshape(len(actions))
+
+
+@numba.njit(cache=True)
+def _on_off(actions: NDArray, period: float) -> tuple[NDArray, NDArray, bool]:
+    """Time on (n,) [s], commanded fraction (n,) [-], and whether all actions (n,) are 0 or 1."""
+    on_time = np.empty(len(actions))
+    valid = True
+    for i in range(len(actions)):
+        on_time[i] = period if actions[i] == 1.0 else 0.0
+        valid &= (actions[i] == 0.0) | (actions[i] == 1.0)
+    return on_time, actions, valid
+
+
+@numba.njit(cache=True)
+def _modulated(actions: NDArray, period: float, slots: int) -> tuple[NDArray, NDArray, bool]:
+    """Time on (n,) [s], duty (n,) [-] in whole slots, and whether all actions (n,) are finite."""
+    on_time, duty = np.empty(len(actions)), np.empty(len(actions))
+    valid = True
+    for i in range(len(actions)):
+        asked = min(max((actions[i] + 1.0) / 2.0, 0.0), 1.0)
+        duty[i] = np.rint(asked * slots) / slots
+        on_time[i] = period if duty[i] >= 1.0 else duty[i] * period
+        valid &= np.isfinite(actions[i])
+    return on_time, duty, valid

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from epv_env.actions import PWM, OnOff
 from epv_env.common.units import BAR, GRAM
-from epv_env.infos import single_info
+from epv_env.infos import step_info
 from epv_env.observation import observation_space
 from epv_env.plant.plantfile import load_plant
 from epv_env.render import Renderer, Snapshot
@@ -77,13 +77,11 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
         return observation, {}
 
     def step(self, action: Any) -> tuple[NDArray, SupportsFloat, bool, bool, dict[str, Any]]:
-        on_time, asked = self.action.decode(np.asarray(action)[None])
-        result = self.task.step(on_time, asked)
-        self._consumption = float(result.consumption[0])
+        result = self.task.step(*self.action.decode(np.asarray(action)[None])).single()
+        self._consumption = result.consumption
         if self.render_mode == "human":
             self.render()
-        info = single_info(result)
-        return result.observation[0], float(result.reward[0]), bool(result.failed[0]), False, info
+        return result.observation, result.reward, result.failed, False, step_info(result)
 
     def snapshot(self) -> Snapshot:
         """The true state at this instant, for pictures and logs (a controller must not see it)."""
@@ -100,7 +98,7 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
             xPV_fraction=float(state.xPV[0]) / p["xPVmax"],
             xMV_fraction=float(state.xMV[0]) / p["xMVmax"],
             I_A=float(state.I[0]),
-            coil_on=bool(self.task.valves.inputs.U[0] > 0),
+            coil_on=bool(self.task.coil[0]),
             sigma_S_g_per_s=self._consumption / GRAM,
         )
 

@@ -2,29 +2,31 @@
 
 from typing import Any
 
-from numpy.typing import NDArray
-
+from epv_env.result import SUCCEEDED, StepResult
 from epv_env.reward import RewardTerms
-from epv_env.task import StepResult
+
+KEYS = (
+    *(f"reward_{name}" for name in RewardTerms._fields),
+    "deviation_bar",
+    "switchings",
+    "vented_g",
+    "consumption_g_per_s",
+    "is_success",
+)
+"""In the order of the figures of a StepResult."""
+_SHOWN = SUCCEEDED + 1
 
 
-def batch_info(result: StepResult) -> dict[str, NDArray]:
-    """Arrays (n,) by key.
+def step_info(result: StepResult) -> dict[str, Any]:
+    """Arrays (n,) by key, or Python numbers for a single episode.
 
     "reward_NAME": each term of the reward; "deviation_bar": p2 - target of largest magnitude within
     the period; "switchings" of the coil; "vented_g": air blown off [g]; "consumption_g_per_s";
     "is_success": settled and inside ±500 mbar ever since.
     """
-    infos = {f"reward_{name}": getattr(result.terms, name) for name in RewardTerms._fields}
-    return infos | {
-        "deviation_bar": result.deviation_bar,
-        "switchings": result.switchings,
-        "vented_g": 1e3 * result.vented_kg,
-        "consumption_g_per_s": 1e3 * result.consumption,
-        "is_success": result.succeeded,
-    }
-
-
-def single_info(result: StepResult) -> dict[str, Any]:
-    """The same for a batch of one, as Python numbers."""
-    return {key: value[0].item() for key, value in batch_info(result).items()}
+    info: dict[str, Any] = dict(zip(KEYS, result.figures[:_SHOWN], strict=True))
+    info["switchings"] = result.switchings
+    info["vented_g"] = 1e3 * result.vented_kg
+    info["consumption_g_per_s"] = 1e3 * result.consumption
+    info["is_success"] = result.succeeded
+    return info

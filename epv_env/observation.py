@@ -63,20 +63,27 @@ LAYOUT = _layout()
 INDEX = {quantity.name: row for row, quantity in enumerate(LAYOUT)}
 """Row of each entry."""
 
-_CENTRE = np.array([quantity.centre for quantity in LAYOUT])
-_SCALE = np.array([quantity.scale for quantity in LAYOUT])
-_LIMIT = np.array([quantity.limit for quantity in LAYOUT], dtype=np.float32)
+CENTRE, SCALE, LIMIT = (
+    np.array([getattr(quantity, name) for quantity in LAYOUT]) for name in ("centre", "scale", "limit")
+)
+"""The layout's numbers by row."""
 
 
 def observation_space() -> gymnasium.spaces.Box:
     """The finite box of one observation, float32."""
-    return gymnasium.spaces.Box(-_LIMIT, _LIMIT, dtype=np.float32)
+    limit = LIMIT.astype(np.float32)
+    return gymnasium.spaces.Box(-limit, limit, dtype=np.float32)
+
+
+def scaled(value, centre, scale, limit):
+    """A value as the observation shows it [-]; numbers or arrays. The step compiles this function."""
+    return np.minimum(np.maximum((value - centre) / scale, -limit), limit)
 
 
 def encode(values: dict[str, NDArray]) -> NDArray:
     """Observations (n, entries) float32 [-] from physical values (n,) by entry name [bar, A, s]."""
     columns = np.stack([values[quantity.name] for quantity in LAYOUT], axis=-1)
-    return np.clip((columns - _CENTRE) / _SCALE, -_LIMIT, _LIMIT).astype(np.float32)
+    return scaled(columns, CENTRE, SCALE, LIMIT).astype(np.float32)
 
 
 def decode(observations: NDArray, name: str) -> NDArray:

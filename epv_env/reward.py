@@ -57,10 +57,32 @@ class RewardTerms(NamedTuple):
 
     def total(self) -> NDArray:
         """The reward, the sum of all terms, (n,) [-]."""
-        return (
-            self.band + self.tracking + self.breakdown + self.switching + self.vented_air
-            + self.failure
-        )  # fmt: skip
+        return total(self)
+
+
+def total(terms):
+    """Sum of RewardTerms [-]. The step compiles this function."""
+    return (
+        terms.band + terms.tracking + terms.breakdown + terms.switching + terms.vented_air
+        + terms.failure
+    )  # fmt: skip
+
+
+def priced(
+    weights, period, error_bar, highest_error_bar, lowest_error_bar, switchings, vented_kg, failed
+):
+    """`reward_terms` of numbers or arrays, by position. The step compiles this function."""
+    scale = period / REFERENCE_PERIOD
+    outside = np.maximum(highest_error_bar, -lowest_error_bar) > weights.band_bar
+    shortfall = np.maximum(-lowest_error_bar, 0.0)
+    return RewardTerms(
+        band=-weights.band * scale * outside,
+        tracking=-weights.tracking * scale / BAND_BAR * np.abs(error_bar),
+        breakdown=-weights.breakdown * scale / BAND_BAR * shortfall,
+        switching=-weights.switching * switchings,
+        vented_air=-weights.vented_air * 1e3 * vented_kg,
+        failure=-weights.failure * failed,
+    )
 
 
 def reward_terms(
@@ -86,14 +108,6 @@ def reward_terms(
         vented_kg: air blown off, (n,) [kg].
         failed: whether the circuit is empty, boolean (n,).
     """
-    scale = period / REFERENCE_PERIOD
-    outside = np.maximum(highest_error_bar, -lowest_error_bar) > weights.band_bar
-    shortfall = np.maximum(-lowest_error_bar, 0.0)
-    return RewardTerms(
-        band=-weights.band * scale * outside,
-        tracking=-weights.tracking * scale / BAND_BAR * np.abs(error_bar),
-        breakdown=-weights.breakdown * scale / BAND_BAR * shortfall,
-        switching=-weights.switching * switchings,
-        vented_air=-weights.vented_air * 1e3 * vented_kg,
-        failure=-weights.failure * failed,
+    return priced(
+        weights, period, error_bar, highest_error_bar, lowest_error_bar, switchings, vented_kg, failed
     )

@@ -5,86 +5,34 @@ generators of its own, one for the plant's parameters, one for pressures, target
 for the noise, so that two plants compared under one seed meet the same disturbance and noise.
 """
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.common.units import BAR
-from epv_env.observation import HISTORY, LONGEST_WAIT, P2_LAGS, P3_LAGS, encode
-from epv_env.plant.channels import CHANNEL
-from epv_env.plant.consumption import Profile, Profiles, draw_profile
-from epv_env.plant.equations import State
+from epv_env.compiled_step import (
+    NOISE_BLOCK,
+    observe_first,
+    step_conclude,
+    step_prepare,
+    step_whole,
+)
+from epv_env.episode import EPISODE, Start
+from epv_env.observation import LAYOUT, LONGEST_WAIT
+from epv_env.period import rules_of
+from epv_env.plant.consumption import Profiles
+from epv_env.plant.lanes import LANES, N_INPUT, N_STATE
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.readings import MEASURED
 from epv_env.plant.simulate import energised
 from epv_env.plant.supply import Supply
+from epv_env.plant.threads import share
 from epv_env.plant.valves import Valves
-from epv_env.reward import BAND_BAR, RewardTerms, reward_terms
-from epv_env.settings import EMPTY_CIRCUIT_BAR, Settings
+from epv_env.result import N_FIGURE, StepResult
+from epv_env.settings import Settings
 
 PRESSURES = ("p1", "p2", "p3")
 """Pressures with which an episode begins."""
-NOISE_BLOCK = 256
-"""Samples of noise drawn at a time for each episode."""
-
-
-class StepResult(NamedTuple):
-    """One control period of every episode; arrays of shape (n,) unless said otherwise."""
-
-    observation: NDArray
-    """(n, entries) float32."""
-    reward: NDArray
-    """Sum of the terms [-]."""
-    terms: RewardTerms
-    """Contribution of each weight [-]."""
-    failed: NDArray
-    """The circuit is empty, or the plant left what can be integrated: what ends an episode."""
-    deviation_bar: NDArray
-    """p2 - target of largest magnitude within the period."""
-    switchings: NDArray
-    """Switchings of the coil within the period."""
-    vented_kg: NDArray
-    """Air blown off within the period [kg]."""
-    consumption: NDArray
-    """Mean consumption of the period [kg/s]."""
-    succeeded: NDArray
-    """Settled and never outside the band since."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Start:
-    """Everything random about one episode but its noise."""
-
-    parameters: Parameters
-    p1: float
-    p2: float
-    p3: float
-    target: float
-    consumption: Profile
-    noise: np.random.Generator
-    supply: Supply
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, settings: Settings) -> "_Start":
-        """Draw an episode; rng gives one seed, from which the three streams of the episode come."""
-        seed = int(rng.integers(2**63))
-        plant, disturbance, noise = (np.random.default_rng((seed, stream)) for stream in range(3))
-        p1 = settings.supply.draw(disturbance)
-        target = disturbance.uniform(*settings.target_bar)
-        drop = disturbance.uniform(*settings.drop_bar)
-        consumption = draw_profile(settings.scenario, disturbance)
-        # Draws that only some settings need come last: they must not shift the others.
-        p2 = target - drop if settings.p2_bar is None else disturbance.uniform(*settings.p2_bar)
-        p3 = p1 if settings.p3_bar is None else disturbance.uniform(*settings.p3_bar) * BAR
-        return cls(
-            parameters=settings.region.draw(plant),
-            p1=p1, p2=p2 * BAR, p3=p3, target=target,
-            consumption=consumption,
-            noise=noise,
-            supply=settings.supply,
-        )  # fmt: skip
 
 
 class LimitingTask:
@@ -97,25 +45,42 @@ class LimitingTask:
         self.period = settings.control_period
         self.valves = Valves(n, threads=threads)
         self.parameters: list[Parameters | None] = [None] * n
-        self.target = np.zeros(n)
-        """Target pressure [bar absolute]."""
-        self.steps = np.zeros(n, dtype=np.int64)
-        self.violated = np.zeros(n, dtype=bool)
         self.supplies = [settings.supply] * n
         self.consumption = Profiles(n)
         """What is drawn from each circuit, the rest of the episode included."""
-        self.compressor = np.zeros(n, dtype=bool)
-        """Whether it runs."""
-        self.coil = np.ones(n, dtype=bool)
-        """Whether it is on at the end of the last period."""
-        self._special_supply = False
-        self._action = np.ones(n)
-        self._waited = np.zeros(n)
-        self._noise: list[np.random.Generator | None] = [None] * n
-        self._noise_block = np.zeros((n, NOISE_BLOCK, len(MEASURED)))
-        self._p2_history = np.zeros((n, HISTORY))
-        self._p3_history = np.zeros((n, HISTORY))
-        self._reading = {name: np.zeros(n) for name in MEASURED}
+        self._episodes = np.zeros(n, dtype=EPISODE)
+        self._recorded: list[tuple[Supply, NDArray]] = []  # supplies with a recording, and whose
+        self._noise_of: list[np.random.Generator | None] = [None] * n
+        self._noise = np.zeros((n, NOISE_BLOCK, len(MEASURED)))
+        self._until_noise = NOISE_BLOCK
+        tables = self.valves.tables
+        lanes = tables.state.shape[1]
+        self._inputs, self._duration = np.zeros((2, N_INPUT, lanes)), np.zeros((2, lanes))
+        self._fixed = (
+            self._episodes, self.consumption.progress, rules_of(settings), self._noise, *tables,
+            np.zeros_like(tables.state), self._inputs, self._duration, np.empty((0, N_STATE, lanes)),
+            self.valves.step,
+        )  # fmt: skip
+
+    @property
+    def target(self) -> NDArray:
+        """Target pressure (n,) [bar absolute]."""
+        return self._episodes["target"]
+
+    @property
+    def steps(self) -> NDArray:
+        """Control periods since each episode's start, (n,)."""
+        return self._episodes["steps"]
+
+    @property
+    def compressor(self) -> NDArray:
+        """Whether it runs, boolean (n,)."""
+        return self._episodes["compressor"]
+
+    @property
+    def coil(self) -> NDArray:
+        """Whether it is on at the end of the last period, boolean (n,)."""
+        return self._episodes["coil"]
 
     def time(self) -> NDArray:
         """Time since each episode's start, (n,) [s]."""
@@ -129,164 +94,99 @@ class LimitingTask:
         Returns all observations (n, entries); those of other episodes are as they were.
         """
         where = np.asarray(where)
-        starts = [_Start.draw(rng, chosen) for rng, chosen in zip(rngs, settings, strict=True)]
-        p = {
-            symbol: np.array([start.parameters[symbol] for start in starts])
-            for symbol in starts[0].parameters
-        }
+        starts = [Start.draw(rng, chosen) for rng, chosen in zip(rngs, settings, strict=True)]
+        self._set_plants(where, starts)
+        for i, start in zip(where.tolist(), starts, strict=True):
+            self.parameters[i] = start.parameters
+            self.supplies[i] = start.supply
+            self.consumption.start(i, start.consumption)
+            self._noise_of[i] = start.noise
+        e = self._episodes
+        e["target"][where] = [start.target for start in starts]
+        for name in ("cut_in", "cut_out", "delivery"):
+            e[name][where] = [getattr(start.supply, name) for start in starts]
+        for name in ("steps", "violated", "compressor", "p1_slope"):
+            e[name][where] = 0
+        e["coil"][where] = True
+        e["action"][where] = 1.0
+        e["waited"][where] = LONGEST_WAIT
+        self._find_recorded()
+        self._draw_noise(where)
+        self._count_to_noise()
+        observation = np.empty((self.n, len(LAYOUT)), dtype=np.float32)
+        tables = self.valves.tables
+        observe_first(e, self._noise, tables.state, tables.sensors, where, observation)
+        return observation
+
+    def step(self, on_time: NDArray, action: NDArray) -> StepResult:
+        """Energise each coil for the first `on_time` (n,) of the period [s], then switch it off.
+
+        action: (n,) the fraction that was asked for, as the next observation shows it. Raises ValueError
+        unless there is one of each for every episode.
+        """
+        if not on_time.shape == action.shape == (self.n,):
+            raise ValueError(f"got {len(on_time)} actions for {self.n} episodes: give one each")
+        self._until_noise -= 1
+        if self._until_noise == 0:
+            self._draw_noise(np.flatnonzero((self.steps + 1) % NOISE_BLOCK == 0))
+            self._count_to_noise(ahead=1)
+        for supply, who in self._recorded:
+            self._episodes["p1_slope"][who] = supply.slope(self.time()[who], self.period)
+        observation = np.empty((self.n, len(LAYOUT)), dtype=np.float32)
+        figures = np.empty((N_FIGURE, self.n))
+        arguments = (*self._fixed, on_time, action, figures, observation)
+        lanes, threads = self._inputs.shape[2], self.valves.threads
+        if self.valves.nominal:
+            share(lambda first, last: step_whole(*arguments, first, last), lanes, threads=threads)
+        else:
+            step_prepare(*arguments, 0, lanes)
+            self._drive()
+            step_conclude(*arguments, 0, lanes)
+        return StepResult(observation, figures)
+
+    def _drive(self) -> None:
+        """Advance valves with effects through the part with the coil on, then the part with it off."""
+        for inputs, duration in zip(self._inputs, self._duration[:, : self.n], strict=True):
+            if np.any(duration):
+                for field, values in zip(self.valves.inputs, inputs, strict=True):
+                    field[:] = values[: self.n]
+                self.valves.advance(duration)
+
+    def _set_plants(self, where: NDArray, starts: Sequence[Start]) -> None:
+        """Give the valves at `where` their parameters and their first state."""
+        values = np.array([list(start.parameters.values()) for start in starts])
+        p = dict(zip(starts[0].parameters, values.T, strict=True))
         volumes = np.array([start.supply.volume for start in starts])
         self.valves.set_parameters(where, p, volumes)
         p1, p2, p3 = (np.array([getattr(start, name) for start in starts]) for name in PRESSURES)
         initial = energised(p, p1=p1, p2=p2, U=self.settings.supply_voltage)._replace(p3=p3)
         for field, value in zip(self.valves.state, initial, strict=True):
             field[where] = value
-        for i, start in zip(where.tolist(), starts, strict=True):
-            self.parameters[i] = start.parameters
-            self.target[i] = start.target
-            self.supplies[i] = start.supply
-            self.consumption.start(i, start.consumption)
-            self._noise[i] = start.noise
-        self.steps[where] = 0
-        self.violated[where] = False
-        self.compressor[where] = False
-        self.coil[where] = True
-        self._action[where] = 1.0
-        self._waited[where] = LONGEST_WAIT
-        self._special_supply = any(s is not self.settings.supply for s in self.supplies)
-        return self._observe(where, fresh=True)
 
-    def step(self, on_time: NDArray, action: NDArray) -> StepResult:
-        """Energise each coil for the first `on_time` (n,) of the period [s], then switch it off.
+    def _find_recorded(self) -> None:
+        """Note which episodes have a supply whose recording has to be read in every period."""
+        recorded = {id(s): s for s in self.supplies if s.recording is not None}
+        self._recorded = [
+            (supply, np.flatnonzero([one is supply for one in self.supplies]))
+            for supply in recorded.values()
+        ]
 
-        action: (n,) the fraction that was asked for, as the next observation shows it.
+    def _draw_noise(self, where: NDArray) -> None:
+        """Fill the blocks of noise of the episodes `where`."""
+
+        def draw(first: int, last: int) -> None:
+            for i in where[first:last].tolist():
+                rng = self._noise_of[i]
+                if rng is not None:
+                    rng.standard_normal(out=self._noise[i])
+                    self._noise[i] *= self.settings.sensor_noise
+
+        if self.settings.sensor_noise:
+            share(draw, -(-len(where) // LANES) * LANES, threads=self.valves.threads)
+
+    def _count_to_noise(self, ahead: int = 0) -> None:
+        """Find the number of steps after which some episode has used up its block of noise.
+
+        ahead: steps that are counted in `steps` only after the present one.
         """
-        switchings = self._switch(on_time, action)
-        time = self.time()
-        consumption = self.consumption.mean_flow(time, self.period)
-        state = self.valves.state
-        before = State(*(field.copy() for field in state))
-        self._drive(on_time, time, consumption)
-        lost = self._restore_lost(before)
-        self.steps += 1
-
-        error = state.p2 / BAR - self.target
-        highest = self.valves.highest_p2 / BAR - self.target
-        lowest = self.valves.lowest_p2 / BAR - self.target
-        deviation = np.where(highest > -lowest, highest, lowest)
-        failed = lost | (state.p2 <= EMPTY_CIRCUIT_BAR * BAR)
-        settled = self.time() > self.settings.settling_time
-        self.violated |= settled & (np.abs(deviation) > BAND_BAR)
-        vented_kg = state.air_vented - before.air_vented
-        terms = reward_terms(
-            self.settings.weights,
-            period=self.period,
-            error_bar=error,
-            highest_error_bar=highest,
-            lowest_error_bar=lowest,
-            switchings=switchings,
-            vented_kg=vented_kg,
-            failed=failed,
-        )
-        return StepResult(
-            observation=self._observe(np.arange(self.n), fresh=False),
-            reward=terms.total(),
-            terms=terms,
-            failed=failed,
-            deviation_bar=deviation,
-            switchings=switchings,
-            vented_kg=vented_kg,
-            consumption=consumption,
-            succeeded=settled & ~self.violated & ~failed,
-        )
-
-    def _switch(self, on_time: NDArray, action: NDArray) -> NDArray:
-        """Count the coil's switchings in this period and remember its last state."""
-        begins_on = on_time > 0
-        ends_on = on_time >= self.period
-        switchings = (begins_on != self.coil).astype(np.int64) + (begins_on != ends_on)
-        self.coil = ends_on
-        self._action = action.astype(float)
-        since = np.where(begins_on & ~ends_on, self.period - on_time, self.period)
-        self._waited = np.where(switchings > 0, since, self._waited + self.period)
-        return switchings
-
-    def _drive(self, on_time: NDArray, time: NDArray, consumption: NDArray) -> None:
-        """Advance the plant through the part with the coil on, then the part with it off."""
-        inputs = self.valves.inputs
-        inputs.sigma_S[:] = consumption
-        self._supply_air(time)
-        self.valves.forget_extremes()
-        inputs.U[:] = np.where(on_time > 0, self.settings.supply_voltage, 0.0)
-        whole = (on_time <= 0) | (on_time >= self.period)
-        self.valves.advance(np.where(whole, self.period, on_time))
-        if not np.all(whole):
-            inputs.U[:] = 0.0
-            self.valves.advance(np.where(whole, 0.0, self.period - on_time))
-
-    def _restore_lost(self, before: State) -> NDArray:
-        """Put valves that could not be integrated back where they were, and say which (n,).
-
-        Their episodes fail; a learner must not meet a NaN.
-        """
-        lost = np.isnan(self.valves.state.p2)
-        if np.any(lost):
-            for field, earlier in zip(self.valves.state, before, strict=True):
-                field[lost] = earlier[lost]
-            self.valves.lowest_p2[lost] = self.valves.highest_p2[lost] = before.p2[lost]
-        return lost
-
-    def _supply_air(self, time: NDArray) -> None:
-        """Set what the compressor delivers and what a recorded supply does."""
-        inputs, p1 = self.valves.inputs, self.valves.state.p1
-        if not self._special_supply:
-            supply = self.settings.supply
-            self.compressor = supply.compressor_runs(p1, self.compressor)
-            inputs.refill[:] = supply.delivery * self.compressor
-            inputs.p1_slope[:] = supply.slope(time, self.period)
-            return
-        for i, supply in enumerate(self.supplies):
-            self.compressor[i] = supply.compressor_runs(p1[i], self.compressor[i])
-            inputs.refill[i] = supply.delivery * self.compressor[i]
-            inputs.p1_slope[i] = supply.slope(time[i : i + 1], self.period)[0]
-
-    def _observe(self, where: NDArray, *, fresh: bool) -> NDArray:
-        """Read the sensors of the episodes `where` and encode all observations.
-
-        fresh: these episodes have just begun, so that their past is their present.
-        """
-        for name, values in self._read(where).items():
-            self._reading[name][where] = values
-        for history, name in ((self._p2_history, "p2"), (self._p3_history, "p3")):
-            if fresh:
-                history[where] = self._reading[name][where, None]
-            else:
-                history[:, 1:] = history[:, :-1].copy()
-                history[:, 0] = self._reading[name]
-        p2, p3 = self._p2_history, self._p3_history
-        values = {
-            "p2_error": p2[:, 0] - self.target,
-            "target": self.target,
-            "p1": self._reading["p1"],
-            "p3": p3[:, 0],
-            "I": self._reading["I"],
-            "action": self._action,
-            "since_switching": np.minimum(self._waited, LONGEST_WAIT),
-        }
-        values |= {f"p2_change_{lag}": p2[:, 0] - p2[:, lag] for lag in P2_LAGS}
-        values |= {f"p3_change_{lag}": p3[:, 0] - p3[:, lag] for lag in P3_LAGS}
-        return encode(values)
-
-    def _read(self, where: NDArray) -> dict[str, NDArray]:
-        """Sensor readings of the episodes `where` [bar, A]."""
-        place = self.steps[where] % NOISE_BLOCK
-        for i in where[place == 0]:
-            rng = self._noise[i]
-            if rng is not None and self.settings.sensor_noise:
-                drawn = rng.standard_normal((NOISE_BLOCK, len(MEASURED)))
-                self._noise_block[i] = self.settings.sensor_noise * drawn
-        normal = self._noise_block[where, place]
-        true = {name: value[where] for name, value in self.valves.readings().items()}
-        return {
-            name: CHANNEL[name].sensor.measure(true[name] / CHANNEL[name].scale, normal[:, k])
-            for k, name in enumerate(MEASURED)
-        }
+        self._until_noise = int(np.min(NOISE_BLOCK - (self.steps + ahead) % NOISE_BLOCK))

@@ -10,11 +10,13 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from epv_env.actions import PWM, OnOff
-from epv_env.infos import batch_info
+from epv_env.infos import KEYS, step_info
 from epv_env.observation import observation_space
 from epv_env.plant.plantfile import load_plant
 from epv_env.settings import OptionError, make_settings, with_options
 from epv_env.task import LimitingTask
+
+_MASKS = tuple(f"_{key}" for key in KEYS)
 
 
 class _ValveVectorEnv(gymnasium.vector.VectorEnv):
@@ -66,7 +68,9 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         self.task = LimitingTask(num_envs, self.settings, threads=threads)
         self._rngs = [np_random(None)[0] for _ in range(num_envs)]
         self._begun = np.zeros(num_envs, dtype=bool)
+        self._all_begun = False
         self._done = np.zeros(num_envs, dtype=bool)
+        self._some_done = False
         self._every = np.ones(num_envs, dtype=bool)
 
     def reset(
@@ -86,10 +90,10 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         return self._begin(where, options), {}
 
     def step(self, actions: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray, dict[str, Any]]:
-        if not np.all(self._begun):
+        if not self._all_begun:
             raise gymnasium.error.ResetNeeded("call reset() on all sub-environments before step()")
         stale = self._done
-        if self.mode is AutoresetMode.DISABLED and np.any(stale):
+        if self.mode is AutoresetMode.DISABLED and self._some_done:
             raise OptionError(
                 f"sub-environment {np.flatnonzero(stale)[0]} has ended: reset it with "
                 "options={'reset_mask': mask} before the next step"
@@ -100,9 +104,9 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
             truncated = np.zeros(self.num_envs, dtype=bool)
         else:
             truncated = self.task.steps >= self.max_episode_steps
-        infos: dict[str, Any] = batch_info(result)
+        infos: dict[str, Any] = step_info(result)
         valid = self._every.copy()
-        if self.mode is AutoresetMode.NEXT_STEP and np.any(stale):
+        if self.mode is AutoresetMode.NEXT_STEP and self._some_done:
             observation = self._begin(np.flatnonzero(stale), {})
             reward, terminated, truncated = (
                 np.where(stale, 0, value).astype(value.dtype)
@@ -110,9 +114,10 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
             )
             valid = ~stale
             infos = {key: np.where(stale, 0, value).astype(value.dtype) for key, value in infos.items()}
-        infos |= {f"_{key}": valid for key in infos}
+        infos |= dict.fromkeys(_MASKS, valid)
         self._done = terminated | truncated
-        if self.mode is AutoresetMode.SAME_STEP and np.any(self._done):
+        self._some_done = bool(self._done.any())
+        if self.mode is AutoresetMode.SAME_STEP and self._some_done:
             observation = self._restart(observation, infos)
         return observation, reward, terminated, truncated, infos
 
@@ -141,7 +146,9 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         ]
         self._done = self._done.copy()
         self._done[where] = False
+        self._some_done = bool(self._done.any())
         self._begun[where] = True
+        self._all_begun = bool(self._begun.all())
         return self.task.begin(where, [self._rngs[i] for i in where], settings)
 
     def _own(self, options: dict[str, Any], i: int) -> dict[str, Any]:

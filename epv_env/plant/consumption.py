@@ -5,13 +5,14 @@ be a step or a ramp; the flow over a control period is the exact mean of the pro
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.common.units import GRAM
+from epv_env.plant.primitives.compiled import exact
 
 APPLICATIONS = 128
 """Applications drawn per episode; one that outlasts them meets them again from the first."""
@@ -42,10 +43,8 @@ class Scenario:
 
     def draw(self, rng: np.random.Generator) -> "Profile":
         """One episode's consumption."""
-        rise, hold, fall, pause, flow = (
-            rng.uniform(*ends, size=APPLICATIONS)
-            for ends in (self.rise, self.hold, self.fall, self.pause, self.flow)
-        )
+        low, high = np.transpose([self.rise, self.hold, self.fall, self.pause, self.flow])[..., None]
+        rise, hold, fall, pause, flow = low + (high - low) * rng.random((5, APPLICATIONS))
         lengths = rise + hold + fall + pause
         start = rng.uniform(*self.first) + np.cumsum(lengths) - lengths
         return Profile(
@@ -116,7 +115,21 @@ def draw_profile(scenario: str | Scenario, rng: np.random.Generator) -> Profile:
     return SCENARIOS[scenario].draw(rng)
 
 
-@numba.njit(cache=True)
+PROGRESS = np.dtype(
+    [
+        ("leak", np.float64),
+        ("applications", np.float64, (APPLICATIONS, 5)),
+        ("span", np.float64),
+        ("now", np.int64),
+        ("offset", np.float64),
+    ],
+    align=True,
+)
+"""A profile and how far it has been read: leak [kg/s], applications, length of their sequence [s],
+number of the application under way, or else of the next one, and when the sequence began last [s]."""
+
+
+@exact
 def _ramped(time: float, start: float, width: float) -> float:
     """Integral up to `time` of a flow that rises from 0 to 1 over `width` from `start` [s]."""
     since = max(time - start, 0.0)
@@ -125,71 +138,58 @@ def _ramped(time: float, start: float, width: float) -> float:
     return rising * rising / (2 * width) + max(since - width, 0.0)
 
 
-@numba.njit(cache=True)
+@exact
 def _passed(application: NDArray, begin: float, end: float) -> float:
     """Air taken by an application (5,) between two times [kg]."""
     start, rise, hold, fall, flow = application
+    if end <= start:
+        return 0.0
     release = start + rise + hold
     grown = _ramped(end, start, rise) - _ramped(begin, start, rise)
     faded = _ramped(end, release, fall) - _ramped(begin, release, fall)
     return flow * (grown - faded)
 
 
-class Progress(NamedTuple):
-    """n sequences of applications, and how far they have been read."""
+@exact
+def mean_flow(p: Any, time: float, period: float) -> float:
+    """Mean consumption of one episode over the period that starts at `time` [kg/s].
 
-    applications: NDArray
-    """(n, APPLICATIONS, 5)"""
-    span: NDArray
-    """Length of each sequence [s]."""
-    now: NDArray
-    """Number of the application under way, or else of the next one."""
-    offset: NDArray
-    """When the sequence began last [s]."""
+    p: a record of PROGRESS, which is read on as far as `time`. Applications do not overlap, so at most
+    the present one and the next can touch a period that is shorter than a pause.
+    """
+    start, rise, hold, fall, _ = p.applications[p.now]
+    if time - p.offset >= start + rise + hold + max(fall, _SHORTEST_RAMP):
+        p.now += 1
+    if p.now == APPLICATIONS:
+        p.now = 0
+        p.offset += p.span
+    begin = time - p.offset
+    taken = 0.0
+    for k in range(p.now, min(p.now + 2, APPLICATIONS)):
+        taken += _passed(p.applications[k], begin, begin + period)
+    return p.leak + taken / period
 
 
 @numba.njit(cache=True)
-def _taken(p: Progress, time: NDArray, period: float) -> NDArray:
-    """Air taken by each valve's applications (n,) in the period from `time` (n,) on [kg].
-
-    p is read on as far as `time`.
-    """
-    taken = np.zeros(len(time))
-    for i, applications in enumerate(p.applications):
-        start, rise, hold, fall, _ = applications[p.now[i]]
-        if time[i] - p.offset[i] >= start + rise + hold + max(fall, _SHORTEST_RAMP):
-            p.now[i] += 1
-        if p.now[i] == APPLICATIONS:
-            p.now[i] = 0
-            p.offset[i] += p.span[i]
-        begin = time[i] - p.offset[i]
-        for application in applications[p.now[i] : p.now[i] + 2]:
-            taken[i] += _passed(application, begin, begin + period)
-    return taken
+def _mean_flows(progress: NDArray, time: NDArray, period: float) -> NDArray:
+    """`mean_flow` of each episode, (n,) [kg/s]; progress (n,) of PROGRESS, time (n,) [s]."""
+    flows = np.empty(len(time))
+    for i in range(len(time)):
+        flows[i] = mean_flow(progress[i], time[i], period)
+    return flows
 
 
 class Profiles:
     """The consumption of n episodes, read forward in time."""
 
     def __init__(self, n: int):
-        self._leak = np.zeros(n)
-        self._progress = Progress(
-            applications=np.zeros((n, APPLICATIONS, 5)), span=np.ones(n),
-            now=np.zeros(n, dtype=np.int64), offset=np.zeros(n),
-        )  # fmt: skip
+        self.progress = np.zeros(n, dtype=PROGRESS)
+        """A record of PROGRESS for each episode, (n,)."""
 
     def start(self, i: int, profile: Profile) -> None:
         """Begin episode i with a profile at time 0."""
-        self._leak[i] = profile.leak
-        self._progress.applications[i] = profile.applications.T
-        self._progress.span[i] = profile.span
-        self._progress.now[i] = 0
-        self._progress.offset[i] = 0.0
+        self.progress[i] = (profile.leak, profile.applications.T, profile.span, 0, 0.0)
 
     def mean_flow(self, time: NDArray, period: float) -> NDArray:
-        """Mean consumption over the period that starts at `time` (n,) [kg/s].
-
-        Applications do not overlap, so at most the present one and the next can touch a period that
-        is shorter than a pause.
-        """
-        return self._leak + _taken(self._progress, time, period) / period
+        """Mean consumption over the period that starts at `time` (n,) [kg/s]."""
+        return _mean_flows(self.progress, time, period)

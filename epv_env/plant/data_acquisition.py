@@ -9,6 +9,15 @@ ADC_BITS = 12
 """Resolution of the data acquisition card (section 3)."""
 
 
+def digitised(value, standard_normal, low, noise, resolution, least, greatest):
+    """Reading of a value with noise, in whole steps of the converter from `low` on, within its ends.
+
+    Arguments are numbers or arrays that broadcast; the environment's step compiles this function.
+    """
+    steps = np.rint((value - low + noise * standard_normal) / resolution)
+    return np.minimum(np.maximum(low + steps * resolution, least), greatest)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Sensor:
     """The sensor of one channel, in the unit of the report's tables (bar absolute, A or V)."""
@@ -37,7 +46,9 @@ class Sensor:
         standard_normal: draws of the same shape [-]. A reading saturates where the range and its
         accuracy end.
         """
+        return digitised(value, standard_normal, *self.constants())
+
+    def constants(self) -> tuple[float, float, float, float, float]:
+        """What `digitised` needs: least value, noise, resolution, least and greatest reading."""
         margin = self.accuracy * self.high
-        steps = np.rint((value - self.low + self.noise * standard_normal) / self.resolution)
-        reading = self.low + steps * self.resolution
-        return np.clip(reading, self.low - margin, self.high + margin)
+        return self.low, self.noise, self.resolution, self.low - margin, self.high + margin

@@ -1,7 +1,7 @@
 """The parameters of the valve: the rows of Tables 5-7 and the sets of values made from them."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, ValuesView
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
@@ -104,7 +104,8 @@ class Parameters(Mapping[str, float]):
         missing = [symbol for symbol in table() if symbol not in values]
         if missing:
             raise ParameterError(f"missing parameters: {', '.join(missing)}: give every symbol")
-        self._values = {symbol: checked_value(symbol, value) for symbol, value in values.items()}
+        checked = {symbol: checked_value(symbol, value) for symbol, value in values.items()}
+        self._values = {symbol: checked[symbol] for symbol in table()}
 
     @classmethod
     def nominal(cls) -> "Parameters":
@@ -123,7 +124,14 @@ class Parameters(Mapping[str, float]):
 
     def replace(self, **changes: float) -> "Parameters":
         """A copy with some values changed. Raises ParameterError."""
-        return Parameters({**self._values, **changes})
+        checked = {symbol: checked_value(symbol, value) for symbol, value in changes.items()}
+        changed = Parameters.__new__(Parameters)  # what is not changed has been checked
+        changed._values = {**self._values, **checked}
+        return changed
+
+    def values(self) -> ValuesView[float]:
+        """The values in the order of `table()`."""
+        return self._values.values()
 
     def __getitem__(self, symbol: str) -> float:
         return self._values[symbol]

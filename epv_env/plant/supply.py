@@ -8,6 +8,15 @@ from numpy.typing import NDArray
 from epv_env.common.units import BAR
 
 
+def two_point(p1, ran, cut_in, cut_out):
+    """Whether a compressor runs: from `cut_in` until `cut_out`, by its memory in between.
+
+    Pressures [Pa absolute]; ran: whether it ran before. Arguments are numbers or arrays that broadcast;
+    the environment's step compiles this function.
+    """
+    return (p1 < cut_in) | (ran & (p1 < cut_out))
+
+
 @dataclass(frozen=True, kw_only=True)
 class Supply:
     """The supply of the input chamber, the same rule for every valve of a batch.
@@ -100,4 +109,4 @@ class Supply:
 
         p1: supply pressure (n,) [Pa absolute]. ran: whether it ran before, boolean (n,).
         """
-        return (p1 < self.cut_in) | (ran & (p1 < self.cut_out))
+        return two_point(p1, ran, self.cut_in, self.cut_out)

@@ -1,9 +1,7 @@
 """A batch of valves: the NumPy side of the compiled integrator."""
 
-import os
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
-from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,20 +15,24 @@ from epv_env.plant.equations import Inputs, State
 from epv_env.plant.lanes import LANES, N_INPUT, N_STATE
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.readings import SENSOR_SYMBOLS, readings
-
-LANES_PER_TASK = 4 * LANES
-"""Fewest lanes, times periods, worth a thread of their own."""
+from epv_env.plant.threads import available_cores, share
 
 
-@cache
-def _pool(process_id: int) -> ThreadPoolExecutor:
-    """One pool per process: a forked child must not wait for its parent's threads."""
-    return ThreadPoolExecutor(available_cores(), thread_name_prefix="epv-plant")
+class Tables(NamedTuple):
+    """Arrays of a batch as the kernels (`integrate.run_nominal`) and the sensors take them."""
 
-
-def available_cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    state: NDArray
+    """(N_STATE, lanes) [SI]."""
+    coefficients: NDArray
+    """(N_COEFFICIENT, lanes) [SI]."""
+    effects: NDArray
+    """(N_EFFECT, lanes) [SI]."""
+    lowest: NDArray
+    """Least p2 since `Valves.forget_extremes`, (lanes,) [Pa]."""
+    highest: NDArray
+    """Greatest p2 since then, (lanes,) [Pa]."""
+    sensors: NDArray
+    """A record with SENSOR_SYMBOLS for each valve, (lanes,) [SI]."""
 
 
 class Valves:
@@ -58,7 +60,15 @@ class Valves:
         self._delay = np.zeros(lanes)
         self._acting_U = np.full(lanes, np.nan)
         self._delay_left = np.zeros(lanes)
-        self._sensors = {symbol: np.zeros(lanes) for symbol in SENSOR_SYMBOLS}
+        self._sensors = np.zeros(lanes, dtype=[(symbol, np.float64) for symbol in SENSOR_SYMBOLS])
+        self.nominal = True
+        """Whether no valve has an effect or a delay: `integrate.run_nominal` is then all it takes."""
+
+    @property
+    def tables(self) -> Tables:
+        """The arrays themselves, for compiled code that calls a kernel between work of its own."""
+        return Tables(self._state, self._coefficients, self._effects, self._lowest, self._highest,
+                      self._sensors)  # fmt: skip
 
     @property
     def state(self) -> State:
@@ -94,16 +104,20 @@ class Valves:
         infinite for a supply that does not sag.
         """
         self._coefficients[:, where] = coefficients(p, reservoir_volume)
-        self._effects[:, where] = effect_constants(p)
-        self._with_effects = has_effects(self._effects)
+        constants = effect_constants(p)
+        self._effects[:, where] = constants
+        self._with_effects[where] = has_effects(constants)
         self._delay[where] = p["t_delay"]
         self._acting_U[where] = np.nan
-        for symbol, values in self._sensors.items():
-            values[where] = p[symbol]
+        for symbol in SENSOR_SYMBOLS:
+            self._sensors[symbol][where] = p[symbol]
+        self.nominal = not (np.any(self._with_effects) or np.any(self._delay))
 
     def readings(self) -> dict[str, NDArray]:
         """What the sensors of p1, p2, p3 and I have before them [Pa, A], shape (n,)."""
-        return readings(self.state, {symbol: v[: self.n] for symbol, v in self._sensors.items()})
+        return readings(
+            self.state, {symbol: self._sensors[symbol][: self.n] for symbol in SENSOR_SYMBOLS}
+        )
 
     def advance(self, duration: ArrayLike) -> None:
         """Apply `inputs` for `duration` [s], one for all or one per valve (n,).
@@ -184,10 +198,4 @@ class Valves:
             run(self._state, self._coefficients, self._effects, inputs, duration, self._lowest,
                 self._highest, out, self.step, first, last)  # fmt: skip
 
-        lanes = self._state.shape[1]
-        tasks = min(self.threads, lanes // LANES, lanes * len(duration) // LANES_PER_TASK)
-        if tasks <= 1:
-            work(0, lanes)
-            return
-        edges = np.linspace(0, lanes // LANES, tasks + 1).astype(int) * LANES
-        list(_pool(os.getpid()).map(work, edges[:-1], edges[1:]))
+        share(work, self._state.shape[1], threads=self.threads, periods=len(duration))

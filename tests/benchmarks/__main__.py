@@ -1,10 +1,10 @@
 """All benchmarks in one table, on this machine and in one run.
 
-python -m tests.benchmarks [--quick] [--json PATH]
+python -m tests.benchmarks [--quick] [--json PATH] [--against COMMIT]
 """
 
-from tests.benchmarks import identification, plant
+from tests.benchmarks import environment, identification, plant
 from tests.benchmarks.command_line import run
 
 if __name__ == "__main__":
-    run(__doc__, plant.benchmark, identification.benchmark)
+    run(__doc__, environment.benchmark, plant.benchmark, identification.benchmark)

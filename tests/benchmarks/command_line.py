@@ -13,6 +13,7 @@ import scipy
 
 from epv_env.plant.valves import available_cores
 from tests.benchmarks.measure import Table
+from tests.benchmarks.paired import compare
 
 Benchmark = Callable[[Table, bool], None]
 """Measures into the table; True: few repetitions, short runs."""
@@ -22,6 +23,11 @@ def run(text: str | None, *benchmarks: Benchmark) -> None:
     """Measure and print everything. text: a program's docstring."""
     parser = argparse.ArgumentParser(description=text.splitlines()[0] if text else None)
     parser.add_argument("--quick", action="store_true", help="few repetitions, short runs")
+    parser.add_argument(
+        "--against",
+        metavar="COMMIT",
+        help="only pair the rates of all interfaces with those of this commit, run by turns",
+    )
     parser.add_argument("--json", type=Path, metavar="PATH", help="also write the figures there")
     arguments = parser.parse_args()
     machine = this_machine()
@@ -31,8 +37,11 @@ def run(text: str | None, *benchmarks: Benchmark) -> None:
         "processes on the machine hardly touch; machines are noisy all the same: trust the ratios."
     )
     table = Table()
-    for benchmark in benchmarks:
-        benchmark(table, arguments.quick)
+    if arguments.against:
+        compare(table, arguments.against, arguments.quick)
+    else:
+        for benchmark in benchmarks:
+            benchmark(table, arguments.quick)
     if arguments.json:
         found = {"machine": machine, "quick": arguments.quick, "results": table.as_dict()}
         arguments.json.write_text(json.dumps(found, indent=1))

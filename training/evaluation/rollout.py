@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import epv_env  # noqa: F401 - registers the ids
 from controllers.base import Controller, Privileged
 from epv_env.common.units import BAR
-from epv_env.infos import batch_info
+from epv_env.infos import step_info
 from epv_env.vector_env import EPValvePWMVectorEnv, EPValveVectorEnv
 from training.evaluation.metrics import EpisodeMetrics, Meter
 
@@ -104,7 +104,7 @@ def run_episodes(
         action = controller.act(observation)
         result = env.task.step(*env.action.decode(action))
         observation = result.observation
-        meter.update(result.reward, result.failed, batch_info(result))
+        meter.update(result.reward, result.failed, step_info(result))
         if trace_of is not None:
             state = env.task.valves.state
             coil = env.action.decode(action)[1][trace_of]

@@ -14,15 +14,18 @@ FLAGS = {"fastmath": {"nnan", "ninf", "nsz", "contract", "arcp"}, "error_model":
 inlined = numba.njit(forceinline=True, **FLAGS)
 """Decorator for the small functions that the kernels absorb."""
 
+exact = numba.njit(forceinline=True, error_model="numpy")
+"""Decorator for functions of numbers that give what NumPy gives, to the bit: nothing is contracted."""
 
-def generated(name: str, arguments: str, body: str, **names):
+
+def generated(name: str, arguments: str, body: str, decorator=inlined, **names):
     """An inlined function from source text: one expression per field, so that no field is typed twice.
 
     LLVM vectorises plain indexing; a loop over the fields of a tuple would go through memory.
     """
     namespace = dict(names)
     exec(f"def {name}({arguments}):\n    {body}\n", namespace)
-    return inlined(namespace[name])
+    return decorator(namespace[name])
 
 
 def replacing(kind, *fields: str):
@@ -34,13 +37,13 @@ def replacing(kind, *fields: str):
     return generated("replace", f"q, {', '.join(fields)}", f"return kind({items})", kind=kind)
 
 
-def source_digest() -> str:
-    """Digest of the plant's sources.
+def source_digest(*others: Path) -> str:
+    """Digest of the plant's sources and of other files.
 
     Numba's disk cache notices a change in a kernel's own file only. A kernel that closes over this
     digest is compiled anew when any equation it inlines has changed.
     """
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parents[1].rglob("*.py")):
+    for path in sorted({*Path(__file__).parents[1].rglob("*.py"), *others}):
         digest.update(path.read_bytes())
     return digest.hexdigest()

@@ -1,0 +1,63 @@
+"""What a control period gave: the compiled step's table of figures, and the same by name."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epv_env.plant.primitives.values import Value
+from epv_env.reward import RewardTerms
+
+N_TERM = len(RewardTerms._fields)
+"""Rows of the reward's terms, which begin a table of figures."""
+DEVIATION, SWITCHINGS, VENTED, CONSUMPTION, SUCCEEDED, REWARD, FAILED = range(N_TERM, N_TERM + 7)
+"""The other rows, named as the properties of StepResult [SI, bar]; truth values are 0 and 1."""
+N_FIGURE = FAILED + 1
+"""Rows of a table of figures."""
+
+
+class StepResult(NamedTuple):
+    """One control period of every episode, or of a single one.
+
+    The properties are arrays (n,), or Python numbers for a single episode.
+    """
+
+    observation: NDArray
+    """(n, entries) float32 [-], or (entries,)."""
+    figures: Value
+    """(N_FIGURE, n) in the order of this module's rows, or a list of N_FIGURE numbers."""
+
+    @property
+    def reward(self) -> Value:
+        """Sum of the terms [-]."""
+        return self.figures[REWARD]
+
+    @property
+    def failed(self) -> Value:
+        """The circuit is empty, or the plant left what can be integrated: what ends an episode."""
+        return self.figures[FAILED] != 0
+
+    @property
+    def switchings(self) -> Value:
+        """Switchings of the coil within the period."""
+        found = self.figures[SWITCHINGS]
+        return int(found) if isinstance(found, float) else found.astype(np.int64)
+
+    @property
+    def vented_kg(self) -> Value:
+        """Air blown off within the period [kg]."""
+        return self.figures[VENTED]
+
+    @property
+    def consumption(self) -> Value:
+        """Mean consumption of the period [kg/s]."""
+        return self.figures[CONSUMPTION]
+
+    @property
+    def succeeded(self) -> Value:
+        """Settled and never outside the band since."""
+        return self.figures[SUCCEEDED] != 0
+
+    def single(self) -> "StepResult":
+        """The result of a batch of one as that of a single episode."""
+        return StepResult(self.observation[0], self.figures[:, 0].tolist())
