@@ -48,14 +48,15 @@ def prediction_figure(diagnosis: Diagnosis) -> Figure:
         for label, (_, colour) in models.items():
             error = residuals[label][run][c] * channel.known_noise / channel.scale
             above.plot(own.time, measured - error, color=colour, linewidth=1.2, label=label)
-            below.plot(own.time, error, color=colour, linewidth=0.9)
+            below.plot(own.time, np.where(own.trusted[c], error, np.nan), color=colour, linewidth=0.9)
         above.plot(own.time, measured, color=MEASURED, linewidth=0.8, label="measured")
         _finish(above, f"{channel.name} [{channel.unit}]")
         _finish(below, f"error [{channel.unit}]")
     rows[0].legend(fontsize="small")
     rows[-1].set_xlabel("time [s]")
     figure.suptitle(f"{own.name}, never fitted to", fontsize="medium")
-    figure.align_ylabels()
+    counted = own.time[np.any(own.trusted, axis=0)]
+    rows[-1].set_xlim(counted[0], counted[-1])
     return figure
 
 

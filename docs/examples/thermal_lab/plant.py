@@ -74,7 +74,7 @@ def thermal_lab(folder: Path) -> OdePlant:
     return OdePlant(
         mode="compiled",
         runs=runs,
-        channels=[Channel(name=name, unit="K", scale=1.0, noise=0.12) for name in ("T1", "T2")],
+        channels=[Channel(name=name, unit="°C", scale=1.0, noise=0.12) for name in ("T1", "T2")],
         states=("T1", "T2", "C1", "C2"),
         rate=rate,
         readings=readings,
