@@ -61,13 +61,19 @@ def _row(variable: Variable) -> str:
     return f'    {{"{variable.name}", {variable.kind.upper()}, {text}}},'
 
 
+def compiler_words(compiler: str) -> list[str]:
+    """The words of a compiler's command; none if there is no such program."""
+    words = shlex.split(compiler)
+    return words if words and shutil.which(words[0]) else []
+
+
 def binary(sources: dict[str, str], identifier: str, compiler: str) -> dict[str, bytes]:
     """The shared library for this platform by its path in an FMU 2.0, empty without a compiler.
 
     Raises ExportError where the compiler does not accept the code.
     """
-    words = shlex.split(compiler)
-    if not words or shutil.which(words[0]) is None:
+    words = compiler_words(compiler)
+    if not words:
         return {}
     _, ending = SYSTEMS.get(platform.system(), SYSTEMS["Linux"])
     main = next(name for name in sources if name.endswith(".c") and name.startswith("fmi"))

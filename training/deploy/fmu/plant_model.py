@@ -127,7 +127,9 @@ def _sources(settings: FmuSettings) -> dict[str, str]:
     state, inputs, coefficients, effects = map(
         translation.structure, (State, Inputs, Coefficients, Effects)
     )
-    rates = translation.function(derivative, (state, inputs, coefficients, effects, NUMBER, NUMBER, TRUTH))
+    rates = translation.function(
+        derivative, (state, inputs, coefficients, effects, NUMBER, NUMBER, TRUTH)
+    )
     for function, types in (
         (coil_current, (*[NUMBER] * 4, effects)),
         (longest_step, (NUMBER, state, effects, NUMBER, NUMBER)),

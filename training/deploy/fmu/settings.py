@@ -7,11 +7,11 @@ from dataclasses import dataclass
 class FmuSettings:
     """Constants of judgement of the plant's FMU; the other constants are those of the kernel."""
 
-    longest_step: float = 250e-6
-    """Integration step while a mover moves [s]: as long as the kernel's, at which it stays within 0.06
-    mbar of SciPy; twice as long while both movers are held."""
+    longest_step: float = 125e-6
+    """Integration step while a mover moves [s], twice as long while both movers are held: half the
+    kernel's, so that the FMU's own error is a sixteenth of the kernel's."""
     most_steps_per_second: int = 1_000_000
-    """Steps in each second begun of a communication step after which the FMU gives up: 250 times as many
+    """Steps in each second begun of a communication step after which the FMU gives up: 125 times as many
     as the longest step needs, so that only rebounds without end are given up."""
     p1: float = 9.5e5
     """Start of p1 [Pa absolute]: a reservoir that the compressor has just filled."""

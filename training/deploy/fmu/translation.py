@@ -106,7 +106,9 @@ class Translation:
         taken = {known.name for known in self._functions.values()}
         name = python.__name__ if python.__name__ not in taken else f"{python.__name__}_{len(taken)}"
         done = CFunction(name=name, result=kind)
-        return _definition(done, dict(zip(names, types, strict=True)), f"    return ({kind}){{\n        {members}}};\n"), done
+        return _definition(
+            done, dict(zip(names, types, strict=True)), f"    return ({kind}){{\n        {members}}};\n"
+        ), done
 
 
 def _definition(done: CFunction, arguments: dict[str, str], body: str) -> str:
@@ -128,7 +130,9 @@ class _Body:
         names = [argument.arg for argument in tree.args.args]
         self.arguments = dict(zip(names, types, strict=True))
         self.locals: dict[str, str] = {}
-        assigned = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+        assigned = {
+            n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
+        }
         self.copied = {
             name: kind
             for name, kind in self.arguments.items()
@@ -311,7 +315,11 @@ class _Body:
         """C of a call of another function, its defaults filled in."""
         parameters = list(inspect.signature(callee.py_func).parameters.values())
         for parameter in parameters[len(values) :]:
-            default = (repr(float(parameter.default)), NUMBER) if parameter.default is not parameter.empty else None
+            default = (
+                (repr(float(parameter.default)), NUMBER)
+                if parameter.default is not parameter.empty
+                else None
+            )
             values.append(keywords.get(parameter.name) or default or ("", ""))
         done = self.translation.function(callee, tuple(kind for _, kind in values))
         passed = [

@@ -171,7 +171,8 @@ static int advance(State *q, const conditions *on, double remaining)
             return 0;
         remaining -= step(q, on, remaining, &hint);
     }
-    return q->p1 > 0.0 && q->p2 > 0.0 && q->p3 > 0.0; /* false for not-a-number, too */
+    /* All are false for not-a-number, too. */
+    return q->p1 > 0.0 && q->p2 > 0.0 && q->p2 + q->far_pressure > 0.0 && q->p3 > 0.0;
 }
 
 static void publish(model *m)
