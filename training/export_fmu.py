@@ -24,7 +24,7 @@ from training.deploy.fmu.variables import Model
 def parse(arguments: list[str] | None) -> argparse.Namespace:
     """The command line's options, checked."""
     parser = argparse.ArgumentParser(
-        description="Write the valve or an exported policy as Functional Mock-up Units (FMI 2.0 and 3.0)."
+        description="Write the valve or an exported policy as Functional Mock-up Units (FMI 2 and 3)."
     )
     commands = parser.add_subparsers(dest="command", required=True)
     plant = commands.add_parser(

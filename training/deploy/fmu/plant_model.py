@@ -80,30 +80,31 @@ def _variables(plant: Plant, settings: FmuSettings) -> tuple[Variable, ...]:
         for name, (unit, meaning) in _fields(State).items()
     ]
     time = Variable(name="time", kind="time", unit="s", meaning="simulated time")
-    return (*inputs, *parameters, *_starts(plant, settings), *outputs, *states, time)
+    return (*inputs, *parameters, *_settings(plant, settings), *outputs, *states, time)
 
 
-def _starts(plant: Plant, settings: FmuSettings) -> list[Variable]:
-    """What sets the state at the start: a shut valve at rest, the coil on."""
-    p = plant.parameters
+def _settings(plant: Plant, settings: FmuSettings) -> list[Variable]:
+    """What sets the supply, the integration, and the state at the start: shut, at rest, the coil on."""
+    stroke = table()["xPVmax"].domain
+    assert stroke is not None
+    finest, coarsest = settings.shortest_longest_step, settings.longest_step
+    current = settings.U / plant.parameters["R"]
     rows = [
         ("V1", "m^3", 0.0, 0.0, 10.0, "volume of the reservoirs; 0: the supply does not sag"),
+        ("longest_step", "s", coarsest, finest, coarsest, "integration step while a mover moves"),
         ("p1_start", "Pa", settings.p1, 1e4, 2e6, "input chamber pressure at the start, absolute"),
         ("p2_start", "Pa", settings.p2, 1e4, 2e6, "output chamber pressure at the start, absolute"),
         ("p3_start", "Pa", settings.p1, 1e4, 2e6, "control chamber pressure at the start, absolute"),
-        ("xPV_start", "m", 0.0, 0.0, p["xPVmax"], "stroke of the piston at the start, 0 = shut"),
+        ("xPV_start", "m", 0.0, 0.0, stroke[1], "stroke of the piston at the start, 0 = shut"),
         ("armature_start", "1", 1.0, 0.0, 1.0, "stroke of the armature over xMVmax, 1 = pulled in"),
-        ("I_start", "A", settings.U / p["R"], -2.0, 2.0, "current of the coil at the start"),
+        ("I_start", "A", current, -2.0, 2.0, "current of the coil at the start"),
     ]
-    domain = table()["xPVmax"].domain
-    assert domain is not None
     return [
         Variable(
-            name=name, kind="parameter", unit=unit, meaning=meaning, start=start, low=low,
-            high=domain[1] if name == "xPV_start" else high,
+            name=name, kind="parameter", unit=unit, meaning=meaning, start=start, low=low, high=high
         )
         for name, unit, start, low, high, meaning in rows
-    ]  # fmt: skip
+    ]
 
 
 def _fields(kind: type) -> dict[str, tuple[str, str]]:
@@ -113,7 +114,8 @@ def _fields(kind: type) -> dict[str, tuple[str, str]]:
     found: dict[str, tuple[str, str]] = {}
     for node, below in zip(tree.body, tree.body[1:], strict=False):
         if isinstance(node, ast.AnnAssign) and isinstance(below, ast.Expr):
-            assert isinstance(node.target, ast.Name) and isinstance(below.value, ast.Constant)
+            assert isinstance(node.target, ast.Name)
+            assert isinstance(below.value, ast.Constant)
             text = " ".join(str(below.value.value).split())
             unit = re.search(r"\[([^\]]+)\]", text)
             assert unit is not None, f"{kind.__name__}.{node.target.id} has no unit in its docstring"
@@ -147,7 +149,6 @@ def _sources(settings: FmuSettings) -> dict[str, str]:
     numbers = {
         "title": TITLE,
         "rates": rates.result,
-        "longest_step": repr(settings.longest_step),
         "most_steps": settings.most_steps_per_second,
         "landing": repr(LANDING),
         "stick_speed": repr(STICK_SPEED),
@@ -172,8 +173,8 @@ def _formulas() -> dict[str, str]:
         channel.name: channel.reading(state, p) for channel in MEASURED_CHANNELS if channel.reading
     }
     start = {
-        "p1": p_start("p1"), "p2": p_start("p2"), "p3": p_start("p3"), "xPV": p_start("xPV"),
-        "xMV": "value[V_armature_start] * c->xMVmax", "I": p_start("I"), "I_coil": p_start("I"),
+        "p1": _start_of("p1"), "p2": _start_of("p2"), "p3": _start_of("p3"), "xPV": _start_of("xPV"),
+        "xMV": "value[V_armature_start] * c->xMVmax", "I": _start_of("I"), "I_coil": _start_of("I"),
         "coil_heat": written(p["theta_coil"]),
     }  # fmt: skip
     sizes = [row.name for row in CONSTANTS if row.is_size]
@@ -191,7 +192,7 @@ def _formulas() -> dict[str, str]:
     }
 
 
-def p_start(name: str) -> str:
+def _start_of(name: str) -> str:
     """The start value of a state in C."""
     return f"value[V_{name}_start]"
 

@@ -15,8 +15,6 @@ from training.deploy.quantisation import ExportError
 
 CODE = ("epv_float.h", "epv_float.c")
 """Files of an export that an FMU is made of."""
-PRESSURE = {"unit": "Pa", "low": 0.0, "high": 1e7}
-"""What all pressures have in common."""
 
 
 class _Observation(msgspec.Struct):
@@ -51,21 +49,19 @@ def policy_model(folder: Path) -> Model:
 
 def _variables() -> tuple[Variable, ...]:
     """Readings, the supply's voltage, and the decision."""
+    pressures = {
+        "p1": (9.5e5, "measured supply pressure, absolute"),
+        "p2": (8e5, "measured circuit pressure, absolute"),
+        "p3": (9.5e5, "measured control pressure, absolute"),
+        "p2_target": (8e5, "wanted circuit pressure, absolute"),
+    }
     return (
-        Variable(
-            name="p1", kind="input", start=9.5e5, meaning="measured supply pressure, absolute", **PRESSURE
+        *(
+            Variable(name=name, kind="input", unit="Pa", start=start, low=0.0, high=1e7, meaning=meaning)
+            for name, (start, meaning) in pressures.items()
         ),
         Variable(
-            name="p2", kind="input", start=8e5, meaning="measured circuit pressure, absolute", **PRESSURE
-        ),
-        Variable(
-            name="p3", kind="input", start=9.5e5, meaning="measured control pressure, absolute", **PRESSURE
-        ),
-        Variable(
-            name="I", kind="input", unit="A", start=0.57, meaning="measured current", low=-100.0, high=100.0
-        ),
-        Variable(
-            name="p2_target", kind="input", start=8e5, meaning="wanted circuit pressure", **PRESSURE
+            name="I", kind="input", unit="A", start=0.57, low=-10.0, high=10.0, meaning="coil current"
         ),
         Variable(
             name="U_on", kind="parameter", unit="V", start=24.0, low=0.0, high=60.0,

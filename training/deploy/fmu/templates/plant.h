@@ -11,7 +11,6 @@
 #include "equations.h"
 #include "variables.h"
 
-#define LONGEST_STEP $longest_step /* while a mover moves [s]; twice that while both are held */
 #define LANDING $landing           /* nearer to a stop than this a mover has landed [m] */
 #define STICK_SPEED $stick_speed   /* a slower rebound ends at the stop [m/s] */
 #define RELEASE_MARGIN $release_margin /* time by which a release is overstepped [s] */
@@ -24,6 +23,7 @@ typedef struct {
     Coefficients c;
     Effects effects;
     Inputs u;
+    double longest_step; /* while a mover moves [s]; twice that while both are held */
     int extended; /* whether an effect or a force for diagnosis acts */
 } conditions;
 
@@ -135,7 +135,7 @@ static double step(State *q, const conditions *on, double remaining, double *hin
     const int held_MV = is_held(q->xMV, q->vMV, c->xMVmax, first.part2);
     const double free_PV = held_PV ? 0.0 : 1.0, free_MV = held_MV ? 0.0 : 1.0;
     const State k1 = held_still(&first.part0, free_PV, free_MV);
-    double h = lesser(lesser(held_PV && held_MV ? 2.0 * LONGEST_STEP : LONGEST_STEP, *hint), remaining);
+    double h = lesser((held_PV && held_MV ? 2.0 : 1.0) * on->longest_step, lesser(*hint, remaining));
     trial t;
     State *end = &t.end;
     int event;
@@ -190,6 +190,7 @@ static const char *model_begin(model *m)
     Effects *effects = &m->on.effects;
 $coefficients
 $effects
+    m->on.longest_step = value[V_longest_step];
     m->effects_act = $effects_act;
     memset(&m->q, 0, sizeof m->q);
 $start
