@@ -22,9 +22,9 @@ from training.deploy.fmu.plant_model import plant_model
 from training.deploy.fmu.units import UnitError, base_units
 from training.export_fmu import main
 
-needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler (cc) here")
+needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler (cc) here")
 FILES = {f"epv_plant_fmi{version[0]}.fmu" for version in VERSIONS}
-STRICT = "-std=c99 -O2 -Wall -Wextra -Wpedantic -Werror".split()
+STRICT = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
 
 
 @pytest.fixture(scope="module")
@@ -125,7 +125,9 @@ def test_the_sources_agree_with_the_standards_header(model, version, tmp_path):
     headers = Path(fmpy.origin).parent / "c-code"
     main_file = f"fmi{version[0]}.c"
     words = ["-I", str(headers), "-include", f"fmi{version[0]}Functions.h", "-c", main_file]
-    done = subprocess.run(["cc", *STRICT, *words], cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        ["cc", *STRICT, *words], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
     assert not done.returncode, done.stderr
 
 

@@ -3,8 +3,9 @@
 import pytest
 
 from epv_env.plant.primitives.compiled import inlined
+from training.deploy.fmu.expressions import NUMBER
 from training.deploy.fmu.tracing import Symbol, TranslationError, written
-from training.deploy.fmu.translation import NUMBER, Translation
+from training.deploy.fmu.translation import Translation
 
 LIMIT = 0.1
 

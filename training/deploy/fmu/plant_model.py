@@ -1,10 +1,7 @@
 """The plant as a model for an FMU: variables from the parameter table, C from the state equations."""
 
-import ast
-import inspect
-import re
 from string import Template
-from textwrap import dedent, indent
+from textwrap import indent
 from typing import Any
 
 from epv_env.plant.channels import MEASURED_CHANNELS
@@ -20,10 +17,12 @@ from epv_env.plant.parameters import table
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.runge_kutta import held_still, is_held
 from training.deploy.c_sources import TITLE
+from training.deploy.fmu.expressions import NUMBER, TRUTH
+from training.deploy.fmu.field_texts import field_texts
 from training.deploy.fmu.files import TEMPLATES
 from training.deploy.fmu.settings import SETTINGS, FmuSettings
 from training.deploy.fmu.tracing import Symbol, written
-from training.deploy.fmu.translation import HELPERS, NUMBER, TRUTH, Translation
+from training.deploy.fmu.translation import HELPERS, Translation
 from training.deploy.fmu.variables import Model, Variable
 
 FORCES = ("air_3", "force_PV", "force_MV")
@@ -57,7 +56,7 @@ def _variables(plant: Plant, settings: FmuSettings) -> tuple[Variable, ...]:
             start=settings.U if name == "U" else 0.0,
             low=0.0 if name in NOT_NEGATIVE else -float("inf"),
         )
-        for name, (unit, meaning) in _fields(Inputs).items()
+        for name, (unit, meaning) in field_texts(Inputs).items()
     ]  # fmt: skip
     parameters = [
         Variable(
@@ -77,7 +76,7 @@ def _variables(plant: Plant, settings: FmuSettings) -> tuple[Variable, ...]:
     ]  # fmt: skip
     states = [
         Variable(name=f"state.{name}", kind="local", unit=unit, meaning=meaning)
-        for name, (unit, meaning) in _fields(State).items()
+        for name, (unit, meaning) in field_texts(State).items()
     ]
     time = Variable(name="time", kind="time", unit="s", meaning="simulated time")
     return (*inputs, *parameters, *_settings(plant, settings), *outputs, *states, time)
@@ -105,22 +104,6 @@ def _settings(plant: Plant, settings: FmuSettings) -> list[Variable]:
         )
         for name, unit, start, low, high, meaning in rows
     ]
-
-
-def _fields(kind: type) -> dict[str, tuple[str, str]]:
-    """Unit and meaning of each field of a named tuple, from the text below it."""
-    tree = ast.parse(dedent(inspect.getsource(kind))).body[0]
-    assert isinstance(tree, ast.ClassDef)
-    found: dict[str, tuple[str, str]] = {}
-    for node, below in zip(tree.body, tree.body[1:], strict=False):
-        if isinstance(node, ast.AnnAssign) and isinstance(below, ast.Expr):
-            assert isinstance(node.target, ast.Name)
-            assert isinstance(below.value, ast.Constant)
-            text = " ".join(str(below.value.value).split())
-            unit = re.search(r"\[([^\]]+)\]", text)
-            assert unit is not None, f"{kind.__name__}.{node.target.id} has no unit in its docstring"
-            found[node.target.id] = ({"-": "1"}.get(unit[1], unit[1].split(" absolute")[0]), text)
-    return found
 
 
 def _sources(settings: FmuSettings) -> dict[str, str]:
