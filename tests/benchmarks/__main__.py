@@ -3,8 +3,8 @@
 python -m tests.benchmarks [--quick] [--json PATH]
 """
 
-from tests.benchmarks import identification, plant
+from tests.benchmarks import fmu, identification, plant
 from tests.benchmarks.command_line import run
 
 if __name__ == "__main__":
-    run(__doc__, plant.benchmark, identification.benchmark)
+    run(__doc__, plant.benchmark, fmu.benchmark, identification.benchmark)
