@@ -44,7 +44,8 @@ def benchmark(table: Table, quick: bool) -> None:
     with tempfile.TemporaryDirectory() as folder:
         unit = Unit(fmu(plant_model(Plant.calibrated()), "3.0", "cc"), Path(folder))
         for name, sizes in PLANTS.items():
-            seconds = durations(lambda i=Instance(unit), p=sizes: braking(i, p, steps), repetitions)
+            instance = Instance(unit)
+            seconds = durations(lambda i=instance, p=sizes: braking(i, p, steps), repetitions)
             found = rates(steps * STEP, seconds)
             table.add(f"simulated time, {name}", "s per CPU s", found)
 
