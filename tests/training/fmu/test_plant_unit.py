@@ -72,7 +72,7 @@ def test_ten_thousand_random_steps_are_the_kernels(units):
     plants = [drawn_parameters(rng, effects=k % 4) for k in range(VALVES)]
     valves = kernel_of(plants)
     instances = [started(units[0], p) for p in plants]
-    on, worst = np.ones(VALVES, dtype=bool), np.zeros(4)
+    on, worst, wanted = np.ones(VALVES, dtype=bool), np.zeros(4), np.zeros((VALVES, 4))
     for _ in range(STEPS):
         on ^= rng.random(VALVES) < 0.3
         U = np.where(on, 24.0, 0.0)
@@ -136,7 +136,7 @@ def test_the_length_of_steps_matters_little(unit):
 def test_each_effect_is_felt(units, name):
     """A parameter that reached nothing would go unnoticed among random ones."""
     sizes = next(effect.drawn[0] for effect in EFFECTS if effect.name == name)
-    large = {size.symbol: size.drawn[1] for size in sizes}
+    large = {size.symbol: size.drawn[1] for size in sizes if size.drawn}
     results = []
     for p in (Parameters.calibrated(), Parameters.calibrated().replace(**large)):
         instance = started(units[0], p)

@@ -146,7 +146,7 @@ def _sources(settings: FmuSettings) -> dict[str, str]:
 
 def _formulas() -> dict[str, str]:
     """C of what the parameters and inputs mean to the equations, and of what the outputs show."""
-    p = {
+    p: dict[str, Any] = {
         symbol: Symbol(f"value[V_{symbol}]" if row.domain else repr(row.value))
         for symbol, row in table().items()
     }
