@@ -171,7 +171,9 @@ def closed_loop(policy: LearnedPolicy, code: CDLL, chosen: argparse.Namespace) -
 def main(arguments: list[str] | None = None) -> int:
     """Command line; returns the exit status."""
     chosen = parse(arguments)
-    check_free(chosen.out, FILES | BUILT | set(POLICY_FILES))
+    # Only an earlier export of a .zip may go with its policy: a training's folder is never replaced.
+    earlier = chosen.policy.suffix == ".zip" and (chosen.out / "contract.json").exists()
+    check_free(chosen.out, FILES | BUILT | set(POLICY_FILES if earlier else ()))
     compiler = find_compiler(chosen.compiler)
     with tempfile.TemporaryDirectory() as temporary:
         folder = policy_folder(chosen.policy, Path(temporary))

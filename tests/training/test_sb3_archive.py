@@ -72,6 +72,12 @@ def test_one_command_makes_a_policy_folder_and_c_and_onnx(saved, tmp_path):
     assert export(path, tmp_path / "ecu") == 0  # an earlier one is replaced
 
 
+def test_a_trained_policys_folder_is_left_alone(saved, tmp_path):
+    (tmp_path / "policy.json").write_text("{}")
+    assert export(saved[1], tmp_path) == 2
+    assert (tmp_path / "policy.json").read_text() == "{}"
+
+
 def test_another_activation_is_refused(env, tmp_path):
     kwargs = {"activation_fn": torch.nn.ReLU}
     PPO("MlpPolicy", env, n_steps=8, batch_size=16, policy_kwargs=kwargs).save(tmp_path / "relu.zip")
