@@ -2,6 +2,10 @@
 
     python training/export.py runs/ppo --out runs/ecu
 
+or, for a policy that stable-baselines3 has saved,
+
+    python training/export.py model.zip --out runs/ecu
+
 writes the policy as ONNX, as C99 in single precision and in integers, the contract, and a parity test,
 but only after the C code was compiled here and agreed with the policy on every one of 10,000 states.
 docs/reference/exported-policy.md says what each file is.
@@ -21,6 +25,7 @@ import numpy as np
 from tqdm import tqdm
 
 from controllers.learned import CONTRACT_FILE, WEIGHTS_FILE, LearnedPolicy, load_policy
+from epv_env.actions import OnOff
 from epv_env.common.command_line import check_positive, fail_clearly, writable_folder
 from training.deploy import measurements as measure
 from training.deploy.atomic_folder import check_free, write_folder
@@ -41,6 +46,8 @@ FILES = {
     "states.csv", "states.h", "parity.c", "bench.c", "report.json",
 }  # fmt: skip
 """What an export consists of."""
+POLICY_FILES = (WEIGHTS_FILE, CONTRACT_FILE)
+"""What is there besides if the policy comes from a .zip: the folder is then a policy's folder, too."""
 BUILT = {"parity", "bench"}
 """What its reader builds there, and another export may sweep away."""
 
@@ -50,7 +57,11 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description="Export a trained policy for an electronic control unit."
     )
-    parser.add_argument("policy", type=Path, help=f"folder with {WEIGHTS_FILE} and {CONTRACT_FILE}")
+    parser.add_argument(
+        "policy",
+        type=Path,
+        help=f"folder with {WEIGHTS_FILE} and {CONTRACT_FILE}, or a .zip of stable-baselines3",
+    )
     parser.add_argument("--out", type=writable_folder, required=True, help="folder to write")
     parser.add_argument(
         "--compiler", default=os.environ.get("CC", "cc"), help="C compiler (default: cc)"
@@ -79,6 +90,19 @@ def prepare(
         weights_sha256=digest,
     )
     return export, deployment_contract(export, provenance=content.get("provenance", {}))
+
+
+def policy_folder(given: Path, temporary: Path) -> Path:
+    """The folder of a policy: what is given, or one made of a .zip. Raises ExportError."""
+    if given.suffix != ".zip":
+        return given
+    from training.deploy.sb3_archive import read_sb3_archive
+    from training.learners.policy_files import save_policy  # torch takes seconds to import: only now
+
+    policy, provenance = read_sb3_archive(given)
+    check_exportable(policy, given)
+    save_policy(policy, temporary, control_period=OnOff.default_period, provenance=provenance)
+    return temporary
 
 
 def check_exportable(policy: LearnedPolicy, folder: Path) -> None:
@@ -147,13 +171,19 @@ def closed_loop(policy: LearnedPolicy, code: CDLL, chosen: argparse.Namespace) -
 def main(arguments: list[str] | None = None) -> int:
     """Command line; returns the exit status."""
     chosen = parse(arguments)
-    check_free(chosen.out, FILES | BUILT)
+    # Only an earlier export of a .zip may go with its policy: a training's folder is never replaced.
+    earlier = chosen.policy.suffix == ".zip" and (chosen.out / "contract.json").exists()
+    check_free(chosen.out, FILES | BUILT | set(POLICY_FILES if earlier else ()))
     compiler = find_compiler(chosen.compiler)
-    export, contract = prepare(load_policy(chosen.policy), chosen.policy)
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = policy_folder(chosen.policy, Path(temporary))
+        export, contract = prepare(load_policy(folder), folder)
+        kept = POLICY_FILES if folder != chosen.policy else ()
+        content = {name: (folder / name).read_bytes() for name in kept}
     files, report = verify(export, compiler, chosen)
     files["contract.json"] = json.dumps(contract, indent=1) + "\n"
     files["report.json"] = json.dumps(report, indent=1) + "\n"
-    content = {name: text.encode("utf-8") for name, text in files.items()}
+    content |= {name: text.encode("utf-8") for name, text in files.items()}
     content["policy.onnx"] = onnx_model(export.policy, period=export.period).SerializeToString()
     write_folder(chosen.out, content)
     print(f"{as_text(report, contract)}\nwritten to {chosen.out}")

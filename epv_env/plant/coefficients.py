@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from epv_env.plant.equations import Coefficients
 from epv_env.plant.primitives.constants import QUARTER_PI
+from epv_env.plant.primitives.values import Value
 
 
 def coefficients(p: Mapping[str, ArrayLike], reservoir_volume: ArrayLike = np.inf) -> NDArray:
@@ -14,9 +15,18 @@ def coefficients(p: Mapping[str, ArrayLike], reservoir_volume: ArrayLike = np.in
 
     reservoir_volume: V1 [m^3]; infinite for a supply that does not sag.
     """
-    p = {symbol: np.asarray(value, dtype=float) for symbol, value in p.items()}
+    values = {symbol: np.asarray(value, dtype=float) for symbol, value in p.items()}
+    rows = folded(values, np.asarray(reservoir_volume, dtype=float))
+    return np.ascontiguousarray(np.broadcast_arrays(*np.atleast_1d(*rows)), dtype=float)
+
+
+def folded(p: Mapping[str, Value], reservoir_volume: Value) -> Coefficients:
+    """The formulas of `coefficients`, for whatever follows NumPy's arithmetic.
+
+    p: values by symbol. reservoir_volume: V1 [m^3]. Returns values of the same kind.
+    """
     RT = p["R_gas"] * p["T_env"]
-    rows = Coefficients(
+    return Coefficients(
         cPV=p["cPV"],
         xPV0=p["xPV0"],
         kPV=p["kPV"],
@@ -45,8 +55,7 @@ def coefficients(p: Mapping[str, ArrayLike], reservoir_volume: ArrayLike = np.in
         N_squared_inverse=1 / p["N"] ** 2,
         RT_V2=RT / p["V2"],
         RT_V3=RT / p["V3"],
-        RT_V1=RT / np.asarray(reservoir_volume, dtype=float),
+        RT_V1=RT / reservoir_volume,
         inverse_sqrt_RT=1 / np.sqrt(RT),
         p_env=p["p_env"],
     )
-    return np.ascontiguousarray(np.broadcast_arrays(*np.atleast_1d(*rows)), dtype=float)

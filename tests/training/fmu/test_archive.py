@@ -1,0 +1,182 @@
+"""What lies in an FMU, whether FMPy accepts it, and what the command writes and refuses."""
+
+import importlib.util
+import io
+import json
+import shutil
+import subprocess
+import zipfile
+from pathlib import Path
+from xml.etree import ElementTree as xml
+
+import numpy as np
+import pytest
+
+from epv_env.common.command_line import fail_clearly
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.plantfile import Plant, save_plant
+from tests.training.fmu.unit import OK, Instance, Unit
+from training.deploy.fmu.files import VERSIONS, fmu, fmu_sources
+from training.deploy.fmu.model_description import model_description
+from training.deploy.fmu.plant_model import plant_model
+from training.deploy.fmu.units import UnitError, base_units
+from training.export_fmu import main
+
+needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler (cc) here")
+FILES = {f"epv_plant_fmi{version[0]}.fmu" for version in VERSIONS}
+STRICT = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
+
+
+@pytest.fixture(scope="module")
+def model():
+    return plant_model(Plant.calibrated())
+
+
+def run(*words: object) -> int:
+    return fail_clearly(lambda: main([str(word) for word in words]))
+
+
+def description(path: Path) -> xml.Element:
+    with zipfile.ZipFile(path) as archive:
+        return xml.fromstring(archive.read("modelDescription.xml"))
+
+
+@pytest.mark.parametrize(
+    ("unit", "powers"),
+    [
+        ("Pa", {"kg": 1, "m": -1, "s": -2}),
+        ("V s/(A m)", {"kg": 1, "m": 1, "s": -2, "A": -2}),  # H/m
+        ("N s/m", {"kg": 1, "s": -1}),
+        ("1/m^2", {"m": -2}),
+        ("K/J", {"K": 1, "kg": -1, "m": -2, "s": 2}),
+        ("1", {}),
+    ],
+)
+def test_units_are_powers_of_base_units(unit, powers):
+    assert base_units(unit) == powers
+
+
+def test_an_unknown_unit_is_named():
+    with pytest.raises(UnitError, match="'furlong'"):
+        base_units("furlong/s")
+
+
+def test_every_number_with_a_dimension_has_its_unit(model):
+    root = xml.fromstring(model_description(model, "3.0", "t"))
+    known = {unit.attrib["name"] for unit in root.iter("Unit")}
+    units = {v.attrib["name"]: v.attrib.get("unit") for v in root.iter("Float64")}
+    assert units["p2"] == "Pa"
+    assert units["I"] == "A"
+    assert units["alphaMV"] is None
+    assert {unit for unit in units.values() if unit} == known
+
+
+@needs_compiler
+def test_the_command_writes_both_versions_of_a_plant_file(tmp_path):
+    plant = Plant(parameters=Parameters.calibrated().replace(R=44.0), region=Plant.calibrated().region)
+    save_plant(plant, tmp_path / "plant.json")
+    assert run("plant", "--plant", tmp_path / "plant.json", "--out", tmp_path / "out") == 0
+    assert {path.name for path in (tmp_path / "out").iterdir()} == FILES
+    for path in (tmp_path / "out").iterdir():
+        instance = Instance(Unit(path.read_bytes(), tmp_path / path.stem)).start()
+        assert instance.step(0.1) == OK
+        assert instance.get("I") == pytest.approx([24 / 44])
+
+
+def test_without_a_compiler_the_sources_are_there(tmp_path, capsys):
+    assert run("plant", "--out", tmp_path, "--compiler", "no-such-compiler") == 0
+    assert "no C compiler" in capsys.readouterr().out
+    for name in FILES:
+        with zipfile.ZipFile(tmp_path / name) as archive:
+            names = set(archive.namelist())
+        assert not any(each.startswith("binaries") for each in names)
+        assert {"modelDescription.xml", "sources/equations.h"} <= names
+        assert ("sources/buildDescription.xml" in names) == ("fmi3" in name)
+
+
+def test_the_same_plant_gives_the_same_sources(model):
+    again = plant_model(Plant.calibrated())
+    assert fmu(model, "3.0", "") == fmu(again, "3.0", "")
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("plant", "--plant", "missing.json"), "cannot read plant file missing.json"),
+        (("policy", "missing"), "give a folder that training/export.py wrote"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_nothing_is_written(tmp_path, capsys, words, sentence):
+    out = tmp_path / "out"
+    assert run(*words, "--out", out) == 2
+    assert sentence in capsys.readouterr().err
+    assert not out.exists()
+
+
+@needs_compiler
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_sources_agree_with_the_standards_header(model, version, tmp_path):
+    """FMPy brings the header; a function of another form than its declaration would not compile."""
+    fmpy = importlib.util.find_spec("fmpy")
+    if fmpy is None or fmpy.origin is None:
+        pytest.skip("FMPy, which has the standard's headers, is not installed")
+    for name, text in fmu_sources(model, version).items():
+        (tmp_path / name).write_text(text)
+    headers = Path(fmpy.origin).parent / "c-code"
+    main_file = f"fmi{version[0]}.c"
+    words = ["-I", str(headers), "-include", f"fmi{version[0]}Functions.h", "-c", main_file]
+    done = subprocess.run(
+        ["cc", *STRICT, *words], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert not done.returncode, done.stderr
+
+
+@needs_compiler
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_prefix_keeps_linked_units_apart(model, version, tmp_path):
+    for name, text in fmu_sources(model, version).items():
+        (tmp_path / name).write_text(text)
+    prefix = f"-DFMI{version[0]}_FUNCTION_PREFIX=valve_"
+    command = ["cc", *STRICT, prefix, "-c", f"fmi{version[0]}.c", "-o", "unit.o"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    text = (tmp_path / "unit.o").read_bytes()
+    assert f"valve_fmi{version[0]}DoStep".encode() in text
+
+
+@needs_compiler
+@pytest.mark.parametrize("version", VERSIONS)
+def test_fmpy_validates_and_simulates_it(model, version, tmp_path):
+    fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed")
+    validation = pytest.importorskip("fmpy.validation")
+    path = tmp_path / "plant.fmu"
+    path.write_bytes(fmu(model, version, "cc"))
+    assert validation.validate_fmu(str(path)) == []
+    signal = np.array(
+        [(0.0, 0.0, 0.01), (0.1, 0.0, 0.01), (0.1, 24.0, 0.0), (0.2, 24.0, 0.0)],
+        dtype=[("time", float), ("U", float), ("sigma_S", float)],
+    )
+    found = fmpy.simulate_fmu(
+        str(path), stop_time=0.2, output_interval=1e-3, input=signal, start_values={"R": 44.0}
+    )
+    instance = Instance(Unit(path.read_bytes(), tmp_path / "own")).start({"R": 44.0})
+    assert instance.step(0.1, U=0.0, sigma_S=0.01) == OK
+    assert instance.step(0.1, U=24.0, sigma_S=0.0) == OK
+    (p2,) = instance.get("p2")
+    assert found["p2"][-1] == pytest.approx(p2, abs=10.0)
+    assert found["p2"].min() < 7.5e5
+
+
+def test_the_archive_is_a_plain_zip(model):
+    with zipfile.ZipFile(io.BytesIO(fmu(model, "2.0", ""))) as archive:
+        assert archive.testzip() is None
+        assert not any("\\" in name or name.startswith("/") for name in archive.namelist())
+
+
+def test_the_description_survives_any_plant_name(tmp_path):
+    plant = Plant(
+        parameters=Parameters.calibrated(), region=Plant.calibrated().region, name='<&" */ \x00\n'
+    )
+    save_plant(plant, tmp_path / "plant.json")
+    assert json.loads((tmp_path / "plant.json").read_text())
+    assert run("plant", "--plant", tmp_path / "plant.json", "--out", tmp_path, "--compiler", "") == 0
+    assert "plant" in description(tmp_path / "epv_plant_fmi2.fmu").attrib["description"]

@@ -1,0 +1,253 @@
+"""The plant's FMU moves as the kernel does, and keeps the contract of its standard."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from epv_env.plant.effects.registry import CATALOGUE, EFFECTS
+from epv_env.plant.parameters import Parameters, table
+from epv_env.plant.plantfile import Plant
+from epv_env.plant.valves import Valves
+from tests.training.fmu.unit import ERROR, OK, Instance, Unit
+from training.deploy.fmu.files import VERSIONS, fmu
+from training.deploy.fmu.plant_model import plant_model
+from training.deploy.fmu.settings import SETTINGS
+
+pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler (cc) here")
+
+VALVES, STEPS, PERIOD = 100, 100, 5e-3
+OUTPUTS = ("p1", "p2", "p3", "I")
+TENTH_OF_A_MILLIBAR = 10.0
+QUICK = 0.1  # s
+SYMBOLS = [symbol for symbol, row in table().items() if row.domain]
+
+
+@pytest.fixture(scope="module")
+def units(tmp_path_factory):
+    """The unit of each version of the standard."""
+    model = plant_model(Plant.calibrated())
+    return [Unit(fmu(model, each, "cc"), tmp_path_factory.mktemp("fmu")) for each in VERSIONS]
+
+
+@pytest.fixture(params=[2, 3])
+def unit(request, units):
+    return units[request.param - 2]
+
+
+def drawn_parameters(rng: np.random.Generator, effects: int) -> Parameters:
+    """Parameters within 5 % of the calibrated ones, with some effects of a drawn size."""
+    changes = {}
+    for symbol in ("R", "V2", "V3", "alphaPV", "alphaMV", "RML", "cPV"):
+        changes[symbol] = Parameters.calibrated()[symbol] * rng.uniform(0.95, 1.05)
+    for k in rng.choice(len(EFFECTS), effects, replace=False):
+        for size in EFFECTS[k].drawn[0]:
+            assert size.drawn is not None
+            changes[size.symbol] = float(np.exp(rng.uniform(*np.log(size.drawn))))
+    return Parameters.calibrated().replace(**changes)
+
+
+def started(unit: Unit, p: Parameters) -> Instance:
+    """An instance with these parameters, its current at rest."""
+    return Instance(unit).start({s: p[s] for s in SYMBOLS} | {"I_start": SETTINGS.U / p["R"]})
+
+
+def kernel_of(plants: list[Parameters]) -> Valves:
+    """The same valves in the kernel."""
+    valves = Valves(len(plants))
+    for k, p in enumerate(plants):
+        valves.set_parameters(np.array([k]), p)
+        state = {
+            "p1": SETTINGS.p1, "p2": SETTINGS.p2, "p3": SETTINGS.p1, "xMV": p["xMVmax"],
+            "I": SETTINGS.U / p["R"], "I_coil": SETTINGS.U / p["R"], "coil_heat": p["theta_coil"],
+        }  # fmt: skip
+        for name, value in state.items():
+            getattr(valves.state, name)[k] = value
+    return valves
+
+
+def test_ten_thousand_random_steps_are_the_kernels(units):
+    """100 plants of other parameters, most with effects, 100 steps of random inputs."""
+    rng = np.random.default_rng(5)
+    plants = [drawn_parameters(rng, effects=k % 4) for k in range(VALVES)]
+    valves = kernel_of(plants)
+    instances = [started(units[0], p) for p in plants]
+    on, worst, wanted = np.ones(VALVES, dtype=bool), np.zeros(4), np.zeros((VALVES, 4))
+    for _ in range(STEPS):
+        on ^= rng.random(VALVES) < 0.3
+        U = np.where(on, 24.0, 0.0)
+        flow = np.where(valves.state.p2 > 3e5, rng.choice([0.0, 0.005, 0.015], VALVES), 0.0)
+        valves.inputs.U[:], valves.inputs.sigma_S[:] = U, flow
+        valves.advance(PERIOD)
+        shown = valves.readings()
+        for k, instance in enumerate(instances):
+            assert instance.step(PERIOD, U=U[k], sigma_S=flow[k]) == OK, instance.said
+        found = np.array([instance.get(*OUTPUTS) for instance in instances])
+        wanted = np.stack([shown[name] for name in OUTPUTS], axis=1)
+        worst = np.maximum(worst, np.abs(found - wanted).max(axis=0))
+    moved = np.ptp(wanted[:, 1])
+    assert moved > 1e5  # the valves did not just stand still
+    assert np.all(worst[:3] < TENTH_OF_A_MILLIBAR), worst
+    assert worst[3] < 1e-4
+
+
+def test_finer_steps_change_little(units):
+    """The error of the default step, on the calibrated plant."""
+    fine, default = (Instance(units[0]).start({"longest_step": step}) for step in (20e-6, 250e-6))
+    for k in range(100):
+        for instance in (fine, default):
+            assert instance.step(PERIOD, U=0.0 if k % 5 < 2 else 24.0, sigma_S=0.01) == OK
+        found, wanted = default.get(*OUTPUTS), fine.get(*OUTPUTS)
+        np.testing.assert_allclose(found[:3], wanted[:3], rtol=0, atol=TENTH_OF_A_MILLIBAR)
+
+
+def test_all_states_come_out(unit):
+    p = Parameters.calibrated()
+    instance, valves = started(unit, p), kernel_of([p])
+    valves.inputs.U[:] = 0.0
+    valves.advance(0.02)
+    assert instance.step(0.02, U=0.0) == OK
+    for name, value in valves.state._asdict().items():
+        (found,) = instance.get(f"state.{name}")
+        np.testing.assert_allclose(found, value[0], rtol=1e-3, atol=1e-9, err_msg=name)
+
+
+def test_both_versions_give_the_same_numbers(units):
+    p = drawn_parameters(np.random.default_rng(1), effects=3)
+    results = []
+    for unit in units:
+        instance = started(unit, p)
+        assert [instance.step(7e-3, U=24.0 * (k % 2)) for k in range(10)] == [OK] * 10
+        results.append(instance.get(*OUTPUTS))
+    assert results[0] == results[1]
+
+
+def test_the_length_of_steps_matters_little(unit):
+    long, short = (started(unit, Parameters.calibrated()) for _ in range(2))
+    for k in range(10):
+        U = 24.0 * (k % 2)
+        assert long.step(10e-3, U=U) == OK
+        for step in (0.3e-3, 4.2e-3, 1e-3, 4.5e-3):
+            assert short.step(step, U=U) == OK
+    np.testing.assert_allclose(long.get(*OUTPUTS[:3]), short.get(*OUTPUTS[:3]), atol=TENTH_OF_A_MILLIBAR)
+
+
+@pytest.mark.parametrize("name", list(CATALOGUE))
+def test_each_effect_is_felt(units, name):
+    """A parameter that reached nothing would go unnoticed among random ones."""
+    sizes = next(effect.drawn[0] for effect in EFFECTS if effect.name == name)
+    large = {size.symbol: size.drawn[1] for size in sizes if size.drawn}
+    results = []
+    for p in (Parameters.calibrated(), Parameters.calibrated().replace(**large)):
+        instance = started(units[0], p)
+        for k in range(30):
+            assert instance.step(5e-3, U=0.0 if k < 24 else 24.0, sigma_S=0.01) == OK
+        results.append(instance.get(*OUTPUTS))
+    assert results[0] != results[1]
+
+
+def test_a_parameter_counts_if_it_is_set_in_time(unit):
+    instance = Instance(unit).start({"R": 50.0})
+    assert instance.step(QUICK, U=24.0) == OK
+    assert instance.get("I") == pytest.approx([24 / 50])
+    assert instance.set({"R": 40.0}) == ERROR
+    assert instance.said == [
+        "parameter R cannot be set while it runs: set it before initialisation ends"
+    ]
+
+
+def test_reset_begins_anew_to_the_bit(unit):
+    instance = Instance(unit).start()
+    first = []
+    for results in (first, []):
+        for k in range(5):
+            assert instance.step(PERIOD, U=24.0 * (k % 2), sigma_S=0.01) == OK
+            results.append(instance.get(*OUTPUTS))
+        assert results == first
+        assert instance.call("Reset") == OK
+        instance.time = 0.0
+        instance.start()
+
+
+def test_a_saved_state_goes_on_to_the_bit(unit):
+    """With a delayed command under way, and through bytes into another instance."""
+    p = {"t_delay": 3e-3}
+    instance = Instance(unit).start(p)
+    assert instance.step(PERIOD, U=24.0) == OK
+    assert instance.step(1e-3, U=0.0) == OK
+    state, time = instance.saved(), instance.time
+    content = instance.bytes_of(state)
+
+    def goes_on(it: Instance) -> list[float]:
+        assert [it.step(2e-3, U=0.0, sigma_S=0.01) for _ in range(10)] == [OK] * 10
+        return it.get(*OUTPUTS)
+
+    wanted = goes_on(instance)
+    instance.restore(state, time)
+    assert goes_on(instance) == wanted
+    other = Instance(unit).start()
+    again = other.state_of(content)
+    assert again is not None
+    other.restore(again, time)
+    assert goes_on(other) == wanted
+    assert other.state_of(content[:-1]) is None
+    assert other.state_of(b"?" * len(content)) is None
+    assert other.said[-1] == "these bytes are not a state of this unit: give those that it wrote"
+
+
+@pytest.mark.parametrize(
+    ("values", "sentence"),
+    [
+        ({"R": 4.0}, "R = 4 is outside [35, 50]: give a value inside it"),
+        ({"U": float("nan")}, "U = nan is outside [-inf, inf]: give a value inside it"),
+        ({"U": float("inf")}, "U = inf is outside [-inf, inf]: give a value inside it"),
+        ({"sigma_S": -1.0}, "sigma_S = -1 is outside [0, inf]: give a value inside it"),
+        ({"p2": 1e5}, "p2 is computed and cannot be set: set an input or a parameter"),
+    ],
+)  # fmt: skip
+def test_a_senseless_value_is_refused(unit, values, sentence):
+    instance = Instance(unit)
+    assert instance.set(values) == ERROR
+    assert instance.said == [sentence]
+
+
+def test_a_piston_beyond_its_stop_is_refused(unit):
+    with pytest.raises(AssertionError, match="beyond the piston's stop"):
+        Instance(unit).start({"xPV_start": 3e-3, "xPVmax": 2e-3})
+
+
+def test_senseless_calls_are_refused(unit):
+    instance = Instance(unit)
+    assert instance.step_from(0.0, 1e-3) == ERROR
+    assert "a step is not allowed before initialisation" in instance.said[-1]
+    instance.start()
+    assert instance.step_from(0.0, -1e-3) == ERROR
+    assert instance.step_from(0.0, float("nan")) == ERROR
+    assert "give a positive, finite length" in instance.said[-1]
+    assert instance.step_from(1.0, 1e-3) == ERROR
+    assert "the step begins at 1 s but the unit is at 0 s" in instance.said[-1]
+    assert instance.step_from(0.0, 1e-3) == OK
+
+
+def test_another_units_token_is_refused(unit):
+    assert not Instance(unit, token="{another}").handle
+
+
+def test_an_emptied_circuit_ends_the_run_in_a_sentence(unit):
+    instance = Instance(unit).start()
+    assert instance.step(1.0, U=24.0, sigma_S=0.1) == ERROR
+    assert "an empty circuit cannot be consumed from" in instance.said[-1]
+    assert instance.step(1e-3) == ERROR
+    assert "after a failed step" in instance.said[-1]
+    assert instance.call("Reset") == OK
+    instance.time = 0.0
+    assert instance.start().step(1e-3, U=24.0, sigma_S=0.0) == OK
+
+
+def test_a_finite_reservoir_sags(unit):
+    results = []
+    for volume in (0.0, 0.02):
+        instance = Instance(unit).start({"V1": volume})
+        assert instance.step(0.3, U=0.0, sigma_S=0.02) == OK
+        results.append(instance.get("p1")[0])
+    assert results[0] == SETTINGS.p1 > results[1]
