@@ -24,6 +24,7 @@ from identification.recordings.reading_steps import column_steps
 from identification.recordings.recording import CHANNELS, Campaign, CampaignError, Recording
 from identification.recordings.recording_checks import check_recording
 from identification.recordings.rules import RULES, RecordingRules
+from identification.recordings.unit_diagnosis import check_reference
 
 DECIMALS = {
     TIME_COLUMN: 9,
@@ -39,7 +40,7 @@ def read_campaign(folder: str | PathLike[str], rules: RecordingRules = RULES) ->
     manifest = read_manifest(folder)
     files = {path: _read_file(path) for path in manifest.roles}
     steps = column_steps([columns for _, columns in files.values()], rules)
-    return Campaign(
+    campaign = Campaign(
         name=manifest.name,
         temperature=manifest.temperature,
         pressure=manifest.pressure,
@@ -49,6 +50,8 @@ def read_campaign(folder: str | PathLike[str], rules: RecordingRules = RULES) ->
         ),
         folder=folder,
     )
+    check_reference(str(folder), campaign.recordings, campaign.pressure, rules)
+    return campaign
 
 
 def check_vacant(folder: Path) -> None:
@@ -79,6 +82,7 @@ def write_campaign(
         check_recording(
             path, columns, role=recording.role, ambient_bar=ambient, steps=steps, rules=rules
         )
+    check_reference(str(folder), campaign.recordings, campaign.pressure, rules)
     for recording, columns in written:
         write_text(folder / f"{recording.name}.csv", _csv(columns))
     write_json(folder / FILE_NAME, content)
