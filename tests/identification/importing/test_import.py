@@ -81,7 +81,8 @@ def test_a_dry_run_shows_everything_and_writes_nothing(bench, tmp_path, capsys):
     path = text(tmp_path / "test1.csv", columns_of(bench.recordings[0]))
     assert main(["import", str(path), "--out", str(tmp_path / "out"), "--dry-run"]) == 0
     shown = capsys.readouterr().out
-    assert "2000 Hz" in shown and "nothing is written" in shown
+    assert "2000 Hz" in shown
+    assert "nothing is written" in shown
     assert sorted(p.name for p in tmp_path.iterdir()) == ["test1.csv"]
 
 
