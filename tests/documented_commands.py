@@ -9,6 +9,7 @@ ROOT = Path(__file__).parents[1]
 
 SHORT_FORMS: dict[str, str] = {
     "python -m identification bench": "tests/identification/test_commands.py",
+    "python -m identification import": "tests/identification/importing",
     "python -m identification quality": "tests/identification/test_commands.py",
     "python -m identification sensitivity": "tests/identification/test_commands.py",
     "python -m identification calibrate": "tests/identification/test_commands.py",

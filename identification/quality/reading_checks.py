@@ -48,6 +48,13 @@ def check_noise(quality: QualityAssessment, channel: ChannelAssessment) -> Judge
     """Is the noise as small as the report's?"""
     deviation = channel.normality.standard_deviation
     ratio = deviation / channel.sensor.noise
+    quiet = graded_status(1.0 / max(ratio, 1e-9), channel.settings.quiet_levels)
+    if channel.dithered and quiet != "good":
+        return Judgement(
+            quiet,
+            f"noise {milli_text(channel, deviation)} before rounding, only {ratio:.2g} times Table 3's; "
+            "check the unit and scaling of the channel, since a reading too small has noise too small",
+        )
     return judgement_of(
         graded_status(ratio, channel.settings.noise_levels),
         f"noise {milli_text(channel, deviation)} before rounding, {ratio:.2f} times Table 3's, "

@@ -35,6 +35,9 @@ class QualitySettings:
     """Drift over the record, relative to Table 1's accuracy, from which it is in doubt, and bad."""
     noise_levels: tuple[float, float] = (1.5, 4.0)
     """Standard deviation relative to Table 3's: 3.5 dB and 12 dB of its signal-to-noise ratio."""
+    quiet_levels: tuple[float, float] = (5.0, 30.0)
+    """Table 3's standard deviation relative to the record's, from which the noise is too small for a
+    sensor of this kind: a reading 100 times too small is as quiet."""
     outlier_levels: tuple[float, float] = (1.0, 2.0)
     """Outlier factor (eq. 18) relative to its limit."""
     outlier_confidence: float = 0.999

@@ -5,6 +5,7 @@ import os
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,7 @@ from identification.recordings.reading_steps import column_steps
 from identification.recordings.recording import CHANNELS, Campaign, CampaignError, Recording
 from identification.recordings.recording_checks import check_recording
 from identification.recordings.rules import RULES, RecordingRules
+from identification.recordings.unit_diagnosis import check_reference
 
 DECIMALS = {
     TIME_COLUMN: 9,
@@ -39,7 +41,7 @@ def read_campaign(folder: str | PathLike[str], rules: RecordingRules = RULES) ->
     manifest = read_manifest(folder)
     files = {path: _read_file(path) for path in manifest.roles}
     steps = column_steps([columns for _, columns in files.values()], rules)
-    return Campaign(
+    campaign = Campaign(
         name=manifest.name,
         temperature=manifest.temperature,
         pressure=manifest.pressure,
@@ -49,6 +51,8 @@ def read_campaign(folder: str | PathLike[str], rules: RecordingRules = RULES) ->
         ),
         folder=folder,
     )
+    check_reference(str(folder), campaign.recordings, campaign.pressure, rules)
+    return campaign
 
 
 def check_vacant(folder: Path) -> None:
@@ -59,14 +63,33 @@ def check_vacant(folder: Path) -> None:
 
 
 def write_campaign(
-    campaign: Campaign, folder: str | PathLike[str], rules: RecordingRules = RULES
+    campaign: Campaign,
+    folder: str | PathLike[str],
+    rules: RecordingRules = RULES,
+    *,
+    provenance: Mapping[str, Any] | None = None,
 ) -> None:
     """Write a campaign that `read_campaign` takes; its JSON last, so that a part of one is none.
 
     Each file is written whole or not at all, in place of one of the same name. Raises CampaignError,
     before anything is written, if the folder holds a campaign already or a recording breaks a rule.
+    provenance: where the recordings come from; campaign.json holds it, and readers ignore it.
     """
     folder = Path(folder)
+    written = check_campaign(campaign, folder, rules)
+    for recording, columns in written:
+        write_text(folder / f"{recording.name}.csv", _csv(columns))
+    content = manifest_content(campaign)
+    write_json(folder / FILE_NAME, {**content, "provenance": provenance} if provenance else content)
+
+
+def check_campaign(
+    campaign: Campaign, folder: Path, rules: RecordingRules = RULES
+) -> list[tuple[Recording, dict[str, NDArray]]]:
+    """Recordings with their columns, each (samples,), as `write_campaign` would write them.
+
+    Nothing is written. Raises CampaignError if the folder holds a campaign already or a rule is broken.
+    """
     check_vacant(folder)
     content = manifest_content(campaign)
     check_manifest(folder, content)
@@ -79,9 +102,8 @@ def write_campaign(
         check_recording(
             path, columns, role=recording.role, ambient_bar=ambient, steps=steps, rules=rules
         )
-    for recording, columns in written:
-        write_text(folder / f"{recording.name}.csv", _csv(columns))
-    write_json(folder / FILE_NAME, content)
+    check_reference(str(folder), campaign.recordings, campaign.pressure, rules)
+    return written
 
 
 def _read_file(path: Path) -> tuple[str, dict[str, NDArray]]:

@@ -12,14 +12,10 @@ from numpy.typing import NDArray
 
 from epv_env.plant.sensors import SENSORS, Sensor
 from identification.recordings.columns import CHANNEL_OF, TIME_COLUMN, line_number
-from identification.recordings.pressure_reference import (
-    check_above_ambient,
-    check_against_supply,
-    check_discharge,
-)
 from identification.recordings.recording import HOLD, CampaignError
 from identification.recordings.rules import RULES, RecordingRules
-from identification.recordings.sampling_times import sampling_period
+from identification.recordings.sampling_times import check_rate, sampling_period
+from identification.recordings.unit_diagnosis import check_units
 
 
 def check_recording(
@@ -43,21 +39,33 @@ def check_recording(
     Raises CampaignError at the first rule that is broken.
     """
     period = sampling_period(file, columns[TIME_COLUMN], rules)
+    _check_samples(file, columns, role, steps or {})
+    if role != "quality" and not switches(columns["U_V"], rules):
+        check_length(file, columns, role, period, rules)
+        _refuse_voltage(file, columns["U_V"])
+    check_units(file, columns, period, ambient_bar, rules)
+    check_rate(file, period, rules)
     check_length(file, columns, role, period, rules)
     for name, channel in CHANNEL_OF.items():
         if name in columns:
             coarse = (steps or {}).get(name, 0.0)
-            if name != "U_V":  # a voltage may be fed back without noise
-                check_alive(file, name, columns[name], may_rest=_may_rest(coarse, channel, role))
             _check_channel(
                 file, name, columns[name], SENSORS[channel], period, ambient_bar, coarse, rules
             )
     if role != "quality":
-        check_switching(file, columns["U_V"], rules)
         check_energised_start(file, columns["U_V"], period)
         check_steady_start(file, columns, period)
-        check_pressures(file, columns, period, ambient_bar, rules)
     return period
+
+
+def _check_samples(
+    file: str, columns: Mapping[str, NDArray], role: str, steps: Mapping[str, float]
+) -> None:
+    """Every channel lives: what is dead tells nothing about units. steps: by column [bar]."""
+    for name, channel in CHANNEL_OF.items():
+        if name in columns and name != "U_V":  # a voltage may be fed back without noise
+            coarse = steps.get(name, 0.0)
+            check_alive(file, name, columns[name], may_rest=_may_rest(coarse, channel, role))
 
 
 def _check_channel(
@@ -70,9 +78,6 @@ def _check_channel(
     coarse: float,
     rules: RecordingRules,
 ) -> None:
-    if name.startswith("p"):
-        check_unit(file, name, values, rules)
-        check_above_ambient(file, name, values, ambient_bar)
     check_range(file, name, values, sensor)
     vented = coarse > 0 and abs(ambient_bar - sensor.low) <= _margin(sensor)
     check_rail(file, name, values, sensor, period, rules, low_end=not vented)
@@ -104,17 +109,6 @@ def check_alive(file: str, name: str, values: NDArray, *, may_rest: bool = False
         raise CampaignError(
             f"{file}, {_lines(0, len(values))}: {name} is {values[0]:g} throughout, and noise moves "
             "every live channel: check its sensor, or give simulated data the sensors' noise"
-        )
-
-
-def check_unit(file: str, name: str, values: NDArray, rules: RecordingRules) -> None:
-    """Pressures, (samples,), are in [bar]. Raises CampaignError."""
-    typical = float(np.median(values))
-    if typical > rules.kilopascal_median:
-        unit, factor = ("Pa", 100000) if typical > rules.pascal_median else ("kPa", 100)
-        raise CampaignError(
-            f"{file}, line {line_number(0)}: {name} is {values[0]:g}, which looks like {unit}: give bar "
-            f"absolute (divide {unit} by {factor})"
         )
 
 
@@ -156,13 +150,20 @@ def check_rail(
         )
 
 
-def check_switching(file: str, U: NDArray, rules: RecordingRules) -> None:
-    """The coil, at voltages (samples,) [V], is on and off: below and above half its greatest voltage."""
-    if np.max(U) < rules.least_voltage or np.min(U) > 0.5 * np.max(U):
-        raise CampaignError(
-            f"{file}, {_lines(0, len(U))}: U_V never switches, it stays between {np.min(U):g} and "
-            f"{np.max(U):g} V: record a switching of the coil, or give the recording the role quality"
-        )
+def switches(U: NDArray, rules: RecordingRules) -> bool:
+    """Whether a coil, at voltages (samples,) in any unit, is on and off: around half the greatest.
+
+    Noise does not switch: its samples differ from each other by nearly as much as from the mean.
+    """
+    size, noise = np.abs(U), np.quantile(np.abs(np.diff(U)), 0.9)
+    return bool(np.min(size) < 0.5 * np.max(size) and np.ptp(U) > rules.switching_noise * noise)
+
+
+def _refuse_voltage(file: str, U: NDArray) -> None:
+    raise CampaignError(
+        f"{file}, {_lines(0, len(U))}: U_V never switches, it stays between {np.min(U):g} and "
+        f"{np.max(U):g} V: record a switching of the coil, or give the recording the role quality"
+    )
 
 
 def check_energised_start(file: str, U: NDArray, period: float) -> None:
@@ -194,24 +195,6 @@ def check_steady_start(file: str, columns: Mapping[str, NDArray], period: float)
                     f"{1e3 * HOLD:g} ms, which must be steady: let the bench settle, energised, "
                     "before recording"
                 )
-
-
-def check_pressures(
-    file: str,
-    columns: Mapping[str, NDArray],
-    period: float,
-    ambient_bar: float,
-    rules: RecordingRules,
-) -> None:
-    """Pressures are absolute, as far as a recording that starts energised and switches can tell.
-
-    columns: by name, each (samples,) in the unit of the name. period [s]. Raises CampaignError.
-    """
-    start = slice(_samples(HOLD, period))
-    for name, channel in CHANNEL_OF.items():
-        if name in columns and channel == "p1":
-            check_against_supply(file, name, columns[name][start], columns["p3_bar"][start])
-    check_discharge(file, columns["U_V"], columns["p3_bar"], period, ambient_bar, rules)
 
 
 def _may_rest(coarse: float, channel: str, role: str) -> bool:

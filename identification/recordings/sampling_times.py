@@ -12,8 +12,7 @@ def sampling_period(file: str, time: NDArray, rules: RecordingRules = RULES) -> 
     """Time between samples [s] of a `time_s` column, (samples,).
 
     Of all periods that explain the printed times the one with the roundest rate in Hz; their middle
-    where no whole rate does. Raises CampaignError for times that are not uniform, do not start at 0 or
-    are slower than `rules.least_rate`.
+    where no whole rate does. Raises CampaignError for times that are not uniform or do not start at 0.
     """
     if len(time) < 2:
         raise CampaignError(
@@ -27,13 +26,16 @@ def sampling_period(file: str, time: NDArray, rules: RecordingRules = RULES) -> 
     if least > greatest:
         _refuse_jitter(file, time)
     period = _roundest(least, greatest)
+    return period
+
+
+def check_rate(file: str, period: float, rules: RecordingRules = RULES) -> None:
+    """Samples follow each other fast enough; period [s]. Raises CampaignError."""
     if period * rules.least_rate > 1 + 1e-9:
         raise CampaignError(
             f"{file}, line {line_number(1)}: sampled at {1 / period:g} Hz: record at "
-            f"{rules.least_rate:g} "
-            "Hz or faster"
+            f"{rules.least_rate:g} Hz or faster"
         )
-    return period
 
 
 def _check_order(file: str, time: NDArray) -> None:

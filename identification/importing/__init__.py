@@ -1,0 +1,1 @@
+"""Campaigns from a bench's own files: MDF, MATLAB, TDMS, Parquet and CSV of any dialect."""

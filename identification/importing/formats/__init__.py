@@ -1,0 +1,1 @@
+"""The formats of measurement files: one file each, one line in the registry."""

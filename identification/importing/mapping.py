@@ -1,0 +1,192 @@
+"""Which channel of a file is which of a recording: by the mapping file, else by names and units."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.importing.channel_names import QUANTITY, meaning, proposed, split_name
+from identification.importing.formats.physical_units import PhysicalUnit, needed_unit
+from identification.importing.formats.source_file import ImportingError, SourceChannel, SourceFile
+from identification.importing.mapping_file import ChannelEntry, MappingFile
+
+SUPPLY_PAIR = ("p1a", "p1b")
+REQUIRED = ("I", "U", "p2", "p3")
+
+REMEDY = "name it in a mapping file (docs/how-to/use-your-recordings.md)"
+
+
+@dataclass(frozen=True, kw_only=True)
+class MappedChannel:
+    """A channel of a file whose meaning, unit and times are known."""
+
+    name: str
+    """Of the recording's channel: one of channel_names.QUANTITY but time."""
+    source: SourceChannel
+    unit: PhysicalUnit
+    reference: str
+    """Of a pressure: gauge, absolute, or absolute, assumed. Empty for others."""
+    factor: float
+    """Of the mapping file."""
+    time: NDArray
+    """(samples,) [s]."""
+    values: NDArray
+    """(samples,) [SI; pressures absolute]."""
+
+    @property
+    def conversion(self) -> str:
+        """What was done to the readings, in words."""
+        steps = [f"× {self.unit.size * self.factor:g}"]
+        steps += ["+ ambient pressure"] if self.reference == "gauge" else []
+        return " ".join(steps)
+
+
+def chosen_channels(source: SourceFile, mapping: MappingFile) -> dict[str, SourceChannel]:
+    """The channel of the file for each of a recording. Raises ImportingError for what is unclear."""
+    entries = {name: entry for name, entry in mapping.channels.items() if name != "time"}
+    chosen = {name: _named(source, entry.source) for name, entry in entries.items()}
+    taken = {id(channel) for channel in chosen.values()}
+    free = [channel for channel in source.channels if id(channel) not in taken]
+    for name, candidates in proposed(free).items():
+        if name == "time" or name in chosen:
+            continue
+        if len(candidates) > 1:
+            names = " or ".join(repr(channel.name) for channel in candidates[:4])
+            raise ImportingError(f"{source.path}: {name} may be {names}: {REMEDY}")
+        chosen[name] = candidates[0]
+    if "p1" in chosen:
+        chosen = {name: channel for name, channel in chosen.items() if name not in SUPPLY_PAIR}
+    _check_complete(source, chosen)
+    return chosen
+
+
+def mapped_channels(
+    source: SourceFile, mapping: MappingFile, ambient: float | None
+) -> list[MappedChannel]:
+    """The channels of a recording in SI units. Raises ImportingError.
+
+    ambient: p_env [Pa absolute]; None: not known, so that gauge pressures are refused.
+    """
+    return [
+        _mapped(source, mapping, name, channel, ambient)
+        for name, channel in chosen_channels(source, mapping).items()
+    ]
+
+
+def _named(source: SourceFile, wanted: str) -> SourceChannel:
+    """The one channel of that name."""
+    found = [channel for channel in source.channels if channel.name == wanted]
+    found = found or [c for c in source.channels if split_name(c.name)[0] == wanted]
+    if len(found) != 1:
+        count = "no channel" if not found else f"{len(found)} channels"
+        known = ", ".join(channel.name for channel in source.channels[:20])
+        raise ImportingError(
+            f"{source.path}: {count} of the name {wanted!r}; there are {known}: mend the mapping file"
+        )
+    return found[0]
+
+
+def _check_complete(source: SourceFile, chosen: Mapping[str, SourceChannel]) -> None:
+    supply = () if "p1" in chosen or all(name in chosen for name in SUPPLY_PAIR) else ("p1",)
+    missing = [name for name in (*supply, *REQUIRED) if name not in chosen]
+    if missing:
+        free = [c.name for c in source.channels if c not in chosen.values() and meaning(c) != "time"]
+        raise ImportingError(
+            f"{source.path}: no channel is known to be {', '.join(missing)}; not used are "
+            f"{', '.join(free[:20]) or 'none'}: {REMEDY}"
+        )
+
+
+def _mapped(
+    source: SourceFile,
+    mapping: MappingFile,
+    name: str,
+    channel: SourceChannel,
+    ambient: float | None,
+) -> MappedChannel:
+    entry = mapping.channels.get(name, ChannelEntry(source=channel.name))
+    place = f"{source.path}, {channel.name}"
+    unit = _unit(place, name, channel, entry)
+    reference = (unit.reference or "absolute, assumed") if unit.quantity == "pressure" else ""
+    offset = 0.0
+    if reference == "gauge":
+        if ambient is None:
+            raise ImportingError(
+                f"{place} is gauge pressure: give the environment's pressure with --ambient-bar or in "
+                "the mapping file"
+            )
+        offset = ambient
+    time, values = _filled(place, _times(source, mapping, channel), channel.values)
+    return MappedChannel(
+        name=name,
+        source=channel,
+        unit=unit,
+        reference=reference,
+        factor=entry.factor,
+        time=time,
+        values=entry.factor * unit.size * values + offset,
+    )
+
+
+def _unit(place: str, name: str, channel: SourceChannel, entry: ChannelEntry) -> PhysicalUnit:
+    """From the mapping file, else from the file's field, else from the channel's name."""
+    inside = split_name(channel.name)[1]
+    text = entry.unit or channel.unit or inside
+    if not text:
+        raise ImportingError(
+            f"{place} has no unit, so that {name} cannot be read: give its unit in a mapping file "
+            "(docs/how-to/use-your-recordings.md)"
+        )
+    unit = needed_unit(text, QUANTITY[name], place)
+    if not entry.unit and channel.unit and inside:
+        other = needed_unit(inside, QUANTITY[name], place)
+        if not np.isclose(other.size, unit.size, rtol=1e-6):
+            raise ImportingError(
+                f"{place} has {inside!r} in its name and {text!r} as its unit: give the right unit in a "
+                "mapping file"
+            )
+    return unit
+
+
+def _times(source: SourceFile, mapping: MappingFile, channel: SourceChannel) -> NDArray:
+    """Times of a channel's samples, (samples,) [s]."""
+    if channel.time is not None:
+        return channel.time
+    wanted = mapping.channels.get("time")
+    mates = [
+        c
+        for c in source.channels
+        if c.table == channel.table and c.time is None and len(c.values) == len(channel.values)
+    ]
+    found = [c for c in mates if (c.name == wanted.source if wanted else meaning(c) == "time")]
+    if len(found) != 1:
+        state = "no channel" if not found else " and ".join(repr(c.name) for c in found)
+        raise ImportingError(
+            f"{source.path}: {state} holds the times of {channel.name}: name one of them, with its "
+            'unit, as "time" in a mapping file'
+        )
+    text = (wanted.unit if wanted else None) or found[0].unit or split_name(found[0].name)[1] or "s"
+    unit = needed_unit(text, "time", f"{source.path}, {found[0].name}")
+    factor = wanted.factor if wanted else 1.0
+    return found[0].values * unit.size * factor
+
+
+def _filled(place: str, time: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
+    """The rows that have both time and value: slow channels leave cells empty."""
+    if len(time) != len(values):
+        raise ImportingError(
+            f"{place} has {len(values)} samples and {len(time)} times: export it with one time for each"
+        )
+    good = np.isfinite(time) & np.isfinite(values)
+    if np.count_nonzero(good) < 2:
+        raise ImportingError(f"{place} has fewer than two samples: leave the file out")
+    return time[good], values[good]
+
+
+def supply_pair_mean(signals: Mapping[str, NDArray]) -> dict[str, NDArray]:
+    """Signals, each (samples,), in which p1 stands for the mean of p1a and p1b."""
+    if not all(name in signals for name in SUPPLY_PAIR):
+        return dict(signals)
+    rest = {name: values for name, values in signals.items() if name not in SUPPLY_PAIR}
+    return {**rest, "p1": np.mean([signals[name] for name in SUPPLY_PAIR], axis=0)}

@@ -1,0 +1,151 @@
+"""Files of benches in many dialects become the same campaign; what is unclear is refused."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+
+from epv_env.plant.parameters import Parameters
+from identification.__main__ import main
+from identification.bench.programmes import REPORT_SUITE
+from identification.bench.session import run_bench
+from identification.importing.formats.physical_units import parsed_unit
+from identification.importing.formats.source_file import ImportingError
+from identification.importing.import_campaign import import_campaign
+from identification.importing.resampling import resampled
+from identification.quality.assessment import assess_recording
+from identification.quality.verdicts import channel_verdict
+from identification.recordings.campaign_files import read_campaign
+from identification.recordings.recording import CHANNELS, CampaignError
+from tests.identification.importing.dialects import DIALECTS, columns_of, text
+
+SUITE = (REPORT_SUITE[0], REPORT_SUITE[-2], REPORT_SUITE[-1])
+
+
+@pytest.fixture(scope="module")
+def bench():
+    """A test, the validation and the record at rest of the virtual bench."""
+    return run_bench(SUITE, Parameters.calibrated(), seed=11)
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+def test_every_dialect_gives_the_same_campaign_and_verdict(bench, dialect, tmp_path):
+    files = [DIALECTS[dialect](tmp_path / r.name, r) for r in bench.recordings]
+    import_campaign(files, tmp_path / "campaign", ambient_bar=1.0)
+    campaign = read_campaign(tmp_path / "campaign")
+    for made, true in zip(campaign.recordings, bench.recordings, strict=True):
+        assert (made.name, made.role, made.period) == (true.name, true.role, true.period)
+        for name in CHANNELS:
+            np.testing.assert_allclose(made.channel(name), true.channel(name), rtol=0, atol=1.0 if
+                                       name.startswith("p") else 1e-5)  # fmt: skip
+    for name in CHANNELS:
+        rest = [assess_recording(c.recordings[-1], 1e5) for c in (campaign, bench)]
+        assert channel_verdict(rest[0], name).status == channel_verdict(rest[1], name).status
+
+
+def test_resampling_neither_delays_nor_folds():
+    """A chirp of 10 Hz to 5 kHz at jittering times: kept below 350 Hz, gone above 500 Hz."""
+    rng = np.random.default_rng(3)
+    time = (np.arange(40_000) + rng.uniform(-0.2, 0.2, 40_000)) / 20_000
+    sweep = 10 + (5000 - 10) * time / 2
+    chirp = np.sin(2 * np.pi * (10 * time + (5000 - 10) * time**2 / 4))
+    grid = 0.001 + np.arange(1990) / 1000
+    made = resampled(time, chirp, grid)
+    frequency = np.interp(grid, time, sweep)
+    true = np.sin(2 * np.pi * (10 * grid + (5000 - 10) * grid**2 / 4))
+    inside, outside = (frequency > 20) & (frequency < 300), frequency > 560
+    assert np.max(np.abs(made - true)[inside]) < 0.01  # a delay of 10 microseconds would show
+    assert np.max(np.abs(made[outside])) < 0.003
+    late = np.sin(2 * np.pi * (10 * (grid - 1e-5) + (5000 - 10) * (grid - 1e-5) ** 2 / 4))
+    assert np.max(np.abs(late - true)[inside]) > 0.01
+
+
+def test_channels_of_other_rates_and_jitter_come_to_one_grid(bench, tmp_path):
+    """The current at 2 kHz, jittering pressures; no current sample moves, no pressure is delayed."""
+    recording = bench.recordings[0]
+    rng = np.random.default_rng(1)
+    columns = columns_of(recording)
+    jitter = recording.time + rng.uniform(-1e-4, 1e-4, len(recording))
+    columns["time"] = (jitter, "s")
+    path = text(tmp_path / "test1.csv", columns)
+    campaign = import_campaign([path], tmp_path / "out", rate=1000.0, ambient_bar=1.0).campaign
+    made = campaign.recordings[0]
+    assert made.period == 1e-3
+    assert json.loads((tmp_path / "out/campaign.json").read_text())["provenance"]["files"][0][
+        "channels"
+    ]["p1"]["resampled"]
+
+
+def test_a_dry_run_shows_everything_and_writes_nothing(bench, tmp_path, capsys):
+    path = text(tmp_path / "test1.csv", columns_of(bench.recordings[0]))
+    assert main(["import", str(path), "--out", str(tmp_path / "out"), "--dry-run"]) == 0
+    shown = capsys.readouterr().out
+    assert "2000 Hz" in shown
+    assert "nothing is written" in shown
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["test1.csv"]
+
+
+def test_the_command_writes_provenance(bench, tmp_path):
+    path = text(tmp_path / "test1.csv", columns_of(bench.recordings[0]))
+    assert main(["import", str(path), "--out", str(tmp_path / "out")]) == 0
+    content = json.loads((tmp_path / "out/campaign.json").read_text())["provenance"]
+    assert len(content["files"][0]["sha256"]) == 64
+    assert content["files"][0]["channels"]["p2"]["unit"] == "bar"
+
+
+def test_a_mapping_file_names_the_rest(bench, tmp_path):
+    columns = {f"K{i}": pair for i, pair in enumerate(columns_of(bench.recordings[0]).values())}
+    path = text(tmp_path / "a.csv", columns, bracket=False)
+    units = ("s", "A", "V", "bar abs", "bar abs", "bar abs")
+    names = ("time", "I", "U", "p1", "p2", "p3")
+    channels = {n: {"source": f"K{i}", "unit": units[i]} for i, n in enumerate(names)}
+    content = {"format": "epv-mapping/1", "channels": channels,
+               "recordings": {"a.csv": {"role": "validation", "name": "b"}}}  # fmt: skip
+    (tmp_path / "map.json").write_text(json.dumps(content))
+    made = import_campaign([path], tmp_path / "out", mapping=tmp_path / "map.json").campaign
+    assert (made.recordings[0].name, made.recordings[0].role) == ("b", "validation")
+
+
+@pytest.mark.parametrize(
+    ("unit", "reference"),
+    [
+        ("barg", "gauge"),
+        ("bar (abs)", "absolute"),
+        ("psig", "gauge"),
+        ("mbar rel", "gauge"),
+        ("bar", ""),
+    ],
+)
+def test_references_of_pressures_are_read(unit, reference):
+    found = parsed_unit(unit)
+    assert found is not None
+    assert found.quantity == "pressure"
+    assert found.reference == reference
+
+
+def test_wrong_inputs_are_refused_and_nothing_written(bench, tmp_path):
+    good = columns_of(bench.recordings[0])
+    gauge = {n: (v, f"{u} gauge" if u == "bar" else u) for n, (v, u) in good.items()}
+    with pytest.raises(ImportingError, match="is gauge pressure: give the environment"):
+        import_campaign([text(tmp_path / "a.csv", gauge)], tmp_path / "out")
+    with pytest.raises(ImportingError, match="has no unit"):
+        import_campaign([text(tmp_path / "b.csv", good, bracket=False)], tmp_path / "out")
+    mbar = {n: (v, "mbar" if u == "bar" else u) for n, (v, u) in good.items()}
+    with pytest.raises(CampaignError, match="1000 times too small"):
+        import_campaign([text(tmp_path / "c.csv", mbar)], tmp_path / "out")
+    rows = (tmp_path / "c.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "d.csv").write_text("".join(rows[:300] + rows[320:]))
+    with pytest.raises(ImportingError, match="no samples from"):
+        import_campaign([tmp_path / "d.csv"], tmp_path / "out")
+    (tmp_path / "e.mat").write_bytes(b"not MATLAB")
+    with pytest.raises(ImportingError, match=r"damaged or no MATLAB file"):
+        import_campaign([tmp_path / "e.mat"], tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_missing_package_is_named_in_one_sentence(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "asammdf", None)
+    (tmp_path / "a.mf4").write_bytes(b"MDF     4.10")
+    with pytest.raises(ImportingError, match=r"need the package asammdf.*epv-valve\[bench-files\]"):
+        import_campaign([tmp_path / "a.mf4"], tmp_path / "out")
