@@ -25,7 +25,7 @@ def write_figures(diagnosis: Diagnosis, folder: Path, name: str) -> list[Path]:
         figures[f"recorded-{name}-left.png"] = missing_term_figure(term, level)
     folder.mkdir(parents=True, exist_ok=True)
     for file, figure in figures.items():
-        figure.savefig(folder / file, dpi=100)
+        figure.savefig(folder / file, dpi=100, bbox_inches="tight")
     return [folder / file for file in figures]
 
 
@@ -52,7 +52,7 @@ def prediction_figure(diagnosis: Diagnosis) -> Figure:
         above.plot(own.time, measured, color=MEASURED, linewidth=0.8, label="measured")
         _finish(above, f"{channel.name} [{channel.unit}]")
         _finish(below, f"error [{channel.unit}]")
-    rows[0].legend(fontsize="small")
+    figure.legend(*rows[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     rows[-1].set_xlabel("time [s]")
     figure.suptitle(f"{own.name}, never fitted to", fontsize="medium")
     counted = own.time[np.any(own.trusted, axis=0)]
