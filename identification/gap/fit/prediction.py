@@ -34,15 +34,7 @@ class Prediction:
 
 def predict(problem: FittingProblem, estimate: Estimate) -> Prediction:
     """Simulate all runs; a held-out run determines its own nuisance parameters and nothing else."""
-    settings = problem.settings
-    count = len(estimate.hypothesis.run_parameters)
-    for _ in range(settings.prediction_iterations if count else 0):
-        runs = _in_run_parameters(problem, estimate)[1]
-        tolerances = _tolerances(problem, runs)
-        steps = [
-            without_run_nuisances(run, tolerances, settings.largest_deviation)[1][:count] for run in runs
-        ]
-        estimate = replace(estimate, run_values=estimate.run_values + np.array(steps))
+    settings, estimate = problem.settings, with_settled_runs(problem, estimate)
     outputs, runs = _in_run_parameters(problem, estimate)
     tolerances = _tolerances(problem, runs)
     shapes = [run.measured.shape for run in problem.plant.runs]
@@ -57,6 +49,22 @@ def predict(problem: FittingProblem, estimate: Estimate) -> Prediction:
             for run, shape in zip(runs, shapes, strict=True)
         ],
     )
+
+
+def with_settled_runs(problem: FittingProblem, estimate: Estimate) -> Estimate:
+    """The estimate whose run parameters suit every run, held-out ones too, all else as it is.
+
+    The outputs need not be linear in them: a winding that begins 30 K warmer, for one.
+    """
+    settings, count = problem.settings, len(estimate.hypothesis.run_parameters)
+    for _ in range(settings.prediction_iterations if count else 0):
+        runs = _in_run_parameters(problem, estimate)[1]
+        tolerances = _tolerances(problem, runs)
+        steps = [
+            without_run_nuisances(run, tolerances, settings.largest_deviation)[1][:count] for run in runs
+        ]
+        estimate = replace(estimate, run_values=estimate.run_values + np.array(steps))
+    return estimate
 
 
 def _tolerances(problem: FittingProblem, runs: Sequence[LinearisedRun]) -> NDArray:

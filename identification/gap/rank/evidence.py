@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.fit.hypothesis import Estimate, cause_places
 from identification.gap.fit.linearisation import linearise
+from identification.gap.fit.prediction import with_settled_runs
 from identification.gap.fit.variable_projection import (
     LinearisedRun,
     NormalEquations,
@@ -85,6 +86,7 @@ def evaluate(
     """
     if not estimates:
         return []
+    estimates = [with_settled_runs(problem, estimate) for estimate in estimates]
     linearised = linearise(problem, estimates, problem.all_runs)
     return [
         evaluate_linearised(problem, estimate, runs, settings)
