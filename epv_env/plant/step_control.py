@@ -1,19 +1,19 @@
 """How long the steps are: the first from the rates, the later ones from an estimate of the error.
 
 The estimate is the difference between the Runge-Kutta step and the midpoint rule, which costs nothing.
-That difference is of third order. Times (h/TIME_SCALE)^2 it is of the fifth, as the error is, and of its
-size where the state changes within about a fifth of TIME_SCALE, as current and pressures do.
+That difference is of third order. Times (h/TIME_SCALE)^2 it is of the fifth, as the error is, and errs on
+the safe side where current and pressures change within 2 ms or more.
 """
 
 from epv_env.plant.primitives.compiled import inlined
 
-DEFAULT_STEP = 250e-6
+DEFAULT_STEP = 200e-6
 """Largest step while a piston or armature moves, and a step that is always good enough [s]."""
 
-LONGEST = 10.0
+LONGEST = 12.5
 """Longest step while both movers are held, over the largest while one moves: half a control period."""
 
-TIME_SCALE = 0.01
+TIME_SCALE = 0.005
 """Time by which the difference to the midpoint rule is brought to the order of the error [s]."""
 
 FASTEST_RATE = 400.0

@@ -61,10 +61,10 @@ def _square_root(value: float) -> Counted:
 
 
 def main() -> None:
-    """Count one pass of `_try_steps` over a block of valves in the middle of an opening."""
+    """Count one pass of `try_steps` over a block of valves in the middle of an opening."""
     import numpy as np
 
-    from epv_env.plant import integrate, lanes
+    from epv_env.plant import lanes, step_control, stepping
     from epv_env.plant.coefficients import coefficients
     from epv_env.plant.parameters import Parameters
     from epv_env.plant.primitives import flow
@@ -78,10 +78,10 @@ def main() -> None:
     c = coefficients(p)
     work[lanes.COEFFICIENT : lanes.COEFFICIENT + len(c)] = c
     work[lanes.REMAINING] = 5e-3
-    work[lanes.HINT] = 1e9
+    work[lanes.HINT] = stepping.UNLIMITED
     counted = np.vectorize(Counted, otypes=[object])(work)
     COUNTS.clear()
-    integrate._try_steps(counted, Counted(integrate.DEFAULT_STEP), False)
+    stepping.try_steps(counted, Counted(step_control.DEFAULT_STEP), False)
     print(json.dumps({kind: number / lanes.LANES for kind, number in COUNTS.items()}))
 
 
