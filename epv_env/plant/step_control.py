@@ -1,8 +1,7 @@
 """How long the steps are: the first from the rates, the later ones from an estimate of the error.
 
 The estimate is the difference between the Runge-Kutta step and the midpoint rule, which costs nothing.
-That difference is of third order. Times (h/TIME_SCALE)^2 it is of the fifth, as the error is, and errs on
-the safe side where current and pressures change within 2 ms or more.
+That difference is of third order. Times (h/TIME_SCALE)^2 it is of the fifth, as the error is.
 """
 
 from epv_env.plant.primitives.compiled import inlined
@@ -17,8 +16,7 @@ TIME_SCALE = 0.005
 """Time by which the difference to the midpoint rule is brought to the order of the error [s]."""
 
 FASTEST_RATE = 400.0
-"""Rate with which current and control pressure change while both movers are held [1/s], to choose a first
-step by."""
+"""Rate with which current and control pressure decay while both movers are held [1/s]."""
 
 PRESSURE_TOLERANCE = 1.0
 """Error of a pressure that a step may make [Pa]; a hundredth of a millibar."""

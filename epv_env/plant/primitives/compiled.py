@@ -19,8 +19,10 @@ inlined = numba.njit(forceinline=True, **FLAGS)
 
 @intrinsic
 def wide_vectors(typing_context):
-    """Let the loops of the calling function use the machine's widest vectors: LLVM avoids those of 512 bits, which
-    slowed down the clock of early processors that had them."""
+    """Let the loops of the calling function use the machine's widest vectors.
+
+    LLVM avoids those of 512 bits, which slowed down the clock of early processors that had them.
+    """
 
     def code(context, builder, signature, arguments):
         # llvmlite lists no attributes with values, but writes them out.
