@@ -71,6 +71,7 @@ def main() -> None:
     from epv_env.plant.simulate import energised
 
     flow.math = SimpleNamespace(sqrt=_square_root)  # type: ignore[assignment]
+    stepping.wide_vectors = lambda: None  # an instruction to the compiler, which is off
     p = Parameters.calibrated()
     work = np.zeros((lanes.N_ROW, lanes.LANES))
     moving = energised(p, p1=12e5, p2=7e5, U=24.0)._replace(p3=6e5, xPV=1e-3, xMV=2e-4)

@@ -18,7 +18,7 @@ inlined = numba.njit(forceinline=True, **FLAGS)
 
 
 @intrinsic
-def wide_vectors(typing_context):
+def wide_vectors(typing_context=None):
     """Let the loops of the calling function use the machine's widest vectors.
 
     LLVM avoids those of 512 bits, which slowed down the clock of early processors that had them.
