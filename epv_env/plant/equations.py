@@ -184,12 +184,18 @@ def piston_force(q, c, effects, extended):
 
 
 @inlined
-def reluctance_inverse(q, c):
-    """1/Rm of the magnetic loop [V s/A]: the air gap closes as the armature is pulled in.
+def reluctance(q, c):
+    """Rm of the magnetic loop [A/(V s)]: the air gap closes as the armature is pulled in.
 
-    A step on trial may run past the stop; the bound, never met within the strokes, keeps it from a pole.
+    A step on trial may run past the stop; the bound, never met within the strokes, keeps it from zero.
     """
-    return 1.0 / max(c.RML + (c.xMVmax - q.xMV) * c.gap_reluctance, 0.5 * c.RML)
+    return max(c.RML + (c.xMVmax - q.xMV) * c.gap_reluctance, 0.5 * c.RML)
+
+
+@inlined
+def reluctance_inverse(q, c):
+    """1/Rm of the magnetic loop [V s/A]."""
+    return 1.0 / reluctance(q, c)
 
 
 @inlined
@@ -211,7 +217,7 @@ def armature_force(q, c, inverse_Rm, effects, extended):
 @inlined
 def current_rate(q, u, c, inverse_Rm, effects, extended):
     """dI/dt [A/s] (eq. 12 with the sign of docs/explanation/plant-model.md, correction 6)."""
-    current, per_inductance = q.I, c.N_squared_inverse / inverse_Rm
+    current, per_inductance = q.I, c.N_squared_inverse * reluctance(q, c)
     if extended:
         current = q.I + effects.I_rem
         flattened = 1.0 + saturation_level(current, inverse_Rm, effects)

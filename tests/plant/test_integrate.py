@@ -91,7 +91,7 @@ def test_agrees_with_scipy_in_random_closed_loops(seed):
     for schedule in random_schedules(4, seed):
         run = simulate_reference(schedule, sample_times(schedule, 1e-3))
         assert np.ptp(run.state.p2) > 0.2e5
-        assert_agrees(schedule, run)
+        assert_agrees(schedule, run, within=0.06)
 
 
 @pytest.mark.slow
