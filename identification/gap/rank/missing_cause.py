@@ -1,7 +1,7 @@
 """Doubt in a set of causes whose remainder one more cause explains.
 
 What a set leaves is an error of its forms, or another cause. Another cause explains an error of form by
-chance, and rarely nearly all of it (`RankingSettings.even_share_left`). So a set is the less probable,
+chance, and rarely nearly all of it (`RankingSettings.completing_share`). So a set is the less probable,
 the less of its remainder stays beside one more cause, however little it leaves of the whole gap.
 """
 
@@ -35,5 +35,5 @@ def log_completeness(
             if possible[j] and len(other - own) == 1 and reached[j] < reached[i]
         ]
         shares[i] = min(with_another, default=reached[i]) / reached[i]
-    odds = (shares / settings.even_share_left) ** settings.credibility_slope
+    odds = (shares / settings.completing_share) ** settings.completing_slope
     return np.where(shares < 1.0, np.log(odds) - np.log1p(odds), 0.0)

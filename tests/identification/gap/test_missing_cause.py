@@ -44,7 +44,7 @@ def test_what_chance_leaves_is_no_reason_for_doubt(two_causes):
 
 def test_the_doubt_is_one_half_at_the_even_share(two_causes):
     chance = SETTINGS.chance_misfit
-    small = SETTINGS.even_share_left * (1000.0 + chance) - chance
+    small = SETTINGS.completing_share * (1000.0 + chance) - chance
     assert doubts(two_causes, {ONE: 1000.0, BOTH: small})[ONE] == pytest.approx(np.log(0.5))
 
 
