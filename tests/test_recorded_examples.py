@@ -10,9 +10,11 @@ import pytest
 from scipy.optimize import least_squares
 
 from docs.examples.pendulum.plant import pendulum
+from docs.examples.recorded_disturbances import RIPPLE_PERIODS, RIPPLE_SIZE, disturbed
 from docs.examples.thermal_lab.plant import thermal_lab
 from docs.examples.toy_car.plant import toy_car
 from identification.gap.model.ode_plant import OdePlant
+from identification.gap.model.prepared_plant import prepared
 
 ROOT = Path(__file__).parents[1]
 RECORDED = ROOT.parent / "shared" / "recorded"
@@ -96,6 +98,31 @@ def test_every_cause_acts_at_its_trials_and_not_at_its_nominal_value(name):
         np.testing.assert_array_equal(found[..., :1], base, err_msg=cause.name)
         noise = own.channels[0].noise
         assert np.min(np.max(np.abs(found[..., 1:] - base), axis=(0, 1))) > noise, cause.name
+
+
+@pytest.mark.parametrize("name", PLANTS)
+@pytest.mark.parametrize("factor", [0.3, 3.0])
+def test_a_wrong_noise_is_stated_for_the_same_readings(name, factor):
+    own = plant(name)
+    other = disturbed(own, f"sigma={factor:g}", seed=0)
+    told = [channel.known_noise for channel in other.channels]
+    seen = [channel.known_noise for channel in prepared(own).channels]
+    assert told == pytest.approx([factor * level for level in seen])
+    assert other.runs == own.runs
+
+
+@pytest.mark.parametrize("name", PLANTS)
+def test_a_ripple_has_its_size_and_correlation(name):
+    own = plant(name)
+    other = disturbed(own, "ripple", seed=0)
+    ripple = np.concatenate(
+        [changed.measured - run.measured for run, changed in zip(own.runs, other.runs, strict=True)],
+        axis=1,
+    )
+    noise = np.array([channel.known_noise for channel in prepared(own).channels])
+    assert np.nanstd(ripple, axis=1) == pytest.approx(RIPPLE_SIZE * noise, rel=0.25)
+    neighbours = np.nanmean(ripple[:, 1:] * ripple[:, :-1], axis=1) / np.nanmean(ripple**2, axis=1)
+    assert neighbours == pytest.approx(np.exp(-1.0 / RIPPLE_PERIODS), abs=0.05)
 
 
 @pytest.mark.parametrize("name", PLANTS)

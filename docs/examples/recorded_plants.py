@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from docs.examples.recorded_disturbances import DISTURBANCES, disturbed
 from docs.examples.recorded_figures import write_figures
 from epv_env.common.command_line import writable_folder
 from identification.gap.diagnosis import Diagnosis, diagnose
@@ -93,9 +94,14 @@ def command(title: str, name: str, plant_of: Callable[[Path], OdePlant]) -> int:
         "--with", nargs="+", default=[], metavar="CAUSE", dest="added",
         help="causes to make part of the model, calibrated like the rest of it",
     )  # fmt: skip
+    parser.add_argument(
+        "--disturb", choices=DISTURBANCES,
+        help="state 0.3 or three times the noise, or add a ripple of twice the noise",
+    )  # fmt: skip
     parser.add_argument("--images", type=writable_folder, help="folder of pictures for documents")
     chosen = parser.parse_args()
     plant = changed(plant_of(chosen.data), without=chosen.without, added=chosen.added)
+    plant = disturbed(plant, chosen.disturb, chosen.seed) if chosen.disturb else plant
     diagnosis = diagnose(plant, seed=chosen.seed)
     write_results(diagnosis, chosen.out)
     heading = f"Gap between model and recordings: {title}"

@@ -16,6 +16,7 @@ from scipy.special import gammaln, softmax
 from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.rank.discrepancy import ChannelDiscrepancy, channel_discrepancies
 from identification.gap.rank.evidence import EvaluatedHypothesis
+from identification.gap.rank.missing_cause import log_completeness
 from identification.gap.rank.settings import RankingSettings
 
 
@@ -30,7 +31,7 @@ class Posterior:
     unknown: float
     """Probability that what acts has no name in the catalogue."""
     scores: list[float]
-    """Log probabilities before the doubt about a remainder, but for a constant, (n,)."""
+    """Log probabilities before the doubt whether the nearest is right, but for a constant, (n,)."""
     shares_left: list[float]
     """Share of the recalibrated model's misfit beyond noise that each hypothesis leaves, (n,) [1]."""
     discrepancies: list[ChannelDiscrepancy]
@@ -56,10 +57,15 @@ def posterior(
         ]
     )
     scores[0] = _no_cause_score(every, misfits, discrepancies, settings)
+    scores[1:] += log_completeness(hypotheses, misfits[1:], settings)
     unknown = _robust(float(misfits[0]), float(misfits[0]), settings) + np.log(settings.prior_unknown)
     weights = softmax([*scores, unknown])[:-1]
     left = _shares_left(misfits, discrepancies, settings)
-    credible = credibility(left, len({cause.name for cause in problem.plant.causes}), settings)
+    credible = credibility(
+        left + settings.unseen_misfit / max(float(misfits[0]), settings.least_misfit),
+        len({cause.name for cause in problem.plant.causes}),
+        settings,
+    )
     named = weights[1:] * credible[1:]
     return Posterior(
         probabilities=named.tolist(),

@@ -26,8 +26,8 @@ FOLDER = Path(identification.gap.__file__).parent
 DEFINITIONS = {"FLOOR", "LAGS", "LEAST", "MEDIAN_TO_SD", "STEP_TO_SD", "PREFIXES", "POWER_PREFIXES"}
 """Numbers that are definitions, and no judgement."""
 
-SAFEGUARDS = {"ACTIVE_SET_ITERATIONS"}
-"""Ends of iterations that find one exact solution: no judgement either."""
+SAFEGUARDS = {"ACTIVE_SET_ITERATIONS", "PIVOTS", "ROUNDING"}
+"""Ends of iterations that find one exact solution, and rounding there: no judgement either."""
 
 STAGES = (
     PreparationSettings,

@@ -1,0 +1,62 @@
+"""A set of causes is doubted where one more cause explains nearly all that it leaves."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.gap.rank.missing_cause import log_completeness
+from identification.gap.rank.ranking import Ranking, rank_hypotheses
+from identification.gap.rank.settings import RankingSettings
+from tests.identification.gap.drives import Drive
+
+SETTINGS = RankingSettings()
+
+
+@pytest.fixture(scope="module")
+def two_causes() -> Ranking:
+    return rank_hypotheses(Drive({"coupling": 0.1, "dead_zone": 0.15}))
+
+
+def doubts(found: Ranking, misfits: dict[frozenset[str], float], other: float = 1e4) -> dict:
+    """Log completeness of each set, by the labels of its causes; `other`: misfit of sets not given."""
+    sets = [frozenset(each.labels) for each in found.hypotheses]
+    values = np.array([misfits.get(own, other) for own in sets])
+    return dict(zip(sets, log_completeness(found.hypotheses, values, SETTINGS), strict=True))
+
+
+ONE, BOTH = frozenset({"coupling"}), frozenset({"coupling", "dead_zone"})
+
+
+def test_a_set_that_leaves_what_another_cause_explains_is_doubted(two_causes):
+    found = doubts(two_causes, {ONE: 700.0, BOTH: 7.0})
+    assert found[ONE] < np.log(0.01)
+    assert found[BOTH] == 0.0
+
+
+def test_a_set_is_hardly_doubted_where_another_cause_explains_half(two_causes):
+    assert doubts(two_causes, {ONE: 700.0, BOTH: 350.0})[ONE] > np.log(0.95)
+
+
+def test_what_chance_leaves_is_no_reason_for_doubt(two_causes):
+    assert doubts(two_causes, {ONE: 6.0, BOTH: 1.0})[ONE] > np.log(0.95)
+
+
+def test_the_doubt_is_one_half_at_the_even_share(two_causes):
+    chance = SETTINGS.chance_misfit
+    small = SETTINGS.completing_share * (1000.0 + chance) - chance
+    assert doubts(two_causes, {ONE: 1000.0, BOTH: small})[ONE] == pytest.approx(np.log(0.5))
+
+
+def test_a_cause_at_the_end_of_its_range_explains_nothing(two_causes):
+    hypotheses = [replace(each, at_bound=True) for each in two_causes.hypotheses]
+    misfits = np.linspace(1.0, 1000.0, len(hypotheses))
+    assert np.all(log_completeness(hypotheses, misfits, SETTINGS) == 0.0)
+
+
+def test_a_small_second_cause_beside_a_large_one_is_named():
+    """It closes less of the gap than an error of the first one's form may, and is there all the same."""
+    found = rank_hypotheses(Drive({"coupling": 0.9, "dead_zone": 0.04}))
+    alone = next(i for i, each in enumerate(found.hypotheses) if each.labels == ("coupling",))
+    assert found.shares_left[alone] < SETTINGS.form_error_share
+    assert found.inclusion["dead_zone"] > 0.9
