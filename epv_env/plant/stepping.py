@@ -49,6 +49,10 @@ STICK_SPEED = 5e-3
 RELEASE_MARGIN = 1e-7
 """Time by which a located release is overstepped, so that the next step finds the mover free [s]."""
 
+RELEASE_LOCATIONS = 3
+"""How often a release is located with effects, each time on a step that ends at the last instant found.
+Friction ends as a stop lets go, so that an error of the instant counts to first order."""
+
 SHORTEST_STEP = 1e-10
 """Every step makes at least this much progress [s]."""
 
@@ -154,6 +158,8 @@ def try_steps(work, step, extended):
         kinked = _passes(q.xMV, end.xMV, c.kink_in) | _passes(q.xMV, end.xMV, c.kink_exh)
         let_go = _lets_go(held_PV, force_PV, end_PV) | _lets_go(held_MV, force_MV, end_MV)
         again = (located == 1.0) & (h > step)  # located once, on too long a step to be exact
+        if extended:
+            again |= (located > 0.0) & (located < RELEASE_LOCATIONS)
         event = beyond | ((located == 0.0) & (kinked | let_go)) | (again & let_go)
         error = relative_error(difference, h, step, extended)
         wrong = (error > 1.0) & (h > step)
