@@ -133,8 +133,8 @@ class RankingSettings:
 
     form_error_share: float = 5e-3
     """Share of the recalibrated model's misfit [1] that an error of a cause's form may leave without
-    any doubt: 7 % in amplitude. Textbook forms are accurate to some percent. Of 0.002 to 0.02 it gave the
-    best calibrated answers on 100 opened blind trials of seed 2040 and 60 of seed 4006, whose forms
+    any doubt: 7 % in amplitude. Textbook forms are accurate to some percent. Of 0.002 to 0.02 it gave
+    the best calibrated answers on 100 opened blind trials of seed 2040 and 60 of seed 4006, whose forms
     deviate by 20 to 50 %."""
 
     bound_margin: float = 1e-4
@@ -192,9 +192,9 @@ class RankingSettings:
     Chosen on the same 100 trials."""
 
     completing_share: float = 0.08
-    """Share of a set's misfit [1] that stays beside one more cause, at which the set lacks that cause with
-    even odds. In those 160 trials the nearest cause left 0.05 and more of an error of form, with one
-    exception, and less than 0.02 of another cause's part."""
+    """Share of a set's misfit [1] that stays beside one more cause, at which the set lacks that cause
+    with even odds. In those 160 trials the nearest cause left 0.05 and more of an error of form, with
+    one exception, and less than 0.02 of another cause's part."""
 
     completing_slope: float = 6.0
     """Exponent by which the odds of a complete set rise with that share [1], from the same figures."""

@@ -1,5 +1,7 @@
 """The verdict of a diagnosis in sentences that a project leader can act on."""
 
+from collections.abc import Sequence
+
 from identification.gap.diagnosis import Diagnosis, hypothesis_label
 from identification.gap.rank.verdict import AMBIGUOUS, KNOWN, NO_GAP, PARTIAL
 from identification.gap.reduce.discrepancy_reduction import NOMINAL, RECALIBRATED
@@ -88,20 +90,27 @@ def _ambiguous(diagnosis: Diagnosis) -> str:
     labels = [cause.hypothesis.labels for cause in rivals]
     common = [label for label in labels[0] if all(label in others for others in labels)]
     rests = [" + ".join(label for label in own if label not in common) for own in labels]
-    names = " or ".join(
-        f"{rest or 'nothing else'} ({probability_text(cause.probability)})"
+    choices = " or ".join(
+        f"{_beside(rest, common)} ({probability_text(cause.probability)})"
         for rest, cause in zip(rests, rivals, strict=True)
     )
-    together = f"{listed(common)} together with " if common else ""
+    explain, close = ("explain", "close") if len(common) > 1 else ("explains", "closes")
+    text = (
+        f"{listed(common)} {explain} the gap, {choices}," if common else f"{choices} {explain} the gap"
+    )
     shares = " or ".join(dict.fromkeys(share_closed(diagnosis, cause) for cause in rivals))
     doubt = "which" if all(rests) else "whether another cause acts or the form of the first one errs"
-    text = (
-        f"{together}{names} explains the gap and closes {shares} of it; these recordings cannot tell "
-        f"{doubt}."
-    )
+    text += f" and {close} {shares} of it; these recordings cannot tell {doubt}."
     if any(diagnosis.surely_helps(cause) for cause in rivals):
         return text
     return f"{text} None of them surely helps on recordings never fitted to: add none yet."
+
+
+def _beside(rest: str, common: Sequence[str]) -> str:
+    """What a rival adds to the causes that all rivals share."""
+    if not common:
+        return rest
+    return f"with {rest}" if rest else "alone"
 
 
 def _no_gap(diagnosis: Diagnosis) -> str:
@@ -138,9 +147,15 @@ def _possible_cause(diagnosis: Diagnosis) -> str:
 
 
 def _unknown(diagnosis: Diagnosis) -> str:
+    unknown = diagnosis.ranking.unknown
+    found = (
+        f"Nothing in the catalogue explains the gap ({probability_text(unknown)}): something is missing"
+        if unknown > 0.5
+        else "No cause in the catalogue is probable enough to be named: it may be one of them, or "
+        f"something that is missing ({probability_text(unknown)})"
+    )
     text = (
-        f"Nothing in the catalogue explains the gap ({probability_text(diagnosis.ranking.unknown)}): "
-        f"something is missing, most likely in {component_at_fault(diagnosis)}"
+        f"{found}, most likely in {component_at_fault(diagnosis)}"
         f"{', see its shape' if diagnosis.localisation.missing_term else ''}."
     )
     return f"{text} {nearest_cause(diagnosis, diagnosis.best)}" if diagnosis.best else text

@@ -100,6 +100,8 @@ def test_an_unknown_cause_is_sent_to_the_place_and_the_shape():
     assert status == "bad"
     unknown = probability_text(found.ranking.unknown)
     assert text.startswith(f"Nothing in the catalogue explains the gap ({unknown})")
+    doubted = replace(found, ranking=replace(found.ranking, unknown=0.4))
+    assert verdict_sentence(doubted, NEXT)[1].startswith("No cause in the catalogue is probable enough")
     component = max(
         found.conclusion.component_probabilities,
         key=found.conclusion.component_probabilities.__getitem__,
@@ -143,10 +145,10 @@ def test_what_rivals_share_is_said_once():
     shares = found.reduction.shares_closed
     known = dict(shares) | {f"lag + {name}": share for name, share in shares.items()}
     both = said(beside(leak), beside(seep))
-    assert both.startswith("lag together with leak (")
+    assert both.startswith("lag explains the gap, with leak (")
     assert "cannot tell which" in both
     alone = said(leak, beside(leak))
-    assert alone.startswith("leak together with nothing else (")
+    assert alone.startswith("leak explains the gap, alone (")
     assert "whether another cause acts or the form of the first one errs" in alone
 
 
