@@ -24,7 +24,7 @@ from epv_env.plant.consumption import mean_flow
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.integrate import run_nominal
 from epv_env.plant.lanes import N_STATE, STATE, state_at
-from epv_env.plant.primitives.compiled import exact, source_digest
+from epv_env.plant.primitives.compiled import exact, source_digest, wide_vectors
 from epv_env.result import CONSUMPTION, FAILED, SWITCHINGS
 
 NOISE_BLOCK = 256
@@ -106,6 +106,7 @@ def _compiled(digest):
               last):  # fmt: skip
         if digest == "":  # keeps the digest in the closure
             return
+        wide_vectors()  # the preference of run_nominal is lost where that is inlined here
         _prepare(episodes, progress, rules, state, before, inputs, duration, lowest, highest, on_time,
                  action, figures, first, last)  # fmt: skip
         parts = 2 if np.any(duration[1, first:last] > 0.0) else 1

@@ -13,7 +13,13 @@ from typing import NamedTuple
 from epv_env.plant.effects.chambers import chamber_rates, pipe_rate
 from epv_env.plant.effects.coil import coil_current, flux_rate, heated, heating_rate
 from epv_env.plant.effects.flows import discharge, effective_seat_diameter, supply_drop_rate
-from epv_env.plant.effects.friction import SLIDING_SPEED_MV, SLIDING_SPEED_PV, friction, stribeck
+from epv_env.plant.effects.friction import (
+    SLIDING_SPEED_MV,
+    SLIDING_SPEED_PV,
+    friction,
+    stop_friction,
+    stribeck,
+)
 from epv_env.plant.effects.magnet import saturated_force, saturation_level
 from epv_env.plant.effects.measurement import lag_rate
 from epv_env.plant.effects.seats import opened
@@ -165,6 +171,12 @@ _with_supply = replacing(State, "p1")
 
 
 @inlined
+def piston_friction(q, effects):
+    """Size of the piston's friction [N]; greatest at rest."""
+    return effects.friction_PV * stribeck(q.vPV, effects.breakaway_PV)
+
+
+@inlined
 def piston_force(q, c, effects, extended):
     """Net force on the PV piston, opening positive [N] (eq. 22; eq. 9 with the cone effect).
 
@@ -178,18 +190,24 @@ def piston_force(q, c, effects, extended):
     force = pressure - c.cPV * (q.xPV + c.xPV0) - c.kPV * q.vPV
     if extended:
         force -= effects.flow_force * c.curtain_PV * q.xPV * (q.p1 - q.p2)
-        size = effects.friction_PV * stribeck(q.vPV, effects.breakaway_PV)
+        size = piston_friction(q, effects)
         force = friction(force, q.xPV, q.vPV, c.xPVmax, size, SLIDING_SPEED_PV)
     return force
 
 
 @inlined
-def reluctance_inverse(q, c):
-    """1/Rm of the magnetic loop [V s/A]: the air gap closes as the armature is pulled in.
+def reluctance(q, c):
+    """Rm of the magnetic loop [A/(V s)]: the air gap closes as the armature is pulled in.
 
-    A step on trial may run past the stop; the bound, never met within the strokes, keeps it from a pole.
+    A step on trial may run past the stop; the bound, never met within the strokes, keeps it from zero.
     """
-    return 1.0 / max(c.RML + (c.xMVmax - q.xMV) * c.gap_reluctance, 0.5 * c.RML)
+    return max(c.RML + (c.xMVmax - q.xMV) * c.gap_reluctance, 0.5 * c.RML)
+
+
+@inlined
+def reluctance_inverse(q, c):
+    """1/Rm of the magnetic loop [V s/A]."""
+    return 1.0 / reluctance(q, c)
 
 
 @inlined
@@ -211,7 +229,7 @@ def armature_force(q, c, inverse_Rm, effects, extended):
 @inlined
 def current_rate(q, u, c, inverse_Rm, effects, extended):
     """dI/dt [A/s] (eq. 12 with the sign of docs/explanation/plant-model.md, correction 6)."""
-    current, per_inductance = q.I, c.N_squared_inverse / inverse_Rm
+    current, per_inductance = q.I, c.N_squared_inverse * reluctance(q, c)
     if extended:
         current = q.I + effects.I_rem
         flattened = 1.0 + saturation_level(current, inverse_Rm, effects)
@@ -312,6 +330,8 @@ def effect_rates(q, u, c, effects, through_PV, inlet, exhaust, leak):
 def derivative(q, u, c, effects, free_PV, free_MV, extended):
     """Rates of all states (eqs 5-12), and the two forces that decide whether a stop holds.
 
+    These forces include the friction of a mover at rest on a stop; a mover that is let go has none yet.
+
     free_PV, free_MV: 1.0 where the mover may move, 0.0 where a stop holds it. extended: a literal
     bool; False compiles the effects away. Returns (State of rates, piston force, armature force).
     """
@@ -324,9 +344,12 @@ def derivative(q, u, c, effects, free_PV, free_MV, extended):
     inlet = flow_inlet(q, c, effects, extended)
     exhaust = flow_exhaust(q, c, effects, extended)
     leak = flow_circuit_leak(q, c, effects, extended)
+    moving_PV, moving_MV = force_PV, force_MV
     if extended:
         force_PV += u.force_PV
         force_MV += u.force_MV
+        moving_PV = force_PV + stop_friction(q.xPV, q.vPV, c.xPVmax, piston_friction(q, effects))
+        moving_MV = force_MV + stop_friction(q.xMV, q.vMV, c.xMVmax, effects.friction_MV)
         (
             p2_rate, p3_rate, coil_heat_rate, heat_3_rate, heat_2_rate, far_rate, drop_rate, lag_2_rate,
             lag_3_rate, current,
@@ -341,9 +364,9 @@ def derivative(q, u, c, effects, free_PV, free_MV, extended):
         p2=p2_rate,
         p3=p3_rate,
         xPV=q.vPV * free_PV,
-        vPV=force_PV * c.mPV_inverse * free_PV,
+        vPV=moving_PV * c.mPV_inverse * free_PV,
         xMV=q.vMV * free_MV,
-        vMV=force_MV * c.mMV_inverse * free_MV,
+        vMV=moving_MV * c.mMV_inverse * free_MV,
         I=current_rate(q, u, c, inverse_Rm, effects, extended),
         p1=u.p1_slope + c.RT_V1 * (u.refill - through_PV - inlet),
         air_in_PV=through_PV,

@@ -38,13 +38,15 @@ N_FORCE = 6
 """Rows of the forces."""
 REMAINING = FORCE + N_FORCE
 """Time left in the period [s]."""
-HINT = REMAINING + 1
+TRIED = REMAINING + 1
+"""Length of the step on trial [s]."""
+HINT = TRIED + 1
 """Largest next step [s]."""
-EVENT = HINT + 1
+LOCATED = HINT + 1
+"""How often the event that the next step ends at has been located; 0 where it ends at none."""
+EVENT = LOCATED + 1
 """1 where the step on trial met an event, else 0."""
-GIVEN_UP = EVENT + 1
-"""1 where the lane could not be integrated, else 0."""
-LOWEST = GIVEN_UP + 1
+LOWEST = EVENT + 1
 """Least p2 so far [Pa]."""
 HIGHEST = LOWEST + 1
 """Greatest p2 so far [Pa]."""
@@ -54,8 +56,11 @@ N_ROW = HIGHEST + 1
 
 @inlined
 def new_workspace():
-    """Working memory of one block. One array of literal shape: LLVM then sees that no rows overlap."""
-    return np.empty((N_ROW, LANES))
+    """Working memory of one block. One array of literal shape: LLVM then sees that no rows overlap.
+
+    Ones, for the lanes that never get a valve: their arithmetic must not slow down that of the others.
+    """
+    return np.ones((N_ROW, LANES))
 
 
 def _reader(kind):
@@ -107,8 +112,7 @@ moved = generated(
 
 
 @inlined
-def copy_rows(source, source_row, source_lane, target, target_row, target_lane, n_rows):
-    """Copy n_rows rows of one block of lanes from table to table."""
+def copy_column(source, source_row, source_lane, target, target_row, target_lane, n_rows):
+    """Copy n_rows rows of one lane from table to table."""
     for row in range(n_rows):
-        for lane in range(LANES):
-            target[target_row + row, target_lane + lane] = source[source_row + row, source_lane + lane]
+        target[target_row + row, target_lane] = source[source_row + row, source_lane]

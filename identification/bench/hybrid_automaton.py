@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from epv_env.plant.coefficients import coefficients
 from epv_env.plant.effects.registry import effect_constants, has_effects
 from epv_env.plant.equations import Coefficients, Inputs, State
-from epv_env.plant.integrate import STICK_SPEED
+from epv_env.plant.stepping import STICK_SPEED
 from identification.bench.right_hand_side import (
     COMPILED_RIGHT_HAND_SIDES,
     RightHandSide,

@@ -61,16 +61,17 @@ def _square_root(value: float) -> Counted:
 
 
 def main() -> None:
-    """Count one pass of `_try_steps` over a block of valves in the middle of an opening."""
+    """Count one pass of `try_steps` over a block of valves in the middle of an opening."""
     import numpy as np
 
-    from epv_env.plant import integrate, lanes
+    from epv_env.plant import lanes, step_control, stepping
     from epv_env.plant.coefficients import coefficients
     from epv_env.plant.parameters import Parameters
     from epv_env.plant.primitives import flow
     from epv_env.plant.simulate import energised
 
     flow.math = SimpleNamespace(sqrt=_square_root)  # type: ignore[assignment]
+    stepping.wide_vectors = lambda: None  # an instruction to the compiler, which is off
     p = Parameters.calibrated()
     work = np.zeros((lanes.N_ROW, lanes.LANES))
     moving = energised(p, p1=12e5, p2=7e5, U=24.0)._replace(p3=6e5, xPV=1e-3, xMV=2e-4)
@@ -78,10 +79,10 @@ def main() -> None:
     c = coefficients(p)
     work[lanes.COEFFICIENT : lanes.COEFFICIENT + len(c)] = c
     work[lanes.REMAINING] = 5e-3
-    work[lanes.HINT] = 1e9
+    work[lanes.HINT] = stepping.UNLIMITED
     counted = np.vectorize(Counted, otypes=[object])(work)
     COUNTS.clear()
-    integrate._try_steps(counted, Counted(integrate.DEFAULT_STEP), False)
+    stepping.try_steps(counted, Counted(step_control.DEFAULT_STEP), False)
     print(json.dumps({kind: number / lanes.LANES for kind, number in COUNTS.items()}))
 
 

@@ -8,7 +8,7 @@ noisy: compare ratios within one run, not figures between runs.
 
 import numpy as np
 
-from epv_env.plant.integrate import DEFAULT_STEP
+from epv_env.plant.step_control import DEFAULT_STEP, LONGEST
 from epv_env.plant.valves import available_cores
 from identification.bench.reference_simulation import simulate_reference
 from tests.benchmarks import startup, workloads
@@ -50,11 +50,11 @@ def kernel(table: Table, repetitions: int, periods: int, batch: Row) -> None:
     """Cost of one step, and how close it comes to what the machine can do."""
     table.section("one step of one valve, one thread (both movers held: the number of steps is known)")
     valves, u = workloads.energised_valves(VALVES, 1), workloads.held(VALVES, periods)
-    steps = VALVES * periods * PERIOD / (2 * DEFAULT_STEP)
+    steps = VALVES * periods * PERIOD / (LONGEST * DEFAULT_STEP)
     seconds = durations(lambda: valves.record(u, PERIOD), repetitions)
     rate = table.add("Runge-Kutta steps", "1/s", rates(steps, seconds))
     table.add("right-hand sides", "1/s", [4 * value for value in rate.values])
-    note = "10 when held, 20 when moving; the rest is events and waiting for the block's slowest"
+    note = "2 at rest, 25 when moving; the rest is events"
     cost = rate.median / batch.median * PERIOD
     table.add("steps' time that a randomly switched period takes", "steps", cost, note=note)
     counts = count_operations()

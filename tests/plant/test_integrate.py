@@ -91,14 +91,14 @@ def test_agrees_with_scipy_in_random_closed_loops(seed):
     for schedule in random_schedules(4, seed):
         run = simulate_reference(schedule, sample_times(schedule, 1e-3))
         assert np.ptp(run.state.p2) > 0.2e5
-        assert_agrees(schedule, run)
+        assert_agrees(schedule, run, within=0.06)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(100, 110))
 def test_agrees_with_scipy_in_many_random_closed_loops(seed):
     for schedule in random_schedules(10, seed):
-        assert_agrees(schedule, simulate_reference(schedule, sample_times(schedule, 1e-3)))
+        assert_agrees(schedule, simulate_reference(schedule, sample_times(schedule, 1e-3)), 0.06)
 
 
 def test_rebounds_end_and_agree_with_scipy():

@@ -86,11 +86,17 @@ def stribeck(v, excess):
 
 
 @inlined
+def stop_friction(x, v, x_max, size):
+    """Friction with which a stop's mover at rest resists its release [N]; zero elsewhere."""
+    side = (1.0 if x <= 0.0 else 0.0) - (1.0 if x >= x_max else 0.0)
+    return size * (side if v == 0.0 else 0.0)
+
+
+@inlined
 def friction(force, x, v, x_max, size, sliding_speed):
     """Net force on a mover with Coulomb friction [N]; force: without friction.
 
     At rest on a stop friction resists the release; else it rises to its size over the sliding speed.
     """
-    side = (1.0 if x <= 0.0 else 0.0) - (1.0 if x >= x_max else 0.0)
     sliding = v / math.sqrt(v * v + sliding_speed * sliding_speed)
-    return force - size * (side if v == 0.0 else sliding)
+    return force - size * sliding - stop_friction(x, v, x_max, size)

@@ -16,15 +16,11 @@ from epv_env.plant.primitives.compiled import inlined
 STABLE = 1.0
 """Longest step times fastest rate at which the integrator follows an effect well [-]."""
 
-FRICTION_STABLE = 0.7
+FRICTION_STABLE = 0.35
 """The same for friction near rest, where its rate falls steeply with speed [-]."""
 
 UNLIMITED = 1.0
 """Longest step where no effect asks for a shorter one [s]."""
-
-STICKY_STEP = 3e-5
-"""Steps shorter than this are asked for by friction so great that a mover chatters as it is let go [s]:
-there they are kept while a stop holds it, too."""
 
 
 def step_limits(effects: tuple[Effect, ...]) -> tuple[Constant, ...]:
@@ -98,7 +94,5 @@ def longest_step(U, q, effects, free_PV, free_MV):
     step = min(effects.steady_step, effects.clamp_step if clamped else effects.steady_step)
     step_PV = friction_step(effects.slow_step_PV, q.vPV, SLIDING_SPEED_PV)
     step_MV = friction_step(effects.slow_step_MV, q.vMV, SLIDING_SPEED_MV)
-    bound_PV = (free_PV > 0.0) | (effects.slow_step_PV < STICKY_STEP)
-    bound_MV = (free_MV > 0.0) | (effects.slow_step_MV < STICKY_STEP)
-    step = min(step, step_PV if bound_PV else step)
-    return min(step, step_MV if bound_MV else step)
+    step = min(step, step_PV if free_PV > 0.0 else step)
+    return min(step, step_MV if free_MV > 0.0 else step)

@@ -8,6 +8,8 @@ import hashlib
 from pathlib import Path
 
 import numba
+from numba import types
+from numba.extending import intrinsic
 
 FLAGS = {"fastmath": {"nnan", "ninf", "nsz", "contract", "arcp"}, "error_model": "numpy"}
 
@@ -16,6 +18,21 @@ inlined = numba.njit(forceinline=True, **FLAGS)
 
 exact = numba.njit(forceinline=True, error_model="numpy")
 """Decorator for functions of numbers that give what NumPy gives, to the bit: nothing is contracted."""
+
+
+@intrinsic
+def wide_vectors(typing_context=None):
+    """Let the loops of the calling function use the machine's widest vectors.
+
+    LLVM avoids those of 512 bits, which slowed down the clock of early processors that had them.
+    """
+
+    def code(context, builder, signature, arguments):
+        # llvmlite lists no attributes with values, but writes them out.
+        set.add(builder.function.attributes, '"prefer-vector-width"="512"')
+        return context.get_dummy_value()
+
+    return types.void(), code
 
 
 def generated(name: str, arguments: str, body: str, decorator=inlined, **names):

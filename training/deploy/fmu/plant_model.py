@@ -11,11 +11,17 @@ from epv_env.plant.effects.registry import CONSTANTS, Effects
 from epv_env.plant.effects.step_limits import longest_step
 from epv_env.plant.equations import Coefficients, Inputs, State, derivative
 from epv_env.plant.events import crossing, hermite, release, turning_point
-from epv_env.plant.integrate import LANDING, RELEASE_MARGIN, SHORTEST_STEP, STICK_SPEED
 from epv_env.plant.lanes import moved
 from epv_env.plant.parameters import table
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.runge_kutta import held_still, is_held
+from epv_env.plant.stepping import (
+    LANDING,
+    RELEASE_LOCATIONS,
+    RELEASE_MARGIN,
+    SHORTEST_STEP,
+    STICK_SPEED,
+)
 from training.deploy.c_sources import TITLE
 from training.deploy.fmu.expressions import NUMBER, TRUTH
 from training.deploy.fmu.field_texts import field_texts
@@ -136,6 +142,7 @@ def _sources(settings: FmuSettings) -> dict[str, str]:
         "landing": repr(LANDING),
         "stick_speed": repr(STICK_SPEED),
         "release_margin": repr(RELEASE_MARGIN),
+        "release_locations": str(RELEASE_LOCATIONS),
         "shortest_step": repr(SHORTEST_STEP),
     }
     return {

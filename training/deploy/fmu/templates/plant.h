@@ -13,6 +13,7 @@
 
 #define LANDING $landing           /* nearer to a stop than this a mover has landed [m] */
 #define STICK_SPEED $stick_speed   /* a slower rebound ends at the stop [m/s] */
+#define RELEASE_LOCATIONS $release_locations /* how often a release is located */
 #define RELEASE_MARGIN $release_margin /* time by which a release is overstepped [s] */
 #define SHORTEST_STEP $shortest_step   /* every step makes at least this much progress [s] */
 #define NO_LIMIT 1e9               /* [s] */
@@ -126,8 +127,9 @@ static trial runge_kutta(const State *q, const State *k1, const conditions *on, 
     return t;
 }
 
-/* Take one step, or only learn how long it may be. Returns the time gone by [s]; hint: of the next. */
-static double step(State *q, const conditions *on, double remaining, double *hint)
+/* Take one step, or only learn how long it may be. Returns the time gone by [s]; hint: of the next step;
+   located: how often the event that it ends at has been located. */
+static double step(State *q, const conditions *on, double remaining, double *hint, int *located)
 {
     const Coefficients *c = &on->c;
     const $rates first = derivative(q, &on->u, c, &on->effects, 1.0, 1.0, on->extended);
@@ -146,11 +148,13 @@ static double step(State *q, const conditions *on, double remaining, double *hin
     t.MV[0] = first.part2;
     event = overruns(q->xPV, q->vPV, end->xPV, end->vPV, h, c->xPVmax) ||
             overruns(q->xMV, q->vMV, end->xMV, end->vMV, h, c->xMVmax);
-    if (*hint >= NO_LIMIT)
-        event = event || passes(q->xMV, end->xMV, c->kink_in) || passes(q->xMV, end->xMV, c->kink_exh) ||
-                (held_PV && t.PV[0] * t.PV[2] < 0.0) || (held_MV && t.MV[0] * t.MV[2] < 0.0);
+    if (*located == 0)
+        event = event || passes(q->xMV, end->xMV, c->kink_in) || passes(q->xMV, end->xMV, c->kink_exh);
+    if (*located < RELEASE_LOCATIONS)
+        event = event || (held_PV && t.PV[0] * t.PV[2] < 0.0) || (held_MV && t.MV[0] * t.MV[2] < 0.0);
     if (event) {
         *hint = locate(q, &t, h, c, held_PV, held_MV);
+        *located += 1;
         return 0.0;
     }
     land(&end->xPV, &end->vPV, c->xPVmax, c->ePV);
@@ -159,6 +163,7 @@ static double step(State *q, const conditions *on, double remaining, double *hin
                                : end->I;
     *q = *end;
     *hint = NO_LIMIT;
+    *located = 0;
     return h;
 }
 
@@ -166,10 +171,11 @@ static double step(State *q, const conditions *on, double remaining, double *hin
 static int advance(State *q, const conditions *on, double remaining)
 {
     double hint = NO_LIMIT, steps = MOST_STEPS * ceil(remaining);
+    int located = 0;
     while (remaining > 0.0) {
         if (steps-- < 1.0)
             return 0;
-        remaining -= step(q, on, remaining, &hint);
+        remaining -= step(q, on, remaining, &hint, &located);
     }
     /* All are false for not-a-number, too. */
     return q->p1 > 0.0 && q->p2 > 0.0 && q->p2 + q->far_pressure > 0.0 && q->p3 > 0.0;

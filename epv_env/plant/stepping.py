@@ -1,0 +1,198 @@
+"""One trial step of every lane of a block, and the events that end a step early.
+
+A step that would pass a stop, let a held mover go, or cross the stroke where the curtain of a magnet
+valve seat exceeds its bore (a kink of the flow area) is not accepted: the instant is located on the
+step's own interpolant and the step is taken again up to it. Between such instants the right-hand side
+is smooth but for the seam of the laminar region, where pressures have all but met; so the classical
+Runge-Kutta method keeps its fourth order (docs/explanation/numerical-integration.md).
+"""
+
+import numba
+
+from epv_env.plant.effects.coil import coil_current
+from epv_env.plant.effects.step_limits import longest_step
+from epv_env.plant.equations import State, derivative
+from epv_env.plant.events import crossing, hermite, release, turning_point
+from epv_env.plant.lanes import (
+    COEFFICIENT,
+    EFFECT,
+    EVENT,
+    FORCE,
+    HIGHEST,
+    HINT,
+    INPUT,
+    LANES,
+    LOCATED,
+    LOWEST,
+    REMAINING,
+    STATE,
+    TRIAL,
+    TRIED,
+    chosen_state,
+    coefficients_at,
+    effects_at,
+    inputs_at,
+    state_at,
+    store_nominal,
+    store_state,
+)
+from epv_env.plant.primitives.compiled import FLAGS, inlined, replacing, wide_vectors
+from epv_env.plant.runge_kutta import held_still, is_held, remaining_stages
+from epv_env.plant.step_control import LONGEST, first_step, next_step, relative_error
+
+LANDING = 1e-8
+"""A mover closer than this to the stop it runs into has landed [m]."""
+
+STICK_SPEED = 5e-3
+"""A rebound slower than this ends at the stop [m/s]: with restitution, rebounds would never end."""
+
+RELEASE_MARGIN = 1e-7
+"""Time by which a located release is overstepped, so that the next step finds the mover free [s]."""
+
+RELEASE_LOCATIONS = 3
+"""How often a release is located with effects, each time on a step that ends at the last instant found.
+Friction ends as a stop lets go, so that an error of the instant counts to first order."""
+
+SHORTEST_STEP = 1e-10
+"""Every step makes at least this much progress [s]."""
+
+_with_landing = replacing(State, "xPV", "vPV", "xMV", "vMV", "I_coil")
+
+UNLIMITED = 1e9
+"""A step hint that never binds [s]."""
+
+
+@inlined
+def _landed(x, v, x_max, restitution):
+    """Position, within the stops, and speed after a possible impact on one of them."""
+    low = (x <= LANDING) & (v < 0.0)
+    high = (x >= x_max - LANDING) & (v > 0.0)
+    rebound = -restitution * v
+    rebound = rebound if abs(rebound) > STICK_SPEED else 0.0
+    x = 0.0 if low else (x_max if high else min(max(x, 0.0), x_max))
+    return x, rebound if low | high else v
+
+
+@inlined
+def _overruns(x0, v0, x1, v1, h, x_max):
+    """Whether a mover is beyond a stop at the end of the step, or where it turns within it."""
+    x = hermite(x0, v0, x1, v1, h, turning_point(v0, v1))
+    return (min(x, x1) < -LANDING) | (max(x, x1) > x_max + LANDING)
+
+
+@inlined
+def _passes(x0, x1, kink):
+    """Whether a step runs through a kink that it did not start on."""
+    return (abs(x0 - kink) > LANDING) & ((x0 - kink) * (x1 - kink) < 0.0)
+
+
+@inlined
+def _lets_go(held, force, force_end):
+    """Whether the force that presses a held mover on its stop has changed sign."""
+    return held & (force * force_end < 0.0)
+
+
+@inlined
+def _passing(x0, v0, x1, v1, h, x_max):
+    """Fraction of the step at which a mover runs into either stop, on its way or at its end."""
+    turn = turning_point(v0, v1)
+    for until in (turn, 1.0):
+        x = hermite(x0, v0, x1, v1, h, until)
+        if x > x_max:
+            return crossing(x0, v0, x1, v1, h, x_max, until)
+        if x < 0.0:
+            return crossing(x0, v0, x1, v1, h, 0.0, until)
+    return 1.0
+
+
+@numba.njit(**FLAGS)
+def _locate(start, trial, h, c, work, lane):
+    """Step from `start` to the first event on the way to `trial` [s].
+
+    start, trial: States before and after a step of h. c: the valve's Coefficients.
+    """
+    fraction = min(
+        _passing(start.xPV, start.vPV, trial.xPV, trial.vPV, h, c.xPVmax),
+        _passing(start.xMV, start.vMV, trial.xMV, trial.vMV, h, c.xMVmax),
+    )
+    for kink in (c.kink_in, c.kink_exh):
+        if abs(start.xMV - kink) > LANDING:
+            passed = crossing(start.xMV, start.vMV, trial.xMV, trial.vMV, h, kink, 1.0)
+            fraction = min(fraction, passed)
+    released = 1.0
+    if is_held(start.xPV, start.vPV, c.xPVmax, work[FORCE, lane]):
+        released = release(work[FORCE, lane], work[FORCE + 1, lane], work[FORCE + 2, lane])
+    if is_held(start.xMV, start.vMV, c.xMVmax, work[FORCE + 3, lane]):
+        at = release(work[FORCE + 3, lane], work[FORCE + 4, lane], work[FORCE + 5, lane])
+        released = min(released, at)
+    return max(min(fraction * h, released * h + RELEASE_MARGIN), SHORTEST_STEP)
+
+
+@inlined
+def try_steps(work, step, extended):
+    """Take one trial step in every lane; accept it where it passes no event and is accurate enough."""
+    wide_vectors()
+    for lane in range(LANES):
+        q = state_at(work, STATE, lane)
+        c = coefficients_at(work, COEFFICIENT, lane)
+        effects = effects_at(work, EFFECT, lane)
+        u = inputs_at(work, INPUT, lane)
+        remaining, hint, located = work[REMAINING, lane], work[HINT, lane], work[LOCATED, lane]
+
+        rates, force_PV, force_MV = derivative(q, u, c, effects, 1.0, 1.0, extended)
+        held_PV = is_held(q.xPV, q.vPV, c.xPVmax, force_PV)
+        held_MV = is_held(q.xMV, q.vMV, c.xMVmax, force_MV)
+        free_PV = 0.0 if held_PV else 1.0
+        free_MV = 0.0 if held_MV else 1.0
+        longest = first_step(rates, step, LONGEST * step) if held_PV & held_MV else step
+        h = min(min(longest, hint), remaining)
+        if extended:
+            h = min(h, longest_step(u.U, q, effects, free_PV, free_MV))
+        end, forces, difference = remaining_stages(
+            q, held_still(rates, free_PV, free_MV), u, c, effects, free_PV, free_MV, h, extended
+        )
+        mid_PV, mid_MV, end_PV, end_MV = forces
+
+        beyond = _overruns(q.xPV, q.vPV, end.xPV, end.vPV, h, c.xPVmax)
+        beyond |= _overruns(q.xMV, q.vMV, end.xMV, end.vMV, h, c.xMVmax)
+        kinked = _passes(q.xMV, end.xMV, c.kink_in) | _passes(q.xMV, end.xMV, c.kink_exh)
+        let_go = _lets_go(held_PV, force_PV, end_PV) | _lets_go(held_MV, force_MV, end_MV)
+        again = (located == 1.0) & (h > step)  # located once, on too long a step to be exact
+        if extended:
+            again |= (located > 0.0) & (located < RELEASE_LOCATIONS)
+        event = beyond | ((located == 0.0) & (kinked | let_go)) | (again & let_go)
+        error = relative_error(difference, h, step, extended)
+        wrong = (error > 1.0) & (h > step)
+        refused = event | wrong
+
+        xPV, vPV = _landed(end.xPV, end.vPV, c.xPVmax, c.ePV)
+        xMV, vMV = _landed(end.xMV, end.vMV, c.xMVmax, c.eMV)
+        current = coil_current(u.U, end.I, c.R, end.coil_heat, effects) if extended else end.I
+        landed = _with_landing(end, xPV, vPV, xMV, vMV, current)
+        reached = chosen_state(refused, q, landed)
+        if extended:
+            store_state(work, TRIAL, lane, end)
+            store_state(work, STATE, lane, reached)
+        else:
+            store_nominal(work, TRIAL, lane, end)
+            store_nominal(work, STATE, lane, reached)
+        work[REMAINING, lane] = remaining if refused else remaining - h
+        work[TRIED, lane] = h
+        controlled = wrong | (hint < UNLIMITED)
+        work[HINT, lane] = max(next_step(h, error), step) if controlled & (located == 0.0) else UNLIMITED
+        work[LOCATED, lane] = located if refused else 0.0
+        work[EVENT, lane] = 1.0 if event & (not wrong) else 0.0
+        work[FORCE, lane], work[FORCE + 1, lane], work[FORCE + 2, lane] = force_PV, mid_PV, end_PV
+        work[FORCE + 3, lane], work[FORCE + 4, lane] = force_MV, mid_MV
+        work[FORCE + 5, lane] = end_MV
+        work[LOWEST, lane] = min(work[LOWEST, lane], reached.p2)
+        work[HIGHEST, lane] = max(work[HIGHEST, lane], reached.p2)
+
+
+@inlined
+def locate_event(work, lane):
+    """Let the next step of a lane that met an event end at the event."""
+    start, trial = state_at(work, STATE, lane), state_at(work, TRIAL, lane)
+    c = coefficients_at(work, COEFFICIENT, lane)
+    work[HINT, lane] = _locate(start, trial, work[TRIED, lane], c, work, lane)
+    work[LOCATED, lane] += 1.0
