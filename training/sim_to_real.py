@@ -138,13 +138,15 @@ def trained(
         from training.learners.policy_files import save_policy  # torch takes seconds to import: only now
         from training.learners.ppo import train
 
-        policy, _ = train(
+        policy, log = train(
             Hyperparameters(**settings.hyperparameters), folder=folder, plant=plant,
             scenario=settings.scenario, parameters=settings.training_region,
             weights=RewardWeights(switching=settings.switching_price),
             timesteps=chosen.timesteps, seed=chosen.seed, device="cpu", resume=True,
         )  # fmt: skip
-        provenance = {"plant": plant.name, "timesteps": chosen.timesteps, "seed": chosen.seed}
+        provenance = {
+            "run": log.run.run, "plant": plant.name, "timesteps": chosen.timesteps, "seed": chosen.seed,
+        }  # fmt: skip
         save_policy(policy, folder, control_period=OnOff.default_period, provenance=provenance)
     return load_policy(folder)
 

@@ -1,8 +1,16 @@
 """Writing files whole or not at all."""
 
 import os
+import stat
 import tempfile
 from pathlib import Path
+
+
+def read_bytes(path: Path) -> bytes:
+    """The content of a regular file. Raises OSError, also for a pipe or a device, which could block."""
+    if not stat.S_ISREG(path.stat().st_mode):
+        raise OSError(f"{path} is no regular file: give one that lies on a disk")
+    return path.read_bytes()
 
 
 def write_text(path: Path, text: str) -> None:

@@ -1,6 +1,7 @@
 """The command lines: the whole job in its short form, and one clear sentence for a wrong input."""
 
 import json
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -57,6 +58,37 @@ def test_a_run_resumes_from_its_checkpoint(finished):
     result = command("--quick", "--out", out, "--resume")
     assert result.returncode == 0, result.stderr
     assert (out / "learning_curve.csv").read_text().splitlines()[: len(before)] == before
+
+
+def test_a_run_has_one_identity_in_all_that_it_writes(finished):
+    out, _ = finished
+    run = json.loads((out / "config.json").read_text())["run"]
+    assert json.loads((out / "policy.json").read_text())["provenance"]["run"] == run
+    for table in ("learning_curve.csv", "validation.csv"):
+        assert {line.split(",")[-1] for line in (out / table).read_text().splitlines()[1:]} == {run}
+
+
+def test_a_finished_run_is_not_overwritten_unasked(finished):
+    out, _ = finished
+    before = {path: path.read_bytes() for path in out.iterdir()}
+    result = command("--quick", "--out", out, "--seed", "5")
+    assert (result.returncode, result.stderr.count("\n")) == (2, 1)
+    assert "holds a finished training: give --force to replace it" in result.stderr
+    assert {path: path.read_bytes() for path in out.iterdir()} == before
+
+
+def test_a_resumed_run_never_hands_out_another_runs_policy(finished, tmp_path):
+    """The checkpoint of another seed, put under a new configuration."""
+    out, _ = finished
+    config = json.loads((out / "config.json").read_text())
+    config["run"], config["options"]["seed"] = "0" * 32, 5
+    (tmp_path / "config.json").write_text(json.dumps(config))
+    shutil.copy(out / "checkpoint.zip", tmp_path)
+    result = command("--quick", "--out", tmp_path, "--resume", "--seed", "5")
+    assert (result.returncode, result.stderr.count("\n")) == (2, 1)
+    assert "belongs to the training run" in result.stderr
+    assert {path.name for path in tmp_path.iterdir()} == {"config.json", "checkpoint.zip"}
+    assert json.loads((tmp_path / "config.json").read_text()) == config
 
 
 def test_a_policy_with_a_memory_is_trained_in_the_short_form_too(tmp_path):

@@ -12,7 +12,8 @@ from safetensors.numpy import load_file, save_file
 
 from controllers.base import Privileged
 from controllers.hysteresis import Hysteresis
-from controllers.learned import WEIGHTS_FILE, LearnedPolicy, PolicyError, load_policy
+from controllers.learned import LearnedPolicy, load_policy
+from controllers.policy_contract import WEIGHTS_FILE, PolicyError
 from controllers.privileged_pulse import PrivilegedPulse
 from controllers.pulse_simulation import pulse_table, pulse_tables
 from controllers.tuned import build, load_tunings

@@ -1,5 +1,6 @@
 """The best policy of a training is kept, judged on scenarios of its own; a seed means one policy."""
 
+import csv
 from dataclasses import fields, replace
 
 import numpy as np
@@ -13,9 +14,9 @@ from epv_env.reward import RewardWeights
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.rollout import run_episodes
 from training.evaluation.seeds import VALIDATION_SEED
-from training.learners.checkpoint_selection import VALIDATION_FILE, validation_points
+from training.learners.checkpoint_selection import validation_points
 from training.learners.hyperparameters import Hyperparameters
-from training.learners.learning_log import read_rows
+from training.learners.learning_log import VALIDATION_FILE
 from training.learners.ppo import train
 from training.learners.validation import score
 
@@ -39,6 +40,15 @@ def trained(folder, *, timesteps=TIMESTEPS, seed=1, resume=False):
         resume=resume, quiet=True,
     )  # fmt: skip
     return policy
+
+
+def read_rows(path):
+    """The numbers of a table by column."""
+    with path.open(newline="") as stream:
+        return [
+            {name: float(value) for name, value in row.items() if name != "run"}
+            for row in csv.DictReader(stream)
+        ]
 
 
 def same(one: LearnedPolicy, other: LearnedPolicy) -> bool:
@@ -73,8 +83,8 @@ def test_a_seed_means_one_policy(finished, tmp_path, monkeypatch):
     (tmp_path / "temporary").mkdir()
     assert same(trained(tmp_path / "again"), policy)
     assert not list((tmp_path / "temporary").iterdir())
-    again = (tmp_path / "again" / VALIDATION_FILE).read_bytes()
-    assert again == (folder / VALIDATION_FILE).read_bytes()
+    again = read_rows(tmp_path / "again" / VALIDATION_FILE)
+    assert again == read_rows(folder / VALIDATION_FILE)
     assert not same(trained(tmp_path / "other", seed=2), policy)
 
 
