@@ -6,6 +6,7 @@ import sys
 from threadpoolctl import threadpool_limits
 
 from epv_env.common.command_line import fail_clearly
+from epv_env.common.folder_lock import only_writer
 from identification.commands.registry import COMMANDS
 
 
@@ -29,7 +30,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the exit status."""
     chosen = parse(arguments)
     # The matrices are small: threads of the linear algebra would only wait for each other.
-    with threadpool_limits(1):
+    with threadpool_limits(1), only_writer(chosen.out):
         chosen.run(chosen)
     return 0
 

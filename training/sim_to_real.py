@@ -30,6 +30,7 @@ from epv_env.common.command_line import (
     writable_folder,
 )
 from epv_env.common.files import write_text
+from epv_env.common.folder_lock import only_writer
 from epv_env.common.results_folder import check_options, write_options
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.reward import RewardWeights
@@ -180,6 +181,12 @@ def announce(step: str) -> None:
 def main(arguments: list[str] | None = None) -> int:
     """Command line; returns the exit status."""
     chosen = parse(arguments)
+    with only_writer(chosen.out):
+        return loop(chosen)
+
+
+def loop(chosen: argparse.Namespace) -> int:
+    """The four stages, those that --out lacks; returns the exit status."""
     check_options(chosen.out, options(chosen), "sim-to-real run")
     announce("1 of 4: the bench records its valve")
     record(chosen)

@@ -20,6 +20,7 @@ from epv_env.common.command_line import (
     parse_with_quick,
     writable_folder,
 )
+from epv_env.common.folder_lock import only_writer
 from epv_env.common.journal import Journal
 from epv_env.common.json_files import write_json
 from epv_env.common.results_folder import check_options, write_options
@@ -159,6 +160,12 @@ def main(arguments: list[str] | None = None) -> int:
     check_pages(chosen.pages, PARTS)
     check_scenario(chosen.scenario)
     plant = load_plant(chosen.plant)
+    with only_writer(chosen.out):
+        return run_and_report(chosen, plant)
+
+
+def run_and_report(chosen: argparse.Namespace, plant: Plant) -> int:
+    """Run what --out lacks, and write the tables and figures; returns the exit status."""
     controllers, digests = named_controllers(chosen.controllers, plant.parameters)
     size = Size(
         episodes=chosen.episodes, joint_episodes=chosen.joint_episodes,

@@ -24,6 +24,7 @@ from epv_env.common.command_line import (
     fail_clearly,
     writable_folder,
 )
+from epv_env.common.folder_lock import only_writer
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.valves import available_cores
 from epv_env.reward import RewardWeights
@@ -154,10 +155,11 @@ def main(arguments: list[str] | None = None) -> int:
     check_not_negative(parser, chosen, "seed")
     first = first_memory(chosen)
     optuna.logging.set_verbosity(optuna.logging.WARNING)
-    for price in chosen.prices:
-        folder = chosen.out / FOLDER.format(price)
-        tuned_at(folder, chosen.kinds, price, chosen.trials, chosen.seed)
-    train_variants(chosen, first)
+    with only_writer(chosen.out):
+        for price in chosen.prices:
+            folder = chosen.out / FOLDER.format(price)
+            tuned_at(folder, chosen.kinds, price, chosen.trials, chosen.seed)
+        train_variants(chosen, first)
     print(f"controllers in {chosen.out}; measure them with training/compare.py --tradeoff {chosen.out}")
     return 0
 

@@ -8,17 +8,23 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from epv_env.common.interruption import Interrupted, interruptible
+
 
 def fail_clearly(main: Callable[[], int]) -> int:
-    """Run a command; a ValueError or OSError becomes one sentence on stderr and exit status 2."""
+    """Run a command; a ValueError or OSError becomes one sentence on stderr and exit status 2.
+
+    Ctrl-C and SIGTERM end the command and its workers, with a sentence and status 130 or 143.
+    """
     try:
-        return main()
+        with interruptible():
+            return main()
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    except KeyboardInterrupt:
+    except Interrupted as interruption:
         print("interrupted: what was finished is kept", file=sys.stderr)
-        return 130
+        return interruption.status
 
 
 def writable_file(text: str) -> Path:

@@ -4,11 +4,11 @@ import json
 import shutil
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from controllers.learned import TRAINED, load_policy
 from controllers.registry import SIMULATING_KINDS, TUNED_KINDS
 
 pytest.importorskip("stable_baselines3")
@@ -149,8 +149,7 @@ def test_tuning_without_a_trial_is_refused(script, tmp_path):
 @pytest.mark.parametrize("shape", [{"memory": 4, "width": 8}, None])
 def test_the_tradeoff_goes_on_from_no_other_kind_of_policy(shape, tmp_path):
     """One of other layers, and one without a memory."""
-    wrong = policy_of(Student(**(shape or {"memory": 32, "width": 64})))
-    wrong = wrong if shape else replace(wrong, cell=None)
+    wrong = policy_of(Student(**shape)) if shape else load_policy(TRAINED / "plain" / "seed-0")
     save_recurrent(wrong, tmp_path / "memory")
     out = tmp_path / "out"
     result = command("--recurrent", tmp_path / "memory", "--out", out, script="training/tradeoff.py")
