@@ -8,7 +8,6 @@ simulation and diagnosis see what a user sees. Finished steps in --out are kept
 """
 
 import argparse
-import json
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -31,6 +30,7 @@ from epv_env.common.command_line import (
 )
 from epv_env.common.files import write_text
 from epv_env.common.folder_lock import only_writer
+from epv_env.common.json_files import decoded
 from epv_env.common.results_folder import check_options, write_options
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.reward import RewardWeights
@@ -127,7 +127,7 @@ def diagnose(chosen: argparse.Namespace) -> dict[str, Any]:
     if not path.exists():
         into = ["--out", str(path.parent), "--seed", str(chosen.seed)]
         identification(["gap", str(chosen.out / CAMPAIGN), *into])
-    return json.loads(path.read_text(encoding="utf-8"))
+    return decoded(path, remedy=f"remove {path.parent}, and the diagnosis runs again")
 
 
 def trained(

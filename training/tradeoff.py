@@ -8,6 +8,7 @@ trains PPO and tunes classic controllers at every price; finished controllers in
 """
 
 import argparse
+import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -153,6 +154,8 @@ def main(arguments: list[str] | None = None) -> int:
     chosen = parser.parse_args(arguments)
     check_positive(parser, chosen, "timesteps", "trials", "workers")
     check_not_negative(parser, chosen, "seed")
+    if not all(0 <= price < math.inf for price in chosen.prices):
+        parser.error("--prices must be finite and must not be negative")
     first = first_memory(chosen)
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     with only_writer(chosen.out):

@@ -92,7 +92,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     )
     chosen = parse_with_quick(parser, arguments, QUICK)
     check_positive(parser, chosen, "timesteps", "episodes", "duration")
-    check_not_negative(parser, chosen, "seed")
+    check_not_negative(parser, chosen, "seed", "switching_price")
     return chosen
 
 
