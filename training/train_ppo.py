@@ -36,7 +36,7 @@ from epv_env.reward import RewardWeights
 from training.evaluation.controller_table import Comparison, as_text, compare
 from training.evaluation.scenarios import TUNING_REGION
 from training.learners.provenance import Configuration, configuration
-from training.learners.run_folder import forget_failed_start, make_free
+from training.learners.run_folder import forget_failed_start, make_free, why_taken
 from training.learners.run_state import check_checkpoint, new_run
 
 SAME_WHEN_RESUMED = ("seed", "plant", "scenario", "parameters", "switching_price", "recurrent")
@@ -102,7 +102,7 @@ def identity(chosen: argparse.Namespace) -> str:
     Raises ValueError if the folder is not free, or cannot be resumed with these options.
     """
     if not chosen.resume:
-        make_free(chosen.out, force=chosen.force)
+        make_free(chosen.out, force=chosen.force or _replace_asked(chosen.out))
         return new_run()
     config = read_config(chosen.out, Configuration)
     if config is None:
@@ -111,6 +111,15 @@ def identity(chosen: argparse.Namespace) -> str:
     check_same(config["options"], options, f"{chosen.out} was trained with", "resume with the same")
     check_checkpoint(chosen.out, config["run"])  # before anything is written
     return config["run"]
+
+
+def _replace_asked(folder: Path) -> bool:
+    """Whether the user, asked in a terminal, wants to replace what a folder holds."""
+    taken = why_taken(folder)
+    if taken is None or not (sys.stdin.isatty() and sys.stderr.isatty()):
+        return False
+    print(taken, file=sys.stderr)
+    return input("begin anew, and remove what that training wrote? [y/N] ").strip().lower() == "y"
 
 
 def evaluate(chosen: argparse.Namespace, plant: Plant) -> Comparison:

@@ -8,6 +8,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from epv_env.common.compilation import announce_compilation
+from epv_env.common.extras import missing_package
 from epv_env.common.interruption import Interrupted, interruptible
 
 
@@ -18,7 +20,14 @@ def fail_clearly(main: Callable[[], int]) -> int:
     """
     try:
         with interruptible():
+            announce_compilation()
             return main()
+    except ModuleNotFoundError as error:
+        sentence = missing_package(error.name or "")
+        if sentence is None:
+            raise
+        print(f"error: {sentence}", file=sys.stderr)
+        return 2
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

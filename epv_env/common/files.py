@@ -30,7 +30,7 @@ def write_bytes(path: Path, content: bytes) -> None:
         os.replace(temporary, path)
     except OSError as error:
         os.unlink(temporary)
-        raise OSError(error.errno, f"cannot write: {error.strerror}", str(path)) from None
+        raise OSError(error.errno, f"cannot write: {error.strerror or error}", str(path)) from None
     except BaseException:
         os.unlink(temporary)
         raise

@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[2]
 WRITTEN = (
     "checkpoint.zip", "config.json", "episode.png", "excursions.png", "learning_curve.csv",
     "learning_curve.png", "model.zip", "policy.json", "policy.safetensors", "table.csv", "table.json",
-    "validation.csv",
+    "tensorboard", "validation.csv",
 )  # fmt: skip
 
 
@@ -70,11 +70,11 @@ def test_a_run_has_one_identity_in_all_that_it_writes(finished):
 
 def test_a_finished_run_is_not_overwritten_unasked(finished):
     out, _ = finished
-    before = {path: path.read_bytes() for path in out.iterdir()}
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
     result = command("--quick", "--out", out, "--seed", "5")
     assert (result.returncode, result.stderr.count("\n")) == (2, 1)
     assert "holds a finished training: give --force to replace it" in result.stderr
-    assert {path: path.read_bytes() for path in out.iterdir()} == before
+    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
 
 
 def test_a_resumed_run_never_hands_out_another_runs_policy(finished, tmp_path):

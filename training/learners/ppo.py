@@ -11,7 +11,7 @@ from typing import Any
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.logger import Logger
+from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
 from controllers.learned import LearnedPolicy
@@ -26,6 +26,7 @@ from training.learners.imitation import imitate
 from training.learners.learning_log import TrainingLog
 from training.learners.policy_files import greedy_policy, policy_bytes, put_layers
 from training.learners.provenance import plant_digest
+from training.learners.run_folder import TENSORBOARD_FOLDER
 from training.learners.run_state import (
     CHECKPOINT_FILE,
     Run,
@@ -137,7 +138,10 @@ def train(
     ]
     if done < timesteps:
         model.num_timesteps = done
+        events = TensorBoardOutputFormat(str(folder / TENSORBOARD_FOLDER))
+        model.set_logger(Logger(folder=None, output_formats=[events]))
         model.learn(timesteps - done, callback=callbacks, reset_num_timesteps=done == 0)
+        events.close()
     if selection.best is None:
         raise RunError(
             f"the run in {folder} has done {done} steps, and none of its policies is validated yet: "

@@ -11,6 +11,9 @@ from training.learners.run_state import CHECKPOINT_FILE, DERIVED_FILES, RunError
 MEMORYLESS_FOLDER, STUDENT_FOLDER = "memoryless", "student"
 """Within the folder of a recurrent policy: what it was trained from."""
 
+TENSORBOARD_FOLDER = "tensorboard"
+"""Within the folder of a training: what `tensorboard --logdir` shows."""
+
 REPORT_FILES = ("table.csv", "table.json", "learning_curve.png", "episode.png", "excursions.png")
 """What the command that trains writes at its end."""
 
@@ -18,7 +21,7 @@ REPORT_FILES = ("table.csv", "table.json", "learning_curve.png", "episode.png", 
 OWN_FILES = (
     CONTRACT_FILE, CHECKPOINT_FILE, CONFIG, WEIGHTS_FILE, *DERIVED_FILES, *REPORT_FILES,
 )  # fmt: skip
-OWN_FOLDERS = (STUDENT_FOLDER, MEMORYLESS_FOLDER)
+OWN_FOLDERS = (STUDENT_FOLDER, MEMORYLESS_FOLDER, TENSORBOARD_FOLDER)
 
 
 def make_free(folder: Path, *, force: bool) -> None:
@@ -27,11 +30,8 @@ def make_free(folder: Path, *, force: bool) -> None:
     Raises RunError if it holds anything, unless `force`: then what a training writes there is removed,
     and other files stay.
     """
-    present = _content(folder)
-    if not present:
-        return
-    if not force:
-        raise RunError(_why_taken(folder, present))
+    if not force and (taken := why_taken(folder)) is not None:
+        raise RunError(taken)
     for name in OWN_FILES:
         (folder / name).unlink(missing_ok=True)
     for name in OWN_FOLDERS:
@@ -49,7 +49,11 @@ def _content(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()} - {LOCK_FILE} if folder.exists() else set()
 
 
-def _why_taken(folder: Path, present: set[str]) -> str:
+def why_taken(folder: Path) -> str | None:
+    """Why a new training cannot begin in a folder, and what to do; None if it is free."""
+    present = _content(folder)
+    if not present:
+        return None
     if foreign := sorted(present - {*OWN_FILES, *OWN_FOLDERS}):
         return (
             f"{folder} holds {foreign[0]!r}, which no training writes: choose a new or empty --out, or "
