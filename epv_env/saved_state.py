@@ -6,6 +6,7 @@ restore_state(env, saved)   # as often as wanted, also into another environment 
 
 import io
 import json
+import zipfile
 from dataclasses import dataclass
 from typing import Any
 
@@ -63,7 +64,7 @@ class SavedState:
                 arrays = {name: file[name] for name in file.files}
             rest = json.loads(str(arrays.pop("rest")))
             generators, elapsed = rest["generators"], rest["elapsed"]
-        except (ValueError, KeyError, OSError, EOFError) as error:
+        except (ValueError, KeyError, OSError, EOFError, zipfile.BadZipFile) as error:
             raise StateError(f"this is no saved state ({error}): save it anew") from None
         settings = task.settings
         objects: dict[str, list[Any]] = dict.fromkeys(PER_EPISODE, [None] * task.n)
