@@ -261,7 +261,6 @@ OTHER_ROLES = [
 ]  # fmt: skip
 
 MANIFESTS = [  # damage, message
-    (lambda folder: (folder / "campaign.json").unlink(), ".No such file.*: give the folder"),
     (text(lambda t: t[:-9], "campaign.json"), "is not JSON in UTF-8 .*line 2.*, or write the file anew"),
     (text(lambda t: "[]", "campaign.json"), "has format None, this version reads 'epv-campaign/1'"),
     (manifest(lambda c: c.update(format="epv-campaign/2")), "has format 'epv-campaign/2', this version"),
@@ -330,6 +329,11 @@ def test_a_bad_campaign_json_is_refused(folder, damage, message):
     damage(folder)
     sentence = f"^{re.escape(str(folder / 'campaign.json'))}.*{message}"
     assert re.search(sentence, refusal(folder)), refusal(folder)
+
+
+def test_a_missing_campaign_json_is_refused(folder):
+    (folder / "campaign.json").unlink()
+    assert re.search(r"cannot read .*campaign\.json .No such.*: give the folder", refusal(folder))
 
 
 def test_a_missing_recording_is_refused(folder):
