@@ -108,9 +108,7 @@ def test_an_unknown_setting_is_refused():
 
 @pytest.mark.parametrize("make", [lambda: gymnasium.make(IDS[0]), lambda: native(IDS[0], 2)])
 def test_an_unknown_reset_option_is_refused(make):
-    with pytest.raises(
-        OptionError, match="unknown reset option 'colour': known are parameters, "
-    ):
+    with pytest.raises(OptionError, match="unknown reset option 'colour': known are parameters, "):
         make().reset(options={"colour": "red"})
 
 
