@@ -11,8 +11,9 @@ import numpy as np
 from controllers.learned import TRAINED, load_policy
 from controllers.policy_contract import CONTRACT_FILE, WEIGHTS_FILE
 from controllers.tuned import TUNED_FILE, load_tunings
+from epv_env.common.files import write_bytes
 from epv_env.common.journal import Journal
-from epv_env.common.results_folder import CONFIG, check_options
+from epv_env.common.results_folder import CONFIG, check_options, write_options
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from identification.bench.programme_file import load_programmes, save_programmes
 from identification.bench.programmes import REPORT_SUITE
@@ -105,12 +106,12 @@ FORMATS = (
     Format(name="policy's weights", file=WEIGHTS_FILE, write=_copied, read=load_policy, json=False),
     Format(
         name="tuned controllers", file="tuned.json",
-        write=lambda folder: (folder / "tuned.json").write_bytes(TUNED_FILE.read_bytes()) and None,
+        write=lambda folder: write_bytes(folder / "tuned.json", TUNED_FILE.read_bytes()),
         read=lambda folder: load_tunings(folder / "tuned.json"),
     ),
     Format(
         name="configuration", file=CONFIG,
-        write=lambda folder: (folder / CONFIG).write_text(json.dumps(SUBJECT)) and None,
+        write=lambda folder: write_options(folder, SUBJECT),
         read=lambda folder: check_options(folder, SUBJECT, "study"),
     ),
     Format(

@@ -15,13 +15,21 @@ from training.command import COMMANDS, IDENTIFICATION
 pytestmark = pytest.mark.training
 
 
+SLOW = [HealthCheck.too_slow, HealthCheck.function_scoped_fixture]
+
+
 def test_the_list_has_every_command_of_the_identification():
     own = [name for name, entry in COMMANDS.items() if entry.module == IDENTIFICATION]
     assert own == [command.name for command in IDENTIFICATION_COMMANDS]
     assert set(NEEDED) == set(COMMANDS)
 
 
-@settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(
+    max_examples=60,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=SLOW,
+)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_a_wrong_command_line_is_refused(seed, tmp_path_factory):
     folder = tmp_path_factory.mktemp("work")

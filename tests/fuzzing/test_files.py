@@ -13,7 +13,13 @@ pytest.importorskip("safetensors")
 from tests.fuzzing.damages import damaged_bytes, damaged_value
 from tests.fuzzing.formats import FORMATS, outcome
 
-QUICK = settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
+SLOW = [HealthCheck.too_slow, HealthCheck.function_scoped_fixture]
+
+QUICK = settings(
+    max_examples=25,
+    deadline=None,
+    suppress_health_check=SLOW,
+)
 
 
 @pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.name)

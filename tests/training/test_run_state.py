@@ -12,7 +12,9 @@ from training.learners.run_folder import forget_failed_start, make_free
 from training.learners.run_state import (
     BEST_ENTRY,
     CHECKPOINT_FILE,
+    PROGRESS_ENTRY,
     RUN_ENTRY,
+    Checkpoint,
     Run,
     RunError,
     load_run,
@@ -25,6 +27,8 @@ pytestmark = pytest.mark.training
 SUBJECT = {"seed": 1, "plant": "abc"}
 RUN = Run(run="one", subject=SUBJECT, timesteps=64, curve=[{"timesteps": 64.0, "success_rate": None}])
 
+STATE = Checkpoint(RUN, b"best", b"progress")
+
 
 def archive() -> bytes:
     stream = io.BytesIO()
@@ -35,14 +39,14 @@ def archive() -> bytes:
 
 @pytest.fixture
 def folder(tmp_path):
-    save_run(tmp_path / CHECKPOINT_FILE, RUN, model=archive(), best=b"best")
+    save_run(tmp_path / CHECKPOINT_FILE, STATE, model=archive())
     return tmp_path
 
 
 def test_what_is_saved_is_loaded(folder):
-    assert unfinished_run(folder, SUBJECT, None) == (RUN, b"best")
+    assert unfinished_run(folder, SUBJECT, None) == STATE
     with zipfile.ZipFile(folder / CHECKPOINT_FILE) as file:  # still an archive of the model
-        assert set(file.namelist()) == {"policy.pth", RUN_ENTRY, BEST_ENTRY}
+        assert set(file.namelist()) == {"policy.pth", RUN_ENTRY, PROGRESS_ENTRY, BEST_ENTRY}
 
 
 def test_another_run_or_subject_is_refused(folder):

@@ -8,12 +8,15 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 
+from stable_baselines3 import PPO
+
 from controllers.learned import LearnedPolicy
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.rollout import run_episodes
 from training.evaluation.seeds import VALIDATION_SEED
+from training.learners import learning_log
 from training.learners.checkpoint_selection import validation_points
 from training.learners.hyperparameters import Hyperparameters
 from training.learners.learning_log import VALIDATION_FILE
@@ -98,6 +101,26 @@ def test_a_resumed_training_keeps_what_was_validated_before(tmp_path):
     finished = trained(tmp_path, resume=True)
     assert read_rows(tmp_path / VALIDATION_FILE) == after
     assert same(finished, trained(tmp_path, resume=True))
+
+
+@pytest.mark.parametrize("rollouts", [1, 3, 6])
+def test_a_killed_training_resumes_to_the_same_policy(finished, tmp_path, monkeypatch, rollouts):
+    """To the bit: the run dies after some rollouts, without a word, and its last checkpoint is old."""
+    _, policy = finished
+    collected = PPO.collect_rollouts
+    remaining = iter(range(rollouts))
+
+    def dying(*arguments, **named):
+        if next(remaining, None) is None:
+            raise SystemError("killed")
+        return collected(*arguments, **named)
+
+    monkeypatch.setattr(PPO, "collect_rollouts", dying)
+    monkeypatch.setattr(learning_log, "CHECKPOINT_SECONDS", 0.0 if rollouts == 3 else 3600.0)
+    with pytest.raises(SystemError):
+        trained(tmp_path)
+    monkeypatch.undo()
+    assert same(trained(tmp_path, resume=True), policy)
 
 
 def test_validation_points_end_with_the_training():

@@ -13,9 +13,11 @@ from tqdm import tqdm
 
 from epv_env.common.files import write_bytes, write_text
 from training.learners.checkpoint_selection import Selection, archive_of
+from training.learners.resumption import save_progress
 from training.learners.run_state import (
     CHECKPOINT_FILE,
     DERIVED_FILES,
+    Checkpoint,
     Row,
     Run,
     save_run,
@@ -24,6 +26,9 @@ from training.learners.run_state import (
 )
 
 CURVE_FILE, VALIDATION_FILE, BEST_FILE = DERIVED_FILES
+CHECKPOINT_SECONDS = 20.0
+"""Least time between two checkpoints [s]: what a killed training loses at most."""
+
 CURVE_COLUMNS = ("timesteps", "seconds", "episode_return", "success_rate")
 
 
@@ -37,7 +42,6 @@ class TrainingLog(BaseCallback):
         selection: Selection,
         *,
         total: int,
-        checkpoint_seconds: float = 20.0,
         quiet: bool,
     ):
         """
@@ -46,7 +50,6 @@ class TrainingLog(BaseCallback):
             run: what was done before; its identity stands in all that is written.
             selection: whose validations and best model are kept with the rest.
             total: environment steps of the whole training.
-            checkpoint_seconds: least time between two checkpoints [s].
             quiet: no progress bar.
         """
         super().__init__()
@@ -56,7 +59,6 @@ class TrainingLog(BaseCallback):
         self._selection = selection
         self._total = total
         self._quiet = quiet
-        self._checkpoint_seconds = checkpoint_seconds
         self._saved_at = float("-inf")  # the first checkpoint follows the imitation
         self.rows = with_nan(run.curve)
         """Of the learning curve, by CURVE_COLUMNS."""
@@ -75,7 +77,7 @@ class TrainingLog(BaseCallback):
 
     def _on_rollout_start(self) -> None:
         """Save between an update and the next rollout: the model has learned from all steps counted."""
-        if time.monotonic() - self._saved_at > self._checkpoint_seconds:
+        if time.monotonic() - self._saved_at > CHECKPOINT_SECONDS:
             self.save()
 
     def _on_rollout_end(self) -> None:
@@ -108,7 +110,8 @@ class TrainingLog(BaseCallback):
             curve=without_nan(self.rows), validations=without_nan(validations),
         )  # fmt: skip
         best = self._selection.best
-        save_run(self._folder / CHECKPOINT_FILE, run, model=archive_of(self.model), best=best)
+        checkpoint = Checkpoint(run, best, save_progress(self.model))
+        save_run(self._folder / CHECKPOINT_FILE, checkpoint, model=archive_of(self.model))
         write_rows(self._folder / CURVE_FILE, CURVE_COLUMNS, self.rows, run=run.run)
         if best is not None:
             write_rows(self._folder / VALIDATION_FILE, list(validations[0]), validations, run=run.run)

@@ -19,13 +19,13 @@ from controllers.tuned import build, load_tunings
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
-from training.evaluation.seeds import RESUMED_SEED
 from training.learners.checkpoint_selection import Selection, validation_points
 from training.learners.hyperparameters import Hyperparameters
 from training.learners.imitation import imitate
 from training.learners.learning_log import TrainingLog
 from training.learners.policy_files import greedy_policy, policy_bytes, put_layers
 from training.learners.provenance import plant_digest
+from training.learners.resumption import restore_progress
 from training.learners.run_folder import TENSORBOARD_FOLDER
 from training.learners.run_state import (
     CHECKPOINT_FILE,
@@ -82,8 +82,8 @@ def train(
 ) -> tuple[LearnedPolicy, TrainingLog]:
     """Train until `timesteps` and return the best validated policy (checkpoint_selection.py).
 
-    An interruption (Ctrl-C) leaves the newest checkpoint behind. A resumed run draws new episodes, so it
-    is a continuation, not a repetition, of an uninterrupted one.
+    An interruption leaves the newest checkpoint behind. A run that is resumed from it gives, to the bit,
+    the policy of an uninterrupted one (on the same machine, and device "cpu").
 
     Raises RunError if the folder's checkpoint is of another run or subject, or damaged.
 
@@ -107,7 +107,7 @@ def train(
         h, plant, student, seed=seed, scenario=scenario, parameters=parameters, weights=asdict(weights)
     )
     found = unfinished_run(folder, subject, run) if resume else None
-    begun, best = found or (Run(run=run or new_run(), subject=as_json(subject)), None)
+    begun = found.run if found else Run(run=run or new_run(), subject=as_json(subject))
     done = begun.timesteps
     torch.set_num_threads(1)  # sums do not depend on the machine's cores; the plant uses them all
     task: dict[str, Any] = {
@@ -118,7 +118,7 @@ def train(
     model = make_model(h, env, seed=seed, device=device)
     if found:
         _restore(model, folder / CHECKPOINT_FILE, device=device)
-        env.seed(RESUMED_SEED + seed * h.num_envs + done)
+        restore_progress(model, found.progress)
     elif h.imitation_epochs:
         _start(model, h, env, plant.parameters, student=student, seed=seed)
     greedy = partial(greedy_policy, student=student)
@@ -128,7 +128,7 @@ def train(
         options=task,
         controller=greedy,
         rows=with_nan(begun.validations),
-        best=best,
+        best=found.best if found else None,
     )
     log = TrainingLog(folder, begun, selection, total=timesteps, quiet=quiet)
     callbacks: list[BaseCallback] = [
@@ -140,7 +140,7 @@ def train(
         model.num_timesteps = done
         events = TensorBoardOutputFormat(str(folder / TENSORBOARD_FOLDER))
         model.set_logger(Logger(folder=None, output_formats=[events]))
-        model.learn(timesteps - done, callback=callbacks, reset_num_timesteps=done == 0)
+        model.learn(timesteps - done, callback=callbacks, reset_num_timesteps=found is None)
         events.close()
     if selection.best is None:
         raise RunError(

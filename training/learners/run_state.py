@@ -11,7 +11,7 @@ import zipfile
 from collections.abc import Mapping
 from math import isnan, nan
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 
@@ -19,7 +19,7 @@ from epv_env.common.files import write_bytes
 
 FORMAT = "epv-training-run/1"
 CHECKPOINT_FILE = "checkpoint.zip"
-RUN_ENTRY, BEST_ENTRY = "run.json", "best.zip"
+RUN_ENTRY, BEST_ENTRY, PROGRESS_ENTRY = "run.json", "best.zip", "progress.npz"
 DERIVED_FILES = ("learning_curve.csv", "validation.csv", "model.zip")
 """Files that a run writes for its user with every checkpoint; it never reads them."""
 
@@ -53,25 +53,35 @@ def new_run() -> str:
     return uuid.uuid4().hex
 
 
-def save_run(path: Path, run: Run, *, model: bytes, best: bytes | None) -> None:
+class Checkpoint(NamedTuple):
+    """What a checkpoint holds beside the model's networks."""
+
+    run: Run
+    best: bytes | None
+    """stable-baselines3's archive of the best validated model; None: none was validated."""
+    progress: bytes
+    """Environments and generators (training/learners/resumption.py)."""
+
+
+def save_run(path: Path, checkpoint: Checkpoint, *, model: bytes) -> None:
     """Write the state of a run, whole or not at all.
 
     Args:
         path: of the checkpoint.
-        run: what was done.
+        checkpoint: what to write beside the model.
         model: stable-baselines3's archive of the model.
-        best: the same of the best validated model; None: none was validated.
     """
     stream = io.BytesIO(model)
     with zipfile.ZipFile(stream, "a") as archive:
-        archive.writestr(RUN_ENTRY, msgspec.json.encode(run))
-        if best is not None:
-            archive.writestr(BEST_ENTRY, best)
+        archive.writestr(RUN_ENTRY, msgspec.json.encode(checkpoint.run))
+        archive.writestr(PROGRESS_ENTRY, checkpoint.progress)
+        if checkpoint.best is not None:
+            archive.writestr(BEST_ENTRY, checkpoint.best)
     write_bytes(path, stream.getvalue())
 
 
-def load_run(path: Path) -> tuple[Run, bytes | None]:
-    """What a checkpoint's run has done, and the archive of its best model if one was validated.
+def load_run(path: Path) -> Checkpoint:
+    """What a checkpoint holds beside the model's networks.
 
     Raises RunError if the checkpoint is missing, damaged, or of another version.
     """
@@ -81,6 +91,7 @@ def load_run(path: Path) -> tuple[Run, bytes | None]:
             if (torn := archive.testzip()) is not None:
                 raise RunError(f"{path} is damaged in its entry {torn}: {remedy}")
             run = msgspec.json.decode(archive.read(RUN_ENTRY), type=Run)
+            progress = archive.read(PROGRESS_ENTRY)
             best = archive.read(BEST_ENTRY) if BEST_ENTRY in archive.namelist() else None
     except FileNotFoundError:
         raise RunError(f"{path} is missing: {remedy}") from None
@@ -90,12 +101,10 @@ def load_run(path: Path) -> tuple[Run, bytes | None]:
         raise RunError(f"{path} is no checkpoint of a training run ({error}): {remedy}") from None
     if run.format != FORMAT:
         raise RunError(f"{path} has format {run.format!r}, this version reads {FORMAT!r}: {remedy}")
-    return run, best
+    return Checkpoint(run, best, progress)
 
 
-def unfinished_run(
-    folder: Path, subject: Mapping[str, Any], identity: str | None
-) -> tuple[Run, bytes | None] | None:
+def unfinished_run(folder: Path, subject: Mapping[str, Any], identity: str | None) -> Checkpoint | None:
     """The run to go on with, from its checkpoint; None if it has to begin.
 
     Args:
@@ -110,18 +119,17 @@ def unfinished_run(
     found = check_checkpoint(folder, identity)
     if found is None:
         return None
-    run, best = found
     wanted = as_json(subject)
     for name in wanted:
-        if run.subject.get(name) != wanted[name]:
+        if found.run.subject.get(name) != wanted[name]:
             raise RunError(
                 f"{path} belongs to a training with another {name.replace('_', ' ')}: resume with the "
                 "same, or choose another --out"
             )
-    return run, best
+    return found
 
 
-def check_checkpoint(folder: Path, identity: str | None) -> tuple[Run, bytes | None] | None:
+def check_checkpoint(folder: Path, identity: str | None) -> Checkpoint | None:
     """What a folder's checkpoint holds; None if the run has not come so far as to write one.
 
     Raises RunError if it is damaged, lost, or of another run than `identity` (None: any).
@@ -130,13 +138,13 @@ def check_checkpoint(folder: Path, identity: str | None) -> tuple[Run, bytes | N
     if not path.exists():
         _check_nothing_lost(folder)
         return None
-    run, best = load_run(path)
-    if identity is not None and run.run != identity:
+    found = load_run(path)
+    if identity is not None and found.run.run != identity:
         raise RunError(
-            f"{path} belongs to the training run {run.run}, not to {identity} that the folder was begun "
-            "with: give --force to begin anew, or choose another --out"
+            f"{path} belongs to the training run {found.run.run}, not to {identity} that the folder was "
+            "begun with: give --force to begin anew, or choose another --out"
         )
-    return run, best
+    return found
 
 
 def _check_nothing_lost(folder: Path) -> None:
