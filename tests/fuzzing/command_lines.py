@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from training.command import COMMANDS, IDENTIFICATION
+from training.console.command import COMMANDS, IDENTIFICATION
 
 NEEDED: dict[str, list[str]] = {
     "train": ["--plant", "nowhere.json"],

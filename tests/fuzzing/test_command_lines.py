@@ -10,7 +10,7 @@ pytest.importorskip("statsmodels")
 
 from identification.commands.registry import COMMANDS as IDENTIFICATION_COMMANDS
 from tests.fuzzing.command_lines import NEEDED, left_files, status_of, wrong_line
-from training.command import COMMANDS, IDENTIFICATION
+from training.console.command import COMMANDS, IDENTIFICATION
 
 pytestmark = pytest.mark.training
 
