@@ -26,7 +26,7 @@ def missing_package(module: str, *, preferred: str = "") -> str | None:
 
 
 def _extras_of(package: str) -> list[str]:
-    """The extras that ask for a package of the index, in their order in pyproject.toml."""
+    """The extras that ask for a package of the index; the one of everything, `all`, stands last."""
     try:
         needed = requires(DISTRIBUTION) or []
     except PackageNotFoundError:
@@ -37,7 +37,7 @@ def _extras_of(package: str) -> list[str]:
         extra = re.search(r"""extra == ['"]([\w-]+)['"]""", line)
         if name and extra and _normal(name[0]) == _normal(package) and extra[1] not in found:
             found.append(extra[1])
-    return found
+    return sorted(found, key=lambda extra: extra == "all")
 
 
 def _normal(name: str) -> str:
