@@ -4,30 +4,28 @@ Loading a policy runs no code from its files: the weights are arrays, the contra
 network is a multilayer perceptron, with a gated recurrent unit before it if the policy is recurrent.
 """
 
-import json
 from dataclasses import dataclass, field, fields
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from safetensors import SafetensorError
-from safetensors.numpy import load_file
+from safetensors.numpy import load
 
 from controllers.dense_layer import dense_layer
-from epv_env.observation import contract
+from controllers.policy_contract import (
+    CONTRACT_FILE,
+    WEIGHTS_FILE,
+    PolicyError,
+    check_arrays,
+    read_contract,
+)
+from epv_env.common.files import read_bytes
 
-FORMAT = "epv-policy/1"
-WEIGHTS_FILE = "policy.safetensors"
-CONTRACT_FILE = "policy.json"
 TRAINED = Path(__file__).parent / "trained"
 """The policies that come with the package, one of each kind: recurrent/seed-7 (with a memory) and
 plain/seed-0 (without one)."""
-
-
-class PolicyError(ValueError):
-    """A policy cannot be used here: the message says why and what to do."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,50 +114,24 @@ def holds_policy(folder: Path) -> bool:
 def load_policy(folder: str | PathLike[str]) -> LearnedPolicy:
     """A policy from its folder (policy.safetensors and policy.json).
 
-    Raises PolicyError if a file is missing or damaged, or if the policy was trained on another
-    observation layout than this version's.
+    Raises PolicyError if a file is missing or damaged, if an array is not what the contract says, or if
+    the policy was trained on another observation layout than this version's.
     """
     folder = Path(folder)
+    found = read_contract(folder)
     try:
-        content: dict[str, Any] = json.loads((folder / CONTRACT_FILE).read_text(encoding="utf-8"))
-        arrays = load_file(folder / WEIGHTS_FILE)
-    except (OSError, json.JSONDecodeError, SafetensorError) as error:
+        arrays = load(read_bytes(folder / WEIGHTS_FILE))
+    except (OSError, ValueError, SafetensorError) as error:
         raise PolicyError(
             f"cannot read a policy from {folder}: {error}; give a folder that training wrote, with "
             f"{CONTRACT_FILE} and {WEIGHTS_FILE}"
         ) from None
-    _check_contract(content, folder)
-    try:
-        layers = [(arrays[f"{i}.weight"], arrays[f"{i}.bias"]) for i in range(content["layers"])]
-        cell = _unit(arrays) if content.get("memory") is not None else None
-    except KeyError as missing_array:
-        raise PolicyError(
-            f"policy {folder} lacks the array {missing_array} in {WEIGHTS_FILE}: train it anew"
-        ) from None
-    name = content.get("name", LearnedPolicy.name)
-    return LearnedPolicy(layers=layers, cell=cell, name=name, environment=content["environment"])
-
-
-def _check_contract(content: dict[str, Any], folder: Path) -> None:
-    """Raises PolicyError if the contract is of another version, incomplete, or of another layout."""
-    if content.get("format") != FORMAT:
-        raise PolicyError(
-            f"policy {folder} has format {content.get('format')!r}, this version reads {FORMAT!r}: "
-            "train it anew"
-        )
-    missing = {"environment", "layers", "observation"} - content.keys()
-    if missing:
-        raise PolicyError(
-            f"policy {folder} lacks {', '.join(sorted(missing))} in {CONTRACT_FILE}: train it anew"
-        )
-    expected = contract(content["observation"]["control_period_s"])
-    if content["observation"] != json.loads(json.dumps(expected)):
-        raise PolicyError(
-            f"policy {folder} was trained on another observation layout than this version's: "
-            "train it anew, or use the version that wrote it"
-        )
+    check_arrays(arrays, found, folder)
+    layers = [(arrays[f"{i}.weight"], arrays[f"{i}.bias"]) for i in range(found.layers)]
+    cell = _unit(arrays) if found.memory else None
+    return LearnedPolicy(layers=layers, cell=cell, name=found.name, environment=found.environment)
 
 
 def _unit(arrays: dict[str, NDArray]) -> GatedUnit:
-    """The recurrent unit among a policy's arrays. Raises KeyError if one of its arrays is missing."""
+    """The recurrent unit among a policy's arrays."""
     return GatedUnit(**{entry.name: arrays[f"memory.{entry.name}"] for entry in fields(GatedUnit)})

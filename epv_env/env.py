@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from epv_env.actions import PWM, OnOff
 from epv_env.common.units import BAR, GRAM
-from epv_env.infos import step_info
+from epv_env.infos import step_info, truth
 from epv_env.observation import observation_space
 from epv_env.plant.plantfile import load_plant
 from epv_env.render import Renderer, Snapshot
@@ -31,10 +31,15 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
             "sensitive_ten_percent", "domain"), or {symbol: value or (low, high)} in SI units.
         supply: None for two reservoirs that sag, a constant pressure [bar absolute], or a Supply.
         scenario: name of a consumption scenario (`epv_env.plant.consumption.SCENARIOS`) or "mixed".
-        target_bar, p2_bar, p3_bar: value or (low, high) [bar absolute].
+        effects: sizes of effects by name, values or (low, high) in SI units.
+        target_bar, p2_bar, p3_bar: value or (low, high) [bar absolute]; the target also as a function
+            of the time [s].
+        band_bar: half-width of the band that the reward prices [bar].
+        privileged: whether info shows true state and parameters (`epv_env.infos.truth`).
         control_period: time between decisions [s].
         supply_voltage, settling_time, sensor_noise, weights, drop_bar: see `epv_env.settings`.
-    reset(options=...) takes parameters, supply, scenario, target_bar, p2_bar and p3_bar for one episode.
+    reset(options=...) takes parameters, effects, supply, scenario, target_bar, p2_bar and p3_bar for one
+    episode.
     Raises ValueError subclasses with one clear sentence for what cannot be used.
     """
 
@@ -47,6 +52,7 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
         plant: Any = None,
         control_period: float | None = None,
         render_mode: Literal["rgb_array", "human"] | None = None,
+        privileged: bool = False,
         **options: Any,
     ):
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
@@ -60,6 +66,7 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
         self.action_space = self.action.space()
         self.observation_space = observation_space()
         self.task = LimitingTask(1, self.settings, threads=1)
+        self.privileged = privileged
         self._renderer: Renderer | None = None
         self._consumption = 0.0
 
@@ -74,14 +81,23 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
             self._renderer.reset()
         if self.render_mode == "human":
             self.render()
-        return observation, {}
+        return observation, self._truth()
+
+    def _truth(self) -> dict[str, Any]:
+        """The privileged entries of info, if they are shown."""
+        if not self.privileged:
+            return {}
+        shown = truth(self.task.valves.state, self.task.parameter_values)
+        return {key: value[0] for key, value in shown.items()}
 
     def step(self, action: Any) -> tuple[NDArray, SupportsFloat, bool, bool, dict[str, Any]]:
-        result = self.task.step(*self.action.decode(np.asarray(action)[None])).single()
+        batch = self.task.step(*self.action.decode(np.asarray(action)[None]))
+        info = {key: value[0, ...] for key, value in step_info(batch).items()}
+        result = batch.single()
         self._consumption = result.consumption
         if self.render_mode == "human":
             self.render()
-        return result.observation, result.reward, result.failed, False, step_info(result)
+        return result.observation, result.reward, result.failed, False, info | self._truth()
 
     def snapshot(self) -> Snapshot:
         """The true state at this instant, for pictures and logs (a controller must not see it)."""

@@ -6,11 +6,12 @@ import numpy as np
 
 from epv_env.common.units import BAR
 from epv_env.observation import HISTORY
-from epv_env.plant.consumption import Profile, draw_profile
+from epv_env.plant.consumption import SILENT, Profile, draw_profile
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.readings import MEASURED
 from epv_env.plant.supply import Supply
 from epv_env.settings import Settings
+from epv_env.signals import MovingTarget, RecordedConsumption
 
 EPISODE = np.dtype(
     [
@@ -54,6 +55,10 @@ class Start:
     """Of the sensors."""
     supply: Supply
     """Where the air comes from."""
+    moving_target: MovingTarget | None
+    """What changes the target; None: it stays."""
+    recorded_consumption: RecordedConsumption | None
+    """What is drawn instead of `consumption`; None: nothing."""
 
     @classmethod
     def draw(cls, rng: np.random.Generator, settings: Settings) -> "Start":
@@ -61,16 +66,22 @@ class Start:
         seed = int(rng.integers(2**63))
         plant, disturbance, noise = (np.random.default_rng((seed, stream)) for stream in range(3))
         p1 = settings.supply.draw(disturbance)
-        target = disturbance.uniform(*settings.target_bar)
+        target = disturbance.uniform(*settings.first_target)
         drop = disturbance.uniform(*settings.drop_bar)
-        consumption = draw_profile(settings.scenario, disturbance)
+        scenario = settings.scenario
+        recorded = scenario if isinstance(scenario, RecordedConsumption) else None
+        consumption = (
+            SILENT if isinstance(scenario, RecordedConsumption) else draw_profile(scenario, disturbance)
+        )
         # Draws that only some settings need come last: they must not shift the others.
         p2 = target - drop if settings.p2_bar is None else disturbance.uniform(*settings.p2_bar)
         p3 = p1 if settings.p3_bar is None else disturbance.uniform(*settings.p3_bar) * BAR
         return cls(
-            parameters=settings.region.draw(plant),
+            parameters=settings.plants.draw(plant),
             p1=p1, p2=p2 * BAR, p3=p3, target=target,
             consumption=consumption,
             noise=noise,
             supply=settings.supply,
+            moving_target=settings.target_bar if isinstance(settings.target_bar, MovingTarget) else None,
+            recorded_consumption=recorded,
         )  # fmt: skip

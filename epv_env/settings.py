@@ -1,74 +1,40 @@
 """What configures an environment: at construction, and per episode through reset(options=...)."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from epv_env.arguments import (
+    PRESSURE_LIMITS_BAR,
+    OptionError,
+    Range,
+    as_effects,
+    as_range,
+    as_region,
+    as_scenario,
+    as_supply,
+    as_target,
+    as_weights,
+)
 from epv_env.common.units import BAR
-from epv_env.plant.consumption import MIXED, Scenario, check_scenario
-from epv_env.plant.parameters import Parameters
+from epv_env.plant.consumption import MIXED, Scenario
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
 from epv_env.plant.supply import Supply
 from epv_env.reward import RewardWeights
-
-Range = tuple[float, float]
-"""Least and greatest value."""
-
-PRESSURE_LIMITS_BAR = (1.0, 16.0)
-"""Range of the pressure sensors (Table 1), bar absolute."""
+from epv_env.signals import MovingTarget, RecordedConsumption
 
 EMPTY_CIRCUIT_BAR = 1.5
 """Circuit pressure at which an episode fails: the consumers could no longer draw their flow."""
 
-OPTIONS = ("parameters", "scenario", "supply", "target_bar", "p2_bar", "p3_bar")
+MOST_NOISE = 1000.0
+"""Factor of the sensors' noise, at most: beyond, every reading is at an end of its range."""
+
+OPTIONS = ("parameters", "effects", "scenario", "supply", "target_bar", "p2_bar", "p3_bar")
 """Keys that reset(options=...) understands, beside Gymnasium's "reset_mask"."""
-
-
-class OptionError(ValueError):
-    """An environment option is unknown or out of range: the message says which and the remedy."""
-
-
-def as_range(name: str, value: Any, limits: Range = PRESSURE_LIMITS_BAR) -> Range:
-    """A number or (low, high) as a range inside the limits. Raises OptionError."""
-    try:
-        low, high = (float(end) for end in (value if np.ndim(value) else (value, value)))
-    except (TypeError, ValueError):
-        raise OptionError(f"{name} is {value!r}: give a number or (low, high)") from None
-    if not limits[0] <= low <= high <= limits[1]:
-        raise OptionError(
-            f"{name} = [{low:g}, {high:g}] must satisfy {limits[0]:g} <= low <= high <= {limits[1]:g}"
-        )
-    return low, high
-
-
-def as_region(value: Any, plant: Plant) -> Region:
-    """A region from its name, from values and ranges by symbol, from Parameters or a Region."""
-    if isinstance(value, Region):
-        return value
-    if isinstance(value, Parameters):
-        return Region(centre=value)
-    if isinstance(value, Mapping):
-        return Region.from_choices(value, plant.parameters)
-    if value == "confidence":
-        if not plant.region.varies:
-            raise OptionError(
-                f"plant {plant.name!r} has no confidence region: give ranges by symbol, or a plant "
-                "file from identification"
-            )
-        return plant.region
-    return Region.named(value, plant.parameters)
-
-
-def as_supply(value: Any) -> Supply:
-    """A Supply, from itself, a constant pressure or range [bar absolute], or None (reservoirs)."""
-    if value is None:
-        return Supply.reservoirs()
-    if isinstance(value, Supply):
-        return value
-    return Supply.constant(*as_range("supply", value))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,14 +42,16 @@ class Settings:
     """Everything that defines the task; units in the names, ranges drawn uniformly per episode."""
 
     region: Region
-    """Region from which the plant's parameters are drawn."""
+    """Region from which the plant's parameters are drawn, but the sizes of `effects`."""
+    effects: Mapping[str, Any] = field(default_factory=dict)
+    """Sizes of effects by symbol, a number or (low, high) [SI]; the others are the region's."""
     control_period: float
     """Time between decisions [s]."""
     supply: Supply = field(default_factory=Supply.reservoirs)
     """Supply of the input chamber."""
-    scenario: str | Scenario = MIXED
-    """Consumption: a name, or a scenario of one's own."""
-    target_bar: Range = (6.0, 9.5)
+    scenario: str | Scenario | RecordedConsumption = MIXED
+    """Consumption: a name, a scenario of one's own, or a recording."""
+    target_bar: Range | MovingTarget = (6.0, 9.5)
     """Target pressure [bar absolute]."""
     p2_bar: Range | None = None
     """First circuit pressure; None: `drop_bar` below the target (an excess could not be undone)."""
@@ -100,28 +68,48 @@ class Settings:
     weights: RewardWeights = field(default_factory=RewardWeights)
     """Weights of the reward."""
 
+    @cached_property
+    def plants(self) -> Region:
+        """The region with the effects: what the plant of an episode is drawn from."""
+        own = Region.from_choices(self.effects, self.region.centre)
+        return replace(self.region, centre=own.centre, boxes={**self.region.boxes, **own.boxes})
+
+    @property
+    def first_target(self) -> Range:
+        """Range of the target at the start of an episode [bar absolute]."""
+        if not isinstance(self.target_bar, MovingTarget):
+            return self.target_bar
+        first = float(self.target_bar.values(np.zeros(1), PRESSURE_LIMITS_BAR)[0])
+        return first, first
+
     def __post_init__(self) -> None:
-        check_scenario(self.scenario)
+        as_scenario(self.scenario)
+        assert self.plants  # refuses sizes outside their domains now, not in the first episode
+        for name in ("control_period", "settling_time", "sensor_noise", "supply_voltage"):
+            value = getattr(self, name)
+            if isinstance(value, str) or not np.isscalar(value):
+                raise OptionError(f"{name} is {value!r}: give a number")
         if not 0.5e-3 <= self.control_period <= 0.1:
             raise OptionError(
                 f"control_period = {self.control_period:g} s must lie between 0.5 ms and 100 ms"
             )
         if not 0 <= self.settling_time < np.inf:
             raise OptionError(f"settling_time = {self.settling_time!r} s must be at least 0")
-        if not 0 <= self.sensor_noise < np.inf:
-            raise OptionError(f"sensor_noise = {self.sensor_noise!r} must be at least 0: 1 is Table 3's")
-        if not isinstance(self.weights, RewardWeights):
-            raise OptionError(f"weights is {self.weights!r}: give a RewardWeights")
+        if not 0 <= self.sensor_noise <= MOST_NOISE:
+            raise OptionError(
+                f"sensor_noise = {self.sensor_noise!r} must lie in 0 to {MOST_NOISE:g}: 1 is Table 3's"
+            )
         self._check_pressures()
 
     def _check_pressures(self) -> None:
         """A target must be reachable from below, and no episode may begin with an empty circuit."""
-        if self.target_bar[1] * BAR > self.supply.pressure[0]:
+        target = self.first_target
+        if target[1] * BAR > self.supply.pressure[0]:
             raise OptionError(
-                f"target_bar up to {self.target_bar[1]:g} bar exceeds the supply's least pressure, "
+                f"target_bar up to {target[1]:g} bar exceeds the supply's least pressure, "
                 f"{self.supply.pressure[0] / BAR:g} bar: lower the target or raise the supply"
             )
-        first = self.target_bar[0] - self.drop_bar[1] if self.p2_bar is None else self.p2_bar[0]
+        first = target[0] - self.drop_bar[1] if self.p2_bar is None else self.p2_bar[0]
         if first <= EMPTY_CIRCUIT_BAR:
             raise OptionError(
                 f"episodes could begin with p2 = {first:g} bar, and the circuit counts as empty at "
@@ -137,7 +125,11 @@ def make_settings(
     plant: Plant,
     *,
     parameters: Any = "exact",
+    effects: Any = None,
+    scenario: Any = MIXED,
     supply: Any = None,
+    weights: Any = None,
+    band_bar: float | None = None,
     target_bar: Any = (6.0, 9.5),
     p2_bar: Any = None,
     p3_bar: Any = None,
@@ -147,8 +139,11 @@ def make_settings(
     """Settings from what a user writes; see `EPValveEnv` for the arguments."""
     return Settings(
         region=as_region(parameters, plant),
+        effects=as_effects(effects or {}),
+        scenario=as_scenario(scenario),
         supply=as_supply(supply),
-        target_bar=as_range("target_bar", target_bar),
+        weights=as_weights(RewardWeights() if weights is None else weights, band_bar),
+        target_bar=as_target(target_bar),
         p2_bar=None if p2_bar is None else as_range("p2_bar", p2_bar),
         p3_bar=None if p3_bar is None else as_range("p3_bar", p3_bar),
         drop_bar=as_range("drop_bar", drop_bar, (0.0, 16.0)),
@@ -163,10 +158,11 @@ def with_options(settings: Settings, options: Mapping[str, Any], plant: Plant) -
         raise OptionError(
             f"unknown reset option {', '.join(map(repr, unknown))}: known are {', '.join(OPTIONS)}"
         )
-    chosen = {name: options.get(name, getattr(settings, name)) for name in OPTIONS[1:]}
-    return make_settings(
+    chosen = {name: options.get(name, getattr(settings, name)) for name in OPTIONS[2:]}
+    made = make_settings(
         plant,
         parameters=options.get("parameters", settings.region),
+        effects=options.get("effects"),
         control_period=settings.control_period,
         drop_bar=settings.drop_bar,
         supply_voltage=settings.supply_voltage,
@@ -175,3 +171,4 @@ def with_options(settings: Settings, options: Mapping[str, Any], plant: Plant) -
         weights=settings.weights,
         **chosen,
     )
+    return made if "effects" in options else replace(made, effects=settings.effects)

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.arguments import PRESSURE_LIMITS_BAR
 from epv_env.compiled_step import (
     NOISE_BLOCK,
     observe_first,
@@ -25,11 +26,11 @@ from epv_env.plant.lanes import LANES, N_INPUT, N_STATE
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.readings import MEASURED
 from epv_env.plant.simulate import energised
-from epv_env.plant.supply import Supply
 from epv_env.plant.threads import share
 from epv_env.plant.valves import Valves
 from epv_env.result import N_FIGURE, StepResult
 from epv_env.settings import Settings
+from epv_env.signals import MovingTarget, RecordedConsumption, Signals, shared
 
 PRESSURES = ("p1", "p2", "p3")
 """Pressures with which an episode begins."""
@@ -45,12 +46,16 @@ class LimitingTask:
         self.period = settings.control_period
         self.valves = Valves(n, threads=threads)
         self.parameters: list[Parameters | None] = [None] * n
+        self.parameter_values = np.zeros((n, len(Parameters.calibrated())))
+        """The same as numbers, in the order of the parameter table (n, parameters) [SI]."""
         self.supplies = [settings.supply] * n
         self.consumption = Profiles(n)
         """What is drawn from each circuit, the rest of the episode included."""
         self._episodes = np.zeros(n, dtype=EPISODE)
-        self._recorded: list[tuple[Supply, NDArray]] = []  # supplies with a recording, and whose
-        self._noise_of: list[np.random.Generator | None] = [None] * n
+        self.moving_targets: list[MovingTarget | None] = [None] * n
+        self.recorded_consumptions: list[RecordedConsumption | None] = [None] * n
+        self._signals = Signals([], [], [])
+        self.noise_of: list[np.random.Generator | None] = [None] * n
         self._noise = np.zeros((n, NOISE_BLOCK, len(MEASURED)))
         self._until_noise = NOISE_BLOCK
         tables = self.valves.tables
@@ -82,6 +87,21 @@ class LimitingTask:
         """Whether it is on at the end of the last period, boolean (n,)."""
         return self._episodes["coil"]
 
+    @property
+    def memory(self) -> dict[str, NDArray]:
+        """The arrays, by name, in which the episodes keep their past (see `Valves.memory`)."""
+        own = {
+            "episodes": self._episodes, "progress": self.consumption.progress, "noise": self._noise,
+            "parameter_values": self.parameter_values,
+        }  # fmt: skip
+        return {**own, **self.valves.memory}
+
+    def settle(self) -> None:
+        """Take note of what `memory` and the lists of each episode's objects hold now."""
+        self.valves.settle()
+        self._find_signals()
+        self._count_to_noise()
+
     def time(self) -> NDArray:
         """Time since each episode's start, (n,) [s]."""
         return self.steps * self.period
@@ -100,7 +120,9 @@ class LimitingTask:
             self.parameters[i] = start.parameters
             self.supplies[i] = start.supply
             self.consumption.start(i, start.consumption)
-            self._noise_of[i] = start.noise
+            self.moving_targets[i] = start.moving_target
+            self.recorded_consumptions[i] = start.recorded_consumption
+            self.noise_of[i] = start.noise
         e = self._episodes
         e["target"][where] = [start.target for start in starts]
         for name in ("cut_in", "cut_out", "delivery"):
@@ -110,7 +132,7 @@ class LimitingTask:
         e["coil"][where] = True
         e["action"][where] = 1.0
         e["waited"][where] = LONGEST_WAIT
-        self._find_recorded()
+        self._find_signals()
         self._draw_noise(where)
         self._count_to_noise()
         observation = np.empty((self.n, len(LAYOUT)), dtype=np.float32)
@@ -130,8 +152,7 @@ class LimitingTask:
         if self._until_noise == 0:
             self._draw_noise(np.flatnonzero((self.steps + 1) % NOISE_BLOCK == 0))
             self._count_to_noise(ahead=1)
-        for supply, who in self._recorded:
-            self._episodes["p1_slope"][who] = supply.slope(self.time()[who], self.period)
+        self._follow_signals()
         observation = np.empty((self.n, len(LAYOUT)), dtype=np.float32)
         figures = np.empty((N_FIGURE, self.n))
         arguments = (*self._fixed, on_time, action, figures, observation)
@@ -155,6 +176,7 @@ class LimitingTask:
     def _set_plants(self, where: NDArray, starts: Sequence[Start]) -> None:
         """Give the valves at `where` their parameters and their first state."""
         values = np.array([list(start.parameters.values()) for start in starts])
+        self.parameter_values[where] = values
         p = dict(zip(starts[0].parameters, values.T, strict=True))
         volumes = np.array([start.supply.volume for start in starts])
         self.valves.set_parameters(where, p, volumes)
@@ -163,20 +185,31 @@ class LimitingTask:
         for field, value in zip(self.valves.state, initial, strict=True):
             field[where] = value
 
-    def _find_recorded(self) -> None:
-        """Note which episodes have a supply whose recording has to be read in every period."""
-        recorded = {id(s): s for s in self.supplies if s.recording is not None}
-        self._recorded = [
-            (supply, np.flatnonzero([one is supply for one in self.supplies]))
-            for supply in recorded.values()
-        ]
+    def _find_signals(self) -> None:
+        """Note which episodes have a signal that has to be read in every period, and which."""
+        self._signals = Signals(
+            supplies=shared([s if s.recording is not None else None for s in self.supplies]),
+            targets=shared(self.moving_targets),
+            consumptions=shared(self.recorded_consumptions),
+        )
+
+    def _follow_signals(self) -> None:
+        """Set what recordings and moving targets say of the period that begins."""
+        e = self._episodes
+        for supply, who in self._signals.supplies:
+            e["p1_slope"][who] = supply.slope(self.time()[who], self.period)
+        for target, who in self._signals.targets:
+            e["target"][who] = target.values(self.time()[who] + self.period, PRESSURE_LIMITS_BAR)
+        for recorded, who in self._signals.consumptions:  # a leak that changes with every period
+            leaks = recorded.mean_flow(self.time()[who], self.period)
+            self.consumption.progress["leak"][who] = leaks
 
     def _draw_noise(self, where: NDArray) -> None:
         """Fill the blocks of noise of the episodes `where`."""
 
         def draw(first: int, last: int) -> None:
             for i in where[first:last].tolist():
-                rng = self._noise_of[i]
+                rng = self.noise_of[i]
                 if rng is not None:
                     rng.standard_normal(out=self._noise[i])
                     self._noise[i] *= self.settings.sensor_noise

@@ -10,10 +10,11 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from epv_env.actions import PWM, OnOff
-from epv_env.infos import KEYS, step_info
+from epv_env.arguments import OptionError, check_count
+from epv_env.infos import KEYS, step_info, truth
 from epv_env.observation import observation_space
 from epv_env.plant.plantfile import load_plant
-from epv_env.settings import OptionError, make_settings, with_options
+from epv_env.settings import make_settings, with_options
 from epv_env.task import LimitingTask
 
 _MASKS = tuple(f"_{key}" for key in KEYS)
@@ -29,6 +30,7 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         autoreset_mode: an AutoresetMode or its value. NEXT_STEP is Gymnasium's default, SAME_STEP is
             what stable-baselines3 needs, DISABLED leaves resets to options={"reset_mask": mask}.
         threads: threads of the plant; None uses every core.
+        privileged: whether infos show true state and parameters, as for the single environment.
     reset(options=...): as for the single environment; a list gives one value for each
     sub-environment, None standing for the constructor's.
     """
@@ -45,15 +47,19 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         plant: Any = None,
         control_period: float | None = None,
         threads: int | None = None,
+        privileged: bool = False,
         render_mode: str | None = None,
         **options: Any,
     ):
-        if num_envs < 1:
-            raise OptionError(f"num_envs = {num_envs}: give at least 1")
+        check_count("num_envs", num_envs)
+        if threads is not None:
+            check_count("threads", threads)
+        if max_episode_steps is not None:
+            check_count("max_episode_steps", max_episode_steps)
         if render_mode is not None:
             raise OptionError("the vector environment does not render: use gymnasium.make instead")
-        self.mode = AutoresetMode(autoreset_mode)
-        self.metadata = {**self.metadata, "autoreset_mode": self.mode}
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         period = self.action_form.default_period if control_period is None else control_period
         self.plant = load_plant(plant)
         self.settings = make_settings(self.plant, control_period=period, **options)
@@ -66,6 +72,7 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.task = LimitingTask(num_envs, self.settings, threads=threads)
+        self.privileged = privileged
         self._rngs = [np_random(None)[0] for _ in range(num_envs)]
         self._begun = np.zeros(num_envs, dtype=bool)
         self._all_begun = False
@@ -87,13 +94,13 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         for i in where:
             if seeds[i] is not None:
                 self._rngs[i] = np_random(seeds[i])[0]
-        return self._begin(where, options), {}
+        return self._begin(where, options), self._truth()
 
     def step(self, actions: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray, dict[str, Any]]:
         if not self._all_begun:
             raise gymnasium.error.ResetNeeded("call reset() on all sub-environments before step()")
         stale = self._done
-        if self.mode is AutoresetMode.DISABLED and self._some_done:
+        if self.autoreset_mode is AutoresetMode.DISABLED and self._some_done:
             raise OptionError(
                 f"sub-environment {np.flatnonzero(stale)[0]} has ended: reset it with "
                 "options={'reset_mask': mask} before the next step"
@@ -106,7 +113,7 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
             truncated = self.task.steps >= self.max_episode_steps
         infos: dict[str, Any] = step_info(result)
         valid = self._every.copy()
-        if self.mode is AutoresetMode.NEXT_STEP and self._some_done:
+        if self.autoreset_mode is AutoresetMode.NEXT_STEP and self._some_done:
             observation = self._begin(np.flatnonzero(stale), {})
             reward, terminated, truncated = (
                 np.where(stale, 0, value).astype(value.dtype)
@@ -117,9 +124,16 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         infos |= dict.fromkeys(_MASKS, valid)
         self._done = terminated | truncated
         self._some_done = bool(self._done.any())
-        if self.mode is AutoresetMode.SAME_STEP and self._some_done:
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._some_done:
             observation = self._restart(observation, infos)
-        return observation, reward, terminated, truncated, infos
+        return observation, reward, terminated, truncated, infos | self._truth()
+
+    def _truth(self) -> dict[str, Any]:
+        """The privileged entries of info, if they are shown; they belong to the observations shown."""
+        if not self.privileged:
+            return {}
+        shown = truth(self.task.valves.state, self.task.parameter_values)
+        return shown | {f"_{key}": self._every.copy() for key in shown}
 
     def _restart(self, observation: NDArray, infos: dict[str, Any]) -> NDArray:
         """Begin the ended episodes anew within the step that ended them."""
@@ -134,6 +148,8 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
             infos["final_info"][f"_{key}"] = ended
             infos[key] = np.where(ended, 0, value).astype(value.dtype)
             infos[f"_{key}"] = ~ended
+        for key, value in self._truth().items():
+            infos["final_info"][key] = ended if key.startswith("_") else value
         infos["_final_obs"] = infos["_final_info"] = ended
         observation = self._begin(np.flatnonzero(ended), {})
         return observation

@@ -3,16 +3,17 @@
 import argparse
 import sys
 
-from threadpoolctl import threadpool_limits
-
 from epv_env.common.command_line import fail_clearly
-from identification.commands.registry import COMMANDS
+from epv_env.common.folder_lock import only_writer
 
 
 def parse(arguments: list[str] | None) -> argparse.Namespace:
     """The command line's options, checked; its `run` is the function of the chosen command."""
+    from identification.commands.registry import COMMANDS  # its packages may be missing: only now
+
+    program = "epv" if sys.argv[0] == "epv" else "python -m identification"
     parser = argparse.ArgumentParser(
-        prog="python -m identification",
+        prog=program,
         description=(
             "Identify the valve from a campaign of recordings (docs/explanation/identification.md)."
         ),
@@ -27,9 +28,11 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the exit status."""
+    from threadpoolctl import threadpool_limits
+
     chosen = parse(arguments)
     # The matrices are small: threads of the linear algebra would only wait for each other.
-    with threadpool_limits(1):
+    with threadpool_limits(1), only_writer(chosen.out):
         chosen.run(chosen)
     return 0
 

@@ -24,6 +24,7 @@ from epv_env.common.command_line import (
     parse_with_quick,
     writable_folder,
 )
+from epv_env.common.folder_lock import only_writer
 from epv_env.common.journal import Journal
 from epv_env.plant.consumption import MIXED
 from epv_env.plant.parameters import Parameters
@@ -198,6 +199,12 @@ def main(arguments: list[str] | None = None) -> int:
     """Command line; returns the exit status."""
     chosen = parse(arguments)
     check_pages(chosen.pages, PARTS)
+    with only_writer(chosen.out):
+        return compare(chosen)
+
+
+def compare(chosen: argparse.Namespace) -> int:
+    """Run, tabulate and draw the comparison; returns the exit status."""
     sizes = Sizes(
         named=chosen.named, random=chosen.random, bound=chosen.bound, tuning=chosen.tuning
     )  # fmt: skip

@@ -24,7 +24,8 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from controllers.learned import CONTRACT_FILE, WEIGHTS_FILE, LearnedPolicy, load_policy
+from controllers.learned import LearnedPolicy, load_policy
+from controllers.policy_contract import CONTRACT_FILE, WEIGHTS_FILE, read_contract
 from epv_env.actions import OnOff
 from epv_env.common.command_line import check_positive, fail_clearly, writable_folder
 from training.deploy import measurements as measure
@@ -78,7 +79,7 @@ def prepare(
 ) -> tuple[Export, dict[str, Any]]:
     """The policy with its integers, and its contract. Raises ExportError for another kind of policy."""
     check_exportable(policy, folder)
-    content = json.loads((folder / CONTRACT_FILE).read_text(encoding="utf-8"))
+    content = read_contract(folder)
     digest = hashlib.sha256((folder / WEIGHTS_FILE).read_bytes()).hexdigest()
     calibration = visit(
         policy, first_seed=CALIBRATION_SEED, episodes=settings.episodes, periods=settings.periods
@@ -86,10 +87,10 @@ def prepare(
     export = Export(
         policy=policy,
         fixed=quantise(policy, calibration.observations, settings=settings),
-        period=content["observation"]["control_period_s"],
+        period=content.observation.control_period_s,
         weights_sha256=digest,
     )
-    return export, deployment_contract(export, provenance=content.get("provenance", {}))
+    return export, deployment_contract(export, provenance=content.provenance)
 
 
 def policy_folder(given: Path, temporary: Path) -> Path:

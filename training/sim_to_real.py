@@ -8,7 +8,6 @@ simulation and diagnosis see what a user sees. Finished steps in --out are kept
 """
 
 import argparse
-import json
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -30,6 +29,8 @@ from epv_env.common.command_line import (
     writable_folder,
 )
 from epv_env.common.files import write_text
+from epv_env.common.folder_lock import only_writer
+from epv_env.common.json_files import decoded
 from epv_env.common.results_folder import check_options, write_options
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.reward import RewardWeights
@@ -126,7 +127,7 @@ def diagnose(chosen: argparse.Namespace) -> dict[str, Any]:
     if not path.exists():
         into = ["--out", str(path.parent), "--seed", str(chosen.seed)]
         identification(["gap", str(chosen.out / CAMPAIGN), *into])
-    return json.loads(path.read_text(encoding="utf-8"))
+    return decoded(path, remedy=f"remove {path.parent}, and the diagnosis runs again")
 
 
 def trained(
@@ -138,13 +139,15 @@ def trained(
         from training.learners.policy_files import save_policy  # torch takes seconds to import: only now
         from training.learners.ppo import train
 
-        policy, _ = train(
+        policy, log = train(
             Hyperparameters(**settings.hyperparameters), folder=folder, plant=plant,
             scenario=settings.scenario, parameters=settings.training_region,
             weights=RewardWeights(switching=settings.switching_price),
             timesteps=chosen.timesteps, seed=chosen.seed, device="cpu", resume=True,
         )  # fmt: skip
-        provenance = {"plant": plant.name, "timesteps": chosen.timesteps, "seed": chosen.seed}
+        provenance = {
+            "run": log.run.run, "plant": plant.name, "timesteps": chosen.timesteps, "seed": chosen.seed,
+        }  # fmt: skip
         save_policy(policy, folder, control_period=OnOff.default_period, provenance=provenance)
     return load_policy(folder)
 
@@ -178,6 +181,12 @@ def announce(step: str) -> None:
 def main(arguments: list[str] | None = None) -> int:
     """Command line; returns the exit status."""
     chosen = parse(arguments)
+    with only_writer(chosen.out):
+        return loop(chosen)
+
+
+def loop(chosen: argparse.Namespace) -> int:
+    """The four stages, those that --out lacks; returns the exit status."""
     check_options(chosen.out, options(chosen), "sim-to-real run")
     announce("1 of 4: the bench records its valve")
     record(chosen)

@@ -8,7 +8,6 @@ explains the method.
 """
 
 import argparse
-import hashlib
 import sys
 from importlib.metadata import version
 from pathlib import Path
@@ -21,6 +20,7 @@ from epv_env.common.command_line import (
     parse_with_quick,
     writable_folder,
 )
+from epv_env.common.folder_lock import only_writer
 from epv_env.common.journal import Journal
 from epv_env.common.json_files import write_json
 from epv_env.common.results_folder import check_options, write_options
@@ -28,6 +28,7 @@ from epv_env.plant.consumption import check_scenario
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.valves import available_cores
 from training.evaluation.seeds import CALIBRATION_SEED, SWEEP_SEED
+from training.learners.provenance import plant_digest
 from training.studies.episode_tasks import Study
 from training.studies.generated_pages import check_pages
 from training.studies.named_controllers import DEFAULT, named_controllers
@@ -115,14 +116,11 @@ def configuration(
     chosen: argparse.Namespace, size: Size, plant: Plant, digests: dict[str, str]
 ) -> dict[str, Any]:
     """Everything that the results depend on."""
-    region = plant.region
-    described = repr([*plant.parameters.items(), region.boxes, region.symbols, region.chi_square])
-    described += "" if region.covariance is None else repr(region.covariance.tolist())
     depends = ("designs", "factors", "scenario", "duration", "seed")
     return {
         "software": version("epv-valve"),
         "controllers": digests,
-        "plant": {"name": plant.name, "sha256": hashlib.sha256(described.encode()).hexdigest()},
+        "plant": {"name": plant.name, "sha256": plant_digest(plant)},
         "size": {
             "episodes": size.episodes,
             "joint_episodes": size.joint_episodes,
@@ -162,6 +160,12 @@ def main(arguments: list[str] | None = None) -> int:
     check_pages(chosen.pages, PARTS)
     check_scenario(chosen.scenario)
     plant = load_plant(chosen.plant)
+    with only_writer(chosen.out):
+        return run_and_report(chosen, plant)
+
+
+def run_and_report(chosen: argparse.Namespace, plant: Plant) -> int:
+    """Run what --out lacks, and write the tables and figures; returns the exit status."""
     controllers, digests = named_controllers(chosen.controllers, plant.parameters)
     size = Size(
         episodes=chosen.episodes, joint_episodes=chosen.joint_episodes,

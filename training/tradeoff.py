@@ -8,6 +8,7 @@ trains PPO and tunes classic controllers at every price; finished controllers in
 """
 
 import argparse
+import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from epv_env.common.command_line import (
     fail_clearly,
     writable_folder,
 )
+from epv_env.common.folder_lock import only_writer
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.valves import available_cores
 from epv_env.reward import RewardWeights
@@ -152,12 +154,15 @@ def main(arguments: list[str] | None = None) -> int:
     chosen = parser.parse_args(arguments)
     check_positive(parser, chosen, "timesteps", "trials", "workers")
     check_not_negative(parser, chosen, "seed")
+    if not all(0 <= price < math.inf for price in chosen.prices):
+        parser.error("--prices must be finite and must not be negative")
     first = first_memory(chosen)
     optuna.logging.set_verbosity(optuna.logging.WARNING)
-    for price in chosen.prices:
-        folder = chosen.out / FOLDER.format(price)
-        tuned_at(folder, chosen.kinds, price, chosen.trials, chosen.seed)
-    train_variants(chosen, first)
+    with only_writer(chosen.out):
+        for price in chosen.prices:
+            folder = chosen.out / FOLDER.format(price)
+            tuned_at(folder, chosen.kinds, price, chosen.trials, chosen.seed)
+        train_variants(chosen, first)
     print(f"controllers in {chosen.out}; measure them with training/compare.py --tradeoff {chosen.out}")
     return 0
 

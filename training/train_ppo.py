@@ -26,6 +26,7 @@ from epv_env.common.command_line import (
     writable_folder,
 )
 from epv_env.common.files import write_text
+from epv_env.common.folder_lock import only_writer
 from epv_env.common.json_files import write_json
 from epv_env.common.results_folder import check_same, read_config, write_options
 from epv_env.plant.consumption import check_scenario
@@ -34,7 +35,9 @@ from epv_env.plant.region import REGIONS
 from epv_env.reward import RewardWeights
 from training.evaluation.controller_table import Comparison, as_text, compare
 from training.evaluation.scenarios import TUNING_REGION
-from training.learners.provenance import configuration
+from training.learners.provenance import Configuration, configuration
+from training.learners.run_folder import forget_failed_start, make_free, why_taken
+from training.learners.run_state import check_checkpoint, new_run
 
 SAME_WHEN_RESUMED = ("seed", "plant", "scenario", "parameters", "switching_price", "recurrent")
 """Options that a resumed training must share with its beginning."""
@@ -82,23 +85,41 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--device", default="cpu", help="torch device; cpu is fastest for so small a net"
     )
-    parser.add_argument("--resume", action="store_true", help="go on from the folder's checkpoint")
+    again = parser.add_mutually_exclusive_group()
+    again.add_argument("--resume", action="store_true", help="go on from the folder's checkpoint")
+    again.add_argument(
+        "--force", action="store_true", help="begin anew in a folder that holds a training already"
+    )
     chosen = parse_with_quick(parser, arguments, QUICK)
     check_positive(parser, chosen, "timesteps", "episodes", "duration")
-    check_not_negative(parser, chosen, "seed")
+    check_not_negative(parser, chosen, "seed", "switching_price")
     return chosen
 
 
-def check_resume(chosen: argparse.Namespace) -> None:
-    """A folder with a checkpoint is continued only if that is asked for, and only with its options."""
+def identity(chosen: argparse.Namespace) -> str:
+    """The run to go on with, or a new one in a folder that is free.
+
+    Raises ValueError if the folder is not free, or cannot be resumed with these options.
+    """
     if not chosen.resume:
-        return
-    config = read_config(chosen.out)
+        make_free(chosen.out, force=chosen.force or _replace_asked(chosen.out))
+        return new_run()
+    config = read_config(chosen.out, Configuration)
     if config is None:
         raise ValueError(f"nothing to resume in {chosen.out}: leave --resume out")
     options = {name: getattr(chosen, name) for name in SAME_WHEN_RESUMED}
-    earlier = {"recurrent": False} | config["options"]
-    check_same(earlier, options, f"{chosen.out} was trained with", "resume with the same")
+    check_same(config["options"], options, f"{chosen.out} was trained with", "resume with the same")
+    check_checkpoint(chosen.out, config["run"])  # before anything is written
+    return config["run"]
+
+
+def _replace_asked(folder: Path) -> bool:
+    """Whether the user, asked in a terminal, wants to replace what a folder holds."""
+    taken = why_taken(folder)
+    if taken is None or not (sys.stdin.isatty() and sys.stderr.isatty()):
+        return False
+    print(taken, file=sys.stderr)
+    return input("begin anew, and remove what that training wrote? [y/N] ").strip().lower() == "y"
 
 
 def evaluate(chosen: argparse.Namespace, plant: Plant) -> Comparison:
@@ -133,8 +154,16 @@ def main(arguments: list[str] | None = None) -> int:
     chosen = parse(arguments)
     plant = load_plant(chosen.plant)
     check_scenario(chosen.scenario)
-    check_resume(chosen)
+    with only_writer(chosen.out):
+        run = identity(chosen)
+        try:
+            return train_and_compare(chosen, plant, run)
+        finally:
+            forget_failed_start(chosen.out)
 
+
+def train_and_compare(chosen: argparse.Namespace, plant: Plant, run: str) -> int:
+    """Train, write the policy down, and compare it; returns the exit status."""
     from training.learners.distillation import Distillation
     from training.learners.hyperparameters import Hyperparameters, recurrent_hyperparameters
     from training.learners.policy_files import save_policy
@@ -147,7 +176,7 @@ def main(arguments: list[str] | None = None) -> int:
     if chosen.quick:
         hyperparameters = replace(hyperparameters, **QUICK_HYPERPARAMETERS)
         distillation = replace(distillation, **QUICK_DISTILLATION)
-    config = configuration(vars(chosen), plant, hyperparameters)
+    config = configuration(vars(chosen), plant, hyperparameters, run=run)
     if chosen.recurrent:
         config["distillation"] = asdict(distillation)
     write_options(chosen.out, config)
@@ -155,7 +184,7 @@ def main(arguments: list[str] | None = None) -> int:
         "folder": chosen.out, "plant": plant, "scenario": chosen.scenario,
         "parameters": chosen.parameters, "weights": weights,
         "timesteps": chosen.timesteps, "seed": chosen.seed, "device": chosen.device,
-        "resume": chosen.resume,
+        "resume": chosen.resume, "run": run,
     }  # fmt: skip
     if chosen.recurrent:
         policy, log = train_recurrent(hyperparameters, distillation, **task)

@@ -8,17 +8,32 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from epv_env.common.compilation import announce_compilation
+from epv_env.common.extras import missing_package
+from epv_env.common.interruption import Interrupted, interruptible
+
 
 def fail_clearly(main: Callable[[], int]) -> int:
-    """Run a command; a ValueError or OSError becomes one sentence on stderr and exit status 2."""
+    """Run a command; a ValueError or OSError becomes one sentence on stderr and exit status 2.
+
+    Ctrl-C and SIGTERM end the command and its workers, with a sentence and status 130 or 143.
+    """
     try:
-        return main()
+        with interruptible():
+            announce_compilation()
+            return main()
+    except ModuleNotFoundError as error:
+        sentence = missing_package(error.name or "")
+        if sentence is None:
+            raise
+        print(f"error: {sentence}", file=sys.stderr)
+        return 2
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    except KeyboardInterrupt:
+    except Interrupted as interruption:
         print("interrupted: what was finished is kept", file=sys.stderr)
-        return 130
+        return interruption.status
 
 
 def writable_file(text: str) -> Path:
@@ -53,16 +68,35 @@ def parse_with_quick(
     return parser.parse_args(arguments)
 
 
+MOST = {
+    "workers": 1024,  # more processes than a machine has cores
+    "duration": 3600.0,  # [s] an episode's traces of an hour fill the memory
+    "seconds": 3600.0,  # [s] the same for a film
+    "episodes": 1_000_000,  # their results fill the memory; and seeds end where others' begin
+    "timesteps": 10**12,  # years
+    "recurrent_timesteps": 10**12,
+    "trials": 1_000_000,
+    "decisions": 10**9,
+    "rate": 1e7,  # [Hz] no bench samples pressures faster
+}
+"""Largest sensible values of options by name: what lies beyond is a slip, and would fail late."""
+
+
 def check_positive(parser: argparse.ArgumentParser, chosen: argparse.Namespace, *names: str) -> None:
-    """End with one sentence unless each of these numbers is finite and above 0, or None."""
+    """End with one sentence unless each of these numbers is above 0 and sensible (MOST), or None."""
     for name in names:
         value = getattr(chosen, name)
+        option = f"--{name.replace('_', '-')}"
         if value is not None and not 0 < value < math.inf:
-            parser.error(f"--{name.replace('_', '-')} must be positive and finite")
+            parser.error(f"{option} must be positive and finite")
+        if value is not None and value > MOST.get(name, math.inf):
+            parser.error(f"{option} {value:g} is beyond {MOST[name]:g}: give less")
 
 
 def check_not_negative(parser: argparse.ArgumentParser, chosen: argparse.Namespace, *names: str) -> None:
-    """End with one sentence if one of these numbers is below 0."""
+    """End with one sentence unless each of these numbers is finite and at least 0."""
     for name in names:
         if getattr(chosen, name) < 0:
             parser.error(f"--{name.replace('_', '-')} must not be negative")
+        if not getattr(chosen, name) < math.inf:
+            parser.error(f"--{name.replace('_', '-')} must be finite")

@@ -1,6 +1,7 @@
 """JSON files: written whole; read with one sentence for each way in which a file can be wrong."""
 
 import json
+import math
 import re
 from os import PathLike
 from pathlib import Path
@@ -8,9 +9,15 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from epv_env.common.files import write_text
+from epv_env.common.files import read_bytes, write_text
 
 Shape = TypeVar("Shape")
+
+DEEPEST = 64
+"""Levels of a file's objects and lists; ours have less than ten."""
+
+LARGEST = 2**63
+"""Whole numbers stay below, as in other programs that read the file."""
 
 
 class JSONFileError(ValueError):
@@ -46,17 +53,64 @@ def read_json(path: str | PathLike[str], shape: type[Shape], *, version: str, re
     return checked(content, shape, where=str(path), remedy=remedy)
 
 
-def decoded(path: str | PathLike[str], *, remedy: str) -> Any:
-    """The content of a JSON file, whatever it is. Raises JSONFileError."""
-    file = Path(path)
+def decoded(path: str | PathLike[str], *, remedy: str, what: str = "", allow_nan: bool = False) -> Any:
+    """The content of a JSON file, whatever it is.
+
+    Args:
+        path: the file; UTF-8, with or without a byte order mark.
+        remedy: what to do about a file that cannot be used.
+        what: names the kind of file in messages, before the path.
+        allow_nan: whether the caller refuses NaN and infinities itself, with the field's name.
+
+    Raises:
+        JSONFileError: the file is missing, no regular file, not JSON, or of senseless depth or numbers.
+    """
+    file = f"{what} {path}".lstrip()
     try:
-        if file.exists() and not file.is_file():
-            raise JSONFileError(f"{path} is no regular file: {remedy}")
-        return msgspec.json.decode(file.read_bytes().removeprefix(b"\xef\xbb\xbf"))
+        return _parsed(read_bytes(Path(path)).decode("utf-8-sig"), allow_nan=allow_nan)
     except OSError as error:
-        raise JSONFileError(f"cannot read {path} ({error.strerror}): {remedy}") from None
-    except (msgspec.DecodeError, RecursionError) as error:
-        raise JSONFileError(f"{path} is not JSON ({error}): {remedy}") from None
+        raise JSONFileError(f"cannot read {file} ({error.strerror}): {remedy}") from None
+    except (ValueError, RecursionError) as error:
+        raise JSONFileError(f"{file} is not JSON in UTF-8 ({error}): {remedy}") from None
+
+
+def _parsed(text: str, *, allow_nan: bool) -> Any:
+    """The content of a JSON text. Raises ValueError or RecursionError."""
+
+    def whole(digits: str) -> int:
+        if len(digits) > len(str(LARGEST)) or abs(int(digits)) >= LARGEST:
+            raise ValueError(f"a whole number of {len(digits)} digits is beyond 64 bits")
+        return int(digits)
+
+    def number(digits: str) -> float:
+        value = float(digits)
+        if math.isinf(value):
+            raise ValueError(f"the number {digits[:20]} is beyond double precision")
+        return value
+
+    def constant(name: str) -> float:
+        if not allow_nan:
+            raise ValueError(f"{name} is no number")
+        return float(name)
+
+    content = json.loads(text, parse_int=whole, parse_float=number, parse_constant=constant)
+    _check_depth(content)
+    return content
+
+
+def _check_depth(content: Any) -> None:
+    """Raises ValueError beyond DEEPEST levels, at which other functions would run out of stack."""
+    level = [content]
+    for _ in range(DEEPEST):
+        nested = [
+            each.values() if isinstance(each, dict) else each
+            for each in level
+            if isinstance(each, (dict, list))
+        ]
+        level = [inner for each in nested for inner in each]
+        if not level:
+            return
+    raise ValueError(f"more than {DEEPEST} levels of objects and lists")
 
 
 def checked(content: Any, shape: type[Shape], *, where: str, remedy: str) -> Shape:

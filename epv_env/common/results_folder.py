@@ -1,11 +1,12 @@
 """A folder of results with its options: a command continues the folder only under the same options."""
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from epv_env.common.json_files import write_json
+from epv_env.common.json_files import checked, decoded, write_json
+
+Shape = TypeVar("Shape")
 
 CONFIG = "config.json"
 
@@ -21,7 +22,7 @@ def check_options(folder: Path, options: Mapping[str, Any], what: str) -> None:
     Raises:
         ValueError: the folder was begun with other options, or its configuration cannot be read.
     """
-    earlier = read_config(folder)
+    earlier = read_config(folder, dict[str, Any])
     if earlier is not None:
         check_same(earlier, options, f"{folder} holds a {what} with", "go on with the same")
 
@@ -41,17 +42,16 @@ def check_same(
             )
 
 
-def read_config(folder: Path) -> dict[str, Any] | None:
-    """The configuration in a folder, None if there is none. Raises ValueError if it is damaged."""
+def read_config(folder: Path, shape: type[Shape]) -> Shape | None:
+    """The configuration in a folder as a `shape`, None if there is none.
+
+    Raises JSONFileError if it is damaged or of another shape.
+    """
     path = folder / CONFIG
     if not path.exists():
         return None
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except json.JSONDecodeError as error:
-        raise ValueError(
-            f"{path} is damaged ({error}): remove the folder, or choose another --out"
-        ) from None
+    remedy = "remove the folder, or choose another --out"
+    return checked(decoded(path, remedy=remedy), shape, where=str(path), remedy=remedy)
 
 
 def write_options(folder: Path, options: Mapping[str, Any]) -> None:

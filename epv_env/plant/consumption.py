@@ -4,7 +4,7 @@ A profile is a set of trapezoids in time (start, rise, hold, fall, height), so a
 be a step or a ramp; the flow over a control period is the exact mean of the profile over it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numba
@@ -41,6 +41,15 @@ class Scenario:
     first: tuple[float, float] = (0.6, 1.5)
     """Start of the first application [s]."""
 
+    def __post_init__(self) -> None:
+        for entry in fields(self)[1:]:
+            low, high = getattr(self, entry.name)
+            if not 0 <= low <= high < np.inf:
+                raise ValueError(
+                    f"scenario: {entry.name} = ({low:g}, {high:g}) must satisfy 0 <= low <= high: "
+                    "consumers draw air, and time does not run back"
+                )
+
     def draw(self, rng: np.random.Generator) -> "Profile":
         """One episode's consumption."""
         low, high = np.transpose([self.rise, self.hold, self.fall, self.pause, self.flow])[..., None]
@@ -65,6 +74,9 @@ class Profile:
     span: float
     """Time after which the sequence begins again [s]."""
 
+
+SILENT = Profile(leak=0.0, applications=np.zeros((5, APPLICATIONS)), span=1.0)
+"""No consumption."""
 
 SCENARIOS: dict[str, Scenario] = {
     "none": Scenario(meaning="no consumption at all"),

@@ -1,6 +1,5 @@
 """The plant file: parameters, effects and region as versioned JSON (docs/reference/files.md)."""
 
-import json
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
@@ -9,7 +8,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from epv_env.common.json_files import JSONFileError, checked, write_json
+from epv_env.common.json_files import JSONFileError, checked, decoded, write_json
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import ParameterError, Parameters
 from epv_env.plant.region import Region
@@ -90,15 +89,12 @@ def load_plant(source: "Plant | str | PathLike[str] | None") -> Plant:
 
 def _content(path: Path) -> _PlantFile:
     """The file's content, its fields and their types checked. Raises PlantFileError."""
+    remedy = "give the path of a plant.json, or write it anew"
     try:
-        # Not msgspec's decoder: a NaN is refused with the parameter's name, by `Parameters`.
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise PlantFileError(
-            f"cannot read plant file {path}: {error.strerror}; give the path of a plant.json"
-        ) from None
-    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise PlantFileError(f"plant file {path} is not JSON ({error}); write it anew") from None
+        # `Parameters` refuses a NaN with the parameter's name.
+        content = decoded(path, remedy=remedy, what="plant file", allow_nan=True)
+    except JSONFileError as error:
+        raise PlantFileError(str(error)) from None
     version = content.get("format") if isinstance(content, dict) else None
     if version != FORMAT:
         raise PlantFileError(

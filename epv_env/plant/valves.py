@@ -71,6 +71,19 @@ class Valves:
                       self._sensors)  # fmt: skip
 
     @property
+    def memory(self) -> dict[str, NDArray]:
+        """The arrays, by name, in which a batch keeps all that its future depends on.
+
+        Copy them, or fill them and call `settle`.
+        """
+        names = ("with_effects", "delay", "acting_U", "delay_left")
+        return {**self.tables._asdict(), **{name: getattr(self, f"_{name}") for name in names}}
+
+    def settle(self) -> None:
+        """Take note of what `memory` holds now."""
+        self.nominal = not (np.any(self._with_effects) or np.any(self._delay))
+
+    @property
     def state(self) -> State:
         """Views of the state, one array of shape (n,) per field; writing to them sets the state."""
         return State(*self._state[:, : self.n])
@@ -111,7 +124,7 @@ class Valves:
         self._acting_U[where] = np.nan
         for symbol in SENSOR_SYMBOLS:
             self._sensors[symbol][where] = p[symbol]
-        self.nominal = not (np.any(self._with_effects) or np.any(self._delay))
+        self.settle()
 
     def readings(self) -> dict[str, NDArray]:
         """What the sensors of p1, p2, p3 and I have before them [Pa, A], shape (n,)."""
@@ -147,7 +160,7 @@ class Valves:
             Inputs(*self._inputs).U[:] = U
             self._duration[:] = lasts
             self._advance_all()
-        self._acting_U = np.where(self._delay_left > 0, acting, commanded)
+        self._acting_U[:] = np.where(self._delay_left > 0, acting, commanded)
 
     def record(self, inputs: Inputs, period: ArrayLike) -> State:
         """Apply a series of inputs, each for `period` [s], and keep every state.

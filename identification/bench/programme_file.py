@@ -1,12 +1,10 @@
 """Programmes of the bench as a file, so that an experiment can be planned here and run there."""
 
-import json
 from collections.abc import Sequence
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
-from epv_env.common.json_files import write_json
+from epv_env.common.json_files import JSONFileError, decoded, write_json
 from epv_env.common.units import BAR
 from epv_env.plant.sensors import SENSORS
 from identification.bench.programmes import Programme
@@ -37,16 +35,11 @@ def save_programmes(programmes: Sequence[Programme], path: str | PathLike[str]) 
 
 def load_programmes(path: str | PathLike[str]) -> tuple[Programme, ...]:
     """The programmes of a file (docs/reference/files.md), every rule checked. Raises ProgrammeError."""
+    remedy = "give the path of a JSON file, or write it anew"
     try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ProgrammeError(
-            f"cannot read programme file {path}: {error.strerror}; give the path of a JSON file"
-        ) from None
-    except (ValueError, RecursionError) as error:  # also a number of thousands of digits
-        raise ProgrammeError(
-            f"programme file {path} is not JSON in UTF-8 ({error}): write it anew"
-        ) from None
+        content = decoded(path, remedy=remedy, what="programme file", allow_nan=True)
+    except JSONFileError as error:
+        raise ProgrammeError(str(error)) from None
     return _decode(str(path), content)
 
 

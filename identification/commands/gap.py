@@ -1,10 +1,10 @@
 """`python -m identification gap`: diagnose a campaign, or the report's own error tables."""
 
 import argparse
-import json
 from pathlib import Path
 
 from epv_env.common.command_line import writable_folder
+from epv_env.common.json_files import decoded
 from identification.commands.command import Command
 from identification.commands.options import add_out, add_seed
 from identification.gap.report import result_files
@@ -55,7 +55,7 @@ def _diagnose_campaign(chosen: argparse.Namespace) -> None:
     diagnosis = diagnose_campaign(
         chosen.campaign, chosen.out, plant=chosen.plant, without=chosen.without, seed=chosen.seed
     )
-    content = json.loads((chosen.out / result_files.GAP).read_text(encoding="utf-8"))
+    content = decoded(chosen.out / result_files.GAP, remedy="diagnose again")
     print(verdict_sentence(diagnosis, content["next_experiment"])[1])
     written = (diagnose.REPORT, result_files.GAP, diagnose.PLANT)
     print(f"written: {', '.join(str(chosen.out / name) for name in written)}")

@@ -5,6 +5,9 @@ from typing import Any
 
 from epv_env.common.command_line import writable_folder
 
+MOST_COUNTED = 100_000
+"""Starts, trials, campaigns or processes, at most: more would run for years."""
+
 
 def add_out(parser: argparse.ArgumentParser, *, help: str = "folder of results") -> None:
     """Add --out, a required folder that exists or can be made."""
@@ -34,6 +37,8 @@ class _AtLeastOne(argparse.Action):
     ) -> None:
         if value < 1:
             parser.error(f"{self.option_strings[0]} must be at least 1")
+        if value > MOST_COUNTED:
+            parser.error(f"{self.option_strings[0]} {value} is beyond {MOST_COUNTED}: give less")
         setattr(chosen, self.dest, value)
 
 

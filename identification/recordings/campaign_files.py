@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.common.files import write_text
+from epv_env.common.files import read_bytes, write_text
 from epv_env.common.json_files import write_json
 from epv_env.common.units import BAR
 from epv_env.plant.channels import CHANNEL, MEASURED_CHANNELS, MeasuredChannel
@@ -109,7 +109,7 @@ def check_campaign(
 def _read_file(path: Path) -> tuple[str, dict[str, NDArray]]:
     """SHA-256 of a file, and its columns by name, each (samples,) in the unit of the name."""
     try:
-        content = path.read_bytes()
+        content = read_bytes(path)
     except OSError as error:
         raise CampaignError(
             f"{path} cannot be read ({error.strerror}): add the file, or take it out of {FILE_NAME}"

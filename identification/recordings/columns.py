@@ -3,6 +3,7 @@
 import csv
 import io
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -72,8 +73,8 @@ def _column_names(file: str, text: str) -> list[str]:
 
 
 def _check_names(place: str, names: Sequence[str]) -> None:
-    for name in names:
-        if names.count(name) > 1:
+    for name, count in Counter(names).items():
+        if count > 1:
             raise CampaignError(f"{place}: column {name!r} stands twice: keep one of them")
     missing = [name for name in REQUIRED_COLUMNS if name not in names]
     if missing:

@@ -1,11 +1,11 @@
 """The campaign.json of a campaign: ambient conditions, and the role of each recording's file."""
 
-import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from epv_env.common.json_files import JSONFileError, decoded
 from epv_env.common.units import BAR
 from epv_env.plant.parameters import ParameterError, checked_value
 from identification.recordings.recording import ROLES, Campaign, CampaignError
@@ -34,14 +34,11 @@ class Manifest:
 def read_manifest(folder: Path) -> Manifest:
     """The campaign.json of a folder. Raises CampaignError."""
     path = folder / FILE_NAME
+    remedy = "give the folder of a campaign, or write the file anew"
     try:
-        content = json.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise CampaignError(
-            f"{path} cannot be read ({error.strerror}): give the folder of a campaign"
-        ) from None
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise CampaignError(f"{path} is not JSON in UTF-8 ({error}): write it anew") from None
+        content = decoded(path, remedy=remedy, allow_nan=True)  # `checked_value` names the field
+    except JSONFileError as error:
+        raise CampaignError(str(error)) from None
     return check_manifest(folder, content)
 
 

@@ -38,7 +38,8 @@ def test_another_version_is_refused(tmp_path):
 
 def test_a_written_policy_acts_as_the_model_it_came_from(tmp_path):
     pytest.importorskip("stable_baselines3")
-    from controllers.learned import PolicyError, load_policy
+    from controllers.learned import load_policy
+    from controllers.policy_contract import PolicyError
     from epv_env.plant.plantfile import Plant
     from epv_env.reward import RewardWeights
     from training.learners.hyperparameters import Hyperparameters
@@ -67,6 +68,8 @@ def test_a_written_policy_acts_as_the_model_it_came_from(tmp_path):
     (tmp_path / "policy.json").write_text(json.dumps(content))
     with pytest.raises(PolicyError, match="another observation layout"):
         load_policy(tmp_path)
+    content["observation"]["entries"].reverse()
+    (tmp_path / "policy.json").write_text(json.dumps(content))
     (tmp_path / "policy.safetensors").write_bytes(b"no weights")
     with pytest.raises(PolicyError, match="cannot read a policy"):
         load_policy(tmp_path)

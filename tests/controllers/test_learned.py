@@ -9,7 +9,8 @@ pytest.importorskip("safetensors")
 from safetensors.numpy import save_file
 
 from controllers.dense_layer import dense_layer
-from controllers.learned import LearnedPolicy, PolicyError, load_policy
+from controllers.learned import LearnedPolicy, load_policy
+from controllers.policy_contract import PolicyError
 
 pytestmark = pytest.mark.training
 
@@ -56,7 +57,7 @@ def test_a_state_is_decided_the_same_in_every_batch():
 def test_a_policy_without_its_meaning_is_refused(tmp_path):
     save_file({"0.weight": np.zeros((2, 19), "f4")}, tmp_path / "policy.safetensors")
     (tmp_path / "policy.json").write_text(json.dumps({"format": "epv-policy/1", "layers": 1}))
-    with pytest.raises(PolicyError, match="lacks environment, observation"):
+    with pytest.raises(PolicyError, match="field 'environment' is missing"):
         load_policy(tmp_path)
 
 

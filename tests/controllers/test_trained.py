@@ -7,7 +7,8 @@ import pytest
 
 pytest.importorskip("safetensors")
 
-from controllers.learned import CONTRACT_FILE, TRAINED, WEIGHTS_FILE, load_policy
+from controllers.learned import TRAINED, load_policy
+from controllers.policy_contract import CONTRACT_FILE, WEIGHTS_FILE
 from training.evaluation.rollout import run_episodes
 
 ROOT = Path(__file__).parents[2]

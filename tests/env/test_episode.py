@@ -129,7 +129,7 @@ def test_a_new_episode_forgets_the_failure_of_the_last():
     for p2, expected in ((7.3, False), (8.0, True)):
         env.reset(seed=0, options={"p2_bar": p2})
         infos = [env.step(1)[-1] for _ in range(SETTLED + 2)]
-        assert infos[-1]["is_success"] is expected
+        assert infos[-1]["is_success"] == expected
 
 
 def test_the_settling_time_can_be_set():

@@ -95,7 +95,7 @@ def test_what_json_cannot_hold_leaves_the_old_file(tmp_path):
 
 
 def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(PlantFileError, match=r"cannot read plant file .*no\.json: No such file"):
+    with pytest.raises(PlantFileError, match=r"cannot read plant file .*no\.json .No such file"):
         load_plant(tmp_path / "no.json")
 
 
@@ -103,7 +103,7 @@ def test_a_missing_file_is_named(tmp_path):
 def test_what_is_not_json_is_refused(tmp_path, content):
     path = tmp_path / "plant.json"
     path.write_bytes(content)
-    with pytest.raises(PlantFileError, match=r"plant\.json is not JSON .*; write it anew"):
+    with pytest.raises(PlantFileError, match=r"plant\.json is not JSON .*, or write it anew"):
         load_plant(path)
 
 

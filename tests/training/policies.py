@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from safetensors.numpy import save_file
 
 from controllers.base import Controller
-from controllers.learned import CONTRACT_FILE, FORMAT, WEIGHTS_FILE, GatedUnit
+from controllers.learned import GatedUnit
+from controllers.policy_contract import CONTRACT_FILE, FORMAT, WEIGHTS_FILE
 from epv_env.observation import LAYOUT, contract
 from training.deploy.double_precision import memory_along
 from training.deploy.visited_states import visit

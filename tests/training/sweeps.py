@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from safetensors.numpy import save_file
 
-from controllers.learned import CONTRACT_FILE, FORMAT, WEIGHTS_FILE
+from controllers.policy_contract import CONTRACT_FILE, FORMAT, WEIGHTS_FILE
 from epv_env.observation import LAYOUT, contract
 from training.sweep import main
 

@@ -1,13 +1,14 @@
 """The command lines: the whole job in its short form, and one clear sentence for a wrong input."""
 
 import json
+import shutil
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from controllers.learned import TRAINED, load_policy
 from controllers.registry import SIMULATING_KINDS, TUNED_KINDS
 
 pytest.importorskip("stable_baselines3")
@@ -21,7 +22,7 @@ ROOT = Path(__file__).parents[2]
 WRITTEN = (
     "checkpoint.zip", "config.json", "episode.png", "excursions.png", "learning_curve.csv",
     "learning_curve.png", "model.zip", "policy.json", "policy.safetensors", "table.csv", "table.json",
-    "validation.csv",
+    "tensorboard", "validation.csv",
 )  # fmt: skip
 
 
@@ -57,6 +58,37 @@ def test_a_run_resumes_from_its_checkpoint(finished):
     result = command("--quick", "--out", out, "--resume")
     assert result.returncode == 0, result.stderr
     assert (out / "learning_curve.csv").read_text().splitlines()[: len(before)] == before
+
+
+def test_a_run_has_one_identity_in_all_that_it_writes(finished):
+    out, _ = finished
+    run = json.loads((out / "config.json").read_text())["run"]
+    assert json.loads((out / "policy.json").read_text())["provenance"]["run"] == run
+    for table in ("learning_curve.csv", "validation.csv"):
+        assert {line.split(",")[-1] for line in (out / table).read_text().splitlines()[1:]} == {run}
+
+
+def test_a_finished_run_is_not_overwritten_unasked(finished):
+    out, _ = finished
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    result = command("--quick", "--out", out, "--seed", "5")
+    assert (result.returncode, result.stderr.count("\n")) == (2, 1)
+    assert "holds a finished training: give --force to replace it" in result.stderr
+    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+
+
+def test_a_resumed_run_never_hands_out_another_runs_policy(finished, tmp_path):
+    """The checkpoint of another seed, put under a new configuration."""
+    out, _ = finished
+    config = json.loads((out / "config.json").read_text())
+    config["run"], config["options"]["seed"] = "0" * 32, 5
+    (tmp_path / "config.json").write_text(json.dumps(config))
+    shutil.copy(out / "checkpoint.zip", tmp_path)
+    result = command("--quick", "--out", tmp_path, "--resume", "--seed", "5")
+    assert (result.returncode, result.stderr.count("\n")) == (2, 1)
+    assert "belongs to the training run" in result.stderr
+    assert {path.name for path in tmp_path.iterdir()} == {"config.json", "checkpoint.zip"}
+    assert json.loads((tmp_path / "config.json").read_text()) == config
 
 
 def test_a_policy_with_a_memory_is_trained_in_the_short_form_too(tmp_path):
@@ -117,8 +149,7 @@ def test_tuning_without_a_trial_is_refused(script, tmp_path):
 @pytest.mark.parametrize("shape", [{"memory": 4, "width": 8}, None])
 def test_the_tradeoff_goes_on_from_no_other_kind_of_policy(shape, tmp_path):
     """One of other layers, and one without a memory."""
-    wrong = policy_of(Student(**(shape or {"memory": 32, "width": 64})))
-    wrong = wrong if shape else replace(wrong, cell=None)
+    wrong = policy_of(Student(**shape)) if shape else load_policy(TRAINED / "plain" / "seed-0")
     save_recurrent(wrong, tmp_path / "memory")
     out = tmp_path / "out"
     result = command("--recurrent", tmp_path / "memory", "--out", out, script="training/tradeoff.py")

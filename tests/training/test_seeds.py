@@ -70,7 +70,6 @@ def used() -> dict[str, Span]:
         "states": (seeds.STATES_SEED, SETTINGS.episodes),
         "closed loop": (seeds.CLOSED_LOOP_SEED, exported.episodes),
         "timing": (seeds.TIMING_SEED, 1),
-        "resumed": (seeds.RESUMED_SEED, trained + chosen.timesteps),
     }
     spans = {purpose: (first, first + count) for purpose, (first, count) in counted.items()}
     return {**spans, **compared(), "sweep": swept()}

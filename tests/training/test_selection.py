@@ -1,5 +1,6 @@
 """The best policy of a training is kept, judged on scenarios of its own; a seed means one policy."""
 
+import csv
 from dataclasses import fields, replace
 
 import numpy as np
@@ -7,15 +8,18 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 
+from stable_baselines3 import PPO
+
 from controllers.learned import LearnedPolicy
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.rollout import run_episodes
 from training.evaluation.seeds import VALIDATION_SEED
-from training.learners.checkpoint_selection import VALIDATION_FILE, validation_points
+from training.learners import learning_log
+from training.learners.checkpoint_selection import validation_points
 from training.learners.hyperparameters import Hyperparameters
-from training.learners.learning_log import read_rows
+from training.learners.learning_log import VALIDATION_FILE
 from training.learners.ppo import train
 from training.learners.validation import score
 
@@ -39,6 +43,15 @@ def trained(folder, *, timesteps=TIMESTEPS, seed=1, resume=False):
         resume=resume, quiet=True,
     )  # fmt: skip
     return policy
+
+
+def read_rows(path):
+    """The numbers of a table by column."""
+    with path.open(newline="") as stream:
+        return [
+            {name: float(value) for name, value in row.items() if name != "run"}
+            for row in csv.DictReader(stream)
+        ]
 
 
 def same(one: LearnedPolicy, other: LearnedPolicy) -> bool:
@@ -73,8 +86,8 @@ def test_a_seed_means_one_policy(finished, tmp_path, monkeypatch):
     (tmp_path / "temporary").mkdir()
     assert same(trained(tmp_path / "again"), policy)
     assert not list((tmp_path / "temporary").iterdir())
-    again = (tmp_path / "again" / VALIDATION_FILE).read_bytes()
-    assert again == (folder / VALIDATION_FILE).read_bytes()
+    again = read_rows(tmp_path / "again" / VALIDATION_FILE)
+    assert again == read_rows(folder / VALIDATION_FILE)
     assert not same(trained(tmp_path / "other", seed=2), policy)
 
 
@@ -88,6 +101,26 @@ def test_a_resumed_training_keeps_what_was_validated_before(tmp_path):
     finished = trained(tmp_path, resume=True)
     assert read_rows(tmp_path / VALIDATION_FILE) == after
     assert same(finished, trained(tmp_path, resume=True))
+
+
+@pytest.mark.parametrize("rollouts", [1, 3, 6])
+def test_a_killed_training_resumes_to_the_same_policy(finished, tmp_path, monkeypatch, rollouts):
+    """To the bit: the run dies after some rollouts, without a word, and its last checkpoint is old."""
+    _, policy = finished
+    collected = PPO.collect_rollouts
+    remaining = iter(range(rollouts))
+
+    def dying(*arguments, **named):
+        if next(remaining, None) is None:
+            raise SystemError("killed")
+        return collected(*arguments, **named)
+
+    monkeypatch.setattr(PPO, "collect_rollouts", dying)
+    monkeypatch.setattr(learning_log, "CHECKPOINT_SECONDS", 0.0 if rollouts == 3 else 3600.0)
+    with pytest.raises(SystemError):
+        trained(tmp_path)
+    monkeypatch.undo()
+    assert same(trained(tmp_path, resume=True), policy)
 
 
 def test_validation_points_end_with_the_training():

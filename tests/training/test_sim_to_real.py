@@ -150,7 +150,7 @@ def test_another_effect_in_the_same_folder_is_refused(finished):
 
 def test_a_folder_whose_options_are_damaged_is_refused(tmp_path):
     (tmp_path / "config.json").write_text('{"effect": ')
-    with pytest.raises(ValueError, match=r"config.json is damaged .* choose another --out"):
+    with pytest.raises(ValueError, match=r"config.json is not JSON .* choose another --out"):
         main(["--quick", "--out", str(tmp_path)])
     assert [path.name for path in tmp_path.iterdir()] == ["config.json"]
 

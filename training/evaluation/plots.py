@@ -1,5 +1,6 @@
 """Figures of a training run, drawn without a display."""
 
+import io
 from pathlib import Path
 
 import matplotlib as mpl
@@ -9,6 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
+from epv_env.common.files import write_bytes
 from epv_env.reward import BAND_BAR
 from training.evaluation.controller_table import Comparison
 from training.evaluation.rollout import Trace
@@ -21,9 +23,10 @@ WIDEST_BAR = 1.2
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a PNG and free the figure."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=130, bbox_inches="tight")
+    """Write a PNG, whole or not at all, and free the figure."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=130, bbox_inches="tight")
+    write_bytes(path, stream.getvalue())
     plt.close(figure)
 
 

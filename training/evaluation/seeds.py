@@ -35,9 +35,6 @@ CLOSED_LOOP_SEED = 8_000_000
 TIMING_SEED = 9_000_000
 """Of the episode in which decisions are timed."""
 
-RESUMED_SEED = 1_000_000_000
-"""Of resumed trainings: the steps done before count from here, so that none meets an episode twice."""
-
 
 def distillation_seeds(seed: int, count: int) -> range:
     """Of the episodes of a distillation. Raises ValueError if others are swept on them."""

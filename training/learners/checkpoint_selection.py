@@ -1,7 +1,7 @@
 """Selection of the best model that a training passes through, judged by its validations."""
 
+import io
 from collections.abc import Callable, Iterable
-from pathlib import Path
 from typing import Any
 
 from stable_baselines3 import PPO
@@ -9,11 +9,8 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from controllers.base import Controller
 from training.evaluation.metrics import EpisodeMetrics
-from training.learners.learning_log import read_rows, save_model, write_rows
+from training.learners.run_state import Row
 from training.learners.validation import ValidationSettings, score, validate
-
-VALIDATION_FILE = "validation.csv"
-BEST_FILE = "model.zip"
 
 
 def validation_points(total: int, *, first_share: float, count: int) -> list[int]:
@@ -23,37 +20,38 @@ def validation_points(total: int, *, first_share: float, count: int) -> list[int
 
 
 class Selection(BaseCallback):
-    """Validates the greedy policy at some points of the training; the best model is in BEST_FILE."""
+    """Validates the greedy policy at some points of the training, and keeps the best model."""
 
     def __init__(
         self,
-        folder: Path,
         *,
         points: Iterable[int],
         settings: ValidationSettings,
         options: dict[str, Any],
         controller: Callable[[PPO], Controller],
+        rows: list[Row],
+        best: bytes | None,
     ):
         """
         Args:
-            folder: of the training.
             points: environment steps after which the policy is validated.
             settings: of a validation.
             options: of the environment.
             controller: makes a controller of a model, its greedy policy.
+            rows: of the earlier part of a resumed training, one for each validation.
+            best: the archive of the best model of that part; None: it was not validated.
         """
         super().__init__()
-        self._folder = folder
         self._points = sorted(points)
         self._settings = settings
         self._options = options
         self._controller = controller
-        self.rows = read_rows(folder / VALIDATION_FILE)
-        """One for each validation, that of a resumed training's earlier part included."""
+        self.rows = rows
+        """One for each validation, those of a resumed training's earlier part included."""
+        self.best = best
+        """The archive of the best model so far; None before the first validation."""
 
     def _on_training_start(self) -> None:
-        if self.num_timesteps == 0:
-            self.rows = []
         self._points = [point for point in self._points if point > self.num_timesteps]
 
     def _on_step(self) -> bool:
@@ -79,12 +77,14 @@ class Selection(BaseCallback):
         row = {"timesteps": float(self.num_timesteps), **figures(metrics, self._settings)}
         self.rows.append(row)
         if row["score"] > best:
-            save_model(self.model, self._folder / BEST_FILE)
-        write_rows(self._folder / VALIDATION_FILE, list(self.rows[0]), self.rows)
+            self.best = archive_of(self.model)
 
-    def restore_best(self, model: PPO) -> None:
-        """Give the model the parameters of the best one so far."""
-        model.set_parameters(str(self._folder / BEST_FILE), device=model.device)
+
+def archive_of(model: PPO) -> bytes:
+    """stable-baselines3's archive of a model."""
+    stream = io.BytesIO()
+    model.save(stream)
+    return stream.getvalue()
 
 
 def figures(metrics: EpisodeMetrics, settings: ValidationSettings) -> dict[str, float]:

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from safetensors.numpy import save
 from stable_baselines3 import PPO
 
-from controllers.learned import CONTRACT_FILE, FORMAT, WEIGHTS_FILE, LearnedPolicy
+from controllers.learned import LearnedPolicy
+from controllers.policy_contract import CONTRACT_FILE, FORMAT, WEIGHTS_FILE
 from epv_env.common.files import write_bytes
 from epv_env.common.json_files import write_json
 from epv_env.observation import contract
@@ -44,13 +45,7 @@ def save_policy(
         control_period: of the observations [s].
         provenance: of the training, ready for JSON.
     """
-    arrays = {}
-    for i, (weight, bias) in enumerate(policy.layers):
-        arrays[f"{i}.weight"], arrays[f"{i}.bias"] = weight, bias
-    memory = None
-    if policy.cell is not None:
-        arrays |= {f"memory.{name}": array for name, array in vars(policy.cell).items()}
-        memory = {"unit": "GRU", "cells": policy.cell.width}
+    memory = None if policy.cell is None else {"unit": "GRU", "cells": policy.cell.width}
     content = {
         "format": FORMAT,
         "name": policy.name,
@@ -62,8 +57,18 @@ def save_policy(
         "observation": contract(control_period),
         "provenance": provenance,
     }
-    write_bytes(folder / WEIGHTS_FILE, save(arrays))
+    write_bytes(folder / WEIGHTS_FILE, policy_bytes(policy))
     write_json(folder / CONTRACT_FILE, content)
+
+
+def policy_bytes(policy: LearnedPolicy) -> bytes:
+    """A policy's weights as safetensors."""
+    arrays = {}
+    for i, (weight, bias) in enumerate(policy.layers):
+        arrays[f"{i}.weight"], arrays[f"{i}.bias"] = weight, bias
+    if policy.cell is not None:
+        arrays |= {f"memory.{name}": array for name, array in vars(policy.cell).items()}
+    return save(arrays)
 
 
 def _linear_layers(model: PPO) -> list[torch.nn.Linear]:

@@ -12,10 +12,12 @@ from tqdm import tqdm
 from controllers.base import Controller
 from controllers.learned import holds_policy, load_policy
 from epv_env.actions import OnOff
+from epv_env.common.folder_lock import only_writer
 from epv_env.plant.consumption import MIXED
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from training.evaluation.scenarios import TUNING_REGION
+from training.learners.run_folder import STUDENT_FOLDER
 
 RECURRENT_TIMESTEPS = 5_000_000
 """Environment steps of PPO for a recurrent policy."""
@@ -58,8 +60,6 @@ class Training:
     @property
     def own_student(self) -> Path:
         """Folder of the student that a recurrent training makes if it is given none."""
-        from training.learners.student import STUDENT_FOLDER  # torch takes seconds to import: only now
-
         return self.folder / STUDENT_FOLDER
 
     def run(self, *, quiet: bool = False) -> None:
@@ -75,19 +75,22 @@ class Training:
             "weights": self.weights, "timesteps": self.timesteps, "seed": self.seed, "device": "cpu",
             "folder": self.folder, "resume": True, "quiet": quiet,
         }  # fmt: skip
-        if self.recurrent:
-            policy, _ = train_recurrent(
-                recurrent_hyperparameters(self.weights),
-                Distillation(),
-                student=self.student,
-                memoryless=self.memoryless,
-                **task,
-            )
-        else:
-            policy, _ = train(Hyperparameters(), **task)
-        prices = {"switching_price": self.weights.switching}
-        provenance = {"timesteps": self.timesteps, "seed": self.seed, **prices}
-        save_policy(policy, self.folder, control_period=OnOff.default_period, provenance=provenance)
+        with only_writer(self.folder):
+            if self.recurrent:
+                policy, log = train_recurrent(
+                    recurrent_hyperparameters(self.weights),
+                    Distillation(),
+                    student=self.student,
+                    memoryless=self.memoryless,
+                    **task,
+                )
+            else:
+                policy, log = train(Hyperparameters(), **task)
+            provenance = {
+                "run": log.run.run, "timesteps": self.timesteps, "seed": self.seed,
+                "switching_price": self.weights.switching,
+            }  # fmt: skip
+            save_policy(policy, self.folder, control_period=OnOff.default_period, provenance=provenance)
 
 
 def train_missing(trainings: Sequence[Training], *, workers: int) -> None:

@@ -1,6 +1,9 @@
 """PPO on the native vector environment: model, imitation, training with selection and resume."""
 
-from dataclasses import replace
+import hashlib
+import io
+import pickle
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -8,7 +11,7 @@ from typing import Any
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.logger import Logger
+from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
 from controllers.learned import LearnedPolicy
@@ -16,12 +19,23 @@ from controllers.tuned import build, load_tunings
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
-from training.evaluation.seeds import RESUMED_SEED
 from training.learners.checkpoint_selection import Selection, validation_points
 from training.learners.hyperparameters import Hyperparameters
 from training.learners.imitation import imitate
-from training.learners.learning_log import CHECKPOINT_FILE, CURVE_FILE, TrainingLog, read_rows
-from training.learners.policy_files import greedy_policy, put_layers
+from training.learners.learning_log import TrainingLog
+from training.learners.policy_files import greedy_policy, policy_bytes, put_layers
+from training.learners.provenance import plant_digest
+from training.learners.resumption import restore_progress
+from training.learners.run_folder import TENSORBOARD_FOLDER
+from training.learners.run_state import (
+    CHECKPOINT_FILE,
+    Run,
+    RunError,
+    as_json,
+    new_run,
+    unfinished_run,
+    with_nan,
+)
 from training.learners.schedules import FadingEntropy, linear
 from training.learners.training_env import make_training_env
 from training.learners.validation import ValidationSettings
@@ -63,12 +77,15 @@ def train(
     device: str,
     resume: bool,
     student: LearnedPolicy | None = None,
+    run: str | None = None,
     quiet: bool = False,
 ) -> tuple[LearnedPolicy, TrainingLog]:
     """Train until `timesteps` and return the best validated policy (checkpoint_selection.py).
 
-    An interruption (Ctrl-C) leaves the newest checkpoint behind. A resumed run draws new episodes, so it
-    is a continuation, not a repetition, of an uninterrupted one.
+    An interruption leaves the newest checkpoint behind. A run that is resumed from it gives, to the bit,
+    the policy of an uninterrupted one (on the same machine, and device "cpu").
+
+    Raises RunError if the folder's checkpoint is of another run or subject, or damaged.
 
     Args:
         h: hyperparameters.
@@ -83,8 +100,15 @@ def train(
         resume: whether to go on from the folder's checkpoint.
         student: a policy to go on from; its recurrent unit stays as it is. None: the model imitates the
             TEACHER first.
+        run: identity of the run; None: that of the folder's checkpoint, or a new one.
         quiet: no progress bar.
     """
+    subject = _subject(
+        h, plant, student, seed=seed, scenario=scenario, parameters=parameters, weights=asdict(weights)
+    )
+    found = unfinished_run(folder, subject, run) if resume else None
+    begun = found.run if found else Run(run=run or new_run(), subject=as_json(subject))
+    done = begun.timesteps
     torch.set_num_threads(1)  # sums do not depend on the machine's cores; the plant uses them all
     task: dict[str, Any] = {
         "plant": plant, "parameters": parameters, "scenario": scenario,
@@ -92,22 +116,21 @@ def train(
     }  # fmt: skip
     env = make_training_env(h, seed=seed, cell=student.cell if student else None, **task)
     model = make_model(h, env, seed=seed, device=device)
-    done = 0
-    if resume and (folder / CHECKPOINT_FILE).exists():
-        model.set_parameters(str(folder / CHECKPOINT_FILE), device=device)
-        done = int(read_rows(folder / CURVE_FILE)[-1]["timesteps"])
-        env.seed(RESUMED_SEED + seed * h.num_envs + done)
+    if found:
+        _restore(model, folder / CHECKPOINT_FILE, device=device)
+        restore_progress(model, found.progress)
     elif h.imitation_epochs:
         _start(model, h, env, plant.parameters, student=student, seed=seed)
     greedy = partial(greedy_policy, student=student)
     selection = Selection(
-        folder,
         points=validation_points(timesteps, first_share=h.first_validation, count=h.validations),
         settings=ValidationSettings(episodes=h.validation_episodes, duration=h.validation_duration),
         options=task,
         controller=greedy,
+        rows=with_nan(begun.validations),
+        best=found.best if found else None,
     )
-    log = TrainingLog(folder, timesteps, quiet=quiet)
+    log = TrainingLog(folder, begun, selection, total=timesteps, quiet=quiet)
     callbacks: list[BaseCallback] = [
         FadingEntropy(h.ent_coef, total=timesteps),
         selection,
@@ -115,13 +138,39 @@ def train(
     ]
     if done < timesteps:
         model.num_timesteps = done
-        try:
-            model.learn(timesteps - done, callback=callbacks, reset_num_timesteps=done == 0)
-        except KeyboardInterrupt:
-            log.save()
-            raise
-    selection.restore_best(model)
+        events = TensorBoardOutputFormat(str(folder / TENSORBOARD_FOLDER))
+        model.set_logger(Logger(folder=None, output_formats=[events]))
+        model.learn(timesteps - done, callback=callbacks, reset_num_timesteps=found is None)
+        events.close()
+    if selection.best is None:
+        raise RunError(
+            f"the run in {folder} has done {done} steps, and none of its policies is validated yet: "
+            f"resume it with more than {timesteps} steps"
+        )
+    best_model: Any = io.BytesIO(selection.best)  # stable-baselines3 takes streams, too
+    model.set_parameters(best_model, device=device)
     return greedy(model), log
+
+
+def _restore(model: PPO, checkpoint: Path, *, device: str) -> None:
+    """Give the model a checkpoint's parameters. Raises RunError if they are another network's."""
+    try:
+        model.set_parameters(str(checkpoint), device=device)
+    except (ValueError, RuntimeError, KeyError, pickle.UnpicklingError) as error:
+        raise RunError(
+            f"{checkpoint} does not fit this training's networks ({error}): give --force to begin anew, "
+            "or choose another --out"
+        ) from None
+
+
+def _subject(
+    h: Hyperparameters, plant: Plant, student: LearnedPolicy | None, **options: Any
+) -> dict[str, Any]:
+    """All that a training depends on but its length, ready for JSON."""
+    return {
+        **options, "hyperparameters": asdict(h), "plant": plant_digest(plant),
+        "student": hashlib.sha256(policy_bytes(student)).hexdigest() if student else None,
+    }  # fmt: skip
 
 
 def training_weights(weights: RewardWeights, h: Hyperparameters) -> RewardWeights:

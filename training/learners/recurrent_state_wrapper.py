@@ -25,11 +25,12 @@ class RecurrentStateWrapper(VecEnvWrapper):
         low, high = np.append(space.low, -limits), np.append(space.high, limits)
         super().__init__(env, observation_space=gymnasium.spaces.Box(low, high, dtype=np.float32))
         self._cell = cell
-        self._state = self._zeros()
+        self.state = self._zeros()
+        """Of the unit in each episode (n, m)."""
 
     def reset(self) -> VecEnvObs:
         """First observations (n, entries + m)."""
-        self._state = self._zeros()
+        self.state = self._zeros()
         return self._with_state(self.venv.reset())
 
     def step_wait(self) -> VecEnvStepReturn:
@@ -37,9 +38,9 @@ class RecurrentStateWrapper(VecEnvWrapper):
         observation, reward, done, infos = self.venv.step_wait()
         for i in np.flatnonzero(done):  # the last observation of an episode belongs to its own state
             last = infos[i]["terminal_observation"]
-            state = self._cell.step(last[None], self._state[i : i + 1])[0]
+            state = self._cell.step(last[None], self.state[i : i + 1])[0]
             infos[i]["terminal_observation"] = np.append(last, state)
-        self._state[done] = 0.0
+        self.state[done] = 0.0
         return self._with_state(observation), reward, done, infos
 
     def _zeros(self) -> NDArray:
@@ -47,5 +48,5 @@ class RecurrentStateWrapper(VecEnvWrapper):
 
     def _with_state(self, observation: VecEnvObs) -> NDArray:
         assert isinstance(observation, np.ndarray)
-        self._state = self._cell.step(observation, self._state)
-        return np.concatenate([observation, self._state], axis=1)
+        self.state = self._cell.step(observation, self.state)
+        return np.concatenate([observation, self.state], axis=1)

@@ -9,10 +9,9 @@ import torch
 from controllers.learned import GatedUnit, LearnedPolicy, load_policy
 from epv_env.observation import LAYOUT
 from training.learners.hyperparameters import FROM_STUDENT, Hyperparameters
+from training.learners.run_folder import STUDENT_FOLDER
 
 NAME = "PPO, recurrent"
-STUDENT_FOLDER = "student"
-"""Folder of the student within that of its recurrent policy."""
 
 
 class Student(torch.nn.Module):

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from controllers.base import Controller
-from controllers.learned import CONTRACT_FILE, WEIGHTS_FILE, load_policy
+from controllers.learned import load_policy
+from controllers.policy_contract import CONTRACT_FILE, WEIGHTS_FILE
 from controllers.tuned import build, load_tunings
 from epv_env.plant.parameters import Parameters
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
+from epv_env.common.interruption import ignore_interrupts
 from epv_env.common.journal import Journal
 from epv_env.common.progress import progress
 from epv_env.plant.parameters import Parameters
@@ -115,6 +116,7 @@ _worker: dict[str, Any] = {}
 
 
 def _prepare_worker(truths: list[TrueSignals], truth: Parameters, seed: int) -> None:
+    ignore_interrupts()
     threadpool_limits(1)  # threads of the linear algebra would take the other workers' cores
     _worker.update(truths=truths, truth=truth, seed=seed)
 

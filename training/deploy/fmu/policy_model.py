@@ -1,13 +1,11 @@
 """An exported policy as a model for an FMU: the C file of the export, called once in every period."""
 
-import json
 from pathlib import Path
 from string import Template
-from typing import Any
 
 import msgspec
 
-from epv_env.common.json_files import JSONFileError, checked
+from epv_env.common.json_files import JSONFileError, read_json
 from training.deploy.deployment_contract import FORMAT
 from training.deploy.fmu.files import TEMPLATES
 from training.deploy.fmu.variables import Model, Variable
@@ -79,15 +77,9 @@ def _variables() -> tuple[Variable, ...]:
 def _contract(folder: Path) -> _Contract:
     """The fields of contract.json that count here, checked. Raises ExportError."""
     path = folder / "contract.json"
+    remedy = "export the policy again, or give a folder that training/export.py wrote"
     try:
-        content: Any = json.loads(_text(path))
-    except (json.JSONDecodeError, RecursionError) as error:
-        raise ExportError(f"{path} is not JSON ({error}): export the policy again") from None
-    version = content.get("format") if isinstance(content, dict) else None
-    if version != FORMAT:
-        raise ExportError(f"{path} has format {version!r}, not {FORMAT!r}: export the policy again")
-    try:
-        contract = checked(content, _Contract, where=str(path), remedy="export the policy again")
+        contract = read_json(path, _Contract, version=FORMAT, remedy=remedy)
     except JSONFileError as error:
         raise ExportError(str(error)) from None
     if not 1e-4 <= contract.observation.control_period_s <= 1.0:

@@ -1,0 +1,121 @@
+"""Signals of one's own over an episode: a target that moves, and a recorded consumption."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from epv_env.common.units import GRAM
+from epv_env.plant.supply import Supply
+
+Signal = TypeVar("Signal")
+
+LONGEST_SIGNAL = 10_000_000
+"""Samples, at most: more is a slip, and would fill the memory."""
+
+
+class SignalError(ValueError):
+    """A signal cannot be used: the message says which, the rule and the remedy."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MovingTarget:
+    """A target pressure that changes within the episode."""
+
+    at: Callable[[float], float]
+    """Target [bar absolute] at a time since the episode's start [s]."""
+
+    @classmethod
+    def recorded(cls, time_s: ArrayLike, target_bar: ArrayLike) -> "MovingTarget":
+        """Linear between samples, and constant beyond their ends.
+
+        time_s: increasing (samples,) [s]. target_bar: (samples,) [bar absolute]. Raises SignalError.
+        """
+        time, values = _samples("a recorded target", time_s, target_bar)
+        return cls(at=lambda seconds: float(np.interp(seconds, time, values)))
+
+    def values(self, time: NDArray, limits: tuple[float, float]) -> NDArray:
+        """Targets (n,) [bar absolute] at times (n,) [s].
+
+        Raises SignalError for one outside the limits [bar absolute].
+        """
+        found = np.array([self.at(seconds) for seconds in time.tolist()], dtype=float)
+        wrong = ~((found >= limits[0]) & (found <= limits[1]))  # true for NaN, too
+        if np.any(wrong):
+            k = int(np.argmax(wrong))
+            raise SignalError(
+                f"the target is {found[k]:g} bar at {time[k]:g} s: keep it between {limits[0]:g} and "
+                f"{limits[1]:g} bar absolute"
+            )
+        return found
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RecordedConsumption:
+    """Measured air consumption: linear between samples, constant beyond their ends."""
+
+    time: NDArray
+    """Increasing times since the episode's start (samples,) [s]."""
+    flow: NDArray
+    """Consumption (samples,) [kg/s], at least 0."""
+
+    @classmethod
+    def from_samples(cls, time_s: ArrayLike, flow_g_per_s: ArrayLike) -> "RecordedConsumption":
+        """time_s: increasing (samples,) [s]. flow_g_per_s: (samples,) [g/s]. Raises SignalError."""
+        time, flow = _samples("a recorded consumption", time_s, flow_g_per_s)
+        return cls(time=time, flow=flow * GRAM)
+
+    def __post_init__(self) -> None:
+        _samples("a recorded consumption", self.time, self.flow)
+        if np.any(self.flow < 0):
+            k = int(np.argmax(self.flow < 0))
+            raise SignalError(
+                f"a recorded consumption is {self.flow[k] / GRAM:g} g/s at {self.time[k]:g} s: give "
+                "flows of at least 0, since consumers draw air"
+            )
+        object.__setattr__(self, "_taken", _integral(self.time, self.flow))
+
+    def mean_flow(self, time: NDArray, period: float) -> NDArray:
+        """Mean flow (n,) [kg/s] over the period [s] that starts at each time (n,) [s]."""
+        return (self._until(time + period) - self._until(time)) / period
+
+    def _until(self, time: NDArray) -> NDArray:
+        """Air drawn from the first sample until `time` (n,) [kg]; negative before it."""
+        k = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.time) - 1)
+        since, begins = time - self.time[k], self.flow[k]
+        ends = np.interp(time, self.time, self.flow)
+        return self.__dict__["_taken"][k] + since * (begins + ends) / 2
+
+
+class Signals(NamedTuple):
+    """Signals that are read in every control period, each with the indices of its episodes."""
+
+    supplies: list[tuple[Supply, NDArray]]
+    targets: list[tuple[MovingTarget, NDArray]]
+    consumptions: list[tuple[RecordedConsumption, NDArray]]
+
+
+def shared(signals: Sequence[Signal | None]) -> list[tuple[Signal, NDArray]]:
+    """Each signal once, with the indices of the episodes that have it, (m,)."""
+    found = {id(signal): signal for signal in signals if signal is not None}
+    return [(each, np.flatnonzero([one is each for one in signals])) for each in found.values()]
+
+
+def _integral(time: NDArray, flow: NDArray) -> NDArray:
+    """Air drawn until each sample (samples,) [kg]."""
+    return np.concatenate([[0.0], np.cumsum(np.diff(time) * (flow[1:] + flow[:-1]) / 2)])
+
+
+def _samples(what: str, time: ArrayLike, values: ArrayLike) -> tuple[NDArray, NDArray]:
+    """Times and values, each (samples,), as arrays. Raises SignalError."""
+    try:
+        t, v = np.array(time, dtype=float), np.array(values, dtype=float)
+    except (TypeError, ValueError):
+        raise SignalError(f"{what} needs numbers: give two lists of them") from None
+    if t.ndim != 1 or t.shape != v.shape or not 0 < t.size <= LONGEST_SIGNAL:
+        raise SignalError(f"{what} has shapes {t.shape} and {v.shape}: give a value for each time")
+    if not (np.all(np.isfinite(t)) and np.all(np.isfinite(v)) and np.all(np.diff(t) > 0)):
+        raise SignalError(f"{what} needs increasing times and finite values: leave other samples out")
+    return t, v

@@ -1,0 +1,177 @@
+"""Effects, moving targets, recorded consumption, weights by name, and the truth for critics."""
+
+import gymnasium
+import numpy as np
+import pytest
+
+import epv_env  # noqa: F401 - registers the ids
+from epv_env.infos import PARAMETER_NAMES, STATE_NAMES
+from epv_env.observation import decode
+from epv_env.plant.consumption import Scenario
+from epv_env.reward import RewardWeights
+from epv_env.signals import MovingTarget, RecordedConsumption
+
+CALM = {"scenario": "none", "supply": 12.0, "p2_bar": 8.0, "target_bar": 8.0}
+
+
+def single(**options):
+    return gymnasium.make("EPValve-v0", **{**CALM, **options}).unwrapped
+
+
+def column(env, symbol):
+    return env.task.parameter_values[:, PARAMETER_NAMES.index(symbol)]
+
+
+def test_effects_are_drawn_anew_for_every_episode():
+    env = single(effects={"eddy_current": (0.001, 0.004), "command_delay": 0.002})
+    found = []
+    for seed in range(20):
+        env.reset(seed=seed)
+        found.append(column(env, "G_eddy")[0])
+        assert column(env, "t_delay")[0] == 0.002
+    assert len(set(found)) == 20
+    assert 0.001 <= min(found) < max(found) <= 0.004
+
+
+def test_effects_of_one_episode_replace_the_constructors():
+    env = single(effects={"eddy_current": 0.004})
+    env.reset(seed=0, options={"effects": {"command_delay": 0.003}})
+    assert (column(env, "G_eddy")[0], column(env, "t_delay")[0]) == (0.0, 0.003)
+    env.reset(seed=0, options={"parameters": {"R": 45.0}})
+    assert (column(env, "G_eddy")[0], column(env, "R")[0]) == (0.004, 45.0)
+    env.reset(seed=0)
+    assert column(env, "G_eddy")[0] == 0.004
+
+
+def test_effects_leave_the_other_draws_as_they_are():
+    plain, other = (
+        single(parameters="confidence"),
+        single(parameters="confidence", effects={"eddy_current": (0.001, 0.004)}),
+    )
+    for env in (plain, other):
+        env.reset(seed=3)
+    for symbol in ("R", "RML", "alphaMV", "alphaPV"):
+        assert column(plain, symbol) == column(other, symbol)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"effects": {"flood": 1.0}}, "unknown effect 'flood'"),
+        ({"effects": 3}, "give a mapping"),
+        ({"effects": {"piston_friction": 8.0}}, "is sized by"),
+        ({"effects": {"eddy_current": {"R": 45.0}}}, "is sized by G_eddy"),
+        ({"effects": {"eddy_current": -1.0}}, "G_eddy"),
+        ({"effects": {"eddy_current": "much"}}, "G_eddy"),
+        ({"target_bar": lambda t: 20.0}, "keep it between 1 and 16"),
+        ({"target_bar": lambda t: float("nan")}, "keep it between 1 and 16"),
+        ({"weights": {"band": 1.0, "flood": 2.0}}, "unknown reward weight 'flood'"),
+        ({"weights": {"band": -1.0}}, "must be finite and at least 0"),
+        ({"weights": 3.0}, "give a RewardWeights"),
+        ({"band_bar": float("nan")}, "must be finite"),
+        ({"sensor_noise": 1e9}, "must lie in 0 to 1000"),
+        ({"sensor_noise": "1"}, "give a number"),
+        ({"control_period": "0.005"}, "give a number"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(options, words):
+    with pytest.raises(ValueError, match=words):
+        single(**options)
+
+
+@pytest.mark.parametrize("name", ["threads", "max_episode_steps", "num_envs"])
+@pytest.mark.parametrize("value", [0, -1, 1.5, "2", True])
+def test_counts_are_whole_numbers_of_at_least_one(name, value):
+    from epv_env.vector_env import EPValveVectorEnv
+
+    with pytest.raises(ValueError, match=f"{name} = .*: give a whole number"):
+        EPValveVectorEnv(**{"num_envs": 2, name: value})
+
+
+def test_negative_flows_are_refused():
+    with pytest.raises(ValueError, match="consumers draw air"):
+        Scenario(meaning="blowing", flow=(-1.0, 2.0))
+    with pytest.raises(ValueError, match="at 1 s: give flows of at least 0"):
+        RecordedConsumption.from_samples([0.0, 1.0], [1.0, -0.1])
+
+
+@pytest.mark.parametrize(
+    "samples", [([0, 1], [1]), ([1, 0], [1, 1]), ([0, np.nan], [1, 1]), ([], []), (["a"], [1])]
+)
+def test_signals_need_increasing_times_and_finite_values(samples):
+    for make in (RecordedConsumption.from_samples, MovingTarget.recorded):
+        with pytest.raises(ValueError, match=r"^a recorded "):
+            make(*samples)
+
+
+def test_a_moving_target_is_what_observation_and_reward_refer_to():
+    env = single(target_bar=MovingTarget.recorded([0.0, 1.0], [8.0, 9.0]), sensor_noise=0.0)
+    observation, _ = env.reset(seed=0)
+    assert decode(observation, "target") == pytest.approx(8.0)
+    for k in range(1, 100):
+        observation, *_, info = env.step(1)
+        target = 8.0 + 0.005 * k
+        assert decode(observation, "target") == pytest.approx(target, abs=1e-6)
+        p2 = env.snapshot().p2_bar
+        assert info["reward_tracking"] == pytest.approx(-0.25 * abs(p2 - target) / 0.5)
+
+
+def test_a_recorded_consumption_is_drawn_as_it_was_measured():
+    """Triangles: the mean over a period is exact, also over a kink, and the ends hold."""
+    recorded = RecordedConsumption.from_samples([0.0, 0.0125, 0.1], [1.0, 3.0, 2.0])
+    env = single(scenario=recorded)
+    env.reset(seed=0)
+    fine = np.linspace(0.0, 0.15, 30 * 2000 + 1)
+    flow = np.interp(fine, [0.0, 0.0125, 0.1], [1.0, 3.0, 2.0])
+    for k in range(30):
+        part = flow[2000 * k : 2000 * (k + 1) + 1]
+        mean = (part[1:] + part[:-1]).mean() / 2
+        assert env.step(1)[-1]["consumption_g_per_s"] == pytest.approx(mean, rel=1e-6)
+
+
+def test_weights_may_be_a_mapping():
+    env = single(weights={"switching": 0.1}, band_bar=0.3)
+    assert env.settings.weights == RewardWeights(switching=0.1, band_bar=0.3)
+
+
+def test_vector_and_single_follow_signals_alike():
+    options = {
+        "target_bar": lambda t: 8.0 + np.sin(t), "supply": 12.0, "p2_bar": 7.0,
+        "scenario": RecordedConsumption.from_samples([0.0, 0.2], [0.0, 4.0]),
+        "effects": {"eddy_current": (0.0, 0.004)},
+    }  # fmt: skip
+    batch = gymnasium.make_vec("EPValve-v0", num_envs=3, privileged=True, **options)
+    alone = [gymnasium.make("EPValve-v0", privileged=True, **options) for _ in range(3)]
+    first, infos = batch.reset(seed=5)
+    for i, env in enumerate(alone):
+        observation, info = env.reset(seed=5 + i)
+        assert np.array_equal(first[i], observation)
+        assert np.array_equal(infos["parameters"][i], info["parameters"])
+    for action in np.random.default_rng(0).integers(0, 2, size=(60, 3)):
+        seen, rewards, *_, infos = batch.step(action)
+        for i, env in enumerate(alone):
+            observation, reward, *_, info = env.step(action[i])
+            assert np.array_equal(seen[i], observation)
+            assert rewards[i] == reward
+            for key, value in info.items():
+                assert isinstance(value, np.ndarray)
+                assert np.array_equal(infos[key][i], value)
+                assert infos[f"_{key}"][i]
+
+
+def test_the_truth_belongs_to_the_observation_shown():
+    for mode in ("NextStep", "SameStep"):
+        env = gymnasium.make_vec(
+            "EPValve-v0", num_envs=2, max_episode_steps=3, autoreset_mode=mode, privileged=True,
+            parameters="ten_percent",
+        )  # fmt: skip
+        assert env.unwrapped.autoreset_mode.value == mode
+        _, before = env.reset(seed=0)
+        for _ in range(3):
+            *_, infos = env.step(np.ones(2, dtype=int))
+        if mode == "NextStep":
+            *_, infos = env.step(np.ones(2, dtype=int))
+        else:
+            assert np.array_equal(infos["final_info"]["true_state"].shape, (2, len(STATE_NAMES)))
+        assert np.array_equal(infos["true_state"].T, np.stack(env.unwrapped.task.valves.state))
+        assert not np.array_equal(infos["parameters"], before["parameters"])

@@ -1,0 +1,79 @@
+"""A restored environment goes on to the bit as it would have: single and vector, noise and draws."""
+
+import copy
+import pickle
+
+import gymnasium
+import numpy as np
+import pytest
+
+import epv_env  # noqa: F401 - registers the ids
+from epv_env.saved_state import SavedState, StateError, restore_state, save_state
+
+KINDS = {
+    "nominal": {"parameters": "ten_percent"},
+    "with a delay": {"effects": {"command_delay": (0.0, 0.01), "circuit_leak": 1e-7}},
+    "with signals": {"target_bar": lambda t: 8.0 + 0.1 * t, "supply": 12.0},
+}
+
+
+def make(kind, count, mode="NextStep"):
+    if count is None:
+        return gymnasium.make("EPValve-v0", max_episode_steps=300, **KINDS[kind])
+    return gymnasium.make_vec(
+        "EPValve-v0", num_envs=count, max_episode_steps=300, autoreset_mode=mode, **KINDS[kind]
+    )
+
+
+def driven(env, actions):
+    """What the environment shows under these actions; a single one begins anew where it ended."""
+    shown = []
+    for action in actions:
+        observation, reward, terminated, truncated, info = env.step(action)
+        shown.append((observation, reward, terminated, truncated, info["deviation_bar"]))
+        if np.ndim(terminated) == 0 and (terminated or truncated):
+            shown.append((env.reset()[0],))
+    return pickle.dumps([[np.asarray(value).tobytes() for value in each] for each in shown])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("count", "mode"), [(None, ""), (3, "NextStep"), (3, "SameStep")])
+def test_what_follows_is_the_same_to_the_bit(kind, count, mode):
+    env, rng = make(kind, count, mode), np.random.default_rng(0)
+    env.reset(seed=4)
+    actions = rng.integers(0, 2, size=(600, count) if count else 600)
+    driven(env, actions[:270])  # beyond a block of noise, and an episode ends soon
+    saved = copy.deepcopy(save_state(env)) if kind != "with signals" else save_state(env)
+    expected = driven(env, actions[270:])
+    assert driven(env, actions[270:]) != expected  # the comparison can fail
+    restore_state(env, saved)
+    assert driven(env, actions[270:]) == expected
+    another = make(kind, count, mode)
+    another.reset(seed=9)
+    restore_state(another, saved)
+    assert driven(another, actions[270:]) == expected
+
+
+@pytest.mark.parametrize("count", [None, 3])
+def test_a_state_survives_a_file(count):
+    env = make("nominal", count)
+    env.reset(seed=1)
+    actions = np.random.default_rng(1).integers(0, 2, size=(50, count) if count else 50)
+    content = save_state(env).to_bytes()
+    expected = driven(env, actions)
+    restore_state(env, SavedState.from_bytes(content, env))
+    assert driven(env, actions) == expected
+
+
+def test_what_cannot_be_restored_is_refused():
+    env = make("nominal", 3)
+    with pytest.raises(StateError, match="call reset"):
+        save_state(env)
+    env.reset(seed=0)
+    other = make("nominal", 2)
+    other.reset(seed=0)
+    with pytest.raises(StateError, match="of another environment"):
+        restore_state(other, save_state(env))
+    for content in (b"", b"no archive", save_state(env).to_bytes()[:100]):
+        with pytest.raises(StateError, match="no saved state"):
+            SavedState.from_bytes(content, env)

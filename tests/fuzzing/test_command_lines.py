@@ -1,0 +1,40 @@
+"""A command line that cannot work ends with status 2, without a traceback and without a file."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+pytest.importorskip("torch")
+pytest.importorskip("statsmodels")
+
+from identification.commands.registry import COMMANDS as IDENTIFICATION_COMMANDS
+from tests.fuzzing.command_lines import NEEDED, left_files, status_of, wrong_line
+from training.console.command import COMMANDS, IDENTIFICATION
+
+pytestmark = pytest.mark.training
+
+
+SLOW = [HealthCheck.too_slow, HealthCheck.function_scoped_fixture]
+
+
+def test_the_list_has_every_command_of_the_identification():
+    own = [name for name, entry in COMMANDS.items() if entry.module == IDENTIFICATION]
+    assert own == [command.name for command in IDENTIFICATION_COMMANDS]
+    assert set(NEEDED) == set(COMMANDS)
+
+
+@settings(
+    max_examples=60,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=SLOW,
+)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_a_wrong_command_line_is_refused(seed, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("work")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        name, arguments = wrong_line(np.random.default_rng(seed))
+        assert status_of(name, arguments) == 2, (name, arguments)
+    assert left_files(folder) == []
