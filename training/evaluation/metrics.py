@@ -50,7 +50,7 @@ class EpisodeMetrics:
     vented_g_per_s: NDArray
     """Air blown off per second, from the start to the episode's end."""
     coil_W: NDArray
-    """Electrical power of the coil, mean from the start to the episode's end: the integral of U I over its time."""
+    """Mean electrical power of the coil, the integral of U I over time, up to the episode's end."""
     episode_return: NDArray
     """Sum of rewards."""
 
