@@ -57,8 +57,8 @@ class Hysteresis:
 
 
 _THRESHOLDS = {
-    "open_below": Range(low=-0.45, high=0.3),
-    "shut_above": Range(low=-0.45, high=0.45),
+    "open_below": Range(low=-0.45, high=0.3, least=-0.5, most=0.5),
+    "shut_above": Range(low=-0.45, high=0.45, least=-0.5, most=0.5),
 }
 
 HYSTERESIS = Registration(
@@ -76,8 +76,8 @@ EXTRAPOLATING_HYSTERESIS = Registration(
     build=lambda values, parameters: Hysteresis(name="hysteresis, extrapolating", **values),
     search_space={
         **_THRESHOLDS,
-        "open_lookahead": Range(low=0.0, high=0.15),
-        "shut_lookahead": Range(low=0.0, high=0.06),
+        "open_lookahead": Range(low=0.0, high=0.15, most=0.5),
+        "shut_lookahead": Range(low=0.0, high=0.06, most=0.5),
         "lag": Choice(values=P2_LAGS),
     },
     cost=CHEAP,

@@ -3,12 +3,16 @@
 The record stands beside the class, in the controller's own file. controllers/registry.py lists it.
 """
 
+import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from controllers.base import Controller
 from epv_env.plant.parameters import Parameters
+
+NEAR_BOUND = 0.02
+"""Share of a range next to its ends where a search's outcome counts as cut off by the bound [1]."""
 
 
 class RegistrationError(ValueError):
@@ -25,6 +29,31 @@ class Range:
     """Upper end, in the unit of the quantity."""
     log: bool = False
     """Whether the search draws it uniformly in its logarithm."""
+    least: float | None = None
+    """Physical limit down to which a search may be widened; None: `low` is the limit."""
+    most: float | None = None
+    """Physical limit up to which a search may be widened; None: `high` is the limit."""
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Least and greatest value that has a meaning."""
+        least = self.low if self.least is None else self.least
+        return least, self.high if self.most is None else self.most
+
+    def widened(self, value: float) -> "Range":
+        """The range for another search, if one ended at `value`; itself if that is not at a bound.
+
+        A bound with less than NEAR_BOUND of the range between it and the value moves outwards by the
+        range's own length (in the logarithm if `log`), at most to the physical limit.
+        """
+        to, back = (math.log, math.exp) if self.log else (float, float)
+        low, high, at = to(self.low), to(self.high), to(value)
+        length, (least, most) = high - low, self.limits
+        if at - low < NEAR_BOUND * length:
+            return replace(self, low=max(back(low - length), least))
+        if high - at < NEAR_BOUND * length:
+            return replace(self, high=min(back(high + length), most))
+        return self
 
 
 @dataclass(frozen=True, kw_only=True)

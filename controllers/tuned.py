@@ -1,7 +1,7 @@
 """The tuned controllers as data (tuned.json): the values that the search found, and how it searched."""
 
 from collections.abc import Collection
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -32,6 +32,8 @@ class Tuning:
     """Mean return of the best on the tuning scenarios."""
     episodes: int
     """Episodes of one evaluation."""
+    widened: dict[str, tuple[float, float]] = field(default_factory=dict)
+    """Ranges that ended at a bound and were searched again, by quantity: the last range searched."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,6 +8,8 @@ The objective is the mean return on the training scenarios, the very reward that
 
 import argparse
 import sys
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +30,10 @@ from epv_env.plant.parameters import Parameters
 from training.evaluation.rollout import run_episodes
 from training.evaluation.scenarios import TUNING_REGION
 from training.evaluation.seeds import TUNING_SEED
+
+SEARCHES = 3
+"""Most searches of a kind, each wider than the one before. Two widenings make a range five times as long
+at a side, or reach its physical limit."""
 
 
 def suggest(space: SearchSpace, trial: Trial) -> dict[str, Any]:
@@ -50,30 +56,70 @@ def budget(kind: str, trials: int, episodes: int) -> tuple[int, int]:
 def tune(
     kind: str, *, trials: int, episodes: int, duration: float, seed: int, options: dict[str, Any]
 ) -> Tuning:
-    """Search one kind of controller. Values that contradict each other cost a trial.
+    """Search one kind of controller; a search that ends at a bound is widened and run again.
 
     Args:
         kind: one of TUNED_KINDS.
-        trials: evaluations (`budget` may allow fewer).
+        trials: evaluations of a search (`budget` may allow fewer).
         episodes: episodes of an evaluation (`budget` may allow fewer).
         duration: length of an episode [s].
         seed: of the search.
         options: of the environment.
     """
-    entry, parameters = registration(kind), Parameters.calibrated()
-    assert entry.search_space is not None, f"{kind} has nothing to tune"
-    space = entry.search_space
+    space = registration(kind).search_space
+    assert space is not None, f"{kind} has nothing to tune"
     trials, episodes = budget(kind, trials, episodes)
-    seeds = list(range(TUNING_SEED, TUNING_SEED + episodes))
+    run = partial(
+        _mean_return, kind, seeds=list(range(TUNING_SEED, TUNING_SEED + episodes)),
+        duration=duration, options=options,
+    )  # fmt: skip
+    searched: SearchSpace = space
+    for _ in range(SEARCHES):
+        study = _search(kind, searched, run, trials, seed)
+        wider = widened(searched, study.best_params)
+        if wider == searched:
+            break
+        print(f"{kind}: the search ended at a bound; searching wider: {_named(searched, wider)}")
+        searched = wider
+    else:
+        print(f"{kind}: {SEARCHES} searches ended at a bound; the last outcome is kept")
+    return Tuning(
+        values=study.best_params, trials=trials, mean_return=study.best_value, episodes=episodes,
+        widened=_named(space, searched),
+    )  # fmt: skip
 
-    def objective(trial: Trial) -> float:
-        try:
-            controller = entry.built(suggest(space, trial), parameters)
-        except ValueError as contradiction:
-            raise optuna.TrialPruned(str(contradiction)) from None
-        metrics, _ = run_episodes(controller, seeds=seeds, duration=duration, options=options)
-        return float(metrics.episode_return.mean())
 
+def widened(space: SearchSpace, values: Mapping[str, Any]) -> SearchSpace:
+    """The space to search next after `values` were found in `space`; itself if none is at a bound."""
+    return {
+        name: quantity if isinstance(quantity, Choice) else quantity.widened(values[name])
+        for name, quantity in space.items()
+    }
+
+
+def _named(before: SearchSpace, after: SearchSpace) -> dict[str, tuple[float, float]]:
+    """The ranges of `after` that differ from `before`, by name."""
+    return {
+        name: (quantity.low, quantity.high)
+        for name, quantity in after.items()
+        if isinstance(quantity, Range) and quantity != before[name]
+    }
+
+
+def _mean_return(kind: str, values: dict[str, Any], **scenarios: Any) -> float:
+    """Mean return of a kind with these quantities. Values that contradict each other cost a trial."""
+    try:
+        controller = registration(kind).built(values, Parameters.calibrated())
+    except ValueError as contradiction:
+        raise optuna.TrialPruned(str(contradiction)) from None
+    metrics, _ = run_episodes(controller, **scenarios)
+    return float(metrics.episode_return.mean())
+
+
+def _search(
+    kind: str, space: SearchSpace, run: Callable[[dict[str, Any]], float], trials: int, seed: int
+) -> optuna.Study:
+    """One search of a space."""
     study = optuna.create_study(
         direction="maximize", sampler=optuna.samplers.TPESampler(seed=seed, multivariate=True)
     )
@@ -82,10 +128,8 @@ def tune(
         def count(*_: Any) -> None:
             bar.update()
 
-        study.optimize(objective, n_trials=trials, callbacks=[count])
-    return Tuning(
-        values=study.best_params, trials=trials, mean_return=study.best_value, episodes=episodes
-    )
+        study.optimize(lambda trial: run(suggest(space, trial)), n_trials=trials, callbacks=[count])
+    return study
 
 
 def kept(path: Path, search: dict[str, Any]) -> dict[str, Tuning]:

@@ -59,7 +59,7 @@ def outside(space: SearchSpace, values: Mapping[str, Any]) -> list[str]:
         if not (
             values[name] in quantity.values
             if isinstance(quantity, Choice)
-            else quantity.low <= values[name] <= quantity.high
+            else quantity.limits[0] <= values[name] <= quantity.limits[1]
         )
     ]
 

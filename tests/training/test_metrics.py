@@ -55,6 +55,13 @@ def test_a_failed_episode_has_not_stayed():
     assert not run([0.0, 0.0], failed=1).stayed[0]
 
 
+def test_an_episode_ends_with_the_period_of_its_failure():
+    ended, shorter = run([-0.1, -0.3, -9.0, -9.0], failed=1), run([-0.1, -0.3])
+    for name in ("episode_return", "rms_bar", "switchings_per_s", "vented_g_per_s", "breakdown_bar"):
+        assert getattr(ended, name) == getattr(shorter, name), name
+    assert ended.episode_return[0] == -2.0
+
+
 DRAWN = 2.0  # g/s, well above the threshold of an event
 
 

@@ -46,11 +46,11 @@ class EpisodeMetrics:
     rms_bar: NDArray
     """Root mean square of each period's largest deviation."""
     switchings_per_s: NDArray
-    """Coil switchings per second, whole episode."""
+    """Coil switchings per second, from the start to the episode's end."""
     vented_g_per_s: NDArray
-    """Air blown off per second, whole episode."""
+    """Air blown off per second, from the start to the episode's end."""
     coil_W: NDArray
-    """Electrical power of the coil, mean of the whole episode: the integral of U I over its time."""
+    """Mean electrical power of the coil, the integral of U I over time, up to the episode's end."""
     episode_return: NDArray
     """Sum of rewards."""
 
@@ -70,7 +70,11 @@ class EpisodeMetrics:
 
 
 class Meter:
-    """Accumulates the metrics of n episodes, period by period, in constant memory."""
+    """Accumulates the metrics of n episodes, period by period, in constant memory.
+
+    An episode ends with the period in which its circuit empties: that period counts, with its one charge
+    for the failure, and no later one does.
+    """
 
     def __init__(self, n: int, period: float, settling_time: float, events: EventSettings = EVENTS):
         """
@@ -84,7 +88,8 @@ class Meter:
         self._period = period
         self._settling_time = settling_time
         self._steps = 0
-        self._counted = 0
+        self._periods = np.zeros(n, dtype=np.int64)
+        self._counted = np.zeros(n, dtype=np.int64)
         self._highest = np.full(n, -np.inf)
         self._lowest = np.full(n, np.inf)
         self._squares = np.zeros(n)
@@ -105,27 +110,36 @@ class Meter:
             info: arrays (n,) by name (epv_env.infos).
         """
         self._steps += 1
-        self._switchings += info["switchings"]
-        self._vented += info["vented_g"]
-        self._return += reward
-        over = self._failed.copy()  # what comes after a failure means nothing
+        runs = self.running
+        self._periods += runs
+        self._switchings += np.where(runs, info["switchings"], 0)
+        self._vented += np.where(runs, info["vented_g"], 0.0)
+        self._return += np.where(runs, reward, 0.0)
         self._failed |= failed
         if self._steps * self._period <= self._settling_time:
             return
-        self._counted += 1
-        deviation = np.where(over, 0.0, info["deviation_bar"])
+        self._counted += runs
+        deviation = np.where(runs, info["deviation_bar"], 0.0)
         self._highest = np.maximum(self._highest, deviation)
         self._lowest = np.minimum(self._lowest, deviation)
         self._squares += deviation**2
         self._low_time = np.where(deviation < -self._shortfall_bar, self._low_time + self._period, 0.0)
         self._longest_low = np.maximum(self._longest_low, self._low_time)
-        consumption = np.where(over, 0.0, info["consumption_g_per_s"])
+        consumption = np.where(runs, info["consumption_g_per_s"], 0.0)
         self._events.update(consumption, np.maximum(-deviation, 0.0))
 
+    @property
+    def running(self) -> NDArray:
+        """Whether an episode goes on, its circuit not having emptied yet, boolean (n,)."""
+        return ~self._failed
+
     def result(self, coil_energy: NDArray | float = 0.0) -> EpisodeMetrics:
-        """The metrics so far. coil_energy: electrical energy of each coil since the start, (n,) [J]."""
+        """The metrics so far.
+
+        coil_energy: electrical energy of each coil from the start to its episode's end, (n,) [J].
+        """
         excursion = np.maximum(self._highest, -self._lowest)
-        time = self._steps * self._period
+        time = self._periods * self._period
         events = self._events.result()
         return EpisodeMetrics(
             stayed=(excursion <= BAND_BAR) & ~self._failed,
@@ -136,7 +150,7 @@ class Meter:
             event_breakdown_bar=events.mean_breakdown,
             event_recovery_s=events.mean_recovery,
             longest_event_recovery_s=events.longest_recovery,
-            rms_bar=np.sqrt(self._squares / max(self._counted, 1)),
+            rms_bar=np.sqrt(self._squares / np.maximum(self._counted, 1)),
             switchings_per_s=self._switchings / time,
             vented_g_per_s=self._vented / time,
             coil_W=np.broadcast_to(coil_energy, excursion.shape) / time,

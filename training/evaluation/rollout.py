@@ -81,8 +81,8 @@ def run_episodes(
 ) -> tuple[EpisodeMetrics, Trace | None]:
     """Run one episode per seed; returns their metrics and the recorded episode.
 
-    An episode whose circuit empties counts as a constraint violation (C1); its valve runs on, since the
-    batch runs as one.
+    An episode whose circuit empties violates the constraint (C1) and ends there: the failure is charged
+    once and nothing later counts. Its valve runs on unseen, since the batch runs as one.
 
     Args:
         controller: decides for all episodes.
@@ -96,6 +96,7 @@ def run_episodes(
     env = make_env(controller, len(seeds), **options)
     observation = begin_episodes(env, controller, seeds, each)
     energy_before = env.task.valves.state.coil_energy.copy()
+    energy = energy_before.copy()
     period = env.settings.control_period
     steps = round(duration / period)
     meter = Meter(len(seeds), period, env.settings.settling_time)
@@ -104,6 +105,7 @@ def run_episodes(
         action = controller.act(observation)
         result = env.task.step(*env.action.decode(action))
         observation = result.observation
+        np.copyto(energy, env.task.valves.state.coil_energy, where=meter.running)
         meter.update(result.reward, result.failed, step_info(result))
         if trace_of is not None:
             state = env.task.valves.state
@@ -119,7 +121,7 @@ def run_episodes(
         if step % 50 == 0:
             progress(step / steps)
     progress(1.0)
-    metrics = meter.result(env.task.valves.state.coil_energy - energy_before)
+    metrics = meter.result(energy - energy_before)
     if trace_of is None:
         return metrics, None
     columns = np.array(rows).T
