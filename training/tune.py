@@ -32,8 +32,8 @@ from training.evaluation.scenarios import TUNING_REGION
 from training.evaluation.seeds import TUNING_SEED
 
 WIDENINGS = 2
-"""Most repetitions of a kind's search, each wider than the one before. Two quadruple a range, or reach its
-physical limit."""
+"""Most repetitions of a kind's search, each wider than the one before. Two quadruple a range, or reach
+its physical limit."""
 
 
 def suggest(space: SearchSpace, trial: Trial) -> dict[str, Any]:
