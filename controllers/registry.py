@@ -1,6 +1,6 @@
 """The controllers by kind: one line each. docs/extending.md says how to add one."""
 
-from controllers import hysteresis, mpc, oracle, privileged_pulse, pulse, pwm
+from controllers import adaptive_pulse, hysteresis, mpc, oracle, privileged_pulse, pulse, pwm
 from controllers.base import Controller
 from controllers.registration import CHEAP, CostClass, Registration, RegistrationError
 from epv_env.plant.parameters import Parameters
@@ -10,6 +10,7 @@ REGISTRY: tuple[Registration, ...] = (
     hysteresis.EXTRAPOLATING_HYSTERESIS,
     pwm.REGISTRATION,
     pulse.REGISTRATION,
+    adaptive_pulse.REGISTRATION,
     mpc.REGISTRATION,
     privileged_pulse.REGISTRATION,
     oracle.REGISTRATION,

@@ -31,9 +31,9 @@ from training.evaluation.rollout import run_episodes
 from training.evaluation.scenarios import TUNING_REGION
 from training.evaluation.seeds import TUNING_SEED
 
-SEARCHES = 3
-"""Most searches of a kind, each wider than the one before. Two widenings make a range five times as long
-at a side, or reach its physical limit."""
+WIDENINGS = 2
+"""Most repetitions of a kind's search, each wider than the one before. Two quadruple a range, or reach
+its physical limit."""
 
 
 def suggest(space: SearchSpace, trial: Trial) -> dict[str, Any]:
@@ -73,16 +73,15 @@ def tune(
         _mean_return, kind, seeds=list(range(TUNING_SEED, TUNING_SEED + episodes)),
         duration=duration, options=options,
     )  # fmt: skip
-    searched: SearchSpace = space
-    for _ in range(SEARCHES):
-        study = _search(kind, searched, run, trials, seed)
+    study, searched = _search(kind, space, run, trials, seed), space
+    for _ in range(WIDENINGS):
         wider = widened(searched, study.best_params)
         if wider == searched:
             break
         print(f"{kind}: the search ended at a bound; searching wider: {_named(searched, wider)}")
-        searched = wider
-    else:
-        print(f"{kind}: {SEARCHES} searches ended at a bound; the last outcome is kept")
+        study, searched = _search(kind, wider, run, trials, seed), wider
+    if widened(searched, study.best_params) != searched:
+        print(f"{kind}: the search ended at a bound again after {WIDENINGS} wider ones; it is kept")
     return Tuning(
         values=study.best_params, trials=trials, mean_return=study.best_value, episodes=episodes,
         widened=_named(space, searched),

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from epv_env.common.units import BAR
 from epv_env.plant.effects.record import Effect, Size
 from epv_env.plant.effects.registry import EFFECTS
 
@@ -90,6 +91,22 @@ def checked_value(symbol: str, value: Any) -> float:
             f"[{low:g}, {high:g}] ({row.source}): {remedy}"
         )
     return float(value)
+
+
+SMALLEST_PRESSURE = 16.0
+"""Least magnitude of a pressure that somebody writes down [Pa], other than 0. The sensors' range is 16
+bar, so a smaller number is one in bar."""
+
+
+def written_value(symbol: str, value: Any) -> float:
+    """`checked_value` of what a person wrote: a pressure in bar is refused too (ParameterError)."""
+    checked = checked_value(symbol, value)
+    if table()[symbol].unit == "Pa" and 0 < abs(checked) <= SMALLEST_PRESSURE:
+        raise ParameterError(
+            f"parameter {symbol} = {checked:g} is in Pa, and {checked:g} Pa is less than a sensor "
+            f"resolves: write {checked * BAR:g} if you mean {checked:g} bar"
+        )
+    return checked
 
 
 class Parameters(Mapping[str, float]):

@@ -14,6 +14,7 @@ from epv_env.plant.parameters import (
     confidence_intervals,
     sensitive_symbols,
     table,
+    written_value,
 )
 
 CALIBRATED_SYMBOLS = ("alphaMV", "alphaPV", "RML", "R")
@@ -107,9 +108,9 @@ class Region:
             if isinstance(choice, (tuple, list, np.ndarray)):
                 if len(choice) != 2:
                     raise ParameterError(f"range of {symbol} is {choice!r}: give (low, high)")
-                boxes[symbol] = (checked_value(symbol, choice[0]), checked_value(symbol, choice[1]))
+                boxes[symbol] = (written_value(symbol, choice[0]), written_value(symbol, choice[1]))
             else:
-                exact[symbol] = checked_value(symbol, choice)
+                exact[symbol] = written_value(symbol, choice)
         return cls(centre=centre.replace(**exact), boxes=boxes)
 
     def draw(self, rng: np.random.Generator) -> Parameters:

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from epv_env.plant.effects.registry import CATALOGUE
-from epv_env.plant.parameters import Parameters
+from epv_env.plant.parameters import Parameters, written_value
 from epv_env.plant.plantfile import load_plant, save_plant
 from identification.bench.programme_file import load_programmes
 from identification.bench.programmes import SUITES
@@ -65,7 +65,12 @@ def _with_values(parameters: Parameters, settings: list[str]) -> Parameters:
     for setting in settings:
         symbol, _, text = setting.partition("=")
         changes[symbol] = _number(text, f"--set {setting}: give SYMBOL=VALUE", "--set R=43.5")
-    return parameters.replace(**changes)
+    return parameters.replace(**_written(changes))
+
+
+def _written(values: dict[str, float]) -> dict[str, float]:
+    """Values by symbol as a person wrote them; ParameterError for one in the wrong unit."""
+    return {symbol: written_value(symbol, value) for symbol, value in values.items()}
 
 
 def _with_effects(parameters: Parameters, settings: list[str]) -> Parameters:
@@ -83,7 +88,7 @@ def _with_effects(parameters: Parameters, settings: list[str]) -> Parameters:
             )
         rule = f"--effect {setting}: give NAME=SIZE"
         values = [_number(size, rule, "--effect piston_friction=8,0") for size in sizes]
-        parameters = parameters.replace(**dict(zip(symbols, values, strict=True)))
+        parameters = parameters.replace(**_written(dict(zip(symbols, values, strict=True))))
     return parameters
 
 

@@ -212,3 +212,13 @@ def test_a_covariance_that_is_none_is_refused(covariance):
 def test_a_bad_joint_region_is_refused(wrong):
     with pytest.raises(ParameterError):
         Region(**{"centre": CENTRE, "chi_square": CHI_SQUARE, **wrong})
+
+
+def test_a_pressure_written_in_bar_is_refused_with_its_value_in_pascal():
+    with pytest.raises(
+        ParameterError, match=r"b_p2 = 0.256 is in Pa.* write 25600 if you"
+    ):
+        Region.from_choices({"b_p2": 0.256}, CENTRE)
+    with pytest.raises(ParameterError, match="write 25600"):
+        Region.from_choices({"b_p2": (0.0, 0.256)}, CENTRE)
+    assert Region.from_choices({"b_p2": 25600.0, "b_p3": 0.0}, CENTRE).centre["b_p2"] == 25600.0
