@@ -5,17 +5,21 @@ import numpy as np
 import pytest
 
 import epv_env  # noqa: F401 - registers the ids
+from epv_env.env import EPValveEnv
 from epv_env.infos import PARAMETER_NAMES, STATE_NAMES
 from epv_env.observation import decode
 from epv_env.plant.consumption import Scenario
 from epv_env.reward import RewardWeights
 from epv_env.signals import MovingTarget, RecordedConsumption
+from epv_env.vector_env import EPValveVectorEnv
 
 CALM = {"scenario": "none", "supply": 12.0, "p2_bar": 8.0, "target_bar": 8.0}
 
 
-def single(**options):
-    return gymnasium.make("EPValve-v0", **{**CALM, **options}).unwrapped
+def single(**options) -> EPValveEnv:
+    env = gymnasium.make("EPValve-v0", **{**CALM, **options}).unwrapped
+    assert isinstance(env, EPValveEnv)
+    return env
 
 
 def column(env, symbol):
@@ -164,14 +168,16 @@ def test_the_truth_belongs_to_the_observation_shown():
         env = gymnasium.make_vec(
             "EPValve-v0", num_envs=2, max_episode_steps=3, autoreset_mode=mode, privileged=True,
             parameters="ten_percent",
-        )  # fmt: skip
-        assert env.unwrapped.autoreset_mode.value == mode
+        ).unwrapped  # fmt: skip
+        assert isinstance(env, EPValveVectorEnv)
+        assert env.autoreset_mode.value == mode
         _, before = env.reset(seed=0)
+        infos = {}
         for _ in range(3):
             *_, infos = env.step(np.ones(2, dtype=int))
         if mode == "NextStep":
             *_, infos = env.step(np.ones(2, dtype=int))
         else:
             assert np.array_equal(infos["final_info"]["true_state"].shape, (2, len(STATE_NAMES)))
-        assert np.array_equal(infos["true_state"].T, np.stack(env.unwrapped.task.valves.state))
+        assert np.array_equal(infos["true_state"].T, np.stack(env.task.valves.state))
         assert not np.array_equal(infos["parameters"], before["parameters"])

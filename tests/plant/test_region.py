@@ -215,9 +215,7 @@ def test_a_bad_joint_region_is_refused(wrong):
 
 
 def test_a_pressure_written_in_bar_is_refused_with_its_value_in_pascal():
-    with pytest.raises(
-        ParameterError, match=r"b_p2 = 0.256 is in Pa.* write 25600 if you"
-    ):
+    with pytest.raises(ParameterError, match=r"b_p2 = 0.256 is in Pa.* write 25600 if you"):
         Region.from_choices({"b_p2": 0.256}, CENTRE)
     with pytest.raises(ParameterError, match="write 25600"):
         Region.from_choices({"b_p2": (0.0, 0.256)}, CENTRE)

@@ -2,6 +2,7 @@
 
 from copy import deepcopy
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -248,7 +249,7 @@ def test_a_policy_that_is_given_a_memory_acts_as_before(student):
 
 def test_where_switching_is_cheap_ppo_goes_on_from_a_policy_without_a_memory(tmp_path):
     def trained(folder, price, student=None, memoryless=None):
-        options = OPTIONS | {"weights": RewardWeights(switching=price)}
+        options: dict[str, Any] = OPTIONS | {"weights": RewardWeights(switching=price)}
         policy, _ = train_recurrent(
             TINY_PPO, TINY, folder=folder, student=student, memoryless=memoryless, timesteps=256, seed=1,
             device="cpu", resume=True, quiet=True, **options,

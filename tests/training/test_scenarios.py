@@ -27,7 +27,9 @@ def settings(name):
 def flow(name, seed=0):
     """Consumption over 10 s [g/s]."""
     profiles = Profiles(1)
-    profiles.start(0, draw_profile(settings(name).scenario, np.random.default_rng(seed)))
+    scenario = settings(name).scenario
+    assert isinstance(scenario, Scenario)
+    profiles.start(0, draw_profile(scenario, np.random.default_rng(seed)))
     return np.array([1e3 * profiles.mean_flow(np.array([t]), 0.005)[0] for t in TIME])
 
 
