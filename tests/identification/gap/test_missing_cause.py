@@ -80,7 +80,7 @@ def test_a_second_cause_may_hide_where_much_is_left(two_causes):
     found = hidden(two_causes, 1e6)
     assert found[ONE] == pytest.approx(1.0 - SETTINGS.hidden_share, rel=1e-6)
     assert found[BOTH] > 0.0
-    assert sum(p for own, p in found.items() if ONE <= own) == pytest.approx(1.0)
+    assert sum(p for own, p in found.items() if own >= ONE) == pytest.approx(1.0)
 
 
 def test_no_cause_hides_where_nothing_is_left(two_causes):
