@@ -16,7 +16,7 @@ from scipy.special import gammaln, softmax
 from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.rank.discrepancy import ChannelDiscrepancy, channel_discrepancies
 from identification.gap.rank.evidence import EvaluatedHypothesis
-from identification.gap.rank.missing_cause import log_completeness
+from identification.gap.rank.missing_cause import log_completeness, with_hidden_causes
 from identification.gap.rank.settings import RankingSettings
 
 
@@ -66,7 +66,7 @@ def posterior(
         len({cause.name for cause in problem.plant.causes}),
         settings,
     )
-    named = weights[1:] * credible[1:]
+    named = with_hidden_causes(weights[1:] * credible[1:], hypotheses, misfits[1:], scores[1:], settings)
     return Posterior(
         probabilities=named.tolist(),
         no_cause=float(weights[0]),

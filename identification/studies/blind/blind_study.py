@@ -58,6 +58,7 @@ def blind_check(
     ]
     section = blind_section(scores, settings)
     if images:
+        images.mkdir(parents=True, exist_ok=True)
         for name, draw in FIGURES.items():
             draw(scores).savefig(images / f"{name}.png", dpi=100)
     content = blind_json(scores, seed=seed, settings=settings)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.rank.missing_cause import log_completeness
+from identification.gap.rank.missing_cause import log_completeness, with_hidden_causes
 from identification.gap.rank.ranking import Ranking, rank_hypotheses
 from identification.gap.rank.settings import RankingSettings
 from tests.identification.gap.drives import Drive
@@ -60,3 +60,29 @@ def test_a_small_second_cause_beside_a_large_one_is_named():
     alone = next(i for i, each in enumerate(found.hypotheses) if each.labels == ("coupling",))
     assert found.shares_left[alone] < SETTINGS.form_error_share
     assert found.inclusion["dead_zone"] > 0.9
+
+
+def hidden(found: Ranking, misfit: float) -> dict[frozenset[str], float]:
+    """Probabilities by labels where ONE alone has all, and each set leaves the misfit [nats]."""
+    sets = [frozenset(each.labels) for each in found.hypotheses]
+    count = len(sets)
+    spread = with_hidden_causes(
+        np.array([float(own == ONE) for own in sets]),
+        found.hypotheses,
+        np.full(count, misfit),
+        np.zeros(count),
+        SETTINGS,
+    )
+    return dict(zip(sets, spread, strict=True))
+
+
+def test_a_second_cause_may_hide_where_much_is_left(two_causes):
+    found = hidden(two_causes, 1e6)
+    assert found[ONE] == pytest.approx(1.0 - SETTINGS.hidden_share, rel=1e-6)
+    assert found[BOTH] > 0.0
+    assert sum(p for own, p in found.items() if own >= ONE) == pytest.approx(1.0)
+
+
+def test_no_cause_hides_where_nothing_is_left(two_causes):
+    assert hidden(two_causes, 0.0)[ONE] == 1.0
+    assert hidden(two_causes, 1.0)[ONE] > 1.0 - 1e-4
