@@ -132,8 +132,8 @@ def test_a_campaign_that_lacks_recordings_is_still_identified(campaign, tmp_path
         (["bench", "--effect", "circuit_leak=1"], "outside its domain"),
         (["bench", "--rate", "100"], "sampling rate 100"),
         (["bench", "--plant", "/no/plant.json"], "cannot read plant file"),
-        (["quality", "/no/campaign"], "cannot be read"),
-        (["run", "/no/campaign"], "cannot be read"),
+        (["quality", "/no/campaign"], "cannot read"),
+        (["run", "/no/campaign"], "cannot read"),
     ],
 )
 def test_a_wrong_value_is_refused_in_one_sentence(arguments, message, tmp_path):

@@ -312,8 +312,8 @@ def good_but(*more: str):
     [
         (lambda tmp_path: [str(tmp_path / "nowhere")], "cannot read a policy from"),
         (folder_without_weights, "give a folder that training wrote"),
-        (weights_not_finite, "weights that are not finite"),
-        (unit_not_finite, "weights that are not finite"),
+        (weights_not_finite, "values that are not finite"),
+        (unit_not_finite, "values that are not finite"),
         (unit_too_steep, "the recurrent unit of the policy is too wide or too steep"),
         (three_actions, "only decisions between off and on"),
         (good_but("--compiler", "no-such-cc"), "there is no C compiler 'no-such-cc' here"),

@@ -11,6 +11,7 @@ from controllers.hysteresis import Hysteresis
 from epv_env.plant.consumption import SCENARIOS, Profiles, Scenario, draw_profile
 from epv_env.plant.plantfile import Plant
 from epv_env.settings import make_settings
+from epv_env.signals import RecordedConsumption
 from training.evaluation.rollout import run_episodes
 from training.evaluation.scenarios import EVALUATION, NAMED, RANDOM
 
@@ -28,7 +29,7 @@ def flow(name, seed=0):
     """Consumption over 10 s [g/s]."""
     profiles = Profiles(1)
     scenario = settings(name).scenario
-    assert isinstance(scenario, Scenario)
+    assert not isinstance(scenario, RecordedConsumption)
     profiles.start(0, draw_profile(scenario, np.random.default_rng(seed)))
     return np.array([1e3 * profiles.mean_flow(np.array([t]), 0.005)[0] for t in TIME])
 

@@ -188,7 +188,7 @@ def test_an_interrupted_writing_leaves_no_campaign_and_can_be_repeated(tmp_path,
         patch.setattr(campaign_files, "write_text", interrupted)
         with pytest.raises(KeyboardInterrupt):
             write_campaign(good_campaign(), tmp_path)
-    with pytest.raises(CampaignError, match="cannot be read"):
+    with pytest.raises(CampaignError, match="cannot read"):
         read_campaign(tmp_path)
     write_campaign(good_campaign(), tmp_path)
     assert len(read_campaign(tmp_path).recordings) == 3

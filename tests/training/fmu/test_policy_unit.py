@@ -105,7 +105,7 @@ def test_the_voltage_of_a_decision_is_a_parameter(ecu, tmp_path):
         ('{"format": "epv-deployment/1", "observation": {"control_period_s": 0}}', "no control period"),
         (
             '{"format": "epv-deployment/1", "observation": {"control_period_s": NaN}}',
-            "no control period",
+            "NaN is no number",
         ),
     ],
 )
