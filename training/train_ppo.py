@@ -45,12 +45,12 @@ SAME_WHEN_RESUMED = ("seed", "plant", "scenario", "parameters", "switching_price
 QUICK = {"timesteps": 65_536, "episodes": 16, "duration": 2.0}
 """The defaults under --quick: everything is done, too short to learn anything."""
 QUICK_HYPERPARAMETERS: dict[str, Any] = {
-    "num_envs": 32, "imitation_epochs": 1, "validations": 1, "validation_episodes": 16,
-    "validation_duration": 2.0,
+    "num_envs": 32, "batch_size": 1024, "imitation_epochs": 1, "validations": 1,
+    "validation_episodes": 16, "validation_duration": 2.0,
 }  # fmt: skip
 
 QUICK_DISTILLATION: dict[str, Any] = {
-    "rounds": 2, "plants": 16, "episodes": 32, "periods": 100, "batch": 16, "validations": 1,
+    "rounds": 2, "plants": 16, "episodes": 32, "periods": 100, "steps": 4, "batch": 16, "validations": 1,
     "validation_episodes": 16, "validation_duration": 2.0,
 }  # fmt: skip
 

@@ -55,9 +55,9 @@ class Distillation:
     """Rounds until the student drives every episode; the teacher's share falls linearly."""
     kept: int = 8
     """Number of latest rounds whose episodes are learned from."""
-    epochs: int = 3
-    """Passes over them in each round."""
-    batch: int = 64
+    steps: int = 12
+    """Gradient steps of each round."""
+    batch: int = 128
     """Episodes of a gradient step."""
     learning_rate: float = 2e-3
     """Adam's step size at the start; it falls linearly to `last_learning_rate`."""
@@ -167,21 +167,15 @@ def _lesson(
 def _learn(
     student: Student, optimiser: torch.optim.Optimizer, lessons: deque[Lesson], d: Distillation
 ) -> float:
-    """Pass over the lessons; returns the mean cross-entropy."""
+    """Gradient steps on episodes drawn from all lessons; returns the mean cross-entropy."""
+    observations, wanted = (torch.cat(part) for part in zip(*lessons, strict=True))
     losses = []
-    for _ in range(d.epochs):
-        batches = [
-            (number, rows)
-            for number in range(len(lessons))
-            for rows in torch.randperm(d.episodes).split(d.batch)
-        ]
-        for k in torch.randperm(len(batches)):
-            number, rows = batches[k]
-            observations, wanted = lessons[number]
-            loss = binary_cross_entropy_with_logits(student(observations[rows]), wanted[rows])
-            optimiser.zero_grad()
-            loss.backward()
-            torch.nn.utils.clip_grad_norm_(student.parameters(), 1.0)
-            optimiser.step()
-            losses.append(float(loss.detach()))
+    for _ in range(d.steps):
+        rows = torch.randint(len(wanted), (d.batch,))
+        loss = binary_cross_entropy_with_logits(student(observations[rows]), wanted[rows])
+        optimiser.zero_grad()
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(student.parameters(), 1.0)
+        optimiser.step()
+        losses.append(float(loss.detach()))
     return float(np.mean(losses))

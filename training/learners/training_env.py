@@ -1,6 +1,6 @@
 """The environment that PPO trains on: drawn plants, scaled rewards, a recurrent unit's state."""
 
-from stable_baselines3.common.vec_env import VecEnvWrapper, VecMonitor
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
 from controllers.learned import GatedUnit
@@ -28,6 +28,14 @@ class ScaledReward(VecEnvWrapper):
         """Observations (n, entries), scaled rewards (n,), ends (n,) and infos."""
         observation, reward, done, infos = self.venv.step_wait()
         return observation, self._scale * reward, done, infos
+
+
+def seed_episodes(env: VecEnv, seed: int) -> None:
+    """Give the environments the first episodes of the training with this seed.
+
+    Raises ValueError if the seed is too large (training/evaluation/seeds.py).
+    """
+    env.seed(training_seeds(seed, env.num_envs)[0])
 
 
 def make_training_env(
@@ -63,6 +71,6 @@ def make_training_env(
         scenario=scenario,
         weights=weights,
     )
-    env.seed(training_seeds(seed, h.num_envs)[0])
+    seed_episodes(env, seed)
     scaled = ScaledReward(VecMonitor(env), h.reward_scale)
     return RecurrentStateWrapper(scaled, cell) if cell else scaled
