@@ -39,7 +39,7 @@ from training.learners.provenance import Configuration, configuration
 from training.learners.run_folder import forget_failed_start, make_free, why_taken
 from training.learners.run_state import check_checkpoint, new_run
 
-SAME_WHEN_RESUMED = ("seed", "plant", "scenario", "parameters", "switching_price", "recurrent")
+SAME_WHEN_RESUMED = ("seed", "plant", "scenario", "parameters", "switching_price", "memory")
 """Options that a resumed training must share with its beginning."""
 
 QUICK = {"timesteps": 65_536, "episodes": 16, "duration": 2.0}
@@ -50,8 +50,8 @@ QUICK_HYPERPARAMETERS: dict[str, Any] = {
 }  # fmt: skip
 
 QUICK_DISTILLATION: dict[str, Any] = {
-    "rounds": 2, "plants": 16, "episodes": 32, "periods": 100, "steps": 4, "batch": 16, "validations": 1,
-    "validation_episodes": 16, "validation_duration": 2.0,
+    "rounds": 2, "plants": 16, "episodes": 32, "periods": 100, "window": 50, "steps": 4, "batch": 16,
+    "validations": 1, "validation_episodes": 16, "validation_duration": 2.0,
 }  # fmt: skip
 
 
@@ -79,7 +79,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         help="reward's price of one switching of the coil: trades wear against excursions",
     )
     parser.add_argument(
-        "--recurrent", action="store_true",
+        "--memory", action=argparse.BooleanOptionalAction, default=True,
         help="a policy with a memory, which first imitates a controller that knows each valve's plant",
     )  # fmt: skip
     parser.add_argument(
@@ -171,13 +171,13 @@ def train_and_compare(chosen: argparse.Namespace, plant: Plant, run: str) -> int
     from training.learners.recurrent_training import train_recurrent
 
     weights = RewardWeights(switching=chosen.switching_price)
-    hyperparameters = recurrent_hyperparameters(weights) if chosen.recurrent else Hyperparameters()
+    hyperparameters = recurrent_hyperparameters(weights) if chosen.memory else Hyperparameters()
     distillation = Distillation()
     if chosen.quick:
         hyperparameters = replace(hyperparameters, **QUICK_HYPERPARAMETERS)
         distillation = replace(distillation, **QUICK_DISTILLATION)
     config = configuration(vars(chosen), plant, hyperparameters, run=run)
-    if chosen.recurrent:
+    if chosen.memory:
         config["distillation"] = asdict(distillation)
     write_options(chosen.out, config)
     task: dict[str, Any] = {
@@ -186,7 +186,7 @@ def train_and_compare(chosen: argparse.Namespace, plant: Plant, run: str) -> int
         "timesteps": chosen.timesteps, "seed": chosen.seed, "device": chosen.device,
         "resume": chosen.resume, "run": run,
     }  # fmt: skip
-    if chosen.recurrent:
+    if chosen.memory:
         policy, log = train_recurrent(hyperparameters, distillation, **task)
     else:
         policy, log = train(hyperparameters, **task)

@@ -57,8 +57,8 @@ class Hyperparameters:
 
 FROM_STUDENT = Hyperparameters(
     band_price=10.0, band_bar=0.32, breakdown_price=2.0, sharpness=3.0, ent_coef=0.0,
-    learning_rate=2e-4, last_learning_rate=5e-6, batch_size=8192, gae_lambda=0.98,
-    first_validation=0.05,
+    learning_rate=1.5e-4, last_learning_rate=5e-6, batch_size=2048, gae_lambda=0.98,
+    validations=5, first_validation=0.2,
 )  # fmt: skip
 """For a recurrent policy that goes on from its student.
 
