@@ -22,7 +22,7 @@ from training.learners.run_folder import STUDENT_FOLDER
 RECURRENT_TIMESTEPS = 5_000_000
 """Environment steps of PPO for a recurrent policy."""
 
-DISTILLATION_STEPS = 25_000_000
+DISTILLATION_STEPS = 15_000_000
 """Environment steps of PPO that take about as long as a distillation (distillation.py)."""
 
 
