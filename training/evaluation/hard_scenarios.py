@@ -2,13 +2,14 @@
 
 Each differs from an ordinary episode in one thing. All are judged by C1, the band after the settling
 time. The valve cannot let air out of the circuit, so no episode begins above the target, and targets
-fall only while consumers draw more than the fall needs. Where an episode begins far below the target,
-`settling_time` leaves the time of the refill; then nothing is drawn until it ends, so that an overshoot
-remains and counts.
+only rise. Where an episode begins far below the target, `settling_time` leaves the time of the refill.
+Nothing is drawn until it ends, so an overshoot remains and counts.
 """
 
 from dataclasses import dataclass, replace
 from typing import Any
+
+import numpy as np
 
 from epv_env.plant.supply import Supply
 from epv_env.signals import MovingTarget
@@ -71,11 +72,11 @@ HARD: dict[str, HardScenario] = {
         meaning="the control chamber begins vented, so the valve is open, 3 to 4 bar below the target",
     ),
     "target steps": HardScenario(
-        meaning="target 6.5 bar, raised by 0.4 bar at 2, 4, 6 and 8 s",
+        meaning="target 6.5 bar, raised by 0.25 bar at 2, 4, 6 and 8 s",
         options={
             "target_bar": MovingTarget.recorded(
                 [0, 2, 2.001, 4, 4.001, 6, 6.001, 8, 8.001],
-                [6.5, 6.5, 6.9, 6.9, 7.3, 7.3, 7.7, 7.7, 8.1],
+                [6.5, 6.5, 6.75, 6.75, 7.0, 7.0, 7.25, 7.25, 7.5],
             ),
             "drop_bar": (0.0, 0.3),
         },
@@ -89,7 +90,7 @@ HARD: dict[str, HardScenario] = {
     "starved": HardScenario(
         meaning="supply at 6 bar, below the target of 7 to 8, and refilled to 11 bar from 3 to 3.9 s",
         options={
-            "supply": Supply.recorded([0.0, 0.1, 3.0, 3.9], [11.0, 6.0, 6.0, 11.0]),
+            "supply": Supply.recorded(np.array([0.0, 0.1, 3.0, 3.9]), np.array([11.0, 6.0, 6.0, 11.0])),
             "target_bar": (7.0, 8.0), "drop_bar": (1.0, 2.0), "settling_time": REFILL_TIME + 3.9,
             "scenario": "none",
         },
