@@ -35,6 +35,7 @@ from epv_env.plant.region import REGIONS
 from epv_env.reward import RewardWeights
 from training.evaluation.controller_table import Comparison, as_text, compare
 from training.evaluation.scenarios import TUNING_REGION
+from training.learners.policy_folders import MEMORYLESS_TIMESTEPS, RECURRENT_TIMESTEPS
 from training.learners.provenance import Configuration, configuration
 from training.learners.run_folder import forget_failed_start, make_free, why_taken
 from training.learners.run_state import check_checkpoint, new_run
@@ -63,7 +64,11 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--out", type=writable_folder, default=Path("runs/ppo"), help="folder of results"
     )
-    parser.add_argument("--timesteps", type=int, default=5_000_000, help="environment steps to train")
+    parser.add_argument(
+        "--timesteps", type=int,
+        help=f"environment steps of PPO; default: {RECURRENT_TIMESTEPS}, without memory "
+        f"{MEMORYLESS_TIMESTEPS}",
+    )  # fmt: skip
     parser.add_argument("--episodes", type=int, default=256, help="evaluation episodes per plant set")
     parser.add_argument("--duration", type=float, default=10.0, help="length of one of them [s]")
     parser.add_argument("--seed", type=int, default=0, help="of the training")
@@ -91,6 +96,8 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         "--force", action="store_true", help="begin anew in a folder that holds a training already"
     )
     chosen = parse_with_quick(parser, arguments, QUICK)
+    if chosen.timesteps is None:
+        chosen.timesteps = RECURRENT_TIMESTEPS if chosen.memory else MEMORYLESS_TIMESTEPS
     check_positive(parser, chosen, "timesteps", "episodes", "duration")
     check_not_negative(parser, chosen, "seed", "switching_price")
     return chosen

@@ -4,7 +4,7 @@ A profile is a set of trapezoids in time (start, rise, hold, fall, height), so a
 be a step or a ramp; the flow over a control period is the exact mean of the profile over it.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -79,6 +79,11 @@ class Profile:
     """Rows start, rise, hold, fall [s], flow [kg/s]; shape (5, APPLICATIONS), in order of time."""
     span: float
     """Time after which the sequence begins again [s]."""
+
+    def later(self, seconds: float) -> "Profile":
+        """The same with all applications later; the leak stays."""
+        shift = np.array([seconds, 0.0, 0.0, 0.0, 0.0])[:, None]
+        return replace(self, applications=self.applications + shift)
 
 
 SILENT = Profile(leak=0.0, applications=np.zeros((5, APPLICATIONS)), span=1.0)

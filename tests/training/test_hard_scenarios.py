@@ -8,12 +8,11 @@ import pytest
 pytest.importorskip("pandas")
 
 from controllers.hysteresis import Hysteresis
-from epv_env.observation import INDEX
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import REFERENCE_PERIOD
 from epv_env.settings import make_settings
 from training import hard_scenarios
-from training.evaluation.faults import FrozenP3, Restart
+from training.evaluation.faults import Restart
 from training.evaluation.hard_scenarios import HARD, REFILL_TIME, VENTED_DROP_BAR
 from training.evaluation.rollout import run_episodes
 from training.evaluation.scenarios import TUNING_REGION
@@ -69,18 +68,6 @@ def test_a_restart_makes_the_controller_forget_once_at_its_time():
     controller = Restart(at=0.05).around(inner, 0.005)
     run_episodes(controller, seeds=[1, 2], duration=0.1, options={})
     assert inner.resets == [(2, 0), (2, 10)]
-
-
-def test_a_frozen_p3_stays_and_all_else_goes_on():
-    plain, inner = Recorder(), Recorder()
-    for controller in (plain, FrozenP3(at=0.05).around(inner, 0.005)):
-        run_episodes(controller, seeds=[1, 2], duration=0.1, options={})
-    seen, usual = np.array(inner.seen), np.array(plain.seen)
-    np.testing.assert_array_equal(seen[:11, :, INDEX["p3"]], usual[:11, :, INDEX["p3"]])
-    np.testing.assert_array_equal(seen[10:, :, INDEX["p3"]], seen[[10], :, INDEX["p3"]].repeat(10, 0))
-    assert not np.any(seen[10:, :, INDEX["p3_change_4"]])
-    assert np.any(usual[10:, :, INDEX["p3"]] != seen[10:, :, INDEX["p3"]])
-    np.testing.assert_array_equal(seen[..., INDEX["target"]], usual[..., INDEX["target"]])
 
 
 def test_an_open_valve_refills_within_the_settling_time():

@@ -13,7 +13,7 @@ import numpy as np
 
 from epv_env.plant.supply import Supply
 from epv_env.signals import MovingTarget
-from training.evaluation.faults import Fault, FrozenP3, Restart
+from training.evaluation.faults import Restart
 from training.evaluation.scenarios import TUNING_REGION, EvaluationScenario, consumption
 
 REFILL_TIME = 1.5
@@ -30,7 +30,7 @@ class HardScenario(EvaluationScenario):
 
     duration: float = 10.0
     """Of an episode [s]."""
-    fault: Fault | None = None
+    fault: Restart | None = None
     """What the controller suffers from; None: nothing."""
 
     @property
@@ -104,7 +104,8 @@ HARD: dict[str, HardScenario] = {
         meaning="the control unit restarts at 5 s", fault=Restart(at=5.0)
     ),
     "p3 frozen": HardScenario(
-        meaning="the reading of p3 stops changing at 2 s", fault=FrozenP3(at=2.0)
+        meaning="the reading of p3 stops changing at 2 s",
+        options={"conditions": {"frozen_p3": 1.0, "frozen_p3_s": 2.0}},
     ),
     "p2 biased": HardScenario(
         meaning="the reading of p2 is 0.256 bar too high (Table 1: 1.6 % of 16 bar)",

@@ -36,7 +36,7 @@ class Distillation(LessonSettings):
     """Units of each of the two hidden layers."""
     kept: int = 4
     """Number of latest rounds whose episodes are learned from."""
-    steps: int = 64
+    steps: int = 72
     """Gradient steps of each round."""
     batch: int = 128
     """Windows of a gradient step."""

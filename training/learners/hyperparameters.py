@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from epv_env.conditions import Conditions
 from epv_env.reward import BAND_BAR, RewardWeights
 
 
@@ -53,14 +54,21 @@ class Hyperparameters:
     """Episodes of a validation."""
     validation_duration: float = 6.0
     """Length of a validation episode [s]."""
+    conditions: Conditions = Conditions()
+    """What training episodes may meet beyond the ordinary; validation episodes are ordinary."""
 
 
 FROM_STUDENT = Hyperparameters(
     band_price=10.0, band_bar=0.32, breakdown_price=2.0, sharpness=3.0, ent_coef=0.0,
     learning_rate=1.5e-4, last_learning_rate=5e-6, batch_size=2048, gae_lambda=0.98,
     validations=5, first_validation=0.2,
+    conditions=Conditions(
+        far=0.05, vented=0.05, coil_off=0.1, noisy=0.3, target_steps=0.2, delayed=0.15,
+    ),
 )  # fmt: skip
 """For a recurrent policy that goes on from its student.
+
+Few episodes begin far below the target: their unavoidable price would drown what the others teach.
 
 One control period more of a pulse is worth 200 mbar, so more exploration than the student's own doubt
 teaches caution only. The student keeps within the band, so the prices near the band's edge and of a

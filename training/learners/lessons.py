@@ -13,6 +13,7 @@ from tqdm import tqdm
 from controllers.base import Controller
 from controllers.learned import LearnedPolicy
 from controllers.pulse_simulation import pulse_tables
+from epv_env.conditions import Conditions
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
@@ -32,7 +33,7 @@ WORKERS = 2
 class LessonSettings:
     """Episodes of a distillation."""
 
-    rounds: int = 32
+    rounds: int = 36
     """Rounds of episodes and learning. The episodes of a round run while the student learns from those
     before, so the student that drives them is one round old."""
     plants: int = 256
@@ -46,6 +47,11 @@ class LessonSettings:
     the recurrent state that the student had there, so the state reaches further back than gradients."""
     handover: int = 4
     """Rounds until the student drives every episode; the teacher's share falls linearly."""
+    conditions: Conditions = Conditions(
+        far=0.2, vented=0.2, coil_off=0.1, starved=0.1, noisy=0.3, target_steps=0.2
+    )
+    """What episodes may meet beyond the ordinary. The teacher's tables are of valves without effects and
+    delays; these are left to PPO."""
 
     def __post_init__(self) -> None:
         if self.periods % self.window:
@@ -103,7 +109,7 @@ class Lessons:
         seeds = list(self._seeds[number * s.episodes : (number + 1) * s.episodes])
         plants = [dict(self._plants[k]) for k in rng.choice(len(self._plants), s.episodes)]
         driven = rng.random(s.episodes) < 1 - number / s.handover
-        env = make_env(student, s.episodes, **self._options)
+        env = make_env(student, s.episodes, **self._options, conditions=s.conditions)
         observation = begin_episodes(env, self._teacher, seeds, {"parameters": plants})
         student.reset(s.episodes)
         observations, wanted, states = [], [], []

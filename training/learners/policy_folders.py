@@ -19,7 +19,10 @@ from epv_env.reward import RewardWeights
 from training.evaluation.scenarios import TUNING_REGION
 from training.learners.run_folder import STUDENT_FOLDER
 
-RECURRENT_TIMESTEPS = 5_000_000
+MEMORYLESS_TIMESTEPS = 5_000_000
+"""Environment steps of PPO for a policy without memory."""
+
+RECURRENT_TIMESTEPS = 8_000_000
 """Environment steps of PPO for a recurrent policy."""
 
 DISTILLATION_STEPS = 15_000_000

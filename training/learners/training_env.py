@@ -51,7 +51,8 @@ def make_training_env(
     """Episodes on drawn plants. Trainings with different seeds meet different episodes.
 
     Args:
-        h: hyperparameters, of which the number and the length of episodes and the reward's scale count.
+        h: hyperparameters, of which the number, length and conditions of episodes and the reward's
+            scale count.
         plant: centre of the region.
         scenario: of the consumption.
         parameters: region that plants are drawn from, "confidence" or another (epv_env.settings).
@@ -70,6 +71,7 @@ def make_training_env(
         parameters=parameters,
         scenario=scenario,
         weights=weights,
+        conditions=h.conditions,
     )
     seed_episodes(env, seed)
     scaled = ScaledReward(VecMonitor(env), h.reward_scale)

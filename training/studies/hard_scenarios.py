@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from controllers.base import Privileged
 from epv_env.plant.effects.registry import EFFECTS
 from epv_env.reward import REFERENCE_PERIOD
 from training.evaluation.hard_scenarios import HARD, HardScenario
@@ -41,7 +42,7 @@ def run_scenario(
     options: dict[str, Any] = {"plant": study.plant, **scenario.all_options}
     period = options.get("control_period", REFERENCE_PERIOD)
     controller = study.controller(label, period)
-    if scenario.fault is not None:
+    if scenario.fault is not None and not isinstance(controller, Privileged):  # it has no memory
         controller = scenario.fault.around(controller, period)
     metrics, _ = run_episodes(controller, seeds=list(seeds), duration=scenario.duration, options=options)
     return metrics
