@@ -3,9 +3,9 @@
 While the coil is off the control chamber vents through its exhaust: ln p3 falls at one constant rate
 while the exhaust is choked, and more slowly below 1.9 times the ambient pressure. The measured p3
 therefore says how far a pulse has come, whatever p3 it began at, and one table serves pulses from rest,
-pulses in quick succession and a valve that begins wide open: pressure gained, as a function of p1, p2/p1,
-the age of the venting (since p3 stood 5 % above the opening pressure) and the time that the coil stays
-off.
+pulses in quick succession and a valve that begins wide open: pressure gained, as a function of p1,
+p2/p1, the age of the venting (since p3 stood 5 % above the opening pressure) and the time that the coil
+stays off.
 """
 
 from collections.abc import Mapping

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from epv_env.conditions import Conditions
+from epv_env.conditions import CONDITIONS, Conditions
 from epv_env.reward import BAND_BAR, RewardWeights
 
 
@@ -54,7 +54,7 @@ class Hyperparameters:
     """Episodes of a validation."""
     validation_duration: float = 6.0
     """Length of a validation episode [s]."""
-    conditions: Conditions = Conditions()
+    conditions: Conditions = CONDITIONS["ordinary"]
     """What training episodes may meet beyond the ordinary; validation episodes are ordinary."""
 
 

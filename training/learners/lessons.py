@@ -29,6 +29,11 @@ WORKERS = 2
 """Threads that make tables: compiled code, which runs outside of Python's lock."""
 
 
+FIRST_FILLINGS = Conditions(far=0.2, vented=0.2, coil_off=0.1, starved=0.1, noisy=0.3, target_steps=0.2)
+"""Starts that ordinary episodes lack. The teacher's tables are of valves without effects and delays;
+these are left to PPO."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class LessonSettings:
     """Episodes of a distillation."""
@@ -47,11 +52,8 @@ class LessonSettings:
     the recurrent state that the student had there, so the state reaches further back than gradients."""
     handover: int = 4
     """Rounds until the student drives every episode; the teacher's share falls linearly."""
-    conditions: Conditions = Conditions(
-        far=0.2, vented=0.2, coil_off=0.1, starved=0.1, noisy=0.3, target_steps=0.2
-    )
-    """What episodes may meet beyond the ordinary. The teacher's tables are of valves without effects and
-    delays; these are left to PPO."""
+    conditions: Conditions = FIRST_FILLINGS
+    """What episodes may meet beyond the ordinary."""
 
     def __post_init__(self) -> None:
         if self.periods % self.window:
