@@ -40,8 +40,8 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
         privileged: whether info shows true state and parameters (`epv_env.infos.truth`).
         control_period: time between decisions [s].
         supply_voltage, settling_time, sensor_noise, weights, drop_bar: see `epv_env.settings`.
-    reset(options=...) takes parameters, effects, supply, scenario, target_bar, p2_bar, p3_bar and conditions
-    for one episode.
+    reset(options=...) takes parameters, effects, supply, scenario, target_bar, p2_bar, p3_bar and
+    conditions for one episode.
     Raises ValueError subclasses with one clear sentence for what cannot be used.
     """
 
