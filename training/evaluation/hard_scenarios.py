@@ -9,9 +9,6 @@ Nothing is drawn until it ends, so an overshoot remains and counts.
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
-from epv_env.plant.supply import Supply
 from epv_env.signals import MovingTarget
 from training.evaluation.faults import Restart
 from training.evaluation.scenarios import TUNING_REGION, EvaluationScenario, consumption
@@ -88,13 +85,11 @@ HARD: dict[str, HardScenario] = {
         duration=60.0,
     ),
     "starved": HardScenario(
-        meaning="supply at 6 bar, below the target of 7 to 8, and refilled to 11 bar from 3 to 3.9 s",
+        meaning="supply 1 to 2 bar below the target, refilled within a second from 3 s on",
         options={
-            "supply": Supply.recorded(np.array([0.0, 0.1, 3.0, 3.9]), np.array([11.0, 6.0, 6.0, 11.0])),
-            "target_bar": (7.0, 8.0), "drop_bar": (1.0, 2.0), "settling_time": REFILL_TIME + 3.9,
-            "scenario": "none",
+            "conditions": {"starved": 1.0, "starved_bar": (1.0, 2.0), "starved_s": 3.0},
+            "drop_bar": (1.0, 2.0), "settling_time": 3.0 + REFILL_TIME, "scenario": "none",
         },
-        duration=10.0,
     ),
     "8 g/s": HardScenario(
         meaning="sudden applications of 8 g/s: training ends at 5.5 g/s",

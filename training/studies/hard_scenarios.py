@@ -6,11 +6,11 @@ from typing import Any
 from controllers.base import Privileged
 from epv_env.plant.effects.registry import EFFECTS
 from epv_env.reward import REFERENCE_PERIOD
+from training.evaluation.effect_levels import effect_levels
 from training.evaluation.hard_scenarios import HARD, HardScenario
 from training.evaluation.metrics import EpisodeMetrics, summary
 from training.evaluation.rollout import run_episodes
 from training.studies.episode_tasks import Study
-from training.studies.sweeps.effect_levels import effect_levels
 
 
 def worn_scenarios() -> dict[str, HardScenario]:

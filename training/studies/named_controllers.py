@@ -15,8 +15,8 @@ from epv_env.plant.parameters import Parameters
 DEFAULT = ("hysteresis, extrapolating", "pulse", "PWM")
 """Controllers that are swept unless others are named: good ones that compute little."""
 
-BOUND = PrivilegedPulse.name
-"""Knows each valve's parameters, and needs no tuning: a bound, not a rival."""
+INFORMED = PrivilegedPulse.name
+"""Knows each valve's parameters, and needs no tuning: a reference, not a rival."""
 
 
 def named_controllers(
@@ -24,7 +24,7 @@ def named_controllers(
 ) -> tuple[dict[str, Controller], dict[str, str]]:
     """Controllers by label, and a digest of what each was made from.
 
-    sources: a tuned kind (controllers/tuned.json), "pulse, informed" for a bound, a folder that training
+    sources: a tuned kind (controllers/tuned.json), "pulse, informed", a folder that training
     wrote, or LABEL=FOLDER.
     parameters: of the plant that the classic ones are designed for. Raises ValueError.
     """
@@ -45,7 +45,7 @@ def _named(source: str, parameters: Parameters) -> tuple[str, Controller, bytes]
     if source in tunings:
         values = tunings[source].values
         return source, build(source, values, parameters), json.dumps(values, sort_keys=True).encode()
-    if source == BOUND:
+    if source == INFORMED:
         return source, build(source, {}, parameters), source.encode()
     label, _, folder = source.rpartition("=")
     path = Path(folder)
