@@ -62,13 +62,11 @@ FROM_STUDENT = Hyperparameters(
     band_price=10.0, band_bar=0.32, breakdown_price=2.0, sharpness=3.0, ent_coef=0.0,
     learning_rate=1.5e-4, last_learning_rate=5e-6, batch_size=2048, gae_lambda=0.98,
     validations=5, first_validation=0.2,
-    conditions=Conditions(
-        far=0.05, vented=0.05, coil_off=0.1, noisy=0.3, target_steps=0.2, delayed=0.15,
-    ),
 )  # fmt: skip
 """For a recurrent policy that goes on from its student.
 
-Few episodes begin far below the target: their unavoidable price would drown what the others teach.
+Episodes are ordinary: the unavoidable price of starts far below the target would drown what the others
+teach. The student knows such starts from its lessons.
 
 One control period more of a pulse is worth 200 mbar, so more exploration than the student's own doubt
 teaches caution only. The student keeps within the band, so the prices near the band's edge and of a
