@@ -59,8 +59,8 @@ class Hyperparameters:
 
 
 FROM_STUDENT = Hyperparameters(
-    band_price=10.0, band_bar=0.32, breakdown_price=2.0, sharpness=3.0, ent_coef=0.0,
-    learning_rate=1.5e-4, last_learning_rate=5e-6, batch_size=2048, gae_lambda=0.98,
+    band_price=10.0, band_bar=0.32, breakdown_price=0.5, sharpness=3.0, ent_coef=0.0,
+    learning_rate=4e-4, last_learning_rate=5e-6, batch_size=2048, gae_lambda=0.98,
     validations=5, first_validation=0.2,
 )  # fmt: skip
 """For a recurrent policy that goes on from its student.
@@ -69,8 +69,8 @@ Episodes are ordinary: the unavoidable price of starts far below the target woul
 teach. The student knows such starts from its lessons.
 
 One control period more of a pulse is worth 200 mbar, so more exploration than the student's own doubt
-teaches caution only. The student keeps within the band, so the prices near the band's edge and of a
-breakdown can be higher."""
+teaches caution only. The student keeps within the band, so the price near the band's edge can be higher.
+At a breakdown price of 2 policies stayed above the target, switched more and lost return."""
 
 FROM_MEMORYLESS = Hyperparameters(learning_rate=4e-4, breakdown_price=0.6, first_validation=0.05)
 """For a recurrent policy that goes on from a policy without memory, where switching is cheap."""
