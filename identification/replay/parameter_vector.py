@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.plant.parameters import Parameters, table
+from epv_env.plant.parameters import Parameters
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class ParameterVector:
     @property
     def domains(self) -> NDArray:
         """Ends of the domains (Tables 6, 7) [SI], (k, 2)."""
-        return np.array([table()[s].domain or (self.reference[s],) * 2 for s in self.symbols])
+        return np.array([self.reference.domain(s) for s in self.symbols])
 
     @property
     def bounds(self) -> NDArray:
