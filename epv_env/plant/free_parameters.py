@@ -33,11 +33,18 @@ def check_free(free: Mapping[str, Freedom], parameters: Parameters) -> None:
         raise ParameterError("free names no parameter: leave it out, or name what is to be calibrated")
     for symbol, freedom in free.items():
         row = table().get(symbol)
-        if row is None or row.domain is None or row.group == "environment":
-            raise ParameterError(f"free.{symbol} cannot be calibrated: name parameters of the valve")
+        if row is None or symbol not in _movable():
+            raise ParameterError(
+                f"free.{symbol} cannot be calibrated: choose from {', '.join(_movable())}"
+            )
         low, high = freedom.bounds or parameters.domain(symbol)
         _check_bounds(symbol, (low, high), parameters)
         _check_prior(symbol, freedom, (low, high))
+
+
+def _movable() -> list[str]:
+    """Symbols of the valve's parameters and of the sizes of effects."""
+    return [s for s, row in table().items() if row.domain and row.group != "environment"]
 
 
 def _check_bounds(symbol: str, bounds: tuple[float, float], parameters: Parameters) -> None:
