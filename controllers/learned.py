@@ -78,6 +78,11 @@ class LearnedPolicy:
         return 0 if self.cell is None else self.cell.width
 
     @property
+    def memory(self) -> NDArray:
+        """Recurrent state (n, cells)."""
+        return self._memory
+
+    @property
     def precision(self) -> np.dtype:
         """Precision of the weights, and so of all results: single, as training writes it."""
         return self.layers[0][0].dtype

@@ -111,7 +111,7 @@ class Search:
         compressor, refill = parents.compressor, np.zeros(coil.shape)
         slope = np.zeros(task.n)
         for i, supply in enumerate(task.supplies):
-            compressor[i] = supply.compressor_runs(parents.state.p1[i], compressor[i])
+            compressor[i] = supply.compressor_runs(parents.state.p1[i], compressor[i], time[i])
             refill[i] = supply.delivery * compressor[i]
             slope[i] = supply.slope(time[i : i + 1], task.period)[0]
         inputs = valves.inputs

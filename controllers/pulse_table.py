@@ -1,9 +1,11 @@
 """Lookup table of a pulse: how long must the coil be off to add this much pressure?
 
-While the coil is off the control chamber vents through a choked exhaust, so ln p3 falls at one constant
-rate. The measured p3 therefore says how far a pulse has come, whatever p3 it began at, and one table
-serves pulses from rest and pulses in quick succession: pressure gained, as a function of p1, p2/p1, the
-age of the venting (since p3 stood 5 % above the opening pressure) and the time that the coil stays off.
+While the coil is off the control chamber vents through its exhaust: ln p3 falls at one constant rate
+while the exhaust is choked, and more slowly below 1.9 times the ambient pressure. The measured p3
+therefore says how far a pulse has come, whatever p3 it began at, and one table serves pulses from rest,
+pulses in quick succession and a valve that begins wide open: pressure gained, as a function of p1,
+p2/p1, the age of the venting (since p3 stood 5 % above the opening pressure) and the time that the coil
+stays off.
 """
 
 from collections.abc import Mapping
@@ -14,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.opening_pressure import opening_pressure
+from controllers.venting_time import venting_time
 from epv_env.common.units import BAR, MILLISECOND
 
 
@@ -31,8 +34,10 @@ class PulseGrid:
         default_factory=lambda: np.array([0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98])
     )
     """Nodes of p2/p1 [1]; denser where the flow falls steeply with the ratio."""
-    age: NDArray = field(default_factory=lambda: _milliseconds(*range(0, 26, 2), 30, 40, 50, 70, 100))
-    """Nodes of the venting's age [s]."""
+    age: NDArray = field(
+        default_factory=lambda: _milliseconds(*range(0, 26, 2), 30, 40, 50, 70, 100, 150, 200, 300)
+    )
+    """Nodes of the venting's age [s]; after the last one the chamber is empty."""
     stay: NDArray = field(default_factory=lambda: _milliseconds(*range(0, 30, 2), 35, 40, 50, 70, 100))
     """Nodes of the time that the coil stays off [s]."""
     start_ratio: float = 1.05
@@ -59,7 +64,7 @@ class PulseTable:
     parameters: Mapping[str, Any]
     """Of the plant, by symbol."""
     vent_rate: float | NDArray
-    """-d ln(p3)/dt while the coil is off [1/s]."""
+    """-d ln(p3)/dt while the coil is off and the exhaust is choked [1/s]."""
     release_lag: float | NDArray
     """From switching off to the control chamber's venting [s]."""
     gain: NDArray
@@ -71,7 +76,9 @@ class PulseTable:
     def venting_age(self, p1: NDArray, p2: NDArray, p3: NDArray) -> NDArray:
         """Time since p3 stood at the grid's start ratio [s], (n,); negative: it is yet to come."""
         opening = opening_pressure(self.parameters, p1 * BAR, p2 * BAR) / BAR
-        return np.log(self.grid.start_ratio * np.maximum(opening, 1.0) / p3) / self.vent_rate
+        ambient = self.parameters["p_env"] / BAR
+        start = self.grid.start_ratio * np.maximum(opening, 1.0) / ambient
+        return (venting_time(start) - venting_time(p3 / ambient)) / self.vent_rate
 
     def time_to_open(self, p1: NDArray, p2: NDArray, p3: NDArray) -> NDArray:
         """Time with the coil off until p3 passes the opening pressure [s], (n,); negative: it has."""

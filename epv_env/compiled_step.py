@@ -19,7 +19,16 @@ from pathlib import Path
 import numba
 import numpy as np
 
-from epv_env.period import judge, measure, observe, refilled, remember, remember_only, switched
+from epv_env.period import (
+    follow_target_steps,
+    judge,
+    measure,
+    observe,
+    refilled,
+    remember,
+    remember_only,
+    switched,
+)
 from epv_env.plant.consumption import mean_flow
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.integrate import run_nominal
@@ -47,9 +56,11 @@ def _prepare(episodes, progress, rules, state, before, inputs, duration, lowest,
     for i in range(first, min(last, len(episodes))):
         e, on = episodes[i], on_time[i]
         figures[SWITCHINGS, i] = switched(e, period, on, action[i])
-        flow = mean_flow(progress[i], e.steps * period, period)
+        begin = e.steps * period
+        flow = mean_flow(progress[i], begin, period)
         figures[CONSUMPTION, i] = flow
-        refill = refilled(e, state[_P1, i])
+        refill = refilled(e, state[_P1, i], begin)
+        follow_target_steps(e, begin + period)
         for part in range(2):
             inputs[part, _FLOW, i] = flow
             inputs[part, _SLOPE, i] = e.p1_slope
@@ -81,11 +92,14 @@ def _conclude(episodes, rules, noise, state, before, lowest, highest, sensors, f
               first, last):  # fmt: skip
     """Judge the period, read the sensors and write the observations."""
     _restore_lost(episodes, state, before, lowest, highest, figures, first, last)
+    period = rules[0].control_period
     for i in range(first, min(last, len(episodes))):
         e = episodes[i]
         vented = state[_VENTED, i] - before[_VENTED, i]
         judge(e, rules[0], state[_P2, i], lowest[i], highest[i], vented, figures, i)
-        measure(e, state_at(state, STATE, i), sensors[i], noise[i, e.steps % NOISE_BLOCK])
+        measure(
+            e, state_at(state, STATE, i), sensors[i], noise[i, e.steps % NOISE_BLOCK], e.steps * period
+        )
         remember(e)
         observe(e, observation[i])
 
@@ -138,7 +152,7 @@ def _compiled(digest):
         if digest == "":
             return
         for i in where:
-            measure(episodes[i], state_at(state, STATE, i), sensors[i], noise[i, 0])
+            measure(episodes[i], state_at(state, STATE, i), sensors[i], noise[i, 0], 0.0)
             remember_only(episodes[i])
         for i in range(len(episodes)):
             observe(episodes[i], observation[i])

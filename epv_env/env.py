@@ -34,12 +34,14 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
         effects: sizes of effects by name, values or (low, high) in SI units.
         target_bar, p2_bar, p3_bar: value or (low, high) [bar absolute]; the target also as a function
             of the time [s].
+        conditions: what an episode may meet beyond the ordinary: None, "broad", a
+            `epv_env.conditions.Conditions`, or a mapping of its fields.
         band_bar: half-width of the band that the reward prices [bar].
         privileged: whether info shows true state and parameters (`epv_env.infos.truth`).
         control_period: time between decisions [s].
         supply_voltage, settling_time, sensor_noise, weights, drop_bar: see `epv_env.settings`.
-    reset(options=...) takes parameters, effects, supply, scenario, target_bar, p2_bar and p3_bar for one
-    episode.
+    reset(options=...) takes parameters, effects, supply, scenario, target_bar, p2_bar, p3_bar and
+    conditions for one episode.
     Raises ValueError subclasses with one clear sentence for what cannot be used.
     """
 

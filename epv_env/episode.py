@@ -1,8 +1,9 @@
 """One episode: what is drawn at its start, and what the compiled step keeps of it in between."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from epv_env.common.units import BAR
 from epv_env.observation import HISTORY
@@ -12,6 +13,9 @@ from epv_env.plant.readings import MEASURED
 from epv_env.plant.supply import Supply
 from epv_env.settings import Settings
 from epv_env.signals import MovingTarget, RecordedConsumption
+
+TARGET_STEPS = 4
+"""Steps that a target may take in an episode, besides a MovingTarget."""
 
 EPISODE = np.dtype(
     [
@@ -28,6 +32,11 @@ EPISODE = np.dtype(
         ("p3_history", np.float64, (HISTORY,)),  # the same of p3 [bar]
         ("coil", np.bool_),  # on at the end of the last period
         ("compressor", np.bool_),  # running
+        ("idle_until", np.float64),  # when the compressor may start [s]
+        ("noise", np.float64),  # factor on the sensors' noise [-]
+        ("p3_frozen_at", np.float64),  # when the reading of p3 stops changing [s]
+        ("target_steps_at", np.float64, (TARGET_STEPS,)),  # [s]
+        ("target_steps_to", np.float64, (TARGET_STEPS,)),  # [bar absolute]
         ("violated", np.bool_),  # outside the band after settling
     ],
     align=True,
@@ -59,6 +68,18 @@ class Start:
     """What changes the target; None: it stays."""
     recorded_consumption: RecordedConsumption | None
     """What is drawn instead of `consumption`; None: nothing."""
+    seed: int
+    """Of all random streams of the episode."""
+    coil: bool = True
+    """Whether the coil is on at the start."""
+    noise_factor: float = 1.0
+    """On the settings' noise of the sensors [-]."""
+    p3_frozen_at: float = np.inf
+    """When the reading of p3 stops changing [s]."""
+    target_steps_at: NDArray = field(default_factory=lambda: np.full(TARGET_STEPS, np.inf))
+    """When the target steps, increasing (TARGET_STEPS,) [s]; infinite: never."""
+    target_steps_to: NDArray = field(default_factory=lambda: np.zeros(TARGET_STEPS))
+    """To which value, (TARGET_STEPS,) [bar absolute]."""
 
     @classmethod
     def draw(cls, rng: np.random.Generator, settings: Settings) -> "Start":
@@ -84,4 +105,5 @@ class Start:
             supply=settings.supply,
             moving_target=settings.target_bar if isinstance(settings.target_bar, MovingTarget) else None,
             recorded_consumption=recorded,
+            seed=seed,
         )  # fmt: skip

@@ -8,6 +8,7 @@ from dataclasses import fields
 import numpy as np
 
 from epv_env.common.units import BAR
+from epv_env.episode import TARGET_STEPS
 from epv_env.observation import (
     CENTRE,
     HISTORY,
@@ -83,9 +84,17 @@ def switched(e, period, on_time, action):
 
 
 @exact
-def refilled(e, p1):
-    """What the compressor delivers in this period at a supply pressure p1 [Pa]: [kg/s]."""
-    e.compressor = _two_point(p1, e.compressor, e.cut_in, e.cut_out)
+def follow_target_steps(e, end):
+    """Take the target that the steps have set when the period ends [s]."""
+    for k in range(TARGET_STEPS):
+        if end >= e.target_steps_at[k]:
+            e.target = e.target_steps_to[k]
+
+
+@exact
+def refilled(e, p1, begin):
+    """Delivery of the compressor [kg/s] at a supply pressure p1 [Pa] in the period from `begin` [s]."""
+    e.compressor = _two_point(p1, e.compressor, e.cut_in, e.cut_out) and begin >= e.idle_until
     return e.delivery * e.compressor
 
 
@@ -116,10 +125,12 @@ def judge(e, rules, p2, lowest, highest, vented, figures, i):
 
 
 @exact
-def measure(e, state, p, normal):
-    """Read the sensors. p: their parameters, a record. normal: a draw for each (4,) [-]."""
+def measure(e, state, p, normal, time):
+    """Read the sensors. p: their parameters, a record. normal: a draw for each (4,) [-]. time: [s]."""
     true = _true_readings(state, p)
     for k in range(len(MEASURED)):
+        if k == _P3 and time > e.p3_frozen_at:
+            continue
         low, noise, resolution, least, greatest = _SENSOR[k]
         e.reading[k] = _digitised(true[k], normal[k], low, noise, resolution, least, greatest)
 

@@ -20,6 +20,7 @@ from epv_env.arguments import (
     as_weights,
 )
 from epv_env.common.units import BAR
+from epv_env.conditions import Conditions, as_conditions
 from epv_env.plant.consumption import MIXED, Scenario
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
@@ -33,7 +34,7 @@ EMPTY_CIRCUIT_BAR = 1.5
 MOST_NOISE = 1000.0
 """Factor of the sensors' noise, at most: beyond, every reading is at an end of its range."""
 
-OPTIONS = ("parameters", "effects", "scenario", "supply", "target_bar", "p2_bar", "p3_bar")
+OPTIONS = ("parameters", "effects", "scenario", "supply", "target_bar", "p2_bar", "p3_bar", "conditions")
 """Keys that reset(options=...) understands, beside Gymnasium's "reset_mask"."""
 
 
@@ -67,6 +68,8 @@ class Settings:
     """Standard deviations of the sensors' noise relative to Table 3's; True is 1, False is 0."""
     weights: RewardWeights = field(default_factory=RewardWeights)
     """Weights of the reward."""
+    conditions: Conditions = field(default_factory=Conditions)
+    """What an episode may meet beyond the ordinary."""
 
     @cached_property
     def plants(self) -> Region:
@@ -84,6 +87,11 @@ class Settings:
 
     def __post_init__(self) -> None:
         as_scenario(self.scenario)
+        if self.conditions.target_steps and isinstance(self.target_bar, MovingTarget):
+            raise OptionError(
+                "conditions: target_steps needs a target_bar that stays in between: give a value or "
+                "(low, high), or set target_steps to 0"
+            )
         assert self.plants  # refuses sizes outside their domains now, not in the first episode
         for name in ("control_period", "settling_time", "sensor_noise", "supply_voltage"):
             value = getattr(self, name)
@@ -134,6 +142,7 @@ def make_settings(
     p2_bar: Any = None,
     p3_bar: Any = None,
     drop_bar: Any = (0.0, 2.0),
+    conditions: Any = None,
     **rest: Any,
 ) -> Settings:
     """Settings from what a user writes; see `EPValveEnv` for the arguments."""
@@ -147,6 +156,7 @@ def make_settings(
         p2_bar=None if p2_bar is None else as_range("p2_bar", p2_bar),
         p3_bar=None if p3_bar is None else as_range("p3_bar", p3_bar),
         drop_bar=as_range("drop_bar", drop_bar, (0.0, 16.0)),
+        conditions=as_conditions(conditions),
         **rest,
     )
 

@@ -18,6 +18,7 @@ from epv_env.compiled_step import (
     step_prepare,
     step_whole,
 )
+from epv_env.condition_draws import under_conditions
 from epv_env.episode import EPISODE, Start
 from epv_env.observation import LAYOUT, LONGEST_WAIT
 from epv_env.period import rules_of
@@ -114,7 +115,10 @@ class LimitingTask:
         Returns all observations (n, entries); those of other episodes are as they were.
         """
         where = np.asarray(where)
-        starts = [Start.draw(rng, chosen) for rng, chosen in zip(rngs, settings, strict=True)]
+        starts = [
+            under_conditions(Start.draw(rng, chosen), chosen.conditions)
+            for rng, chosen in zip(rngs, settings, strict=True)
+        ]
         self._set_plants(where, starts)
         for i, start in zip(where.tolist(), starts, strict=True):
             self.parameters[i] = start.parameters
@@ -124,13 +128,14 @@ class LimitingTask:
             self.recorded_consumptions[i] = start.recorded_consumption
             self.noise_of[i] = start.noise
         e = self._episodes
-        e["target"][where] = [start.target for start in starts]
-        for name in ("cut_in", "cut_out", "delivery"):
+        for name in ("target", "coil", "p3_frozen_at", "target_steps_at", "target_steps_to"):
+            e[name][where] = [getattr(start, name) for start in starts]
+        e["noise"][where] = [self.settings.sensor_noise * start.noise_factor for start in starts]
+        for name in ("cut_in", "cut_out", "delivery", "idle_until"):
             e[name][where] = [getattr(start.supply, name) for start in starts]
         for name in ("steps", "violated", "compressor", "p1_slope"):
             e[name][where] = 0
-        e["coil"][where] = True
-        e["action"][where] = 1.0
+        e["action"][where] = e["coil"][where]
         e["waited"][where] = LONGEST_WAIT
         self._find_signals()
         self._draw_noise(where)
@@ -181,7 +186,9 @@ class LimitingTask:
         volumes = np.array([start.supply.volume for start in starts])
         self.valves.set_parameters(where, p, volumes)
         p1, p2, p3 = (np.array([getattr(start, name) for start in starts]) for name in PRESSURES)
-        initial = energised(p, p1=p1, p2=p2, U=self.settings.supply_voltage)._replace(p3=p3)
+        coil = np.array([start.coil for start in starts])
+        initial = energised(p, p1=p1, p2=p2, U=self.settings.supply_voltage * coil)
+        initial = initial._replace(p3=p3, xMV=np.where(coil, initial.xMV, 0.0))
         for field, value in zip(self.valves.state, initial, strict=True):
             field[where] = value
 
@@ -212,7 +219,7 @@ class LimitingTask:
                 rng = self.noise_of[i]
                 if rng is not None:
                     rng.standard_normal(out=self._noise[i])
-                    self._noise[i] *= self.settings.sensor_noise
+                    self._noise[i] *= self._episodes["noise"][i]
 
         if self.settings.sensor_noise:
             share(draw, -(-len(where) // LANES) * LANES, threads=self.valves.threads)

@@ -58,7 +58,7 @@ class LoopSettings:
     switching_price: float = 0.2
     """Price of a switching in the reward [1]. Below the default: at a high price, so short a training
     has not learned to control yet."""
-    hyperparameters: Mapping[str, int] = field(
+    hyperparameters: Mapping[str, Any] = field(
         default_factory=lambda: {"num_envs": 128, "batch_size": 1024, "n_epochs": 4}
     )
     """Of PPO: four times as many updates per environment step as train_ppo.py, so that it learns in a

@@ -30,7 +30,13 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.valves import available_cores
 from epv_env.reward import RewardWeights
 from training.evaluation.scenarios import TUNING_REGION
-from training.learners.policy_folders import RECURRENT_TIMESTEPS, Training, seed_trainings, train_missing
+from training.learners.policy_folders import (
+    MEMORYLESS_TIMESTEPS,
+    RECURRENT_TIMESTEPS,
+    Training,
+    seed_trainings,
+    train_missing,
+)
 from training.studies.comparison.contenders import Contender
 from training.tune import tune
 
@@ -136,7 +142,12 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description="Optimise controllers at several prices of switching.")
     parser.add_argument("--out", type=writable_folder, default=Path("runs/tradeoff"))
     parser.add_argument("--prices", type=float, nargs="+", default=[0.5, 1.0, 2.0])
-    parser.add_argument("--timesteps", type=int, default=5_000_000, help="training steps at each price")
+    parser.add_argument(
+        "--timesteps",
+        type=int,
+        default=MEMORYLESS_TIMESTEPS,
+        help="training steps at each price",
+    )
     parser.add_argument(
         "--kinds", nargs="+", choices=TUNED_KINDS, default=["hysteresis, extrapolating"],
         help="classic controllers to tune",

@@ -35,23 +35,24 @@ from epv_env.plant.region import REGIONS
 from epv_env.reward import RewardWeights
 from training.evaluation.controller_table import Comparison, as_text, compare
 from training.evaluation.scenarios import TUNING_REGION
+from training.learners.policy_folders import MEMORYLESS_TIMESTEPS, RECURRENT_TIMESTEPS
 from training.learners.provenance import Configuration, configuration
 from training.learners.run_folder import forget_failed_start, make_free, why_taken
 from training.learners.run_state import check_checkpoint, new_run
 
-SAME_WHEN_RESUMED = ("seed", "plant", "scenario", "parameters", "switching_price", "recurrent")
+SAME_WHEN_RESUMED = ("seed", "plant", "scenario", "parameters", "switching_price", "memory")
 """Options that a resumed training must share with its beginning."""
 
 QUICK = {"timesteps": 65_536, "episodes": 16, "duration": 2.0}
 """The defaults under --quick: everything is done, too short to learn anything."""
 QUICK_HYPERPARAMETERS: dict[str, Any] = {
-    "num_envs": 32, "imitation_epochs": 1, "validations": 1, "validation_episodes": 16,
-    "validation_duration": 2.0,
+    "num_envs": 32, "batch_size": 1024, "imitation_epochs": 1, "validations": 1,
+    "validation_episodes": 16, "validation_duration": 2.0,
 }  # fmt: skip
 
 QUICK_DISTILLATION: dict[str, Any] = {
-    "rounds": 2, "plants": 16, "episodes": 32, "periods": 100, "batch": 16, "validations": 1,
-    "validation_episodes": 16, "validation_duration": 2.0,
+    "rounds": 2, "plants": 16, "episodes": 32, "periods": 100, "window": 50, "steps": 4, "batch": 16,
+    "validations": 1, "validation_episodes": 16, "validation_duration": 2.0,
 }  # fmt: skip
 
 
@@ -63,7 +64,11 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--out", type=writable_folder, default=Path("runs/ppo"), help="folder of results"
     )
-    parser.add_argument("--timesteps", type=int, default=5_000_000, help="environment steps to train")
+    parser.add_argument(
+        "--timesteps", type=int,
+        help=f"environment steps of PPO; default: {RECURRENT_TIMESTEPS}, without memory "
+        f"{MEMORYLESS_TIMESTEPS}",
+    )  # fmt: skip
     parser.add_argument("--episodes", type=int, default=256, help="evaluation episodes per plant set")
     parser.add_argument("--duration", type=float, default=10.0, help="length of one of them [s]")
     parser.add_argument("--seed", type=int, default=0, help="of the training")
@@ -79,7 +84,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         help="reward's price of one switching of the coil: trades wear against excursions",
     )
     parser.add_argument(
-        "--recurrent", action="store_true",
+        "--memory", action=argparse.BooleanOptionalAction, default=True,
         help="a policy with a memory, which first imitates a controller that knows each valve's plant",
     )  # fmt: skip
     parser.add_argument(
@@ -91,6 +96,8 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         "--force", action="store_true", help="begin anew in a folder that holds a training already"
     )
     chosen = parse_with_quick(parser, arguments, QUICK)
+    if chosen.timesteps is None:
+        chosen.timesteps = RECURRENT_TIMESTEPS if chosen.memory else MEMORYLESS_TIMESTEPS
     check_positive(parser, chosen, "timesteps", "episodes", "duration")
     check_not_negative(parser, chosen, "seed", "switching_price")
     return chosen
@@ -171,13 +178,13 @@ def train_and_compare(chosen: argparse.Namespace, plant: Plant, run: str) -> int
     from training.learners.recurrent_training import train_recurrent
 
     weights = RewardWeights(switching=chosen.switching_price)
-    hyperparameters = recurrent_hyperparameters(weights) if chosen.recurrent else Hyperparameters()
+    hyperparameters = recurrent_hyperparameters(weights) if chosen.memory else Hyperparameters()
     distillation = Distillation()
     if chosen.quick:
         hyperparameters = replace(hyperparameters, **QUICK_HYPERPARAMETERS)
         distillation = replace(distillation, **QUICK_DISTILLATION)
     config = configuration(vars(chosen), plant, hyperparameters, run=run)
-    if chosen.recurrent:
+    if chosen.memory:
         config["distillation"] = asdict(distillation)
     write_options(chosen.out, config)
     task: dict[str, Any] = {
@@ -186,7 +193,7 @@ def train_and_compare(chosen: argparse.Namespace, plant: Plant, run: str) -> int
         "timesteps": chosen.timesteps, "seed": chosen.seed, "device": chosen.device,
         "resume": chosen.resume, "run": run,
     }  # fmt: skip
-    if chosen.recurrent:
+    if chosen.memory:
         policy, log = train_recurrent(hyperparameters, distillation, **task)
     else:
         policy, log = train(hyperparameters, **task)

@@ -4,7 +4,8 @@ A profile is a set of trapezoids in time (start, rise, hold, fall, height), so a
 be a step or a ramp; the flow over a control period is the exact mean of the profile over it.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from typing import Any
 
 import numba
@@ -52,7 +53,7 @@ class Scenario:
 
     def draw(self, rng: np.random.Generator) -> "Profile":
         """One episode's consumption."""
-        low, high = np.transpose([self.rise, self.hold, self.fall, self.pause, self.flow])[..., None]
+        low, high = self._ends
         rise, hold, fall, pause, flow = low + (high - low) * rng.random((5, APPLICATIONS))
         lengths = rise + hold + fall + pause
         start = rng.uniform(*self.first) + np.cumsum(lengths) - lengths
@@ -61,6 +62,11 @@ class Scenario:
             applications=np.stack([start, rise, hold, fall, flow * GRAM]),
             span=float(np.sum(lengths)),
         )
+
+    @cached_property
+    def _ends(self) -> NDArray:
+        """Lower and upper ends of rise, hold, fall, pause and flow, (2, 5, 1)."""
+        return np.transpose([self.rise, self.hold, self.fall, self.pause, self.flow])[..., None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,6 +79,11 @@ class Profile:
     """Rows start, rise, hold, fall [s], flow [kg/s]; shape (5, APPLICATIONS), in order of time."""
     span: float
     """Time after which the sequence begins again [s]."""
+
+    def later(self, seconds: float) -> "Profile":
+        """The same with all applications later; the leak stays."""
+        shift = np.array([seconds, 0.0, 0.0, 0.0, 0.0])[:, None]
+        return replace(self, applications=self.applications + shift)
 
 
 SILENT = Profile(leak=0.0, applications=np.zeros((5, APPLICATIONS)), span=1.0)

@@ -197,10 +197,15 @@ class Parameters(Mapping[str, float]):
     def replace(self, **changes: float) -> "Parameters":
         """A copy with some values changed. Raises ParameterError."""
         own = self._own_domains
-        checked = {symbol: checked_value(symbol, value, own) for symbol, value in changes.items()}
-        changed = Parameters.__new__(Parameters)  # what is not changed has been checked
-        changed._values = {**self._values, **checked}
-        changed._own_domains = own
+        return self.replace_unchecked(
+            {symbol: checked_value(symbol, value, own) for symbol, value in changes.items()}
+        )
+
+    def replace_unchecked(self, changes: Mapping[str, float]) -> "Parameters":
+        """A copy with values changed by symbol that are inside their domains already."""
+        changed = Parameters.__new__(Parameters)
+        changed._values = {**self._values, **changes}
+        changed._own_domains = self._own_domains
         return changed
 
     @property

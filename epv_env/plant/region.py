@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -116,13 +117,18 @@ class Region:
 
     def draw(self, rng: np.random.Generator) -> Parameters:
         """One plant of the region."""
-        changes = {symbol: float(rng.uniform(*ends)) for symbol, ends in self.boxes.items()}
+        changes = dict(zip(self.boxes, rng.uniform(*self._ends).tolist(), strict=True))
         if self.covariance is not None:
             k = len(self.symbols)
             direction = rng.standard_normal(k)
             ball = direction * rng.uniform() ** (1 / k) / np.linalg.norm(direction)
             changes |= dict(zip(self.symbols, self.joint(ball[None])[0].tolist(), strict=True))
-        return self.centre.replace(**changes)
+        return self.centre.replace_unchecked(changes)  # a box or an ellipsoid within the domains
+
+    @cached_property
+    def _ends(self) -> NDArray:
+        """Lower and upper ends of the boxes (2, boxes) [SI]."""
+        return np.array(list(self.boxes.values())).reshape(-1, 2).T
 
     def joint(self, ball: NDArray) -> NDArray:
         """Points of the ellipsoid (points, k) for those of the unit ball; kept inside the domains [SI].

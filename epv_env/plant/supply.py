@@ -1,6 +1,6 @@
 """Where the input chamber's air comes from: constant, recorded, or reservoirs with a compressor."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,10 @@ def two_point(p1, ran, cut_in, cut_out):
     the environment's step compiles this function.
     """
     return (p1 < cut_in) | (ran & (p1 < cut_out))
+
+
+REFILL_DELIVERY = 0.8
+"""Air that a full line passes into the reservoirs: from 5 to 12.5 bar within a second [kg/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,6 +39,8 @@ class Supply:
     """Pressure at which the compressor stops [Pa absolute]."""
     delivery: float = 0.0
     """Air that the running compressor delivers [kg/s]."""
+    idle_until: float = 0.0
+    """Time since the episode's start before which the compressor stands still [s]."""
     recording: tuple[NDArray, NDArray] | None = None
     """Recorded time [s] and p1 [Pa absolute], held constant beyond its ends."""
 
@@ -79,6 +85,15 @@ class Supply:
         )
 
     @classmethod
+    def starved(cls, pressure_bar: float, *, refill_s: float) -> "Supply":
+        """Reservoirs at a low pressure [bar absolute], cut off until a full line refills them.
+
+        The refill begins at refill_s [s] and lasts less than a second.
+        """
+        reservoirs = cls.reservoirs((pressure_bar, pressure_bar))
+        return replace(reservoirs, delivery=REFILL_DELIVERY, idle_until=refill_s)
+
+    @classmethod
     def recorded(cls, time_s: NDArray, pressure_bar: NDArray) -> "Supply":
         """A measured p1, linear between its samples.
 
@@ -104,9 +119,15 @@ class Supply:
             return np.zeros_like(time)
         return (np.interp(time + period, *self.recording) - np.interp(time, *self.recording)) / period
 
-    def compressor_runs(self, p1: NDArray, ran: NDArray) -> NDArray:
+    @property
+    def lasting(self) -> float:
+        """Pressure that the supply has in the long run, at least [Pa absolute]."""
+        return max(self.pressure[0], self.cut_in)
+
+    def compressor_runs(self, p1: NDArray, ran: NDArray, time: float) -> NDArray:
         """Whether the compressor runs now, boolean (n,), by two-point control with memory.
 
-        p1: supply pressure (n,) [Pa absolute]. ran: whether it ran before, boolean (n,).
+        p1: supply pressure (n,) [Pa absolute]. ran: whether it ran before, boolean (n,). time: since
+        the episode's start [s].
         """
-        return two_point(p1, ran, self.cut_in, self.cut_out)
+        return two_point(p1, ran, self.cut_in, self.cut_out) & (time >= self.idle_until)

@@ -148,7 +148,7 @@ def _learning(share: float) -> Run:
     periods = model.n_steps * model.n_envs
 
     def run() -> int:
-        model.learn(periods)
+        model.learn(periods, reset_num_timesteps=False)
         return periods
 
     return run
@@ -187,8 +187,8 @@ INTERFACES = {
             one_thread=True,
         ),
         Interface(name="stable-baselines3 VecEnv, 256 valves", begin=partial(_adapted, 256)),
-        Interface(name="PPO collecting, 256 valves", begin=_collecting),
-        Interface(name="PPO, learning included, 256 valves", begin=_learning),
+        Interface(name="PPO as in make train, collecting", begin=_collecting),
+        Interface(name="PPO as in make train, learning included", begin=_learning),
     )
 }
 """All interfaces by name; threads are those of the plant, PyTorch has one."""

@@ -119,6 +119,42 @@ def test_p3_vents_at_one_rate_until_the_valve_opens(plant, table):
     assert valves.state.p3 == pytest.approx(opening, rel=1e-3)
 
 
+def test_an_empty_chamber_is_seen_to_shut_late(plant, table):
+    """A valve that begins wide open over an empty chamber: first filling, and after a long release."""
+    p1, p2 = np.array([10.5, 11.5, 12.5]), np.array([3.5, 4.5, 6.0])
+    valves = Valves(3, threads=1)
+    start = energised(plant, p1=p1 * BAR, p2=p2 * BAR, U=24.0)
+    empty = start._replace(
+        p3=np.full(3, plant["p_env"]), xPV=np.full(3, plant["xPVmax"]), xMV=0.0, I=0.0, I_coil=0.0
+    )
+    for field, value in zip(valves.state, empty, strict=True):
+        field[:] = value
+    valves.inputs.U[:] = 24.0
+    valves.advance(150e-3)
+    assert not np.any(valves.state.xPV)
+    p3 = np.full(3, plant["p_env"] / BAR)
+    foreseen = table.gained(p1, p2, p3, np.zeros(3))
+    np.testing.assert_allclose(foreseen, valves.state.p2 / BAR - p2, rtol=0.05)
+    assert np.all(foreseen > 1.3 * table.gained(p1, p2, np.full(3, 3.0), np.zeros(3)))
+
+
+def test_a_chamber_vents_in_the_time_foretold(plant, table):
+    """Down to subcritical pressures, where ln p3 falls more slowly."""
+    p1, p2 = np.array([11.0]), np.array([7.0])
+    valves = Valves(1, threads=1)
+    for field, value in zip(
+        valves.state, energised(plant, p1=p1 * BAR, p2=p2 * BAR, U=24.0), strict=True
+    ):
+        field[:] = value
+    valves.set_parameters(np.arange(1), {**plant, "V2": 1e9 * plant["V2"]})
+    seen = []
+    for _ in range(30):
+        valves.advance(10e-3)
+        seen.append(float(table.venting_age(p1, p2, valves.state.p3 / BAR)[0]))
+    assert valves.state.p3 < 1.3 * BAR
+    np.testing.assert_allclose(np.diff(seen[2:]), 10e-3, rtol=0.02)
+
+
 def test_one_valve_is_answered_as_a_batch_to_the_bit(table, cases):
     asked = np.linspace(0.0, 1.0, len(cases[0]))
     together = table.duration(*cases, asked, -1.5), table.gained(*cases, asked / 20, -1.5)

@@ -13,6 +13,7 @@ from training.console.command import COMMANDS, IDENTIFICATION
 NEEDED: dict[str, list[str]] = {
     "train": ["--plant", "nowhere.json"],
     "compare": ["--tradeoff", "nowhere", "--cluster", "nowhere", "--scenarios", "flood"],
+    "hard-scenarios": ["--scenarios", "flood"],
     "sweep": ["--plant", "nowhere.json"],
     "tune": ["--only", "flood"],
     "tradeoff": ["--kinds", "flood"],

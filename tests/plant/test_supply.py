@@ -52,7 +52,7 @@ def test_the_compressor_remembers_between_its_thresholds():
     p1 = np.array([10.4, 11.5, 12.4, 12.5, 11.5, 10.6, 10.5, 10.49]) * BAR
     runs, seen = np.array([False]), []
     for pressure in p1:
-        runs = supply.compressor_runs(np.array([pressure]), runs)
+        runs = supply.compressor_runs(np.array([pressure]), runs, 0.0)
         seen.append(bool(runs[0]))
     assert seen == [True, True, True, False, False, False, False, True]
 
@@ -62,7 +62,7 @@ def test_a_compressor_cycles_between_its_thresholds():
     supply = Supply.reservoirs()
     p1, runs, seen = np.array([11e5]), np.array([False]), []
     for _ in range(4000):
-        runs = supply.compressor_runs(p1, runs)
+        runs = supply.compressor_runs(p1, runs, 0.0)
         p1 = p1 + 0.1 * RT / supply.volume * (supply.delivery * runs - 2e-3)
         seen.append(p1[0])
     assert min(seen) == pytest.approx(10.5e5, abs=300)
@@ -72,7 +72,7 @@ def test_a_compressor_cycles_between_its_thresholds():
 
 def test_a_constant_supply_never_starts_a_compressor():
     supply = Supply.constant(8.0)
-    assert not supply.compressor_runs(np.array([1e-3, 8e5]), np.array([False, False])).any()
+    assert not supply.compressor_runs(np.array([1e-3, 8e5]), np.array([False, False]), 0.0).any()
 
 
 def test_first_pressures_are_drawn_from_the_range():

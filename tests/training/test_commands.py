@@ -37,7 +37,7 @@ def command(*arguments, script="training/train_ppo.py"):
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
     out = tmp_path_factory.mktemp("run")
-    result = command("--quick", "--out", out)
+    result = command("--quick", "--no-memory", "--out", out)
     assert result.returncode == 0, result.stderr
     return out, result
 
@@ -55,7 +55,7 @@ def test_the_short_run_writes_everything_and_prints_the_table(finished):
 def test_a_run_resumes_from_its_checkpoint(finished):
     out, _ = finished
     before = (out / "learning_curve.csv").read_text().splitlines()
-    result = command("--quick", "--out", out, "--resume")
+    result = command("--quick", "--no-memory", "--out", out, "--resume")
     assert result.returncode == 0, result.stderr
     assert (out / "learning_curve.csv").read_text().splitlines()[: len(before)] == before
 
@@ -71,7 +71,7 @@ def test_a_run_has_one_identity_in_all_that_it_writes(finished):
 def test_a_finished_run_is_not_overwritten_unasked(finished):
     out, _ = finished
     before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
-    result = command("--quick", "--out", out, "--seed", "5")
+    result = command("--quick", "--no-memory", "--out", out, "--seed", "5")
     assert (result.returncode, result.stderr.count("\n")) == (2, 1)
     assert "holds a finished training: give --force to replace it" in result.stderr
     assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
@@ -84,7 +84,7 @@ def test_a_resumed_run_never_hands_out_another_runs_policy(finished, tmp_path):
     config["run"], config["options"]["seed"] = "0" * 32, 5
     (tmp_path / "config.json").write_text(json.dumps(config))
     shutil.copy(out / "checkpoint.zip", tmp_path)
-    result = command("--quick", "--out", tmp_path, "--resume", "--seed", "5")
+    result = command("--quick", "--no-memory", "--out", tmp_path, "--resume", "--seed", "5")
     assert (result.returncode, result.stderr.count("\n")) == (2, 1)
     assert "belongs to the training run" in result.stderr
     assert {path.name for path in tmp_path.iterdir()} == {"config.json", "checkpoint.zip"}
@@ -92,17 +92,17 @@ def test_a_resumed_run_never_hands_out_another_runs_policy(finished, tmp_path):
 
 
 def test_a_policy_with_a_memory_is_trained_in_the_short_form_too(tmp_path):
-    result = command("--quick", "--recurrent", "--timesteps", "16384", "--out", tmp_path)
+    result = command("--quick", "--timesteps", "16384", "--out", tmp_path)
     assert result.returncode == 0, result.stderr
     assert "PPO, recurrent" in result.stdout
     assert json.loads((tmp_path / "policy.json").read_text())["memory"]["unit"] == "GRU"
-    result = command("--quick", "--out", tmp_path, "--resume")
-    assert "was trained with recurrent True, not False" in result.stderr
+    result = command("--quick", "--no-memory", "--out", tmp_path, "--resume")
+    assert "was trained with memory True, not False" in result.stderr
 
 
 def test_resuming_with_another_seed_is_refused(finished):
     out, _ = finished
-    result = command("--quick", "--out", out, "--resume", "--seed", "5")
+    result = command("--quick", "--no-memory", "--out", out, "--resume", "--seed", "5")
     assert result.returncode == 2
     assert "resume with the same" in result.stderr
 

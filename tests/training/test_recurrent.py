@@ -25,8 +25,9 @@ from epv_env.reward import RewardWeights
 from tests.training.policies import random_layers
 from training.deploy.double_precision import in_double, logits_along
 from training.evaluation.rollout import begin_episodes, make_env, run_episodes
-from training.learners.distillation import Distillation, distil, known_plants
+from training.learners.distillation import Distillation, distil
 from training.learners.hyperparameters import Hyperparameters
+from training.learners.lessons import known_plants
 from training.learners.policy_files import greedy_policy, put_layers, save_policy
 from training.learners.ppo import make_model
 from training.learners.recurrent_training import train_recurrent
@@ -41,8 +42,8 @@ OPTIONS = {
     "weights": RewardWeights(),
 }  # fmt: skip
 TINY = Distillation(
-    memory=8, width=16, rounds=3, plants=4, episodes=16, periods=60, handover=2, kept=2, epochs=1,
-    batch=8, validations=2, validation_episodes=8, validation_duration=0.8,
+    memory=8, width=16, rounds=3, plants=4, episodes=16, periods=60, handover=2, kept=2, steps=4,
+    window=30, batch=16, validations=2, validation_episodes=8, validation_duration=0.8,
 )  # fmt: skip
 TINY_PPO = Hyperparameters(
     num_envs=8, width=16, n_steps=16, batch_size=64, episode_steps=30, imitation_epochs=1, validations=2,
@@ -71,6 +72,11 @@ def same(one, other) -> bool:
     return all(np.array_equal(a, b) for a, b in zip(weights(one), weights(other), strict=True))
 
 
+def nothing(n) -> torch.Tensor:
+    """The recurrent state of n episodes that begin."""
+    return torch.zeros(n, TINY.memory)
+
+
 SIMPLE = Hysteresis(
     open_below=0.0, shut_above=0.0, open_lookahead=0.01, shut_lookahead=0.01, name="simple"
 )
@@ -79,7 +85,7 @@ SIMPLE = Hysteresis(
 
 def test_the_policy_computes_what_torch_does(student, readings):
     with torch.no_grad():
-        expected = student(torch.as_tensor(readings.swapaxes(0, 1).copy())).numpy().T
+        expected = student(torch.as_tensor(readings.swapaxes(0, 1).copy()), nothing(6)).numpy().T
     policy = policy_of(student)
     policy.reset(readings.shape[1])
     logits = np.array([policy.logits(part) for part in readings])
@@ -90,7 +96,9 @@ def test_in_double_precision_too(student, readings):
     """Where the order of sums is of no account."""
     along = readings.swapaxes(0, 1).copy()
     with torch.no_grad():
-        expected = deepcopy(student).double()(torch.as_tensor(along).double()).numpy()
+        expected = (
+            deepcopy(student).double()(torch.as_tensor(along).double(), nothing(6).double()).numpy()
+        )
     logits = logits_along(in_double(policy_of(student)), along)
     np.testing.assert_allclose(logits[..., 1] - logits[..., 0], expected, atol=1e-12)
 
@@ -215,7 +223,7 @@ def untrained_policy(d, seed):
 
 
 def test_a_student_comes_to_act_as_its_teacher():
-    longer = replace(TINY, rounds=10, epochs=4, learning_rate=1e-2)
+    longer = replace(TINY, rounds=10, steps=16, learning_rate=1e-2)
     plants = known_plants(longer.plants, OPTIONS, seed=1, quiet=True)
     student = distil(longer, SIMPLE, plants, options=OPTIONS, seed=1, quiet=True)
     assert agreement(student, SIMPLE) > 0.9

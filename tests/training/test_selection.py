@@ -8,8 +8,6 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 
-from stable_baselines3 import PPO
-
 from controllers.learned import LearnedPolicy
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
@@ -17,6 +15,7 @@ from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.rollout import run_episodes
 from training.evaluation.seeds import VALIDATION_SEED
 from training.learners import learning_log
+from training.learners.batch_ppo import BatchPPO
 from training.learners.checkpoint_selection import validation_points
 from training.learners.hyperparameters import Hyperparameters
 from training.learners.learning_log import VALIDATION_FILE
@@ -107,7 +106,7 @@ def test_a_resumed_training_keeps_what_was_validated_before(tmp_path):
 def test_a_killed_training_resumes_to_the_same_policy(finished, tmp_path, monkeypatch, rollouts):
     """To the bit: the run dies after some rollouts, without a word, and its last checkpoint is old."""
     _, policy = finished
-    collected = PPO.collect_rollouts
+    collected = BatchPPO.collect_rollouts
     remaining = iter(range(rollouts))
 
     def dying(*arguments, **named):
@@ -115,7 +114,7 @@ def test_a_killed_training_resumes_to_the_same_policy(finished, tmp_path, monkey
             raise SystemError("killed")
         return collected(*arguments, **named)
 
-    monkeypatch.setattr(PPO, "collect_rollouts", dying)
+    monkeypatch.setattr(BatchPPO, "collect_rollouts", dying)
     monkeypatch.setattr(learning_log, "CHECKPOINT_SECONDS", 0.0 if rollouts == 3 else 3600.0)
     with pytest.raises(SystemError):
         trained(tmp_path)

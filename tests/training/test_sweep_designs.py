@@ -12,11 +12,11 @@ from epv_env.plant.parameters import Parameters, sensitive_symbols, table
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import CALIBRATED_SYMBOLS, Region
 from epv_env.settings import make_settings
+from training.evaluation.effect_levels import LEVELS, effect_levels
 from training.evaluation.rollout import run_episodes
 from training.evaluation.seeds import SWEEP_SEED
 from training.studies.episode_tasks import Batch, Study, condensed
 from training.studies.parallel_run import Outcome
-from training.studies.sweeps.effect_levels import LEVELS, effect_levels
 from training.studies.sweeps.episode_plan import TASK_EPISODES, Size, cells, chosen_points
 from training.studies.sweeps.experiment_designs import ONE_AT_A_TIME, hypercube, parameters, regions
 from training.studies.sweeps.parameter_space import Space

@@ -26,7 +26,7 @@ class EvaluationScenario:
     """Of the environment: consumption, target, supply, first pressure; defaults elsewhere."""
 
 
-def _consumption(like: str | None = None, **ranges: Any) -> Scenario:
+def consumption(like: str | None = None, **ranges: Any) -> Scenario:
     """A consumption of its own, or one of the environment's with other ranges."""
     if like is None:
         return Scenario(meaning="of an evaluation scenario", **ranges)
@@ -46,7 +46,7 @@ NAMED: dict[str, EvaluationScenario] = {
     ),
     "steady draw": EvaluationScenario(
         meaning="1 to 4 g/s all the time",
-        options={"scenario": _consumption(leak=(1.0, 4.0))},
+        options={"scenario": consumption(leak=(1.0, 4.0))},
     ),
     "service": EvaluationScenario(
         meaning="service braking: ramps to 1 to 3.5 g/s every few seconds",
@@ -59,7 +59,7 @@ NAMED: dict[str, EvaluationScenario] = {
     "one emergency": EvaluationScenario(
         meaning="a single application of 5 to 5.5 g/s for 2 to 3 s, after seconds of rest",
         options={
-            "scenario": _consumption(
+            "scenario": consumption(
                 "emergency", flow=(5.0, 5.5), hold=(2.0, 3.0), first=(2.0, 4.0), pause=(60.0, 60.0)
             )
         },
@@ -75,7 +75,7 @@ NAMED: dict[str, EvaluationScenario] = {
     "anti-lock": EvaluationScenario(
         meaning="faster modulation than any in training: six to twelve bursts of 3 to 5.5 g/s a second",
         options={
-            "scenario": _consumption("pumping", flow=(3.0, 5.5), hold=(0.04, 0.08), pause=(0.04, 0.08))
+            "scenario": consumption("pumping", flow=(3.0, 5.5), hold=(0.04, 0.08), pause=(0.04, 0.08))
         },
     ),
     "creeping": EvaluationScenario(
@@ -84,19 +84,17 @@ NAMED: dict[str, EvaluationScenario] = {
     ),
     "staircase": EvaluationScenario(
         meaning="levels of 0.5 to 5 g/s that follow one another without a pause",
-        options={"scenario": _consumption(flow=(0.5, 5.0), hold=(0.3, 0.8), pause=(0.0, 0.0))},
+        options={"scenario": consumption(flow=(0.5, 5.0), hold=(0.3, 0.8), pause=(0.0, 0.0))},
     ),
     "parking": EvaluationScenario(
         meaning="seconds of rest, then a short application: the valve has to wake up",
         options={
-            "scenario": _consumption(
-                flow=(2.0, 4.0), hold=(0.1, 0.3), pause=(2.5, 3.5), first=(2.5, 3.5)
-            )
+            "scenario": consumption(flow=(2.0, 4.0), hold=(0.1, 0.3), pause=(2.5, 3.5), first=(2.5, 3.5))
         },
     ),
     "worst repeated": EvaluationScenario(
         meaning="the largest step, 5.5 g/s, again and again at the pace of the valve's own overshoot",
-        options={"scenario": _consumption(flow=(5.5, 5.5), hold=(0.2, 0.4), pause=(0.2, 0.4))},
+        options={"scenario": consumption(flow=(5.5, 5.5), hold=(0.2, 0.4), pause=(0.2, 0.4))},
     ),
     "compressor off": EvaluationScenario(
         meaning="40 litres at 9.5 to 10.5 bar that nothing refills, emergencies",

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from epv_env.conditions import CONDITIONS, Conditions
 from epv_env.reward import BAND_BAR, RewardWeights
 
 
@@ -9,17 +10,17 @@ from epv_env.reward import BAND_BAR, RewardWeights
 class Hyperparameters:
     """What defines a training with PPO; the rest is stable-baselines3's default."""
 
-    num_envs: int = 256
+    num_envs: int = 1024
     """Episodes that run side by side."""
     episode_steps: int = 600
     """Length of a training episode [control periods] (3 s)."""
-    n_steps: int = 64
+    n_steps: int = 32
     """Length of a rollout between two updates [control periods]."""
-    batch_size: int = 2048
+    batch_size: int = 4096
     """Transitions of a gradient step."""
-    n_epochs: int = 3
-    """Passes over a rollout in each update."""
-    learning_rate: float = 7e-4
+    n_epochs: int = 1
+    """Passes over a rollout in each update. Another environment step costs less than another pass."""
+    learning_rate: float = 1.5e-3
     """Adam's step size at the start; it falls linearly to `last_learning_rate`."""
     last_learning_rate: float = 2e-5
     """Adam's step size at the end."""
@@ -33,7 +34,7 @@ class Hyperparameters:
     """Half-width of the band with this price, at most C1's; a narrower one keeps a margin [bar]."""
     breakdown_price: float = 0.0
     """Price of the shortfall below the target in training, unless the reward's own is higher."""
-    imitation_epochs: int = 8
+    imitation_epochs: int = 2
     """Passes over the demonstration that the model imitates first (training/learners/imitation.py)."""
     sharpness: float = 1.0
     """Factor of the logits of a student to go on from [1]: the larger, the less it explores."""
@@ -53,14 +54,19 @@ class Hyperparameters:
     """Episodes of a validation."""
     validation_duration: float = 6.0
     """Length of a validation episode [s]."""
+    conditions: Conditions = CONDITIONS["ordinary"]
+    """What training episodes may meet beyond the ordinary; validation episodes are ordinary."""
 
 
 FROM_STUDENT = Hyperparameters(
     band_price=10.0, band_bar=0.32, breakdown_price=2.0, sharpness=3.0, ent_coef=0.0,
-    learning_rate=1e-4, last_learning_rate=5e-6, n_steps=128, batch_size=8192, gae_lambda=0.98,
-    first_validation=0.05,
+    learning_rate=1.5e-4, last_learning_rate=5e-6, batch_size=2048, gae_lambda=0.98,
+    validations=5, first_validation=0.2,
 )  # fmt: skip
 """For a recurrent policy that goes on from its student.
+
+Episodes are ordinary: the unavoidable price of starts far below the target would drown what the others
+teach. The student knows such starts from its lessons.
 
 One control period more of a pulse is worth 200 mbar, so more exploration than the student's own doubt
 teaches caution only. The student keeps within the band, so the prices near the band's edge and of a

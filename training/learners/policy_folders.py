@@ -19,10 +19,13 @@ from epv_env.reward import RewardWeights
 from training.evaluation.scenarios import TUNING_REGION
 from training.learners.run_folder import STUDENT_FOLDER
 
-RECURRENT_TIMESTEPS = 5_000_000
+MEMORYLESS_TIMESTEPS = 5_000_000
+"""Environment steps of PPO for a policy without memory."""
+
+RECURRENT_TIMESTEPS = 8_000_000
 """Environment steps of PPO for a recurrent policy."""
 
-DISTILLATION_STEPS = 25_000_000
+DISTILLATION_STEPS = 15_000_000
 """Environment steps of PPO that take about as long as a distillation (distillation.py)."""
 
 

@@ -19,6 +19,7 @@ from controllers.tuned import build, load_tunings
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
+from training.learners.batch_ppo import BatchPPO
 from training.learners.checkpoint_selection import Selection, validation_points
 from training.learners.hyperparameters import Hyperparameters
 from training.learners.imitation import imitate
@@ -37,16 +38,20 @@ from training.learners.run_state import (
     with_nan,
 )
 from training.learners.schedules import FadingEntropy, linear
-from training.learners.training_env import make_training_env
+from training.learners.training_env import make_training_env, seed_episodes
 from training.learners.validation import ValidationSettings
 
 TEACHER = "pulse"
 """Controller that a model imitates first: the best that does not simulate, on the calibrated plant."""
 
 
+FUSED_ADAM = {"fused": True, "eps": 1e-5}
+"""stable-baselines3's settings of Adam, its update in one kernel."""
+
+
 def make_model(h: Hyperparameters, env: VecEnv, *, seed: int, device: str) -> PPO:
     """A new PPO model. device: of torch."""
-    model = PPO(
+    model = BatchPPO(
         "MlpPolicy",
         env,
         n_steps=h.n_steps,
@@ -56,11 +61,12 @@ def make_model(h: Hyperparameters, env: VecEnv, *, seed: int, device: str) -> PP
         gamma=h.gamma,
         gae_lambda=h.gae_lambda,
         ent_coef=h.ent_coef,
-        policy_kwargs={"net_arch": [h.width, h.width]},
+        policy_kwargs={"net_arch": [h.width, h.width], "optimizer_kwargs": FUSED_ADAM},
         seed=seed,
         device=device,
     )
     model.set_logger(Logger(folder=None, output_formats=[]))  # its own leaves an empty folder in /tmp
+    seed_episodes(env, seed)  # the model has seeded them, too, and other trainings' alike
     return model
 
 

@@ -12,9 +12,10 @@ from controllers.learned import LearnedPolicy, holds_policy, load_policy
 from controllers.policy_contract import read_contract
 from controllers.privileged_pulse import PrivilegedPulse
 from epv_env.actions import OnOff
-from training.learners.distillation import Distillation, distil, known_plants
+from training.learners.distillation import Distillation, distil
 from training.learners.hyperparameters import Hyperparameters, switching_is_cheap
 from training.learners.learning_log import TrainingLog
+from training.learners.lessons import known_plants
 from training.learners.policy_files import save_policy
 from training.learners.ppo import train
 from training.learners.run_folder import MEMORYLESS_FOLDER, STUDENT_FOLDER

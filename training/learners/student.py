@@ -28,12 +28,13 @@ class Student(torch.nn.Module):
             torch.nn.Linear(width, 1),
         )  # fmt: skip
 
-    def forward(self, observations: torch.Tensor) -> torch.Tensor:
-        """Log odds of energising the coil (episodes, periods).
+    def forward(self, observations: torch.Tensor, before: torch.Tensor) -> torch.Tensor:
+        """Log odds of energising the coil (windows, periods).
 
-        observations: (episodes, periods, entries).
+        observations: (windows, periods, entries). before: recurrent state that each window begins with,
+        (windows, cells).
         """
-        states, _ = self.memory(observations)
+        states, _ = self.memory(observations, before[None])
         return self.layers(torch.cat([observations, states], dim=-1))[..., 0]
 
 
@@ -73,6 +74,6 @@ def load_student(folder: Path, h: Hyperparameters = FROM_STUDENT) -> LearnedPoli
         raise ValueError(
             f"the policy in {folder} has {student.cells} cells and hidden layers of {widths}: PPO goes "
             f"on from one with a memory and layers of {[h.width, h.width]}, as `python "
-            f"training/train_ppo.py --recurrent` writes into its folder `{STUDENT_FOLDER}`"
+            f"training/train_ppo.py` writes into its folder `{STUDENT_FOLDER}`"
         )
     return student

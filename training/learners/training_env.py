@@ -1,6 +1,6 @@
 """The environment that PPO trains on: drawn plants, scaled rewards, a recurrent unit's state."""
 
-from stable_baselines3.common.vec_env import VecEnvWrapper, VecMonitor
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
 from controllers.learned import GatedUnit
@@ -30,6 +30,14 @@ class ScaledReward(VecEnvWrapper):
         return observation, self._scale * reward, done, infos
 
 
+def seed_episodes(env: VecEnv, seed: int) -> None:
+    """Give the environments the first episodes of the training with this seed.
+
+    Raises ValueError if the seed is too large (training/evaluation/seeds.py).
+    """
+    env.seed(training_seeds(seed, env.num_envs)[0])
+
+
 def make_training_env(
     h: Hyperparameters,
     *,
@@ -43,7 +51,8 @@ def make_training_env(
     """Episodes on drawn plants. Trainings with different seeds meet different episodes.
 
     Args:
-        h: hyperparameters, of which the number and the length of episodes and the reward's scale count.
+        h: hyperparameters, of which the number, length and conditions of episodes and the reward's
+            scale count.
         plant: centre of the region.
         scenario: of the consumption.
         parameters: region that plants are drawn from, "confidence" or another (epv_env.settings).
@@ -62,7 +71,8 @@ def make_training_env(
         parameters=parameters,
         scenario=scenario,
         weights=weights,
+        conditions=h.conditions,
     )
-    env.seed(training_seeds(seed, h.num_envs)[0])
+    seed_episodes(env, seed)
     scaled = ScaledReward(VecMonitor(env), h.reward_scale)
     return RecurrentStateWrapper(scaled, cell) if cell else scaled

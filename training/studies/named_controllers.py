@@ -8,11 +8,15 @@ from pathlib import Path
 from controllers.base import Controller
 from controllers.learned import load_policy
 from controllers.policy_contract import CONTRACT_FILE, WEIGHTS_FILE
+from controllers.privileged_pulse import PrivilegedPulse
 from controllers.tuned import build, load_tunings
 from epv_env.plant.parameters import Parameters
 
 DEFAULT = ("hysteresis, extrapolating", "pulse", "PWM")
 """Controllers that are swept unless others are named: good ones that compute little."""
+
+INFORMED = PrivilegedPulse.name
+"""Knows each valve's parameters, and needs no tuning: a reference, not a rival."""
 
 
 def named_controllers(
@@ -20,7 +24,8 @@ def named_controllers(
 ) -> tuple[dict[str, Controller], dict[str, str]]:
     """Controllers by label, and a digest of what each was made from.
 
-    sources: a tuned kind (controllers/tuned.json), a folder that training wrote, or LABEL=FOLDER.
+    sources: a tuned kind (controllers/tuned.json), "pulse, informed", a folder that training
+    wrote, or LABEL=FOLDER.
     parameters: of the plant that the classic ones are designed for. Raises ValueError.
     """
     controllers: dict[str, Controller] = {}
@@ -40,6 +45,8 @@ def _named(source: str, parameters: Parameters) -> tuple[str, Controller, bytes]
     if source in tunings:
         values = tunings[source].values
         return source, build(source, values, parameters), json.dumps(values, sort_keys=True).encode()
+    if source == INFORMED:
+        return source, build(source, {}, parameters), source.encode()
     label, _, folder = source.rpartition("=")
     path = Path(folder)
     if not path.is_dir():

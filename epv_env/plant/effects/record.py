@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.primitives.values import Value
@@ -43,6 +44,23 @@ class Size:
     """Standard deviation between recordings of one valve; None: the size is the same in all of them."""
     difference: float | None = None
     """Change for a finite difference, where `scatter` is given."""
+
+    @property
+    def typical(self) -> float:
+        """The geometric middle of what trials and sweeps draw."""
+        low, high = self.drawn or self.swept or (0.0, 0.0)
+        return float(np.sqrt(low * high))
+
+    @property
+    def mild(self) -> tuple[float, float]:
+        """The drawn sizes from the weakest to the typical, least first."""
+        low, high = self.drawn or self.swept or (0.0, 0.0)
+        return (self.typical, high) if self.stronger_when_smaller else (low, self.typical)
+
+    def draw(self, rng: np.random.Generator, sizes: tuple[float, float]) -> float:
+        """A size, log-uniform between two sizes; with either sign if it has two."""
+        drawn = float(np.exp(rng.uniform(*np.log(sizes))))
+        return -drawn if self.either_sign and rng.uniform() < 0.5 else drawn
 
 
 @dataclass(frozen=True, kw_only=True)

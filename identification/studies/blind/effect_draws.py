@@ -5,7 +5,6 @@ From about a tenth of the top to the top, log-uniform: small ones show where det
 
 import numpy as np
 
-from epv_env.plant.effects.record import Size
 from epv_env.plant.effects.registry import effect
 
 PARAMETER_OFF = (0.015, 0.05)
@@ -19,19 +18,12 @@ def draw_sizes(name: str, rng: np.random.Generator) -> dict[str, float]:
     """Sizes of one variant of an effect of the catalogue by symbol [SI]. Raises EffectError."""
     alternatives = effect(name).drawn
     chosen = alternatives[int(rng.integers(len(alternatives)))]
-    return {size.symbol: _draw(size, rng) for size in chosen}
+    return {size.symbol: size.draw(rng, size.drawn or (0.0, 0.0)) for size in chosen}
 
 
 def top_sizes(name: str) -> dict[str, float]:
     """Sizes of an effect at the top of what is drawn, by symbol [SI]. Raises EffectError."""
     return {size.symbol: (size.drawn or (0.0, 0.0))[1] for size in effect(name).drawn[0]}
-
-
-def _draw(size: Size, rng: np.random.Generator) -> float:
-    """One size [SI], log-uniform in its drawn range."""
-    low, high = size.drawn or (0.0, 0.0)
-    drawn = float(np.exp(rng.uniform(np.log(low), np.log(high))))
-    return -drawn if size.either_sign and rng.uniform() < 0.5 else drawn
 
 
 def draw_parameter(value: float, rng: np.random.Generator) -> float:

@@ -68,13 +68,13 @@ class Result:
         return float(np.nanmax(np.abs(own - others)))
 
 
-def flows(count: int) -> NDArray:
+def flows(count: int, highest: float = 10.0) -> NDArray:
     """Evenly spaced flows, (count,).
 
     The public benchmark begins at 0.2. There the first rebounds accumulate to infinitely many, which
-    its programs leave to rounding.
+    its programs leave to rounding. It ends at 10.
     """
-    return np.linspace(0.3, 10.0, count)
+    return np.linspace(0.3, highest, count)
 
 
 @inlined

@@ -10,7 +10,7 @@ from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import table
 from epv_env.plant.plantfile import Plant
 from identification.sensitivity.one_at_a_time import changed_values
-from training.studies.sweeps.effect_levels import effect_levels
+from training.evaluation.effect_levels import effect_levels
 from training.studies.sweeps.parameter_space import Space
 
 JOINT = ("exact", "confidence", "ten_percent", "sensitive_ten_percent")

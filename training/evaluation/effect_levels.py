@@ -2,8 +2,6 @@
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from epv_env.plant.effects.record import Size
 from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.parameters import table
@@ -35,10 +33,9 @@ def _name(effect: str, sizes: tuple[Size, ...], sign: int, *, several: bool) -> 
 def _size(size: Size, level: str, sign: int) -> float:
     """A size, with its sign [SI]."""
     low, high = size.drawn or size.swept or (0.0, 0.0)
-    middle = float(np.sqrt(low * high))
     if size.stronger_when_smaller:
-        return {"small": high, "typical": middle, "top": low}[level]
+        return {"small": high, "typical": size.typical, "top": low}[level]
     least, greatest = table()[size.symbol].domain or (0.0, 0.0)
     if level == "top":
         return greatest if sign > 0 else least
-    return sign * (low if level == "small" else middle)
+    return sign * (low if level == "small" else size.typical)

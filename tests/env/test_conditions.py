@@ -1,0 +1,193 @@
+"""Conditions beyond the ordinary do what they say, in the single environment and the batch alike."""
+
+from dataclasses import replace
+
+import gymnasium
+import numpy as np
+import pytest
+
+from epv_env.arguments import OptionError
+from epv_env.common.units import BAR
+from epv_env.condition_draws import WORN, under_conditions
+from epv_env.conditions import CONDITIONS, PROBABILITIES, Conditions
+from epv_env.episode import Start
+from epv_env.observation import INDEX
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.plantfile import Plant
+from epv_env.settings import make_settings
+from tests.env.rollouts import actions, assert_same, native, run, side_by_side
+
+PERIOD = 5e-3
+DRAWS = 200
+
+
+def starts(**conditions):
+    """Episodes' starts under conditions, and the same without."""
+    settings = make_settings(Plant.calibrated(), control_period=PERIOD)
+    plain = [Start.draw(np.random.default_rng(seed), settings) for seed in range(DRAWS)]
+    return [under_conditions(start, Conditions(**conditions)) for start in plain], plain
+
+
+def observed(name, options, commands, n=2):
+    """Entries of the observations after each step (periods, n) [-], and the environment."""
+    env = native("EPValve-v0", n, sensor_noise=0.0, **options)
+    env.reset(seed=1)
+    return np.array([env.step(np.full(n, command))[0][:, INDEX[name]] for command in commands]), env
+
+
+@pytest.mark.parametrize("identifier", ["EPValve-v0", "EPValvePWM-v0"])
+def test_single_and_batch_agree_under_all_conditions(identifier):
+    options = {"conditions": Conditions(**dict.fromkeys(PROBABILITIES, 0.5)), "max_episode_steps": 40}
+    commands = actions(identifier, 5, 90)
+    found = run(native(identifier, 5, **options), commands)
+    assert_same(found, run(side_by_side(identifier, 5, **options), commands))
+
+
+def test_conditions_are_an_option_of_reset_that_lasts_one_episode():
+    env = gymnasium.make("EPValve-v0")
+    vented = {"vented": 1.0}
+    first, _ = env.reset(seed=3, options={"conditions": vented})
+    expected, _ = gymnasium.make("EPValve-v0", conditions=vented).reset(seed=3)
+    np.testing.assert_array_equal(first, expected)
+    again, _ = env.reset(seed=3)
+    np.testing.assert_array_equal(again, gymnasium.make("EPValve-v0").reset(seed=3)[0])
+    assert not np.array_equal(first, again)
+
+
+def test_no_condition_leaves_the_episode_as_it_is():
+    found, plain = starts()
+    assert all(a is b for a, b in zip(found, plain, strict=True))
+
+
+@pytest.mark.parametrize("name", PROBABILITIES)
+def test_a_probability_is_the_share_of_the_episodes(name):
+    found, plain = starts(**{name: 0.5})
+    changed = sum(a is not b for a, b in zip(found, plain, strict=True))
+    assert 70 <= changed <= 130  # four standard deviations of 200 coins
+
+
+@pytest.mark.parametrize("name", [name for name in PROBABILITIES if name != "noisy"])
+def test_what_a_condition_draws_does_not_depend_on_the_others_probabilities(name):
+    alone, _ = starts(**{name: 0.3})
+    beside, _ = starts(**{name: 0.3, "noisy": 1.0})
+    for a, b in zip(alone, beside, strict=True):
+        assert str(a) == str(replace(b, noise_factor=a.noise_factor, noise=a.noise))
+
+
+def test_first_states_are_physical():
+    found, plain = starts(**dict.fromkeys(("starved", "far", "vented", "coil_off"), 0.5))
+    for start, usual in zip(found, plain, strict=True):
+        assert 1.5 * BAR < start.p2 <= max(start.p1, usual.p2)
+        assert start.p3 in (start.p1, start.parameters["p_env"])
+        assert start.coil or start is not usual
+
+
+def test_a_worn_valve_has_one_to_three_effects_up_to_their_typical_size():
+    nominal = Parameters.calibrated()
+    mild = {size.symbol: max(map(abs, size.mild)) for sizes in WORN for size in sizes}
+    found, _ = starts(worn=1.0)
+    seen = set()
+    for start in found:
+        sizes = {s: v for s, v in start.parameters.items() if v != nominal[s]}
+        assert 1 <= len(sizes) <= 6
+        assert all(abs(size) <= 1.0001 * mild[symbol] for symbol, size in sizes.items())
+        seen |= set(sizes)
+    assert seen == set(mild)
+
+
+def test_a_bias_and_a_delay_stay_in_their_ranges():
+    found, _ = starts(biased_p2=1.0, delayed=1.0)
+    bias = np.array([start.parameters["b_p2"] for start in found]) / BAR
+    delay = np.array([start.parameters["t_delay"] for start in found])
+    assert -0.256 <= bias.min() < -0.2 < 0.2 < bias.max() <= 0.256
+    assert 0 <= delay.min() < 1e-3 < 4e-3 < delay.max() <= 5e-3
+
+
+def test_a_rest_delays_the_applications_and_nothing_else():
+    found, plain = starts(rest=1.0)
+    later = np.array([a.consumption.applications[0, 0] for a in found])
+    later -= [b.consumption.applications[0, 0] for b in plain]
+    assert 2 <= later.min() < 4 < 60 < later.max() <= 120
+    for a, b in zip(found, plain, strict=True):
+        np.testing.assert_array_equal(a.consumption.applications[1:], b.consumption.applications[1:])
+
+
+def test_a_frozen_p3_reads_the_same_from_its_time_on():
+    options = {"conditions": {"frozen_p3": 1.0, "frozen_p3_s": 0.05}}
+    commands = [0] * 30
+    frozen, _ = observed("p3", options, commands)
+    usual, _ = observed("p3", {}, commands)
+    np.testing.assert_array_equal(frozen[:10], usual[:10])
+    np.testing.assert_array_equal(frozen[10:], frozen[[9]].repeat(20, 0))
+    assert np.all(usual[12] != frozen[12])
+
+
+def test_the_target_steps_at_the_end_of_its_period():
+    options = {
+        "target_bar": 7.0,
+        "conditions": {"target_steps": 1.0, "target_step_s": 0.048, "target_step_bar": 0.3},
+    }  # fmt: skip
+    shown, env = observed("target", options, [1] * 60)
+    targets = 8.0 + 4.0 * shown[:, 0]
+    expected = 7.0 + 0.3 * np.minimum(np.arange(1, 61) * 5e-3 // 0.048, 4)
+    np.testing.assert_allclose(targets, expected, atol=1e-5)
+    np.testing.assert_allclose(env.unwrapped.task.target, 8.2)
+
+
+def test_a_falling_or_unreachable_target_stays_where_the_supply_reaches():
+    found, _ = starts(target_steps=1.0, target_step_bar=(3.0, 5.0))
+    assert all(np.max(s.target_steps_to) * BAR <= s.supply.lasting for s in found)
+
+
+def test_a_starved_supply_is_refilled_within_a_second_and_not_before_its_time():
+    options = {"conditions": {"starved": 1.0, "starved_bar": 1.0, "starved_s": 0.5}, "scenario": "none"}
+    env = native("EPValve-v0", 4, **options)
+    env.reset(seed=1)
+    p1 = []
+    for _ in range(300):
+        env.step(np.ones(4, dtype=int))
+        p1.append(env.unwrapped.task.valves.state.p1 / BAR)
+    p1 = np.array(p1)
+    assert np.all(p1[99] <= env.unwrapped.task.target - 1.0 + 1e-6)
+    assert np.all(p1[101] > p1[99])
+    assert np.all(p1[-1] >= 12.5)
+
+
+def test_a_coil_that_begins_off_lets_the_control_chamber_empty_at_once():
+    off, env = observed("p3", {"conditions": {"coil_off": 1.0}}, [0])
+    on, _ = observed("p3", {}, [0])
+    assert np.all(off < on)
+    assert np.all(env.unwrapped.task.steps == 1)
+
+
+def test_noise_has_its_drawn_size():
+    env = native("EPValve-v0", 64, conditions={"noisy": 1.0, "noise_factor": (0.0, 4.0)})
+    env.reset(seed=1)
+    spread = env.unwrapped.task._noise.std(axis=(1, 2))
+    assert spread.min() < 0.5 < 3.5 < spread.max() < 4.3
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ("flood", "conditions is 'flood': give one of ordinary, broad"),
+        ({"flood": 0.1}, "unknown condition 'flood': known are"),
+        ({"worn": 1.5}, "conditions: worn"),
+        ({"rest_s": (5.0, 2.0)}, "conditions: rest_s"),
+        ({"most_effects": 0}, "most_effects = 0: give a whole number"),
+    ],
+)
+def test_a_wrong_condition_is_refused(given, sentence):
+    with pytest.raises(OptionError, match=sentence):
+        gymnasium.make("EPValve-v0", conditions=given)
+
+
+def test_steps_of_a_moving_target_are_refused():
+    with pytest.raises(OptionError, match="target_steps needs a target_bar that stays"):
+        gymnasium.make("EPValve-v0", conditions={"target_steps": 0.5}, target_bar=lambda t: 7.0)
+
+
+def test_the_broad_conditions_run_without_losing_a_plant():
+    env = native("EPValve-v0", 128, conditions=CONDITIONS["broad"], autoreset_mode="SameStep")
+    rollout = run(env, np.ones((200, 128), dtype=int))
+    assert all(np.all(np.isfinite(step.reward)) for step in rollout.steps)

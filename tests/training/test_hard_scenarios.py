@@ -1,0 +1,121 @@
+"""The scenarios beyond training are what they say, can be met, and come as a table."""
+
+import json
+
+import numpy as np
+import pytest
+
+pytest.importorskip("pandas")
+
+from controllers.hysteresis import Hysteresis
+from epv_env.plant.plantfile import Plant
+from epv_env.reward import REFERENCE_PERIOD
+from epv_env.settings import make_settings
+from training import hard_scenarios
+from training.evaluation.faults import Restart
+from training.evaluation.hard_scenarios import HARD, REFILL_TIME, VENTED_DROP_BAR
+from training.evaluation.rollout import run_episodes
+from training.evaluation.scenarios import TUNING_REGION
+from training.studies.hard_scenarios import all_scenarios, worn_scenarios
+
+pytestmark = pytest.mark.training
+
+
+class Recorder(Hysteresis):
+    """Notes what it sees and when it is reset."""
+
+    def __init__(self) -> None:
+        super().__init__(open_below=-0.1, shut_above=0.0)
+        self.seen, self.resets = [], []
+
+    def reset(self, n):
+        self.resets.append((n, len(self.seen)))
+        super().reset(n)
+
+    def act(self, observations):
+        self.seen.append(observations.copy())
+        return super().act(observations)
+
+
+class Shut(Hysteresis):
+    """Keeps the coil on, which shuts the valve."""
+
+    def act(self, observations):
+        return np.ones(len(observations), dtype=int)
+
+
+class Open(Hysteresis):
+    """Keeps the coil off, which opens the valve."""
+
+    def act(self, observations):
+        return np.zeros(len(observations), dtype=int)
+
+
+@pytest.mark.parametrize("name", all_scenarios())
+def test_the_environment_accepts_every_scenario(name):
+    options = {"control_period": REFERENCE_PERIOD, **all_scenarios()[name].all_options}
+    assert make_settings(Plant.calibrated(), **options).control_period > 0
+    assert all_scenarios()[name].meaning
+
+
+def test_every_typical_effect_is_worn_once():
+    assert len(worn_scenarios()) > 30
+    assert all(len(scenario.options["effects"]) == 1 for scenario in worn_scenarios().values())
+
+
+def test_a_restart_makes_the_controller_forget_once_at_its_time():
+    inner = Recorder()
+    controller = Restart(at=0.05).around(inner, 0.005)
+    run_episodes(controller, seeds=[1, 2], duration=0.1, options={})
+    assert inner.resets == [(2, 0), (2, 10)]
+
+
+def test_an_open_valve_refills_within_the_settling_time():
+    options = {
+        "parameters": TUNING_REGION, "drop_bar": (4.4, 4.4), "scenario": "none",
+        "settling_time": REFILL_TIME,
+    }  # fmt: skip
+    metrics, _ = run_episodes(
+        Open(open_below=-0.1, shut_above=0.0), seeds=list(range(16)), duration=2.0, options=options
+    )
+    assert np.all(metrics.breakdown_bar < 0.5)
+
+
+@pytest.mark.parametrize(("drop", "avoidable"), [(VENTED_DROP_BAR[0], True), (0.3, False)])
+def test_a_vented_valve_can_be_shut_in_time_only_from_far_below(drop, avoidable):
+    options = {
+        "parameters": TUNING_REGION, "p3_bar": (1.0, 1.0), "drop_bar": (drop, drop), "scenario": "none",
+    }  # fmt: skip
+    _, trace = run_episodes(
+        Shut(open_below=-0.1, shut_above=0.0), seeds=list(range(16)), duration=1.5, options=options,
+        trace_of=0,
+    )  # fmt: skip
+    assert trace is not None
+    assert (trace.p2_bar.max() < trace.target_bar + 0.5) == avoidable
+
+
+def test_a_starved_circuit_reaches_its_band_once_refilled_and_not_before():
+    scenario = HARD["starved"]
+    controller = Hysteresis(open_below=0.0, shut_above=0.0)
+    for duration, reached in ((2.9, False), (4.5, True)):
+        _, trace = run_episodes(
+            controller, seeds=list(range(4)), duration=duration, options=scenario.all_options, trace_of=0
+        )
+        assert trace is not None
+        assert (trace.p2_bar.max() > trace.target_bar - 0.5) == reached
+
+
+def test_the_command_writes_a_table(tmp_path, capsys):
+    names = ["restart", "p3 frozen"]
+    arguments = ["--quick", "--out", str(tmp_path), "--scenarios", *names]
+    assert hard_scenarios.main(arguments) == 0
+    content = json.loads((tmp_path / hard_scenarios.RESULT).read_text())
+    assert [row["scenario"] for row in content["rows"]] == names
+    assert all(0 <= row["C1_stayed"] <= 1 for row in content["rows"])
+    assert "restart" in capsys.readouterr().out
+
+
+def test_the_command_names_an_unknown_scenario(tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        hard_scenarios.parse(["--out", str(tmp_path), "--scenarios", "no such"])
+    assert "no scenario 'no such': choose from" in capsys.readouterr().err
