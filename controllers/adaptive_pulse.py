@@ -174,7 +174,9 @@ class AdaptivePulse:
 REGISTRATION = Registration(
     kind="pulse, adaptive",
     controller=AdaptivePulse,
-    build=lambda values, parameters: AdaptivePulse(table=pulse_table(parameters), **values),
+    build=lambda values, plant: AdaptivePulse(
+        table=pulse_table(plant.parameters, supply_voltage=plant.voltage), **values
+    ),
     search_space={
         "trigger": Range(low=-0.3, high=0.1, least=-0.5, most=0.5),
         "aim": Range(low=-0.1, high=0.3, least=-0.5, most=0.5),

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from epv_env.common.units import BAR
 from epv_env.observation import decode
 from epv_env.plant.equations import State
-from epv_env.plant.parameters import Parameters, table
+from epv_env.plant.parameters import Parameters
 from epv_env.plant.readings import MEASURED
 from epv_env.plant.sensors import SENSORS, Sensor
 from epv_env.plant.simulate import energised
@@ -135,7 +135,7 @@ class Estimator:
 
     def _begin(self, read: dict[str, NDArray]) -> None:
         """Energised at rest, where the current tells the resistance (Ohm); p3 as it is read."""
-        low, high = table()["R"].domain or (0.0, np.inf)
+        low, high = self.parameters.domain("R")
         self._values["R"] = np.clip(self.supply_voltage / np.maximum(read["I"], 1e-3), low, high)
         self._valves.set_parameters(np.arange(self._valves.n), self._values)
         initial = energised(self._values, p1=read["p1"], p2=read["p2"], U=self.supply_voltage)

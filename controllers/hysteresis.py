@@ -64,7 +64,7 @@ _THRESHOLDS = {
 HYSTERESIS = Registration(
     kind="hysteresis",
     controller=Hysteresis,
-    build=lambda values, parameters: Hysteresis(name="hysteresis", **values),
+    build=lambda values, plant: Hysteresis(name="hysteresis", **values),
     search_space=_THRESHOLDS,
     cost=CHEAP,
 )
@@ -73,7 +73,7 @@ HYSTERESIS = Registration(
 EXTRAPOLATING_HYSTERESIS = Registration(
     kind="hysteresis, extrapolating",
     controller=Hysteresis,
-    build=lambda values, parameters: Hysteresis(name="hysteresis, extrapolating", **values),
+    build=lambda values, plant: Hysteresis(name="hysteresis, extrapolating", **values),
     search_space={
         **_THRESHOLDS,
         "open_lookahead": Range(low=0.0, high=0.15, most=0.5),

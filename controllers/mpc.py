@@ -91,7 +91,9 @@ class MPC:
 REGISTRATION = Registration(
     kind="MPC",
     controller=MPC,
-    build=lambda values, parameters: MPC(parameters=parameters, threads=1, **values),
+    build=lambda values, plant: MPC(
+        parameters=plant.parameters, supply_voltage=plant.voltage, threads=1, **values
+    ),
     search_space={
         "tail": Range(low=0.02, high=0.3, log=True),
         "floor": Range(low=-0.2, high=0.0),

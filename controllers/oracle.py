@@ -66,7 +66,7 @@ class Oracle:
 REGISTRATION = Registration(
     kind="oracle",
     controller=Oracle,
-    build=lambda values, parameters: Oracle(threads=1),
+    build=lambda values, plant: Oracle(threads=1),
     search_space=None,
     cost=SIMULATING,
 )

@@ -49,7 +49,7 @@ class PrivilegedPulse:
         plants = [parameters for parameters in task.parameters if parameters is not None]
         assert len(plants) == task.n, "the episodes must have begun"
         self._pulse = Pulse(
-            table=pulse_tables(plants), trigger=self.trigger, aim=self.aim,
+            table=pulse_tables(plants, task.settings.supply_voltage), trigger=self.trigger, aim=self.aim,
             filter_time=self.filter_time, look_ahead=self.look_ahead, rounding=self.rounding,
         )  # fmt: skip
         self._pulse.reset(task.n)
@@ -66,7 +66,7 @@ class PrivilegedPulse:
 REGISTRATION = Registration(
     kind="pulse, informed",
     controller=PrivilegedPulse,
-    build=lambda values, parameters: PrivilegedPulse(),
+    build=lambda values, plant: PrivilegedPulse(),
     search_space=None,
     cost=TABLE_PER_PLANT,
 )

@@ -99,7 +99,9 @@ class Pulse:
 REGISTRATION = Registration(
     kind="pulse",
     controller=Pulse,
-    build=lambda values, parameters: Pulse(table=pulse_table(parameters), **values),
+    build=lambda values, plant: Pulse(
+        table=pulse_table(plant.parameters, supply_voltage=plant.voltage), **values
+    ),
     search_space={
         "trigger": Range(low=-0.3, high=0.1, least=-0.5, most=0.5),
         "aim": Range(low=-0.1, high=0.3, least=-0.5, most=0.5),

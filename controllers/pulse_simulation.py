@@ -61,9 +61,12 @@ def pulse_table(
     )  # fmt: skip
 
 
-def pulse_tables(plants: Sequence[Mapping[str, float]]) -> PulseTables:
-    """The tables of n plants (parameters by symbol), in their order. A plant's table is made once."""
-    tables = [_cached_table(tuple(plant.items())) for plant in plants]
+def pulse_tables(plants: Sequence[Mapping[str, float]], supply_voltage: float = 24.0) -> PulseTables:
+    """The tables of n plants (parameters by symbol), in their order. A plant's table is made once.
+
+    supply_voltage: of their coils when on [V].
+    """
+    tables = [_cached_table(tuple(plant.items()), supply_voltage) for plant in plants]
     return PulseTables(
         parameters={s: np.array([plant[s] for plant in plants]) for s in plants[0]},
         vent_rate=np.array([table.vent_rate for table in tables]),
@@ -74,9 +77,9 @@ def pulse_tables(plants: Sequence[Mapping[str, float]]) -> PulseTables:
 
 
 @lru_cache(maxsize=1024)
-def _cached_table(plant: tuple[tuple[str, float], ...]) -> PulseTable:
+def _cached_table(plant: tuple[tuple[str, float], ...], supply_voltage: float) -> PulseTable:
     """The table of a plant. Searches and lessons meet the same plants again and again."""
-    return pulse_table(dict(plant))
+    return pulse_table(dict(plant), supply_voltage=supply_voltage)
 
 
 def _valves(p: Mapping[str, float], state: State, U: float) -> Valves:

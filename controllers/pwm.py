@@ -13,6 +13,7 @@ from controllers.registration import CHEAP, Range, Registration
 from epv_env.common.units import BAR
 from epv_env.observation import decode
 from epv_env.plant.parameters import Parameters
+from epv_env.plant.plantfile import Plant
 
 
 @dataclass(kw_only=True)
@@ -80,15 +81,18 @@ class DesignPoint:
     """Period of the PWM [s]: the environment's."""
 
 
-def build(values: Mapping[str, Any], parameters: Parameters, point: DesignPoint = DesignPoint()) -> PWM:
+def build(values: Mapping[str, Any], plant: Plant, point: DesignPoint = DesignPoint()) -> PWM:
     """The controller with a loop shaped for a plant.
 
     values: quantities of the search space by name. Raises ValueError if no gain keeps the phase margin.
     """
     loop = {name: values[name] for name in ("inner_time", "phase_margin", "integral_time")}
     rest = {name: value for name, value in values.items() if name not in loop}
-    shaped = design(parameters, p1=point.p1, p2=point.p2, period=point.period, **loop)
-    return PWM(design=shaped, parameters=parameters, control_period=point.period, **rest)
+    shaped = design(
+        plant.parameters, p1=point.p1, p2=point.p2, period=point.period,
+        supply_voltage=plant.voltage, **loop,
+    )  # fmt: skip
+    return PWM(design=shaped, parameters=plant.parameters, control_period=point.period, **rest)
 
 
 REGISTRATION = Registration(

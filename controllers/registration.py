@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from controllers.base import Controller
-from epv_env.plant.parameters import Parameters
+from epv_env.plant.plantfile import Plant
 
 NEAR_BOUND = 0.02
 """Share of a range next to its ends where a search's outcome counts as cut off by the bound [1]."""
@@ -108,19 +108,19 @@ class Registration:
     """Name in tables, in controllers/tuned.json and on command lines."""
     controller: type
     """The class."""
-    build: Callable[[Mapping[str, Any], Parameters], Controller]
+    build: Callable[[Mapping[str, Any], Plant], Controller]
     """Makes the controller from its tuned quantities, designed for a plant. Raises ValueError if the
     quantities contradict each other."""
     search_space: SearchSpace | None
     """The quantities that tuning searches; None: nothing is tuned."""
     cost: CostClass
 
-    def built(self, values: Mapping[str, Any], parameters: Parameters) -> Controller:
+    def built(self, values: Mapping[str, Any], plant: Plant) -> Controller:
         """The controller, from exactly the quantities of its search space.
 
         Args:
             values: tuned quantities by name.
-            parameters: of the plant that it is designed for.
+            plant: that it is designed for: parameters and voltage of the coil.
 
         Raises:
             RegistrationError: a quantity is missing or unknown.
@@ -135,4 +135,4 @@ class Registration:
                     "and its tuned values must name the same quantities; tune anew with "
                     f"`python training/tune.py --only {self.kind!r}`"
                 )
-        return self.build(values, parameters)
+        return self.build(values, plant)

@@ -3,7 +3,7 @@
 from controllers import adaptive_pulse, hysteresis, mpc, oracle, privileged_pulse, pulse, pwm
 from controllers.base import Controller
 from controllers.registration import CHEAP, CostClass, Registration, RegistrationError
-from epv_env.plant.parameters import Parameters
+from epv_env.plant.plantfile import Plant
 
 REGISTRY: tuple[Registration, ...] = (
     hysteresis.HYSTERESIS,
@@ -31,9 +31,9 @@ def cost_class(name: str) -> CostClass:
     return next((entry.cost for entry in REGISTRY if entry.kind == name), CHEAP)
 
 
-def untuned_controllers(parameters: Parameters) -> list[Controller]:
+def untuned_controllers(plant: Plant) -> list[Controller]:
     """The registered controllers that have nothing to tune: those that see what no ECU measures."""
-    return [entry.built({}, parameters) for entry in REGISTRY if entry.search_space is None]
+    return [entry.built({}, plant) for entry in REGISTRY if entry.search_space is None]
 
 
 TUNED_KINDS = tuple(entry.kind for entry in REGISTRY if entry.search_space is not None)

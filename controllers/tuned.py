@@ -9,7 +9,7 @@ from typing import Any
 from controllers.base import Controller
 from controllers.registry import registration
 from epv_env.common.json_files import JSONFileError, read_json, write_json
-from epv_env.plant.parameters import Parameters
+from epv_env.plant.plantfile import Plant
 
 FORMAT = "epv-controllers/1"
 TUNED_FILE = Path(__file__).parent / "tuned.json"
@@ -73,25 +73,23 @@ def save_tunings(tunings: dict[str, Tuning], path: str | PathLike[str], search: 
     write_json(path, content)
 
 
-def build(kind: str, values: dict[str, Any], parameters: Parameters) -> Controller:
+def build(kind: str, values: dict[str, Any], plant: Plant) -> Controller:
     """A controller of one of the registry's kinds from its tuned quantities.
 
     Args:
         kind: as the registry names it.
         values: tuned quantities by name.
-        parameters: of the plant that it is designed for.
+        plant: that it is designed for.
 
     Raises:
         ValueError: the kind is unknown, a quantity is missing or unknown, or quantities contradict each
             other.
     """
-    return registration(kind).built(values, parameters)
+    return registration(kind).built(values, plant)
 
 
-def tuned_controllers(
-    parameters: Parameters | None = None, *, without: Collection[str] = ()
-) -> list[Controller]:
+def tuned_controllers(plant: Plant | None = None, *, without: Collection[str] = ()) -> list[Controller]:
     """The classic controllers as tuned, designed for a plant (None: the report's calibration)."""
-    plant = parameters or Parameters.calibrated()
+    described = plant or Plant.calibrated()
     tunings = load_tunings()
-    return [build(kind, tunings[kind].values, plant) for kind in tunings if kind not in without]
+    return [build(kind, tunings[kind].values, described) for kind in tunings if kind not in without]

@@ -143,6 +143,7 @@ def make_settings(
     p3_bar: Any = None,
     drop_bar: Any = (0.0, 2.0),
     conditions: Any = None,
+    supply_voltage: float | None = None,
     **rest: Any,
 ) -> Settings:
     """Settings from what a user writes; see `EPValveEnv` for the arguments."""
@@ -157,6 +158,7 @@ def make_settings(
         p3_bar=None if p3_bar is None else as_range("p3_bar", p3_bar),
         drop_bar=as_range("drop_bar", drop_bar, (0.0, 16.0)),
         conditions=as_conditions(conditions),
+        supply_voltage=plant.voltage if supply_voltage is None else supply_voltage,
         **rest,
     )
 

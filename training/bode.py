@@ -63,7 +63,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--out", type=writable_file, required=True, help="PNG file to write")
     parser.add_argument("--plant", default=None, help="plant file; default: the report's calibration")
     chosen = parser.parse_args(arguments)
-    tuned = build("PWM", load_tunings()["PWM"].values, load_plant(chosen.plant).parameters)
+    tuned = build("PWM", load_tunings()["PWM"].values, load_plant(chosen.plant))
     assert isinstance(tuned, PWM)
     bode(tuned.design, chosen.out)
     print(f"{tuned.design}; drawn in {chosen.out}")

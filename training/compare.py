@@ -27,7 +27,6 @@ from epv_env.common.command_line import (
 from epv_env.common.folder_lock import only_writer
 from epv_env.common.journal import Journal
 from epv_env.plant.consumption import MIXED
-from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.valves import available_cores
 from epv_env.reward import RewardWeights
@@ -141,7 +140,7 @@ def contenders(chosen: argparse.Namespace) -> list[Contender]:
         name = next(iter(policies.values())).name
         runs = {f"{name}, {seed}": policy for seed, policy in policies.items()}
         found.append(Contender(name=name, runs=runs, learned=True))
-    others = [*tuned_controllers(), *untuned_controllers(Parameters.calibrated())]
+    others = [*tuned_controllers(), *untuned_controllers(Plant.calibrated())]
     return found + [Contender(name=c.name, runs={c.name: c}) for c in others]
 
 

@@ -70,7 +70,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Command line; returns the exit status."""
     chosen = parse(arguments)
     plant = load_plant(chosen.plant)
-    controllers, digests = named_controllers(chosen.controllers, plant.parameters)
+    controllers, digests = named_controllers(chosen.controllers, plant)
     scenarios = {name: all_scenarios()[name] for name in chosen.scenarios}
     study = Study(controllers=controllers, plant=plant, scenario=MIXED, duration=10.0)
     seeds = range(EVALUATION_SEED, EVALUATION_SEED + chosen.episodes)

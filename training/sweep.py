@@ -166,7 +166,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def run_and_report(chosen: argparse.Namespace, plant: Plant) -> int:
     """Run what --out lacks, and write the tables and figures; returns the exit status."""
-    controllers, digests = named_controllers(chosen.controllers, plant.parameters)
+    controllers, digests = named_controllers(chosen.controllers, plant)
     size = Size(
         episodes=chosen.episodes, joint_episodes=chosen.joint_episodes,
         effort=Effort(screened=chosen.screened, generations=chosen.generations),

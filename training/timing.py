@@ -102,7 +102,7 @@ def main(arguments: list[str] | None = None) -> int:
     plant = load_plant(chosen.plant)
     options = {"plant": plant, "scenario": check_scenario(chosen.scenario)}
     sources = chosen.controllers or list(load_tunings())
-    controllers, _ = named_controllers(sources, plant.parameters)
+    controllers, _ = named_controllers(sources, plant)
     table = timing_table(
         {
             label: decision_times(controller, decisions=chosen.decisions, options=options)

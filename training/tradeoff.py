@@ -26,7 +26,7 @@ from epv_env.common.command_line import (
     writable_folder,
 )
 from epv_env.common.folder_lock import only_writer
-from epv_env.plant.parameters import Parameters
+from epv_env.plant.plantfile import Plant
 from epv_env.plant.valves import available_cores
 from epv_env.reward import RewardWeights
 from training.evaluation.scenarios import TUNING_REGION
@@ -91,7 +91,7 @@ def finished_variants(folder: Path | None) -> list[Contender]:
         controllers += [load_policy(each) for each in learned if holds_policy(each)]
         if (path / TUNED_FILE).exists():
             tunings = load_tunings(path / TUNED_FILE)
-            plant = Parameters.calibrated()
+            plant = Plant.calibrated()
             controllers += [build(kind, tuning.values, plant) for kind, tuning in tunings.items()]
         variants += [variant(controller, price) for controller in controllers]
     if not variants:

@@ -133,7 +133,7 @@ def evaluate(chosen: argparse.Namespace, plant: Plant) -> Comparison:
     """The comparison on unseen scenarios, with a progress bar."""
     contenders = [
         load_policy(chosen.out),
-        *tuned_controllers(plant.parameters, without=SIMULATING_KINDS),
+        *tuned_controllers(plant, without=SIMULATING_KINDS),
     ]
     with tqdm(
         total=100,

@@ -26,7 +26,7 @@ from epv_env.common.command_line import (
     fail_clearly,
     writable_file,
 )
-from epv_env.plant.parameters import Parameters
+from epv_env.plant.plantfile import Plant
 from training.evaluation.rollout import run_episodes
 from training.evaluation.scenarios import TUNING_REGION
 from training.evaluation.seeds import TUNING_SEED
@@ -108,7 +108,7 @@ def _named(before: SearchSpace, after: SearchSpace) -> dict[str, tuple[float, fl
 def _mean_return(kind: str, values: dict[str, Any], **scenarios: Any) -> float:
     """Mean return of a kind with these quantities. Values that contradict each other cost a trial."""
     try:
-        controller = registration(kind).built(values, Parameters.calibrated())
+        controller = registration(kind).built(values, Plant.calibrated())
     except ValueError as contradiction:
         raise optuna.TrialPruned(str(contradiction)) from None
     metrics, _ = run_episodes(controller, **scenarios)

@@ -30,7 +30,9 @@ class Parameter:
     value: float
     """Nominal value [unit]."""
     domain: tuple[float, float] | None
-    """Expected range (Tables 6, 7); None for a physical constant."""
+    """Expected range (Tables 6, 7) of the report's valve; None for a physical constant."""
+    possible: tuple[float, float] | None
+    """Range of any valve of this kind, within which a plant's own domain must lie; None: a constant."""
     group: str
     """'known', 'partially known', 'unknown' (section 5.1), 'unmodelled' or 'environment'."""
     sensitive: bool
@@ -39,6 +41,16 @@ class Parameter:
     """Table or equation of the report, or the effect."""
     meaning: str
     """What the parameter is, in a line."""
+
+
+Domains = Mapping[str, tuple[float, float]]
+"""Least and greatest value by symbol [SI]."""
+
+_RANGES = ("domain", "possible")
+"""Fields of a row that are ranges."""
+
+_REPORTS: Domains = MappingProxyType({})
+"""Own domains of the report's valve: none, the table's hold."""
 
 
 @cache
@@ -51,7 +63,7 @@ def _data() -> dict[str, Any]:
 def table() -> Mapping[str, Parameter]:
     """Every parameter by its symbol: those of the report in its order, then the sizes of effects."""
     rows = [
-        Parameter(**{**row, "domain": tuple(row["domain"]) if row["domain"] else None})
+        Parameter(**{**row, **{name: tuple(row[name]) if row[name] else None for name in _RANGES}})
         for row in _data()["parameters"]
     ]
     rows += [_size_row(effect, size) for effect in EFFECTS for size in effect.sizes if size.domain]
@@ -61,8 +73,9 @@ def table() -> Mapping[str, Parameter]:
 def _size_row(effect: Effect, size: Size) -> Parameter:
     """The row of a number that sizes an effect; 0, which is off, is its value."""
     return Parameter(
-        symbol=size.symbol, unit=size.unit, value=0.0, domain=size.domain, group="unmodelled",
-        sensitive=False, source=f"effect {effect.name}", meaning=size.meaning,
+        symbol=size.symbol, unit=size.unit, value=0.0, domain=size.domain,
+        possible=size.domain, group="unmodelled", sensitive=False, source=f"effect {effect.name}",
+        meaning=size.meaning,
     )  # fmt: skip
 
 
@@ -76,21 +89,53 @@ def confidence_intervals() -> dict[str, tuple[float, float]]:
     return {symbol: (low, high) for symbol, (low, high) in _data()["confidence95"]["intervals"].items()}
 
 
-def checked_value(symbol: str, value: Any) -> float:
-    """The value as a float, if `symbol` exists and its domain holds it; else ParameterError."""
+def checked_value(symbol: str, value: Any, own: Domains = _REPORTS) -> float:
+    """The value as a float, if `symbol` exists and its domain holds it; else ParameterError.
+
+    own: domains of the plant that replace the table's [SI].
+    """
+    row = _row(symbol)
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
+        raise ParameterError(f"parameter {symbol} is {value!r}: give one number [{row.unit}]")
+    low, high = own.get(symbol, row.domain or (row.value, row.value))
+    if not low <= value <= high:
+        source = "the plant's own" if symbol in own else row.source
+        raise ParameterError(
+            f"parameter {symbol} = {value:g} {row.unit} is outside its domain "
+            f"[{low:g}, {high:g}] ({source}): {_remedy(row, symbol in own)}"
+        )
+    return float(value)
+
+
+def _row(symbol: str) -> Parameter:
     row = table().get(symbol)
     if row is None:
         raise ParameterError(f"unknown parameter {symbol!r}: known symbols are {', '.join(table())}")
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
-        raise ParameterError(f"parameter {symbol} is {value!r}: give one number [{row.unit}]")
-    low, high = row.domain if row.domain else (row.value, row.value)
-    if not low <= value <= high:
-        remedy = "give a value inside it" if row.domain else "leave this constant out"
+    return row
+
+
+def _remedy(row: Parameter, own: bool) -> str:
+    """What to do about a value outside its domain; own: the domain is the plant's own."""
+    if row.domain is None:
+        return "leave this constant out"
+    if own or row.possible == row.domain:
+        return "give a value inside it"
+    return "give a value inside it, or for another valve its own domain in a plant file's `domains`"
+
+
+def checked_domain(symbol: str, ends: tuple[float, float]) -> tuple[float, float]:
+    """A plant's own domain [SI], if a valve of this kind may have it; else ParameterError."""
+    row, (low, high) = _row(symbol), ends
+    if row.possible is None:
+        raise ParameterError(f"{symbol} is a constant and has no domain: leave it out")
+    least, greatest = row.possible
+    if not least <= low < high <= greatest:
         raise ParameterError(
-            f"parameter {symbol} = {value:g} {row.unit} is outside its domain "
-            f"[{low:g}, {high:g}] ({row.source}): {remedy}"
+            f"the domain [{low:g}, {high:g}] {row.unit} of {symbol} is none of a valve of this kind, "
+            f"whose {row.meaning} lies in [{least:g}, {greatest:g}] {row.unit}: give low < high "
+            "inside, in SI units"
         )
-    return float(value)
+    return float(low), float(high)
 
 
 SMALLEST_PRESSURE = 16.0
@@ -98,9 +143,9 @@ SMALLEST_PRESSURE = 16.0
 bar, so a smaller number is one in bar."""
 
 
-def written_value(symbol: str, value: Any) -> float:
+def written_value(symbol: str, value: Any, own: Domains = _REPORTS) -> float:
     """`checked_value` of what a person wrote: a pressure in bar is refused too (ParameterError)."""
-    checked = checked_value(symbol, value)
+    checked = checked_value(symbol, value, own)
     if table()[symbol].unit == "Pa" and 0 < abs(checked) <= SMALLEST_PRESSURE:
         raise ParameterError(
             f"parameter {symbol} = {checked:g} is in Pa, and {checked:g} Pa is less than a sensor "
@@ -110,19 +155,29 @@ def written_value(symbol: str, value: Any) -> float:
 
 
 class Parameters(Mapping[str, float]):
-    """An immutable, complete and checked set of values by symbol.
+    """An immutable, complete and checked set of values by symbol, with the domains of its valve.
 
     >>> Parameters.calibrated().replace(alphaMV=0.7)["alphaMV"]
     0.7
     """
 
-    def __init__(self, values: Mapping[str, float]):
-        """values: a value for every symbol of `table()`. Raises ParameterError."""
+    def __init__(self, values: Mapping[str, float], own_domains: Domains = _REPORTS):
+        """Check the values and the domains in which they must lie.
+
+        Args:
+            values: a value for every symbol of `table()` [SI].
+            own_domains: domains of this valve that replace the table's [SI].
+
+        Raises:
+            ParameterError: a symbol is missing, unknown, or has a value or domain that cannot be.
+        """
         missing = [symbol for symbol in table() if symbol not in values]
         if missing:
             raise ParameterError(f"missing parameters: {', '.join(missing)}: give every symbol")
-        checked = {symbol: checked_value(symbol, value) for symbol, value in values.items()}
+        own = {symbol: checked_domain(symbol, ends) for symbol, ends in own_domains.items()}
+        checked = {symbol: checked_value(symbol, value, own) for symbol, value in values.items()}
         self._values = {symbol: checked[symbol] for symbol in table()}
+        self._own_domains: Domains = own
 
     @classmethod
     def nominal(cls) -> "Parameters":
@@ -141,15 +196,27 @@ class Parameters(Mapping[str, float]):
 
     def replace(self, **changes: float) -> "Parameters":
         """A copy with some values changed. Raises ParameterError."""
+        own = self._own_domains
         return self.replace_unchecked(
-            {symbol: checked_value(symbol, value) for symbol, value in changes.items()}
+            {symbol: checked_value(symbol, value, own) for symbol, value in changes.items()}
         )
 
     def replace_unchecked(self, changes: Mapping[str, float]) -> "Parameters":
         """A copy with values changed by symbol that are inside their domains already."""
         changed = Parameters.__new__(Parameters)
         changed._values = {**self._values, **changes}
+        changed._own_domains = self._own_domains
         return changed
+
+    @property
+    def own_domains(self) -> Domains:
+        """Domains [SI] of this valve that replace the table's; empty for the report's."""
+        return self._own_domains
+
+    def domain(self, symbol: str) -> tuple[float, float]:
+        """Least and greatest value [SI]: its own domain, else the table's; a constant's value twice."""
+        row = table()[symbol]
+        return self._own_domains.get(symbol, row.domain or (row.value, row.value))
 
     def values(self) -> ValuesView[float]:
         """The values in the order of `table()`."""

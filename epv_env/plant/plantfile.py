@@ -1,6 +1,7 @@
 """The plant file: parameters, effects and region as versioned JSON (docs/reference/files.md)."""
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -9,15 +10,24 @@ import msgspec
 import numpy as np
 
 from epv_env.common.json_files import JSONFileError, checked, decoded, write_json
+from epv_env.plant.bench_sensors import changed_fields, own_sensors
+from epv_env.plant.data_acquisition import Sensor
 from epv_env.plant.effects.registry import CATALOGUE
+from epv_env.plant.force_balance import check_valve
+from epv_env.plant.free_parameters import FREE_PARAMETERS, Freedom, check_free
 from epv_env.plant.parameters import ParameterError, Parameters
 from epv_env.plant.region import Region
+from epv_env.plant.sensors import SENSORS
 
 FORMAT = "epv-plant/1"
 """Version of the file, in its field `format`."""
 
 REMEDY = "the file is not of the form that docs/reference/files.md describes; write it anew"
 """What to do about a file with a wrong field; ends a message."""
+
+
+VOLTAGE = 24.0
+"""Voltage of the report's energised coil [V]."""
 
 
 class PlantFileError(ValueError):
@@ -36,6 +46,12 @@ class Plant:
     """Name in reports and plots."""
     provenance: dict[str, Any] = field(default_factory=dict)
     """Where the values come from (recordings, hashes, versions); free-form."""
+    voltage: float = VOLTAGE
+    """Of the energised coil [V]."""
+    sensors: Mapping[str, Sensor] = field(default_factory=lambda: SENSORS)
+    """The bench's sensor of each channel [bar absolute, A or V]."""
+    free: Mapping[str, Freedom] = field(default_factory=lambda: FREE_PARAMETERS)
+    """What a calibration may move, by symbol."""
 
     @classmethod
     def calibrated(cls) -> "Plant":
@@ -56,6 +72,14 @@ class _JointFields(msgspec.Struct):
     chi_square: float
 
 
+class _FreeFields(msgspec.Struct, forbid_unknown_fields=True):
+    """A parameter of field `free`."""
+
+    bounds: tuple[float, float] | None = None
+    mean: float | None = None
+    sd: float | None = None
+
+
 class _RegionFields(msgspec.Struct):
     """Field `region`."""
 
@@ -67,6 +91,10 @@ class _PlantFile(msgspec.Struct):
     """A plant file; values of parameters are checked by `Parameters`, which names their domains."""
 
     parameters: Any
+    domains: dict[str, tuple[float, float]] = {}
+    voltage_V: float = VOLTAGE
+    sensors: dict[str, dict[str, float]] = {}
+    free: dict[str, _FreeFields] | None = None
     effects: dict[str, dict[str, Any]] = {}
     region: _RegionFields = msgspec.field(default_factory=_RegionFields)
     name: str = "unnamed"
@@ -118,6 +146,10 @@ def save_plant(plant: Plant, path: str | PathLike[str]) -> None:
         "format": FORMAT,
         "name": plant.name,
         "parameters": {s: value for s, value in plant.parameters.items() if s not in sizing},
+        "domains": {symbol: list(ends) for symbol, ends in plant.parameters.own_domains.items()},
+        "voltage_V": plant.voltage,
+        "sensors": changed_fields(plant.sensors),
+        "free": {symbol: _given(freedom) for symbol, freedom in plant.free.items()},
         "effects": {name: sizes for name, sizes in effects.items() if any(sizes.values())},
         "region": {"boxes": {symbol: list(ends) for symbol, ends in plant.region.boxes.items()}},
         "provenance": plant.provenance,
@@ -134,17 +166,38 @@ def save_plant(plant: Plant, path: str | PathLike[str]) -> None:
 def _plant(content: _PlantFile, place: str) -> Plant:
     """The plant that a file describes; place: how messages begin. Raises PlantFileError."""
     try:
-        parameters = Parameters.calibrated().replace(**_values(content))
+        values = {**Parameters.calibrated(), **_values(content)}
+        parameters = Parameters(values, content.domains)
+        sensors = own_sensors(content.sensors)
+        if content.domains or content.sensors or content.voltage_V != VOLTAGE:
+            check_valve(parameters, content.voltage_V, sensors)
         return Plant(
             parameters=parameters,
             region=_region(content.region, parameters),
             name=content.name,
             provenance=content.provenance,
+            voltage=content.voltage_V,
+            sensors=sensors,
+            free=_free(content, parameters),
         )
     except ParameterError as error:
         raise PlantFileError(f"{place}: {error}") from None
     except ValueError as error:
         raise PlantFileError(f"{place}: {error}: {REMEDY}") from None
+
+
+def _free(content: _PlantFile, parameters: Parameters) -> Mapping[str, Freedom]:
+    """What a calibration may move. Raises ParameterError."""
+    if content.free is None:
+        return FREE_PARAMETERS
+    free = {symbol: Freedom(**msgspec.structs.asdict(given)) for symbol, given in content.free.items()}
+    check_free(free, parameters)
+    return free
+
+
+def _given(freedom: Freedom) -> dict[str, Any]:
+    """The fields of a Freedom that say anything, for JSON."""
+    return {name: value for name, value in asdict(freedom).items() if value is not None}
 
 
 def _values(content: _PlantFile) -> dict[str, Any]:

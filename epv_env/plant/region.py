@@ -14,7 +14,6 @@ from epv_env.plant.parameters import (
     checked_value,
     confidence_intervals,
     sensitive_symbols,
-    table,
     written_value,
 )
 
@@ -44,15 +43,15 @@ class Region:
         for symbol, (low, high) in self.boxes.items():
             if not low <= high:
                 raise ParameterError(f"range of {symbol} is [{low:g}, {high:g}]: give low <= high")
-            checked_value(symbol, low)
-            checked_value(symbol, high)
+            checked_value(symbol, low, self.centre.own_domains)
+            checked_value(symbol, high, self.centre.own_domains)
         if self.covariance is not None:
             self._check_joint(self.covariance)
 
     def _check_joint(self, covariance: NDArray) -> None:
         k = len(self.symbols)
         for symbol in self.symbols:
-            checked_value(symbol, self.centre.get(symbol, np.nan))
+            checked_value(symbol, self.centre.get(symbol, np.nan), self.centre.own_domains)
         proper = (
             covariance.shape == (k, k)
             and bool(np.all(np.isfinite(covariance)))
@@ -86,13 +85,13 @@ class Region:
         if name == "confidence":
             shift = {s: centre[s] - Parameters.calibrated()[s] for s in CALIBRATED_SYMBOLS}
             intervals = confidence_intervals().items()
-            boxes = {s: _cut(s, low + shift[s], high + shift[s]) for s, (low, high) in intervals}
+            boxes = {s: _cut(centre, s, low + shift[s], high + shift[s]) for s, (low, high) in intervals}
         elif name == "ten_percent":
             boxes = _relative(centre, CALIBRATED_SYMBOLS, 0.1)
         elif name == "sensitive_ten_percent":
             boxes = _relative(centre, sensitive_symbols(), 0.1)
         elif name == "domain":
-            boxes = {s: table()[s].domain or (centre[s], centre[s]) for s in CALIBRATED_SYMBOLS}
+            boxes = {s: centre.domain(s) for s in CALIBRATED_SYMBOLS}
         else:
             raise ParameterError(
                 f"unknown parameter region {name!r}: choose one of {', '.join(REGIONS)}, or give "
@@ -103,15 +102,17 @@ class Region:
     @classmethod
     def from_choices(cls, choices: Mapping[str, Any], centre: Parameters) -> "Region":
         """Exact values and (low, high) ranges by symbol; what is not named stays at the centre."""
+        own = centre.own_domains
         exact: dict[str, float] = {}
         boxes: dict[str, tuple[float, float]] = {}
         for symbol, choice in choices.items():
             if isinstance(choice, (tuple, list, np.ndarray)):
                 if len(choice) != 2:
                     raise ParameterError(f"range of {symbol} is {choice!r}: give (low, high)")
-                boxes[symbol] = (written_value(symbol, choice[0]), written_value(symbol, choice[1]))
+                low, high = (written_value(symbol, end, own) for end in choice)
+                boxes[symbol] = (low, high)
             else:
-                exact[symbol] = written_value(symbol, choice)
+                exact[symbol] = written_value(symbol, choice, own)
         return cls(centre=centre.replace(**exact), boxes=boxes)
 
     def draw(self, rng: np.random.Generator) -> Parameters:
@@ -139,7 +140,7 @@ class Region:
         variances, axes = np.linalg.eigh(_correlation(self.covariance))
         offset = (ball * np.sqrt(np.maximum(variances, 0))) @ axes.T
         offset *= np.sqrt(self.chi_square * np.diag(self.covariance))
-        low, high = np.transpose([table()[s].domain or (-np.inf, np.inf) for s in self.symbols])
+        low, high = np.transpose([self.centre.domain(s) for s in self.symbols])
         return np.clip([self.centre[s] for s in self.symbols] + offset, low, high)
 
 
@@ -154,10 +155,10 @@ def _relative(
     centre: Parameters, symbols: tuple[str, ...], share: float
 ) -> dict[str, tuple[float, float]]:
     """Boxes of +-share around the centre, cut at the domains."""
-    return {s: _cut(s, centre[s] * (1 - share), centre[s] * (1 + share)) for s in symbols}
+    return {s: _cut(centre, s, centre[s] * (1 - share), centre[s] * (1 + share)) for s in symbols}
 
 
-def _cut(symbol: str, low: float, high: float) -> tuple[float, float]:
+def _cut(centre: Parameters, symbol: str, low: float, high: float) -> tuple[float, float]:
     """The interval within the symbol's domain."""
-    least, greatest = table()[symbol].domain or (-np.inf, np.inf)
+    least, greatest = centre.domain(symbol)
     return float(np.clip(low, least, greatest)), float(np.clip(high, least, greatest))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.plant.channels import MEASURED_CHANNELS
+from epv_env.plant.data_acquisition import Sensor
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.readings import readings
@@ -17,16 +17,11 @@ from identification.bench.reference_simulation import simulate_reference
 from identification.bench.schedule import delayed_schedule, piecewise_schedule
 from identification.bench.settings import BENCH, BenchSettings
 from identification.recordings.recording import CHANNELS, UNITS, Campaign, Recording
+from identification.recordings.rules import RULES, RecordingRules
 from identification.report_2003.cases import SAMPLING_RATE
 
 RESERVOIR_VOLUME = 0.08
 """The bench's two reservoirs of 40 litres (section 3) [m^3]; air drawn from them lowers p1."""
-
-SENSOR_OFFSETS = {channel.name: channel.sensor.offset for channel in MEASURED_CHANNELS}
-"""Reading less truth at the start of a recording (Table 2; pressures less 1 bar) [bar, A, V]."""
-
-SENSOR_TRENDS = {channel.name: channel.sensor.trend for channel in MEASURED_CHANNELS}
-"""Drift of the readings (Table 2) [bar/s, A/s, V/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,18 +60,24 @@ def run_programme(
 
 
 def measured_recording(
-    truth: TrueSignals, rng: np.random.Generator, offsets: Mapping[str, float] = SENSOR_OFFSETS
+    truth: TrueSignals,
+    rng: np.random.Generator,
+    offsets: Mapping[str, float] | None = None,
+    sensors: Mapping[str, Sensor] = SENSORS,
 ) -> Recording:
     """A recording of the truth by the sensors of Tables 1 to 3: offset, trend, noise, 12 bit.
 
-    offsets: by channel, as SENSOR_OFFSETS [bar, A, V]; a channel that is left out has none.
+    offsets: by channel [bar, A, V], a channel that is left out has none; None: the sensors' own.
+    sensors: of the bench, by channel [bar absolute, A or V].
     """
+    if offsets is None:
+        offsets = {name: sensor.offset for name, sensor in sensors.items()}
     readings = {}
     for channel in CHANNELS:
         value = truth.channels[channel] / UNITS[channel][1]
         time = np.arange(len(value)) * truth.period
-        drifted = value + offsets.get(channel, 0.0) + SENSOR_TRENDS[channel] * time
-        reading = SENSORS[channel].measure(drifted, rng.standard_normal(len(value)))
+        drifted = value + offsets.get(channel, 0.0) + sensors[channel].trend * time
+        reading = sensors[channel].measure(drifted, rng.standard_normal(len(value)))
         readings[channel] = reading * UNITS[channel][1]
     return Recording(
         name=truth.programme.name,
@@ -93,16 +94,22 @@ def measured_campaign(
     *,
     seed: int,
     name: str = "virtual bench",
-    offsets: Mapping[str, float] = SENSOR_OFFSETS,
+    offsets: Mapping[str, float] | None = None,
+    rules: RecordingRules = RULES,
 ) -> Campaign:
-    """A campaign of the truths; each recording's noise has a generator of its own, from the seed."""
+    """A campaign of the truths; each recording's noise has a generator of its own, from the seed.
+
+    rules: by which the recordings are read, with the bench's sensors.
+    """
     generators = [np.random.default_rng([seed, index]) for index in range(len(truths))]
     return Campaign(
         name=name,
         temperature=parameters["T_env"],
         pressure=parameters["p_env"],
+        rules=rules,
         recordings=tuple(
-            measured_recording(t, rng, offsets) for t, rng in zip(truths, generators, strict=True)
+            measured_recording(t, rng, offsets, rules.sensors)
+            for t, rng in zip(truths, generators, strict=True)
         ),
     )
 

@@ -1,11 +1,12 @@
 """Programmes of the bench as a file, so that an experiment can be planned here and run there."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import Any
 
 from epv_env.common.json_files import JSONFileError, decoded, write_json
 from epv_env.common.units import BAR
+from epv_env.plant.data_acquisition import Sensor
 from epv_env.plant.sensors import SENSORS
 from identification.bench.programmes import Programme
 from identification.bench.settings import BENCH
@@ -23,24 +24,33 @@ class ProgrammeError(ValueError):
     """A programme file cannot be read or run: the message names file, programme, rule and remedy."""
 
 
-def save_programmes(programmes: Sequence[Programme], path: str | PathLike[str]) -> None:
+def save_programmes(
+    programmes: Sequence[Programme],
+    path: str | PathLike[str],
+    sensors: Mapping[str, Sensor] = SENSORS,
+) -> None:
     """Write programmes that `load_programmes` takes, whole or not at all.
 
     Raises ProgrammeError, before anything is written, for what could not be read back.
     """
     content = {"format": FORMAT, "programmes": [_content(programme) for programme in programmes]}
-    _decode(str(path), content)
+    _decode(str(path), content, sensors)
     write_json(path, content)
 
 
-def load_programmes(path: str | PathLike[str]) -> tuple[Programme, ...]:
-    """The programmes of a file (docs/reference/files.md), every rule checked. Raises ProgrammeError."""
+def load_programmes(
+    path: str | PathLike[str], sensors: Mapping[str, Sensor] = SENSORS
+) -> tuple[Programme, ...]:
+    """The programmes of a file (docs/reference/files.md), every rule checked.
+
+    sensors: of the bench, by channel [bar absolute, A or V]. Raises ProgrammeError.
+    """
     remedy = "give the path of a JSON file, or write it anew"
     try:
         content = decoded(path, remedy=remedy, what="programme file", allow_nan=True)
     except JSONFileError as error:
         raise ProgrammeError(str(error)) from None
-    return _decode(str(path), content)
+    return _decode(str(path), content, sensors)
 
 
 def _content(programme: Programme) -> dict[str, Any]:
@@ -58,7 +68,7 @@ def _content(programme: Programme) -> dict[str, Any]:
     }
 
 
-def _decode(path: str, content: Any) -> tuple[Programme, ...]:
+def _decode(path: str, content: Any, sensors: Mapping[str, Sensor]) -> tuple[Programme, ...]:
     version = content.get("format") if isinstance(content, dict) else None
     if version != FORMAT:
         raise ProgrammeError(
@@ -68,7 +78,8 @@ def _decode(path: str, content: Any) -> tuple[Programme, ...]:
     if not isinstance(entries, list) or not entries:
         raise ProgrammeError(f"programme file {path}: programmes is not a list of at least one: add one")
     programmes = tuple(
-        _programme(f"{path}, programme {number}", entry) for number, entry in enumerate(entries, start=1)
+        _programme(f"{path}, programme {number}", entry, sensors)
+        for number, entry in enumerate(entries, start=1)
     )
     names = [programme.name for programme in programmes]
     twice = next((name for name in names if names.count(name) > 1), None)
@@ -77,20 +88,20 @@ def _decode(path: str, content: Any) -> tuple[Programme, ...]:
     return programmes
 
 
-def _programme(place: str, entry: Any) -> Programme:
+def _programme(place: str, entry: Any, sensors: Mapping[str, Sensor]) -> Programme:
     if not isinstance(entry, dict):
         raise ProgrammeError(f"{place} is not an object: give its fields as in docs/reference/files.md")
     role = _text(place, entry, "role")
     if role not in ROLES:
         raise ProgrammeError(f"{place}: unknown role {role!r}: choose one of {', '.join(ROLES)}")
-    supply = _number(place, entry, "supply_bar", SENSORS["p1"].low, SENSORS["p1"].high)
+    supply = _number(place, entry, "supply_bar", sensors["p1"].low, sensors["p1"].high)
     return Programme(
         name=_file_name(place, entry),
         role=role,
         case=_case(place, entry, switches=role != "quality"),
         p1=round(supply * BAR, 6),
-        p2=round(_number(place, entry, "circuit_bar", SENSORS["p2"].low, supply) * BAR, 6),
-        U_on=_number(place, entry, "voltage_V", 1.0 if role != "quality" else 0.0, SENSORS["U"].high),
+        p2=round(_number(place, entry, "circuit_bar", sensors["p2"].low, supply) * BAR, 6),
+        U_on=_number(place, entry, "voltage_V", 1.0 if role != "quality" else 0.0, sensors["U"].high),
     )
 
 

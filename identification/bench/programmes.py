@@ -1,6 +1,7 @@
 """What the virtual bench does: the report's recordings, and a wider suite for diagnosis."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from epv_env.common.units import BAR
 from identification.report_2003.cases import (
@@ -67,3 +68,9 @@ DIAGNOSIS_SUITE = (
 
 SUITES = {"report": REPORT_SUITE, "diagnosis": DIAGNOSIS_SUITE}
 """Programmes by the name of their suite."""
+
+
+def at_voltage(suite: Sequence[Programme], voltage: float) -> tuple[Programme, ...]:
+    """A suite for a coil made for another voltage [V]: every voltage in the same ratio."""
+    factor = voltage / ENERGISED_VOLTAGE
+    return tuple(replace(programme, U_on=factor * programme.U_on) for programme in suite)

@@ -8,6 +8,7 @@ from identification.bench.measurement import measured_campaign, run_programme
 from identification.bench.programmes import Programme
 from identification.bench.settings import BENCH, BenchSettings
 from identification.recordings.recording import Campaign
+from identification.recordings.rules import RULES, RecordingRules
 from identification.report_2003.cases import SAMPLING_RATE
 
 
@@ -17,11 +18,13 @@ def run_bench(
     *,
     seed: int,
     rate: float = SAMPLING_RATE,
+    rules: RecordingRules = RULES,
     settings: BenchSettings = BENCH,
 ) -> Campaign:
     """Run and measure every programme on a plant with the true parameters.
 
-    rate: samples per second [1/s]. seed: of the sensors' noise. Raises ValueError for a rate that the
+    rate: samples per second [1/s]. seed: of the sensors' noise. rules: by which the recordings are read,
+    with the bench's sensors. Raises ValueError for a rate that the
     bench does not have.
     """
     least, greatest = settings.least_rate, settings.greatest_rate
@@ -33,4 +36,4 @@ def run_bench(
         run_programme(truth, programme, rate=rate, settings=settings)
         for programme in progress(suite, what="bench: recordings", total=len(suite))
     ]
-    return measured_campaign(truths, truth, seed=seed)
+    return measured_campaign(truths, truth, seed=seed, rules=rules)

@@ -20,7 +20,7 @@ class Calibration:
 
     problem: CalibrationProblem
     fits: Mapping[str, list[SearchResult]]
-    """By method, one for each start; the first start is the reference (Table 10)."""
+    """By method, one for each start; the first start is the reference (Table 10, or the plant file)."""
     warnings: list[str]
     before: list[Response]
     """Of the calibration recordings at the start's parameters (Table 11)."""
@@ -57,6 +57,7 @@ def calibrate(
     symbols = list(problem.vector.symbols)
     reference = dict(problem.vector.reference)
     about = {**subject, "symbols": symbols, "reference": reference, "seed": seed}
+    about |= {"bounds": problem.vector.domains.tolist(), "prior": problem.vector.known()}
     about |= {"starts": settings.starts, **settings.changed()}
     fits = search_from_all_starts(problem, points, Journal(journal, about), settings)
     after = {

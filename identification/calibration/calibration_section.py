@@ -77,15 +77,15 @@ def _doubts(calibration: Calibration) -> list[Verdict]:
 def _estimates(calibration: Calibration) -> Table:
     vector = calibration.problem.vector
     rows = []
-    for symbol in vector.symbols:
-        row, low_high = table()[symbol], table()[symbol].domain or (0.0, 0.0)
+    for symbol, (low, high) in zip(vector.symbols, vector.domains.tolist(), strict=True):
+        row = table()[symbol]
         values = [calibration.parameters(method)[symbol] for method in METHODS]
         rows.append(
             [
                 f"{symbol} ({row.meaning}) [{row.unit}]",
                 f"{vector.reference[symbol]:.7g}",
                 *(f"{value:.7g}" for value in values),
-                f"{low_high[0]:g} to {low_high[1]:g}",
+                f"{low:g} to {high:g}",
             ]
         )
     columns = ["Parameter", "start", *METHODS, "domain"]

@@ -56,7 +56,7 @@ def _other_minima(method: str, fits: list[SearchResult], tolerance: float) -> li
     if same[0] and np.all(same):
         return []
     others = [fit.error for fit, reached in zip(fits, same, strict=True) if not reached]
-    first = "" if same[0] else "; the usual start (Table 10) is among those that do not"
+    first = "" if same[0] else "; the usual start is among those that do not"
     return [
         f"{method}: {np.sum(same)} of {len(fits)} starts reach the least error "
         f"{best_search(fits).error:.6g}, "

@@ -1,10 +1,10 @@
 """What a calibration is about: recordings, their noise, and the parameters that may move."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-from epv_env.plant.parameters import ParameterError, Parameters, table
-from epv_env.plant.region import CALIBRATED_SYMBOLS
+from epv_env.plant.free_parameters import FREE_PARAMETERS, Freedom, check_free
+from epv_env.plant.parameters import Parameters
 from identification.quality.assessment import SensorOffset, assess_recording, sensor_offsets
 from identification.quality.settings import QUALITY, QualitySettings
 from identification.recordings.noise_estimation import pooled_noise
@@ -45,13 +45,15 @@ def calibration_problem(
     campaign: Campaign,
     *,
     start: Parameters | None = None,
-    symbols: Sequence[str] = CALIBRATED_SYMBOLS,
+    free: Mapping[str, Freedom] = FREE_PARAMETERS,
     quality: QualitySettings = QUALITY,
 ) -> CalibrationProblem:
     """The problem that a campaign poses, from `start` (None: Table 10) at the campaign's ambient.
 
-    Raises CampaignError if there is no recording to fit to; ParameterError for symbols that cannot be
-    fitted.
+    free: which parameters may move, and how far.
+
+    Raises CampaignError if there is no recording to fit to; ParameterError for parameters that
+    cannot be fitted, or ambient conditions outside the plant's domain.
     """
     if not campaign.with_role("calibration"):
         raise CampaignError(
@@ -60,8 +62,8 @@ def calibration_problem(
     start = (start or Parameters.initial_guess()).replace(
         T_env=campaign.temperature, p_env=campaign.pressure
     )
-    _check_fitted(symbols, start)
-    steps = campaign_steps(campaign.recordings)
+    check_free(free, start)
+    steps = campaign_steps(campaign.recordings, campaign.rules)
     offsets = _offsets(campaign, quality, steps)
     values = {name: offset.value for name, offset in offsets.items()}
     return CalibrationProblem(
@@ -70,21 +72,8 @@ def calibration_problem(
         noise=pooled_noise(campaign),
         offsets=offsets,
         steps=steps,
-        vector=ParameterVector(symbols=tuple(symbols), reference=start),
+        vector=ParameterVector(symbols=tuple(free), reference=start, freedoms=free),
     )
-
-
-def _check_fitted(symbols: Sequence[str], start: Parameters) -> None:
-    """Symbols that can be fitted exist, have a domain, and do not start at zero."""
-    free = [symbol for symbol, row in table().items() if row.domain]
-    fixed = [symbol for symbol in symbols if symbol not in free]
-    if fixed:
-        raise ParameterError(f"{', '.join(fixed)} cannot be fitted: choose from {', '.join(free)}")
-    zero = [symbol for symbol in symbols if start[symbol] == 0]
-    if zero:
-        raise ParameterError(
-            f"{', '.join(zero)} start at 0, from which a relative change leads nowhere: start elsewhere"
-        )
 
 
 def _offsets(
@@ -92,7 +81,9 @@ def _offsets(
 ) -> dict[str, SensorOffset]:
     """The sensors' offsets from the first quality recording that shows them."""
     for recording in campaign.with_role("quality"):
-        offsets = sensor_offsets(assess_recording(recording, campaign.pressure, quality, steps))
+        sensors = campaign.rules.sensors
+        assessed = assess_recording(recording, campaign.pressure, quality, steps, sensors)
+        offsets = sensor_offsets(assessed)
         if offsets:
             return offsets
     return {}

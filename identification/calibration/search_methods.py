@@ -68,13 +68,15 @@ def weighted_least_squares(
 ) -> SearchResult:
     """Minimise the sum of squares in units of the noise by a trust-region Gauss-Newton method.
 
+    What is known of the parameters before counts like readings do.
+
     misfit: with the weights of the noise. start: scaled vector (k,), without unit.
     """
     began = perf_counter()
     result = least_squares(
-        lambda z: np.concatenate(misfit.residuals(z)),
+        lambda z: np.concatenate([*misfit.residuals(z), misfit.vector.prior(z)[0]]),
         start,
-        jac=lambda z: np.vstack(misfit.linearised(z)[1]),  # type: ignore[arg-type]
+        jac=lambda z: np.vstack([*misfit.linearised(z)[1], misfit.vector.prior(z)[1]]),  # type: ignore[arg-type]
         bounds=misfit.vector.bounds.T,
         xtol=settings.precision,
         ftol=settings.precision,

@@ -1,17 +1,22 @@
 """`python -m identification bench`: write a campaign of a virtual bench."""
 
 import argparse
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from epv_env.plant.effects.registry import CATALOGUE
-from epv_env.plant.parameters import Parameters, written_value
-from epv_env.plant.plantfile import load_plant, save_plant
+from epv_env.plant.parameters import Domains, Parameters, written_value
+from epv_env.plant.plantfile import Plant, load_plant, save_plant
+from epv_env.plant.region import Region
 from identification.bench.programme_file import load_programmes
-from identification.bench.programmes import SUITES
+from identification.bench.programmes import SUITES, Programme, at_voltage
 from identification.bench.session import run_bench
 from identification.commands.command import Command
-from identification.commands.options import add_out, add_seed
+from identification.commands.options import add_out, add_plant, add_seed
 from identification.recordings.campaign_files import check_vacant, write_campaign
+from identification.recordings.rules import RULES
+from identification.recordings.valve_rules import rules_of
 from identification.report_2003.cases import SAMPLING_RATE
 
 
@@ -23,7 +28,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     recordings.add_argument("--suite", choices=SUITES, default="report", help="which recordings")
     recordings.add_argument("--programme", type=Path, default=None, help="JSON file of other recordings")
     parser.add_argument("--rate", type=float, default=SAMPLING_RATE, help="samples per second")
-    parser.add_argument("--plant", default=None, help="plant file of the truth; default: Table 12")
+    add_plant(parser, help="plant file of the truth; default: Table 12")
     parser.add_argument(
         "--set", action="append", default=[], metavar="SYMBOL=VALUE", help="another true value [SI]"
     )
@@ -40,23 +45,29 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(chosen: argparse.Namespace) -> None:
     """Write the campaign. Raises ValueError for a wrong value, or a folder that holds a campaign."""
     check_vacant(chosen.out)
-    truth = _with_values(load_plant(chosen.plant).parameters, chosen.set)
+    plant = load_plant(chosen.plant)
+    rules = rules_of(plant) if chosen.plant else RULES
+    truth = _with_values(plant.parameters, chosen.set)
     truth = _with_effects(truth, chosen.effect)
-    suite = load_programmes(chosen.programme) if chosen.programme else SUITES[chosen.suite]
-    campaign = run_bench(suite, truth, seed=chosen.seed, rate=chosen.rate)
+    campaign = run_bench(_suite(chosen, plant), truth, seed=chosen.seed, rate=chosen.rate, rules=rules)
     write_campaign(campaign, chosen.out)
     if chosen.truth is not None:
         _save_truth(truth, chosen)
     print(f"{len(campaign.recordings)} recordings in {chosen.out}")
 
 
+def _suite(chosen: argparse.Namespace, plant: Plant) -> Sequence[Programme]:
+    """The recordings to make, at the voltage of the plant's coil."""
+    if chosen.programme:
+        return load_programmes(chosen.programme, plant.sensors)
+    return at_voltage(SUITES[chosen.suite], plant.voltage)
+
+
 def _save_truth(truth: Parameters, chosen: argparse.Namespace) -> None:
     """Write the true parameters as a plant file whose region is that one point."""
     plant = load_plant(chosen.plant)
-    save_plant(
-        type(plant)(parameters=truth, region=type(plant.region)(centre=truth), name="truth"),
-        chosen.truth,
-    )
+    truthful = replace(plant, parameters=truth, region=Region(centre=truth), name="truth", provenance={})
+    save_plant(truthful, chosen.truth)
 
 
 def _with_values(parameters: Parameters, settings: list[str]) -> Parameters:
@@ -65,12 +76,12 @@ def _with_values(parameters: Parameters, settings: list[str]) -> Parameters:
     for setting in settings:
         symbol, _, text = setting.partition("=")
         changes[symbol] = _number(text, f"--set {setting}: give SYMBOL=VALUE", "--set R=43.5")
-    return parameters.replace(**_written(changes))
+    return parameters.replace(**_written(changes, parameters.own_domains))
 
 
-def _written(values: dict[str, float]) -> dict[str, float]:
+def _written(values: dict[str, float], own: Domains) -> dict[str, float]:
     """Values by symbol as a person wrote them; ParameterError for one in the wrong unit."""
-    return {symbol: written_value(symbol, value) for symbol, value in values.items()}
+    return {symbol: written_value(symbol, value, own) for symbol, value in values.items()}
 
 
 def _with_effects(parameters: Parameters, settings: list[str]) -> Parameters:
@@ -88,7 +99,9 @@ def _with_effects(parameters: Parameters, settings: list[str]) -> Parameters:
             )
         rule = f"--effect {setting}: give NAME=SIZE"
         values = [_number(size, rule, "--effect piston_friction=8,0") for size in sizes]
-        parameters = parameters.replace(**_written(dict(zip(symbols, values, strict=True))))
+        parameters = parameters.replace(
+            **_written(dict(zip(symbols, values, strict=True)), parameters.own_domains)
+        )
     return parameters
 
 

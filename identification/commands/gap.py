@@ -6,7 +6,7 @@ from pathlib import Path
 from epv_env.common.command_line import writable_folder
 from epv_env.common.json_files import decoded
 from identification.commands.command import Command
-from identification.commands.options import add_out, add_seed
+from identification.commands.options import add_out, add_plant, add_seed
 from identification.gap.report import result_files
 from identification.gap.report.verdict_sentences import verdict_sentence
 from identification.report.result_files import as_text
@@ -24,9 +24,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     subject.add_argument("--tables", action="store_true", help="diagnose Tables 11, 13 and 15 instead")
     add_out(parser)
     add_seed(parser, help="of resampling and uncertain conditions")
-    parser.add_argument(
-        "--plant", default=None, help="plant file of the nominal model; default: Table 10"
-    )
+    add_plant(parser, help="plant file of the nominal model; default: Table 10")
     parser.add_argument(
         "--without", action="append", default=[], metavar="CAUSE", help="leave out of the catalogue"
     )

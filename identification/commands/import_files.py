@@ -4,12 +4,15 @@ import argparse
 from pathlib import Path
 
 from epv_env.common.command_line import check_positive
+from epv_env.plant.plantfile import load_plant
 from identification.commands.command import Command
-from identification.commands.options import add_out
+from identification.commands.options import add_out, add_plant
 from identification.importing.findings import import_text, source_table
 from identification.importing.formats.registry import read_source
 from identification.importing.import_campaign import check_imported, read_files
 from identification.recordings.campaign_files import check_vacant, write_campaign
+from identification.recordings.rules import RULES
+from identification.recordings.valve_rules import rules_of
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -18,6 +21,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "files", nargs="+", type=Path, metavar="FILE", help="MDF, MATLAB, TDMS, Parquet or text files"
     )
     add_out(parser, help="folder of the campaign")
+    add_plant(parser, help="plant file of another valve than the report's, for the checks")
     parser.add_argument(
         "--mapping", type=Path, default=None, help="JSON file that says what names and units do not"
     )
@@ -39,6 +43,7 @@ def run(chosen: argparse.Namespace) -> None:
     """Show what the files hold and write the campaign. Raises ImportingError or CampaignError."""
     chosen.check(chosen)
     check_vacant(chosen.out)
+    rules = rules_of(load_plant(chosen.plant)) if chosen.plant else RULES
     for file in chosen.files:
         print(source_table(read_source(file)), end="\n\n")
     imported = read_files(
@@ -48,6 +53,7 @@ def run(chosen: argparse.Namespace) -> None:
         temperature_K=chosen.temperature_K,
         rate=chosen.rate,
         name=chosen.name,
+        rules=rules,
     )
     print(import_text(imported), end="\n\n")
     if chosen.dry_run:

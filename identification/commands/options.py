@@ -1,6 +1,7 @@
 """Options that several commands share, with the checks of their values."""
 
 import argparse
+from pathlib import Path
 from typing import Any
 
 from epv_env.common.command_line import writable_folder
@@ -12,6 +13,11 @@ MOST_COUNTED = 100_000
 def add_out(parser: argparse.ArgumentParser, *, help: str = "folder of results") -> None:
     """Add --out, a required folder that exists or can be made."""
     parser.add_argument("--out", type=writable_folder, required=True, help=help)
+
+
+def add_plant(parser: argparse.ArgumentParser, *, help: str) -> None:
+    """Add --plant, a plant file."""
+    parser.add_argument("--plant", type=Path, metavar="FILE", default=None, help=help)
 
 
 def add_seed(parser: argparse.ArgumentParser, *, help: str) -> None:

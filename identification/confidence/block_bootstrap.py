@@ -18,6 +18,7 @@ def block_bootstrap(
     jacobians: Sequence[NDArray],
     *,
     block: int,
+    prior: NDArray | None = None,
     seed: int = 0,
     draws: int = CONFIDENCE.bootstrap_draws,
 ) -> NDArray:
@@ -27,8 +28,10 @@ def block_bootstrap(
         residuals: weighted, per recording (3 samples,).
         jacobians: by the scaled parameters, per recording (3 samples, k).
         block: length of the blocks [samples].
+        prior: derivatives (p, k) of what is known before, which no draw changes; None: nothing is.
     """
-    H = np.linalg.inv(sum(J.T @ J for J in jacobians))
+    known = 0.0 if prior is None else prior.T @ prior
+    H = np.linalg.inv(sum(J.T @ J for J in jacobians) + known)
     sums = [_block_sums(s, block) for s in score_series(residuals, jacobians)]
     rng = np.random.default_rng(seed)
     moved = np.zeros((draws, H.shape[0]))

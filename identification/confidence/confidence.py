@@ -111,6 +111,7 @@ def assess_confidence(
             residuals,
             jacobians,
             block=settings.blocks_per_lag * covariance.lags,
+            prior=problem.vector.prior(z)[1],
             seed=seed,
             draws=settings.bootstrap_draws,
         ),

@@ -4,7 +4,8 @@ An estimate that minimises a weighted sum of squares moves with the noise e of t
 H = (J'W'WJ)^-1. The usual covariance s^2 H assumes independent e of the weights' size; here the middle
 of the sandwich H M H sums what neighbouring samples have in common (Newey & West 1987). The inputs
 that the model takes as known (U, p1) carry noise too, of which the residuals show nothing: its share is
-found by drawing that noise anew.
+found by drawing that noise anew. What is known of the parameters before adds its
+information to J'W'WJ and, as one more reading each, to M.
 """
 
 from collections.abc import Mapping, Sequence
@@ -61,7 +62,9 @@ def estimate_covariance(
     z: the estimate, scaled (k,), without unit. seed: of the noise drawn for the inputs.
     """
     residuals, jacobians = misfit.linearised(z)
-    H = np.linalg.inv(sum(J.T @ J for J in jacobians))
+    slopes = problem.vector.prior(z)[1]
+    known = slopes.T @ slopes
+    H = np.linalg.inv(sum(J.T @ J for J in jacobians) + known)
     samples = sum(len(residual) for residual in residuals)
     variance = sum(float(r @ r) for r in residuals) / (samples - len(z))
     lags = max(correlation_lags(residual) for residual in residuals)
@@ -70,7 +73,7 @@ def estimate_covariance(
     inputs = _input_share(problem, misfit, z, influence, seed, settings.input_draws)
     return EstimateCovariance(
         independent=variance * H,
-        residual=H @ middle @ H,
+        residual=H @ (middle + known) @ H,
         inputs=inputs + _offset_share(problem, misfit, z, influence),
         lags=lags,
     )

@@ -19,7 +19,7 @@ from identification.importing.settings import IMPORT, ImportSettings
 from identification.recordings.campaign_files import check_campaign, write_campaign
 from identification.recordings.recording import Campaign, Recording
 from identification.recordings.recording_checks import switches
-from identification.recordings.rules import RULES
+from identification.recordings.rules import RULES, RecordingRules
 
 USUAL_TEMPERATURE, USUAL_PRESSURE = 293.0, 1.0 * BAR
 """Ambient conditions that are assumed, and said to be, where nobody gives them [K, Pa absolute]."""
@@ -61,6 +61,7 @@ def read_files(
     temperature_K: float | None = None,
     rate: float | None = None,
     name: str | None = None,
+    rules: RecordingRules = RULES,
     settings: ImportSettings = IMPORT,
 ) -> ImportedCampaign:
     """The campaign that measurement files make, in memory.
@@ -72,6 +73,7 @@ def read_files(
         temperature_K: T_env [K]; None: likewise, else 293 K.
         rate: samples per second of the recordings [1/s]; None: of each file's slowest channel.
         name: of the campaign; None: that of the first file's folder.
+        rules: by which the recordings are checked (`rules_of` for another valve than the report's).
         settings: of resampling.
 
     Raises:
@@ -90,6 +92,7 @@ def read_files(
         temperature=USUAL_TEMPERATURE if temperature is None else temperature,
         pressure=USUAL_PRESSURE if given is None else given,
         recordings=tuple(file.recording for file in imported),
+        rules=rules,
     )
     assumptions = _assumptions(imported, content, pressure, temperature)
     return ImportedCampaign(campaign=campaign, files=imported, assumptions=assumptions)

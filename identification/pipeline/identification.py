@@ -6,6 +6,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from epv_env.plant.parameters import Parameters
+from epv_env.plant.plantfile import Plant
 from identification.calibration.calibrate import Calibration, calibrate
 from identification.calibration.problem import CalibrationProblem, calibration_problem
 from identification.confidence.confidence import Confidence, assess_confidence
@@ -25,6 +26,8 @@ class Identification:
     """File of the finished searches."""
     seed: int = 0
     """Of starts, draws and resampling."""
+    plant: Plant | None = None
+    """The valve as its data sheet describes it; None: the report's, from Table 10."""
     settings: IdentificationSettings = IDENTIFICATION
     """Judgements of every stage."""
 
@@ -36,7 +39,10 @@ class Identification:
     @cached_property
     def problem(self) -> CalibrationProblem:
         """What is to be fitted to which recordings. Raises CampaignError."""
-        return calibration_problem(self.campaign, quality=self.settings.quality)
+        if self.plant is None:
+            return calibration_problem(self.campaign, quality=self.settings.quality)
+        start, free = self.plant.parameters, self.plant.free
+        return calibration_problem(self.campaign, start=start, free=free, quality=self.settings.quality)
 
     @cached_property
     def calibration(self) -> Calibration:

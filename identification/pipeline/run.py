@@ -1,6 +1,7 @@
 """The whole identification of one campaign: every stage, the plant file, the report."""
 
 import sys
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
@@ -37,7 +38,8 @@ def run(identification: Identification, out: Path) -> Plant:
 
 def calibrated_plant(identification: Identification) -> Plant:
     """The calibrated plant with its joint region and where it comes from."""
-    return Plant(
+    return replace(
+        identification.plant or Plant.calibrated(),
         parameters=identification.parameters,
         region=identification.confidence.region,
         name=identification.campaign.name,

@@ -56,8 +56,11 @@ def quality(identification: Identification) -> Result:
             "about 5 s at rest, coil off and exhausted, and list it in campaign.json"
         )
     settings, pressure = identification.settings.quality, identification.campaign.pressure
-    steps = campaign_steps(identification.campaign.recordings)
-    assessments = [assess_recording(recording, pressure, settings, steps) for recording in recordings]
+    steps = campaign_steps(identification.campaign.recordings, identification.campaign.rules)
+    sensors = identification.campaign.rules.sensors
+    assessments = [
+        assess_recording(recording, pressure, settings, steps, sensors) for recording in recordings
+    ]
     return Result(
         sections=[quality_section(assessment) for assessment in assessments],
         content={"quality": [quality_export.as_json(assessment) for assessment in assessments]},

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from itertools import combinations
 from types import MappingProxyType
 
+from epv_env.plant.data_acquisition import Sensor
+from epv_env.plant.sensors import SENSORS
 from identification.quality.channel import ChannelAssessment, assess_channel
 from identification.quality.correlation_tests import PairCorrelation, assess_correlation
 from identification.quality.settings import QUALITY, QualitySettings
@@ -76,12 +78,13 @@ def assess_recording(
     environment_pressure: float,
     settings: QualitySettings = QUALITY,
     steps: Mapping[str, float] = FINE,
+    sensors: Mapping[str, Sensor] = SENSORS,
 ) -> QualityAssessment:
     """Statistics of a steady recording.
 
     environment_pressure: p_env [Pa absolute]. steps: coarse steps of the campaign's readings by channel
-    [SI], which a record at rest may not show. Raises CampaignError for a record of fewer than
-    `settings.least_samples`.
+    [SI], which a record at rest may not show. sensors: by channel [bar, A, V]. Raises CampaignError for
+    a record of fewer than `settings.least_samples`.
     """
     if len(recording) < settings.least_samples:
         raise CampaignError(
@@ -89,7 +92,9 @@ def assess_recording(
             f"{settings.least_samples} or more: record 5 s of steady state"
         )
     channels = {
-        name: _channel(recording, name, environment_pressure, settings, steps.get(name, 0.0))
+        name: _channel(
+            recording, sensors[name], name, environment_pressure, settings, steps.get(name, 0.0)
+        )
         for name in CHANNELS
     }
     pairs = _pairs(channels, greatest_lag(len(recording), recording.period, settings))
@@ -132,6 +137,7 @@ def greatest_lag(samples: int, period: float, settings: QualitySettings = QUALIT
 
 def _channel(
     recording: Recording,
+    sensor: Sensor,
     name: str,
     environment_pressure: float,
     settings: QualitySettings,
@@ -145,6 +151,7 @@ def _channel(
         rest=environment_pressure / size if name in PRESSURES else 0.0,
         lags=greatest_lag(len(recording), recording.period, settings),
         step=step / size,
+        sensor=sensor,
         settings=settings,
     )
 

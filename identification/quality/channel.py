@@ -50,16 +50,13 @@ class ChannelAssessment:
     """None for a signal that never changes."""
     settings: QualitySettings = QUALITY
     """What the channel was judged by."""
+    sensor: Sensor
+    """Range, accuracy and noise that it should have; Table 1's and Table 3's on the report's bench."""
 
     @property
     def unit(self) -> str:
         """A, V or bar."""
         return UNITS[self.name][0]
-
-    @property
-    def sensor(self) -> Sensor:
-        """Table 1's range and accuracy, Table 3's noise."""
-        return SENSORS[self.name]
 
     @property
     def accuracy(self) -> float:
@@ -119,6 +116,7 @@ def assess_channel(
     rest: float,
     lags: int,
     step: float = 0.0,
+    sensor: Sensor | None = None,
     settings: QualitySettings = QUALITY,
 ) -> ChannelAssessment:
     """Statistics of one channel.
@@ -129,13 +127,15 @@ def assess_channel(
         period: time between samples [s].
         rest: what a perfect sensor reads at rest [A, V or bar].
         lags: greatest lag of the autocorrelation [samples].
+        sensor: of the channel; None: the report's.
         step: of the readings, where a record that hardly moves cannot show it [A, V or bar].
     """
+    sensor = sensor or SENSORS[name]
     time = np.arange(len(readings)) * period
     trend = fit_trend(time, readings)
     moves = bool(np.ptp(readings) > 0)
     residual = readings - trend.at(time) if moves else np.zeros_like(readings)
-    description = descriptive_statistics(residual, greatest=SENSORS[name].high)
+    description = descriptive_statistics(residual, greatest=sensor.high)
     step = reading_step(readings) or step
     rounding = step / description.standard_deviation if moves else 0.0
     return ChannelAssessment(
@@ -153,4 +153,5 @@ def assess_channel(
         normality=assess_normality(readings, trend.at(time), step, settings) if moves else UNTESTED,
         whiteness=assess_whiteness(residual, lags, settings) if moves else None,
         settings=settings,
+        sensor=sensor,
     )

@@ -50,6 +50,7 @@ def read_campaign(folder: str | PathLike[str], rules: RecordingRules = RULES) ->
             for path, role in manifest.roles.items()
         ),
         folder=folder,
+        rules=rules,
     )
     check_reference(str(folder), campaign.recordings, campaign.pressure, rules)
     return campaign
@@ -65,7 +66,6 @@ def check_vacant(folder: Path) -> None:
 def write_campaign(
     campaign: Campaign,
     folder: str | PathLike[str],
-    rules: RecordingRules = RULES,
     *,
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
@@ -76,21 +76,20 @@ def write_campaign(
     provenance: where the recordings come from; campaign.json holds it, and readers ignore it.
     """
     folder = Path(folder)
-    written = check_campaign(campaign, folder, rules)
+    written = check_campaign(campaign, folder)
     for recording, columns in written:
         write_text(folder / f"{recording.name}.csv", _csv(columns))
     content = manifest_content(campaign)
     write_json(folder / FILE_NAME, {**content, "provenance": provenance} if provenance else content)
 
 
-def check_campaign(
-    campaign: Campaign, folder: Path, rules: RecordingRules = RULES
-) -> list[tuple[Recording, dict[str, NDArray]]]:
+def check_campaign(campaign: Campaign, folder: Path) -> list[tuple[Recording, dict[str, NDArray]]]:
     """Recordings with their columns, each (samples,), as `write_campaign` would write them.
 
     Nothing is written. Raises CampaignError if the folder holds a campaign already or a rule is broken.
     """
     check_vacant(folder)
+    rules = campaign.rules
     content = manifest_content(campaign)
     check_manifest(folder, content)
     written = [(recording, _columns(recording)) for recording in campaign.recordings]

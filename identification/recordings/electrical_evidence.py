@@ -5,7 +5,6 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.plant.sensors import SENSORS
 from identification.recordings.rules import RULES, RecordingRules
 
 
@@ -78,7 +77,7 @@ def settled_samples(energised: NDArray, period: float, rules: RecordingRules = R
 
 def _at_rest(voltage: float, current: float, rules: RecordingRules) -> Iterator[str]:
     """A coil that is off from the beginning."""
-    sensor = SENSORS["U"]
+    sensor = rules.sensors["U"]
     if abs(voltage) > sensor.accuracy * sensor.high:
         yield f"the voltage is {voltage:.4g} V, neither off nor on"
     yield from _rest_current(current, rules)

@@ -5,13 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.plant.sensors import SENSORS
 from identification.recordings.reading_steps import campaign_steps, rounding_error
 from identification.recordings.recording import CHANNELS, HOLD, UNITS, Campaign, CampaignError, Recording
 from identification.recordings.rules import RULES, RecordingRules
 
 
-def pooled_noise(campaign: Campaign, rules: RecordingRules = RULES) -> dict[str, float]:
+def pooled_noise(campaign: Campaign) -> dict[str, float]:
     """Standard deviation of each channel's readings about the true value [A, V, Pa], pooled.
 
     From the quality recordings if there are any, otherwise from the holds that the other recordings
@@ -21,7 +20,7 @@ def pooled_noise(campaign: Campaign, rules: RecordingRules = RULES) -> dict[str,
     stretches = [(r, len(r)) for r in steady] or [
         (r, energised_start_length(r)) for r in campaign.recordings
     ]
-    return _pooled(campaign.recordings, stretches, rules)
+    return _pooled(campaign.recordings, stretches, campaign.rules)
 
 
 def noise_of_energised_start(recording: Recording, rules: RecordingRules = RULES) -> dict[str, float]:
@@ -47,7 +46,8 @@ def _pooled(
 ) -> dict[str, float]:
     """The noise by channel [SI] in stretches, at least the error by which the recordings are rounded."""
     coarse = campaign_steps(recordings, rules)
-    least = {name: coarse.get(name, SENSORS[name].resolution * UNITS[name][1]) for name in CHANNELS}
+    finest = {name: rules.sensors[name].resolution * UNITS[name][1] for name in CHANNELS}
+    least = {**finest, **coarse}
     return {
         name: max(_deviation(name, stretches, rules.noise_block), rounding_error(least[name]))
         for name in CHANNELS

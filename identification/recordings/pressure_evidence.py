@@ -10,16 +10,9 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.plant.sensors import SENSORS
 from identification.recordings.discharge import choked_discharges, discharge_ends
 from identification.recordings.electrical_evidence import starting_state
 from identification.recordings.rules import RULES, RecordingRules
-
-PRESSURE = SENSORS["p1"]
-"""Range, accuracy and noise of the pressure sensors (Table 1)."""
-
-MARGIN = PRESSURE.accuracy * PRESSURE.high
-"""Their accuracy [bar]."""
 
 
 def pressure_contradictions(
@@ -33,11 +26,11 @@ def pressure_contradictions(
     signals: p1, p2 and p3 [bar], each (samples,). energised: whether the coil is on, boolean
     (samples,). ambient: p_env [bar absolute].
     """
-    yield from _ranges(signals, ambient)
+    yield from _ranges(signals, ambient, rules)
     start = starting_state(energised)
     levels = {name: float(np.mean(values[start])) for name, values in signals.items()}
     if energised[0]:
-        yield from _energised_start(levels)
+        yield from _energised_start(levels, rules)
     else:
         yield from _at_rest(levels, ambient, rules)
     if energised[0] and not np.all(energised):
@@ -47,21 +40,22 @@ def pressure_contradictions(
         yield from _venting_end(signals["p3"], energised, ambient, rules)
 
 
-def _ranges(signals: Mapping[str, NDArray], ambient: float) -> Iterator[str]:
+def _ranges(signals: Mapping[str, NDArray], ambient: float, rules: RecordingRules) -> Iterator[str]:
     """A hundredth of the samples may be elsewhere: a few are a fault of another kind."""
     for name, values in signals.items():
         low, high = np.quantile(values, (0.01, 0.99))
-        if low < ambient - MARGIN:
+        margin, highest = rules.pressure_margin, rules.sensors[name].high
+        if low < ambient - margin:
             yield f"{name} falls to {low:.4g} bar, below the ambient {ambient:g} bar"
-        if high > PRESSURE.high + MARGIN:
-            yield f"{name} rises to {high:.4g} bar, beyond the sensor's {PRESSURE.high:g} bar"
+        if high > highest + margin:
+            yield f"{name} rises to {high:.4g} bar, beyond the sensor's {highest:g} bar"
 
 
-def _energised_start(levels: Mapping[str, float]) -> Iterator[str]:
+def _energised_start(levels: Mapping[str, float], rules: RecordingRules) -> Iterator[str]:
     p1, p2, p3 = (levels[name] for name in ("p1", "p2", "p3"))
-    if abs(p1 - p3) > 2 * MARGIN:
+    if abs(p1 - p3) > 2 * rules.pressure_margin:
         yield f"with the coil on, p1 is {p1:.4g} and p3 {p3:.4g} bar, although the open inlet joins them"
-    if p2 > p1 + 2 * MARGIN:
+    if p2 > p1 + 2 * rules.pressure_margin:
         yield f"the circuit's p2 of {p2:.4g} bar lies above its supply p1 of {p1:.4g} bar"
 
 
@@ -85,7 +79,7 @@ def _filling(
     """An open valve fills a circuit that is next to empty."""
     rise = float(np.quantile(signals["p2"], 0.99)) - levels["p2"]
     opened = np.quantile(signals["p3"], 0.01) < 0.65 * levels["p3"]
-    if opened and levels["p2"] < rules.nearly_vented * ambient and rise < 2 * MARGIN:
+    if opened and levels["p2"] < rules.nearly_vented * ambient and rise < 2 * rules.pressure_margin:
         yield f"p2 rises by only {rise:.2g} bar from {levels['p2']:.4g}, although the valve opens"
 
 
@@ -103,13 +97,13 @@ def _venting_end(
 def _at_rest(levels: Mapping[str, float], ambient: float, rules: RecordingRules) -> Iterator[str]:
     """Coil off for long: p3 is ambient, and the open valve lets p2 fill up to p1."""
     p1, p2, p3 = (levels[name] for name in ("p1", "p2", "p3"))
-    if abs(p3 - ambient) > MARGIN:
+    if abs(p3 - ambient) > rules.pressure_margin:
         yield f"at rest, p3 is {p3:.4g} bar, and the exhaust is open to the ambient {ambient:g} bar"
-    if p1 > p2 + 2 * MARGIN:
+    if p1 > p2 + 2 * rules.pressure_margin:
         yield f"at rest, p1 is {p1:.4g} and p2 {p2:.4g} bar, although the open valve joins them"
     for name, level, other in (("p1", p1, p2), ("p2", p2, p1)):
         doubled = abs(level - 2 * ambient) < rules.gauge_likeness * ambient
-        if doubled and max(abs(other - ambient), abs(p3 - ambient)) < MARGIN:
+        if doubled and max(abs(other - ambient), abs(p3 - ambient)) < rules.pressure_margin:
             yield f"at rest, {name} is {level:.4g} bar where the others are at ambient {ambient:g} bar"
 
 

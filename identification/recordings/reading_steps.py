@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.channels import CHANNEL
-from epv_env.plant.sensors import SENSORS
 from identification.recordings.recording import PRESSURES, UNITS, Recording
 from identification.recordings.rules import RULES, RecordingRules
 
@@ -63,7 +62,7 @@ def column_steps(
         for column in columns
         if any(column in r for r in recordings)
     }
-    return coarse_steps(readings, {c: SENSORS[columns[c]].noise for c in readings}, rules)
+    return coarse_steps(readings, {c: rules.sensors[columns[c]].noise for c in readings}, rules)
 
 
 def campaign_steps(recordings: Iterable[Recording], rules: RecordingRules = RULES) -> dict[str, float]:
@@ -74,7 +73,7 @@ def campaign_steps(recordings: Iterable[Recording], rules: RecordingRules = RULE
     pressures = {
         name: np.concatenate([recording.channel(name) for recording in recordings]) for name in PRESSURES
     }
-    noise = {name: SENSORS[name].noise * UNITS[name][1] for name in PRESSURES}
+    noise = {name: rules.sensors[name].noise * UNITS[name][1] for name in PRESSURES}
     return coarse_steps(pressures, noise, rules)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.channels import CHANNEL, MEASURED_CHANNELS
+from identification.recordings.rules import RULES, RecordingRules
 
 ROLES = ("calibration", "validation", "quality")
 """What a recording may be used for: fitting, testing only, statistics of the noise (section 4)."""
@@ -96,6 +97,8 @@ class Campaign:
     """p_env [Pa absolute]."""
     recordings: tuple[Recording, ...]
     folder: Path | None = None
+    rules: RecordingRules = RULES
+    """Limits and sensors of the bench and its valve, by which the recordings are read."""
 
     def with_role(self, role: str) -> tuple[Recording, ...]:
         """The recordings with one of ROLES."""

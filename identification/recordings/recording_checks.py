@@ -10,7 +10,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.plant.sensors import SENSORS, Sensor
+from epv_env.plant.data_acquisition import Sensor
 from identification.recordings.columns import CHANNEL_OF, TIME_COLUMN, line_number
 from identification.recordings.recording import HOLD, CampaignError
 from identification.recordings.rules import RULES, RecordingRules
@@ -50,11 +50,11 @@ def check_recording(
         if name in columns:
             coarse = (steps or {}).get(name, 0.0)
             _check_channel(
-                file, name, columns[name], SENSORS[channel], period, ambient_bar, coarse, rules
+                file, name, columns[name], rules.sensors[channel], period, ambient_bar, coarse, rules
             )
     if role != "quality":
         check_energised_start(file, columns["U_V"], period)
-        check_steady_start(file, columns, period)
+        check_steady_start(file, columns, period, rules)
     return period
 
 
@@ -178,7 +178,9 @@ def check_energised_start(file: str, U: NDArray, period: float) -> None:
         )
 
 
-def check_steady_start(file: str, columns: Mapping[str, NDArray], period: float) -> None:
+def check_steady_start(
+    file: str, columns: Mapping[str, NDArray], period: float, rules: RecordingRules = RULES
+) -> None:
     """Current and pressures rest during HOLD: first and last quarter agree within the accuracy.
 
     columns: by name, each (samples,) in the unit of the name. period [s]. Raises CampaignError.
@@ -189,7 +191,7 @@ def check_steady_start(file: str, columns: Mapping[str, NDArray], period: float)
         if name in columns and name != "U_V":
             start = columns[name][:count]
             change = float(np.mean(start[-quarter:]) - np.mean(start[:quarter]))
-            if abs(change) > _margin(SENSORS[channel]):
+            if abs(change) > _margin(rules.sensors[channel]):
                 raise CampaignError(
                     f"{file}, {_lines(0, count)}: {name} changes by {change:g} in the first "
                     f"{1e3 * HOLD:g} ms, which must be steady: let the bench settle, energised, "

@@ -1,6 +1,10 @@
 """The limits by which a recording is refused or its noise is read (docs/reference/files.md)."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from epv_env.plant.data_acquisition import Sensor
+from epv_env.plant.sensors import SENSORS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,6 +71,13 @@ class RecordingRules:
     that is somewhat quieter than Table 3's then rarely leaves a code."""
     noise_block: float = 0.05
     """Time over which a drift passes for straight when the noise is read [s]."""
+    sensors: Mapping[str, Sensor] = field(default_factory=lambda: SENSORS)
+    """The bench's sensor of each channel [bar absolute, A or V]; Tables 1 to 3."""
+
+    @property
+    def pressure_margin(self) -> float:
+        """Accuracy of the pressure sensors, of the worst of them [bar]."""
+        return max(self.sensors[name].accuracy * self.sensors[name].high for name in ("p1", "p2", "p3"))
 
 
 RULES = RecordingRules()

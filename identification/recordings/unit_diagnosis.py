@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.common.units import BAR
-from epv_env.plant.sensors import SENSORS
 from identification.recordings.columns import CHANNEL_OF, line_number
 from identification.recordings.discharge import choked_discharges, discharge_ends, venting_rate
 from identification.recordings.electrical_evidence import (
@@ -110,7 +109,7 @@ def _check_electrical(
         signals,
         lambda right: electrical_contradictions(right, period, rules),
         lambda: electrical_misreadings(signals, rest),
-        _unusual_noise,
+        lambda right: _unusual_noise(right, rules),
         rules,
     )
 
@@ -170,16 +169,16 @@ def _unusual_pressures(
         decades = abs(float(np.log10(max(p1, 1e-9) / rules.usual_supply))) + abs(p1 - p3)
     discharges = choked_discharges(signals["p3"], energised, ambient, rules)
     end = abs(discharge_ends(signals["p3"], discharges)[0]) if discharges else 0.0
-    return decades + min(end, 3.0) + _unusual_noise(signals)
+    return decades + min(end, 3.0) + _unusual_noise(signals, rules)
 
 
-def _unusual_noise(signals: Signals) -> float:
+def _unusual_noise(signals: Signals, rules: RecordingRules) -> float:
     """Decades by which the noises of some signals, each (samples,), are off the sensors'."""
     decades = 0.0
     for name, values in signals.items():
         noise = float(np.median(np.abs(np.diff(values)))) / 0.95
         if noise > 0.0:
-            decades += abs(float(np.log10(noise / SENSORS[name].noise)))
+            decades += abs(float(np.log10(noise / rules.sensors[name].noise)))
     return decades
 
 
@@ -215,4 +214,8 @@ def _wrong_time(factor: float) -> str:
         unit, size = "looks like ks: give s (multiply by 1000)", ""
     elif 3e5 < factor < 3e6:
         unit, size = "looks like µs: give s (divide by 1000000)", ""
-    return f"time_s {unit}" if unit else f"time_s looks {size}: give the true sampling rate in s"
+    return (
+        f"time_s {unit}"
+        if unit
+        else f"time_s looks {size}: give the true sampling rate in s, or another valve's --plant"
+    )

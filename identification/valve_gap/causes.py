@@ -1,13 +1,14 @@
 """The catalogue of causes of a gap, with physical ranges and sizes to begin a search from."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from epv_env.plant.effects.record import Size
 from epv_env.plant.effects.registry import EFFECTS
-from epv_env.plant.parameters import table
+from epv_env.plant.parameters import Parameters, table
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.gap.model.cause import Cause
 from identification.gap.model.free_parameter import FreeParameter, NuisanceParameter
+from identification.replay.parameter_vector import ParameterVector
 from identification.valve_gap.settings import VALVE, ValveSettings
 
 PARAMETER_COMPONENTS = {
@@ -20,9 +21,18 @@ PARAMETER_COMPONENTS = {
 """Component of each parameter outside the four, all of Tables 6 and 7 but the cone model's."""
 
 
-def catalogue(without: Sequence[str] = (), settings: ValveSettings = VALVE) -> tuple[Cause, ...]:
-    """All causes but those named. Raises ValueError for a name that none has."""
-    every = effects() + parameters(settings)
+def catalogue(
+    nominal: Parameters,
+    without: Sequence[str] = (),
+    settings: ValveSettings = VALVE,
+    free: Collection[str] = CALIBRATED_SYMBOLS,
+) -> tuple[Cause, ...]:
+    """All causes but those named; without those parameters that calibration fits anyway.
+
+    nominal: parameters of the model. free: symbols that calibration fits. Raises ValueError for a name
+    that no cause has.
+    """
+    every = effects() + [c for c in parameters(nominal, settings) if c.parameters[0].symbol not in free]
     unknown = set(without) - {cause.name for cause in every}
     if unknown:
         known = ", ".join(dict.fromkeys(cause.name for cause in every))
@@ -46,13 +56,13 @@ def effects() -> list[Cause]:
     ]
 
 
-def parameters(settings: ValveSettings = VALVE) -> list[Cause]:
-    """Causes `parameter:<symbol>`: a parameter outside the four off its table value."""
+def parameters(nominal: Parameters, settings: ValveSettings = VALVE) -> list[Cause]:
+    """Causes `parameter:<symbol>`: a parameter outside the four off its nominal value."""
     return [
         Cause(
             name=f"parameter:{symbol}",
             component=component,
-            parameters=(parameter_size(symbol, settings),),
+            parameters=(parameter_size(symbol, nominal, settings),),
             prior=settings.parameter_prior,
             exact_form=True,
         )
@@ -79,31 +89,31 @@ def _run_parameter(size: Size) -> NuisanceParameter:
     return NuisanceParameter(symbol=size.symbol, sd=size.scatter or 0.0, step=size.difference or 0.0)
 
 
-def parameter_size(symbol: str, settings: ValveSettings = VALVE) -> FreeParameter:
-    """A parameter that is not off by itself; its scale is its table value."""
-    row = table()[symbol]
-    low, high = row.domain or (row.value, row.value)
+def parameter_size(symbol: str, nominal: Parameters, settings: ValveSettings = VALVE) -> FreeParameter:
+    """A parameter that is not off by itself; its scale is its nominal value."""
+    value, (low, high) = nominal[symbol], nominal.domain(symbol)
     return FreeParameter(
         symbol=symbol,
-        unit=row.unit,
-        low=max(low, row.value * (1 - settings.parameter_range)),
-        high=min(high, row.value * (1 + settings.parameter_range)),
-        nominal=row.value,
-        trials=tuple(row.value * factor for factor in settings.parameter_trials),
-        scale=row.value,
+        unit=table()[symbol].unit,
+        low=max(low, value * (1 - settings.parameter_range)),
+        high=min(high, value * (1 + settings.parameter_range)),
+        nominal=value,
+        trials=tuple(value * factor for factor in settings.parameter_trials),
+        scale=value,
     )
 
 
-def calibrated(start: dict[str, float]) -> list[FreeParameter]:
-    """The four parameters that calibration fits, from `start`."""
+def calibrated(vector: ParameterVector) -> list[FreeParameter]:
+    """The parameters that calibration fits, from the vector's reference, within its bounds."""
+    start = vector.reference
     return [
         FreeParameter(
             symbol=symbol,
             unit=table()[symbol].unit,
-            low=min(table()[symbol].domain or (0.0,)),
-            high=max(table()[symbol].domain or (0.0,)),
+            low=low,
+            high=high,
             nominal=start[symbol],
             scale=start[symbol],
         )
-        for symbol in CALIBRATED_SYMBOLS
+        for symbol, (low, high) in zip(vector.symbols, vector.domains.tolist(), strict=True)
     ]

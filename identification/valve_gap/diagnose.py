@@ -4,25 +4,28 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import version
+from os import PathLike
 from pathlib import Path
 from time import perf_counter
 
 from scipy.stats import chi2
 
 from epv_env.common.journal import Journal
-from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from epv_env.plant.region import Region
 from identification.bench.programme_file import save_programmes
+from identification.bench.programmes import at_voltage
 from identification.gap.diagnosis import Diagnosis, diagnose, hypothesis_label
 from identification.gap.fit.fit_cache import FitCache
 from identification.gap.report.parameter_intervals import fitted_values, parameter_covariance
 from identification.gap.report.result_files import write_results
 from identification.gap.report.sections import sections
 from identification.recordings.campaign_files import read_campaign
+from identification.recordings.rules import RULES
+from identification.recordings.valve_rules import rules_of
 from identification.report.page import write_page
+from identification.valve_gap.programmes import CANDIDATES, next_experiment
 from identification.valve_gap.programmes import FILE_NAME as PROGRAMME
-from identification.valve_gap.programmes import next_experiment
 from identification.valve_gap.valve import Valve
 
 REPORT, PLANT, JOURNAL = "report.html", "plant.json", "fits.jsonl"
@@ -36,7 +39,7 @@ def diagnose_campaign(
     campaign: Path,
     out: Path,
     *,
-    plant: str | None = None,
+    plant: str | PathLike[str] | None = None,
     without: Sequence[str] = (),
     seed: int = 0,
     report: bool = True,
@@ -52,9 +55,9 @@ def diagnose_campaign(
     that cannot be used, ValueError for an unknown cause, a wrong noise or a plant file that is none.
     """
     began = perf_counter()
-    recorded = read_campaign(campaign)
-    nominal = load_plant(plant).parameters if plant else None
-    valve = Valve(recorded, nominal, without=without, noise=noise)
+    described = load_plant(plant) if plant else None
+    recorded = read_campaign(campaign, rules_of(described) if described else RULES)
+    valve = Valve(recorded, described, without=without, noise=noise)
     journal = Journal(out / JOURNAL, _subject(valve, without, noise or {}))
     steps = Steps(began) if report else _silent
     found = diagnose(valve, seed=seed, cache=FitCache(valve, journal, steps))
@@ -68,11 +71,15 @@ def _report(found: Diagnosis, valve: Valve, name: str, out: Path, steps: Callabl
     """Write what people use of it; returns what to record next."""
     steps("next experiment")
     experiment = next_experiment(
-        found.ranking, valve, settings=found.settings.design, verdict=found.conclusion.verdict
+        found.ranking,
+        valve,
+        at_voltage(CANDIDATES, valve.plant.voltage),
+        settings=found.settings.design,
+        verdict=found.conclusion.verdict,
     )
     (out / PROGRAMME).unlink(missing_ok=True)
     if experiment.programme:
-        save_programmes([experiment.programme], out / PROGRAMME)
+        save_programmes([experiment.programme], out / PROGRAMME, valve.plant.sensors)
     save_plant(refitted_plant(found, valve, name), out / PLANT)
     steps("report")
     title = f"Gap between model and recordings: {name}"
@@ -89,15 +96,16 @@ def refitted_plant(found: Diagnosis, valve: Valve, name: str) -> Plant:
     To be added is what the verdict names, whether it explains all or a part, and what surely reduces the
     gap on held-out recordings.
 
-    Its region is where the recordings leave the four parameters and the sizes, jointly; autocorrelated
-    residuals widen it.
+    Its region is where the recordings leave the calibrated parameters and the sizes, jointly;
+    autocorrelated residuals widen it.
     """
     named = found.named if found.named and found.surely_helps(found.named) else None
     best = named.hypothesis if named else found.ranking.recalibrated
-    parameters = Parameters({**valve.base, **fitted_values(found, best)})
+    parameters = valve.base.replace(**fitted_values(found, best))
     problem = found.ranking.problem
     symbols = tuple(p.symbol for p in problem.parameters(best.estimate))
-    return Plant(
+    return replace(
+        valve.plant,
         parameters=parameters,
         region=Region(
             centre=parameters,

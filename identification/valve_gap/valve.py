@@ -6,7 +6,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.plant.free_parameters import FREE_PARAMETERS
 from epv_env.plant.parameters import Parameters
+from epv_env.plant.plantfile import Plant
 from identification.calibration.problem import calibration_problem
 from identification.gap.model.free_parameter import NuisanceParameter
 from identification.gap.model.recorded_run import Channel, Run
@@ -36,7 +38,7 @@ class Valve:
     def __init__(
         self,
         campaign: Campaign,
-        nominal: Parameters | None = None,
+        plant: Plant | None = None,
         without: Sequence[str] = (),
         settings: ValveSettings = VALVE,
         noise: Mapping[str, float] | None = None,
@@ -45,7 +47,7 @@ class Valve:
 
         Args:
             campaign: its calibration and validation recordings.
-            nominal: the parameters as given; None: Table 10.
+            plant: the nominal parameters, and those that calibration fits; None: Table 10's four.
             without: names of causes to leave out.
             settings: judgements about the valve.
             noise: standard deviation of the readings by channel [Pa, A], where it is known better than
@@ -58,7 +60,9 @@ class Valve:
         self.settings = settings
         self.time_scale = settings.time_scale
         given = _checked_noise(noise or {})
-        problem = calibration_problem(campaign, start=nominal)
+        start, free = (plant.parameters, plant.free) if plant else (None, FREE_PARAMETERS)
+        problem = calibration_problem(campaign, start=start, free=free)
+        self.plant = plant or Plant.calibrated()
         self.base = problem.vector.reference
         self.recordings = (*problem.calibration, *problem.validation)
         self.channels = tuple(
@@ -71,11 +75,12 @@ class Valve:
             for name in OUTPUTS
         )
         self.runs = tuple(as_run(recording) for recording in self.recordings)
-        self.parameters = tuple(causes.calibrated(dict(self.base)))
-        self.causes = causes.catalogue(without, settings)
+        self.parameters = tuple(causes.calibrated(problem.vector))
+        self.causes = causes.catalogue(self.base, without, settings, free)
         self.tolerances = tuple(
             _tolerance(symbol, self.base, settings.parameter_scatter)
             for symbol in causes.PARAMETER_COMPONENTS
+            if symbol not in free
         )
         self.warnings = coarse_step_warnings(problem.steps)
         self.run_offsets = (_rounded(P2_START, problem.steps.get("p2", 0.0)), P3_ZERO, I_ZERO)

@@ -9,6 +9,7 @@ from controllers.mpc_prediction import PREDICTION, Decision, Predictor, sequence
 from controllers.tuned import build, load_tunings
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
+from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from epv_env.vector_env import EPValveVectorEnv
 
@@ -91,7 +92,7 @@ def test_it_earns_more_than_the_tuned_hysteresis():
     returns = []
     for controller in (
         MPC(parameters=plant, threads=1),
-        build("hysteresis, extrapolating", tuned.values, plant),
+        build("hysteresis, extrapolating", tuned.values, Plant.calibrated()),
     ):
         env, observation = begun(4, scenario="service", parameters="ten_percent")
         controller.reset(4)

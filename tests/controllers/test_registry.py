@@ -18,7 +18,7 @@ from controllers.learned import LearnedPolicy
 from controllers.registration import CHEAP, Choice, Range, Registration, RegistrationError, SearchSpace
 from controllers.registry import REGISTRY, cost_class, registration
 from controllers.tuned import Tuning, build, load_tunings
-from epv_env.plant.parameters import Parameters
+from epv_env.plant.plantfile import Plant
 
 FROM_FILES = (LearnedPolicy,)
 """Controllers that training writes into folders: not registered, since each folder names itself."""
@@ -74,7 +74,7 @@ def problems(entry: Registration, tunings: Mapping[str, Tuning]) -> list[str]:
         ]
     try:
         values = tunings[entry.kind].values if space is not None else {}
-        made = entry.built(values, Parameters.calibrated())
+        made = entry.built(values, Plant.calibrated())
     except (TypeError, ValueError) as error:
         return [f"{entry.kind!r} cannot be built from its tuned values: {error}"]
     checks: dict[str, Callable[[], bool]] = {
@@ -121,8 +121,8 @@ def test_kinds_are_unique():
             {"search_space": dict.fromkeys(("open_below", "shut_above"), Range(low=0.0, high=1.0))},
             "its tuned values leave its search space",
         ),
-        ({"build": lambda values, parameters: LearnedPolicy(layers=[])}, "it builds a LearnedPolicy"),
-        ({"build": lambda values, parameters: LearnedPolicy(**values)}, "cannot be built"),
+        ({"build": lambda values, plant: LearnedPolicy(layers=[])}, "it builds a LearnedPolicy"),
+        ({"build": lambda values, plant: LearnedPolicy(**values)}, "cannot be built"),
     ],
 )
 def test_what_an_incomplete_record_lacks_is_named(changes, words):
@@ -138,9 +138,9 @@ def test_an_unknown_kind_and_a_forgotten_value_get_one_sentence():
     with pytest.raises(
         RegistrationError, match="unknown controller 'fuzzy': choose one of hysteresis, "
     ):
-        build("fuzzy", {}, Parameters.calibrated())
+        build("fuzzy", {}, Plant.calibrated())
     with pytest.raises(RegistrationError, match=r"'hysteresis' lacks shut_above: .* tune anew"):
-        build("hysteresis", {"open_below": -0.1}, Parameters.calibrated())
+        build("hysteresis", {"open_below": -0.1}, Plant.calibrated())
 
 
 def test_a_learned_policy_is_cheap():

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from epv_env.plant.free_parameters import Freedom
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.sensors import SENSORS
 from identification.bench.measurement import TrueSignals, measured_campaign, run_programme
@@ -73,3 +74,8 @@ def exact_problem() -> CalibrationProblem:
     recordings = tuple(exact_recording(name) for name in SWITCHING)
     campaign = Campaign(name="exact", temperature=293.0, pressure=1e5, recordings=recordings)
     return calibration_problem(campaign)
+
+
+def freed(*symbols: str) -> dict[str, Freedom]:
+    """These parameters may move within their domains, and nothing is known of them before."""
+    return dict.fromkeys(symbols, Freedom())

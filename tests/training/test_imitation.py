@@ -21,7 +21,7 @@ PLANT = Plant.calibrated()
 
 
 def built(kind):
-    return build(kind, load_tunings()[kind].values, PLANT.parameters)
+    return build(kind, load_tunings()[kind].values, PLANT)
 
 
 def environment(seed=0):

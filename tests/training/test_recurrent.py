@@ -196,7 +196,7 @@ def test_each_valve_s_table_is_that_of_its_plant_to_the_bit():
 
 @pytest.mark.parametrize("informed", [False, True])
 def test_only_a_pulse_that_knows_its_plant_holds_the_band_on_others(informed):
-    tuned = build("pulse", load_tunings()["pulse"].values, PLANT.parameters)
+    tuned = build("pulse", load_tunings()["pulse"].values, PLANT)
     example = PrivilegedPulse() if informed else tuned
     assert isinstance(example, Privileged) == informed
     metrics, _ = run_episodes(example, seeds=list(range(40, 64)), duration=4.0, options=OPTIONS)

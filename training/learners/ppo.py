@@ -16,7 +16,6 @@ from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
 from controllers.learned import LearnedPolicy
 from controllers.tuned import build, load_tunings
-from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from training.learners.batch_ppo import BatchPPO
@@ -126,7 +125,7 @@ def train(
         _restore(model, folder / CHECKPOINT_FILE, device=device)
         restore_progress(model, found.progress)
     elif h.imitation_epochs:
-        _start(model, h, env, plant.parameters, student=student, seed=seed)
+        _start(model, h, env, plant, student=student, seed=seed)
     greedy = partial(greedy_policy, student=student)
     selection = Selection(
         points=validation_points(timesteps, first_share=h.first_validation, count=h.validations),
@@ -193,13 +192,13 @@ def _start(
     model: PPO,
     h: Hyperparameters,
     env: VecEnvWrapper,
-    parameters: Parameters,
+    plant: Plant,
     *,
     student: LearnedPolicy | None,
     seed: int,
 ) -> None:
     """Start from a student, whose returns the critic learns, or from an imitation of the TEACHER."""
-    teacher = student or build(TEACHER, load_tunings()[TEACHER].values, parameters)
+    teacher = student or build(TEACHER, load_tunings()[TEACHER].values, plant)
     if student:
         put_layers(model, student, h.sharpness)
     imitate(

@@ -10,7 +10,7 @@ from controllers.learned import load_policy
 from controllers.policy_contract import CONTRACT_FILE, WEIGHTS_FILE
 from controllers.privileged_pulse import PrivilegedPulse
 from controllers.tuned import build, load_tunings
-from epv_env.plant.parameters import Parameters
+from epv_env.plant.plantfile import Plant
 
 DEFAULT = ("hysteresis, extrapolating", "pulse", "PWM")
 """Controllers that are swept unless others are named: good ones that compute little."""
@@ -20,18 +20,18 @@ INFORMED = PrivilegedPulse.name
 
 
 def named_controllers(
-    sources: Sequence[str], parameters: Parameters
+    sources: Sequence[str], plant: Plant
 ) -> tuple[dict[str, Controller], dict[str, str]]:
     """Controllers by label, and a digest of what each was made from.
 
     sources: a tuned kind (controllers/tuned.json), "pulse, informed", a folder that training
     wrote, or LABEL=FOLDER.
-    parameters: of the plant that the classic ones are designed for. Raises ValueError.
+    plant: that the classic ones are designed for. Raises ValueError.
     """
     controllers: dict[str, Controller] = {}
     digests: dict[str, str] = {}
     for source in sources:
-        label, controller, content = _named(source, parameters)
+        label, controller, content = _named(source, plant)
         if label in controllers:
             raise ValueError(f"two controllers are called {label!r}: give one as LABEL=FOLDER")
         controllers[label] = controller
@@ -39,14 +39,14 @@ def named_controllers(
     return controllers, digests
 
 
-def _named(source: str, parameters: Parameters) -> tuple[str, Controller, bytes]:
+def _named(source: str, plant: Plant) -> tuple[str, Controller, bytes]:
     """Label, controller, and the bytes that define it."""
     tunings = load_tunings()
     if source in tunings:
         values = tunings[source].values
-        return source, build(source, values, parameters), json.dumps(values, sort_keys=True).encode()
+        return source, build(source, values, plant), json.dumps(values, sort_keys=True).encode()
     if source == INFORMED:
-        return source, build(source, {}, parameters), source.encode()
+        return source, build(source, {}, plant), source.encode()
     label, _, folder = source.rpartition("=")
     path = Path(folder)
     if not path.is_dir():

@@ -7,8 +7,6 @@ import pytest
 
 from epv_env.plant.sensors import SENSORS
 from identification.bench.measurement import (
-    SENSOR_OFFSETS,
-    SENSOR_TRENDS,
     measured_campaign,
     measured_recording,
 )
@@ -40,8 +38,8 @@ def deviation(channel):
 def test_offset_and_trend_of_table_2_are_in_the_rest_record(channel):
     offset, slope, _, samples = line(channel)
     error = deviation(channel) / np.sqrt(samples)
-    assert offset == pytest.approx(SENSOR_OFFSETS[channel], abs=4 * 2 * error)
-    assert slope == pytest.approx(SENSOR_TRENDS[channel], abs=4 * np.sqrt(12) * error / 5.0)
+    assert offset == pytest.approx(SENSORS[channel].offset, abs=4 * 2 * error)
+    assert slope == pytest.approx(SENSORS[channel].trend, abs=4 * np.sqrt(12) * error / 5.0)
 
 
 @pytest.mark.parametrize("channel", ["p2", "p3", "U"])

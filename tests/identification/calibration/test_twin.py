@@ -7,12 +7,12 @@ import pytest
 
 from epv_env.plant.parameters import ParameterError
 from epv_env.plant.region import CALIBRATED_SYMBOLS
-from identification.bench.measurement import SENSOR_OFFSETS
+from epv_env.plant.sensors import SENSORS
 from identification.calibration.problem import calibration_problem
 from identification.calibration.search_methods import SearchResult, nelder_mead, weighted_least_squares
 from identification.recordings.recording import CHANNELS, UNITS, CampaignError
 from identification.replay.responses import total_response_error
-from tests.identification.twins import TRUE, calibration, exact_problem, problem, twin
+from tests.identification.twins import TRUE, calibration, exact_problem, freed, problem, twin
 
 TOLERANCE = {"alphaMV": 3e-4, "alphaPV": 9e-4, "RML": 8e-4, "R": 3e-4}
 """Four standard deviations of the estimates with the bench's noise, relative."""
@@ -80,7 +80,7 @@ def test_a_good_calibration_warns_of_nothing():
 @pytest.mark.parametrize("symbols", [("alphaPV",), ("R", "RML"), ("alphaMV", "alphaPV", "R")])
 def test_fewer_parameters_can_be_fitted(symbols):
     moved = {symbol: 0.97 * TRUE[symbol] for symbol in symbols}
-    posed = calibration_problem(twin(), start=TRUE.replace(**moved), symbols=symbols)
+    posed = calibration_problem(twin(), start=TRUE.replace(**moved), free=freed(*symbols))
     fit = fitted(posed)
     assert fit.z.shape == (len(symbols),)
     assert_near_truth(posed, fit.z)
@@ -88,7 +88,7 @@ def test_fewer_parameters_can_be_fitted(symbols):
 
 def test_other_parameters_than_the_report_s_can_be_fitted():
     posed = calibration_problem(
-        twin(), start=TRUE.replace(mMV=0.0024, V2=0.95e-3), symbols=("mMV", "V2")
+        twin(), start=TRUE.replace(mMV=0.0024, V2=0.95e-3), free=freed("mMV", "V2")
     )
     assert np.max(np.abs(apart(posed, fitted(posed).z))) < 0.01
 
@@ -112,7 +112,7 @@ def test_without_a_record_at_rest_nothing_is_subtracted():
 def test_with_one_the_bench_s_offsets_are():
     for channel in CHANNELS:
         offset, unit = problem().offsets[channel], UNITS[channel][1]
-        assert offset.value == pytest.approx(SENSOR_OFFSETS[channel] * unit, abs=4 * offset.error)
+        assert offset.value == pytest.approx(SENSORS[channel].offset * unit, abs=4 * offset.error)
         read = twin().recordings[0].channel(channel) - problem().calibration[0].channel(channel)
         np.testing.assert_allclose(read, offset.value, rtol=1e-6)
 
@@ -137,14 +137,14 @@ def test_a_campaign_without_a_recording_to_fit_to_is_refused():
 @pytest.mark.parametrize(
     ("symbols", "message"),
     [
-        (("a1", "R"), "a1 start at 0, from which a relative change leads nowhere: start elsewhere"),
-        (("x", "R"), "x cannot be fitted: choose from .*alphaMV"),
-        (("kappa",), "kappa cannot be fitted"),
+        (("a1", "R"), "a1 starts at 0, from which a relative change leads nowhere: start elsewhere"),
+        (("x", "R"), "x cannot be calibrated: choose from .*alphaMV"),
+        (("kappa",), "kappa cannot be calibrated"),
     ],
 )
 def test_symbols_that_cannot_be_fitted_are_refused(symbols, message):
     with pytest.raises(ParameterError, match=message):
-        calibration_problem(twin(), symbols=symbols)
+        calibration_problem(twin(), free=freed(*symbols))
 
 
 def test_a_fit_comes_back_from_json():

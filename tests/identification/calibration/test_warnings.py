@@ -11,7 +11,7 @@ from identification.calibration.calibration_section import calibration_json, cal
 from identification.calibration.calibration_warnings import calibration_warnings
 from identification.calibration.problem import calibration_problem
 from identification.calibration.settings import CalibrationSettings
-from tests.identification.twins import TRUE, calibration, problem, twin
+from tests.identification.twins import TRUE, calibration, freed, problem, twin
 
 START = Parameters.initial_guess()
 
@@ -69,19 +69,19 @@ def test_a_search_that_is_cut_short_is_not_trusted(warnings):
 
 
 def test_parameters_that_act_by_their_ratio_cannot_be_separated(warnings):
-    sentences = warnings(calibration_problem(twin(), symbols=("alphaMV", "V3")))
+    sentences = warnings(calibration_problem(twin(), free=freed("alphaMV", "V3")))
     assert any("the recordings cannot separate alphaMV, V3" in warning for warning in sentences)
 
 
 def test_only_those_are_named_that_cannot_be_separated():
-    four = calibration_problem(twin(), symbols=("alphaMV", "R", "V3", "alphaPV"))
+    four = calibration_problem(twin(), free=freed("alphaMV", "R", "V3", "alphaPV"))
     sentences = calibration_warnings(four, fits(z=four.vector.scaled(TRUE)))
     (separate,) = (warning for warning in sentences if "cannot separate" in warning)
     assert "cannot separate alphaMV, V3 (" in separate
 
 
 def test_recordings_that_the_model_cannot_explain_are_noticed(warnings):
-    sentences = warnings(calibration_problem(twin(), symbols=("alphaMV",)))
+    sentences = warnings(calibration_problem(twin(), free=freed("alphaMV")))
     assert any("misses the recordings by" in warning for warning in sentences)
     assert not any("cannot separate" in warning for warning in sentences)
 

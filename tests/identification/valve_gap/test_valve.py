@@ -28,7 +28,7 @@ def campaign(**effect: float) -> Campaign:
 
 def test_every_effect_of_the_plant_is_a_cause_with_a_component():
     assert {cause.name for cause in effects()} == set(CATALOGUE)
-    for cause in effects() + parameters():
+    for cause in effects() + parameters(Parameters.calibrated()):
         for size in cause.parameters:
             assert size.low < size.high
             assert size.trials, cause.label

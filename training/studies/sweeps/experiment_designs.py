@@ -68,7 +68,7 @@ def parameters(plant: Plant) -> Iterator[Point]:
     for symbol, row in table().items():
         if row.domain is None or row.group == "unmodelled" or symbol in effects:
             continue
-        low, high = row.domain
+        low, high = plant.parameters.domain(symbol)
         minus, plus = changed_values(symbol, plant.parameters[symbol])
         levels = {"-10 %": max(minus, low), "+10 %": min(plus, high), "least": low, "greatest": high}
         for level, value in levels.items():

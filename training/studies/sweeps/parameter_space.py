@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from epv_env.plant.parameters import table
 from epv_env.plant.region import Region
 
 
@@ -31,9 +30,17 @@ class Space:
         boxed = ends[:, 0] + coordinates[:, : len(boxes)] * np.ptp(ends, axis=1)
         points = np.hstack([boxed, self.region.joint(_ball(2 * coordinates[:, len(boxes) :] - 1))])
         return [
-            {symbol: _inside(symbol, value) for symbol, value in zip(self.symbols, row, strict=True)}
+            {
+                symbol: self._inside(symbol, value)
+                for symbol, value in zip(self.symbols, row, strict=True)
+            }
             for row in points.tolist()
         ]
+
+    def _inside(self, symbol: str, value: float) -> float:
+        """The value within the parameter's domain: rounding may step over its end."""
+        low, high = self.region.centre.domain(symbol)
+        return min(max(value, low), high)
 
     def latin_hypercube(self, points: int, seed: int) -> NDArray:
         """Coordinates (points, symbols): each symbol's range is cut into slices of one point each."""
@@ -45,9 +52,3 @@ def _ball(cube: NDArray) -> NDArray:
     length = np.linalg.norm(cube, axis=1, keepdims=True)
     furthest = np.max(np.abs(cube), axis=1, keepdims=True, initial=0.0)
     return cube * furthest / np.where(length > 0, length, 1.0)
-
-
-def _inside(symbol: str, value: float) -> float:
-    """The value within the parameter's domain: rounding may step over its end."""
-    low, high = table()[symbol].domain or (value, value)
-    return min(max(value, low), high)

@@ -1,0 +1,63 @@
+"""A valve of half the size, described by a plant file: its truth comes back as the report's does."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from epv_env.plant.parameters import ParameterError
+from epv_env.plant.plantfile import Plant, load_plant
+from identification.bench.measurement import measured_campaign, run_programme
+from identification.bench.programmes import REPORT_SUITE, at_voltage
+from identification.calibration.problem import CalibrationProblem, calibration_problem
+from identification.calibration.search_methods import weighted_least_squares
+from identification.confidence.covariance import estimate_covariance
+from identification.recordings.valve_rules import rules_of
+
+HALF_SIZE = Path(__file__).parents[3] / "docs/examples/half_size/half-size.json"
+TRUE_VALUES = {"alphaMV": 0.66, "alphaPV": 0.33, "RML": 3.2e7, "R": 12.4}
+NINETY_NINE_PERCENT = 13.3
+"""Of chi-square with four degrees of freedom."""
+
+
+@cache
+def plant() -> Plant:
+    return load_plant(HALF_SIZE)
+
+
+@cache
+def problem() -> CalibrationProblem:
+    """What its virtual bench's recordings pose, from the data sheet's values."""
+    truth, rules = plant().parameters.replace(**TRUE_VALUES), rules_of(plant())
+    suite = at_voltage(REPORT_SUITE, plant().voltage)
+    truths = [run_programme(truth, programme) for programme in suite]
+    campaign = measured_campaign(truths, truth, seed=2, rules=rules)
+    return calibration_problem(campaign, start=plant().parameters, free=plant().free)
+
+
+@cache
+def estimate():
+    """The scaled estimate (k,) and its covariance (k, k)."""
+    misfit = problem().least_squares()
+    fit = weighted_least_squares(misfit, problem().vector.scaled(problem().vector.reference))
+    assert fit.converged
+    return fit.z, estimate_covariance(problem(), misfit, fit.z, seed=0).total
+
+
+def test_its_truth_lies_in_the_joint_region_of_its_estimate():
+    z, covariance = estimate()
+    true = problem().vector.reference.replace(**TRUE_VALUES)
+    apart = z - problem().vector.scaled(true)
+    assert apart @ np.linalg.solve(covariance, apart) < NINETY_NINE_PERCENT
+
+
+def test_its_data_sheet_does_not():
+    z, covariance = estimate()
+    apart = z - problem().vector.scaled(problem().vector.reference)
+    assert apart @ np.linalg.solve(covariance, apart) > 100 * NINETY_NINE_PERCENT
+
+
+def test_the_report_s_limits_would_refuse_it():
+    with pytest.raises(ParameterError, match="R = 12 Ohm is outside its domain"):
+        Plant.calibrated().parameters.replace(R=plant().parameters["R"])
