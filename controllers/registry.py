@@ -1,6 +1,15 @@
 """The controllers by kind: one line each. docs/extending.md says how to add one."""
 
-from controllers import adaptive_pulse, hysteresis, mpc, oracle, privileged_pulse, pulse, pwm
+from controllers import (
+    adaptive_hysteresis,
+    adaptive_pulse,
+    hysteresis,
+    mpc,
+    oracle,
+    privileged_pulse,
+    pulse,
+    pwm,
+)
 from controllers.base import Controller
 from controllers.registration import CHEAP, CostClass, Registration, RegistrationError
 from epv_env.plant.plantfile import Plant
@@ -8,6 +17,7 @@ from epv_env.plant.plantfile import Plant
 REGISTRY: tuple[Registration, ...] = (
     hysteresis.HYSTERESIS,
     hysteresis.EXTRAPOLATING_HYSTERESIS,
+    adaptive_hysteresis.REGISTRATION,
     pwm.REGISTRATION,
     pulse.REGISTRATION,
     adaptive_pulse.REGISTRATION,
