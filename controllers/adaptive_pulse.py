@@ -1,7 +1,7 @@
 """Adaptive pulse control: the pulse controller on a table that it fits to its valve from its own pulses.
 
-A certainty-equivalent self-tuning regulator: the plan treats what controllers/valve_learner.py has learnt
-as true, except for a lower aim while the opening pressure is uncertain.
+A certainty-equivalent self-tuning regulator: the plan treats what the learner has found out
+(controllers/valve_learner.py) as true, except for a lower aim while the opening pressure is uncertain.
 """
 
 from dataclasses import dataclass, field

@@ -19,6 +19,7 @@ from controllers.oracle import Oracle
 from controllers.registry import untuned_controllers
 from controllers.tuned import tuned_controllers
 from epv_env.common.command_line import (
+    check_not_negative,
     check_positive,
     fail_clearly,
     parse_with_quick,
@@ -33,7 +34,7 @@ from epv_env.reward import RewardWeights
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.rollout import Trace, run_episodes
 from training.evaluation.scenarios import EVALUATION, RANDOM
-from training.evaluation.seeds import EVALUATION_SEED
+from training.evaluation.seeds import EVALUATION_SEED, VALIDATION_SEED
 from training.learners.policy_folders import (
     RECURRENT_TIMESTEPS,
     seed_folder,
@@ -52,6 +53,7 @@ from training.studies.comparison.episode_blocks import Block, joined_results, pl
 from training.studies.comparison.score_tables import ComparisonResults
 from training.studies.episode_tasks import Study
 from training.studies.generated_pages import check_pages
+from training.studies.imported_controllers import HELP, imported_controller, is_import
 from training.studies.parallel_run import run_tasks, task_runner
 from training.tradeoff import finished_variants, variant
 
@@ -70,6 +72,9 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     """The command line's options, checked."""
     parser = argparse.ArgumentParser(description="Compare controllers (docs/results/comparison.md).")
     parser.add_argument("--out", type=writable_folder, default=Path("runs/comparison"))
+    parser.add_argument(
+        "--controllers", type=_own, nargs="+", default=[], metavar="MODULE:CLASS", help=HELP
+    )
     _add_policies(parser)
     _add_episodes(parser)
     parser.add_argument("--workers", type=int, default=available_cores(), help="processes")
@@ -84,9 +89,19 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         "seeds", "recurrent_seeds", "timesteps", "recurrent_timesteps", "named", "random", "bound",
         "tuning", "duration", "workers",
     )  # fmt: skip
+    check_not_negative(parser, chosen, "seed")
+    if chosen.seed + max(chosen.named, chosen.random, chosen.bound) > VALIDATION_SEED - EVALUATION_SEED:
+        parser.error(f"--seed {chosen.seed}: give less, from a million on others are trained on them")
     if RANDOM not in chosen.scenarios:
         parser.error(f"--scenarios must hold {RANDOM!r}: the probabilities refer to it")
     return chosen
+
+
+def _own(source: str) -> str:
+    """The name of a controller of one's own, as argparse takes it."""
+    if not is_import(source):
+        raise argparse.ArgumentTypeError(f"{source!r}: give MODULE:CLASS, for instance mine:Relay")
+    return source
 
 
 def _add_policies(parser: argparse.ArgumentParser) -> None:
@@ -121,6 +136,7 @@ def _add_episodes(parser: argparse.ArgumentParser) -> None:
         help="random ones on each region, to bound the violation rate of ±500 mbar",
     )  # fmt: skip
     parser.add_argument("--tuning", type=int, default=256, help="episodes that choose a training seed")
+    parser.add_argument("--seed", type=int, default=0, help="of the first evaluation episode")
     parser.add_argument("--duration", type=float, default=10.0, help="length of an episode [s]")
 
 
@@ -140,8 +156,13 @@ def contenders(chosen: argparse.Namespace) -> list[Contender]:
         name = next(iter(policies.values())).name
         runs = {f"{name}, {seed}": policy for seed, policy in policies.items()}
         found.append(Contender(name=name, runs=runs, learned=True))
-    others = [*tuned_controllers(), *untuned_controllers(Plant.calibrated())]
-    return found + [Contender(name=c.name, runs={c.name: c}) for c in others]
+    own = [imported_controller(source) for source in chosen.controllers]
+    others = [*own, *tuned_controllers(), *untuned_controllers(Plant.calibrated())]
+    found += [Contender(name=c.name, runs={c.name: c}) for c in others]
+    names = [contender.name for contender in found]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise ValueError(f"two controllers are called {twice[0]!r}: give yours another name")
+    return found
 
 
 def limit_at_least_price(variants: list[Contender]) -> list[Contender]:
@@ -172,13 +193,13 @@ def run_blocks(blocks: list[Block], everyone: list[Contender], chosen: argparse.
     return joined_results(blocks, {name: outcome["result"] for name, outcome in outcomes.items()})
 
 
-def same_episode(c: ComparisonResults, duration: float) -> dict[str, Trace]:
+def same_episode(c: ComparisonResults, duration: float, first_seed: int) -> dict[str, Trace]:
     """One random episode of the calibrated plant under each contender's chosen run, in time."""
     traces = {}
     for contender in c.contenders:
         controller = contender.runs[c.chosen[contender.name]]
         _, trace = run_episodes(
-            controller, seeds=[EVALUATION_SEED], duration=duration, trace_of=0,
+            controller, seeds=[first_seed], duration=duration, trace_of=0,
             options=EVALUATION[RANDOM].options,
         )  # fmt: skip
         if trace is not None:
@@ -210,13 +231,14 @@ def compare(chosen: argparse.Namespace) -> int:
     everyone = contenders(chosen)
     variants = finished_variants(chosen.tradeoff)
     variants += limit_at_least_price(variants)
-    blocks = plan([*everyone, *variants], chosen.scenarios, sizes)
+    first_seed = EVALUATION_SEED + chosen.seed
+    blocks = plan([*everyone, *variants], chosen.scenarios, sizes, first_seed)
     results = run_blocks(blocks, [*everyone, *variants], chosen)
     comparison = ComparisonResults(everyone, chosen.scenarios, results, variants)
     tables = comparison_tables(comparison, trade_off_episodes=chosen.random)
-    settings = {name: getattr(chosen, name) for name in (*QUICK, "quick")}
+    settings = {name: getattr(chosen, name) for name in (*QUICK, "seed", "quick")}
     print(write_tables(comparison, tables, settings=settings, out=chosen.out, pages=chosen.pages))
-    traces, curves = same_episode(comparison, chosen.duration), learning_curves(chosen)
+    traces, curves = same_episode(comparison, chosen.duration, first_seed), learning_curves(chosen)
     write_figures(comparison, tables, traces=traces, curves=curves, out=chosen.out, images=chosen.images)
     print(f"\nresults in {chosen.out}")
     return 0

@@ -61,7 +61,7 @@ class LoopSettings:
     hyperparameters: Mapping[str, Any] = field(
         default_factory=lambda: {"num_envs": 128, "batch_size": 1024, "n_epochs": 4}
     )
-    """Of PPO: sixteen times as many updates per environment step as train_ppo.py without a memory, so that
+    """Of PPO: sixteen times as many updates per environment step as train_ppo.py without a memory:
     it learns in a quarter of the steps."""
 
 

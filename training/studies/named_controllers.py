@@ -11,6 +11,8 @@ from controllers.policy_contract import CONTRACT_FILE, WEIGHTS_FILE
 from controllers.privileged_pulse import PrivilegedPulse
 from controllers.tuned import build, load_tunings
 from epv_env.plant.plantfile import Plant
+from training.studies.fingerprint import fingerprint
+from training.studies.imported_controllers import imported_controller, is_import
 
 DEFAULT = ("hysteresis, extrapolating", "pulse", "PWM")
 """Controllers that are swept unless others are named: good ones that compute little."""
@@ -25,7 +27,7 @@ def named_controllers(
     """Controllers by label, and a digest of what each was made from.
 
     sources: a tuned kind (controllers/tuned.json), "pulse, informed", a folder that training
-    wrote, or LABEL=FOLDER.
+    wrote, LABEL=FOLDER, or MODULE:CLASS.
     plant: that the classic ones are designed for. Raises ValueError.
     """
     controllers: dict[str, Controller] = {}
@@ -47,11 +49,14 @@ def _named(source: str, plant: Plant) -> tuple[str, Controller, bytes]:
         return source, build(source, values, plant), json.dumps(values, sort_keys=True).encode()
     if source == INFORMED:
         return source, build(source, {}, plant), source.encode()
+    if is_import(source):
+        controller = imported_controller(source)
+        return controller.name, controller, fingerprint(controller).encode()
     label, _, folder = source.rpartition("=")
     path = Path(folder)
     if not path.is_dir():
         raise ValueError(
-            f"no controller {source!r}: give a folder that training wrote, or one of "
+            f"no controller {source!r}: give a folder that training wrote, MODULE:CLASS, or one of "
             f"{', '.join(tunings)}"
         )
     policy = load_policy(path)

@@ -5,11 +5,9 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
 
-import joblib
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.base import Controller
 from training.evaluation.controller_table import PLANTS, plant_region
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.scenarios import EVALUATION, RANDOM, TUNING_REGION
@@ -26,17 +24,13 @@ from training.studies.comparison.contenders import (
     Sizes,
 )
 from training.studies.episode_tasks import Study
+from training.studies.fingerprint import fingerprint
 
 BLOCK_EPISODES = 512
 """Episodes side by side; larger batches are hardly faster, smaller ones resume in finer steps."""
 
 EPISODE_OPTIONS = ("scenario", "target_bar")
 """Options that may differ from episode to episode of a block. A supply might, but then costs more."""
-
-
-def fingerprint(controller: Controller) -> str:
-    """A short hash of the controller's settings and weights."""
-    return str(joblib.hash(controller))[:12]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,12 +82,14 @@ def _options(scenario: str) -> dict[str, Any]:
     return EVALUATION[RANDOM if scenario == TUNING else scenario].options
 
 
-def plan(contenders: list[Contender], scenarios: list[str], sizes: Sizes) -> list[Block]:
-    """All blocks of a comparison."""
+def plan(
+    contenders: list[Contender], scenarios: list[str], sizes: Sizes, first_seed: int = EVALUATION_SEED
+) -> list[Block]:
+    """All blocks of a comparison. first_seed: of the evaluation's episodes."""
     blocks = []
     for contender in contenders:
         expense = EXPENSIVE.get(contender.name, CHEAP)
-        together = _sharing_blocks(_cases(contender, scenarios, sizes), expense)
+        together = _sharing_blocks(_cases(contender, scenarios, sizes), expense, first_seed)
         for run_name, controller in contender.runs.items():
             own = partial(Block, run_name=run_name, version=fingerprint(controller), cost=expense.times)
             for (plants, first, count, _), alike in together.items():
@@ -112,12 +108,12 @@ def _cases(contender: Contender, scenarios: list[str], sizes: Sizes) -> dict[tup
 
 
 def _sharing_blocks(
-    cases: dict[tuple[str, str], int], expense: Expense
+    cases: dict[tuple[str, str], int], expense: Expense, first_seed: int
 ) -> dict[tuple[str, int, int, str], list[str]]:
     """Scenarios that can share blocks, by plant set, first seed, episodes, and their other options."""
     together: dict[tuple[str, int, int, str], list[str]] = {}
     for (plants, scenario), wanted in cases.items():
-        first = TUNING_SEED if scenario == TUNING else EVALUATION_SEED
+        first = TUNING_SEED if scenario == TUNING else first_seed
         others = {name: v for name, v in _options(scenario).items() if name not in EPISODE_OPTIONS}
         key = plants, first, expense.episodes(plants, scenario, wanted), repr(others)
         together.setdefault(key, []).append(scenario)
