@@ -39,9 +39,7 @@ def imported_controller(source: str) -> Controller:
     try:
         controller: Any = found()
     except TypeError as error:
-        raise ValueError(
-            f"controller {source}: {error}: give every argument a default value"
-        ) from None
+        raise ValueError(f"controller {source}: {error}: give every argument a default value") from None
     lacking = [name for name in ("name", "environment", "reset", "act") if not hasattr(controller, name)]
     if lacking:
         raise ValueError(

@@ -97,8 +97,7 @@ def test_a_start_in_another_basin_is_reported(tmp_path):
     assert not any("usual start" in warning for warning in sentences)
     turned = {method: found_fits[::-1] for method, found_fits in fits.items()}
     assert all(
-        "the usual start is among" in warning
-        for warning in calibration_warnings(problem(), turned)
+        "the usual start is among" in warning for warning in calibration_warnings(problem(), turned)
     )
 
 
