@@ -20,10 +20,19 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_out(parser)
     add_seed(parser, help="of starts, draws and resampling")
     add_count(parser, "--starts", default=CALIBRATION.starts, help="searches of each method")
+    parser.add_argument(
+        "--report-2003", action="store_true", help="show the figures of the report SCL-001/2003 beside"
+    )
 
 
 def chosen_identification(chosen: argparse.Namespace) -> Identification:
     """The identification of the chosen campaign. Raises CampaignError."""
     campaign = read_campaign(chosen.campaign)
     settings = IdentificationSettings(calibration=CalibrationSettings(starts=chosen.starts))
-    return Identification(campaign, chosen.out / JOURNAL, seed=chosen.seed, settings=settings)
+    return Identification(
+        campaign,
+        chosen.out / JOURNAL,
+        seed=chosen.seed,
+        settings=settings,
+        report_2003=chosen.report_2003,
+    )
