@@ -28,7 +28,7 @@ def profiles(confidence: Confidence) -> Figure:
         axes.set_xlabel(_axis(symbol))
         axes.grid(alpha=0.3)
     panels[0].legend(fontsize="small")
-    figure.supylabel("total error (eq. 21) [%]")
+    figure.supylabel("total error [%]")
     return figure
 
 

@@ -72,8 +72,13 @@ class Diagnosis:
 
 
 def hypothesis_label(hypothesis: EvaluatedHypothesis) -> str:
-    """A hypothesis in one line."""
+    """A hypothesis in one line, as in files."""
     return " + ".join(hypothesis.labels)
+
+
+def hypothesis_title(hypothesis: EvaluatedHypothesis) -> str:
+    """A hypothesis in one line, for people."""
+    return " + ".join(hypothesis.titles)
 
 
 def diagnose(
@@ -177,7 +182,7 @@ def _warnings(
     if not recalibrated.converged:
         warnings.append("the recalibration did not converge: its gap may be too large")
     return warnings + [
-        f"the fit of {hypothesis_label(cause.hypothesis)} did not converge: its size and its "
+        f"the fit of {hypothesis_title(cause.hypothesis)} did not converge: its size and its "
         "probability are in doubt"
         for cause in judged
         if not cause.hypothesis.converged and cause.probability > mentioned_probability

@@ -47,14 +47,13 @@ def _values(identification: Identification, common: Sequence[Reason], judged: Se
         rows.append(
             [
                 f"{row.meaning} ({trust.symbol})",
-                f"{value:.5g}{unit}",
-                f"{low:.5g} to {high:.5g}",
+                f"{value:.5g} ({low:.5g} to {high:.5g}){unit}",
                 f"{ANSWERS[status]}{': ' if why else ''}{why}",
             ]
         )
         statuses.append(status)
     return Table(
-        columns=["Parameter", "value", "95 % interval", "trust it?"],
+        columns=["Parameter", "value (95 % interval)", "trust it"],
         rows=rows,
         statuses=statuses,
         caption="MV: magnet valve; PV: protection valve. Intervals hold the sensors' noise, not what "

@@ -75,8 +75,8 @@ def _errors(study: OneAtATime) -> Table:
     errors = {symbol: percentages(study.exact[symbol]) for symbol in printed_rows()}
     order = sorted(errors, key=lambda symbol: max(errors[symbol]), reverse=True)
     return Table(
-        columns=["Parameter", "meaning", "total error for −10 % / +10 % [%]"],
-        rows=[[symbol, table()[symbol].meaning, _pair(errors[symbol])] for symbol in order],
+        columns=["Parameter", "total error for −10 % / +10 % [%]"],
+        rows=[[f"{table()[symbol].meaning} ({symbol})", _pair(errors[symbol])] for symbol in order],
         caption="How far the responses move when one parameter changes. a1 is zero and goes to the ends "
         "of its domain, ±0.1 rad.",
     )

@@ -51,6 +51,7 @@ def parameters(settings: ValveSettings = VALVE) -> list[Cause]:
     return [
         Cause(
             name=f"parameter:{symbol}",
+            words=f"another {symbol} ({table()[symbol].meaning})",
             component=component,
             parameters=(parameter_size(symbol, settings),),
             prior=settings.parameter_prior,

@@ -1,6 +1,6 @@
 """The report of a diagnosis as sections of the HTML page."""
 
-from identification.gap.diagnosis import Diagnosis, hypothesis_label
+from identification.gap.diagnosis import Diagnosis, hypothesis_title
 from identification.gap.rank.verdict import AMBIGUOUS, KNOWN, NO_GAP
 from identification.gap.report import (
     localisation_figures,
@@ -48,8 +48,9 @@ def _verdict(diagnosis: Diagnosis, next_experiment: str) -> Section:
     )
     return Section(
         title="Verdict",
+        summary=True,
         verdicts=[Verdict(status=status, text=text)],
-        blocks=[Text(text=explanation)],
+        blocks=[tables.parameter_table(diagnosis), Text(text=explanation)],
     )
 
 
@@ -79,7 +80,7 @@ def _ranking(diagnosis: Diagnosis) -> Section:
     ambiguity_set = diagnosis.conclusion.ambiguity_set
     verdicts = [Verdict(status="note", text=sentences.hidden_causes_sentence(diagnosis))]
     if ambiguity_set:
-        names = ", ".join(hypothesis_label(cause.hypothesis) for cause in ambiguity_set)
+        names = ", ".join(hypothesis_title(cause.hypothesis) for cause in ambiguity_set)
         share = percent(diagnosis.ranking.settings.ambiguity_share)
         text = f"The fewest causes that hold {share} of the probability of all causes: {names}."
         status = "good" if len(ambiguity_set) == 1 else "doubt"
@@ -106,7 +107,7 @@ def _reduction(diagnosis: Diagnosis) -> Section:
     reduction = diagnosis.reduction
     blocks: list[Block] = [
         Picture(
-            figure=reduction_figures.gap_figure(reduction),
+            figure=reduction_figures.gap_figure(diagnosis),
             caption="Gap of every model on held-out recordings with "
             f"{level_text(diagnosis)} intervals; red: noise alone.",
         )
@@ -114,20 +115,19 @@ def _reduction(diagnosis: Diagnosis) -> Section:
     if reduction.shares_closed and diagnosis.conclusion.verdict != NO_GAP:
         blocks.append(
             Picture(
-                figure=reduction_figures.share_figure(reduction),
+                figure=reduction_figures.share_figure(diagnosis),
                 caption="Share that each cause closes of the gap between recalibration and noise.",
             )
         )
     blocks.append(tables.gap_table(diagnosis))
     if diagnosis.best and diagnosis.conclusion.verdict in (KNOWN, AMBIGUOUS):
         best = diagnosis.best.hypothesis
-        blocks.append(residual(diagnosis, best, f"Residual with {hypothesis_label(best)}"))
+        blocks.append(residual(diagnosis, best, f"Residual with {hypothesis_title(best)}"))
     blocks += [
         Picture(
             figure=ranking_figures.parameter_change_figure(diagnosis),
             caption="Changes of the calibrated parameters: they absorb part of what the model lacks.",
         ),
-        tables.parameter_table(diagnosis),
     ]
     return Section(
         title="How far the gap shrinks",
@@ -140,7 +140,7 @@ def _remainder(diagnosis: Diagnosis) -> Section:
     """What no named cause explains: how much, where, of which shape, and what is only disturbance."""
     blocks: list[Block] = []
     if diagnosis.remaining and diagnosis.best:
-        name = hypothesis_label(diagnosis.best.hypothesis)
+        name = hypothesis_title(diagnosis.best.hypothesis)
         blocks += missing_term(diagnosis, diagnosis.remaining, f"The model with {name}")
         blocks.append(residual(diagnosis, diagnosis.best.hypothesis, f"Residual with {name}"))
     text = remainder_sentence(diagnosis)
