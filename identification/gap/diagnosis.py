@@ -66,6 +66,12 @@ class Diagnosis:
         """
         return self.reduction.shares_closed[hypothesis_label(cause.hypothesis)]
 
+    @property
+    def kept(self) -> EvaluatedHypothesis:
+        """The model to use: with the named cause where it surely reduces the gap, else recalibrated."""
+        helps = self.named and self.surely_helps(self.named)
+        return self.named.hypothesis if self.named and helps else self.ranking.recalibrated
+
     def surely_helps(self, cause: RankedCause) -> bool:
         """Whether adding a judged cause surely reduces the gap on held-out recordings."""
         return self.share_closed(cause).low > 0.0

@@ -5,10 +5,7 @@ from collections.abc import Sequence
 from epv_env.plant.parameters import table
 from identification.pipeline.identification import Identification
 from identification.pipeline.trust import Reason, Trust, common_reasons, judge_values, worst
-from identification.report.page import Section, Table, Verdict
-
-ANSWERS = {"good": "yes", "doubt": "with care", "bad": "no"}
-"""Whether to trust a value, by its status."""
+from identification.report.page import ANSWERS, Section, Table, Verdict
 
 ADVICE = {
     "good": "The model with these values holds on recordings that were not fitted to",

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 LABELS = {"good": "good", "doubt": "in doubt", "bad": "not acceptable", "note": "note"}
 """What the page says for each status of a verdict."""
 
+ANSWERS = {"good": "yes", "doubt": "with care", "bad": "no"}
+"""Whether to trust a value, by its status."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:

@@ -104,6 +104,7 @@ def calibrated(start: dict[str, float]) -> list[FreeParameter]:
             low=min(table()[symbol].domain or (0.0,)),
             high=max(table()[symbol].domain or (0.0,)),
             nominal=start[symbol],
+            meaning=table()[symbol].meaning,
             scale=start[symbol],
         )
         for symbol in CALIBRATED_SYMBOLS

@@ -98,7 +98,7 @@ def refitted_plant(found: Diagnosis, valve: Valve, name: str) -> Plant:
     residuals widen it.
     """
     named = found.named if found.named and found.surely_helps(found.named) else None
-    best = named.hypothesis if named else found.ranking.recalibrated
+    best = found.kept
     parameters = Parameters({**valve.base, **fitted_values(found, best)})
     problem = found.ranking.problem
     symbols = tuple(p.symbol for p in problem.parameters(best.estimate))

@@ -76,7 +76,7 @@ def residual_figure(
         rows[0].fill_between(
             time, row - 0.4, row + 0.4, where=mask.tolist(), color=f"C{row}", step="mid", linewidth=0.0
         )
-    rows[0].set_yticks(range(len(masks)), list(masks), fontsize=7)
+    rows[0].set_yticks(range(len(masks)), [name.replace("_", " ") for name in masks], fontsize=7)
     rows[0].invert_yaxis()
     for axes, channel, values in zip(rows[1:], plant.channels, residual, strict=True):
         axes.axhspan(-band, band, color="0.85")

@@ -44,7 +44,8 @@ def location_figure(diagnosis: Diagnosis) -> Figure:
     probabilities = localisation.equation_probabilities.items()
     equations = {examined[name]: share for name, share in probabilities if name in examined}
     equations[NOTHING] = localisation.nothing_missing
-    components = diagnosis.conclusion.component_probabilities
+    found = diagnosis.conclusion.component_probabilities
+    components = {name.replace("_", " "): share for name, share in found.items()}
     rows = max(len(equations), len(components))
     figure = Figure(figsize=(9.5, 0.9 + 0.28 * rows), layout="constrained")
     left, right = figure.subplots(1, 2)

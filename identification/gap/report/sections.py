@@ -9,6 +9,7 @@ from identification.gap.report import (
     sentences,
     tables,
 )
+from identification.gap.report.calibrated_values import calibrated_values
 from identification.gap.report.localisation_blocks import (
     level_text,
     missing_term,
@@ -50,7 +51,7 @@ def _verdict(diagnosis: Diagnosis, next_experiment: str) -> Section:
         title="Verdict",
         summary=True,
         verdicts=[Verdict(status=status, text=text)],
-        blocks=[tables.parameter_table(diagnosis), Text(text=explanation)],
+        blocks=[calibrated_values(diagnosis, status), Text(text=explanation)],
     )
 
 
@@ -128,6 +129,7 @@ def _reduction(diagnosis: Diagnosis) -> Section:
             figure=ranking_figures.parameter_change_figure(diagnosis),
             caption="Changes of the calibrated parameters: they absorb part of what the model lacks.",
         ),
+        tables.parameter_table(diagnosis),
     ]
     return Section(
         title="How far the gap shrinks",

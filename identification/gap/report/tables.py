@@ -22,7 +22,10 @@ def ranking_table(diagnosis: Diagnosis) -> Table:
             [
                 hypothesis_title(cause.hypothesis),
                 ", ".join(
-                    dict.fromkeys(c.component for c in cause.hypothesis.estimate.hypothesis.causes)
+                    dict.fromkeys(
+                        c.component.replace("_", " ")
+                        for c in cause.hypothesis.estimate.hypothesis.causes
+                    )
                 ),
                 probability_text(cause.probability),
                 "; ".join(sentences.sizes_with_intervals(diagnosis, cause)),
