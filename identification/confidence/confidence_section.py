@@ -22,7 +22,7 @@ def confidence_section(confidence: Confidence, *, report_2003: bool = False) -> 
             _correlations(confidence),
             Text(text=_gradient(confidence)),
             Picture(
-                figure=figures.profiles(confidence),
+                figure=figures.profiles(confidence, report_2003=report_2003),
                 caption="Model error over one parameter at a time.",
                 printed="Figures 16 and 17",
             ),

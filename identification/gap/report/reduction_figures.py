@@ -1,20 +1,23 @@
 """Figures of the discrepancy reduction: bars with intervals."""
 
+from collections.abc import Callable
+
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from identification.gap.diagnosis import Diagnosis
 from identification.gap.reduce.block_bootstrap import Interval
+from identification.gap.reduce.discrepancy_reduction import DiscrepancyReduction
 from identification.gap.reduce.gaps import FLOOR, Gap
 from identification.gap.report.labels import row_height, wrapped
-from identification.gap.report.names import in_words
 
 
-def gap_figure(diagnosis: Diagnosis) -> Figure:
-    """Gap of every model on held-out runs, overall and by channel, with 90 % intervals."""
-    reduction = diagnosis.reduction
-    gaps = {in_words(diagnosis, name): gap for name, gap in reduction.gaps.items()}
+def gap_figure(reduction: DiscrepancyReduction, words: Callable[[str], str] = str) -> Figure:
+    """Gap of every model on held-out runs, overall and by channel, with 90 % intervals.
+
+    words: what people read instead of a cause's name.
+    """
+    gaps = {words(name): gap for name, gap in reduction.gaps.items()}
     models = {**gaps, "black box": reduction.black_box}
     panels = ["overall", *reduction.noise_ratios]
     figure = Figure(figsize=(10, 1.4 + 0.32 * row_height(models) * len(models)), layout="constrained")
@@ -33,13 +36,15 @@ def gap_figure(diagnosis: Diagnosis) -> Figure:
     return figure
 
 
-def share_figure(diagnosis: Diagnosis) -> Figure:
-    """Share of the explainable gap that each cause closes, with 90 % intervals."""
-    shares = diagnosis.reduction.shares_closed
-    names = [in_words(diagnosis, name) for name in shares]
+def share_figure(reduction: DiscrepancyReduction, words: Callable[[str], str] = str) -> Figure:
+    """Share of the explainable gap that each cause closes, with 90 % intervals.
+
+    words: what people read instead of a cause's name.
+    """
+    names = [words(name) for name in reduction.shares_closed]
     figure = Figure(figsize=(7, 1.2 + 0.32 * row_height(names) * len(names)), layout="constrained")
     axes = figure.subplots()
-    _bars(axes, [_percent(share) for share in shares.values()])
+    _bars(axes, [_percent(share) for share in reduction.shares_closed.values()])
     axes.set_yticks(range(len(names)), [wrapped(name) for name in names])
     axes.invert_yaxis()
     axes.set_xlim(0, 100)

@@ -1,5 +1,7 @@
 """The report of a diagnosis as sections of the HTML page."""
 
+from functools import partial
+
 from identification.gap.diagnosis import Diagnosis, hypothesis_title
 from identification.gap.rank.verdict import AMBIGUOUS, KNOWN, NO_GAP
 from identification.gap.report import (
@@ -16,6 +18,7 @@ from identification.gap.report.localisation_blocks import (
     percent,
     residual,
 )
+from identification.gap.report.names import in_words
 from identification.gap.report.remainder_sentences import disturbance_sentence, remainder_sentence
 from identification.gap.report.verdict_sentences import verdict_sentence
 from identification.report.page import Block, Picture, Section, Text, Verdict
@@ -105,10 +108,10 @@ def _ranking(diagnosis: Diagnosis) -> Section:
 
 
 def _reduction(diagnosis: Diagnosis) -> Section:
-    reduction = diagnosis.reduction
+    reduction, words = diagnosis.reduction, partial(in_words, diagnosis)
     blocks: list[Block] = [
         Picture(
-            figure=reduction_figures.gap_figure(diagnosis),
+            figure=reduction_figures.gap_figure(reduction, words),
             caption="Gap of every model on held-out recordings with "
             f"{level_text(diagnosis)} intervals; red: noise alone.",
         )
@@ -116,7 +119,7 @@ def _reduction(diagnosis: Diagnosis) -> Section:
     if reduction.shares_closed and diagnosis.conclusion.verdict != NO_GAP:
         blocks.append(
             Picture(
-                figure=reduction_figures.share_figure(diagnosis),
+                figure=reduction_figures.share_figure(reduction, words),
                 caption="Share that each cause closes of the gap between recalibration and noise.",
             )
         )
