@@ -97,8 +97,8 @@ def refitted_plant(found: Diagnosis, valve: Valve, name: str) -> Plant:
     Its region is where the recordings leave the four parameters and the sizes, jointly; autocorrelated
     residuals widen it.
     """
-    named = found.named if found.named and found.surely_helps(found.named) else None
     best = found.kept
+    named = bool(best.labels)
     parameters = Parameters({**valve.base, **fitted_values(found, best)})
     problem = found.ranking.problem
     symbols = tuple(p.symbol for p in problem.parameters(best.estimate))
