@@ -95,7 +95,7 @@ def test_the_command_finds_the_leak(tmp_path):
     assert found["ambiguity_set"] == [["leak"]]
     low, high = found["causes"][0]["magnitude"]["leak_1_per_s"][1:]
     assert low <= 4e-3 <= high
-    assert "data:image/png" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "data:image/svg+xml" in (tmp_path / "report.html").read_text(encoding="utf-8")
     assert sorted(path.stem for path in (tmp_path / "recordings").iterdir()) == [
         "test_1", "test_2", "validation",
     ]  # fmt: skip

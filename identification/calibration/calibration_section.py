@@ -14,15 +14,16 @@ from identification.report.page import Picture, Section, Table, Text, Verdict
 def calibration_section(calibration: Calibration) -> Section:
     """Estimates of both methods, errors before and after, and what speaks against them."""
     return Section(
-        title="Calibration (section 6.2)",
+        title="Calibration",
+        printed="section 6.2",
         verdicts=[_verdict(calibration), *_doubts(calibration)],
         blocks=[
             _estimates(calibration),
             Text(text=_offsets(calibration)),
             _starts(calibration),
-            error_table(calibration.before, "Errors at the start's parameters (Table 11)."),
+            error_table(calibration.before, "Errors at the start's parameters.", "Table 11"),
             *(
-                error_table(calibration.after[method], f"Errors after {method} (Table 13).")
+                error_table(calibration.after[method], f"Errors after {method}.", "Table 13")
                 for method in METHODS
             ),
             *(
@@ -64,8 +65,8 @@ def _verdict(calibration: Calibration) -> Verdict:
     good = error < limit
     return Verdict(
         status="good" if good else "bad",
-        text=f"The total error (eq. 21) falls from {percent(before)} to {percent(error)} %, "
-        f"{'below' if good else 'not below'} the report's limit of {100 * limit:.0f} %; the "
+        text=f"The total error falls from {percent(before)} to {percent(error)} %, "
+        f"{'below' if good else 'not below'} the limit of {100 * limit:.0f} %; the "
         f"residual of the least-squares fit is {rms:.3g} times the noise (1 is the floor).",
     )
 
@@ -89,7 +90,7 @@ def _estimates(calibration: Calibration) -> Table:
             ]
         )
     columns = ["Parameter", "start", *METHODS, "domain"]
-    return Table(columns=columns, rows=rows, caption="Estimates (Tables 10 and 12).")
+    return Table(columns=columns, rows=rows, caption="Estimates.", printed="Tables 10 and 12")
 
 
 def _offsets(calibration: Calibration) -> str:
@@ -123,7 +124,7 @@ def _starts(calibration: Calibration) -> Table:
             )
     columns = ["Method", "start", "error at the end", "reaches the best", "evaluations", "time [s]"]
     caption = (
-        f"Searches from several starts ({', '.join(calibration.problem.vector.symbols)}); error: eq. 21 "
-        "as a fraction for Nelder-Mead, rms in noise deviations for least squares."
+        f"Searches from several starts ({', '.join(calibration.problem.vector.symbols)}); error: the "
+        "total error as a fraction for Nelder-Mead, rms in noise deviations for least squares."
     )
     return Table(columns=columns, rows=rows, caption=caption)

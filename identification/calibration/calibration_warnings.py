@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.calibration.multi_start import METHODS, best_search, reached_best
 from identification.calibration.problem import CalibrationProblem
@@ -25,8 +24,7 @@ def calibration_warnings(
         warnings += _on_bounds(problem, method, best, settings.near_bound)
         warnings += _other_minima(method, fits[method], settings.same_minimum)
     best = best_search(fits["least squares"])
-    jacobian = np.vstack(problem.least_squares().linearised(best.z)[1])
-    warnings += _conditioning(problem, jacobian, settings)
+    warnings += _conditioning(problem, best, settings)
     return warnings + _unexplained(best, settings.unexplained)
 
 
@@ -39,15 +37,19 @@ def _not_converged(method: str, fit: SearchResult) -> list[str]:
     ]
 
 
-def _on_bounds(problem: CalibrationProblem, method: str, fit: SearchResult, share: float) -> list[str]:
+def symbols_on_bounds(problem: CalibrationProblem, fit: SearchResult, share: float) -> list[str]:
+    """Parameters that ended within a share [1] of their domain's width from one of its ends."""
     low, high = problem.vector.bounds.T
     margin = share * (high - low)
     at = (fit.z < low + margin) | (fit.z > high - margin)
+    return [symbol for symbol, on_bound in zip(problem.vector.symbols, at, strict=True) if on_bound]
+
+
+def _on_bounds(problem: CalibrationProblem, method: str, fit: SearchResult, share: float) -> list[str]:
     return [
         f"{method} ends at the end of {symbol}'s domain: the recordings ask for a value outside it, so "
         "the model lacks something or another parameter is wrong"
-        for symbol, on_bound in zip(problem.vector.symbols, at, strict=True)
-        if on_bound
+        for symbol in symbols_on_bounds(problem, fit, share)
     ]
 
 
@@ -64,17 +66,28 @@ def _other_minima(method: str, fits: list[SearchResult], tolerance: float) -> li
     ]
 
 
-def _conditioning(
-    problem: CalibrationProblem, jacobian: NDArray, settings: CalibrationSettings
-) -> list[str]:
+def inseparable_symbols(
+    problem: CalibrationProblem, fit: SearchResult, settings: CalibrationSettings = CALIBRATION
+) -> tuple[list[str], float]:
+    """Parameters that the recordings cannot separate, if any, and the condition number [1]."""
+    jacobian = np.vstack(problem.least_squares().linearised(fit.z)[1])
     normalised = jacobian / np.maximum(np.linalg.norm(jacobian, axis=0), np.finfo(float).tiny)
     condition = float(np.linalg.cond(normalised))
     if condition < settings.ill_conditioned:
-        return []
+        return [], condition
     direction = np.abs(np.linalg.svd(normalised, full_matrices=False)[2][-1])
     involved = [
         s for s, w in zip(problem.vector.symbols, direction, strict=True) if w > settings.involved_weight
     ]
+    return involved, condition
+
+
+def _conditioning(
+    problem: CalibrationProblem, fit: SearchResult, settings: CalibrationSettings
+) -> list[str]:
+    involved, condition = inseparable_symbols(problem, fit, settings)
+    if not involved:
+        return []
     return [
         f"the recordings cannot separate {', '.join(involved)} (condition number {condition:.0f}): fix "
         "one of them, or record what moves them apart"

@@ -24,6 +24,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_plant(parser, help="plant file of another valve than the report's, as its data sheet has it")
     add_seed(parser, help="of starts, draws and resampling")
     add_count(parser, "--starts", default=CALIBRATION.starts, help="searches of each method")
+    parser.add_argument(
+        "--report-2003", action="store_true", help="show the figures of the report SCL-001/2003 beside"
+    )
 
 
 def chosen_identification(chosen: argparse.Namespace) -> Identification:
@@ -32,5 +35,10 @@ def chosen_identification(chosen: argparse.Namespace) -> Identification:
     campaign = read_campaign(chosen.campaign, rules_of(plant) if plant else RULES)
     settings = IdentificationSettings(calibration=CalibrationSettings(starts=chosen.starts))
     return Identification(
-        campaign, chosen.out / JOURNAL, seed=chosen.seed, plant=plant, settings=settings
+        campaign,
+        chosen.out / JOURNAL,
+        seed=chosen.seed,
+        plant=plant,
+        settings=settings,
+        report_2003=chosen.report_2003,
     )

@@ -11,8 +11,11 @@ from epv_env.plant.parameters import table
 from identification.confidence.confidence import Confidence
 
 
-def profiles(confidence: Confidence) -> Figure:
-    """Total error over one parameter at a time, the others held (Figures 16 and 17)."""
+def profiles(confidence: Confidence, *, report_2003: bool = False) -> Figure:
+    """Total error over one parameter at a time, the others held (Figures 16 and 17).
+
+    report_2003: with the intervals of eq. 23, too.
+    """
     vector = confidence.problem.vector
     figure = Figure(figsize=(9, 5.5), layout="constrained")
     panels = _panels(figure, len(vector.symbols))
@@ -20,15 +23,16 @@ def profiles(confidence: Confidence) -> Figure:
     rows = zip(panels, vector.symbols, centre, confidence.minimum.profiles, strict=True)
     for axes, symbol, value, profile in rows:
         axes.plot(value * (1 + confidence.minimum.offsets), 100 * profile, color="tab:blue")
-        low, high = confidence.report_intervals()[symbol]
-        axes.axvspan(low, high, color="tab:red", alpha=0.4, label="eq. 23")
+        if report_2003:
+            low, high = confidence.report_intervals()[symbol]
+            axes.axvspan(low, high, color="tab:red", alpha=0.4, label="eq. 23")
         low, high = confidence.intervals()[symbol]
         axes.axvspan(low, high, color="tab:green", alpha=0.3, label="95 % interval")
         axes.axvline(value, color="black", linewidth=0.6)
         axes.set_xlabel(_axis(symbol))
         axes.grid(alpha=0.3)
     panels[0].legend(fontsize="small")
-    figure.supylabel("total error (eq. 21) [%]")
+    figure.supylabel("total error [%]")
     return figure
 
 

@@ -10,19 +10,21 @@ from identification.confidence.confidence import Confidence
 from identification.report.page import Picture, Section, Table, Text, Verdict
 
 
-def confidence_section(confidence: Confidence) -> Section:
-    """Intervals of both kinds, the joint region, and the check of the minimum."""
+def confidence_section(confidence: Confidence, *, report_2003: bool = False) -> Section:
+    """Intervals, the joint region, and the check of the minimum; report_2003: with eq. 23's."""
     return Section(
-        title="Confidence (section 6.3)",
+        title="Confidence",
+        printed="section 6.3",
         verdicts=[_precision(confidence), _agreement(confidence), _minimum(confidence)],
         blocks=[
-            _intervals(confidence),
+            _intervals(confidence, report_2003),
             _deviations(confidence),
             _correlations(confidence),
             Text(text=_gradient(confidence)),
             Picture(
-                figure=figures.profiles(confidence),
-                caption="Model error over one parameter at a time (Figures 16 and 17).",
+                figure=figures.profiles(confidence, report_2003=report_2003),
+                caption="Model error over one parameter at a time.",
+                printed="Figures 16 and 17",
             ),
             Picture(
                 figure=figures.region(confidence),
@@ -101,7 +103,7 @@ def _gradient(confidence: Confidence) -> str:
     )
 
 
-def _intervals(confidence: Confidence) -> Table:
+def _intervals(confidence: Confidence, report_2003: bool) -> Table:
     symbols = confidence.problem.vector.symbols
     estimates = confidence.estimate * confidence.problem.vector.scale
     rows = [
@@ -109,16 +111,16 @@ def _intervals(confidence: Confidence) -> Table:
             f"{symbol} [{table()[symbol].unit}]",
             f"{estimate:.7g}",
             *(f"{end:.7g}" for end in confidence.intervals()[symbol]),
-            *(f"{end:.7g}" for end in confidence.report_intervals()[symbol]),
+            *(f"{end:.7g}" for end in confidence.report_intervals()[symbol] if report_2003),
         ]
         for symbol, estimate in zip(symbols, estimates, strict=True)
     ]
-    columns = ["Parameter", "estimate", "low", "high", "eq. 23 low", "eq. 23 high"]
-    caption = (
-        "95 % intervals: of the least-squares estimate (sandwich covariance and noise of the inputs), "
-        "and eq. 23 as printed around the Nelder-Mead estimate (Table 14)."
-    )
-    return Table(columns=columns, rows=rows, caption=caption)
+    columns = ["Parameter", "estimate", "low", "high"]
+    caption = "95 % intervals of the least-squares estimate (sandwich covariance, noise of the inputs)"
+    if report_2003:
+        columns += ["eq. 23 low", "eq. 23 high"]
+        caption += ", and eq. 23 as printed around the Nelder-Mead estimate"
+    return Table(columns=columns, rows=rows, caption=f"{caption}.", printed="Table 14")
 
 
 def _deviations(confidence: Confidence) -> Table:

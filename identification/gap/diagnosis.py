@@ -66,14 +66,25 @@ class Diagnosis:
         """
         return self.reduction.shares_closed[hypothesis_label(cause.hypothesis)]
 
+    @property
+    def kept(self) -> EvaluatedHypothesis:
+        """The model to use: with the named cause where it surely reduces the gap, else recalibrated."""
+        helps = self.named and self.surely_helps(self.named)
+        return self.named.hypothesis if self.named and helps else self.ranking.recalibrated
+
     def surely_helps(self, cause: RankedCause) -> bool:
         """Whether adding a judged cause surely reduces the gap on held-out recordings."""
         return self.share_closed(cause).low > 0.0
 
 
 def hypothesis_label(hypothesis: EvaluatedHypothesis) -> str:
-    """A hypothesis in one line."""
+    """A hypothesis in one line, as in files."""
     return " + ".join(hypothesis.labels)
+
+
+def hypothesis_title(hypothesis: EvaluatedHypothesis) -> str:
+    """A hypothesis in one line, for people."""
+    return " + ".join(hypothesis.titles)
 
 
 def diagnose(
@@ -177,7 +188,7 @@ def _warnings(
     if not recalibrated.converged:
         warnings.append("the recalibration did not converge: its gap may be too large")
     return warnings + [
-        f"the fit of {hypothesis_label(cause.hypothesis)} did not converge: its size and its "
+        f"the fit of {hypothesis_title(cause.hypothesis)} did not converge: its size and its "
         "probability are in doubt"
         for cause in judged
         if not cause.hypothesis.converged and cause.probability > mentioned_probability

@@ -12,6 +12,7 @@ from identification.calibration.problem import CalibrationProblem, calibration_p
 from identification.confidence.confidence import Confidence, assess_confidence
 from identification.pipeline.settings import IDENTIFICATION, IdentificationSettings
 from identification.recordings.recording import Campaign
+from identification.validation.validate import Validation, validate
 
 ESTIMATOR = "least squares"
 """The method whose estimate goes on: it weighs the outputs by their noise, so it scatters least."""
@@ -30,6 +31,8 @@ class Identification:
     """The valve as its data sheet describes it; None: the report's, from Table 10."""
     settings: IdentificationSettings = IDENTIFICATION
     """Judgements of every stage."""
+    report_2003: bool = False
+    """Whether the pages show, beside the results, what the report SCL-001/2003 prints."""
 
     @property
     def hashes(self) -> dict[str, str]:
@@ -62,6 +65,11 @@ class Identification:
     def confidence(self) -> Confidence:
         """Intervals and joint region."""
         return assess_confidence(self.calibration, seed=self.seed, settings=self.settings.confidence)
+
+    @cached_property
+    def validation(self) -> Validation:
+        """The calibrated model on the held-out recordings. Raises CampaignError if there is none."""
+        return validate(self.problem, self.parameters, self.settings.validation)
 
     @property
     def parameters(self) -> Parameters:

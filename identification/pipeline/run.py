@@ -10,6 +10,8 @@ from typing import Any
 from epv_env.plant.plantfile import Plant, save_plant
 from identification.pipeline.identification import ESTIMATOR, Identification
 from identification.pipeline.stages import STAGES, Result, result_or_omission
+from identification.pipeline.summary import summary_section
+from identification.recordings.campaign_facts import campaign_facts
 from identification.report.page import Section
 from identification.report.result_files import write_results
 
@@ -58,12 +60,21 @@ def _write_report(
     out: Path, identification: Identification, plant: Plant, results: list[Result]
 ) -> None:
     """Write report.html and report.json."""
-    sections: list[Section] = [section for result in results for section in result.sections]
+    sections: list[Section] = [summary_section(identification)]
+    sections += [section for result in results for section in result.sections]
     content: dict[str, Any] = {"provenance": plant.provenance}
     for result in results:
         content |= result.content
     title = f"Identification of the protection valve: {identification.campaign.name}"
-    write_results(out, "report", title=title, sections=sections, content=content)
+    write_results(
+        out,
+        "report",
+        title=title,
+        sections=sections,
+        content=content,
+        facts=campaign_facts(identification.campaign),
+        report_2003=identification.report_2003,
+    )
 
 
 def _remaining(seconds: float, done: float) -> str:

@@ -18,7 +18,6 @@ from identification.sensitivity.collinearity import sensitivities_on_recordings
 from identification.sensitivity.one_at_a_time import studied_symbols
 from identification.sensitivity.sensitivity_section import sensitivity_section
 from identification.sensitivity.sensitivity_study import run_sensitivity_study
-from identification.validation.validate import validate
 from identification.validation.validation_section import validation_json, validation_section
 
 
@@ -62,7 +61,10 @@ def quality(identification: Identification) -> Result:
         assess_recording(recording, pressure, settings, steps, sensors) for recording in recordings
     ]
     return Result(
-        sections=[quality_section(assessment) for assessment in assessments],
+        sections=[
+            quality_section(assessment, report_2003=identification.report_2003)
+            for assessment in assessments
+        ],
         content={"quality": [quality_export.as_json(assessment) for assessment in assessments]},
     )
 
@@ -75,7 +77,7 @@ def sensitivity(identification: Identification) -> Result:
     outputs = sensitivities_on_recordings(replay, studied_symbols(), problem.noise, settings)
     study = run_sensitivity_study(outputs=outputs, seed=identification.seed, settings=settings)
     return Result(
-        sections=[sensitivity_section(study)],
+        sections=[sensitivity_section(study, report_2003=identification.report_2003)],
         content={"sensitivity": sensitivity_export.as_json(study)},
     )
 
@@ -93,14 +95,14 @@ def confidence(identification: Identification) -> Result:
     """Section 6.3."""
     intervals = identification.confidence
     return Result(
-        sections=[confidence_section(intervals)], content={"confidence": confidence_json(intervals)}
+        sections=[confidence_section(intervals, report_2003=identification.report_2003)],
+        content={"confidence": confidence_json(intervals)},
     )
 
 
 def validation(identification: Identification) -> Result:
     """Section 7. Raises CampaignError if nothing was held out."""
-    settings = identification.settings.validation
-    validated = validate(identification.problem, identification.parameters, settings)
+    validated = identification.validation
     return Result(
         sections=[validation_section(validated)], content={"validation": validation_json(validated)}
     )

@@ -20,17 +20,18 @@ UNIT_COLUMNS = [f"{name} [{UNITS[name][0]}]" for name in CHANNELS]
 """Headings of a table with a column per channel."""
 
 
-def quality_section(quality: QualityAssessment) -> Section:
-    """Everything that section 4 shows, beside the report's values."""
+def quality_section(quality: QualityAssessment, *, report_2003: bool = False) -> Section:
+    """Everything that section 4 shows; report_2003: beside the report's values."""
     return Section(
-        title=f"Data quality: {quality.name} ({quality.samples} samples, section 4)",
+        title=f"Data quality: {quality.name} ({quality.samples} samples)",
+        printed="section 4",
         verdicts=[channel_verdict(quality, name) for name in CHANNELS],
         blocks=[
             _checks(quality),
             Text(text=_state(quality)),
-            _trends(quality),
-            _statistics(quality),
-            _correlations(quality),
+            _trends(quality, report_2003),
+            _statistics(quality, report_2003),
+            _correlations(quality, report_2003),
             *_pictures(quality),
         ],
     )
@@ -44,8 +45,8 @@ def _state(quality: QualityAssessment) -> str:
         return f"The record is at rest. A calibration may subtract these offsets [A, V, Pa]: {values}."
     off = [name for name, channel in quality.channels.items() if not channel.at_rest]
     return (
-        f"Not at rest or not steady: {', '.join(off)}. The limits are Table 1's accuracy about 0 A, 0 V "
-        "and p_env, and a tenth of it for a drift. A calibration subtracts no offsets."
+        f"Not at rest or not steady: {', '.join(off)}. The limits are the sensors' accuracy about 0 A, "
+        "0 V and p_env, and a tenth of it for a drift. A calibration subtracts no offsets."
     )
 
 
@@ -63,17 +64,19 @@ def _checks(quality: QualityAssessment) -> Table:
     return Table(columns=["Channel", "verdict", *CHECKS], rows=rows, caption="Status of every check.")
 
 
-def _trends(quality: QualityAssessment) -> Table:
+def _trends(quality: QualityAssessment, report_2003: bool) -> Table:
     trends = [quality.channels[name].trend for name in CHANNELS]
+    slopes = [_estimate(trend.factor, trend.factor_error) for trend in trends]
+    offsets = [_estimate(trend.offset, trend.offset_error) for trend in trends]
+    rows = [["factor [unit/s]", *slopes], ["offset [unit]", *offsets]]
+    if report_2003:
+        rows.insert(1, ["  the report's", *_printed_trends(reported.TREND_SLOPES)])
+        rows.append(["  the report's", *_printed_trends(reported.TREND_OFFSETS)])
     return Table(
         columns=["Parameter", *UNIT_COLUMNS],
-        rows=[
-            ["factor [unit/s]", *(_estimate(trend.factor, trend.factor_error) for trend in trends)],
-            ["  the report's", *_printed_trends(reported.TREND_SLOPES)],
-            ["offset [unit]", *(_estimate(trend.offset, trend.offset_error) for trend in trends)],
-            ["  the report's", *_printed_trends(reported.TREND_OFFSETS)],
-        ],
-        caption="Signal offset and trend check (Table 2), ± one standard error.",
+        rows=rows,
+        caption="Signal offset and trend check, ± one standard error.",
+        printed="Table 2",
     )
 
 
@@ -92,17 +95,19 @@ def _estimate(value: float, error: float) -> str:
     return f"{value:z.6f} ± {error:.6f}" if math.isfinite(error) else f"{value:z.6f}"
 
 
-def _statistics(quality: QualityAssessment) -> Table:
+def _statistics(quality: QualityAssessment, report_2003: bool) -> Table:
     statistics = {name: channel.description for name, channel in quality.channels.items()}
     rows = []
     for field in fields(DescriptiveStatistics):
         label = reported.STATISTIC_NAMES[field.name]
         rows.append([label, *(_cell(statistics[name], field.name) for name in CHANNELS)])
-        rows.append(["  the report's", *_printed_statistics(field.name)])
+        if report_2003:
+            rows.append(["  the report's", *_printed_statistics(field.name)])
     return Table(
         columns=["Parameter", *UNIT_COLUMNS],
         rows=rows,
-        caption="Central, dispersion and distribution properties of the detrended signals (Table 3).",
+        caption="Central, dispersion and distribution properties of the detrended signals.",
+        printed="Table 3",
     )
 
 
@@ -119,7 +124,7 @@ def _printed_correlation(first: str, second: str) -> str:
     return NOT_PRINTED if printed is None else f"{printed:.4f}"
 
 
-def _correlations(quality: QualityAssessment) -> Table:
+def _correlations(quality: QualityAssessment, report_2003: bool) -> Table:
     rows = [
         [
             f"{first}, {second}",
@@ -127,17 +132,22 @@ def _correlations(quality: QualityAssessment) -> Table:
             f"{quality.adjusted[first, second]:.2g}",
             f"{pair.peak:.4f}",
             f"{1e3 * quality.period * pair.peak_lag:.3g}",
-            _printed_correlation(first, second),
+            *([_printed_correlation(first, second)] if report_2003 else []),
         ]
         for (first, second), pair in quality.pairs.items()
     ]
-    columns = ["Pair", "correlation", "p, family-wise", "greatest", "at lag [ms]", "the report's"]
+    columns = ["Pair", "correlation", "p, family-wise", "greatest", "at lag [ms]"]
+    if report_2003:
+        columns.append("the report's")
     caption = (
-        f"Correlation of the detrended signals (Table 4). Independent white signals lie within "
+        f"Correlation of the detrended signals. Independent white signals lie within "
         f"±{white_noise_band(quality.samples):.4f} in 95 % of cases."
     )
-    return Table(columns=columns, rows=rows, caption=caption)
+    return Table(columns=columns, rows=rows, caption=caption, printed="Table 4")
 
 
 def _pictures(quality: QualityAssessment) -> list[Picture]:
-    return [Picture(figure=draw(quality), caption=text) for draw, text in figures.CAPTIONS.items()]
+    return [
+        Picture(figure=draw(quality), caption=text, printed=printed)
+        for draw, (text, printed) in figures.CAPTIONS.items()
+    ]

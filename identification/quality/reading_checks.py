@@ -52,12 +52,12 @@ def check_noise(quality: QualityAssessment, channel: ChannelAssessment) -> Judge
     if channel.dithered and quiet != "good":
         return Judgement(
             quiet,
-            f"noise {milli_text(channel, deviation)} before rounding, only {ratio:.2g} times Table 3's; "
+            f"noise {milli_text(channel, deviation)} before rounding, only {ratio:.2g} times the usual; "
             "check the unit and scaling of the channel, since a reading too small has noise too small",
         )
     return judgement_of(
         graded_status(ratio, channel.settings.noise_levels),
-        f"noise {milli_text(channel, deviation)} before rounding, {ratio:.2f} times Table 3's, "
+        f"noise {milli_text(channel, deviation)} before rounding, {ratio:.2f} times the usual, "
         f"signal-to-noise ratio {channel.description.signal_to_noise:.1f} dB",
         "check shielding, ground and supply of the sensor",
     )
@@ -81,7 +81,7 @@ def check_resolution(quality: QualityAssessment, channel: ChannelAssessment) -> 
     steps = channel.normality.standard_deviation / channel.quantum if channel.quantum else np.inf
     return judgement_of(
         "doubt" if ratio > channel.settings.coarse_step or not channel.dithered else "good",
-        f"one step is {milli_text(channel, channel.quantum)}, {ratio:.2f} times Table 1's range in 12 "
+        f"one step is {milli_text(channel, channel.quantum)}, {ratio:.2f} times the usual range in 12 "
         f"bits, and the noise is {steps:.2g} steps",
         "check the converter's range and bits, since rounding errors do not average out",
     )

@@ -10,14 +10,29 @@ from identification.report.page import Section, write_page
 
 
 def write_results(
-    out: Path, name: str, *, title: str, sections: Sequence[Section], content: Mapping[str, Any]
+    out: Path,
+    name: str,
+    *,
+    title: str,
+    sections: Sequence[Section],
+    content: Mapping[str, Any],
+    facts: Mapping[str, str] | None = None,
+    report_2003: bool = False,
 ) -> None:
-    """Write `out/name.json` and the self-contained `out/name.html`, each whole or not at all."""
+    """Write `out/name.json` and the self-contained `out/name.html`, each whole or not at all.
+
+    facts: what the page rests on, by name. report_2003: whether the page says where the report prints
+    the like.
+    """
     write_json(out / f"{name}.json", content, allow_nan=False)
-    footer = (
-        f"Written by epv-valve {version('epv-valve')}. Sections and tables are those of SCL-001/2003."
+    write_page(
+        out / f"{name}.html",
+        title=title,
+        sections=sections,
+        facts=facts,
+        footer=f"Written by epv-valve {version('epv-valve')}.",
+        report_2003=report_2003,
     )
-    write_page(out / f"{name}.html", title=title, sections=sections, footer=footer)
 
 
 def as_text(sections: Sequence[Section]) -> str:

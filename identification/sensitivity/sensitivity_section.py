@@ -3,7 +3,7 @@
 import math
 
 from epv_env.plant.parameters import confidence_intervals, sensitive_symbols, table
-from identification.report.page import Picture, Section, Table, Text, Verdict
+from identification.report.page import Block, Picture, Section, Table, Text, Verdict
 from identification.sensitivity import sensitivity_figures as figures
 from identification.sensitivity.collinearity import OutputSensitivities
 from identification.sensitivity.global_indices import SobolIndices
@@ -29,21 +29,19 @@ METHOD = (
 """How the tables were computed, for the page."""
 
 
-def sensitivity_section(study: SensitivityStudy) -> Section:
-    """Everything that section 5 shows, beside the report's values."""
+def sensitivity_section(study: SensitivityStudy, *, report_2003: bool = False) -> Section:
+    """Everything that section 5 shows; report_2003: beside the report's values."""
     rows = study.one_at_a_time
     return Section(
-        title="Parametric sensitivity (section 5)",
+        title="Parametric sensitivity",
+        printed="section 5",
         verdicts=[
-            _reproduced("Fixed step", agreement_with_printed(rows.fixed_step)),
-            _reproduced("Exact stops", agreement_with_printed(rows.exact)),
+            *(_reproductions(rows) if report_2003 else []),
             *_separability(study.outputs),
             _dominant(study.indices),
         ],
         blocks=[
-            Text(text=METHOD),
-            _rows(rows),
-            Picture(figure=figures.tornado(rows, printed_rows()), caption="Tables 8 and 9."),
+            *(_beside_printed(rows) if report_2003 else [_errors(rows)]),
             _pairs(study.outputs),
             Picture(
                 figure=figures.collinearity_map(study.outputs),
@@ -56,6 +54,31 @@ def sensitivity_section(study: SensitivityStudy) -> Section:
                 "(a1 within ±0.05 rad), with bootstrap 95 % intervals.",
             ),
         ],
+    )
+
+
+def _reproductions(rows: OneAtATime) -> list[Verdict]:
+    return [
+        _reproduced("Fixed step", agreement_with_printed(rows.fixed_step)),
+        _reproduced("Exact stops", agreement_with_printed(rows.exact)),
+    ]
+
+
+def _beside_printed(rows: OneAtATime) -> list[Block]:
+    """Tables 8 and 9 beside ours, as text, table and figure."""
+    picture = Picture(figure=figures.tornado(rows, printed_rows()), caption="Tables 8 and 9.")
+    return [Text(text=METHOD), _rows(rows), picture]
+
+
+def _errors(study: OneAtATime) -> Table:
+    """How far the responses move with each parameter, the most sensitive first."""
+    errors = {symbol: percentages(study.exact[symbol]) for symbol in printed_rows()}
+    order = sorted(errors, key=lambda symbol: max(errors[symbol]), reverse=True)
+    return Table(
+        columns=["Parameter", "total error for −10 % / +10 % [%]"],
+        rows=[[f"{table()[symbol].meaning} ({symbol})", _pair(errors[symbol])] for symbol in order],
+        caption="How far the responses move when one parameter changes. a1 is zero and goes to the ends "
+        "of its domain, ±0.1 rad.",
     )
 
 

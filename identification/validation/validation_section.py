@@ -16,10 +16,11 @@ from identification.validation.validate import OutputResidual, Validation
 def validation_section(validation: Validation) -> Section:
     """The 10 % rule, the residuals, the responses."""
     return Section(
-        title="Validation on held-out recordings (section 7)",
+        title="Validation on held-out recordings",
+        printed="section 7",
         verdicts=[_error_verdict(validation), _residual_verdict(validation)],
         blocks=[
-            error_table(validation.answers, "Result of the model validation (Table 15)."),
+            error_table(validation.answers, "Result of the model validation.", "Table 15"),
             _residual_table(validation),
             *(
                 Picture(figure=response_figure(answer), caption="Validation: " + answer.recording.name)
@@ -79,7 +80,7 @@ def _error_verdict(validation: Validation) -> Verdict:
     return Verdict(
         status="good" if good else "bad",
         text=f"The greatest partial error on held-out recordings is {percent(validation.worst)} %, "
-        f"{'below' if good else 'not below'} the report's limit of {100 * limit:.0f} %.",
+        f"{'below' if good else 'not below'} the limit of {100 * limit:.0f} %.",
     )
 
 

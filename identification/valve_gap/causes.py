@@ -61,6 +61,7 @@ def parameters(nominal: Parameters, settings: ValveSettings = VALVE) -> list[Cau
     return [
         Cause(
             name=f"parameter:{symbol}",
+            words=f"another {symbol} ({table()[symbol].meaning})",
             component=component,
             parameters=(parameter_size(symbol, nominal, settings),),
             prior=settings.parameter_prior,
@@ -113,6 +114,7 @@ def calibrated(vector: ParameterVector) -> list[FreeParameter]:
             low=low,
             high=high,
             nominal=start[symbol],
+            meaning=table()[symbol].meaning,
             scale=start[symbol],
         )
         for symbol, (low, high) in zip(vector.symbols, vector.domains.tolist(), strict=True)

@@ -20,7 +20,9 @@ from identification.gap.fit.fit_cache import FitCache
 from identification.gap.report.parameter_intervals import fitted_values, parameter_covariance
 from identification.gap.report.result_files import write_results
 from identification.gap.report.sections import sections
+from identification.recordings.campaign_facts import campaign_facts
 from identification.recordings.campaign_files import read_campaign
+from identification.recordings.recording import Campaign
 from identification.recordings.rules import RULES
 from identification.recordings.valve_rules import rules_of
 from identification.report.page import write_page
@@ -62,12 +64,14 @@ def diagnose_campaign(
     steps = Steps(began) if report else _silent
     found = diagnose(valve, seed=seed, cache=FitCache(valve, journal, steps))
     found = replace(found, warnings=[*valve.warnings, *found.warnings])
-    text = _report(found, valve, recorded.name, out, steps) if report else ""
+    text = _report(found, valve, recorded, out, steps) if report else ""
     write_results(found, out, text, seconds=perf_counter() - began)
     return found
 
 
-def _report(found: Diagnosis, valve: Valve, name: str, out: Path, steps: Callable[[str], None]) -> str:
+def _report(
+    found: Diagnosis, valve: Valve, campaign: Campaign, out: Path, steps: Callable[[str], None]
+) -> str:
     """Write what people use of it; returns what to record next."""
     steps("next experiment")
     experiment = next_experiment(
@@ -80,13 +84,14 @@ def _report(found: Diagnosis, valve: Valve, name: str, out: Path, steps: Callabl
     (out / PROGRAMME).unlink(missing_ok=True)
     if experiment.programme:
         save_programmes([experiment.programme], out / PROGRAMME, valve.plant.sensors)
-    save_plant(refitted_plant(found, valve, name), out / PLANT)
+    save_plant(refitted_plant(found, valve, campaign.name), out / PLANT)
     steps("report")
-    title = f"Gap between model and recordings: {name}"
+    title = f"Gap between model and recordings: {campaign.name}"
     guide = "docs/explanation/diagnosis.md"
     footer = f"Written by epv-valve {version('epv-valve')}. Figures and fields: {guide}."
     pages = sections(found, experiment.text)
-    write_page(out / REPORT, title=title, sections=pages, footer=footer)
+    facts = campaign_facts(campaign)
+    write_page(out / REPORT, title=title, sections=pages, facts=facts, footer=footer)
     return experiment.text
 
 
@@ -99,8 +104,8 @@ def refitted_plant(found: Diagnosis, valve: Valve, name: str) -> Plant:
     Its region is where the recordings leave the calibrated parameters and the sizes, jointly;
     autocorrelated residuals widen it.
     """
-    named = found.named if found.named and found.surely_helps(found.named) else None
-    best = named.hypothesis if named else found.ranking.recalibrated
+    best = found.kept
+    named = bool(best.labels)
     parameters = valve.base.replace(**fitted_values(found, best))
     problem = found.ranking.problem
     symbols = tuple(p.symbol for p in problem.parameters(best.estimate))

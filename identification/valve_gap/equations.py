@@ -15,16 +15,35 @@ from identification.recordings.recording import OUTPUTS
 from identification.replay.model_inputs import ModelInputs
 
 EQUATIONS = (
-    StateEquation(name="f1", state="p2", component="output_chamber", unit="g/s", scale=GRAM, step=1e-5),
     StateEquation(
-        name="f2", state="p3", component="control_chamber", unit="mg/s", scale=MILLIGRAM, step=1e-6
+        name="f1", meaning="air balance of the output chamber", state="p2", component="output_chamber",
+        unit="g/s", scale=GRAM, step=1e-5,
     ),
-    StateEquation(name="f3", state="xPV", component="protection_valve", unit="m/s", step=0.0),
-    StateEquation(name="f4", state="vPV", component="protection_valve", unit="N", step=0.1),
-    StateEquation(name="f5", state="xMV", component="armature", unit="m/s", step=0.0),
-    StateEquation(name="f6", state="vMV", component="armature", unit="N", step=1e-3),
-    StateEquation(name="f7", state="I", component="solenoid", unit="V", step=1e-2),
-)
+    StateEquation(
+        name="f2", meaning="air balance of the control chamber", state="p3", component="control_chamber",
+        unit="mg/s", scale=MILLIGRAM, step=1e-6,
+    ),
+    StateEquation(
+        name="f3", meaning="stroke of the piston", state="xPV", component="protection_valve",
+        unit="m/s", step=0.0,
+    ),
+    StateEquation(
+        name="f4", meaning="force balance of the piston", state="vPV", component="protection_valve",
+        unit="N", step=0.1,
+    ),
+    StateEquation(
+        name="f5", meaning="stroke of the armature", state="xMV", component="armature",
+        unit="m/s", step=0.0,
+    ),
+    StateEquation(
+        name="f6", meaning="force balance of the armature", state="vMV", component="armature",
+        unit="N", step=1e-3,
+    ),
+    StateEquation(
+        name="f7", meaning="voltage balance of the coil", state="I", component="solenoid",
+        unit="V", step=1e-2,
+    ),
+)  # fmt: skip
 """f3 and f5 say x' = v: nothing can be missing there, and their step is 0."""
 
 FORCINGS = {

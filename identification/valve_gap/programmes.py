@@ -126,7 +126,7 @@ def next_experiment(
     if verdict == UNKNOWN or (verdict is None and ranking.unknown > sum(ranking.probabilities)):
         return _none_can_be_chosen(rivals, NOTHING_EXPLAINS)
     if verdict == PARTIAL and rivals.probability[0] > valve.settings.certain:
-        return _none_can_be_chosen(rivals, REST_WITHOUT_NAME.format(rivals.names[0]))
+        return _none_can_be_chosen(rivals, REST_WITHOUT_NAME.format(rivals.titles[0]))
     plan = planned(valve, programmes)
     found = expected_information(ranking.problem, plan, rivals, settings)
     options = [Option(programme=p, information=i) for p, i in zip(programmes, found, strict=True)]
@@ -167,13 +167,13 @@ def sentence(option: Option, rivals: Rivals, splits: bool, certain: float = VALV
 
     certain: probability of the best rival above which no further experiment is needed.
     """
-    names = _listed(rivals.names)
+    names = _listed(rivals.titles)
     before = ":".join(f"{100 * p:.0f}" for p in rivals.probability)
     after = odds_text(option.information.expected_best)
     record = described(option.programme)
     if rivals.probability[0] > certain:
         return (
-            f"None is needed ({rivals.names[0]}: {odds_text(rivals.probability[0])}); {record} would "
+            f"None is needed ({rivals.titles[0]}: {odds_text(rivals.probability[0])}); {record} would "
             f"tell {names} apart best ({RUN})"
         )
     if splits:

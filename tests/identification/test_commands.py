@@ -14,6 +14,7 @@ from epv_env.plant.plantfile import load_plant
 from identification.__main__ import main
 from identification.calibration import multi_start as starts
 from identification.recordings.campaign_files import read_campaign
+from tests.identification.browser import DESK, PHONE, box, check_layout, opened
 
 
 @pytest.fixture(scope="module")
@@ -64,8 +65,38 @@ def test_the_report_needs_no_other_file(finished):
     page = (finished / "report.html").read_text()
     sources = re.findall(r'(?:src|href)="([^"]{0,20})', page)
     assert len(sources) > 10
-    assert all(source.startswith("data:image/png") for source in sources)
-    assert page.index("Verdicts") < page.index("<figure>")
+    assert all(source.startswith(("data:image/svg+xml", "#")) for source in sources)
+    assert page.index("Verdicts") < page.index("<figure")
+    assert len(page) < 5e6
+
+
+def test_the_report_begins_with_the_values_their_meaning_and_whether_to_trust_them(finished):
+    page = (finished / "report.html").read_text()
+    first = page[page.index("<h1>") : page.index("Contents")]
+    value = f"{load_plant(finished / 'plant.json').parameters['R']:.5g}"
+    assert f'resistance of the solenoid (R)</td><td data-column="value (95 % interval)">{value}' in first
+    assert first.count('<tr class="good">') == 4
+    assert first.count(">yes</td>") == 4
+    assert "test1, test2, test3, test4 (calibration); validation (validation); rest (quality)" in first
+
+
+def test_the_report_of_a_bench_says_nothing_of_2003_unless_asked(finished, campaign, tmp_path):
+    printed = r"SCL-001|2003|[Tt]he report|Tables? \d|Figures? \d|[Ee]qs?\. ?\d|section \d"
+    page = re.sub(
+        r'<style>.*?</style>|src="[^"]*"', "", (finished / "report.html").read_text(), flags=re.S
+    )
+    assert re.findall(printed, page) == []
+    assert main(["quality", str(campaign), "--out", str(tmp_path), "--report-2003"]) == 0
+    asked = (tmp_path / "quality.html").read_text()
+    assert "(Table 3 of SCL-001/2003)" in asked
+    assert "the report&#39;s" in asked
+
+
+def test_the_report_in_a_browser(finished, tmp_path):
+    check_layout(finished / "report.html", tmp_path)
+    for window in (DESK, PHONE):
+        with opened(finished / "report.html", window) as page:
+            assert box(page, ".judging")["bottom"] < window[1]  # all values on the first screen
 
 
 def test_the_environment_draws_its_plants_from_the_joint_region(finished):

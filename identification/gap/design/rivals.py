@@ -19,8 +19,13 @@ class Rivals:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names for reports."""
+        """Names for files."""
         return tuple(" + ".join(each.hypothesis.labels) or "no cause" for each in self.estimates)
+
+    @property
+    def titles(self) -> tuple[str, ...]:
+        """Names for people."""
+        return tuple(" + ".join(each.hypothesis.titles) or "no cause" for each in self.estimates)
 
 
 def select_rivals(ranking: Ranking, settings: DesignSettings | None = None) -> Rivals:

@@ -21,10 +21,17 @@ class Cause:
     """Probability before any data, relative to the other causes."""
     variant: str = ""
     """Which of several forms of the cause this is; empty where there is one form."""
+    words: str = ""
+    """What people read instead of a name that they cannot know; empty where the name says it."""
     exact_form: bool = False
     """True where the form is not in doubt: a parameter of the model differs from its nominal value."""
 
     @property
     def label(self) -> str:
-        """Name and variant."""
+        """Name and variant, as in files."""
         return f"{self.name} ({self.variant})" if self.variant else self.name
+
+    @property
+    def title(self) -> str:
+        """The cause for people."""
+        return self.words or self.label

@@ -19,6 +19,8 @@ class FreeParameter:
     trials: tuple[float, ...] = ()
     """Values [SI] from which the search for a cause begins; () for a calibrated parameter, whose search
     begins at `nominal`."""
+    meaning: str = ""
+    """What the parameter is, in words; empty where the symbol says it."""
     scale: float = math.nan
     """Usual size [SI], not 0; the optimiser works with value/scale. Left out: `usual_size`."""
 
@@ -26,6 +28,11 @@ class FreeParameter:
         """Give a parameter without a scale its usual size, so that every scale is a number."""
         if math.isnan(self.scale):
             object.__setattr__(self, "scale", self.usual_size)
+
+    @property
+    def title(self) -> str:
+        """The parameter for people."""
+        return f"{self.meaning} ({self.symbol})" if self.meaning else self.symbol
 
     @property
     def usual_size(self) -> float:

@@ -17,8 +17,15 @@ class StateEquation:
     """Unit of the forcing in reports."""
     scale: float = 1.0
     """Size of that unit in SI."""
+    meaning: str = ""
+    """The equation in words, as in 'balance of the air'; empty where the name says it."""
     step: float
     """Forcing for a finite difference [SI]; 0 for an identity such as x' = v, which lacks nothing."""
+
+    @property
+    def title(self) -> str:
+        """The equation for people."""
+        return f"{self.meaning} ({self.name})" if self.meaning else self.name
 
 
 @dataclass(frozen=True, kw_only=True)

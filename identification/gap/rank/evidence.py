@@ -51,6 +51,11 @@ class EvaluatedHypothesis:
         """Labels of the causes."""
         return self.estimate.hypothesis.labels
 
+    @property
+    def titles(self) -> tuple[str, ...]:
+        """The causes for people."""
+        return self.estimate.hypothesis.titles
+
     def price(self, inflation: float, least: float) -> float:
         """Log of the ranges of the causes' parameters over what the data leave (Laplace) [nats].
 

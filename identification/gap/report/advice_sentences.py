@@ -1,6 +1,6 @@
 """Whether a cause is to be added: by what it does on recordings that were never fitted to."""
 
-from identification.gap.diagnosis import Diagnosis, hypothesis_label
+from identification.gap.diagnosis import Diagnosis, hypothesis_label, hypothesis_title
 from identification.gap.rank.verdict import RankedCause
 from identification.gap.reduce.discrepancy_reduction import RECALIBRATED
 from identification.gap.report.quantities import gap_text, listed, probability_text
@@ -10,7 +10,7 @@ from identification.gap.report.sentences import share_closed
 def add_or_not(diagnosis: Diagnosis, cause: RankedCause) -> str:
     """The advice on a cause that the verdict names."""
     if diagnosis.surely_helps(cause):
-        return f"add {listed(cause.hypothesis.labels)}"
+        return f"add {listed(cause.hypothesis.titles)}"
     them = "it" if len(cause.effects) == 1 else "them"
     return f"that this helps on recordings never fitted to is not sure, so do not add {them} yet"
 
@@ -20,7 +20,7 @@ def nearest_cause(diagnosis: Diagnosis, cause: RankedCause) -> str:
 
     Whether it helps is one question, whether it is true another.
     """
-    name, share = hypothesis_label(cause.hypothesis), share_closed(diagnosis, cause)
+    name, share = hypothesis_title(cause.hypothesis), share_closed(diagnosis, cause)
     if diagnosis.surely_helps(cause):
         true = "it is the true cause" if len(cause.effects) == 1 else "they are the true causes"
         return (
@@ -28,7 +28,10 @@ def nearest_cause(diagnosis: Diagnosis, cause: RankedCause) -> str:
             f"{true} is doubtful ({probability_text(cause.probability)})."
         )
     gaps = diagnosis.reduction.gaps
-    before, after = gaps[RECALIBRATED].overall.value, gaps[name].overall.value
+    before, after = (
+        gaps[RECALIBRATED].overall.value,
+        gaps[hypothesis_label(cause.hypothesis)].overall.value,
+    )
     if after > before:
         return (
             f"The nearest cause, {name}, makes recordings never fitted to worse (from "

@@ -20,7 +20,7 @@ def missing_term(diagnosis: Diagnosis, localisation: Localisation, model: str) -
     blocks: list[Block] = [
         Picture(
             figure=localisation_figures.forcing_figure(plant, forcing, level),
-            caption=f"{model} lacks this term in {forcing.equation.name}: the forcing with which it "
+            caption=f"{model} lacks this term in {forcing.equation.title}: the forcing with which it "
             "meets the recordings.",
         )
     ]

@@ -76,7 +76,7 @@ def residual_figure(
         rows[0].fill_between(
             time, row - 0.4, row + 0.4, where=mask.tolist(), color=f"C{row}", step="mid", linewidth=0.0
         )
-    rows[0].set_yticks(range(len(masks)), list(masks), fontsize=7)
+    rows[0].set_yticks(range(len(masks)), [name.replace("_", " ") for name in masks], fontsize=7)
     rows[0].invert_yaxis()
     for axes, channel, values in zip(rows[1:], plant.channels, residual, strict=True):
         axes.axhspan(-band, band, color="0.85")
@@ -103,7 +103,7 @@ def missing_term_figure(term: MissingTerm, level: float) -> Figure:
     axes.axhline(0.0, color="black", linewidth=0.6)
     axes.set_xlabel(f"{term.state} [{term.state_unit}]")
     missing = term.equation
-    axes.set_ylabel(f"missing in {missing.name}, d{missing.state}/dt [{missing.unit}]")
+    axes.set_ylabel(f"missing in d{missing.state}/dt,\n{missing.title} [{missing.unit}]")
     axes.set_title(f"alone has {term.explained:.0%} of the forcing's effect", fontsize="small")
     axes.legend(fontsize="small")
     axes.grid(alpha=0.3)

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from identification.gap.diagnosis import Diagnosis, hypothesis_label
+from identification.gap.diagnosis import Diagnosis, hypothesis_title
 from identification.gap.model.free_parameter import FreeParameter
 from identification.gap.report.labels import row_height, wrapped
 from identification.gap.report.parameter_intervals import parameter_intervals
@@ -27,8 +27,8 @@ OTHERS = "all other sets of causes"
 
 def ranking_figure(diagnosis: Diagnosis) -> Figure:
     """Probability of each cause, of none and of an unknown one."""
-    causes = {hypothesis_label(c.hypothesis): c.probability for c in diagnosis.judged}
-    named = [hypothesis_label(c.hypothesis) for c in diagnosis.conclusion.ambiguity_set]
+    causes = {hypothesis_title(c.hypothesis): c.probability for c in diagnosis.judged}
+    named = [hypothesis_title(c.hypothesis) for c in diagnosis.conclusion.ambiguity_set]
     rest = {NO_CAUSE: diagnosis.ranking.no_cause, UNKNOWN_CAUSE: diagnosis.ranking.unknown}
     colours = [NAMED if name in named else OTHER for name in (*causes, OTHERS)] + [NO_NAME] * len(rest)
     causes[OTHERS] = sum(diagnosis.ranking.probabilities) - sum(causes.values())
@@ -40,11 +40,12 @@ def ranking_figure(diagnosis: Diagnosis) -> Figure:
 def location_figure(diagnosis: Diagnosis) -> Figure:
     """Probability that something is missing: by equation or reading, and by component."""
     localisation = diagnosis.localisation
-    examined = {forcing.equation.name for forcing in localisation.forcings}
+    examined = {f.equation.name: f.equation.title for f in localisation.forcings}
     probabilities = localisation.equation_probabilities.items()
-    equations = {name: share for name, share in probabilities if name in examined}
+    equations = {examined[name]: share for name, share in probabilities if name in examined}
     equations[NOTHING] = localisation.nothing_missing
-    components = diagnosis.conclusion.component_probabilities
+    found = diagnosis.conclusion.component_probabilities
+    components = {name.replace("_", " "): share for name, share in found.items()}
     rows = max(len(equations), len(components))
     figure = Figure(figsize=(9.5, 0.9 + 0.28 * rows), layout="constrained")
     left, right = figure.subplots(1, 2)
@@ -59,7 +60,7 @@ def size_figure(diagnosis: Diagnosis) -> Figure:
     """Fitted sizes with intervals in their physical range; of improbable causes only if all are."""
     causes = mentioned_causes(diagnosis) or diagnosis.judged
     rows = [
-        (hypothesis_label(cause.hypothesis), parameter, interval)
+        (hypothesis_title(cause.hypothesis), parameter, interval)
         for cause in causes
         for parameter, interval in zip(
             cause.hypothesis.estimate.hypothesis.parameters,
@@ -91,7 +92,7 @@ def parameter_change_figure(diagnosis: Diagnosis) -> Figure:
     estimates = {"recalibrated": diagnosis.ranking.recalibrated.estimate}
     if diagnosis.best:
         best = diagnosis.best.hypothesis
-        estimates[f"with {hypothesis_label(best)}"] = best.estimate
+        estimates[f"with {hypothesis_title(best)}"] = best.estimate
     parameters = problem.plant.parameters
     symbols = [p.symbol for p in parameters]
     begin = problem.values(diagnosis.nominal)

@@ -1,5 +1,7 @@
 """Figures of the discrepancy reduction: bars with intervals."""
 
+from collections.abc import Callable
+
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
@@ -10,9 +12,13 @@ from identification.gap.reduce.gaps import FLOOR, Gap
 from identification.gap.report.labels import row_height, wrapped
 
 
-def gap_figure(reduction: DiscrepancyReduction) -> Figure:
-    """Gap of every model on held-out runs, overall and by channel, with 90 % intervals."""
-    models = {**reduction.gaps, "black box": reduction.black_box}
+def gap_figure(reduction: DiscrepancyReduction, words: Callable[[str], str] = str) -> Figure:
+    """Gap of every model on held-out runs, overall and by channel, with 90 % intervals.
+
+    words: what people read instead of a cause's name.
+    """
+    gaps = {words(name): gap for name, gap in reduction.gaps.items()}
+    models = {**gaps, "black box": reduction.black_box}
     panels = ["overall", *reduction.noise_ratios]
     figure = Figure(figsize=(10, 1.4 + 0.32 * row_height(models) * len(models)), layout="constrained")
     axes = figure.subplots(1, len(panels), sharey=True)
@@ -30,9 +36,12 @@ def gap_figure(reduction: DiscrepancyReduction) -> Figure:
     return figure
 
 
-def share_figure(reduction: DiscrepancyReduction) -> Figure:
-    """Share of the explainable gap that each cause closes, with 90 % intervals."""
-    names = list(reduction.shares_closed)
+def share_figure(reduction: DiscrepancyReduction, words: Callable[[str], str] = str) -> Figure:
+    """Share of the explainable gap that each cause closes, with 90 % intervals.
+
+    words: what people read instead of a cause's name.
+    """
+    names = [words(name) for name in reduction.shares_closed]
     figure = Figure(figsize=(7, 1.2 + 0.32 * row_height(names) * len(names)), layout="constrained")
     axes = figure.subplots()
     _bars(axes, [_percent(share) for share in reduction.shares_closed.values()])

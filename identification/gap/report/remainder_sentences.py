@@ -1,6 +1,6 @@
 """Sentences on what no named cause explains: the remainder, and disturbances beside the noise."""
 
-from identification.gap.diagnosis import Diagnosis, hypothesis_label
+from identification.gap.diagnosis import Diagnosis, hypothesis_title
 from identification.gap.report.json_export import discrepancy
 from identification.gap.report.quantities import listed, probability_text, quantity, share_text
 from identification.gap.report.remainder import Remainder, remainder
@@ -15,7 +15,7 @@ def remainder_place(left: Remainder) -> str:
     if probability <= left.location.nothing_missing:
         return ""
     return (
-        f", most likely in {equation.name} of {equation.component.replace('_', ' ')} "
+        f", most likely in {equation.title} of {equation.component.replace('_', ' ')} "
         f"({probability_text(probability)})"
     )
 
@@ -28,7 +28,7 @@ def remainder_sentence(diagnosis: Diagnosis) -> str:
     if not diagnosis.named:
         return f"No cause is named, so the whole gap remains{remainder_place(left)}."
     return (
-        f"{hypothesis_label(diagnosis.named.hypothesis)} leaves {share_text(left.share)} of the gap on "
+        f"{hypothesis_title(diagnosis.named.hypothesis)} leaves {share_text(left.share)} of the gap on "
         f"recordings never fitted to{remainder_place(left)}."
     )
 

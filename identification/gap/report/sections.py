@@ -1,6 +1,8 @@
 """The report of a diagnosis as sections of the HTML page."""
 
-from identification.gap.diagnosis import Diagnosis, hypothesis_label
+from functools import partial
+
+from identification.gap.diagnosis import Diagnosis, hypothesis_title
 from identification.gap.rank.verdict import AMBIGUOUS, KNOWN, NO_GAP
 from identification.gap.report import (
     localisation_figures,
@@ -9,12 +11,14 @@ from identification.gap.report import (
     sentences,
     tables,
 )
+from identification.gap.report.calibrated_values import calibrated_values
 from identification.gap.report.localisation_blocks import (
     level_text,
     missing_term,
     percent,
     residual,
 )
+from identification.gap.report.names import in_words
 from identification.gap.report.remainder_sentences import disturbance_sentence, remainder_sentence
 from identification.gap.report.verdict_sentences import verdict_sentence
 from identification.report.page import Block, Picture, Section, Text, Verdict
@@ -48,8 +52,9 @@ def _verdict(diagnosis: Diagnosis, next_experiment: str) -> Section:
     )
     return Section(
         title="Verdict",
+        summary=True,
         verdicts=[Verdict(status=status, text=text)],
-        blocks=[Text(text=explanation)],
+        blocks=[calibrated_values(diagnosis, status), Text(text=explanation)],
     )
 
 
@@ -79,7 +84,7 @@ def _ranking(diagnosis: Diagnosis) -> Section:
     ambiguity_set = diagnosis.conclusion.ambiguity_set
     verdicts = [Verdict(status="note", text=sentences.hidden_causes_sentence(diagnosis))]
     if ambiguity_set:
-        names = ", ".join(hypothesis_label(cause.hypothesis) for cause in ambiguity_set)
+        names = ", ".join(hypothesis_title(cause.hypothesis) for cause in ambiguity_set)
         share = percent(diagnosis.ranking.settings.ambiguity_share)
         text = f"The fewest causes that hold {share} of the probability of all causes: {names}."
         status = "good" if len(ambiguity_set) == 1 else "doubt"
@@ -103,10 +108,10 @@ def _ranking(diagnosis: Diagnosis) -> Section:
 
 
 def _reduction(diagnosis: Diagnosis) -> Section:
-    reduction = diagnosis.reduction
+    reduction, words = diagnosis.reduction, partial(in_words, diagnosis)
     blocks: list[Block] = [
         Picture(
-            figure=reduction_figures.gap_figure(reduction),
+            figure=reduction_figures.gap_figure(reduction, words),
             caption="Gap of every model on held-out recordings with "
             f"{level_text(diagnosis)} intervals; red: noise alone.",
         )
@@ -114,14 +119,14 @@ def _reduction(diagnosis: Diagnosis) -> Section:
     if reduction.shares_closed and diagnosis.conclusion.verdict != NO_GAP:
         blocks.append(
             Picture(
-                figure=reduction_figures.share_figure(reduction),
+                figure=reduction_figures.share_figure(reduction, words),
                 caption="Share that each cause closes of the gap between recalibration and noise.",
             )
         )
     blocks.append(tables.gap_table(diagnosis))
     if diagnosis.best and diagnosis.conclusion.verdict in (KNOWN, AMBIGUOUS):
         best = diagnosis.best.hypothesis
-        blocks.append(residual(diagnosis, best, f"Residual with {hypothesis_label(best)}"))
+        blocks.append(residual(diagnosis, best, f"Residual with {hypothesis_title(best)}"))
     blocks += [
         Picture(
             figure=ranking_figures.parameter_change_figure(diagnosis),
@@ -140,7 +145,7 @@ def _remainder(diagnosis: Diagnosis) -> Section:
     """What no named cause explains: how much, where, of which shape, and what is only disturbance."""
     blocks: list[Block] = []
     if diagnosis.remaining and diagnosis.best:
-        name = hypothesis_label(diagnosis.best.hypothesis)
+        name = hypothesis_title(diagnosis.best.hypothesis)
         blocks += missing_term(diagnosis, diagnosis.remaining, f"The model with {name}")
         blocks.append(residual(diagnosis, diagnosis.best.hypothesis, f"Residual with {name}"))
     text = remainder_sentence(diagnosis)

@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 
-from identification.gap.diagnosis import Diagnosis, hypothesis_label
+from identification.gap.diagnosis import Diagnosis, hypothesis_label, hypothesis_title
 from identification.gap.rank.verdict import NO_GAP, RankedCause
 from identification.gap.reduce.discrepancy_reduction import NOMINAL, RECALIBRATED
 from identification.gap.reduce.gaps import FLOOR
+from identification.gap.report.names import in_words
 from identification.gap.report.parameter_intervals import parameter_intervals
 from identification.gap.report.quantities import (
     gap_text,
@@ -27,7 +28,10 @@ def component_at_fault(diagnosis: Diagnosis) -> str:
         if forcing.equation.component == component
     ]
     equation = max(equations, key=lambda name: localisation.equation_probabilities[name], default="")
-    named = f"{equation}, " if equation else ""
+    meaning = next(
+        (f.equation.meaning for f in localisation.forcings if f.equation.name == equation), ""
+    )
+    named = "".join(f"{part}, " for part in (meaning, equation) if part)
     return f"{component.replace('_', ' ')} ({named}{probability_text(probability)})"
 
 
@@ -50,7 +54,7 @@ def reduction_sentence(diagnosis: Diagnosis) -> str:
     models = {"nominal": gaps[NOMINAL], "recalibrated": gaps[RECALIBRATED]}
     if diagnosis.best:
         name = hypothesis_label(diagnosis.best.hypothesis)
-        models[f"with {name}"] = gaps[name]
+        models[f"with {hypothesis_title(diagnosis.best.hypothesis)}"] = gaps[name]
     models["with a black box on top of recalibration"] = diagnosis.reduction.black_box
     listed = "; ".join(f"{name} {gap_with_interval(gap.overall)}" for name, gap in models.items())
     text = (
@@ -66,7 +70,7 @@ def reduction_sentence(diagnosis: Diagnosis) -> str:
 
 def hidden_causes_sentence(diagnosis: Diagnosis) -> str:
     """Causes that the recordings cannot show, whatever the residual."""
-    absorbed = diagnosis.ranking.separability.absorbed
+    absorbed = [in_words(diagnosis, label) for label in diagnosis.ranking.separability.absorbed]
     if not absorbed:
         return "At its usual size every cause of the catalogue would show in these recordings."
     return (
@@ -80,7 +84,7 @@ def look_alikes(diagnosis: Diagnosis, cause: RankedCause) -> str:
     separability = diagnosis.ranking.separability
     place = separability.labels.index
     twins = [
-        f"{twin} ({abs(separability.correlation[place(label), place(twin)]):.3f})"
+        f"{in_words(diagnosis, twin)} ({abs(separability.correlation[place(label), place(twin)]):.3f})"
         for label in cause.hypothesis.labels
         for twin in separability.twins(label)
     ]
@@ -92,7 +96,7 @@ def parameters_at_bounds(diagnosis: Diagnosis) -> list[str]:
     problem = diagnosis.ranking.problem
     estimates = {RECALIBRATED: diagnosis.ranking.recalibrated.estimate}
     estimates |= {
-        hypothesis_label(cause.hypothesis): cause.hypothesis.estimate
+        hypothesis_title(cause.hypothesis): cause.hypothesis.estimate
         for cause in mentioned_causes(diagnosis)
     }
     tolerance = diagnosis.settings.report.bound_tolerance

@@ -1,9 +1,10 @@
 """Tables of a diagnosis for the HTML page."""
 
-from identification.gap.diagnosis import Diagnosis, hypothesis_label
+from identification.gap.diagnosis import Diagnosis, hypothesis_title
 from identification.gap.reduce.gaps import FLOOR, Gap
 from identification.gap.report import sentences
 from identification.gap.report.json_export import discrepancy, inclusion
+from identification.gap.report.names import in_words
 from identification.gap.report.quantities import (
     gap_text,
     gap_with_interval,
@@ -19,9 +20,12 @@ def ranking_table(diagnosis: Diagnosis) -> Table:
         columns=["Cause", "component", "probability", "size (90 %)", "closes", "looks like"],
         rows=[
             [
-                hypothesis_label(cause.hypothesis),
+                hypothesis_title(cause.hypothesis),
                 ", ".join(
-                    dict.fromkeys(c.component for c in cause.hypothesis.estimate.hypothesis.causes)
+                    dict.fromkeys(
+                        c.component.replace("_", " ")
+                        for c in cause.hypothesis.estimate.hypothesis.causes
+                    )
                 ),
                 probability_text(cause.probability),
                 "; ".join(sentences.sizes_with_intervals(diagnosis, cause)),
@@ -41,7 +45,7 @@ def inclusion_table(diagnosis: Diagnosis) -> Table:
     least = diagnosis.settings.report.mentioned_probability
     rows = [
         [
-            name,
+            in_words(diagnosis, name),
             components[name].replace("_", " "),
             probability_text(probability),
             "yes" if name in diagnosis.conclusion.held else "-",
@@ -78,7 +82,7 @@ def discrepancy_table(diagnosis: Diagnosis) -> Table:
 
 
 def gap_table(diagnosis: Diagnosis) -> Table:
-    """Gap of every model in noise deviations, and in the 2003 report's percent where defined."""
+    """Gap of every model in noise deviations, and in percent where defined."""
     models = {**diagnosis.reduction.gaps, "black box": diagnosis.reduction.black_box}
     channels = list(diagnosis.reduction.noise_ratios)
     columns = ["overall", *channels]
@@ -86,13 +90,13 @@ def gap_table(diagnosis: Diagnosis) -> Table:
     caption = f"Noise deviations; {FLOOR:g} is noise alone."
     if shown:
         caption = (
-            f"Left: noise deviations, {FLOOR:g} is noise alone. Right: the report's error (eqs 19-21), "
-            "every run with nominal offsets."
+            f"Left: noise deviations, {FLOOR:g} is noise alone. Right: mean distance of model and "
+            "recording in percent of the recording's mean, every run with nominal offsets."
         )
     return Table(
         columns=["Model", *(f"{c} [noise]" for c in columns), *(f"{c} [%]" for c in shown)],
         rows=[
-            [name, *_noise_units(model, channels), *_percent(model, shown)]
+            [in_words(diagnosis, name), *_noise_units(model, channels), *_percent(model, shown)]
             for name, model in models.items()
         ],
         caption=caption,
@@ -119,7 +123,7 @@ def parameter_table(diagnosis: Diagnosis) -> Table:
     }
     if diagnosis.best:
         best = diagnosis.best.hypothesis
-        estimates[f"with {hypothesis_label(best)}"] = best.estimate
+        estimates[f"with {hypothesis_title(best)}"] = best.estimate
     values = [problem.values(estimate) for estimate in estimates.values()]
     return Table(
         columns=["Parameter", *estimates],

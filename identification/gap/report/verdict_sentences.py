@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 
-from identification.gap.diagnosis import Diagnosis, hypothesis_label
+from identification.gap.diagnosis import Diagnosis, hypothesis_title
 from identification.gap.rank.verdict import AMBIGUOUS, KNOWN, NO_GAP, PARTIAL
 from identification.gap.reduce.discrepancy_reduction import NOMINAL, RECALIBRATED
 from identification.gap.reduce.gaps import FLOOR
 from identification.gap.report.advice_sentences import add_or_not, nearest_cause
+from identification.gap.report.names import in_words
 from identification.gap.report.quantities import (
     gap_text,
     gap_with_interval,
@@ -44,7 +45,7 @@ def _known(diagnosis: Diagnosis) -> str:
     single = len(best.effects) == 1
     explain, them = ("explains", "it") if single else ("together explain", "them")
     text = (
-        f"{listed(best.hypothesis.labels)} {explain} the gap "
+        f"{listed(best.hypothesis.titles)} {explain} the gap "
         f"({probability_text(best.probability)}): adding {them} with {sizes_text(diagnosis, best)} "
         f"closes {share_closed(diagnosis, best)} of the gap on recordings never fitted to"
     )
@@ -71,14 +72,17 @@ def _partial(diagnosis: Diagnosis) -> str:
     chances = ", ".join(probability_text(inclusion[name]) for name in held)
     are, them = ("is", "it") if len(held) == 1 else ("are", "them")
     faint = [
-        f"{name} ({probability_text(inclusion[name])})" for name in best.effects if name not in held
+        f"{in_words(diagnosis, name)} ({probability_text(inclusion[name])})"
+        for name in best.effects
+        if name not in held
     ]
     together = f" together with {listed(faint)}, less sure," if faint else ""
     left = remainder(diagnosis)
     drawn = left.location and left.location.missing_term
     look = ", and look at the missing term" if drawn else ""
+    named = listed([in_words(diagnosis, name) for name in held])
     return (
-        f"{listed(held)} {are} part of the gap ({chances}): adding {them}{together} with "
+        f"{named} {are} part of the gap ({chances}): adding {them}{together} with "
         f"{sizes_text(diagnosis, best)} closes {share_closed(diagnosis, best)} of it on recordings "
         f"never fitted to. {share_text(left.share)} remains{remainder_place(left)}: "
         f"{add_or_not(diagnosis, best)}{look}."
@@ -87,7 +91,7 @@ def _partial(diagnosis: Diagnosis) -> str:
 
 def _ambiguous(diagnosis: Diagnosis) -> str:
     rivals = diagnosis.conclusion.ambiguity_set
-    labels = [cause.hypothesis.labels for cause in rivals]
+    labels = [cause.hypothesis.titles for cause in rivals]
     common = [label for label in labels[0] if all(label in others for others in labels)]
     rests = [" + ".join(label for label in own if label not in common) for own in labels]
     choices = " or ".join(
@@ -136,7 +140,7 @@ def _possible_cause(diagnosis: Diagnosis) -> str:
     """The cause that may act all the same, and why the verdict does not name it."""
     ranking = diagnosis.ranking
     probabilities = {
-        hypothesis_label(cause.hypothesis): cause.probability for cause in diagnosis.conclusion.causes
+        hypothesis_title(cause.hypothesis): cause.probability for cause in diagnosis.conclusion.causes
     }
     probabilities["something outside the catalogue"] = ranking.unknown
     name = max(probabilities, key=probabilities.__getitem__)

@@ -34,11 +34,11 @@ def reproduce(out: Path, *, seed: int = 0) -> list[Section]:
         "slips": errata_json(),
     }
     sections = [
-        sensitivity_section(study),
+        sensitivity_section(study, report_2003=True),
         bench_section(identification),
-        quality_section(quality),
+        quality_section(quality, report_2003=True),
         errata_section(),
     ]
     title = "The report SCL-001/2003 beside its reproduction"
-    write_results(out, "reproduce", title=title, sections=sections, content=content)
+    write_results(out, "reproduce", title=title, sections=sections, content=content, report_2003=True)
     return sections

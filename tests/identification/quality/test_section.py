@@ -12,7 +12,7 @@ from identification.quality.printed_statistics import CORRELATIONS, STATISTICS, 
 from identification.quality.quality_export import as_json, as_text
 from identification.quality.quality_section import quality_section
 from identification.recordings.recording import CHANNELS
-from identification.report.page import Picture, Table, write_page
+from identification.report.page import Picture, Section, Table, write_page
 from tests.identification.quality.records import AMBIENT, rest_record, with_channel
 
 
@@ -30,22 +30,23 @@ def test_a_page_can_be_written(tmp_path):
 
 
 @pytest.mark.parametrize("which", [0, 1])
-def test_a_section_is_complete(which):
-    section = quality_section(qualities()[which])
+@pytest.mark.parametrize("report_2003", [False, True])
+def test_a_section_is_complete(which, report_2003):
+    section = quality_section(qualities()[which], report_2003=report_2003)
     assert [verdict.status for verdict in section.verdicts].count("good") == 5 - which
     assert sum(isinstance(block, Picture) for block in section.blocks) == 6
     for table in (block for block in section.blocks if isinstance(block, Table)):
         assert {len(row) for row in table.rows} == {len(table.columns)}
 
 
-def test_tables_show_the_report_s_figures_beside_their_own():
-    cells = {
-        cell
-        for block in quality_section(qualities()[0]).blocks
-        if isinstance(block, Table)
-        for row in block.rows
-        for cell in row
-    }
+def cells_of(section: Section) -> set[str]:
+    tables = (block for block in section.blocks if isinstance(block, Table))
+    return {cell for table in tables for row in table.rows for cell in row}
+
+
+def test_tables_show_the_report_s_figures_beside_their_own_if_asked():
+    assert "  the report's" not in cells_of(quality_section(qualities()[0]))
+    cells = cells_of(quality_section(qualities()[0], report_2003=True))
     for name in CHANNELS:
         assert f"{TREND_SLOPES[name]:.6f}" in cells
         assert f"{STATISTICS[name].kurtosis:.4f}" in cells

@@ -3,12 +3,15 @@
 import html
 import re
 import sys
+from dataclasses import replace
+from datetime import datetime
 
 import pytest
 from matplotlib.figure import Figure
 
 from identification.report import page as module
 from identification.report.page import Picture, Section, Table, Text, Verdict, write_page
+from identification.report.svg import as_svg
 
 UNSAFE = "<b>5 & 'a' \"b\"</b>"
 
@@ -41,23 +44,69 @@ def test_a_page_holds_what_it_was_given(tmp_path):
     assert "<b>in doubt</b>" in text
     assert "<th>x</th><th>y</th>" in text
     assert "<tr><td>2</td><td>3</td></tr>" in text
-    assert "<caption>Numbers.</caption>" in text
-    assert text.count("data:image/png;base64,") == 1
+    assert '<p class="caption">Numbers.</p>' in text
+    assert text.count("data:image/svg+xml;base64,") == 1
     assert "<h2>Verdicts</h2>" not in text
 
 
 def test_the_verdicts_of_several_sections_come_first(tmp_path):
     text = written(tmp_path / "page.html", full_section(), full_section("Second"))
-    headings = re.findall(r"<h[123]>(.*?)</h[123]>", text)
-    assert headings == ["Page", "Verdicts", "First", "Second", "First", "Second"]
+    headings = re.findall(r"<h[123]>(?:<a.*?>)?(.*?)(?:</a>)?</h[123]>", text)
+    assert headings == ["Page", "Contents", "Verdicts", "First", "Second", "First", "Second"]
     assert text.count('<li class="doubt">') == 4
+
+
+def test_the_summary_stands_before_the_contents_and_its_verdicts_stand_once(tmp_path):
+    summary = replace(full_section("Answer"), summary=True)
+    text = written(tmp_path / "page.html", full_section(), full_section("Second"), summary)
+    assert text.index("Answer") < text.index("Contents") < text.index("First")
+    assert text.count('<li class="doubt">') == 5
+
+
+def test_the_page_says_what_it_rests_on_and_when_it_was_written(tmp_path):
+    write_page(
+        tmp_path / "page.html",
+        title="Page",
+        sections=[full_section()],
+        facts={"Recordings": "test1"},
+        written=datetime(2026, 11, 3, 14, 5),
+    )
+    text = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "<dt>Recordings</dt><dd>test1</dd>" in text
+    assert "<dt>Written</dt><dd>3 November 2026, 14:05</dd>" in text
+
+
+@pytest.mark.parametrize("asked", [False, True])
+def test_the_report_of_2003_is_named_only_where_asked_for(tmp_path, asked):
+    table = Table(columns=["x"], rows=[["1"]], caption="Numbers.", printed="Table 12")
+    section = Section(title="Stage", verdicts=[], blocks=[table], printed="section 6")
+    write_page(tmp_path / "page.html", title="Page", sections=[section], report_2003=asked)
+    text = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert ("Numbers. (Table 12 of SCL-001/2003)" in text) is asked
+    assert ("Stage (section 6 of SCL-001/2003)" in text) is asked
+
+
+def test_the_same_figure_gives_the_same_image(tmp_path):
+    def figure():
+        made = Figure(figsize=(2, 2))
+        made.subplots().plot([0, 1], label="line")
+        return made
+
+    assert as_svg(figure()) == as_svg(figure())
+
+
+def test_a_cloud_of_points_costs_no_more_than_its_pixels():
+    """As shapes 20,000 points take more than a megabyte."""
+    figure = Figure(figsize=(2, 2))
+    figure.subplots().plot(range(20_000), ".")
+    assert len(as_svg(figure)) < 100_000
 
 
 def test_each_status_has_a_colour_that_no_other_rule_outranks(tmp_path):
     """`.verdicts li` sets the bar; a colour of a lone class would lose against that rule."""
     style = re.search(r"<style>(.*?)</style>", written(tmp_path / "page.html"), re.DOTALL)
     assert style is not None
-    colours = dict(re.findall(r"\.verdicts \.(\w+) { border-color: (#\w+) }", style[1]))
+    colours = dict(re.findall(r"\.verdicts \.(\w+)[^{}]*{ border-left-color: (#\w+) }", style[1]))
     assert set(colours) == set(module.LABELS)
     assert len(set(colours.values())) == len(colours)
 

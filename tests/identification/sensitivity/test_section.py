@@ -31,8 +31,11 @@ def short_study() -> SensitivityStudy:
 def test_section_and_data(tmp_path):
     study = short_study()
     section = sensitivity_section(study)
-    assert [verdict.status for verdict in section.verdicts] == ["good", "doubt", "good", "note", "note"]
-    assert sum(isinstance(block, Picture) for block in section.blocks) == 3
+    assert [verdict.status for verdict in section.verdicts] == ["good", "note", "note"]
+    assert sum(isinstance(block, Picture) for block in section.blocks) == 2
+    beside = sensitivity_section(study, report_2003=True)
+    assert [verdict.status for verdict in beside.verdicts] == ["good", "doubt", "good", "note", "note"]
+    assert sum(isinstance(block, Picture) for block in beside.blocks) == 3
     write_page(tmp_path / "page.html", title="Sensitivity", sections=[section])
     data = json.loads(json.dumps(as_json(study), allow_nan=False))
     assert data["collinearity"]["all_sensitive"] is None

@@ -19,6 +19,7 @@ from identification.recordings.campaign_files import write_campaign
 from identification.recordings.recording import Campaign, CampaignError, Recording
 from identification.valve_gap import diagnose as module
 from identification.valve_gap.diagnose import diagnose_campaign
+from tests.identification.browser import check_layout
 
 NAMES = ("test1", "low_supply", "validation")
 
@@ -55,6 +56,15 @@ def test_the_command_names_the_effect_and_writes_its_files(diagnosed):
     assert value == pytest.approx(4e-3, rel=0.03)
     assert found["gap"]["with_cause"] < 1.05 < found["gap"]["recalibrated"]
     assert "<html" in (diagnosed / "out" / "report.html").read_text()
+
+
+def test_its_report_has_words_for_equations_and_parameters(diagnosed, tmp_path):
+    path = diagnosed / "out" / "report.html"
+    page = path.read_text()
+    assert "voltage balance of the coil" in page
+    assert "resistance of the solenoid (R)" in page
+    assert "parameter:" not in page
+    check_layout(path, tmp_path)
 
 
 def test_its_plant_file_goes_into_the_environment(diagnosed):

@@ -1,0 +1,115 @@
+"""The first screen of a calibration: values, meanings, and honest answers whether to trust them."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from epv_env.plant.parameters import table
+from epv_env.plant.region import CALIBRATED_SYMBOLS
+from identification.calibration.calibrate import Calibration
+from identification.pipeline.identification import ESTIMATOR, Identification
+from identification.pipeline.summary import summary_section
+from identification.pipeline.trust import common_reasons, judge_values
+from identification.report.page import Table
+from identification.validation.validate import Validation, validate
+from tests.identification.confidence.results import twin_confidence
+from tests.identification.twins import TRUE, calibration, problem, twin
+
+
+def identification(
+    calibrated: Calibration | None = None, validation: Validation | None = None
+) -> Identification:
+    """Twin recordings that are already calibrated, so that a test takes no search."""
+    made = Identification(twin(), Path("not-written.jsonl"))
+    found = calibrated or calibration()
+    made.__dict__["calibration"] = found
+    made.__dict__["confidence"] = replace(twin_confidence(), estimate=found.best(ESTIMATOR).z)
+    made.__dict__["validation"] = validation or validate(problem(), TRUE)
+    return made
+
+
+def with_best(**changes) -> Calibration:
+    """The calibration with another result of its only least-squares search."""
+    fits = dict(calibration().fits)
+    fits[ESTIMATOR] = [replace(fits[ESTIMATOR][0], **changes)]
+    return replace(calibration(), fits=fits)
+
+
+def values(made: Identification) -> Table:
+    (block,) = summary_section(made).blocks
+    assert isinstance(block, Table)
+    return block
+
+
+def test_a_good_calibration_is_to_be_trusted():
+    section = summary_section(identification())
+    assert section.summary
+    assert [verdict.status for verdict in section.verdicts] == ["good"]
+    assert values(identification()).statuses == ["good"] * len(CALIBRATED_SYMBOLS)
+
+
+def test_each_value_stands_with_its_meaning_and_its_interval():
+    made = identification()
+    for symbol, row in zip(CALIBRATED_SYMBOLS, values(made).rows, strict=True):
+        assert row[0] == f"{table()[symbol].meaning} ({symbol})"
+        assert row[1].startswith(f"{made.parameters[symbol]:.5g} (")
+        assert row[-1] == "yes"
+
+
+def test_a_model_that_misses_held_out_recordings_makes_all_values_doubtful():
+    wrong = validate(problem(), TRUE.replace(R=1.02 * TRUE["R"]))
+    made = identification(validation=wrong)
+    (verdict,) = summary_section(made).verdicts
+    assert verdict.status == "doubt"
+    assert "held-out I is missed by" in verdict.text
+    assert set(values(made).statuses) == {"doubt"}
+
+
+def test_a_model_beyond_the_limit_is_not_to_be_used():
+    wrong = validate(problem(), TRUE.replace(alphaPV=2 * TRUE["alphaPV"]))
+    (verdict,) = summary_section(identification(validation=wrong)).verdicts
+    assert verdict.status == "bad"
+    assert verdict.text.startswith("Do not use these values: the model misses held-out recordings by")
+
+
+def test_without_a_held_out_recording_nothing_is_promised():
+    made = identification()
+    kept = tuple(r for r in twin().recordings if r.role != "validation")
+    made = replace(made, campaign=replace(twin(), recordings=kept))
+    (reason,) = common_reasons(replace_results(made))
+    assert (reason.status, "no recording was held out" in reason.text) == ("doubt", True)
+
+
+def replace_results(made: Identification) -> Identification:
+    """The calibration again, for a copy forgets it."""
+    made.__dict__["calibration"] = calibration()
+    return made
+
+
+def test_a_search_that_has_not_converged_is_not_to_be_used():
+    made = identification(with_best(converged=False))
+    assert [reason.status for reason in common_reasons(made)] == ["bad"]
+
+
+@pytest.mark.parametrize("symbol", ["R", "alphaMV"])
+def test_only_the_value_at_an_end_of_its_domain_is_not_to_be_used(symbol):
+    vector = calibration().problem.vector
+    z = calibration().best(ESTIMATOR).z.copy()
+    place = vector.symbols.index(symbol)
+    z[place] = np.max(vector.bounds[place])
+    statuses = {t.symbol: t.status for t in judge_values(identification(with_best(z=z)))}
+    assert statuses[symbol] == "bad"
+    assert "bad" not in {status for other, status in statuses.items() if other != symbol}
+
+
+def test_a_wide_interval_is_doubted():
+    made = identification()
+    wide = twin_confidence().covariance
+    made.__dict__["confidence"] = replace(
+        twin_confidence(), covariance=replace(wide, inputs=wide.inputs + 1.0)
+    )
+    judged = judge_values(made)
+    assert {trust.status for trust in judged} == {"doubt"}
+    assert all("wide" in trust.reasons[-1].text for trust in judged)
