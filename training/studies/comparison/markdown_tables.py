@@ -27,9 +27,9 @@ FIGURES = {
 """Columns of the main table, and where `summary` has them."""
 README_CONTROLLERS = (
     "PPO, recurrent",
+    "pulse, adaptive",
     "hysteresis, extrapolating",
     "PWM",
-    "pulse",
     "MPC",
     "pulse, informed",
 )
