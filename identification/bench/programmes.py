@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from epv_env.common.units import BAR
+from epv_env.plant.plantfile import VOLTAGE
 from identification.report_2003.cases import (
     CALIBRATION_CASES,
     CIRCUIT_PRESSURE,
@@ -71,6 +72,6 @@ SUITES = {"report": REPORT_SUITE, "diagnosis": DIAGNOSIS_SUITE}
 
 
 def at_voltage(suite: Sequence[Programme], voltage: float) -> tuple[Programme, ...]:
-    """A suite for a coil made for another voltage [V]: every voltage in the same ratio."""
-    factor = voltage / ENERGISED_VOLTAGE
+    """A suite for a coil made for another voltage [V] than the report's: all in the same ratio."""
+    factor = voltage / VOLTAGE
     return tuple(replace(programme, U_on=factor * programme.U_on) for programme in suite)

@@ -61,3 +61,9 @@ def test_its_data_sheet_does_not():
 def test_the_report_s_limits_would_refuse_it():
     with pytest.raises(ParameterError, match="R = 12 Ohm is outside its domain"):
         Plant.calibrated().parameters.replace(R=plant().parameters["R"])
+
+
+def test_suites_are_recorded_at_the_voltage_of_the_coil():
+    assert at_voltage(REPORT_SUITE, Plant.calibrated().voltage) == tuple(REPORT_SUITE)
+    halved = at_voltage(REPORT_SUITE, plant().voltage)
+    assert [2 * p.U_on for p in halved] == [p.U_on for p in REPORT_SUITE]
