@@ -8,6 +8,7 @@ import matplotlib as mpl
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from cycler import cycler
 from matplotlib.figure import Figure
 
 from epv_env.common.files import write_bytes
@@ -15,7 +16,12 @@ from epv_env.reward import BAND_BAR
 from training.evaluation.controller_table import Comparison
 from training.evaluation.rollout import Trace
 
-COLOURS = plt.rcParams["axes.prop_cycle"].by_key()["color"]
+COLOURS = (*plt.rcParams["axes.prop_cycle"].by_key()["color"], "black")
+"""Of lines and dots: as many as there are controllers to compare."""
+plt.rcParams["axes.prop_cycle"] = cycler(color=COLOURS)
+
+LEGEND_COLUMNS = 6
+"""Most entries of a legend side by side: more would widen the figure."""
 
 
 WIDEST_BAR = 1.2
@@ -66,7 +72,10 @@ def episode_overlay(traces: dict[str, Trace], path: Path) -> None:
         )
     axes[0].set_ylabel("circuit pressure p2\n[bar absolute]")
     figure.legend(
-        *axes[0].get_legend_handles_labels(), fontsize=8, ncols=rows + 1, loc="outside upper center"
+        *axes[0].get_legend_handles_labels(),
+        fontsize=8,
+        ncols=min(rows + 1, LEGEND_COLUMNS),
+        loc="outside upper center",
     )
     axes[-1].plot(first.time, first.consumption_g_per_s, color="0.3")
     axes[-1].set_ylabel("consumption\n[g/s]", rotation=0, ha="right", va="center", fontsize=8)
@@ -92,5 +101,7 @@ def excursion_distribution(comparison: Comparison, path: Path) -> None:
         axis.grid(alpha=0.3, which="both")
     np.atleast_1d(axes)[0].set_ylabel("episodes with a larger excursion [%]")
     handles = np.atleast_1d(axes)[0].get_legend_handles_labels()
-    figure.legend(*handles, fontsize=8, ncols=len(handles[0]), loc="outside upper center")
+    figure.legend(
+        *handles, fontsize=8, ncols=min(len(handles[0]), LEGEND_COLUMNS), loc="outside upper center"
+    )
     save_figure(figure, path)

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 
 from epv_env.reward import BAND_BAR
-from training.evaluation.plots import COLOURS, plt
+from training.evaluation.plots import COLOURS, LEGEND_COLUMNS, plt
 from training.studies.comparison.score_tables import FRONT, HIGHER_IS_BETTER, JUDGED_ON, SCORES
 from training.studies.result_files import records
 
@@ -38,7 +38,9 @@ def scenario_maps(rows: pd.DataFrame, plants: str) -> Figure:
         for (i, j), value in np.ndenumerate(cells.to_numpy()):
             axes.text(j, i, format(value, spec), ha="center", va="center", fontsize=8,
                       color="white" if value > 0.7 * top else "black")  # fmt: skip
-        axes.set_xticks(range(len(names)), [str(n).replace(", ", ",\n") for n in names], fontsize=8)
+        axes.set_xticks(
+            range(len(names)), [str(n).replace(", ", ",\n") for n in names], fontsize=7, rotation=45
+        )
         axes.set_yticks(range(len(scenarios)), scenarios)
         axes.set_title(f"{label}; {plants}", fontsize=10)
     return figure
@@ -129,7 +131,9 @@ def trade_off_figure(traded: pd.DataFrame) -> Figure:
         axes.set_title(f"above: {', '.join(beyond)}" if len(beyond) else "", fontsize=8)
         axes.grid(alpha=0.3, which="both")
     handles = panels[0].get_legend_handles_labels()
-    figure.legend(*handles, fontsize=8, ncols=len(handles[0]), loc="outside upper center")
+    figure.legend(
+        *handles, fontsize=8, ncols=min(len(handles[0]), LEGEND_COLUMNS), loc="outside upper center"
+    )
     return figure
 
 
