@@ -20,8 +20,10 @@ PANELS = {
 
 STAGES = {BEFORE: "before:\nnominal plant", AFTER: "after:\ncorrected plant"}
 MARKERS = {SIMULATED: "o", MEASURED: "s"}
-APART, SHIFT = 0.2, 0.05
-"""Distances on the x-axis: between controllers, and from simulated to measured."""
+SIDES = {SIMULATED: -0.2, MEASURED: 0.2}
+"""Distance from a controller's place, in distances between controllers [1]."""
+WIDTH = 0.8
+"""Of the controllers of a stage together on the x-axis; the stages are 1 apart."""
 
 
 def performance_figure(aims: pd.DataFrame) -> Figure:
@@ -31,10 +33,12 @@ def performance_figure(aims: pd.DataFrame) -> Figure:
     """
     figure, panels = plt.subplots(1, len(PANELS), figsize=(13, 4.2), layout="constrained")
     names = list(dict.fromkeys(aims["controller"]))
+    apart = WIDTH / len(names)
     for axes, (column, (label, factor)) in zip(panels, PANELS.items(), strict=True):
         for k, name in enumerate(names):
             own = aims.loc[aims["controller"] == name]
-            _draw(axes, own, column, factor, (k - (len(names) - 1) / 2) * APART, COLOURS[k])
+            places = {place: (k - (len(names) - 1) / 2 + side) * apart for place, side in SIDES.items()}
+            _draw(axes, own, column, factor, places, COLOURS[k])
         axes.set(ylabel=label, xlim=(-0.5, 1.5), xticks=[0, 1], xticklabels=STAGES.values())
         axes.set_ylim(bottom=None if factor > 1 else 0.0)
         axes.grid(alpha=0.3, axis="y")
@@ -48,12 +52,17 @@ def performance_figure(aims: pd.DataFrame) -> Figure:
 
 
 def _draw(
-    axes: Axes, rows: pd.DataFrame, column: str, factor: float, offset: float, colour: str
+    axes: Axes,
+    rows: pd.DataFrame,
+    column: str,
+    factor: float,
+    offsets: dict[str, float],
+    colour: str,
 ) -> None:
     """One controller's points, simulated and measured, before and after."""
     rows = rows.set_index(["stage", "place"])
     for x, stage in enumerate(STAGES):
-        places = {SIMULATED: x + offset - SHIFT, MEASURED: x + offset + SHIFT}
+        places = {place: x + offset for place, offset in offsets.items()}
         values = {place: factor * rows.loc[(stage, place), column] for place in places}
         axes.plot(list(places.values()), list(values.values()), color=colour, lw=1.2, alpha=0.7)
         for place, at in places.items():
