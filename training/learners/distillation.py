@@ -30,7 +30,7 @@ from training.learners.validation import ValidationSettings, score, validate
 class Distillation(LessonSettings):
     """What defines a distillation: its episodes, and how the student learns from them."""
 
-    memory: int = 32
+    memory: int = 64
     """Cells of the gated recurrent unit."""
     width: int = 64
     """Units of each of the two hidden layers."""

@@ -1,9 +1,9 @@
 """Hyperparameters of PPO: the default, and those of the training of recurrent policies."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from epv_env.conditions import CONDITIONS, Conditions
-from epv_env.reward import BAND_BAR, RewardWeights
+from epv_env.reward import RewardWeights
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -13,7 +13,10 @@ class Hyperparameters:
     num_envs: int = 1024
     """Episodes that run side by side."""
     episode_steps: int = 600
-    """Length of a training episode [control periods] (3 s)."""
+    """Length of the shortest training episodes [control periods] (3 s)."""
+    longest_episode_steps: int | None = None
+    """Length of the longest [control periods]; the others' lie between, a rollout apart. None: all
+    have one length."""
     n_steps: int = 32
     """Length of a rollout between two updates [control periods]."""
     batch_size: int = 4096
@@ -27,11 +30,13 @@ class Hyperparameters:
     reward_scale: float = 0.02
     """Factor of the rewards that the learner sees [1]. It makes the critic's errors about as large as
     the actor's advantages: PPO clips the gradients of both in common."""
+    leaving_charge: float = 0.0
+    """Price of a training episode that leaves the band with a margin, once; recurrent policies only."""
+    leaving_margin_bar: float = 0.46
+    """Deviation from the target that counts as leaving [bar]."""
     band_price: float = 6.0
     """Price of a constraint violation in training, unless the reward's own is higher. Violations are so
     rare for a good policy that learning would hardly notice them at the reward's own price."""
-    band_bar: float = BAND_BAR
-    """Half-width of the band with this price, at most C1's; a narrower one keeps a margin [bar]."""
     breakdown_price: float = 0.0
     """Price of the shortfall below the target in training, unless the reward's own is higher."""
     imitation_epochs: int = 2
@@ -46,6 +51,16 @@ class Hyperparameters:
     """Entropy coefficient at the start [1]; it falls linearly to zero."""
     width: int = 64
     """Units of each of the two hidden layers."""
+    critic_width: int = 128
+    """Units of each of the critic's, if it sees more than the actor (recurrent policies)."""
+    critic_rate: float = 1.0
+    """Learning rate of such a critic over the actor's [1]."""
+    critic_first: int = 0
+    """Environment steps in which such a critic learns alone."""
+    averaging: float = 0.99
+    """Factor by which the weight of a recurrent policy's actor in its average falls with each update [1]."""
+    clip_range: float = 0.2
+    """Share by which an update may change the probability of an action before it is clipped [1]."""
     validations: int = 8
     """Number of validated policies, evenly from `first_validation` to the end."""
     first_validation: float = 0.75
@@ -57,22 +72,31 @@ class Hyperparameters:
     conditions: Conditions = CONDITIONS["ordinary"]
     """What training episodes may meet beyond the ordinary; validation episodes are ordinary."""
 
+    @property
+    def episode_lengths(self) -> list[int]:
+        """Length of each environment's episodes, (num_envs,) [control periods].
+
+        Different lengths keep the environments out of step: every rollout sees all parts of an episode.
+        """
+        longest = self.longest_episode_steps or self.episode_steps
+        between = range(self.episode_steps, longest + 1, self.n_steps)
+        return [between[i % len(between)] for i in range(self.num_envs)]
+
 
 FROM_STUDENT = Hyperparameters(
-    band_price=10.0, band_bar=0.32, breakdown_price=0.5, sharpness=3.0, ent_coef=0.0,
-    learning_rate=4e-4, last_learning_rate=5e-6, batch_size=2048, gae_lambda=0.98,
-    validations=5, first_validation=0.2,
+    n_steps=50, batch_size=1600, longest_episode_steps=2000, learning_rate=1.5e-4,
+    last_learning_rate=1e-5, critic_rate=6.0, critic_first=1_500_000, clip_range=0.1, gae_lambda=0.98,
+    ent_coef=0.0, sharpness=4.0, leaving_charge=200.0, leaving_margin_bar=0.43, band_price=0.0,
+    breakdown_price=0.35, imitation_epochs=0, validations=5, first_validation=0.6,
+    conditions=Conditions(extreme=0.6, braking=0.3),
 )  # fmt: skip
 """For a recurrent policy that goes on from its student.
 
-Episodes are ordinary: the unavoidable price of starts far below the target would drown what the others
-teach. The student knows such starts from its lessons.
+Long episodes teach it to remember. Plants from the region's corners and hard applications are frequent,
+since only their coincidence drives a good policy out of the band. One control period more of a pulse is
+worth 200 mbar, so more exploration than the student's own doubt teaches caution only."""
 
-One control period more of a pulse is worth 200 mbar, so more exploration than the student's own doubt
-teaches caution only. The student keeps within the band, so the price near the band's edge can be higher.
-At a breakdown price of 2 policies stayed above the target, switched more and lost return."""
-
-FROM_MEMORYLESS = Hyperparameters(learning_rate=4e-4, breakdown_price=0.6, first_validation=0.05)
+FROM_MEMORYLESS = replace(FROM_STUDENT, sharpness=1.0, breakdown_price=0.6, first_validation=0.2)
 """For a recurrent policy that goes on from a policy without memory, where switching is cheap."""
 
 

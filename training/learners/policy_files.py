@@ -1,6 +1,5 @@
 """Writing a policy as safetensors and a contract, which others can load without running code."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,24 +13,25 @@ from controllers.policy_contract import CONTRACT_FILE, FORMAT, WEIGHTS_FILE
 from epv_env.common.files import write_bytes
 from epv_env.common.json_files import write_json
 from epv_env.observation import contract
+from training.learners.recurrent_actor_critic import RecurrentActorCritic
 
 
-def greedy_policy(model: PPO, student: LearnedPolicy | None = None) -> LearnedPolicy:
-    """The model's actor as a controller. It shares the model's weights: training changes it.
+def greedy_policy(model: PPO) -> LearnedPolicy:
+    """The model's actor as a controller.
 
-    student: the policy that the model went on from; its recurrent unit and its name are kept.
-    Raises TypeError for a policy that is not a plain multilayer perceptron with tanh layers.
+    Raises TypeError for a policy that is neither recurrent, as this project's are, nor a plain
+    multilayer perceptron with tanh layers.
     """
+    if isinstance(model.policy, RecurrentActorCritic):
+        return model.policy.greedy()
     layers = [(_array(layer.weight), _array(layer.bias)) for layer in _linear_layers(model)]
-    return replace(student, layers=layers) if student else LearnedPolicy(layers=layers)
+    return LearnedPolicy(layers=layers)
 
 
-def put_layers(model: PPO, policy: LearnedPolicy, sharpness: float) -> None:
-    """Copy the policy's layers into the model's actor, of the same shapes; logits times `sharpness`."""
-    *hidden, (weight, bias) = policy.layers
-    layers = [*hidden, (sharpness * weight, sharpness * bias)]
-    for layer, (weight, bias) in zip(_linear_layers(model), layers, strict=True):
-        layer.load_state_dict({"weight": torch.as_tensor(weight), "bias": torch.as_tensor(bias)})
+def go_on_from(model: PPO, student: LearnedPolicy, sharpness: float) -> None:
+    """Make the model's actor a recurrent student, its logits times `sharpness`."""
+    assert isinstance(model.policy, RecurrentActorCritic)
+    model.policy.go_on_from(student, sharpness)
 
 
 def save_policy(

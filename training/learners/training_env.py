@@ -1,15 +1,14 @@
-"""The environment that PPO trains on: drawn plants, scaled rewards, a recurrent unit's state."""
+"""The environment that PPO trains on: drawn plants, scaled rewards, and what only a critic may see."""
 
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
-from controllers.learned import GatedUnit
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from epv_env.sb3 import make_sb3_env
 from training.evaluation.seeds import training_seeds
 from training.learners.hyperparameters import Hyperparameters
-from training.learners.recurrent_state_wrapper import RecurrentStateWrapper
+from training.learners.privileged_wrapper import PrivilegedWrapper
 
 
 class ScaledReward(VecEnvWrapper):
@@ -46,33 +45,41 @@ def make_training_env(
     parameters: str,
     seed: int,
     weights: RewardWeights,
-    cell: GatedUnit | None = None,
+    privileged: bool = False,
 ) -> VecEnvWrapper:
     """Episodes on drawn plants. Trainings with different seeds meet different episodes.
 
     Args:
-        h: hyperparameters, of which the number, length and conditions of episodes and the reward's
-            scale count.
+        h: hyperparameters, of which the number, lengths and conditions of episodes, the reward's scale
+            and the charge for leaving count.
         plant: centre of the region.
         scenario: of the consumption.
         parameters: region that plants are drawn from, "confidence" or another (epv_env.settings).
         seed: of the training.
         weights: prices of the reward.
-        cell: a unit whose state ends the observations (training/learners/recurrent_state_wrapper.py).
+        privileged: whether observations end with the critic's view and leaving is charged
+            (training/learners/privileged_wrapper.py).
 
     Raises:
         ValueError: the seed is too large (training/evaluation/seeds.py).
     """
+    lengths = h.episode_lengths
     env = make_sb3_env(
         "EPValve-v0",
         h.num_envs,
-        max_episode_steps=h.episode_steps,
+        max_episode_steps=lengths,
         plant=plant,
         parameters=parameters,
         scenario=scenario,
         weights=weights,
         conditions=h.conditions,
+        privileged=privileged,
     )
     seed_episodes(env, seed)
-    scaled = ScaledReward(VecMonitor(env), h.reward_scale)
-    return RecurrentStateWrapper(scaled, cell) if cell else scaled
+    monitored = VecMonitor(env)
+    if not privileged:
+        return ScaledReward(monitored, h.reward_scale)
+    return PrivilegedWrapper(
+        monitored, scale=h.reward_scale, charge=h.leaving_charge, margin_bar=h.leaving_margin_bar,
+        longest=max(lengths),
+    )  # fmt: skip
