@@ -88,7 +88,10 @@ FROM_STUDENT = Hyperparameters(
     last_learning_rate=1e-5, critic_rate=6.0, critic_first=1_500_000, clip_range=0.1, gae_lambda=0.98,
     ent_coef=0.0, sharpness=4.0, leaving_charge=200.0, leaving_margin_bar=0.43, band_price=0.0,
     breakdown_price=0.35, imitation_epochs=0, validations=5, first_validation=0.6,
-    conditions=Conditions(extreme=0.6, braking=0.3),
+    conditions=Conditions(
+        extreme=0.5, braking=0.25, far=0.06, vented=0.08, coil_off=0.08, starved=0.08, rest=0.05,
+        rest_s=(2.0, 8.0), target_steps=0.1, noisy=0.2, frozen_p3=0.05, biased_p2=0.05, delayed=0.15,
+    ),
 )  # fmt: skip
 """For a recurrent policy that goes on from its student.
 
