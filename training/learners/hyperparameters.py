@@ -58,7 +58,7 @@ class Hyperparameters:
     critic_first: int = 0
     """Environment steps in which such a critic learns alone."""
     averaging: float = 0.99
-    """Factor by which an actor's weight in the average falls with each update; recurrent policies [1]."""
+    """Factor by which an actor's weight in the average falls with each update [1]; if recurrent."""
     clip_range: float = 0.2
     """Share by which an update may change the probability of an action before it is clipped [1]."""
     validations: int = 8
