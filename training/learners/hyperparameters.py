@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 from epv_env.conditions import CONDITIONS, Conditions
-from epv_env.reward import RewardWeights
+from epv_env.reward import BAND_BAR, RewardWeights
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +37,8 @@ class Hyperparameters:
     band_price: float = 6.0
     """Price of a constraint violation in training, unless the reward's own is higher. Violations are so
     rare for a good policy that learning would hardly notice them at the reward's own price."""
+    band_bar: float = BAND_BAR
+    """Half-width of the band with this price, at most C1's; a narrower one keeps a margin [bar]."""
     breakdown_price: float = 0.0
     """Price of the shortfall below the target in training, unless the reward's own is higher."""
     imitation_epochs: int = 2

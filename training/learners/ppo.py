@@ -197,10 +197,11 @@ def _subject(
 
 
 def training_weights(weights: RewardWeights, h: Hyperparameters) -> RewardWeights:
-    """Prices of the reward in training: at least those of the hyperparameters."""
+    """Prices of the reward in training: at least those of the hyperparameters, on at most their band."""
     return replace(
         weights,
         band=max(weights.band, h.band_price),
+        band_bar=min(weights.band_bar, h.band_bar),
         breakdown=max(weights.breakdown, h.breakdown_price),
     )
 
