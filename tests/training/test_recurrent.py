@@ -28,9 +28,11 @@ from training.evaluation.rollout import begin_episodes, make_env, run_episodes
 from training.learners.distillation import Distillation, distil
 from training.learners.hyperparameters import Hyperparameters
 from training.learners.lessons import known_plants
-from training.learners.policy_files import save_policy
+from training.learners.policy_files import greedy_policy, put_layers, save_policy
+from training.learners.ppo import make_model
 from training.learners.recurrent_training import train_recurrent
 from training.learners.student import NAME, Student, policy_of, put_policy, with_memory_of
+from training.learners.training_env import make_training_env
 
 pytestmark = pytest.mark.training
 
@@ -44,8 +46,8 @@ TINY = Distillation(
     window=30, batch=16, validations=2, validation_episodes=8, validation_duration=0.8,
 )  # fmt: skip
 TINY_PPO = Hyperparameters(
-    num_envs=8, width=16, n_steps=16, batch_size=64, episode_steps=32, longest_episode_steps=64,
-    imitation_epochs=0, validations=2, validation_episodes=4, validation_duration=0.8,
+    num_envs=8, width=16, n_steps=16, batch_size=64, episode_steps=30, imitation_epochs=1, validations=2,
+    validation_episodes=4, validation_duration=0.8,
 )  # fmt: skip
 
 
@@ -137,6 +139,48 @@ def test_a_policy_whose_memory_is_missing_is_refused(student, tmp_path):
     save_file(without, tmp_path / WEIGHTS_FILE)
     with pytest.raises(PolicyError, match=r"lacks the array 'memory\.weight_input'"):
         load_policy(tmp_path)
+
+
+def test_an_observation_ends_with_what_the_policy_remembers_in_its_own_episode(student):
+    """Also the last one of an episode, which comes with the first one of the next."""
+    policy = policy_of(student)
+    h = replace(TINY_PPO, num_envs=3, episode_steps=5)
+    env = make_training_env(h, seed=0, cell=policy.cell, **OPTIONS)
+    entries = len(LAYOUT)
+    policy.reset(3)
+    first = shown = np.asarray(env.reset())
+    ends: list[np.ndarray] = []
+    while not ends:
+        assert np.array_equal(policy.logits(shown[:, :entries]), layers_alone(policy, shown))
+        shown, _, done, infos = env.step(np.ones(3, dtype=int))
+        shown = np.asarray(shown)
+        ends = [info["terminal_observation"] for info in np.array(infos)[done]]
+    last = np.array(ends)
+    assert np.array_equal(policy.logits(last[:, :entries]), layers_alone(policy, last))
+    policy.reset(3)
+    assert np.array_equal(policy.logits(shown[:, :entries]), layers_alone(policy, shown))
+    assert not np.array_equal(last[:, entries:], first[:, entries:])
+
+
+def layers_alone(policy, observations):
+    """The logits of the layers, which see the memory in the observations."""
+    return replace(policy, cell=None).logits(observations)
+
+
+def test_ppo_goes_on_from_the_student(student, readings):
+    """Its actor is the student's, and its policy has the student's unit; sharper, it doubts less."""
+    policy = policy_of(student)
+    env = make_training_env(TINY_PPO, seed=0, cell=policy.cell, **OPTIONS)
+    model = make_model(TINY_PPO, env, seed=4, device="cpu")
+    assert not same(greedy_policy(model, policy), policy)
+    put_layers(model, policy, 1.0)
+    assert same(greedy_policy(model, policy), policy)
+    put_layers(model, policy, 3.0)
+    sharp = greedy_policy(model, policy)
+    for each in (sharp, policy):
+        each.reset(6)
+    for part in readings:
+        np.testing.assert_allclose(sharp.logits(part), 3 * policy.logits(part), atol=1e-5)
 
 
 def test_a_student_takes_a_policy_s_weights_and_gives_them_back(student, readings):

@@ -13,7 +13,7 @@ from epv_env.reward import RewardWeights
 from tests.training.test_recurrent import same
 from training.learners import learning_log
 from training.learners.hyperparameters import Hyperparameters
-from training.learners.policy_files import go_on_from, greedy_policy
+from training.learners.policy_files import greedy_policy, put_student
 from training.learners.ppo import make_model, train
 from training.learners.sequence_ppo import SequencePPO, log_probability
 from training.learners.student import Student, policy_of
@@ -26,8 +26,9 @@ TASK: dict[str, Any] = {
     "weights": RewardWeights(),
 }  # fmt: skip
 H = Hyperparameters(
-    num_envs=6, n_steps=20, batch_size=60, episode_steps=20, longest_episode_steps=60, width=16,
-    critic_width=16, imitation_epochs=0, validations=1, validation_episodes=4, validation_duration=0.8,
+    end_to_end=True, num_envs=6, n_steps=20, batch_size=60, episode_steps=20, longest_episode_steps=60,
+    width=16, critic_width=16, imitation_epochs=0, validations=1, validation_episodes=4,
+    validation_duration=0.8,
 )  # fmt: skip
 
 
@@ -40,7 +41,7 @@ def learner(h=H) -> SequencePPO:
     env = make_training_env(h, seed=0, privileged=True, **TASK)
     model = make_model(h, env, seed=0, device="cpu", cells=8)
     assert isinstance(model, SequencePPO)
-    go_on_from(model, student(), 1.0)
+    put_student(model, student(), 1.0)
     return model
 
 

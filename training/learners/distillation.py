@@ -30,7 +30,7 @@ from training.learners.validation import ValidationSettings, score, validate
 class Distillation(LessonSettings):
     """What defines a distillation: its episodes, and how the student learns from them."""
 
-    memory: int = 64
+    memory: int = 32
     """Cells of the gated recurrent unit."""
     width: int = 64
     """Units of each of the two hidden layers."""
@@ -50,6 +50,10 @@ class Distillation(LessonSettings):
     """Episodes of a validation."""
     validation_duration: float = 6.0
     """Length of a validation episode [s]."""
+
+
+FOR_END_TO_END = Distillation(memory=64, rounds=24)
+"""For a student whose recurrent unit learns on with PPO: larger, and less of it is imitation."""
 
 
 def distil(

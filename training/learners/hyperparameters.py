@@ -1,6 +1,6 @@
 """Hyperparameters of PPO: the default, and those of the training of recurrent policies."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from epv_env.conditions import CONDITIONS, Conditions
 from epv_env.reward import BAND_BAR, RewardWeights
@@ -30,10 +30,6 @@ class Hyperparameters:
     reward_scale: float = 0.02
     """Factor of the rewards that the learner sees [1]. It makes the critic's errors about as large as
     the actor's advantages: PPO clips the gradients of both in common."""
-    leaving_charge: float = 0.0
-    """Price of a training episode that leaves the band with a margin, once; recurrent policies only."""
-    leaving_margin_bar: float = 0.46
-    """Deviation from the target that counts as leaving [bar]."""
     band_price: float = 6.0
     """Price of a constraint violation in training, unless the reward's own is higher. Violations are so
     rare for a good policy that learning would hardly notice them at the reward's own price."""
@@ -43,26 +39,33 @@ class Hyperparameters:
     """Price of the shortfall below the target in training, unless the reward's own is higher."""
     imitation_epochs: int = 2
     """Passes over the demonstration that the model imitates first (training/learners/imitation.py)."""
+    end_to_end: bool = False
+    """Whether gradients go through a student's recurrent unit (training/learners/sequence_ppo.py). The
+    critic then sees more than the actor, and the fields up to `averaging` count."""
+    leaving_charge: float = 0.0
+    """Price of a training episode that leaves the band with a margin, once."""
+    leaving_margin_bar: float = BAND_BAR
+    """Deviation from the target that counts as leaving [bar]."""
+    critic_width: int = 128
+    """Units of each of the critic's hidden layers."""
+    critic_rate: float = 6.0
+    """Learning rate of the critic over the actor's [1]."""
+    critic_first: int = 0
+    """Environment steps in which the critic learns alone."""
+    averaging: float = 0.99
+    """Factor by which an actor's weight in the average falls with each update [1]."""
     sharpness: float = 1.0
     """Factor of the logits of a student to go on from [1]: the larger, the less it explores."""
     gamma: float = 0.995
     """Discount factor of a control period [1]."""
+    clip_range: float = 0.2
+    """Share by which an update may change the probability of an action before it is clipped [1]."""
     gae_lambda: float = 0.95
     """Decay of the generalised advantage estimate (Schulman et al., ICLR 2016) [1]."""
     ent_coef: float = 0.003
     """Entropy coefficient at the start [1]; it falls linearly to zero."""
     width: int = 64
     """Units of each of the two hidden layers."""
-    critic_width: int = 128
-    """Units of each of the critic's, if it sees more than the actor (recurrent policies)."""
-    critic_rate: float = 1.0
-    """Learning rate of such a critic over the actor's [1]."""
-    critic_first: int = 0
-    """Environment steps in which such a critic learns alone."""
-    averaging: float = 0.99
-    """Factor by which an actor's weight in the average falls with each update [1]; if recurrent."""
-    clip_range: float = 0.2
-    """Share by which an update may change the probability of an action before it is clipped [1]."""
     validations: int = 8
     """Number of validated policies, evenly from `first_validation` to the end."""
     first_validation: float = 0.75
@@ -86,23 +89,36 @@ class Hyperparameters:
 
 
 FROM_STUDENT = Hyperparameters(
-    n_steps=50, batch_size=1600, longest_episode_steps=2000, learning_rate=1.5e-4,
-    last_learning_rate=1e-5, critic_rate=6.0, critic_first=1_500_000, clip_range=0.1, gae_lambda=0.98,
-    ent_coef=0.0, sharpness=4.0, leaving_charge=200.0, leaving_margin_bar=0.43, band_price=0.0,
-    breakdown_price=0.35, imitation_epochs=0, validations=5, first_validation=0.6,
+    band_price=10.0, band_bar=0.32, breakdown_price=0.5, sharpness=3.0, ent_coef=0.0,
+    learning_rate=4e-4, last_learning_rate=5e-6, batch_size=2048, gae_lambda=0.98,
+    validations=5, first_validation=0.2,
+)  # fmt: skip
+"""For a recurrent policy that goes on from its student.
+
+Episodes are ordinary: the unavoidable price of starts far below the target would drown what the others
+teach. The student knows such starts from its lessons.
+
+One control period more of a pulse is worth 200 mbar, so more exploration than the student's own doubt
+teaches caution only. The student keeps within the band, so the price near the band's edge can be higher.
+At a breakdown price of 2 policies stayed above the target, switched more and lost return."""
+
+FROM_MEMORYLESS = Hyperparameters(learning_rate=4e-4, breakdown_price=0.6, first_validation=0.05)
+"""For a recurrent policy that goes on from a policy without memory, where switching is cheap."""
+
+END_TO_END = Hyperparameters(
+    end_to_end=True, n_steps=50, batch_size=1600, longest_episode_steps=2000, learning_rate=1.5e-4,
+    last_learning_rate=1e-5, critic_first=1_500_000, clip_range=0.1, gae_lambda=0.98, ent_coef=0.0,
+    sharpness=4.0, leaving_charge=300.0, leaving_margin_bar=0.36, band_price=0.0, breakdown_price=0.5,
+    imitation_epochs=0, validations=5, first_validation=0.6,
     conditions=Conditions(
         extreme=0.5, braking=0.25, far=0.06, vented=0.08, coil_off=0.08, starved=0.08, rest=0.05,
         rest_s=(2.0, 8.0), target_steps=0.1, noisy=0.2, frozen_p3=0.05, biased_p2=0.05, delayed=0.15,
     ),
 )  # fmt: skip
-"""For a recurrent policy that goes on from its student.
+"""For a recurrent policy that goes on from its student, the recurrent unit included.
 
 Long episodes teach it to remember. Plants from the region's corners and hard applications are frequent,
-since only their coincidence drives a good policy out of the band. One control period more of a pulse is
-worth 200 mbar, so more exploration than the student's own doubt teaches caution only."""
-
-FROM_MEMORYLESS = replace(FROM_STUDENT, sharpness=1.0, breakdown_price=0.6, first_validation=0.2)
-"""For a recurrent policy that goes on from a policy without memory, where switching is cheap."""
+since a good policy leaves the band only where they meet."""
 
 
 def switching_is_cheap(weights: RewardWeights) -> bool:
@@ -110,6 +126,11 @@ def switching_is_cheap(weights: RewardWeights) -> bool:
     return weights.switching < RewardWeights().switching
 
 
-def recurrent_hyperparameters(weights: RewardWeights) -> Hyperparameters:
-    """PPO's hyperparameters for a recurrent policy at these prices of the reward."""
+def recurrent_hyperparameters(weights: RewardWeights, *, end_to_end: bool = False) -> Hyperparameters:
+    """PPO's hyperparameters for a recurrent policy at these prices of the reward.
+
+    end_to_end: whether the recurrent unit learns, too.
+    """
+    if end_to_end:
+        return END_TO_END
     return FROM_MEMORYLESS if switching_is_cheap(weights) else FROM_STUDENT

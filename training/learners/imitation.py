@@ -92,6 +92,7 @@ def imitate(
     steps: int,
     epochs: int,
     seed: int,
+    learn_actor: bool = True,
     settings: ImitationSettings = ImitationSettings(),
 ) -> list[float]:
     """Fit actor and critic to a demonstration; returns the actor's mean cross-entropy in each epoch.
@@ -103,6 +104,7 @@ def imitate(
         steps: control periods of the demonstration.
         epochs: passes over it.
         seed: of the action noise and of the batches.
+        learn_actor: False if the actor is the teacher already.
         settings: of the imitation.
     """
     observations, actions, returns = demonstrate(
@@ -122,7 +124,7 @@ def imitate(
             cross_entropy = -log_probability.mean()
             error = (values.flatten() - value[rows]) * trusted[rows]
             optimiser.zero_grad()
-            (cross_entropy + (error**2).mean()).backward()
+            (learn_actor * cross_entropy + (error**2).mean()).backward()
             optimiser.step()
             total += float(cross_entropy.detach()) * len(rows)
         losses.append(total / len(x))

@@ -38,7 +38,7 @@ these are left to PPO."""
 class LessonSettings:
     """Episodes of a distillation."""
 
-    rounds: int = 24
+    rounds: int = 36
     """Rounds of episodes and learning. The episodes of a round run while the student learns from those
     before, so the student that drives them is one round old."""
     plants: int = 256

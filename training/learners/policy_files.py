@@ -1,5 +1,6 @@
 """Writing a policy as safetensors and a contract, which others can load without running code."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,22 +17,31 @@ from epv_env.observation import contract
 from training.learners.recurrent_actor_critic import RecurrentActorCritic
 
 
-def greedy_policy(model: PPO) -> LearnedPolicy:
-    """The model's actor as a controller.
+def greedy_policy(model: PPO, student: LearnedPolicy | None = None) -> LearnedPolicy:
+    """The model's actor as a controller. It shares the model's weights: training changes it.
 
-    Raises TypeError for a policy that is neither recurrent, as this project's are, nor a plain
-    multilayer perceptron with tanh layers.
+    student: the policy that the model went on from; its recurrent unit and its name are kept, unless
+    the model has learned a unit of its own.
+    Raises TypeError for a policy that is not a plain multilayer perceptron with tanh layers.
     """
     if isinstance(model.policy, RecurrentActorCritic):
         return model.policy.greedy()
     layers = [(_array(layer.weight), _array(layer.bias)) for layer in _linear_layers(model)]
-    return LearnedPolicy(layers=layers)
+    return replace(student, layers=layers) if student else LearnedPolicy(layers=layers)
 
 
-def go_on_from(model: PPO, student: LearnedPolicy, sharpness: float) -> None:
-    """Make the model's actor a recurrent student, its logits times `sharpness`."""
+def put_student(model: PPO, student: LearnedPolicy, sharpness: float) -> None:
+    """Make the model's actor a recurrent student, the unit included; logits times `sharpness`."""
     assert isinstance(model.policy, RecurrentActorCritic)
     model.policy.go_on_from(student, sharpness)
+
+
+def put_layers(model: PPO, policy: LearnedPolicy, sharpness: float) -> None:
+    """Copy the policy's layers into the model's actor, of the same shapes; logits times `sharpness`."""
+    *hidden, (weight, bias) = policy.layers
+    layers = [*hidden, (sharpness * weight, sharpness * bias)]
+    for layer, (weight, bias) in zip(_linear_layers(model), layers, strict=True):
+        layer.load_state_dict({"weight": torch.as_tensor(weight), "bias": torch.as_tensor(bias)})
 
 
 def save_policy(

@@ -23,7 +23,7 @@ from training.learners.checkpoint_selection import Selection, validation_points
 from training.learners.hyperparameters import Hyperparameters
 from training.learners.imitation import imitate
 from training.learners.learning_log import TrainingLog
-from training.learners.policy_files import go_on_from, greedy_policy, policy_bytes
+from training.learners.policy_files import greedy_policy, policy_bytes, put_layers, put_student
 from training.learners.provenance import plant_digest
 from training.learners.recurrent_actor_critic import RecurrentActorCritic
 from training.learners.resumption import restore_progress
@@ -53,12 +53,11 @@ FUSED_ADAM = {"fused": True, "eps": 1e-5}
 def make_model(
     h: Hyperparameters, env: VecEnv, *, seed: int, device: str, cells: int | None = None
 ) -> PPO:
-    """A new PPO model. device: of torch. cells: of its memory; None: it has none."""
-    if cells is None:
-        kind: Any = BatchPPO
-        own: dict[str, Any] = {"policy": "MlpPolicy"}
-        policy: dict[str, Any] = {"net_arch": [h.width, h.width]}
-    else:
+    """A new PPO model. device: of torch. cells: of a recurrent unit that learns; None: it has none."""
+    kind: Any = BatchPPO
+    own: dict[str, Any] = {"policy": "MlpPolicy"}
+    policy: dict[str, Any] = {"net_arch": [h.width, h.width]}
+    if cells is not None:
         kind = SequencePPO
         own = {
             "policy": RecurrentActorCritic, "critic_rate": h.critic_rate, "critic_first": h.critic_first,
@@ -120,8 +119,8 @@ def train(
         seed: of the training.
         device: of torch.
         resume: whether to go on from the folder's checkpoint.
-        student: a recurrent policy to go on from. None: the model imitates the TEACHER first, and has no
-            memory.
+        student: a policy to go on from; its recurrent unit learns if `h.end_to_end`, or stays as it is.
+            None: the model imitates the TEACHER first.
         run: identity of the run; None: that of the folder's checkpoint, or a new one.
         quiet: no progress bar.
     """
@@ -136,20 +135,23 @@ def train(
         "plant": plant, "parameters": parameters, "scenario": scenario,
         "weights": training_weights(weights, h),
     }  # fmt: skip
-    env = make_training_env(h, seed=seed, privileged=student is not None, **task)
-    model = make_model(h, env, seed=seed, device=device, cells=student.cells if student else None)
+    learns = student if h.end_to_end else None  # whose recurrent unit learns
+    shown = student.cell if student and not learns else None
+    env = make_training_env(h, seed=seed, cell=shown, privileged=learns is not None, **task)
+    model = make_model(h, env, seed=seed, device=device, cells=learns.cells if learns else None)
     if found:
         _restore(model, folder / CHECKPOINT_FILE, device=device)
         restore_progress(model, found.progress)
-    elif student is not None:
-        go_on_from(model, student, h.sharpness)
+    elif learns:
+        put_student(model, learns, h.sharpness)
     elif h.imitation_epochs:
-        _start(model, h, env, plant, seed=seed)
+        _start(model, h, env, plant, student=student, seed=seed)
+    greedy = partial(greedy_policy, student=student)
     selection = Selection(
         points=validation_points(timesteps, first_share=h.first_validation, count=h.validations),
         settings=ValidationSettings(episodes=h.validation_episodes, duration=h.validation_duration),
         options=task,
-        controller=greedy_policy,
+        controller=greedy,
         rows=with_nan(begun.validations),
         best=found.best if found else None,
     )
@@ -172,7 +174,7 @@ def train(
         )
     best_model: Any = io.BytesIO(selection.best)  # stable-baselines3 takes streams, too
     model.set_parameters(best_model, device=device)
-    return greedy_policy(model), log
+    return greedy(model), log
 
 
 def _restore(model: PPO, checkpoint: Path, *, device: str) -> None:
@@ -206,7 +208,20 @@ def training_weights(weights: RewardWeights, h: Hyperparameters) -> RewardWeight
     )
 
 
-def _start(model: PPO, h: Hyperparameters, env: VecEnvWrapper, plant: Plant, *, seed: int) -> None:
-    """Start from an imitation of the TEACHER."""
-    teacher = build(TEACHER, load_tunings()[TEACHER].values, plant)
-    imitate(model, teacher, env, steps=h.episode_steps - 1, epochs=h.imitation_epochs, seed=seed)
+def _start(
+    model: PPO,
+    h: Hyperparameters,
+    env: VecEnvWrapper,
+    plant: Plant,
+    *,
+    student: LearnedPolicy | None,
+    seed: int,
+) -> None:
+    """Start from a student, whose returns the critic learns, or from an imitation of the TEACHER."""
+    teacher = student or build(TEACHER, load_tunings()[TEACHER].values, plant)
+    if student:
+        put_layers(model, student, h.sharpness)
+    imitate(
+        model, teacher, env, steps=h.episode_steps - 1, epochs=h.imitation_epochs, seed=seed,
+        learn_actor=student is None,
+    )  # fmt: skip

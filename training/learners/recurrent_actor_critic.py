@@ -72,7 +72,7 @@ class RecurrentActorCritic(BasePolicy):
     def go_on_from(self, policy: LearnedPolicy, sharpness: float) -> None:
         """Make the actor that of a policy of the same shape, its logits times `sharpness`."""
         put_policy(self.actor, policy, sharpness)
-        put_policy(self.average.module, policy, sharpness)
+        self.average.module.load_state_dict(self.actor.state_dict())
 
     def greedy(self) -> LearnedPolicy:
         """The greedy policy of the averaged actor, with a copy of its weights.
@@ -80,7 +80,9 @@ class RecurrentActorCritic(BasePolicy):
         It is steadier than the latest one (Izmailov et al., Averaging weights leads to wider optima, UAI
         2018).
         """
-        return policy_of(self.average.module)
+        averaged = self.average.module
+        assert isinstance(averaged, Student)
+        return policy_of(averaged)
 
     def averaged(self) -> None:
         """Take the present actor into the average."""

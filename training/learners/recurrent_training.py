@@ -102,8 +102,7 @@ def _distil_into(folder: Path, d: Distillation, *, run: str, quiet: bool, **task
 def _train_memoryless_into(folder: Path, h: Hyperparameters, **task: Any) -> None:
     """Train a policy without memory at the default rates and prices. task: `train`'s arguments."""
     usual = Hyperparameters()
-    sizes = ("num_envs", "width", "validations", "validation_episodes", "validation_duration")
-    own = replace(usual, **{name: getattr(h, name) for name in sizes})
-    policy, log = train(own, folder=folder, **task)
+    rates = {"learning_rate": usual.learning_rate, "breakdown_price": usual.breakdown_price}
+    policy, log = train(replace(h, **rates), folder=folder, **task)
     provenance = {"run": log.run.run, "timesteps": task["timesteps"], "seed": task["seed"]}
     save_policy(policy, folder, control_period=OnOff.default_period, provenance=provenance)

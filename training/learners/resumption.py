@@ -15,6 +15,7 @@ from stable_baselines3.common.vec_env import VecEnvWrapper, VecMonitor
 from epv_env.saved_state import SavedState, restore_state, save_state
 from epv_env.sb3 import SB3VectorEnv
 from training.learners.privileged_wrapper import PrivilegedWrapper
+from training.learners.recurrent_state_wrapper import RecurrentStateWrapper
 from training.learners.run_state import RunError
 from training.learners.sequence_ppo import SequencePPO
 
@@ -97,6 +98,8 @@ def _wrapped(model: PPO) -> Iterator[tuple[str, Any, str]]:
         if isinstance(wrapper, VecMonitor):
             yield "returns", wrapper, "episode_returns"
             yield "lengths", wrapper, "episode_lengths"
+        if isinstance(wrapper, RecurrentStateWrapper):
+            yield "memory", wrapper, "state"
         if isinstance(wrapper, PrivilegedWrapper):
             yield "left", wrapper, "left"
     if isinstance(model, SequencePPO):

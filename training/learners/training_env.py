@@ -1,14 +1,16 @@
-"""The environment that PPO trains on: drawn plants, scaled rewards, and what only a critic may see."""
+"""The environment that PPO trains on: drawn plants, scaled rewards, what a recurrent policy needs."""
 
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
+from controllers.learned import GatedUnit
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from epv_env.sb3 import make_sb3_env
 from training.evaluation.seeds import training_seeds
 from training.learners.hyperparameters import Hyperparameters
 from training.learners.privileged_wrapper import PrivilegedWrapper
+from training.learners.recurrent_state_wrapper import RecurrentStateWrapper
 
 
 class ScaledReward(VecEnvWrapper):
@@ -45,6 +47,7 @@ def make_training_env(
     parameters: str,
     seed: int,
     weights: RewardWeights,
+    cell: GatedUnit | None = None,
     privileged: bool = False,
 ) -> VecEnvWrapper:
     """Episodes on drawn plants. Trainings with different seeds meet different episodes.
@@ -57,8 +60,10 @@ def make_training_env(
         parameters: region that plants are drawn from, "confidence" or another (epv_env.settings).
         seed: of the training.
         weights: prices of the reward.
-        privileged: whether observations end with the critic's view and leaving is charged
-            (training/learners/privileged_wrapper.py).
+        cell: a unit whose state ends the observations (training/learners/recurrent_state_wrapper.py).
+
+        privileged: whether observations end with a critic's view instead, and leaving the band is
+            charged (training/learners/privileged_wrapper.py).
 
     Raises:
         ValueError: the seed is too large (training/evaluation/seeds.py).
@@ -76,10 +81,10 @@ def make_training_env(
         privileged=privileged,
     )
     seed_episodes(env, seed)
-    monitored = VecMonitor(env)
-    if not privileged:
-        return ScaledReward(monitored, h.reward_scale)
-    return PrivilegedWrapper(
-        monitored, scale=h.reward_scale, charge=h.leaving_charge, margin_bar=h.leaving_margin_bar,
-        longest=max(lengths),
-    )  # fmt: skip
+    if privileged:
+        return PrivilegedWrapper(
+            VecMonitor(env), scale=h.reward_scale, charge=h.leaving_charge,
+            margin_bar=h.leaving_margin_bar, longest=max(lengths),
+        )  # fmt: skip
+    scaled = ScaledReward(VecMonitor(env), h.reward_scale)
+    return RecurrentStateWrapper(scaled, cell) if cell else scaled
