@@ -33,6 +33,7 @@ SHORT_FORMS: dict[str, str] = {
     "python training/compare.py": "tests/training/test_compare.py",
     "python training/export.py": "tests/training/test_export.py",
     "python training/export_fmu.py": "tests/training/fmu",
+    "python training/regret.py": "tests/training/test_regret.py",
     "python training/hard_scenarios.py": "tests/training/test_hard_scenarios.py",
     "python training/sim_to_real.py": "tests/training/test_sim_to_real.py",
     "python training/sweep.py": "tests/training/test_sweep_run.py",

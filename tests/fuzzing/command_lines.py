@@ -14,6 +14,7 @@ NEEDED: dict[str, list[str]] = {
     "train": ["--plant", "nowhere.json"],
     "compare": ["--tradeoff", "nowhere", "--cluster", "nowhere", "--scenarios", "flood"],
     "hard-scenarios": ["--scenarios", "flood"],
+    "regret": ["--episodes", "0"],
     "sweep": ["--plant", "nowhere.json"],
     "tune": ["--only", "flood"],
     "tradeoff": ["--kinds", "flood"],

@@ -29,6 +29,7 @@ class Entry(NamedTuple):
 COMMANDS: dict[str, Entry] = {
     "train": Entry("training.train_ppo", "train a policy and compare it with classic controllers"),
     "compare": Entry("training.compare", "compare all controllers on the same unseen episodes"),
+    "regret": Entry("training.regret", "what controllers lose against the causal bound"),
     "hard-scenarios": Entry("training.hard_scenarios", "controllers on scenarios beyond training"),
     "sweep": Entry("training.sweep", "robustness against parameters, effects and conditions"),
     "tune": Entry("training.tune", "search the classic controllers' settings"),
