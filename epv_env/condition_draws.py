@@ -8,6 +8,7 @@ import numpy as np
 from epv_env.common.units import BAR
 from epv_env.conditions import PROBABILITIES, Conditions
 from epv_env.episode import TARGET_STEPS, Start
+from epv_env.plant.consumption import SCENARIOS
 from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.supply import Supply
 
@@ -91,9 +92,17 @@ def _delayed(start: Start, c: Conditions, rng: np.random.Generator) -> Start:
     return replace(start, parameters=start.parameters.replace(t_delay=delay))
 
 
+def _extreme(start: Start, c: Conditions, rng: np.random.Generator) -> Start:
+    return replace(start, parameters=start.region.towards_ends(start.parameters))
+
+
+def _braking(start: Start, c: Conditions, rng: np.random.Generator) -> Start:
+    return replace(start, consumption=SCENARIOS["emergency"].draw(rng), recorded_consumption=None)
+
+
 _CHANGES: dict[str, Callable[[Start, Conditions, np.random.Generator], Start]] = {
     "starved": _starved, "far": _far, "vented": _vented, "coil_off": _coil_off, "rest": _rest,
     "target_steps": _target_steps, "noisy": _noisy, "frozen_p3": _frozen_p3, "worn": _worn,
-    "biased_p2": _biased_p2, "delayed": _delayed,
+    "biased_p2": _biased_p2, "delayed": _delayed, "extreme": _extreme, "braking": _braking,
 }  # fmt: skip
 """By the name of the probability."""

@@ -8,7 +8,7 @@ from epv_env.arguments import PRESSURE_LIMITS_BAR, OptionError, Range, as_range
 
 PROBABILITIES = (
     "starved", "far", "vented", "coil_off", "rest", "target_steps", "noisy", "frozen_p3", "worn",
-    "biased_p2", "delayed",
+    "biased_p2", "delayed", "extreme", "braking",
 )  # fmt: skip
 """Fields of Conditions that are probabilities, in the order in which the conditions act."""
 
@@ -80,6 +80,10 @@ class Conditions:
     """How late [ms]; the catalogue's typical delay is below 2, a slow network's is 5."""
     worn: float = 0.0
     """Probability that the valve has effects of the catalogue, up to their typical sizes."""
+    extreme: float = 0.0
+    """Probability that the plant lies near a corner of its region: rare valves become common."""
+    braking: float = 0.0
+    """Probability that the consumption is that of emergencies, the hardest."""
     most_effects: int = 3
     """How many at most; their number is uniform. A worn valve has more than one fault."""
 

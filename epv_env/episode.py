@@ -10,6 +10,7 @@ from epv_env.observation import HISTORY
 from epv_env.plant.consumption import SILENT, Profile, draw_profile
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.readings import MEASURED
+from epv_env.plant.region import Region
 from epv_env.plant.supply import Supply
 from epv_env.settings import Settings
 from epv_env.signals import MovingTarget, RecordedConsumption
@@ -50,6 +51,8 @@ class Start:
 
     parameters: Parameters
     """Of the plant."""
+    region: Region
+    """That the plant was drawn from."""
     p1: float
     """First pressure of the supply [Pa absolute]."""
     p2: float
@@ -98,7 +101,7 @@ class Start:
         p2 = target - drop if settings.p2_bar is None else disturbance.uniform(*settings.p2_bar)
         p3 = p1 if settings.p3_bar is None else disturbance.uniform(*settings.p3_bar) * BAR
         return cls(
-            parameters=settings.plants.draw(plant),
+            parameters=settings.plants.draw(plant), region=settings.plants,
             p1=p1, p2=p2 * BAR, p3=p3, target=target,
             consumption=consumption,
             noise=noise,

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from epv_env.env import _ValveEnv
 from epv_env.plant.parameters import Parameters
+from epv_env.plant.supply import Supply
 from epv_env.vector_env import _ValveVectorEnv
 
 ValveEnv = _ValveEnv | _ValveVectorEnv
@@ -43,16 +44,20 @@ class SavedState:
     """Steps that Gymnasium's time limit has counted; None: there is none."""
 
     def to_bytes(self) -> bytes:
-        """The state for a file. Raises StateError where an episode has objects of its own.
+        """The state for a file. Raises StateError where an episode has recordings or signals of its own.
 
-        The file holds numbers only: supplies are the constructor's, and so are signals.
+        The file holds numbers only: recordings and signals are the constructor's.
         """
+        numbers = dict(self.arrays)
         for name, found in self.objects.items():
-            if any(each is not found[0] for each in found):
+            if all(each is found[0] for each in found):
+                continue
+            if name != "supplies" or any(supply.recording is not None for supply in found):
                 raise StateError(f"episodes have {name} of their own: only numbers go into a file")
+            numbers[name] = np.array([supply.numbers for supply in found])
         stream = io.BytesIO()
         rest = json.dumps({"generators": self.generators, "elapsed": self.elapsed}, default=_plain)
-        np.savez_compressed(stream, rest=np.array(rest), **self.arrays)  # type: ignore[arg-type]
+        np.savez_compressed(stream, rest=np.array(rest), **numbers)  # type: ignore[arg-type]
         return stream.getvalue()
 
     @classmethod
@@ -68,7 +73,11 @@ class SavedState:
             raise StateError(f"this is no saved state ({error}): save it anew") from None
         settings = task.settings
         objects: dict[str, list[Any]] = dict.fromkeys(PER_EPISODE, [None] * task.n)
-        objects["supplies"] = [settings.supply] * task.n
+        own = arrays.pop("supplies", None)
+        if own is None:
+            objects["supplies"] = [settings.supply] * task.n
+        else:
+            objects["supplies"] = [Supply.from_numbers(row) for row in own.tolist()]
         return cls(arrays=arrays, generators=generators, objects=objects, elapsed=elapsed)
 
 

@@ -26,7 +26,8 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
     Sub-environment i, seeded with seed + i as in SyncVectorEnv, gives the same trajectory to the bit as
     the single environment with that seed. Arguments as for the single environment, and:
         num_envs: number of valves.
-        max_episode_steps: control periods after which an episode is truncated; None: never.
+        max_episode_steps: control periods after which an episode is truncated, one number for all or
+            one for each sub-environment; None: never.
         autoreset_mode: an AutoresetMode or its value. NEXT_STEP is Gymnasium's default, SAME_STEP is
             what stable-baselines3 needs, DISABLED leaves resets to options={"reset_mask": mask}.
         threads: threads of the plant; None uses every core.
@@ -42,7 +43,7 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         self,
         num_envs: int = 1,
         *,
-        max_episode_steps: int | None = None,
+        max_episode_steps: int | list[int] | tuple[int, ...] | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         plant: Any = None,
         control_period: float | None = None,
@@ -54,7 +55,15 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         check_count("num_envs", num_envs)
         if threads is not None:
             check_count("threads", threads)
-        if max_episode_steps is not None:
+        if isinstance(max_episode_steps, (list, tuple)):
+            if len(max_episode_steps) != num_envs:
+                raise OptionError(
+                    f"max_episode_steps lists {len(max_episode_steps)} numbers for {num_envs} "
+                    "environments: give one each, or one for all"
+                )
+            for steps in max_episode_steps:
+                check_count("max_episode_steps", steps)
+        elif max_episode_steps is not None:
             check_count("max_episode_steps", max_episode_steps)
         if render_mode is not None:
             raise OptionError("the vector environment does not render: use gymnasium.make instead")
@@ -64,7 +73,9 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         self.plant = load_plant(plant)
         self.settings = make_settings(self.plant, control_period=period, **options)
         self.num_envs = num_envs
-        self.max_episode_steps = max_episode_steps
+        self.max_episode_steps: Any = max_episode_steps
+        if isinstance(max_episode_steps, (list, tuple)):
+            self.max_episode_steps = np.array(max_episode_steps)
         self.render_mode = None
         self.action = self.action_form(period)
         self.single_action_space = self.action.space()
@@ -107,10 +118,8 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
             )
         result = self.task.step(*self.action.decode(actions))
         observation, reward, terminated = result.observation, result.reward, result.failed
-        if self.max_episode_steps is None:
-            truncated = np.zeros(self.num_envs, dtype=bool)
-        else:
-            truncated = self.task.steps >= self.max_episode_steps
+        limit = np.inf if self.max_episode_steps is None else self.max_episode_steps
+        truncated = self.task.steps >= limit
         infos: dict[str, Any] = step_info(result)
         valid = self._every.copy()
         if self.autoreset_mode is AutoresetMode.NEXT_STEP and self._some_done:

@@ -24,6 +24,7 @@ SHORT_FORMS: dict[str, str] = {
     "python -m docs.examples.tank": "tests/test_tank_example.py",
     "python -m docs.examples.thermal_lab": "tests/test_recorded_examples.py",
     "python -m docs.examples.toy_car": "tests/test_recorded_examples.py",
+    "python -m docs.examples.research": "tests/test_research_examples.py",
     "python -m docs.examples.pendulum": "tests/test_recorded_examples.py",
     "python -m docs.scripts.component_data": "tests/test_component_data.py",
     "python docs/scripts/film.py": "tests/test_docs.py",

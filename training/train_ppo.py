@@ -35,18 +35,24 @@ from epv_env.plant.region import REGIONS
 from epv_env.reward import RewardWeights
 from training.evaluation.controller_table import Comparison, as_text, compare
 from training.evaluation.scenarios import TUNING_REGION
-from training.learners.policy_folders import MEMORYLESS_TIMESTEPS, RECURRENT_TIMESTEPS
+from training.learners.policy_folders import (
+    END_TO_END_TIMESTEPS,
+    MEMORYLESS_TIMESTEPS,
+    RECURRENT_TIMESTEPS,
+)
 from training.learners.provenance import Configuration, configuration
 from training.learners.run_folder import forget_failed_start, make_free, why_taken
 from training.learners.run_state import check_checkpoint, new_run
 
-SAME_WHEN_RESUMED = ("seed", "plant", "scenario", "parameters", "switching_price", "memory")
+SAME_WHEN_RESUMED = (
+    "seed", "plant", "scenario", "parameters", "switching_price", "memory", "end_to_end",
+)  # fmt: skip
 """Options that a resumed training must share with its beginning."""
 
 QUICK = {"timesteps": 65_536, "episodes": 16, "duration": 2.0}
 """The defaults under --quick: everything is done, too short to learn anything."""
 QUICK_HYPERPARAMETERS: dict[str, Any] = {
-    "num_envs": 32, "batch_size": 1024, "imitation_epochs": 1, "validations": 1,
+    "num_envs": 32, "batch_size": 1024, "critic_first": 2000, "imitation_epochs": 1, "validations": 1,
     "validation_episodes": 16, "validation_duration": 2.0,
 }  # fmt: skip
 
@@ -67,7 +73,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--timesteps", type=int,
         help=f"environment steps of PPO; default: {RECURRENT_TIMESTEPS}, without memory "
-        f"{MEMORYLESS_TIMESTEPS}",
+        f"{MEMORYLESS_TIMESTEPS}, end to end {END_TO_END_TIMESTEPS}",
     )  # fmt: skip
     parser.add_argument("--episodes", type=int, default=256, help="evaluation episodes per plant set")
     parser.add_argument("--duration", type=float, default=10.0, help="length of one of them [s]")
@@ -88,6 +94,10 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         help="a policy with a memory, which first imitates a controller that knows each valve's plant",
     )  # fmt: skip
     parser.add_argument(
+        "--end-to-end", action="store_true",
+        help="the memory learns with PPO, too, under a critic that sees the true state (6 minutes)",
+    )  # fmt: skip
+    parser.add_argument(
         "--device", default="cpu", help="torch device; cpu is fastest for so small a net"
     )
     again = parser.add_mutually_exclusive_group()
@@ -97,7 +107,10 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     )
     chosen = parse_with_quick(parser, arguments, QUICK)
     if chosen.timesteps is None:
-        chosen.timesteps = RECURRENT_TIMESTEPS if chosen.memory else MEMORYLESS_TIMESTEPS
+        recurrent = END_TO_END_TIMESTEPS if chosen.end_to_end else RECURRENT_TIMESTEPS
+        chosen.timesteps = recurrent if chosen.memory else MEMORYLESS_TIMESTEPS
+    if chosen.end_to_end and not chosen.memory:
+        parser.error("--end-to-end trains a memory: leave --no-memory out")
     check_positive(parser, chosen, "timesteps", "episodes", "duration")
     check_not_negative(parser, chosen, "seed", "switching_price")
     return chosen
@@ -171,15 +184,17 @@ def main(arguments: list[str] | None = None) -> int:
 
 def train_and_compare(chosen: argparse.Namespace, plant: Plant, run: str) -> int:
     """Train, write the policy down, and compare it; returns the exit status."""
-    from training.learners.distillation import Distillation
+    from training.learners.distillation import FOR_END_TO_END, Distillation
     from training.learners.hyperparameters import Hyperparameters, recurrent_hyperparameters
     from training.learners.policy_files import save_policy
     from training.learners.ppo import train
     from training.learners.recurrent_training import train_recurrent
 
     weights = RewardWeights(switching=chosen.switching_price)
-    hyperparameters = recurrent_hyperparameters(weights) if chosen.memory else Hyperparameters()
-    distillation = Distillation()
+    hyperparameters = Hyperparameters()
+    if chosen.memory:
+        hyperparameters = recurrent_hyperparameters(weights, end_to_end=chosen.end_to_end)
+    distillation = FOR_END_TO_END if chosen.end_to_end else Distillation()
     if chosen.quick:
         hyperparameters = replace(hyperparameters, **QUICK_HYPERPARAMETERS)
         distillation = replace(distillation, **QUICK_DISTILLATION)

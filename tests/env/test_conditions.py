@@ -1,6 +1,7 @@
 """Conditions beyond the ordinary do what they say, in the single environment and the batch alike."""
 
 from dataclasses import replace
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -21,9 +22,9 @@ PERIOD = 5e-3
 DRAWS = 200
 
 
-def starts(**conditions):
+def starts(region: Any = "sensitive_ten_percent", **conditions: Any):
     """Episodes' starts under conditions, and the same without."""
-    settings = make_settings(Plant.calibrated(), control_period=PERIOD)
+    settings = make_settings(Plant.calibrated(), control_period=PERIOD, parameters=region)
     plain = [Start.draw(np.random.default_rng(seed), settings) for seed in range(DRAWS)]
     return [under_conditions(start, Conditions(**conditions)) for start in plain], plain
 
@@ -85,7 +86,7 @@ def test_first_states_are_physical():
 def test_a_worn_valve_has_one_to_three_effects_up_to_their_typical_size():
     nominal = Parameters.calibrated()
     mild = {size.symbol: max(map(abs, size.mild)) for sizes in WORN for size in sizes}
-    found, _ = starts(worn=1.0)
+    found, _ = starts("exact", worn=1.0)
     seen = set()
     for start in found:
         sizes = {s: v for s, v in start.parameters.items() if v != nominal[s]}
@@ -191,3 +192,26 @@ def test_the_broad_conditions_run_without_losing_a_plant():
     env = native("EPValve-v0", 128, conditions=CONDITIONS["broad"], autoreset_mode="SameStep")
     rollout = run(env, np.ones((200, 128), dtype=int))
     assert all(np.all(np.isfinite(step.reward)) for step in rollout.steps)
+
+
+def test_extreme_plants_keep_to_the_region_and_gather_at_its_ends():
+    found, plain = starts(extreme=1.0)
+    boxes = found[0].region.boxes
+    low, high = np.transpose(list(boxes.values()))
+    moved, usual = (
+        (np.array([[start.parameters[symbol] for symbol in boxes] for start in some]) - low)
+        / (high - low)
+        for some in (found, plain)
+    )
+    assert np.all((moved >= 0) & (moved <= 1))
+    assert np.all((moved - 0.5) * (usual - 0.5) >= 0)  # towards the nearer end
+    near = np.minimum(moved, 1 - moved) < 0.1
+    assert near.mean() == pytest.approx(0.48, abs=0.03)
+    assert np.mean(np.minimum(usual, 1 - usual) < 0.1) == pytest.approx(0.2, abs=0.03)
+    assert all(a.parameters == b.parameters for a, b in zip(*starts("exact", extreme=1.0), strict=True))
+
+
+def test_braking_is_the_consumption_of_emergencies():
+    found, _ = starts(braking=1.0)
+    flows = np.array([start.consumption.applications[4] for start in found])
+    assert 4.0e-3 <= flows.min() < flows.max() <= 5.5e-3

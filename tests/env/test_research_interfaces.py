@@ -92,6 +92,18 @@ def test_counts_are_whole_numbers_of_at_least_one(name, value):
         EPValveVectorEnv(**{"num_envs": 2, name: value})
 
 
+def test_each_sub_environment_may_have_a_length_of_its_own():
+    lengths = [2, 3, 5]
+    env = gymnasium.make_vec(
+        "EPValve-v0", num_envs=3, max_episode_steps=lengths, autoreset_mode="SameStep"
+    )
+    env.reset(seed=0)
+    ends = np.array([env.step(np.ones(3, dtype=int))[3] for _ in range(30)])
+    assert ends.sum(axis=0).tolist() == [15, 10, 6]
+    with pytest.raises(ValueError, match="lists 2 numbers for 3 environments"):
+        gymnasium.make_vec("EPValve-v0", num_envs=3, max_episode_steps=[2, 3])
+
+
 def test_negative_flows_are_refused():
     with pytest.raises(ValueError, match="consumers draw air"):
         Scenario(meaning="blowing", flow=(-1.0, 2.0))

@@ -65,6 +65,23 @@ def test_a_state_survives_a_file(count):
     assert driven(env, actions) == expected
 
 
+def test_supplies_of_their_own_survive_a_file():
+    """Under conditions some episodes have other reservoirs than the constructor's."""
+    options = {"conditions": {"starved": 0.5}, "max_episode_steps": 300, "autoreset_mode": "SameStep"}
+    env, other = (gymnasium.make_vec("EPValve-v0", num_envs=6, **options) for _ in range(2))
+    for each, seed in ((env, 2), (other, 9)):
+        each.reset(seed=seed)
+    tasks = [each.unwrapped.task for each in (env, other)]  # type: ignore[attr-defined]
+    first = [supply.numbers for supply in tasks[0].supplies]
+    assert len({numbers[-1] for numbers in first}) > 1
+    actions = np.random.default_rng(1).integers(0, 2, size=(400, 6))
+    content = save_state(env).to_bytes()
+    expected = driven(env, actions)
+    restore_state(other, SavedState.from_bytes(content, other))
+    assert [supply.numbers for supply in tasks[1].supplies] == first
+    assert driven(other, actions) == expected
+
+
 def test_what_cannot_be_restored_is_refused():
     env = make("nominal", 3)
     with pytest.raises(StateError, match="call reset"):

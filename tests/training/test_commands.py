@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from controllers.learned import TRAINED, load_policy
@@ -100,6 +101,18 @@ def test_a_policy_with_a_memory_is_trained_in_the_short_form_too(tmp_path):
     assert "was trained with memory True, not False" in result.stderr
 
 
+def test_a_memory_is_trained_end_to_end(tmp_path):
+    where = ("--quick", "--timesteps", "16384", "--out", tmp_path)
+    result = command(*where, "--end-to-end")
+    assert result.returncode == 0, result.stderr
+    learned, student = (load_policy(folder) for folder in (tmp_path, tmp_path / "student"))
+    assert learned.cell is not None
+    assert student.cell is not None
+    assert learned.cells == student.cells == 64
+    assert not np.array_equal(learned.cell.weight_memory, student.cell.weight_memory)
+    assert "was trained with end_to_end True, not False" in command(*where, "--resume").stderr
+
+
 def test_resuming_with_another_seed_is_refused(finished):
     out, _ = finished
     result = command("--quick", "--no-memory", "--out", out, "--resume", "--seed", "5")
@@ -117,6 +130,7 @@ def test_resuming_with_another_seed_is_refused(finished):
         (["--seed", "-1"], "--seed must not be negative"),
         (["--out", "/dev/null/x"], "is not a folder"),
         (["--resume"], "nothing to resume"),
+        (["--end-to-end", "--no-memory"], "--end-to-end trains a memory"),
     ],
 )
 def test_wrong_input_gets_one_sentence_and_leaves_nothing(arguments, words, tmp_path):

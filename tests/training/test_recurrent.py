@@ -31,7 +31,7 @@ from training.learners.lessons import known_plants
 from training.learners.policy_files import greedy_policy, put_layers, save_policy
 from training.learners.ppo import make_model
 from training.learners.recurrent_training import train_recurrent
-from training.learners.student import NAME, Student, policy_of, with_memory_of
+from training.learners.student import NAME, Student, policy_of, put_policy, with_memory_of
 from training.learners.training_env import make_training_env
 
 pytestmark = pytest.mark.training
@@ -177,6 +177,19 @@ def test_ppo_goes_on_from_the_student(student, readings):
     assert same(greedy_policy(model, policy), policy)
     put_layers(model, policy, 3.0)
     sharp = greedy_policy(model, policy)
+    for each in (sharp, policy):
+        each.reset(6)
+    for part in readings:
+        np.testing.assert_allclose(sharp.logits(part), 3 * policy.logits(part), atol=1e-5)
+
+
+def test_a_student_takes_a_policy_s_weights_and_gives_them_back(student, readings):
+    policy, other = policy_of(student), Student(memory=TINY.memory, width=TINY.width)
+    assert not same(policy_of(other), policy)
+    put_policy(other, policy)
+    assert same(policy_of(other), policy)
+    put_policy(other, policy, sharpness=3.0)  # sharper, it doubts less
+    sharp = policy_of(other)
     for each in (sharp, policy):
         each.reset(6)
     for part in readings:

@@ -138,12 +138,7 @@ class BatchPPO(PPO):
         A time limit is no end of the task: the value of the last observation stands for what follows.
         """
         with torch.no_grad():
-            for k, observations in enumerate(buffer.observations):
-                seen = torch.from_numpy(observations)
-                every = log_softmax(self._actor(seen), dim=1)
-                taken = torch.from_numpy(buffer.actions[k].astype(np.int64))
-                buffer.log_probs[k] = every.gather(1, taken)[:, 0].numpy()
-                buffer.values[k] = self._critic(seen).numpy()
+            self._evaluate(buffer)
             for k, late, observations in ends:
                 following = self._critic(torch.from_numpy(observations)).numpy()
                 buffer.rewards[k, late] += self.gamma * following
@@ -151,6 +146,15 @@ class BatchPPO(PPO):
             last = self._critic(torch.from_numpy(self._last_obs))
         buffer.compute_returns_and_advantage(last_values=last, dones=dones)
         buffer.full = True
+
+    def _evaluate(self, buffer: RolloutBuffer) -> None:
+        """Values and log probabilities of the rollout."""
+        for k, observations in enumerate(buffer.observations):
+            seen = torch.from_numpy(observations)
+            every = log_softmax(self._actor(seen), dim=1)
+            taken = torch.from_numpy(buffer.actions[k].astype(np.int64))
+            buffer.log_probs[k] = every.gather(1, taken)[:, 0].numpy()
+            buffer.values[k] = self._critic(seen).numpy()
 
     def _actor(self, observations: torch.Tensor) -> torch.Tensor:
         """Logits (n, actions); observations: (n, entries)."""

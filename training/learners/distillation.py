@@ -52,6 +52,10 @@ class Distillation(LessonSettings):
     """Length of a validation episode [s]."""
 
 
+FOR_END_TO_END = Distillation(memory=64, rounds=24)
+"""For a student whose recurrent unit learns on with PPO: larger, and less of it is imitation."""
+
+
 def distil(
     d: Distillation,
     teacher: Controller,

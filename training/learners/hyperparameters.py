@@ -13,7 +13,10 @@ class Hyperparameters:
     num_envs: int = 1024
     """Episodes that run side by side."""
     episode_steps: int = 600
-    """Length of a training episode [control periods] (3 s)."""
+    """Length of the shortest training episodes [control periods] (3 s)."""
+    longest_episode_steps: int | None = None
+    """Length of the longest [control periods]; the others' lie between, a rollout apart. None: all
+    have one length."""
     n_steps: int = 32
     """Length of a rollout between two updates [control periods]."""
     batch_size: int = 4096
@@ -36,10 +39,27 @@ class Hyperparameters:
     """Price of the shortfall below the target in training, unless the reward's own is higher."""
     imitation_epochs: int = 2
     """Passes over the demonstration that the model imitates first (training/learners/imitation.py)."""
+    end_to_end: bool = False
+    """Whether gradients go through a student's recurrent unit (training/learners/sequence_ppo.py). The
+    critic then sees more than the actor, and the fields up to `averaging` count."""
+    leaving_charge: float = 0.0
+    """Price of a training episode that leaves the band with a margin, once."""
+    leaving_margin_bar: float = BAND_BAR
+    """Deviation from the target that counts as leaving [bar]."""
+    critic_width: int = 128
+    """Units of each of the critic's hidden layers."""
+    critic_rate: float = 6.0
+    """Learning rate of the critic over the actor's [1]."""
+    critic_first: int = 0
+    """Environment steps in which the critic learns alone."""
+    averaging: float = 0.99
+    """Factor by which an actor's weight in the average falls with each update [1]."""
     sharpness: float = 1.0
     """Factor of the logits of a student to go on from [1]: the larger, the less it explores."""
     gamma: float = 0.995
     """Discount factor of a control period [1]."""
+    clip_range: float = 0.2
+    """Share by which an update may change the probability of an action before it is clipped [1]."""
     gae_lambda: float = 0.95
     """Decay of the generalised advantage estimate (Schulman et al., ICLR 2016) [1]."""
     ent_coef: float = 0.003
@@ -56,6 +76,16 @@ class Hyperparameters:
     """Length of a validation episode [s]."""
     conditions: Conditions = CONDITIONS["ordinary"]
     """What training episodes may meet beyond the ordinary; validation episodes are ordinary."""
+
+    @property
+    def episode_lengths(self) -> list[int]:
+        """Length of each environment's episodes, (num_envs,) [control periods].
+
+        Different lengths keep the environments out of step: every rollout sees all parts of an episode.
+        """
+        longest = self.longest_episode_steps or self.episode_steps
+        between = range(self.episode_steps, longest + 1, self.n_steps)
+        return [between[i % len(between)] for i in range(self.num_envs)]
 
 
 FROM_STUDENT = Hyperparameters(
@@ -75,12 +105,32 @@ At a breakdown price of 2 policies stayed above the target, switched more and lo
 FROM_MEMORYLESS = Hyperparameters(learning_rate=4e-4, breakdown_price=0.6, first_validation=0.05)
 """For a recurrent policy that goes on from a policy without memory, where switching is cheap."""
 
+END_TO_END = Hyperparameters(
+    end_to_end=True, n_steps=50, batch_size=1600, longest_episode_steps=2000, learning_rate=1.5e-4,
+    last_learning_rate=1e-5, critic_first=1_500_000, clip_range=0.1, gae_lambda=0.98, ent_coef=0.0,
+    sharpness=4.0, leaving_charge=300.0, leaving_margin_bar=0.36, band_price=0.0, breakdown_price=0.5,
+    imitation_epochs=0, validations=5, first_validation=0.6,
+    conditions=Conditions(
+        extreme=0.5, braking=0.25, far=0.06, vented=0.08, coil_off=0.08, starved=0.08, rest=0.05,
+        rest_s=(2.0, 8.0), target_steps=0.1, noisy=0.2, frozen_p3=0.05, biased_p2=0.05, delayed=0.15,
+    ),
+)  # fmt: skip
+"""For a recurrent policy that goes on from its student, the recurrent unit included.
+
+Long episodes teach it to remember. Plants from the region's corners and hard applications are frequent,
+since a good policy leaves the band only where they meet."""
+
 
 def switching_is_cheap(weights: RewardWeights) -> bool:
     """Whether a switching costs less than by default: frequent switching, unlike the student's, pays."""
     return weights.switching < RewardWeights().switching
 
 
-def recurrent_hyperparameters(weights: RewardWeights) -> Hyperparameters:
-    """PPO's hyperparameters for a recurrent policy at these prices of the reward."""
+def recurrent_hyperparameters(weights: RewardWeights, *, end_to_end: bool = False) -> Hyperparameters:
+    """PPO's hyperparameters for a recurrent policy at these prices of the reward.
+
+    end_to_end: whether the recurrent unit learns, too.
+    """
+    if end_to_end:
+        return END_TO_END
     return FROM_MEMORYLESS if switching_is_cheap(weights) else FROM_STUDENT

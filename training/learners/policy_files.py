@@ -14,16 +14,26 @@ from controllers.policy_contract import CONTRACT_FILE, FORMAT, WEIGHTS_FILE
 from epv_env.common.files import write_bytes
 from epv_env.common.json_files import write_json
 from epv_env.observation import contract
+from training.learners.recurrent_actor_critic import RecurrentActorCritic
 
 
 def greedy_policy(model: PPO, student: LearnedPolicy | None = None) -> LearnedPolicy:
     """The model's actor as a controller. It shares the model's weights: training changes it.
 
-    student: the policy that the model went on from; its recurrent unit and its name are kept.
+    student: the policy that the model went on from; its recurrent unit and its name are kept, unless
+    the model has learned a unit of its own.
     Raises TypeError for a policy that is not a plain multilayer perceptron with tanh layers.
     """
+    if isinstance(model.policy, RecurrentActorCritic):
+        return model.policy.greedy()
     layers = [(_array(layer.weight), _array(layer.bias)) for layer in _linear_layers(model)]
     return replace(student, layers=layers) if student else LearnedPolicy(layers=layers)
+
+
+def put_student(model: PPO, student: LearnedPolicy, sharpness: float) -> None:
+    """Make the model's actor a recurrent student, the unit included; logits times `sharpness`."""
+    assert isinstance(model.policy, RecurrentActorCritic)
+    model.policy.go_on_from(student, sharpness)
 
 
 def put_layers(model: PPO, policy: LearnedPolicy, sharpness: float) -> None:

@@ -25,6 +25,9 @@ MEMORYLESS_TIMESTEPS = 5_000_000
 RECURRENT_TIMESTEPS = 8_000_000
 """Environment steps of PPO for a recurrent policy."""
 
+END_TO_END_TIMESTEPS = 16_000_000
+"""The same if the recurrent unit learns, too."""
+
 DISTILLATION_STEPS = 15_000_000
 """Environment steps of PPO that take about as long as a distillation (distillation.py)."""
 

@@ -23,8 +23,9 @@ from training.learners.checkpoint_selection import Selection, validation_points
 from training.learners.hyperparameters import Hyperparameters
 from training.learners.imitation import imitate
 from training.learners.learning_log import TrainingLog
-from training.learners.policy_files import greedy_policy, policy_bytes, put_layers
+from training.learners.policy_files import greedy_policy, policy_bytes, put_layers, put_student
 from training.learners.provenance import plant_digest
+from training.learners.recurrent_actor_critic import RecurrentActorCritic
 from training.learners.resumption import restore_progress
 from training.learners.run_folder import TENSORBOARD_FOLDER
 from training.learners.run_state import (
@@ -37,6 +38,7 @@ from training.learners.run_state import (
     with_nan,
 )
 from training.learners.schedules import FadingEntropy, linear
+from training.learners.sequence_ppo import SequencePPO
 from training.learners.training_env import make_training_env, seed_episodes
 from training.learners.validation import ValidationSettings
 
@@ -48,11 +50,23 @@ FUSED_ADAM = {"fused": True, "eps": 1e-5}
 """stable-baselines3's settings of Adam, its update in one kernel."""
 
 
-def make_model(h: Hyperparameters, env: VecEnv, *, seed: int, device: str) -> PPO:
-    """A new PPO model. device: of torch."""
-    model = BatchPPO(
-        "MlpPolicy",
-        env,
+def make_model(
+    h: Hyperparameters, env: VecEnv, *, seed: int, device: str, cells: int | None = None
+) -> PPO:
+    """A new PPO model. device: of torch. cells: of a recurrent unit that learns; None: it has none."""
+    kind: Any = BatchPPO
+    own: dict[str, Any] = {"policy": "MlpPolicy"}
+    policy: dict[str, Any] = {"net_arch": [h.width, h.width]}
+    if cells is not None:
+        kind = SequencePPO
+        own = {
+            "policy": RecurrentActorCritic, "critic_rate": h.critic_rate, "critic_first": h.critic_first,
+        }  # fmt: skip
+        policy = {
+            "memory": cells, "width": h.width, "critic_width": h.critic_width, "averaging": h.averaging,
+        }  # fmt: skip
+    model: PPO = kind(
+        env=env,
         n_steps=h.n_steps,
         batch_size=h.batch_size,
         n_epochs=h.n_epochs,
@@ -60,9 +74,11 @@ def make_model(h: Hyperparameters, env: VecEnv, *, seed: int, device: str) -> PP
         gamma=h.gamma,
         gae_lambda=h.gae_lambda,
         ent_coef=h.ent_coef,
-        policy_kwargs={"net_arch": [h.width, h.width], "optimizer_kwargs": FUSED_ADAM},
+        clip_range=h.clip_range,
+        policy_kwargs={**policy, "optimizer_kwargs": FUSED_ADAM},
         seed=seed,
         device=device,
+        **own,
     )
     model.set_logger(Logger(folder=None, output_formats=[]))  # its own leaves an empty folder in /tmp
     seed_episodes(env, seed)  # the model has seeded them, too, and other trainings' alike
@@ -103,8 +119,8 @@ def train(
         seed: of the training.
         device: of torch.
         resume: whether to go on from the folder's checkpoint.
-        student: a policy to go on from; its recurrent unit stays as it is. None: the model imitates the
-            TEACHER first.
+        student: a policy to go on from; its recurrent unit learns if `h.end_to_end`, or stays as it is.
+            None: the model imitates the TEACHER first.
         run: identity of the run; None: that of the folder's checkpoint, or a new one.
         quiet: no progress bar.
     """
@@ -119,11 +135,15 @@ def train(
         "plant": plant, "parameters": parameters, "scenario": scenario,
         "weights": training_weights(weights, h),
     }  # fmt: skip
-    env = make_training_env(h, seed=seed, cell=student.cell if student else None, **task)
-    model = make_model(h, env, seed=seed, device=device)
+    learns = student if h.end_to_end else None  # whose recurrent unit learns
+    shown = student.cell if student and not learns else None
+    env = make_training_env(h, seed=seed, cell=shown, privileged=learns is not None, **task)
+    model = make_model(h, env, seed=seed, device=device, cells=learns.cells if learns else None)
     if found:
         _restore(model, folder / CHECKPOINT_FILE, device=device)
         restore_progress(model, found.progress)
+    elif learns:
+        put_student(model, learns, h.sharpness)
     elif h.imitation_epochs:
         _start(model, h, env, plant, student=student, seed=seed)
     greedy = partial(greedy_policy, student=student)

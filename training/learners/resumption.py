@@ -14,8 +14,10 @@ from stable_baselines3.common.vec_env import VecEnvWrapper, VecMonitor
 
 from epv_env.saved_state import SavedState, restore_state, save_state
 from epv_env.sb3 import SB3VectorEnv
+from training.learners.privileged_wrapper import PrivilegedWrapper
 from training.learners.recurrent_state_wrapper import RecurrentStateWrapper
 from training.learners.run_state import RunError
+from training.learners.sequence_ppo import SequencePPO
 
 MONITORED = ("r", "l", "t")
 """Return, length and time of an episode, as VecMonitor calls them."""
@@ -63,6 +65,9 @@ def restore_progress(model: PPO, content: bytes) -> None:
         raise RunError(f"the checkpoint's episodes cannot be restored ({error}): begin anew") from None
     for name, wrapper, attribute in _wrapped(model):
         setattr(wrapper, attribute, saved[name])
+    for wrapper in _layers(model):
+        if isinstance(wrapper, PrivilegedWrapper):
+            wrapper.foresee(np.arange(wrapper.num_envs))
     model._last_obs = saved["last_obs"]
     model._last_episode_starts = saved["last_starts"]
     model._n_updates = int(saved["updates"])
@@ -88,13 +93,17 @@ def _inner(model: PPO) -> SB3VectorEnv:
 
 
 def _wrapped(model: PPO) -> Iterator[tuple[str, Any, str]]:
-    """Name in the file, wrapper and attribute of each array that a wrapper keeps."""
+    """Name in the file, owner and attribute of each array that wrappers and the model keep."""
     for wrapper in _layers(model):
         if isinstance(wrapper, VecMonitor):
             yield "returns", wrapper, "episode_returns"
             yield "lengths", wrapper, "episode_lengths"
         if isinstance(wrapper, RecurrentStateWrapper):
             yield "memory", wrapper, "state"
+        if isinstance(wrapper, PrivilegedWrapper):
+            yield "left", wrapper, "left"
+    if isinstance(model, SequencePPO):
+        yield "memory", model, "memory"
 
 
 def _of_wrappers(model: PPO, *, fresh: bool = False) -> dict[str, NDArray]:

@@ -37,20 +37,48 @@ class Student(torch.nn.Module):
         states, _ = self.memory(observations, before[None])
         return self.layers(torch.cat([observations, states], dim=-1))[..., 0]
 
+    def step(
+        self, observations: torch.Tensor, memory: torch.Tensor
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """Log odds (n,) after observations (n, entries), and the recurrent state (n, cells) then.
+
+        memory: recurrent state before, (n, cells).
+        """
+        _, state = self.memory(observations[:, None], memory[None])
+        return self.layers(torch.cat([observations, state[0]], dim=-1))[:, 0], state[0]
+
+
+UNIT = {
+    "weight_input": "weight_ih_l0", "weight_memory": "weight_hh_l0", "bias_input": "bias_ih_l0",
+    "bias_memory": "bias_hh_l0",
+}  # fmt: skip
+"""torch's names of a recurrent unit's arrays, by those of GatedUnit."""
+LAYERS = (0, 2, 4)
+"""Places of the linear layers in `Student.layers`."""
+
 
 def policy_of(student: Student) -> LearnedPolicy:
     """The student's greedy policy, with a copy of its weights."""
     arrays = {name: tensor.numpy().copy() for name, tensor in student.state_dict().items()}
-    cell = GatedUnit(
-        weight_input=arrays["memory.weight_ih_l0"],
-        weight_memory=arrays["memory.weight_hh_l0"],
-        bias_input=arrays["memory.bias_ih_l0"],
-        bias_memory=arrays["memory.bias_hh_l0"],
-    )
-    layers = [(arrays[f"layers.{k}.weight"], arrays[f"layers.{k}.bias"]) for k in (0, 2, 4)]
+    cell = GatedUnit(**{name: arrays[f"memory.{own}"] for name, own in UNIT.items()})
+    layers = [(arrays[f"layers.{k}.weight"], arrays[f"layers.{k}.bias"]) for k in LAYERS]
     weight, bias = layers[-1]  # the log odds of one action are the logit of the one, 0 of the other
     layers[-1] = np.concatenate([0 * weight, weight]), np.concatenate([0 * bias, bias])
     return LearnedPolicy(layers=layers, cell=cell, name=NAME)
+
+
+def put_policy(student: Student, policy: LearnedPolicy, sharpness: float = 1.0) -> None:
+    """Give a student the weights of a policy of the same shape: the inverse of `policy_of`.
+
+    sharpness: factor of the log odds [1].
+    """
+    assert policy.cell is not None
+    *hidden, (weight, bias) = policy.layers
+    last = sharpness * (weight[1:] - weight[:1]), sharpness * (bias[1:] - bias[:1])
+    arrays = {f"memory.{own}": getattr(policy.cell, name) for name, own in UNIT.items()}
+    for k, (weight, bias) in zip(LAYERS, [*hidden, last], strict=True):
+        arrays |= {f"layers.{k}.weight": weight, f"layers.{k}.bias": bias}
+    student.load_state_dict({name: torch.as_tensor(array) for name, array in arrays.items()})
 
 
 def with_memory_of(student: LearnedPolicy, policy: LearnedPolicy) -> LearnedPolicy:

@@ -1,4 +1,4 @@
-"""The environment that PPO trains on: drawn plants, scaled rewards, a recurrent unit's state."""
+"""The environment that PPO trains on: drawn plants, scaled rewards, what a recurrent policy needs."""
 
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
@@ -9,6 +9,7 @@ from epv_env.reward import RewardWeights
 from epv_env.sb3 import make_sb3_env
 from training.evaluation.seeds import training_seeds
 from training.learners.hyperparameters import Hyperparameters
+from training.learners.privileged_wrapper import PrivilegedWrapper
 from training.learners.recurrent_state_wrapper import RecurrentStateWrapper
 
 
@@ -47,12 +48,13 @@ def make_training_env(
     seed: int,
     weights: RewardWeights,
     cell: GatedUnit | None = None,
+    privileged: bool = False,
 ) -> VecEnvWrapper:
     """Episodes on drawn plants. Trainings with different seeds meet different episodes.
 
     Args:
-        h: hyperparameters, of which the number, length and conditions of episodes and the reward's
-            scale count.
+        h: hyperparameters, of which the number, lengths and conditions of episodes, the reward's scale
+            and the charge for leaving count.
         plant: centre of the region.
         scenario: of the consumption.
         parameters: region that plants are drawn from, "confidence" or another (epv_env.settings).
@@ -60,19 +62,29 @@ def make_training_env(
         weights: prices of the reward.
         cell: a unit whose state ends the observations (training/learners/recurrent_state_wrapper.py).
 
+        privileged: whether observations end with a critic's view instead, and leaving the band is
+            charged (training/learners/privileged_wrapper.py).
+
     Raises:
         ValueError: the seed is too large (training/evaluation/seeds.py).
     """
+    lengths = h.episode_lengths
     env = make_sb3_env(
         "EPValve-v0",
         h.num_envs,
-        max_episode_steps=h.episode_steps,
+        max_episode_steps=lengths,
         plant=plant,
         parameters=parameters,
         scenario=scenario,
         weights=weights,
         conditions=h.conditions,
+        privileged=privileged,
     )
     seed_episodes(env, seed)
+    if privileged:
+        return PrivilegedWrapper(
+            VecMonitor(env), scale=h.reward_scale, charge=h.leaving_charge,
+            margin_bar=h.leaving_margin_bar, longest=max(lengths),
+        )  # fmt: skip
     scaled = ScaledReward(VecMonitor(env), h.reward_scale)
     return RecurrentStateWrapper(scaled, cell) if cell else scaled
