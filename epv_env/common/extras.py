@@ -26,18 +26,22 @@ def missing_package(module: str, *, preferred: str = "") -> str | None:
 
 
 def _extras_of(package: str) -> list[str]:
-    """The extras that ask for a package of the index; the one of everything, `all`, stands last."""
+    """The extras that ask for a package of the index, the one with the fewest packages first."""
     try:
         needed = requires(DISTRIBUTION) or []
     except PackageNotFoundError:
         return []
+    sizes: dict[str, int] = {}
     found = []
     for line in needed:
         name = re.match(r"[\w.-]+", line)
         extra = re.search(r"""extra == ['"]([\w-]+)['"]""", line)
-        if name and extra and _normal(name[0]) == _normal(package) and extra[1] not in found:
+        if not name or not extra:
+            continue
+        sizes[extra[1]] = sizes.get(extra[1], 0) + 1
+        if _normal(name[0]) == _normal(package) and extra[1] not in found:
             found.append(extra[1])
-    return sorted(found, key=lambda extra: extra == "all")
+    return sorted(found, key=lambda extra: sizes[extra])
 
 
 def _normal(name: str) -> str:
