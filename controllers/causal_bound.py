@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.likely_consumption import likely_flows, scenario_of
+from controllers.pulse import Pulse
 from controllers.pulse_simulation import pulse_tables
 from controllers.pulse_table import PulseTable
 from epv_env.common.units import BAR
@@ -59,17 +60,19 @@ class CausalBound:
         self._task = task
         self._rng = np.random.default_rng(self.seed)
         self._scenarios: list[Scenario] = [scenario_of(record) for record in task.consumption.progress]
-        self._trials = 2 * self.draws
-        self._owner = np.repeat(np.arange(task.n), self._trials)
-        self._table = _own_rows(pulse_tables(plants, task.settings.supply_voltage), self._owner)
+        self._owner = np.repeat(np.arange(task.n), 2 * self.draws)
+        tables = pulse_tables(plants, task.settings.supply_voltage)
+        self._pulse = Pulse(
+            table=_own_tables(tables, self._owner), trigger=self.trigger, aim=self.aim,
+            filter_time=task.period, look_ahead=self.look_ahead, rounding=self.rounding,
+            control_period=task.period,
+        )  # fmt: skip  # it filters nothing: it is told the true state
         p = {symbol: np.array([plant[symbol] for plant in plants]) for symbol in plants[0]}
         self._fall = (p["R_gas"] * p["T_env"] / p["V2"] / BAR)[self._owner]  # [bar/kg]
         self._valves = Valves(len(self._owner), threads=self.threads)
         volume = np.array([supply.volume for supply in task.supplies])
-        lanes = np.arange(self._valves.n)
-        self._valves.set_parameters(
-            lanes, {s: v[self._owner] for s, v in p.items()}, volume[self._owner]
-        )
+        each = {symbol: values[self._owner] for symbol, values in p.items()}
+        self._valves.set_parameters(np.arange(self._valves.n), each, volume[self._owner])
 
     def act(self, observations: NDArray) -> NDArray:
         """0 (off) or 1 (on) for each valve, (n,). Raises ValueError if no task is watched."""
@@ -102,7 +105,7 @@ class CausalBound:
         first = np.tile(np.repeat([False, True], self.draws), task.n)
         cost, vented = np.zeros(len(owner)), valves.state.air_vented.copy()
         for k in range(self.horizon):
-            action = first if k == 0 else self._pulse(valves.state, target, coil, flows[:, k - 1])
+            action = first if k == 0 else self._continued(valves.state, target, coil, flows[:, k - 1])
             valves.inputs.U[:] = np.where(action, task.settings.supply_voltage, 0.0)
             valves.inputs.sigma_S[:] = flows[:, k]
             valves.forget_extremes()
@@ -119,34 +122,28 @@ class CausalBound:
             coil, vented = action, valves.state.air_vented.copy()
         return cost
 
-    def _pulse(self, state: State, target: NDArray, coil: NDArray, flow: NDArray) -> NDArray:
+    def _continued(self, state: State, target: NDArray, coil: NDArray, flow: NDArray) -> NDArray:
         """Whether the pulse controller energises the coils, bool (trials,); it sees state and flow."""
         p1, p2, p3 = state.p1 / BAR, state.p2 / BAR, state.p3 / BAR
-        error, falls, table = p2 - target, -self._fall * flow, self._table
-        opens_in = table.time_to_open(p1, p2, p3)
-        ahead = self.look_ahead * (opens_in + table.release_lag)
-        begins = (opens_in > 0) & (error + falls * ahead < self.trigger)
-        remaining = table.duration(p1, p2, p3, self.aim - error, falls)
-        assert self._task is not None
-        ends = remaining < self.rounding * self._task.period
-        return np.where(coil, ~begins, ends)
+        opens_in = self._pulse.table.time_to_open(p1, p2, p3)
+        return self._pulse.decide((p1, p2, p3), opens_in, p2 - target, -self._fall * flow, coil)
 
 
+@dataclass(frozen=True, kw_only=True)
 class _TrialTables(PulseTable):
     """The tables of each trial's own valve, without a copy for each."""
 
     owner: NDArray
+    """The valve, by its place in the tables (trials,)."""
 
     def _rows(self, table: NDArray, nodes: tuple[NDArray, ...]) -> NDArray:
         return table[self.owner, *nodes]
 
 
-def _own_rows(tables: PulseTable, owner: NDArray) -> PulseTable:
+def _own_tables(tables: PulseTable, owner: NDArray) -> PulseTable:
     """The tables (n,) for trials that belong to the valves `owner` (trials,)."""
-    shared = _TrialTables(
+    return _TrialTables(
         parameters={s: np.asarray(v)[owner] for s, v in tables.parameters.items()},
         vent_rate=np.asarray(tables.vent_rate)[owner], release_lag=np.asarray(tables.release_lag)[owner],
-        gain=tables.gain, lasts=tables.lasts, grid=tables.grid,
+        gain=tables.gain, lasts=tables.lasts, grid=tables.grid, owner=owner,
     )  # fmt: skip
-    object.__setattr__(shared, "owner", owner)
-    return shared

@@ -71,15 +71,32 @@ class Pulse:
         )
         p2 = error + target
         opens_in = self.table.time_to_open(p1, p2, p3)
-        shut = opens_in > 0
-        self._estimate(error, shut)
+        self._estimate(error, opens_in > 0)
         falls = np.minimum(self._slope, 0.0)  # only consumption moves p2 behind a shut valve
+        return self.decide((p1, p2, p3), opens_in, self._error, falls, coil > 0.5).astype(int)
 
+    def decide(
+        self,
+        pressures: tuple[NDArray, NDArray, NDArray],
+        opens_in: NDArray,
+        error: NDArray,
+        falls: NDArray,
+        coil: NDArray,
+    ) -> NDArray:
+        """Whether to energise each coil, bool (n,); all arguments are arrays (n,).
+
+        Args:
+            pressures: p1, p2 and p3 [bar absolute].
+            opens_in: the table's time to open at these pressures [s].
+            error: p2 - target [bar].
+            falls: slope that consumption gives p2, zero or negative [bar/s].
+            coil: whether it is energised now.
+        """
         ahead = self.look_ahead * (opens_in + self.table.release_lag)
-        begins = shut & (self._error + falls * ahead < self.trigger)
-        remaining = self.table.duration(p1, p2, p3, self.aim - self._error, falls)
+        begins = (opens_in > 0) & (error + falls * ahead < self.trigger)
+        remaining = self.table.duration(*pressures, self.aim - error, falls)
         ends = remaining < self.rounding * self.control_period
-        return np.where(coil > 0.5, np.where(begins, 0, 1), np.where(ends, 1, 0))
+        return np.where(coil, ~begins, ends)
 
     def _estimate(self, error: NDArray, shut: NDArray) -> None:
         """Follow p2 - target and its slope while the valve is shut; while it is open keep the slope.
