@@ -1,5 +1,6 @@
 """The critic's view is the truth, at the end of an episode too, and leaving the band is charged once."""
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from stable_baselines3.common.vec_env import VecMonitor
 from epv_env.common.units import BAR
 from epv_env.observation import LAYOUT
 from epv_env.sb3 import make_sb3_env
-from training.learners.privileged_wrapper import CRITIC, MECHANICS, PrivilegedWrapper
+from training.learners.privileged_wrapper import FLOW, FORESIGHT, MECHANICS, PrivilegedWrapper
 
 pytestmark = pytest.mark.training
 
@@ -38,7 +39,7 @@ def test_it_shows_the_true_state_also_where_an_episode_ends():
     for _ in range(120):
         shown, _, done, infos = env.step(np.ones(N, dtype=int))
         shown = np.asarray(shown)
-        assert shown.shape == (N, ENTRIES + MECHANICS + 13 + len(CRITIC.foresight) - 1 + 2)
+        assert shown.shape == (N, ENTRIES + MECHANICS + 13 + len(FORESIGHT) - 1 + 2)
         np.testing.assert_allclose(
             shown[:, ENTRIES + 3], task.valves.state.p2 / (4 * BAR) - 2, atol=1e-5
         )
@@ -56,13 +57,13 @@ def test_it_foresees_the_consumption():
     inner: Any = env.unwrapped
     shown = np.asarray(env.reset())
     first = ENTRIES + MECHANICS + 13
-    foreseen = shown[:, first : first + len(CRITIC.foresight) - 1] * CRITIC.flow
+    foreseen = shown[:, first : first + len(FORESIGHT) - 1] * FLOW
     flows = []
     for _ in range(32):
         env.step(np.ones(N, dtype=int))
         flows.append(inner.last_infos["consumption_g_per_s"].copy() * 1e-3)
     measured = np.array(flows)
-    for k, (begin, end) in enumerate(zip(CRITIC.foresight[:6], CRITIC.foresight[1:6], strict=False)):
+    for k, (begin, end) in enumerate(pairwise(FORESIGHT[:6])):
         np.testing.assert_allclose(foreseen[:, k], measured[begin:end].mean(axis=0), atol=1e-9)
 
 

@@ -78,9 +78,14 @@ class BatchPPO(PPO):
                 figures += self._step([part[rows] for part in tensors], clip)
                 count += 1
             self._n_updates += 1
+        self._record(figures / count, clip)
+
+    def _record(self, figures: torch.Tensor, clip: float) -> None:
+        """Log the mean figures (5,) of an update's gradient steps, named as in stable-baselines3."""
         names = ("policy_gradient_loss", "value_loss", "entropy_loss", "approx_kl", "clip_fraction")
-        for name, value in zip(names, (figures / count).tolist(), strict=True):
+        for name, value in zip(names, figures.tolist(), strict=True):
             self.logger.record(f"train/{name}", value)
+        buffer = self.rollout_buffer
         explained = explained_variance(buffer.values.flatten(), buffer.returns.flatten())
         self.logger.record("train/explained_variance", float(explained))
         self.logger.record("train/n_updates", self._n_updates, exclude="tensorboard")
@@ -95,10 +100,9 @@ class BatchPPO(PPO):
         observations, actions, before, advantages, returns = batch
         logits, values = self._actor(observations), self._critic(observations)
         every = log_softmax(logits, dim=1)
-        change = every.gather(1, actions)[:, 0] - before
-        ratio = change.exp()
         advantages = (advantages - advantages.mean()) / (advantages.std() + 1e-8)
-        gain = torch.min(advantages * ratio, advantages * ratio.clamp(1 - clip, 1 + clip))
+        change = every.gather(1, actions)[:, 0] - before
+        gain, divergence, clipped = clipped_objective(change, advantages, clip)
         entropy = -(every.exp() * every).sum(dim=1).mean()
         value_loss = mse_loss(values, returns)
         loss = -gain.mean() - self.ent_coef * entropy + self.vf_coef * value_loss
@@ -107,9 +111,7 @@ class BatchPPO(PPO):
         torch.nn.utils.clip_grad_norm_(self.policy.parameters(), self.max_grad_norm, foreach=True)
         self.policy.optimizer.step()
         with torch.no_grad():
-            divergence = ((ratio - 1) - change).mean()
-            clipped = ((ratio - 1).abs() > clip).float().mean()
-            return torch.stack([-gain.mean(), value_loss, -entropy, divergence, clipped])
+            return torch.stack([-gain.mean(), value_loss, -entropy, divergence.mean(), clipped.mean()])
 
     def _sampled(self, observation: NDArray, chance: torch.Tensor) -> NDArray:
         """Actions (n,) drawn from the policy; chance: uniform in [0, 1), (n, 1)."""
@@ -163,3 +165,22 @@ class BatchPPO(PPO):
     def _critic(self, observations: torch.Tensor) -> torch.Tensor:
         """Values (n,); observations: (n, entries)."""
         return self.policy.value_net(self.policy.mlp_extractor.value_net(observations))[:, 0]
+
+
+def clipped_objective(
+    change: torch.Tensor, advantages: torch.Tensor, clip: float
+) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    """Of each action PPO's clipped gain, divergence from the rollout's policy, and 1 if it is clipped.
+
+    Shapes are alike, and only the gain has gradients (Schulman et al., Proximal Policy Optimization
+    Algorithms, 2017, equation 7).
+
+    Args:
+        change: log probability of the action less that in the rollout.
+        advantages: of the actions.
+        clip: share by which the ratio of probabilities may leave 1.
+    """
+    ratio = change.exp()
+    gain = torch.min(advantages * ratio, advantages * ratio.clamp(1 - clip, 1 + clip))
+    with torch.no_grad():
+        return gain, (ratio - 1) - change, ((ratio - 1).abs() > clip).float()

@@ -41,7 +41,7 @@ class Hyperparameters:
     """Passes over the demonstration that the model imitates first (training/learners/imitation.py)."""
     end_to_end: bool = False
     """Whether gradients go through a student's recurrent unit (training/learners/sequence_ppo.py). The
-    critic then sees more than the actor, and the fields up to `averaging` count."""
+    critic then sees more than the actor, the fields up to `averaging` count, and `ent_coef` does not."""
     leaving_charge: float = 0.0
     """Price of a training episode that leaves the band with a margin, once."""
     leaving_margin_bar: float = BAND_BAR

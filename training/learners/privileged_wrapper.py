@@ -6,7 +6,6 @@ consumption does not depend on the actions, so a critic that foresees it takes t
 of the advantages and leaves them unbiased (input-dependent baselines: Mao et al., ICLR 2019).
 """
 
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -19,29 +18,19 @@ from epv_env.common.units import BAR, GRAM
 from epv_env.observation import decode
 from epv_env.plant.consumption import totals
 from epv_env.plant.equations import State
+from epv_env.sb3 import SB3VectorEnv
 from epv_env.task import LimitingTask
 
 MECHANICS, FLAGS = 7, 2
 """Entries of the true state, and of what has happened in the episode."""
 
 
-def _foresight() -> NDArray:
-    return np.array([0, 4, 8, 14, 22, 32, 50, 80, 140, 240])
-
-
-@dataclass(frozen=True, kw_only=True)
-class CriticSettings:
-    """Entries of the critic's view, and their scales."""
-
-    foresight: NDArray = field(default_factory=_foresight)
-    """Ends of the intervals whose mean consumption is foreseen [control periods from now]."""
-    flow: float = 2.0 * GRAM
-    """Consumption that is shown as 1 [kg/s]."""
-    parameter: float = 0.1
-    """Relative deviation of a parameter from the region's centre that is shown as 1 [1]."""
-
-
-CRITIC = CriticSettings()
+FORESIGHT = np.array([0, 4, 8, 14, 22, 32, 50, 80, 140, 240])
+"""Ends of the intervals whose mean consumption is foreseen [control periods from now]."""
+FLOW = 2.0 * GRAM
+"""Consumption that is shown as 1 [kg/s]."""
+DEVIATION = 0.1
+"""Relative deviation of a parameter from the region's centre that is shown as 1 [1]."""
 
 
 class PrivilegedWrapper(VecEnvWrapper):
@@ -55,7 +44,6 @@ class PrivilegedWrapper(VecEnvWrapper):
         charge: float,
         margin_bar: float,
         longest: int,
-        critic: CriticSettings = CRITIC,
     ):
         """
         Args:
@@ -64,8 +52,9 @@ class PrivilegedWrapper(VecEnvWrapper):
             charge: price of an episode that leaves the band in training, once.
             margin_bar: deviation from the target, after the settling time, that counts as leaving [bar].
             longest: control periods of the longest episode.
-            critic: of the critic's view.
         """
+        assert isinstance(env.unwrapped, SB3VectorEnv)
+        self._env = env.unwrapped
         self._task: LimitingTask = env.get_attr("task")[0]
         settings = self._task.settings
         region = settings.plants
@@ -73,9 +62,9 @@ class PrivilegedWrapper(VecEnvWrapper):
             row for row, symbol in enumerate(region.centre) if symbol in (*region.boxes, *region.symbols)
         ]
         self._centre = np.array(list(region.centre.values()))[self._symbols]
-        self._scale, self._charge, self._margin_bar, self._critic = scale, charge, margin_bar, critic
+        self._scale, self._charge, self._margin_bar = scale, charge, margin_bar
         self._settled = round(settings.settling_time / settings.control_period)
-        self._times = np.arange(longest + critic.foresight[-1] + 1) * settings.control_period
+        self._times = np.arange(longest + FORESIGHT[-1] + 1) * settings.control_period
         n = env.num_envs
         self.left = np.zeros(n, dtype=bool)
         """Whether the episode has been charged (n,)."""
@@ -89,7 +78,7 @@ class PrivilegedWrapper(VecEnvWrapper):
     @property
     def _entries(self) -> int:
         """Number of entries that are appended."""
-        return MECHANICS + len(self._symbols) + len(self._critic.foresight) - 1 + FLAGS
+        return MECHANICS + len(self._symbols) + len(FORESIGHT) - 1 + FLAGS
 
     def reset(self) -> VecEnvObs:
         """First observations (n, entries + more)."""
@@ -102,7 +91,7 @@ class PrivilegedWrapper(VecEnvWrapper):
         before = self._task.steps.copy()
         observation, reward, done, infos = self.venv.step_wait()
         ended = np.flatnonzero(done).tolist()
-        deviation = self._inner_infos()["deviation_bar"].copy()
+        deviation = self._env.last_infos["deviation_bar"].copy()
         deviation[ended] = [infos[i]["deviation_bar"] for i in ended]
         leaves = (np.abs(deviation) > self._margin_bar) & (before >= self._settled) & ~self.left
         self.left |= leaves
@@ -116,12 +105,6 @@ class PrivilegedWrapper(VecEnvWrapper):
         """Take note of the consumption of the episodes `who`, which have just begun."""
         if len(who):
             self._taken[who] = totals(self._task.consumption.progress[who], self._times)
-
-    def _inner_infos(self) -> dict[str, Any]:
-        inner: Any = self.venv
-        while isinstance(inner, VecEnvWrapper):
-            inner = inner.venv
-        return inner.last_infos
 
     def _shown(self, observation: VecEnvObs) -> NDArray:
         """Observations of all episodes with the critic's view."""
@@ -148,10 +131,10 @@ class PrivilegedWrapper(VecEnvWrapper):
             ],
             axis=1,
         )  # fmt: skip
-        plant = (values[:, self._symbols] / self._centre - 1) / self._critic.parameter
-        ahead = steps[:, None] + self._critic.foresight
+        plant = (values[:, self._symbols] / self._centre - 1) / DEVIATION
+        ahead = steps[:, None] + FORESIGHT
         taken = np.take_along_axis(self._taken[who], np.minimum(ahead, len(self._times) - 1), axis=1)
-        lengths = np.diff(self._critic.foresight) * self._task.period
-        flows = np.diff(taken, axis=1) / lengths / self._critic.flow
+        lengths = np.diff(FORESIGHT) * self._task.period
+        flows = np.diff(taken, axis=1) / lengths / FLOW
         rest = np.stack([self.left[who], np.minimum(steps / self._settled, 1.1)], axis=1)
         return np.concatenate([observation, mechanics, plant, flows, rest], axis=1).astype(np.float32)

@@ -87,9 +87,10 @@ def _layers(model: PPO) -> Iterator[Any]:
 
 
 def _inner(model: PPO) -> SB3VectorEnv:
-    *_, inner = _layers(model)
-    assert isinstance(inner, SB3VectorEnv)
-    return inner
+    env = model.get_env()
+    assert env is not None
+    assert isinstance(env.unwrapped, SB3VectorEnv)
+    return env.unwrapped
 
 
 def _wrapped(model: PPO) -> Iterator[tuple[str, Any, str]]:

@@ -13,17 +13,19 @@ import torch
 from numpy.typing import NDArray
 from stable_baselines3.common.buffers import RolloutBuffer
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.utils import explained_variance
 from stable_baselines3.common.vec_env import VecEnv
 from torch.nn.functional import logsigmoid, mse_loss
 
 from epv_env.observation import LAYOUT
-from training.learners.batch_ppo import BatchPPO
+from training.learners.batch_ppo import BatchPPO, clipped_objective
 from training.learners.recurrent_actor_critic import RecurrentActorCritic
 
 
 class SequencePPO(BatchPPO):
-    """PPO for two actions with a RecurrentActorCritic."""
+    """PPO for two actions with a RecurrentActorCritic.
+
+    ent_coef and vf_coef have no effect: no entropy is paid for, and the critic has weights of its own.
+    """
 
     policy: RecurrentActorCritic  # type: ignore[assignment]
 
@@ -61,11 +63,9 @@ class SequencePPO(BatchPPO):
     def train(self) -> None:
         """Update the networks on the rollout: PPO's clipped objective."""
         self.policy.set_training_mode(True)
-        rate = self.lr_schedule(self._current_progress_remaining)
-        for group, factor in zip(
-            self.policy.optimizer.param_groups, (1.0, self._critic_rate), strict=True
-        ):
-            group["lr"] = factor * rate
+        self._update_learning_rate(self.policy.optimizer)
+        _, critic = self.policy.optimizer.param_groups
+        critic["lr"] *= self._critic_rate
         assert callable(self.clip_range)
         clip = self.clip_range(self._current_progress_remaining)
         buffer = self.rollout_buffer
@@ -78,14 +78,7 @@ class SequencePPO(BatchPPO):
                 count += 1
             self._n_updates += 1
         self.policy.averaged()
-        names = ("policy_gradient_loss", "value_loss", "entropy_loss", "approx_kl", "clip_fraction")
-        for name, value in zip(names, (figures / count).tolist(), strict=True):
-            self.logger.record(f"train/{name}", value)
-        explained = explained_variance(buffer.values.flatten(), buffer.returns.flatten())
-        self.logger.record("train/explained_variance", float(explained))
-        self.logger.record("train/learning_rate", rate)
-        self.logger.record("train/n_updates", self._n_updates, exclude="tensorboard")
-        self.logger.record("train/clip_range", clip)
+        self._record(figures / count, clip)
 
     def _windows(self, buffer: RolloutBuffer) -> list[torch.Tensor]:
         """Of every episode: observations (n, periods, entries); actions, log probabilities, advantages
@@ -120,15 +113,13 @@ class SequencePPO(BatchPPO):
         if self.num_timesteps > self._critic_first:
             odds = self.policy.log_odds(observations, before)
             change = log_probability(odds, actions) - old
-            ratio = change.exp()
-            gain = torch.min(advantages * ratio, advantages * ratio.clamp(1 - clip, 1 + clip)) * whole
-            loss = value_loss - gain.mean()
+            parts = clipped_objective(change, advantages, clip)
+            gain, divergence, clipped = ((whole * part).mean() for part in parts)
+            loss = value_loss - gain
             with torch.no_grad():
                 chance = odds.sigmoid()
                 entropy = -(chance * logsigmoid(odds) + (1 - chance) * logsigmoid(-odds)).mean()
-                divergence = (whole * ((ratio - 1) - change)).mean()
-                clipped = (whole * ((ratio - 1).abs() > clip)).mean()
-                figures = torch.stack([-gain.mean(), value_loss, -entropy, divergence, clipped])
+                figures = torch.stack([-gain, value_loss, -entropy, divergence, clipped])
         self.policy.optimizer.zero_grad()
         loss.backward()
         for part in (self.policy.actor, self.policy.critic):

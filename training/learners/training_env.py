@@ -61,7 +61,6 @@ def make_training_env(
         seed: of the training.
         weights: prices of the reward.
         cell: a unit whose state ends the observations (training/learners/recurrent_state_wrapper.py).
-
         privileged: whether observations end with a critic's view instead, and leaving the band is
             charged (training/learners/privileged_wrapper.py).
 
