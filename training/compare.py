@@ -9,7 +9,7 @@ continues where it stopped. After a change of the plant or of a controller's cod
 
 import argparse
 import sys
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,12 +26,10 @@ from epv_env.common.command_line import (
     writable_folder,
 )
 from epv_env.common.folder_lock import only_writer
-from epv_env.common.journal import Journal
 from epv_env.plant.consumption import MIXED
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.valves import available_cores
 from epv_env.reward import RewardWeights
-from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.rollout import Trace, run_episodes
 from training.evaluation.scenarios import EVALUATION, RANDOM
 from training.evaluation.seeds import EVALUATION_SEED, VALIDATION_SEED
@@ -49,12 +47,12 @@ from training.studies.comparison.comparison_report import (
     write_tables,
 )
 from training.studies.comparison.contenders import Contender, Results, Sizes
-from training.studies.comparison.episode_blocks import Block, joined_results, plan
+from training.studies.comparison.episode_blocks import Block, block_results, plan
 from training.studies.comparison.score_tables import ComparisonResults
 from training.studies.episode_tasks import Study
 from training.studies.generated_pages import check_pages
 from training.studies.imported_controllers import HELP, imported_controller, is_import
-from training.studies.parallel_run import run_tasks, task_runner
+from training.studies.parallel_run import task_runner
 from training.tradeoff import finished_variants, variant
 
 JOURNAL_FILE = "blocks.jsonl"
@@ -177,20 +175,11 @@ def limit_at_least_price(variants: list[Contender]) -> list[Contender]:
 def run_blocks(blocks: list[Block], everyone: list[Contender], chosen: argparse.Namespace) -> Results:
     """The blocks' episodes: those that --out lacks are run, side by side."""
     controllers = {run: controller for c in everyone for run, controller in c.runs.items()}
-    plant = Plant.calibrated()
     study = Study(
-        controllers=controllers, plant=plant, scenario=MIXED, duration=chosen.duration
-    )  # fmt: skip
-    subject = {
-        "plant": dict(plant.parameters),
-        "duration": chosen.duration,
-        "figures": [entry.name for entry in fields(EpisodeMetrics)],
-        "scenarios": {name: repr(scenario.options) for name, scenario in EVALUATION.items()},
-    }
-    journal = Journal(chosen.out / JOURNAL_FILE, subject)
+        controllers=controllers, plant=Plant.calibrated(), scenario=MIXED, duration=chosen.duration
+    )
     with task_runner(chosen.workers, chosen.cluster) as run:
-        outcomes = run_tasks(blocks, study, journal, run, what="comparison")
-    return joined_results(blocks, {name: outcome["result"] for name, outcome in outcomes.items()})
+        return block_results(blocks, study, chosen.out / JOURNAL_FILE, run, what="comparison")
 
 
 def same_episode(c: ComparisonResults, duration: float, first_seed: int) -> dict[str, Trace]:

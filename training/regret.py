@@ -24,24 +24,26 @@ from epv_env.common.command_line import (
     writable_folder,
 )
 from epv_env.common.folder_lock import only_writer
-from epv_env.common.journal import Journal
 from epv_env.common.json_files import write_json
 from epv_env.plant.consumption import MIXED
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.threads import available_cores
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.scenarios import RANDOM, TUNING_REGION
-from training.evaluation.seeds import EVALUATION_SEED
+from training.evaluation.seeds import EVALUATION_SEED, VALIDATION_SEED
 from training.evaluation.statistics import paired_difference
-from training.studies.comparison.episode_blocks import Block, joined_results
+from training.studies.comparison.episode_blocks import Block, block_results
 from training.studies.episode_tasks import Study
 from training.studies.fingerprint import fingerprint
+from training.studies.generated_pages import markdown
 from training.studies.named_controllers import INFORMED, named_controllers
-from training.studies.parallel_run import run_tasks, task_runner
+from training.studies.parallel_run import task_runner
 from training.studies.result_files import records
 
 BLOCK = 8
 """Episodes of the bound that are run, and resumed, together."""
+COST = 200
+"""Computing time of an episode of the bound, in those of the others: for the progress bar."""
 
 DEFAULT = (
     f"PPO, recurrent={TRAINED / 'recurrent' / 'seed-8'}", f"PPO={TRAINED / 'plain' / 'seed-0'}",
@@ -84,17 +86,18 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--workers", type=int, default=available_cores(), help="processes")
     chosen = parse_with_quick(parser, arguments, QUICK)
     check_positive(parser, chosen, "episodes", "duration", "workers")
+    if chosen.episodes > VALIDATION_SEED - EVALUATION_SEED:
+        parser.error(f"--episodes must be at most {VALIDATION_SEED - EVALUATION_SEED}")
     return chosen
 
 
 def blocks_of(name: str, controller: Controller, episodes: int) -> list[Block]:
     """The random episodes of one controller, on plants within ±10 %."""
-    size = BLOCK if isinstance(controller, CausalBound) else episodes
+    size, cost = (BLOCK, COST) if isinstance(controller, CausalBound) else (episodes, 1)
     return [
         Block(
             run_name=name, version=fingerprint(controller), plants=TUNING_REGION, scenarios=(RANDOM,),
-            first_seed=EVALUATION_SEED + first, count=min(size, episodes - first),
-            cost=200 if isinstance(controller, CausalBound) else 1,
+            first_seed=EVALUATION_SEED + first, count=min(size, episodes - first), cost=cost,
         )
         for first in range(0, episodes, size)
     ]  # fmt: skip
@@ -122,14 +125,14 @@ def regret_table(found: dict[str, EpisodeMetrics], bound: str) -> pd.DataFrame:
 def as_markdown(table: pd.DataFrame) -> str:
     """The table with its intervals, as documentation shows it."""
     headings = ["controller", "left", *(figure.heading for figure in FIGURES)]
-    lines = [f"| {' | '.join(headings)} |", f"|{' --- |' * len(headings)}"]
+    rows = []
     for row in records(table):
         cells = [
             f"{row[f.heading]:.3g} ({row[f'{f.heading}, low']:.3g} to {row[f'{f.heading}, high']:.3g})"
             for f in FIGURES
         ]
-        lines.append(f"| {' | '.join([row['controller'], str(row['left']), *cells])} |")
-    return "\n".join(lines)
+        rows.append([row["controller"], str(row["left"]), *cells])
+    return markdown(headings, rows)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -142,10 +145,8 @@ def main(arguments: list[str] | None = None) -> int:
     blocks = [b for name, c in controllers.items() for b in blocks_of(name, c, chosen.episodes)]
     study = Study(controllers=controllers, plant=plant, scenario=MIXED, duration=chosen.duration)
     with only_writer(chosen.out):
-        journal = Journal(chosen.out / "blocks.jsonl", {"duration": chosen.duration})
         with task_runner(chosen.workers, None) as run:
-            outcomes = run_tasks(blocks, study, journal, run, what="regret")
-        results = joined_results(blocks, {name: outcome["result"] for name, outcome in outcomes.items()})
+            results = block_results(blocks, study, chosen.out / "blocks.jsonl", run, what="regret")
         found = {name: results[name, TUNING_REGION, RANDOM] for name in controllers}
         table = regret_table(found, bound.name)
         own = found[bound.name]

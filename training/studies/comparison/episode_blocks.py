@@ -1,13 +1,15 @@
 """The episodes of a comparison: blocks that run side by side, and their joined results."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.common.journal import Journal
 from training.evaluation.controller_table import PLANTS, plant_region
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.scenarios import EVALUATION, RANDOM, TUNING_REGION
@@ -25,6 +27,7 @@ from training.studies.comparison.contenders import (
 )
 from training.studies.episode_tasks import Study
 from training.studies.fingerprint import fingerprint
+from training.studies.parallel_run import TaskRunner, run_tasks
 
 BLOCK_EPISODES = 512
 """Episodes side by side; larger batches are hardly faster, smaller ones resume in finer steps."""
@@ -133,6 +136,28 @@ def _blocks_of(block: Callable[..., Block], scenarios: list[str], first: int, co
         for k in range(0, len(scenarios), together)
         for begin in range(0, count, BLOCK_EPISODES)
     ]  # fmt: skip
+
+
+def block_results(
+    blocks: list[Block], study: Study, journal: Path, run: TaskRunner, *, what: str
+) -> Results:
+    """Episodes of all blocks by run, plant set and scenario; only those that are missing are run.
+
+    Args:
+        blocks: of the study.
+        study: with the controllers that the blocks name.
+        journal: file of finished blocks; it begins anew for another plant, duration or set of scenarios.
+        run: where the blocks run (`task_runner`).
+        what: name of the progress bar.
+    """
+    subject = {
+        "plant": dict(study.plant.parameters),
+        "duration": study.duration,
+        "figures": [entry.name for entry in fields(EpisodeMetrics)],
+        "scenarios": {name: repr(scenario.options) for name, scenario in EVALUATION.items()},
+    }
+    outcomes = run_tasks(blocks, study, Journal(journal, subject), run, what=what)
+    return joined_results(blocks, {name: outcome["result"] for name, outcome in outcomes.items()})
 
 
 def joined_results(blocks: list[Block], outcomes: Mapping[str, dict[str, Any]]) -> Results:
