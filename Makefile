@@ -72,7 +72,7 @@ results: tradeoff ## compare all controllers, and write docs/results/comparison.
 		--out runs/comparison --images docs/images --pages docs/results/comparison.md README.md $(ARGS)
 
 robustness: $(VENV)/.installed ## sweep parameters, effects and conditions, and write docs/results/robustness.md's figures
-	$(PY) training/sweep.py --controllers "hysteresis, extrapolating" PWM pulse PPO=$(POLICIES)/plain/seed-0 \
+	$(PY) training/sweep.py --controllers "hysteresis, extrapolating" PWM pulse "pulse, adaptive" PPO=$(POLICIES)/plain/seed-0 \
 		"PPO, recurrent=$(POLICIES)/recurrent/seed-8" \
 		--out runs/robustness --images docs/images --pages docs/results/robustness.md docs/results/speed.md $(ARGS)
 

@@ -1,6 +1,7 @@
 """The scenarios beyond training are what they say, can be met, and come as a table."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 pytest.importorskip("pandas")
 
 from controllers.hysteresis import Hysteresis
+from epv_env.plant.consumption import MIXED
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import REFERENCE_PERIOD
 from epv_env.settings import make_settings
@@ -16,7 +18,9 @@ from training.evaluation.faults import Restart
 from training.evaluation.hard_scenarios import HARD, REFILL_TIME, VENTED_DROP_BAR
 from training.evaluation.rollout import run_episodes
 from training.evaluation.scenarios import TUNING_REGION
-from training.studies.hard_scenarios import all_scenarios, worn_scenarios
+from training.studies import hard_scenarios as study_of_hard_scenarios
+from training.studies.episode_tasks import Study
+from training.studies.hard_scenarios import all_scenarios, run_scenario, worn_scenarios
 
 pytestmark = pytest.mark.training
 
@@ -119,3 +123,16 @@ def test_the_command_names_an_unknown_scenario(tmp_path, capsys):
     with pytest.raises(SystemExit):
         hard_scenarios.parse(["--out", str(tmp_path), "--scenarios", "no such"])
     assert "no scenario 'no such': choose from" in capsys.readouterr().err
+
+
+def test_episodes_in_batches_are_those_of_one_run(monkeypatch):
+    study = Study(
+        controllers={"open": Open(open_below=-0.1, shut_above=0.0)}, plant=Plant.calibrated(),
+        scenario=MIXED, duration=10.0,
+    )  # fmt: skip
+    scenario = replace(HARD["as in training"], duration=1.0)
+    whole = run_scenario(study, "open", scenario, range(5))
+    monkeypatch.setattr(study_of_hard_scenarios, "SIDE_BY_SIDE", 2)
+    assert np.array_equal(
+        run_scenario(study, "open", scenario, range(5)).excursion_bar, whole.excursion_bar
+    )

@@ -1,9 +1,9 @@
 """Scenarios beyond training: starts far off, long rests, starvation, faults, timing.
 
-Each differs from an ordinary episode in one thing. All are judged by C1, the band after the settling
-time. The valve cannot let air out of the circuit, so no episode begins above the target, and targets
-only rise. Where an episode begins far below the target, `settling_time` leaves the time of the refill.
-Nothing is drawn until it ends, so an overshoot remains and counts.
+Each differs in one thing from an ordinary episode, which comes first. All are judged by C1, the band
+after the settling time. The valve cannot let air out of the circuit, so no episode begins above the
+target, and targets only rise. Where an episode begins far below the target, `settling_time` leaves the
+time of the refill. Nothing is drawn until it ends, so an overshoot remains and counts.
 """
 
 from dataclasses import dataclass, replace
@@ -62,6 +62,7 @@ def _rest(seconds: float) -> HardScenario:
 
 
 HARD: dict[str, HardScenario] = {
+    "as in training": HardScenario(meaning="nothing differs: plants within ±10 %"),
     "2 to 4 bar below": _recovery(2.0, 4.0),
     "4 to 4.4 bar below": _recovery(4.0, 4.4),
     "vented": replace(

@@ -12,6 +12,9 @@ from training.evaluation.metrics import EpisodeMetrics, summary
 from training.evaluation.rollout import run_episodes
 from training.studies.episode_tasks import Study
 
+SIDE_BY_SIDE = 1000
+"""Episodes that are run together: many more would fill the memory."""
+
 
 def worn_scenarios() -> dict[str, HardScenario]:
     """A scenario for each effect of the catalogue, variant and sign, at its typical size."""
@@ -44,8 +47,12 @@ def run_scenario(
     controller = study.controller(label, period)
     if scenario.fault is not None and not isinstance(controller, Privileged):  # it has no memory
         controller = scenario.fault.around(controller, period)
-    metrics, _ = run_episodes(controller, seeds=list(seeds), duration=scenario.duration, options=options)
-    return metrics
+    parts = []
+    for first in range(0, len(seeds), SIDE_BY_SIDE):
+        batch = list(seeds[first : first + SIDE_BY_SIDE])
+        metrics, _ = run_episodes(controller, seeds=batch, duration=scenario.duration, options=options)
+        parts.append(metrics)
+    return EpisodeMetrics.joined(parts)
 
 
 def rows(
