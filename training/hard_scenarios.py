@@ -27,7 +27,7 @@ from epv_env.plant.plantfile import load_plant
 from training.evaluation.seeds import EVALUATION_SEED, VALIDATION_SEED
 from training.studies.episode_tasks import Study
 from training.studies.hard_scenarios import all_scenarios, rows
-from training.studies.named_controllers import DEFAULT, named_controllers
+from training.studies.named_controllers import DEFAULT, FALLBACK, named_controllers, p3_checked
 
 RESULT = "hard_scenarios.json"
 FORMAT = "epv-hard-scenarios/1"
@@ -50,6 +50,10 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--episodes", type=int, default=256, help="of each scenario and controller")
     parser.add_argument("--plant", default=None, help="plant file; default: the report's calibration")
+    parser.add_argument(
+        "--p3-check", action="store_true",
+        help=f"{FALLBACK!r} takes over from each controller once p3 is implausible",
+    )  # fmt: skip
     chosen = parse_with_quick(parser, arguments, QUICK)
     check_positive(parser, chosen, "episodes")
     if chosen.episodes > VALIDATION_SEED - EVALUATION_SEED:
@@ -72,6 +76,8 @@ def main(arguments: list[str] | None = None) -> int:
     plant = load_plant(chosen.plant)
     controllers, digests = named_controllers(chosen.controllers, plant)
     scenarios = {name: all_scenarios()[name] for name in chosen.scenarios}
+    if chosen.p3_check:
+        controllers = {label: p3_checked(each, plant) for label, each in controllers.items()}
     study = Study(controllers=controllers, plant=plant, scenario=MIXED, duration=10.0)
     seeds = range(EVALUATION_SEED, EVALUATION_SEED + chosen.episodes)
     count = len(scenarios) * len(controllers)

@@ -16,6 +16,7 @@ import controllers
 import epv_env  # noqa: F401 - registers the environments
 from controllers.causal_bound import CausalBound
 from controllers.learned import LearnedPolicy
+from controllers.p3_check import P3Check
 from controllers.registration import CHEAP, Choice, Range, Registration, RegistrationError, SearchSpace
 from controllers.registry import REGISTRY, cost_class, registration
 from controllers.tuned import Tuning, build, load_tunings
@@ -23,6 +24,7 @@ from epv_env.plant.plantfile import Plant
 
 UNREGISTERED = {
     LearnedPolicy: "training writes it into folders, each of which names itself",
+    P3Check: "worn around a controller, which has a record of its own",
     CausalBound: "a yardstick of training/regret.py, too slow for the comparison",
 }
 """Controllers that the registry does not list, each with the reason."""

@@ -1,0 +1,89 @@
+"""A plausibility check of the p3 sensor, worn around a controller that believes its readings.
+
+The coil decides where p3 goes: on, the control chamber fills up to p1; off, it empties to the ambient
+pressure. A reading far from that end that stands still contradicts the coil. From then on a controller
+that does not read p3 takes over.
+"""
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controllers.base import Controller, Privileged
+from epv_env.observation import LONGEST_WAIT, decode
+
+CHANGE = "p3_change_4"
+"""The entry of the observation whose magnitude says whether p3 moves."""
+
+
+@dataclass(kw_only=True)
+class P3Check:
+    """Lets `main` act until a valve's p3 is implausible, and `fallback` from then to the reset."""
+
+    main: Controller
+    """For the on/off environment."""
+    fallback: Controller
+    """For the same environment; it must not read p3."""
+    wait: float = 25e-3
+    """Time for which the coil has been as it is before p3 must move [s]: the armature's delay, the
+    latency of the command, and the four periods over which the change is observed."""
+    still: float = 0.02
+    """Change over four control periods below which p3 stands still [bar]: twice the standard deviation
+    that Table 3's noise gives it. A chamber that fills or empties moves many times as much."""
+    margin: float = 0.5
+    """Distance of p3 from the end that it goes to, within which it may stand still [bar]."""
+    ambient: float = 1.0
+    """Pressure that the chamber empties to [bar]."""
+    control_period: float = 5e-3
+    """[s]"""
+    name: str = field(init=False)
+    environment: str = field(init=False)
+    _failed: NDArray = field(default_factory=lambda: np.zeros(0, dtype=bool), repr=False)
+
+    def __post_init__(self) -> None:
+        if isinstance(self.main, Privileged):
+            raise ValueError(f"{self.main.name!r} reads no sensor: there is no p3 to check")
+        if self.main.environment != self.fallback.environment:
+            raise ValueError(
+                f"{self.fallback.name!r} is for {self.fallback.environment} and {self.main.name!r} for "
+                f"{self.main.environment}: the one that takes over must act in the same environment"
+            )
+        self.main = _with_period(self.main, self.control_period)
+        self.fallback = _with_period(self.fallback, self.control_period)
+        self.name, self.environment = f"{self.main.name}, p3 checked", self.main.environment
+
+    @property
+    def failed(self) -> NDArray:
+        """Whether the p3 of each valve was found implausible since the reset, bool (n,)."""
+        return self._failed
+
+    def reset(self, n: int) -> None:
+        """Believe every sensor; n episodes begin."""
+        self.main.reset(n)
+        self.fallback.reset(n)
+        self._failed = np.zeros(n, dtype=bool)
+
+    def act(self, observations: NDArray) -> NDArray:
+        """0 (off) or 1 (on) for each valve, (n,)."""
+        self._failed = self._failed | self._implausible(observations)
+        # Both follow every valve: the one that takes over knows what has happened.
+        actions = self.main.act(observations), self.fallback.act(observations)
+        return np.where(self._failed, actions[1], actions[0])
+
+    def _implausible(self, observations: NDArray) -> NDArray:
+        """Whether p3 stands still where the coil should move it, bool (n,)."""
+        p1, p3, coil, lasted, change = (
+            decode(observations, name) for name in ("p1", "p3", "action", "since_switching", CHANGE)
+        )
+        on = coil > 0.5
+        remains = np.where(on, p1 - p3, p3 - self.ambient)
+        waited = lasted > min(self.wait, LONGEST_WAIT) - self.control_period / 2  # whole periods
+        return waited & (np.abs(change) < self.still) & (remains > self.margin)
+
+
+def _with_period(controller: Controller, period: float) -> Controller:
+    """The controller for another control period [s], if it has a setting for it."""
+    own: Any = controller
+    return replace(own, control_period=period) if hasattr(own, "control_period") else own
