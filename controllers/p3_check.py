@@ -41,6 +41,7 @@ class P3Check:
     name: str = field(init=False)
     environment: str = field(init=False)
     _failed: NDArray = field(default_factory=lambda: np.zeros(0, dtype=bool), repr=False)
+    _periods: int = field(default=0, repr=False)
 
     def __post_init__(self) -> None:
         if isinstance(self.main, Privileged):
@@ -64,9 +65,11 @@ class P3Check:
         self.main.reset(n)
         self.fallback.reset(n)
         self._failed = np.zeros(n, dtype=bool)
+        self._periods = 0
 
     def act(self, observations: NDArray) -> NDArray:
         """0 (off) or 1 (on) for each valve, (n,)."""
+        self._periods += 1
         self._failed = self._failed | self._implausible(observations)
         # Both follow every valve: the one that takes over knows what has happened.
         actions = self.main.act(observations), self.fallback.act(observations)
@@ -79,7 +82,9 @@ class P3Check:
         )
         on = coil > 0.5
         remains = np.where(on, p1 - p3, p3 - self.ambient)
-        waited = lasted > min(self.wait, LONGEST_WAIT) - self.control_period / 2  # whole periods
+        # What happened before the first observation is not known: the coil may have switched just then.
+        known = np.minimum(lasted, self._periods * self.control_period)
+        waited = known > min(self.wait, LONGEST_WAIT) - self.control_period / 2  # whole periods
         return waited & (np.abs(change) < self.still) & (remains > self.margin)
 
 

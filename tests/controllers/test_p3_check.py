@@ -30,8 +30,11 @@ class Constant:
 
 
 def checked(**settings) -> P3Check:
+    """A check that has seen p3 move for 25 ms."""
     check = P3Check(main=Constant(action=0), fallback=Constant(action=1), **settings)
     check.reset(VALVES)
+    for _ in range(5):
+        check.act(seen())
     return check
 
 
@@ -70,6 +73,13 @@ def test_each_valve_is_judged_alone_and_until_the_reset():
     assert check.act(seen()).tolist() == [0, 1, 0]
     check.reset(VALVES)
     assert check.act(seen()).tolist() == [0, 0, 0]
+
+
+def test_the_first_observations_are_believed():
+    check = checked()
+    check.reset(VALVES)
+    actions = [check.act(seen(p3_change_4=0.0))[0] for _ in range(6)]
+    assert actions == [0, 0, 0, 0, 1, 1]
 
 
 def test_both_controllers_get_the_control_period():
