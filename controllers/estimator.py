@@ -11,6 +11,7 @@ Sources: Simon, Optimal State Estimation (Wiley 2006), ch. 5 (Kalman filter); Gu
 Filtering and Change Detection (Wiley 2000), ch. 3 (cumulated sum) and 8 (covariance raised at a jump).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,7 +31,7 @@ from epv_env.plant.valves import Valves
 class EstimatorSettings:
     """How far the filter trusts model and readings."""
 
-    model_error: float = 0.1
+    model_error: float = 0.3
     """Share of a predicted change that may be wrong, standard deviation [1]."""
     noise_p1: float = 2e-3 * BAR
     """Change of p1 in a period that the model does not foresee, standard deviation [Pa]."""
@@ -109,6 +110,12 @@ class Estimator:
         self._rate_variance = np.full(n, self.settings.jump**2)
         self._covariance = np.zeros(n)
         self._rising, self._falling = np.zeros(n), np.zeros(n)
+
+    def assume(self, parameters: Mapping[str, NDArray]) -> None:
+        """Go on with other plant parameters: values (n,) by symbol."""
+        self._values.update(parameters)
+        if self._begun:
+            self._valves.set_parameters(np.arange(self._valves.n), self._values)
 
     def observe(self, observations: NDArray, coil: NDArray) -> StateEstimate:
         """Take in observations (n, entries) made after a period with the coils on or off, bool (n,).

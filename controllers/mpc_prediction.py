@@ -1,6 +1,6 @@
 """The MPC's prediction: switching sequences run through the plant and priced by the reward."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,12 +17,14 @@ from epv_env.reward import RewardWeights, reward_terms
 class PredictionSettings:
     """Candidates of the prediction, and how exactly they are simulated."""
 
-    horizon: int = 28
+    horizon: int = 40
     """Length of the simulation [control periods]: venting to the opening pressure takes about 13 periods
-    of 5 ms, shutting 5."""
-    pulse_lengths: Mapping[int, range] = field(
-        default_factory=lambda: {0: range(1, 21), 1: range(4, 20), 3: range(4, 20)}
-    )
+    of 5 ms and 25 on a valve that opens late, shutting 5."""
+    pulse_lengths: Mapping[int, Sequence[int]] = field(
+        default_factory=lambda: {
+            0: (*range(1, 21), *range(22, 35, 3)), 1: range(4, 20), 3: range(4, 20),
+        }
+    )  # fmt: skip
     """Lengths of the candidate pulses by the wait before them, both [control periods]. A later pulse has
     as fine a choice of lengths as one now: a coarser choice would make opening now look better."""
     step: float = 1e-3

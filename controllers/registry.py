@@ -2,6 +2,7 @@
 
 from controllers import (
     adaptive_hysteresis,
+    adaptive_mpc,
     adaptive_pulse,
     hysteresis,
     mpc,
@@ -22,6 +23,7 @@ REGISTRY: tuple[Registration, ...] = (
     pulse.REGISTRATION,
     adaptive_pulse.REGISTRATION,
     mpc.REGISTRATION,
+    adaptive_mpc.REGISTRATION,
     privileged_pulse.REGISTRATION,
     oracle.REGISTRATION,
 )

@@ -25,7 +25,7 @@ def test_every_controller_was_tuned_with_the_same_budget_or_a_stated_smaller_one
     assert tuple(tunings) == TUNED_KINDS
     full = {(t.trials, t.episodes) for kind, t in tunings.items() if kind not in SIMULATING_KINDS}
     assert full == {(100, 128)}
-    assert SIMULATING_KINDS == ("MPC",)
+    assert SIMULATING_KINDS == ("MPC", "MPC, adaptive")
     for kind in SIMULATING_KINDS:
         assert (tunings[kind].trials, tunings[kind].episodes) == budget(kind, 100, 128) == (16, 32)
 

@@ -54,7 +54,7 @@ def test_prices_are_what_the_episodes_then_cost():
     )
     cost = -sum(env.task.step(*env.action.decode(move)).reward for move in table.T)
     assert np.ptp(cost) > 5  # the sequences differ
-    np.testing.assert_allclose(foreseen[0], cost, atol=0.15)
+    np.testing.assert_allclose(foreseen[0], cost, atol=0.2)  # a pulse's error of 2 mbar for 0.2 s
 
 
 def test_resting_costs_nothing_more_at_the_target_and_more_the_further_off():
