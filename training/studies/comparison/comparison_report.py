@@ -23,7 +23,8 @@ from training.studies.result_files import records
 RESULTS_FILE, TABLES_FILE = "results.json", "tables.md"
 
 PARTS = (
-    "results", "short", "bars", "duels", "means", "trade", "scenarios", "tuning", "episodes"
+    "results", "short", "bars", "duels", "means", "trade", "life", "scenarios", "tuning",
+    "episodes",
 )  # fmt: skip
 """Generated parts that a page can ask for: "bars" are the acceptance criteria, "duels" the paired
 comparisons, under the names that pages and results.json have for them."""
@@ -44,6 +45,8 @@ class ComparisonTables:
     scenarios: pd.DataFrame
     means: pd.DataFrame
     trade_off: pd.DataFrame
+    life: pd.DataFrame
+    """Switching life; empty without its scenarios."""
     ours: Contender | None
     """The first learned contender, if one takes part."""
     paired: pd.DataFrame
@@ -61,6 +64,7 @@ def comparison_tables(c: ComparisonResults, *, trade_off_episodes: int) -> Compa
         scenarios=score_tables.by_scenario(c),
         means=score_tables.interquartile_means(c),
         trade_off=score_tables.trade_off(c, trade_off_episodes),
+        life=score_tables.switching_life(c),
         ours=ours,
         paired=pd.DataFrame() if ours is None else score_tables.paired_comparisons(c, ours),
         criteria=[criterion for each in learned for criterion in criteria(c, each)],
@@ -84,8 +88,8 @@ def write_tables(
         "settings": dict(settings), "tuning": markdown_tables.budget_text(c), "chosen": c.chosen,
         "figures": records(tables.figures), "scenarios": records(tables.scenarios),
         "interquartile_means": records(tables.means), "duels": records(tables.paired),
-        "trade": records(tables.trade_off), "bars": [each.as_record() for each in tables.criteria],
-        "lost": tables.lost,
+        "trade": records(tables.trade_off), "life": records(tables.life),
+        "bars": [each.as_record() for each in tables.criteria], "lost": tables.lost,
     }  # fmt: skip
     write_json(out / RESULTS_FILE, content)
     parts = _parts(c, tables)
@@ -109,6 +113,7 @@ def _parts(c: ComparisonResults, tables: ComparisonTables) -> dict[str, str]:
         *against_rivals,
         markdown_tables.iqm_table(tables.means) + _image(MEANS),
         markdown_tables.trade_off_table(tables.trade_off),
+        markdown_tables.life_table(tables.life),
         markdown_tables.scenario_table(c.scenarios),
         markdown_tables.budget_text(c),
         markdown_tables.episodes_text(c) + _image(SCENARIO_MAPS),

@@ -145,6 +145,18 @@ def trade_off_table(traded: pd.DataFrame) -> str:
     return markdown(headings, rows)
 
 
+def life_table(life: pd.DataFrame) -> str:
+    """Switching life by controller, the longest first."""
+    if life.empty:
+        return "The scenarios of the switching life did not run."
+    rows = [
+        [row["controller"], *(f"{row[k]:.2f}" for k in ("at_rest", "in_service")), f"{row['years']:.2g}"]
+        for row in records(life.sort_values("years", ascending=False))
+    ]
+    headings = ["controller", "switchings at rest [1/s]", "in service [1/s]", "life [years]"]
+    return markdown(headings, rows)
+
+
 def budget_text(c: ComparisonResults) -> str:
     """How the controllers were tuned and trained."""
     search, tunings = load_search(), load_tunings()

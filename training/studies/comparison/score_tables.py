@@ -20,6 +20,7 @@ from training.evaluation.statistics import (
     pareto_front,
     probability_of_improvement,
 )
+from training.evaluation.switching_life import life_years
 from training.studies.comparison.contenders import TRADE_OFF_ON, Contender, Results, chosen_run
 
 SCORES = {
@@ -36,6 +37,9 @@ HIGHER_IS_BETTER = {"episode_return"}
 
 JUDGED_ON = ("calibrated", "sensitive_ten_percent")
 """Plant sets on which all scenarios run."""
+
+LIFE_ON, LIFE_SCENARIOS = "sensitive_ten_percent", ("rest", "service")
+"""Plant set and scenarios that the switching life refers to."""
 
 ALL_RUNS = ", all seeds"
 """Ends the name of the row that holds every run of a learned contender."""
@@ -168,6 +172,24 @@ def _named(name: str, of: Estimate) -> dict[str, float]:
 def _rows(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
     """A table of rows that are made one by one."""
     return pd.DataFrame(list(rows))
+
+
+def switching_life(c: ComparisonResults) -> pd.DataFrame:
+    """A row per contender: switchings per second at rest and in service, and the life [years].
+
+    On LIFE_ON; empty if the comparison lacks one of the two scenarios.
+    """
+    rows = []
+    for contender in c.contenders if set(LIFE_SCENARIOS) <= set(c.scenarios) else []:
+        rest, service = (
+            float(np.mean(c.metrics(contender.name, LIFE_ON, scenario).switchings_per_s))
+            for scenario in LIFE_SCENARIOS
+        )
+        years = life_years(at_rest=rest, in_service=service)
+        rows.append(
+            {"controller": contender.name, "at_rest": rest, "in_service": service, "years": years}
+        )
+    return pd.DataFrame(rows)
 
 
 FRONT = {
