@@ -238,6 +238,8 @@ def test_the_training_seed_is_chosen_on_the_tuning_scenarios_alone():
         ("PPO, seed 1", "calibrated", RANDOM): episodes(5, returned=-99.0),
     }
     assert chosen_run(both, results) == "PPO, seed 1"
+    left = {("PPO, seed 1", TUNING_REGION, TUNING): episodes(5, returned=-10.0, left=1)}
+    assert chosen_run(both, results | left) == "PPO, seed 0"
     assert {block.plants for block in plan([both], [RANDOM], SIZES)} >= {TUNING_REGION}
 
 

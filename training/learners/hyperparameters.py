@@ -74,8 +74,10 @@ class Hyperparameters:
     """Episodes of a validation."""
     validation_duration: float = 6.0
     """Length of a validation episode [s]."""
+    validation_conditions: Conditions = CONDITIONS["ordinary"]
+    """What validation episodes may meet beyond the ordinary."""
     conditions: Conditions = CONDITIONS["ordinary"]
-    """What training episodes may meet beyond the ordinary; validation episodes are ordinary."""
+    """What training episodes may meet beyond the ordinary."""
 
     @property
     def episode_lengths(self) -> list[int]:
@@ -89,14 +91,17 @@ class Hyperparameters:
 
 
 FROM_STUDENT = Hyperparameters(
-    band_price=10.0, band_bar=0.32, breakdown_price=0.5, sharpness=3.0, ent_coef=0.0,
+    band_price=10.0, band_bar=0.28, breakdown_price=0.5, sharpness=3.0, ent_coef=0.0,
     learning_rate=4e-4, last_learning_rate=5e-6, batch_size=2048, gae_lambda=0.98,
-    validations=5, first_validation=0.2,
+    validations=3, first_validation=0.5, validation_episodes=1024,
+    validation_conditions=Conditions(extreme=0.5, braking=0.5),
+    conditions=Conditions(extreme=0.5, braking=0.3),
 )  # fmt: skip
 """For a recurrent policy that goes on from its student.
 
-Episodes are ordinary: the unavoidable price of starts far below the target would drown what the others
-teach. The student knows such starts from its lessons.
+A good policy leaves the band only where a slow or fast valve meets an emergency. Both are rare in
+ordinary episodes, so training and validation make them frequent. Starts far below the target, which the
+student knows from its lessons, are left out: their unavoidable price would drown what the others teach.
 
 One control period more of a pulse is worth 200 mbar, so more exploration than the student's own doubt
 teaches caution only. The student keeps within the band, so the price near the band's edge can be higher.

@@ -150,7 +150,7 @@ def train(
     selection = Selection(
         points=validation_points(timesteps, first_share=h.first_validation, count=h.validations),
         settings=ValidationSettings(episodes=h.validation_episodes, duration=h.validation_duration),
-        options=task,
+        options={**task, "conditions": h.validation_conditions},
         controller=greedy,
         rows=with_nan(begun.validations),
         best=found.best if found else None,

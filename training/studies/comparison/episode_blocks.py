@@ -20,6 +20,7 @@ from training.studies.comparison.contenders import (
     EXPENSIVE,
     TRADE_OFF_ON,
     TUNING,
+    TUNING_CONDITIONS,
     Contender,
     Expense,
     Results,
@@ -81,8 +82,10 @@ class Block:
 
 
 def _options(scenario: str) -> dict[str, Any]:
-    """Of the environment; the tuning's scenarios are random ones."""
-    return EVALUATION[RANDOM if scenario == TUNING else scenario].options
+    """Of the environment; the tuning's scenarios are random ones under harder conditions."""
+    if scenario == TUNING:
+        return {**EVALUATION[RANDOM].options, "conditions": TUNING_CONDITIONS}
+    return EVALUATION[scenario].options
 
 
 def plan(

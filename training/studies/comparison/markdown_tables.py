@@ -172,8 +172,8 @@ def budget_text(c: ComparisonResults) -> str:
         if contender.learned:
             text += (
                 f" {contender.name}: {len(contender.runs)} training seeds on the same plants; the one "
-                f"that stands for it ({c.chosen[contender.name]}) has the best mean return on the "
-                "tuning scenarios."
+                f"that stands for it ({c.chosen[contender.name]}) leaves the band least often on hard "
+                "tuning episodes."
             )
     return text
 

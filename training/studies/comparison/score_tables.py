@@ -57,7 +57,7 @@ class ComparisonResults:
 
     @cached_property
     def chosen(self) -> dict[str, str]:
-        """The run that stands for each contender: of a learned one, that with the best tuning return."""
+        """The run that stands for each contender: of a learned one, that which leaves least often."""
         return {c.name: chosen_run(c, self.results) for c in self.contenders}
 
     def metrics(self, contender: str, plants: str, scenario: str = RANDOM) -> EpisodeMetrics:
