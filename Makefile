@@ -73,7 +73,7 @@ results: tradeoff ## compare all controllers, and write docs/results/comparison.
 
 robustness: $(VENV)/.installed ## sweep parameters, effects and conditions, and write docs/results/robustness.md's figures
 	$(PY) training/sweep.py --controllers "hysteresis, extrapolating" PWM pulse "pulse, adaptive" PPO=$(POLICIES)/plain/seed-0 \
-		"PPO, recurrent=$(POLICIES)/recurrent/seed-8" \
+		"PPO, recurrent=$(POLICIES)/recurrent/seed-7" \
 		--out runs/robustness --images docs/images --pages docs/results/robustness.md docs/results/speed.md $(ARGS)
 
 export: $(VENV)/.installed ## turn the policy of `make train` into C and ONNX (needs a C compiler)

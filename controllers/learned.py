@@ -24,7 +24,7 @@ from controllers.policy_contract import (
 from epv_env.common.files import read_bytes
 
 TRAINED = Path(__file__).parent / "trained"
-"""The policies that come with the package, one of each kind: recurrent/seed-8 (with a memory) and
+"""The policies that come with the package, one of each kind: recurrent/seed-7 (with a memory) and
 plain/seed-0 (without one)."""
 
 

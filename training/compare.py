@@ -133,7 +133,7 @@ def _add_episodes(parser: argparse.ArgumentParser) -> None:
         "--bound", type=int, default=4096,
         help="random ones on each region, to bound the violation rate of ±500 mbar",
     )  # fmt: skip
-    parser.add_argument("--tuning", type=int, default=1024, help="episodes that choose a training seed")
+    parser.add_argument("--tuning", type=int, default=2048, help="episodes that choose a training seed")
     parser.add_argument("--seed", type=int, default=0, help="of the first evaluation episode")
     parser.add_argument("--duration", type=float, default=10.0, help="length of an episode [s]")
 

@@ -46,7 +46,7 @@ COST = 200
 """Computing time of an episode of the bound, in those of the others: for the progress bar."""
 
 DEFAULT = (
-    f"PPO, recurrent={TRAINED / 'recurrent' / 'seed-8'}", f"PPO={TRAINED / 'plain' / 'seed-0'}",
+    f"PPO, recurrent={TRAINED / 'recurrent' / 'seed-7'}", f"PPO={TRAINED / 'plain' / 'seed-0'}",
     *(kind for kind in TUNED_KINDS if kind not in SIMULATING_KINDS), INFORMED,
 )  # fmt: skip
 

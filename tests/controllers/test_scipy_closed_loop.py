@@ -60,7 +60,7 @@ def closed_loop(
     *, step: float = DEFAULT_STEP, scipy: bool = False, flow_factor: float = 1.0
 ) -> tuple[NDArray, NDArray]:
     """p2 - target [bar] and the policy's actions, (periods, EPISODES), on plants within ±10 %."""
-    policy = load_policy(TRAINED / "recurrent" / "seed-8")
+    policy = load_policy(TRAINED / "recurrent" / "seed-7")
     region = Region.named(TUNING_REGION, Plant.calibrated().parameters)
     env: Any = make_env(policy, EPISODES, parameters=region)
     valves = env.task.valves

@@ -14,7 +14,7 @@ from training.evaluation.rollout import run_episodes
 ROOT = Path(__file__).parents[2]
 POLICIES = ROOT / "docs" / "results" / "policies"
 """Every policy of the comparison; the package holds one of each kind, to which links lead from here."""
-IN_PACKAGE = ("plain/seed-0", "recurrent/seed-8")
+IN_PACKAGE = ("plain/seed-0", "recurrent/seed-7")
 
 FOLDERS = sorted(path.parent for path in POLICIES.rglob(CONTRACT_FILE))
 SEEDS = [folder for folder in FOLDERS if folder.name.startswith("seed-")]
@@ -60,7 +60,7 @@ def test_a_policy_of_the_package_is_the_one_that_is_compared(name: str):
 
 
 def test_one_with_a_memory_holds_the_band_on_valves_that_it_does_not_know():
-    policy = load_policy(TRAINED / "recurrent" / "seed-8")
+    policy = load_policy(TRAINED / "recurrent" / "seed-7")
     options = {"parameters": "sensitive_ten_percent"}
     metrics, _ = run_episodes(policy, seeds=list(range(64)), duration=5.0, options=options)
     assert metrics.stayed.mean() > 0.95

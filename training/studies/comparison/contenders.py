@@ -22,7 +22,9 @@ CRITERIA_ON = "calibrated"
 TUNING = "tuning"
 """Scenarios on which one of the training seeds is chosen, with seeds of the tuning."""
 
-TUNING_CONDITIONS = Conditions(extreme=0.5, braking=0.5)
+TUNING_CONDITIONS = Conditions(
+    extreme=0.5, braking=0.5, coil_off=0.2, starved=0.1, target_steps=0.3
+)  # fmt: skip
 """Under which they run: a good policy leaves the band so rarely in ordinary episodes that a choice among
 several would be chance."""
 
