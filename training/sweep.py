@@ -7,6 +7,9 @@ A sweep that was stopped continues where it stopped when it is started again. do
 explains the method.
 """
 
+import training.console.missing_packages  # noqa: F401 - before what may be missing
+
+# isort: split
 import argparse
 import sys
 from importlib.metadata import version

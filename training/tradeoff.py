@@ -7,6 +7,9 @@ trains PPO and tunes classic controllers at every price; finished controllers in
 `training/compare.py --tradeoff runs/tradeoff` measures and draws them.
 """
 
+import training.console.missing_packages  # noqa: F401 - before what may be missing
+
+# isort: split
 import argparse
 import sys
 from pathlib import Path
@@ -168,7 +171,7 @@ def main(arguments: list[str] | None = None) -> int:
     if not all(0 <= price <= MOST["switching_price"] for price in chosen.prices):
         parser.error(f"--prices must lie between 0 and {MOST['switching_price']:g}")
     first = first_memory(chosen)
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
     with only_writer(chosen.out):
         for price in chosen.prices:
             folder = chosen.out / FOLDER.format(price)
