@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 BAND_BAR = 0.5
 """Tolerance of control aim C1 (section 2.3)."""
 
+WIDEST_BAND_BAR = 16.0
+"""The sensors' range: no pressure is farther from a target."""
+
 REFERENCE_PERIOD = 5e-3
 """Control period to which the weights refer [s]; other periods scale the running terms."""
 
@@ -37,6 +40,10 @@ class RewardWeights:
             value = getattr(self, entry.name)
             if not (np.isfinite(value) and value >= 0):
                 raise ValueError(f"reward weight {entry.name} = {value!r} must be finite and at least 0")
+        if not 0 < self.band_bar <= WIDEST_BAND_BAR:
+            raise ValueError(
+                f"band_bar = {self.band_bar!r} must lie above 0 and at most at {WIDEST_BAND_BAR:g} bar"
+            )
 
 
 class RewardTerms(NamedTuple):

@@ -3,6 +3,9 @@
 python training/bode.py --out docs/images/pwm-bode.png
 """
 
+import training.console.missing_packages  # noqa: F401 - before what may be missing
+
+# isort: split
 import argparse
 import sys
 from pathlib import Path

@@ -7,6 +7,9 @@ and missing policies are trained into it. Finished blocks in --out are kept: an 
 continues where it stopped. After a change of the plant or of a controller's code, choose another --out.
 """
 
+import training.console.missing_packages  # noqa: F401 - before what may be missing
+
+# isort: split
 import argparse
 import sys
 from dataclasses import replace

@@ -11,6 +11,9 @@ but only after the C code was compiled here and agreed with the policy on every 
 docs/reference/exported-policy.md says what each file is.
 """
 
+import training.console.missing_packages  # noqa: F401 - before what may be missing
+
+# isort: split
 import argparse
 import hashlib
 import json

@@ -7,6 +7,9 @@ Each writes two files, after FMI 2.0 and FMI 3.0, for co-simulation: C sources, 
 platform if a C compiler is there. docs/reference/fmu.md says what is in them.
 """
 
+import training.console.missing_packages  # noqa: F401 - before what may be missing
+
+# isort: split
 import argparse
 import os
 import sys

@@ -6,6 +6,9 @@
 docs/how-to/compare-controllers.md explains the table.
 """
 
+import training.console.missing_packages  # noqa: F401 - before what may be missing
+
+# isort: split
 import argparse
 import sys
 from pathlib import Path

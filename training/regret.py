@@ -5,6 +5,9 @@
 docs/explanation/controllers.md explains the bound, docs/results/comparison.md holds the table.
 """
 
+import training.console.missing_packages  # noqa: F401 - before what may be missing
+
+# isort: split
 import argparse
 import sys
 from dataclasses import dataclass

@@ -7,6 +7,9 @@ simulation and diagnosis see what a user sees. Finished steps in --out are kept
 (docs/results/sim-to-real.md).
 """
 
+import training.console.missing_packages  # noqa: F401 - before what may be missing
+
+# isort: split
 import argparse
 import sys
 from collections.abc import Mapping

@@ -7,6 +7,9 @@ A sweep that was stopped continues where it stopped when it is started again. do
 explains the method.
 """
 
+import training.console.missing_packages  # noqa: F401 - before what may be missing
+
+# isort: split
 import argparse
 import sys
 from importlib.metadata import version
@@ -70,7 +73,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     )
     chosen = parse_with_quick(parser, arguments, QUICK)
     check_positive(
-        parser, chosen, "episodes", "joint_episodes", "duration", "generations", "workers"
+        parser, chosen, "episodes", "joint_episodes", "duration", "screened", "generations", "workers"
     )  # fmt: skip
     check_not_negative(parser, chosen, "seed")
     _check_episodes(parser, chosen)
@@ -142,6 +145,7 @@ def sweep(
     tasks = [*worst, *(batch for cell in planned for batch in cell.batches)]
     cores = available_cores()
     with task_runner(chosen.workers or cores, chosen.cluster) as run:
+        write_options(chosen.out, config)
         outcomes = run_tasks(tasks, study, Journal(chosen.out / JOURNAL, config), run, what="sweep")
         handing_out = overhead(run, study)
     estimate = cost(
@@ -174,7 +178,6 @@ def run_and_report(chosen: argparse.Namespace, plant: Plant) -> int:
     points = chosen_points(plant, chosen.designs, chosen.factors, size, chosen.seed)
     config = configuration(chosen, size, plant, digests)
     check_options(chosen.out, config, "sweep")
-    write_options(chosen.out, config)
     study = Study(
         controllers=controllers, plant=plant, scenario=chosen.scenario, duration=chosen.duration
     )

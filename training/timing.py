@@ -7,6 +7,9 @@ process's threads without garbage collection, because an ECU has neither other p
 export times the C code (docs/reference/exported-policy.md).
 """
 
+import training.console.missing_packages  # noqa: F401 - before what may be missing
+
+# isort: split
 import argparse
 import gc
 import sys

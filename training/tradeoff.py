@@ -7,8 +7,10 @@ trains PPO and tunes classic controllers at every price; finished controllers in
 `training/compare.py --tradeoff runs/tradeoff` measures and draws them.
 """
 
+import training.console.missing_packages  # noqa: F401 - before what may be missing
+
+# isort: split
 import argparse
-import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -20,6 +22,7 @@ from controllers.learned import holds_policy, load_policy
 from controllers.registry import TUNED_KINDS
 from controllers.tuned import build, load_search, load_tunings, save_tunings
 from epv_env.common.command_line import (
+    MOST,
     check_not_negative,
     check_positive,
     fail_clearly,
@@ -165,10 +168,10 @@ def main(arguments: list[str] | None = None) -> int:
     chosen = parser.parse_args(arguments)
     check_positive(parser, chosen, "timesteps", "trials", "workers")
     check_not_negative(parser, chosen, "seed")
-    if not all(0 <= price < math.inf for price in chosen.prices):
-        parser.error("--prices must be finite and must not be negative")
+    if not all(0 <= price <= MOST["switching_price"] for price in chosen.prices):
+        parser.error(f"--prices must lie between 0 and {MOST['switching_price']:g}")
     first = first_memory(chosen)
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
     with only_writer(chosen.out):
         for price in chosen.prices:
             folder = chosen.out / FOLDER.format(price)

@@ -5,6 +5,9 @@
 writes policy, configuration, table and figures into runs/ppo and prints the table.
 """
 
+import training.console.missing_packages  # noqa: F401 - before what may be missing
+
+# isort: split
 import argparse
 import sys
 from dataclasses import asdict, replace
@@ -182,6 +185,17 @@ def main(arguments: list[str] | None = None) -> int:
             forget_failed_start(chosen.out)
 
 
+def check_device(name: str) -> None:
+    """Raises ValueError unless torch can hold a number on the device of this name."""
+    import torch
+
+    try:
+        torch.zeros(1, device=name)
+    except (RuntimeError, AssertionError) as error:
+        reason = str(error).splitlines()[0]
+        raise ValueError(f"--device {name!r}: {reason}: give cpu, or a device of this machine") from None
+
+
 def train_and_compare(chosen: argparse.Namespace, plant: Plant, run: str) -> int:
     """Train, write the policy down, and compare it; returns the exit status."""
     from training.learners.distillation import FOR_END_TO_END, Distillation
@@ -190,6 +204,7 @@ def train_and_compare(chosen: argparse.Namespace, plant: Plant, run: str) -> int
     from training.learners.ppo import train
     from training.learners.recurrent_training import train_recurrent
 
+    check_device(chosen.device)
     weights = RewardWeights(switching=chosen.switching_price)
     hyperparameters = Hyperparameters()
     if chosen.memory:

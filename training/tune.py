@@ -6,6 +6,9 @@
 The objective is the mean return on the training scenarios, the very reward that PPO maximises.
 """
 
+import training.console.missing_packages  # noqa: F401 - before what may be missing
+
+# isort: split
 import argparse
 import sys
 from collections.abc import Callable, Mapping
@@ -157,7 +160,7 @@ def main(arguments: list[str] | None = None) -> int:
     chosen = parser.parse_args(arguments)
     check_positive(parser, chosen, "trials", "episodes", "duration")
     check_not_negative(parser, chosen, "seed")
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
     options = {"parameters": TUNING_REGION}
     settings = {"trials": chosen.trials, "episodes": chosen.episodes, "duration": chosen.duration}
     search = {"method": "Optuna TPE on the mean return", **settings, "seed": chosen.seed, **options}

@@ -73,6 +73,12 @@ MOST = {
     "duration": 3600.0,  # [s] an episode's traces of an hour fill the memory
     "seconds": 3600.0,  # [s] the same for a film
     "episodes": 1_000_000,  # their results fill the memory; and seeds end where others' begin
+    **dict.fromkeys(("named", "random", "bound", "tuning", "joint_episodes", "screened"), 1_000_000),
+    "seeds": 1000,  # trainings
+    "recurrent_seeds": 1000,
+    "generations": 10_000,
+    "seed": 2**32 - 1,  # what NumPy's and torch's generators take
+    "switching_price": 1000.0,  # a switching would cost more than any excursion
     "timesteps": 10**12,  # years
     "recurrent_timesteps": 10**12,
     "trials": 1_000_000,
@@ -86,17 +92,23 @@ def check_positive(parser: argparse.ArgumentParser, chosen: argparse.Namespace, 
     """End with one sentence unless each of these numbers is above 0 and sensible (MOST), or None."""
     for name in names:
         value = getattr(chosen, name)
-        option = f"--{name.replace('_', '-')}"
         if value is not None and not 0 < value < math.inf:
-            parser.error(f"{option} must be positive and finite")
-        if value is not None and value > MOST.get(name, math.inf):
-            parser.error(f"{option} {value:g} is beyond {MOST[name]:g}: give less")
+            parser.error(f"--{name.replace('_', '-')} must be positive and finite")
+        _check_most(parser, name, value)
 
 
 def check_not_negative(parser: argparse.ArgumentParser, chosen: argparse.Namespace, *names: str) -> None:
-    """End with one sentence unless each of these numbers is finite and at least 0."""
+    """End with one sentence unless each of these numbers is at least 0 and sensible (MOST)."""
     for name in names:
-        if getattr(chosen, name) < 0:
+        value = getattr(chosen, name)
+        if value < 0:
             parser.error(f"--{name.replace('_', '-')} must not be negative")
-        if not getattr(chosen, name) < math.inf:
+        if not value < math.inf:
             parser.error(f"--{name.replace('_', '-')} must be finite")
+        _check_most(parser, name, value)
+
+
+def _check_most(parser: argparse.ArgumentParser, name: str, value: float | None) -> None:
+    most = MOST.get(name, math.inf)
+    if value is not None and value > most:
+        parser.error(f"--{name.replace('_', '-')} must be at most {most:.10g}")

@@ -19,10 +19,12 @@ def missing_package(module: str, *, preferred: str = "") -> str | None:
     if not extras:
         return None
     extra = preferred if preferred in extras else extras[0]
-    return (
-        f"this needs the package {top}, which is not installed: pip install "
-        f"'{DISTRIBUTION}[{extra}]' (in a clone: pip install -e '.[{extra}]')"
-    )
+    return f"this needs the package {top}, which is not installed: {how_to_install(extra)}"
+
+
+def how_to_install(extra: str) -> str:
+    """The commands that install an extra: from the package index, and in a clone."""
+    return f"pip install '{DISTRIBUTION}[{extra}]' (in a clone: pip install -e '.[{extra}]')"
 
 
 def _extras_of(package: str) -> list[str]:

@@ -11,6 +11,7 @@ import numpy as np
 from gymnasium.error import DependencyNotInstalled
 from numpy.typing import NDArray
 
+from epv_env.common.extras import how_to_install
 from epv_env.render.average import halved
 from epv_env.render.palette import Colour
 
@@ -35,7 +36,7 @@ def load_pygame() -> ModuleType:
         import pygame
     except ImportError as error:
         raise DependencyNotInstalled(
-            "pygame draws the valve and is not installed: run `pip install epv-valve[render]`"
+            f"pygame draws the valve and is not installed: {how_to_install('render')}"
         ) from error
     return pygame
 

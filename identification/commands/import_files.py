@@ -36,7 +36,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--name", default=None, help="of the campaign; default: the files' folder")
     parser.add_argument("--dry-run", action="store_true", help="show everything and write nothing")
-    parser.set_defaults(check=lambda chosen: check_positive(parser, chosen, "rate", "ambient_bar"))
+    parser.set_defaults(
+        check=lambda chosen: check_positive(parser, chosen, "rate", "ambient_bar", "temperature_K")
+    )
 
 
 def run(chosen: argparse.Namespace) -> None:

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from epv_env.common.command_line import writable_folder
+from epv_env.common.command_line import MOST, writable_folder
 
 MOST_COUNTED = 100_000
 """Starts, trials, campaigns or processes, at most: more would run for years."""
@@ -22,7 +22,7 @@ def add_plant(parser: argparse.ArgumentParser, *, help: str) -> None:
 
 def add_seed(parser: argparse.ArgumentParser, *, help: str) -> None:
     """Add --seed, a whole number from 0 up; help: what the seed draws."""
-    parser.add_argument("--seed", type=int, action=_NotNegative, default=0, help=help)
+    parser.add_argument("--seed", type=int, action=_Seed, default=0, help=help)
 
 
 def add_count(parser: argparse.ArgumentParser, option: str, *, default: int | None, help: str) -> None:
@@ -44,16 +44,18 @@ class _AtLeastOne(argparse.Action):
         if value < 1:
             parser.error(f"{self.option_strings[0]} must be at least 1")
         if value > MOST_COUNTED:
-            parser.error(f"{self.option_strings[0]} {value} is beyond {MOST_COUNTED}: give less")
+            parser.error(f"{self.option_strings[0]} must be at most {MOST_COUNTED}")
         setattr(chosen, self.dest, value)
 
 
-class _NotNegative(argparse.Action):
-    """Stores a number; ends with one sentence if it is below 0."""
+class _Seed(argparse.Action):
+    """Stores a number; ends with one sentence if it is no seed of a generator."""
 
     def __call__(
         self, parser: argparse.ArgumentParser, chosen: argparse.Namespace, value: Any, option: Any = None
     ) -> None:
         if value < 0:
             parser.error(f"{self.option_strings[0]} must not be negative")
+        if value > MOST["seed"]:
+            parser.error(f"{self.option_strings[0]} must be at most {MOST['seed']}")
         setattr(chosen, self.dest, value)

@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 
 from identification.importing.formats.physical_units import parsed_unit
-from identification.importing.formats.source_file import SourceChannel
+from identification.importing.formats.source_file import ImportingError, SourceChannel, SourceFile
 
 QUANTITY: Mapping[str, str] = {
     "time": "time",
@@ -77,3 +77,16 @@ def proposed(channels: Sequence[SourceChannel]) -> dict[str, list[SourceChannel]
         if name is not None:
             found.setdefault(name, []).append(channel)
     return found
+
+
+def named_channel(source: SourceFile, wanted: str) -> SourceChannel:
+    """The one channel that a mapping file calls by this name. Raises ImportingError."""
+    found = [channel for channel in source.channels if channel.name == wanted]
+    found = found or [c for c in source.channels if split_name(c.name)[0] == wanted]
+    if len(found) != 1:
+        count = "no channel" if not found else f"{len(found)} channels"
+        known = ", ".join(channel.name for channel in source.channels[:20])
+        raise ImportingError(
+            f"{source.path}: {count} of the name {wanted!r}; there are {known}: mend the mapping file"
+        )
+    return found[0]

@@ -1,14 +1,16 @@
 """Which channel of a file is which of a recording: by the mapping file, else by names and units."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.importing.channel_names import QUANTITY, meaning, proposed, split_name
+from identification.importing.channel_names import QUANTITY, meaning, named_channel, proposed, split_name
+from identification.importing.clocks import clock_of
 from identification.importing.formats.physical_units import PhysicalUnit, needed_unit
 from identification.importing.formats.source_file import ImportingError, SourceChannel, SourceFile
+from identification.importing.formats.time_stamps import begin_offsets
 from identification.importing.mapping_file import ChannelEntry, MappingFile
 
 SUPPLY_PAIR = ("p1a", "p1b")
@@ -30,7 +32,9 @@ class MappedChannel:
     factor: float
     """Of the mapping file."""
     time: NDArray
-    """(samples,) [s]."""
+    """(samples,) [s], from one begin for all channels of a file."""
+    begin: np.datetime64 | None
+    """The point in time at which its file's clock is 0; None: not told."""
     values: NDArray
     """(samples,) [SI; pressures absolute]."""
 
@@ -45,7 +49,7 @@ class MappedChannel:
 def chosen_channels(source: SourceFile, mapping: MappingFile) -> dict[str, SourceChannel]:
     """The channel of the file for each of a recording. Raises ImportingError for what is unclear."""
     entries = {name: entry for name, entry in mapping.channels.items() if name != "time"}
-    chosen = {name: _named(source, entry.source) for name, entry in entries.items()}
+    chosen = {name: named_channel(source, entry.source) for name, entry in entries.items()}
     taken = {id(channel) for channel in chosen.values()}
     free = [channel for channel in source.channels if id(channel) not in taken]
     for name, candidates in proposed(free).items():
@@ -68,23 +72,15 @@ def mapped_channels(
 
     ambient: p_env [Pa absolute]; None: not known, so that gauge pressures are refused.
     """
-    return [
+    mapped = [
         _mapped(source, mapping, name, channel, ambient)
         for name, channel in chosen_channels(source, mapping).items()
     ]
-
-
-def _named(source: SourceFile, wanted: str) -> SourceChannel:
-    """The one channel of that name."""
-    found = [channel for channel in source.channels if channel.name == wanted]
-    found = found or [c for c in source.channels if split_name(c.name)[0] == wanted]
-    if len(found) != 1:
-        count = "no channel" if not found else f"{len(found)} channels"
-        known = ", ".join(channel.name for channel in source.channels[:20])
-        raise ImportingError(
-            f"{source.path}: {count} of the name {wanted!r}; there are {known}: mend the mapping file"
-        )
-    return found[0]
+    offsets = begin_offsets(str(source.path), [channel.begin for channel in mapped])
+    return [
+        replace(channel, time=channel.time + offset)
+        for channel, offset in zip(mapped, offsets, strict=True)
+    ]
 
 
 def _check_complete(source: SourceFile, chosen: Mapping[str, SourceChannel]) -> None:
@@ -117,7 +113,8 @@ def _mapped(
                 "the mapping file"
             )
         offset = ambient
-    time, values = _filled(place, _times(source, mapping, channel), channel.values)
+    clock = clock_of(source, mapping, channel, entry.time)
+    time, values = _filled(place, clock.times, channel.values)
     return MappedChannel(
         name=name,
         source=channel,
@@ -125,6 +122,7 @@ def _mapped(
         reference=reference,
         factor=entry.factor,
         time=time,
+        begin=clock.begin,
         values=entry.factor * unit.size * values + offset,
     )
 
@@ -147,29 +145,6 @@ def _unit(place: str, name: str, channel: SourceChannel, entry: ChannelEntry) ->
                 "mapping file"
             )
     return unit
-
-
-def _times(source: SourceFile, mapping: MappingFile, channel: SourceChannel) -> NDArray:
-    """Times of a channel's samples, (samples,) [s]."""
-    if channel.time is not None:
-        return channel.time
-    wanted = mapping.channels.get("time")
-    mates = [
-        c
-        for c in source.channels
-        if c.table == channel.table and c.time is None and len(c.values) == len(channel.values)
-    ]
-    found = [c for c in mates if (c.name == wanted.source if wanted else meaning(c) == "time")]
-    if len(found) != 1:
-        state = "no channel" if not found else " and ".join(repr(c.name) for c in found)
-        raise ImportingError(
-            f"{source.path}: {state} holds the times of {channel.name}: name one of them, with its "
-            'unit, as "time" in a mapping file'
-        )
-    text = (wanted.unit if wanted else None) or found[0].unit or split_name(found[0].name)[1] or "s"
-    unit = needed_unit(text, "time", f"{source.path}, {found[0].name}")
-    factor = wanted.factor if wanted else 1.0
-    return found[0].values * unit.size * factor
 
 
 def _filled(place: str, time: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:

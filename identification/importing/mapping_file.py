@@ -22,6 +22,8 @@ class ChannelEntry(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_o
     """Unit, with gauge or absolute for pressures; None: as the file says."""
     factor: float = 1.0
     """Right value over reading, besides the unit; -1 turns a sign round."""
+    time: str | None = None
+    """Name of the channel that holds its times; None: as the file says, or the one named as "time"."""
 
 
 class RecordingEntry(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
@@ -53,7 +55,7 @@ class MappingFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_on
 
 def read_mapping(path: Path) -> MappingFile:
     """A mapping file. Raises ImportingError or JSONFileError."""
-    remedy = "write it as docs/reference/files.md shows"
+    remedy = "write it as docs/how-to/use-your-recordings.md shows"
     mapping = read_json(path, MappingFile, version=FORMAT, remedy=remedy)
     for name in mapping.channels:
         if name not in QUANTITY:

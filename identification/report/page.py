@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from epv_env.common.extras import how_to_install
 from epv_env.common.files import write_text
 
 if TYPE_CHECKING:
@@ -142,7 +143,7 @@ def _template() -> "Template":
         from jinja2 import Environment, PackageLoader, StrictUndefined
     except ImportError:
         raise ImportError(
-            "an HTML page needs Jinja2, which is not installed: pip install 'epv-valve[identification]'"
+            f"an HTML page needs Jinja2, which is not installed: {how_to_install('identification')}"
         ) from None
     environment = Environment(
         loader=PackageLoader("identification.report", package_path=""),

@@ -3,10 +3,12 @@
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.wrappers import RecordVideo
 from numpy.typing import NDArray
 
 from epv_env.render import Renderer, Snapshot, canvas, gas, geometry, palette, strip, window
@@ -238,10 +240,23 @@ def test_an_unknown_mode_is_refused() -> None:
         Renderer("ansi", fps=60)  # pyright: ignore[reportArgumentType]
 
 
+def test_an_episode_is_filmed(tmp_path: Path) -> None:
+    pytest.importorskip("moviepy", reason="needs the extra 'video'")
+    env = gymnasium.make("EPValve-v0", render_mode="rgb_array", max_episode_steps=10)
+    film = RecordVideo(env, str(tmp_path), episode_trigger=lambda _: True)
+    film.reset(seed=0)
+    for _ in range(10):
+        film.step(1)
+    film.close()
+    assert [path.stat().st_size > 1000 for path in tmp_path.glob("*.mp4")] == [True]
+
+
 def test_without_pygame_the_remedy_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pygame", None)
     renderer = Renderer("rgb_array", fps=60)
-    with pytest.raises(gymnasium.error.DependencyNotInstalled, match=r"pip install epv-valve\[render\]"):
+    with pytest.raises(
+        gymnasium.error.DependencyNotInstalled, match=r"pip install 'epv-valve\[render\]'"
+    ):
         renderer.draw(SHUT)
 
 

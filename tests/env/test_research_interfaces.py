@@ -73,6 +73,8 @@ def test_effects_leave_the_other_draws_as_they_are():
         ({"weights": {"band": -1.0}}, "must be finite and at least 0"),
         ({"weights": 3.0}, "give a RewardWeights"),
         ({"band_bar": float("nan")}, "must be finite"),
+        ({"band_bar": 0.0}, "must lie above 0 and at most at 16 bar"),
+        ({"band_bar": 1e9}, "must lie above 0 and at most at 16 bar"),
         ({"sensor_noise": 1e9}, "must lie in 0 to 1000"),
         ({"sensor_noise": "1"}, "give a number"),
         ({"control_period": "0.005"}, "give a number"),

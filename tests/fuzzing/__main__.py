@@ -1,4 +1,4 @@
-"""Counts what becomes of wrong inputs: python -m tests.fuzzing --inputs 1200"""
+"""Counts what becomes of wrong inputs: python -m tests.fuzzing --inputs 1800"""
 
 import argparse
 import os
@@ -15,6 +15,7 @@ import numpy as np
 from tests.fuzzing.command_lines import import_commands, left_files, status_of, wrong_line
 from tests.fuzzing.damages import damaged_bytes, damaged_value
 from tests.fuzzing.formats import FORMATS, outcome
+from tests.fuzzing.option_values import NO_VALUES, number_options, refusal, says
 
 LONGEST = 10
 """Time after which an input counts as a hang [s]."""
@@ -48,6 +49,20 @@ def outcome_of_line(rng: np.random.Generator, folder: Path) -> tuple[str, str]:
     return "wrote a file" if left_files(folder) else found, f"{name} {arguments}"
 
 
+def outcome_of_value(rng: np.random.Generator, folder: Path) -> tuple[str, str]:
+    """What becomes of one wrong number behind one option: outcome, and the option."""
+    options = number_options()
+    name, option = options[int(rng.integers(len(options)))]
+    value = NO_VALUES[int(rng.integers(len(NO_VALUES)))]
+    status, sentence = refusal(name, option, value)
+    found = "refused" if status == 2 and says(sentence, option) else f"status {status}: {sentence}"
+    return "wrote a file" if left_files(folder) else found, f"{name} {option}={value}"
+
+
+OUTCOMES = {"file": outcome_of_file, "line": outcome_of_line, "value": outcome_of_value}
+"""Kinds of wrong inputs, and what becomes of one."""
+
+
 def observed(what: str, seed: int) -> tuple[str, str]:
     """Outcome of the input of this seed."""
     rng = np.random.default_rng(seed)
@@ -56,7 +71,7 @@ def observed(what: str, seed: int) -> tuple[str, str]:
         os.chdir(name)
         signal.alarm(LONGEST)
         try:
-            return (outcome_of_file if what == "file" else outcome_of_line)(rng, Path(name))
+            return OUTCOMES[what](rng, Path(name))
         except Hang:
             return "hang", f"{what} {seed}"
         except Exception as error:
@@ -69,7 +84,7 @@ def observed(what: str, seed: int) -> tuple[str, str]:
 def main() -> int:
     """Command line; returns 1 if an input was not refused as it should be."""
     parser = argparse.ArgumentParser(description="Count what becomes of wrong inputs.")
-    parser.add_argument("--inputs", type=int, default=1200, help="half of them files, half lines")
+    parser.add_argument("--inputs", type=int, default=1800, help="files, lines and numbers by turns")
     parser.add_argument("--seed", type=int, default=0, help="of the first input")
     chosen = parser.parse_args()
 
@@ -81,7 +96,7 @@ def main() -> int:
     counts: Counter[tuple[str, str]] = Counter()
     slowest = 0.0
     for k in range(chosen.inputs):
-        what = ("file", "line")[k % 2]
+        what = list(OUTCOMES)[k % len(OUTCOMES)]
         began = time.perf_counter()
         found, which = observed(what, chosen.seed + k)
         slowest = max(slowest, time.perf_counter() - began)

@@ -1,12 +1,16 @@
 """The console command `epv`: every command by one name, and a missing package with its extra."""
 
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from epv_env.common.extras import missing_package
 from training.console.command import COMMANDS, overview, run
+
+ROOT = Path(__file__).parents[2]
 
 WITHOUT = """
 import sys
@@ -66,3 +70,19 @@ def test_an_unknown_command_is_refused_with_the_nearest():
         run(["trian"])
     with pytest.raises(ValueError, match="`epv` lists them"):
         run(["0"])
+
+
+def test_a_script_names_a_missing_package_too(tmp_path):
+    """Its imports fail before its `main` is called."""
+    hook = WITHOUT.partition("sys.argv")[0].format(wanted=EXTRAS_ONLY)
+    (tmp_path / "sitecustomize.py").write_text(hook)
+    paths = os.pathsep.join([str(tmp_path), str(ROOT)])
+    result = subprocess.run(
+        [sys.executable, str(ROOT / "training" / "sweep.py"), "--help"],
+        capture_output=True, text=True, timeout=120, check=False,
+        env={**os.environ, "PYTHONPATH": paths},
+    )  # fmt: skip
+    assert result.returncode != 0
+    assert result.stderr.startswith("error: this needs the package ")
+    assert "pip install 'epv-valve[training]'" in result.stderr
+    assert result.stderr.count("\n") == 1

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.common.extras import how_to_install
 from identification.gap.model.recorded_run import Run
 
 StartValues = Callable[[Run], Mapping[str, float]]
@@ -124,7 +125,9 @@ def _unpacked(path: Path) -> _Unpacked:
         fmpy = importlib.import_module("fmpy")
         call_failed = importlib.import_module("fmpy.fmi1").FMICallException
     except ImportError:
-        raise ImportError("an FMU needs FMPy, which is not installed: pip install '.[fmu]'") from None
+        raise ImportError(
+            f"an FMU needs FMPy, which is not installed: {how_to_install('fmu')}"
+        ) from None
     folder = TemporaryDirectory(prefix="fmu-", ignore_cleanup_errors=True)
     try:
         fmpy.extract(str(path), folder.name)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
+from epv_env.common.extras import how_to_install
 from identification.importing.formats.source_file import ImportingError, SourceChannel
 
 EXTRA = "bench-files"
@@ -35,6 +36,5 @@ def needed_package(name: str, purpose: str) -> ModuleType:
     except ImportError:
         package = name.partition(".")[0]
         raise ImportingError(
-            f"{purpose} need the package {package}, which is not installed: "
-            f"pip install 'epv-valve[{EXTRA}]' (in a clone: pip install -e '.[{EXTRA}]')"
+            f"{purpose} need the package {package}, which is not installed: {how_to_install(EXTRA)}"
         ) from None

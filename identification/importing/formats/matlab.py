@@ -21,6 +21,9 @@ HDF5_SIGNATURE = b"\x89HDF"
 VALUE_FIELDS, TIME_FIELDS, UNIT_FIELDS = ("data", "values", "value"), ("time", "t"), ("unit", "units")
 """Fields of a struct that holds one channel."""
 
+TIME_UNIT_FIELDS = ("time_unit", "t_unit", "timeunit", "time_units")
+"""Fields of such a struct that hold the unit of its times."""
+
 
 def read(path: Path) -> tuple[str, list[SourceChannel]]:
     """Every numeric vector, and every column of a numeric matrix."""
@@ -68,16 +71,17 @@ def _columns(
             unit=unit,
             values=np.asarray(column, dtype=float),
             time=time,
-            table=f"{path}[{len(column)}]",
+            table=path,
         )
 
 
 def _single(name: str, content: Mapping[str, Any]) -> Iterator[SourceChannel]:
     """A struct that holds one channel, perhaps with its own time."""
-    value = np.asarray(_first(content, VALUE_FIELDS))
-    time, unit = _first(content, TIME_FIELDS), _first(content, UNIT_FIELDS)
-    times = None if time is None else np.ravel(np.asarray(time, dtype=float))
-    yield from _columns(name, value, str(unit or ""), name, times)
+    unit, time = _first(content, UNIT_FIELDS), _first(content, TIME_FIELDS)
+    yield from _columns(name, np.asarray(_first(content, VALUE_FIELDS)), str(unit or ""), name)
+    if time is not None:
+        time_unit = str(_first(content, TIME_UNIT_FIELDS) or "")
+        yield from _columns(f"{name}.time", np.asarray(time), time_unit, name)
 
 
 def _simulink(path: str, time: NDArray, signals: Any) -> Iterator[SourceChannel]:

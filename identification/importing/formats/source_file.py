@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 from numpy.typing import NDArray
 
 
@@ -22,8 +23,11 @@ class SourceChannel:
     """(samples,), in that unit; NaN where a row has no value."""
     time: NDArray | None = None
     """Times of the samples, (samples,) [s]; None: another channel of the table holds them."""
+    begin: np.datetime64 | None = None
+    """The point in time at which `time`, or a channel that holds times, is 0; None: not told."""
     table: str = ""
-    """Channels of one table share their rows; the name of a group, sheet or struct."""
+    """Channels of one table share their rows; the name of a group, sheet or struct, dots between the
+    names of structs within structs."""
 
 
 @dataclass(frozen=True, kw_only=True)

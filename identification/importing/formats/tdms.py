@@ -18,13 +18,7 @@ def read(path: Path) -> tuple[str, list[SourceChannel]]:
     nptdms = needed_package("nptdms", "TDMS files")
     with nptdms.TdmsFile.open(path) as file:
         channels = [
-            SourceChannel(
-                name=channel.name,
-                unit=_unit(channel.properties),
-                values=seconds(np.asarray(channel[:])),
-                time=_times(channel),
-                table=group.name,
-            )
+            _channel(group.name, channel)
             for group in file.groups()
             for channel in group.channels()
             if channel.dtype.kind in "iufM" and len(channel) > 1
@@ -36,11 +30,18 @@ def _unit(properties: dict[str, Any]) -> str:
     return next((str(properties[name]) for name in UNIT_PROPERTIES if name in properties), "")
 
 
-def _times(channel: Any) -> np.ndarray | None:
-    """Times of a waveform [s]; None for a channel whose times are another channel."""
-    if not channel.properties.get("wf_increment"):
-        return None
-    return channel.time_track()
+def _channel(group: str, channel: Any) -> SourceChannel:
+    """A waveform with its times and their begin, or a channel whose times are another channel."""
+    values, begin = seconds(np.asarray(channel[:]))
+    waveform = bool(channel.properties.get("wf_increment"))
+    return SourceChannel(
+        name=channel.name,
+        unit=_unit(channel.properties) or ("s" if begin is not None else ""),
+        values=values,
+        time=channel.time_track() if waveform else None,
+        begin=channel.properties.get("wf_start_time") if waveform else begin,
+        table=group,
+    )
 
 
 TDMS = FileFormat(name="TDMS", suffixes=(".tdms",), read=read)

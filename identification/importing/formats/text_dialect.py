@@ -2,11 +2,11 @@
 
 import codecs
 import csv
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from identification.importing.formats.source_file import ImportingError
+from identification.importing.formats.time_stamps import STAMP
 
 MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -20,9 +20,6 @@ COMMENTS = ("#", "%", "//", "!")
 
 SAMPLE = 40
 """Lines at the middle and at the end of a file from which the dialect is read."""
-
-STAMP = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d")
-"""Beginning of a point in time (ISO 8601)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +91,7 @@ def found_dialect(file: str, lines: Sequence[str]) -> Dialect:
     if _fit(best, sample) <= 0:
         raise ImportingError(
             f"{file}: no separator and decimal sign make columns of numbers of its lines: export it as "
-            "CSV, one line per sample"
+            "CSV, one line per sample, with times in seconds or as ISO 8601 (2026-03-01T10:00:00.0005)"
         )
     return best
 

@@ -9,14 +9,8 @@ from numpy.typing import NDArray
 from identification.importing.formats.file_format import FileFormat
 from identification.importing.formats.physical_units import is_unit
 from identification.importing.formats.source_file import ImportingError, SourceChannel
-from identification.importing.formats.text_dialect import (
-    COMMENTS,
-    STAMP,
-    Dialect,
-    decoded,
-    found_dialect,
-)
-from identification.importing.formats.time_stamps import seconds
+from identification.importing.formats.text_dialect import COMMENTS, Dialect, decoded, found_dialect
+from identification.importing.formats.time_stamps import STAMP, points_in_time, seconds
 
 Row = tuple[int, list[str]]
 """Number of a line in its file, and its cells."""
@@ -34,10 +28,10 @@ def read(path: Path) -> tuple[str, list[SourceChannel]]:
     rows = [(number, dialect.cells(line)) for number, line in lines]
     names, units, data = _parts(str(path), rows, dialect)
     channels = [
-        SourceChannel(
-            name=name,
-            unit="s" if _stamped(data, column) else units[column],
-            values=_column(str(path), data, column, name, dialect),
+        _times(str(path), data, column, name)
+        if _stamped(data, column)
+        else SourceChannel(
+            name=name, unit=units[column], values=_column(str(path), data, column, name, dialect)
         )
         for column, name in enumerate(names)
         if name
@@ -84,11 +78,15 @@ def _stamped(data: Sequence[Row], column: int) -> bool:
     return column < len(cells) and STAMP.match(cells[column]) is not None
 
 
+def _times(file: str, data: Sequence[Row], column: int, name: str) -> SourceChannel:
+    """A column of points in time, as seconds."""
+    texts = (cells[column] if column < len(cells) else "" for _, cells in data)
+    values, begin = seconds(points_in_time(f"{file}, {name}", texts))
+    return SourceChannel(name=name, unit="s", values=values, begin=begin)
+
+
 def _column(file: str, data: Sequence[Row], column: int, name: str, dialect: Dialect) -> NDArray:
     """The numbers of a column, (samples,); NaN for an empty cell."""
-    if _stamped(data, column):
-        stamps = [cells[column].replace(",", ".").rstrip("Z") for _, cells in data]
-        return seconds(np.array(stamps, dtype="datetime64[ns]"))
     values = np.empty(len(data))
     for place, (line, cells) in enumerate(data):
         cell = cells[column] if column < len(cells) else ""

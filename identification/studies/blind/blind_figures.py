@@ -21,6 +21,9 @@ from identification.valve_gap.causes import PARAMETER_COMPONENTS
 NO_GAP, UNKNOWN, SEVERAL, NO_TRUE_CAUSE = "no gap", "unknown", "several", "nothing"
 """Labels of rows and columns that are no cause."""
 
+CELL, ROOM_FOR_NAMES = 0.4, 2.0
+"""Of a matrix: size of a cell and of the names beside it [inch]."""
+
 
 def component_figure(trials: Sequence[TrialScore]) -> Figure:
     """True against diagnosed component, for trials with at most one cause."""
@@ -33,7 +36,7 @@ def component_figure(trials: Sequence[TrialScore]) -> Figure:
         for trial in _with_one_cause_at_most(trials)
     ]
     rows, columns = [NO_TRUE_CAUSE, *names], [NO_GAP, *names, UNKNOWN]
-    return _matrix_figure(confusion_matrix(pairs, rows, columns), rows, columns, size=(7.5, 6.5))
+    return _matrix_figure(confusion_matrix(pairs, rows, columns), rows, columns)
 
 
 def cause_figure(trials: Sequence[TrialScore]) -> Figure:
@@ -43,7 +46,7 @@ def cause_figure(trials: Sequence[TrialScore]) -> Figure:
         (_true_label(trial, str), _diagnosed_label(trial)) for trial in _with_one_cause_at_most(trials)
     ]
     rows, columns = [NO_TRUE_CAUSE, *names], [NO_GAP, *names, SEVERAL, UNKNOWN]
-    return _matrix_figure(confusion_matrix(pairs, rows, columns), rows, columns, size=(13, 12))
+    return _matrix_figure(confusion_matrix(pairs, rows, columns), rows, columns)
 
 
 def detection_figure(trials: Sequence[TrialScore], settings: BlindSettings = DEFAULTS) -> Figure:
@@ -111,14 +114,13 @@ def _diagnosed_label(trial: TrialScore) -> str:
     return trial.first_cause[0] if len(trial.first_cause) == 1 else SEVERAL
 
 
-def _matrix_figure(
-    counts: NDArray, rows: Sequence[str], columns: Sequence[str], *, size: tuple[float, float]
-) -> Figure:
+def _matrix_figure(counts: NDArray, rows: Sequence[str], columns: Sequence[str]) -> Figure:
     """Counts (rows, columns) coloured by their share of the row; without empty rows and columns."""
     keep_rows = np.flatnonzero(counts.sum(axis=1)).tolist()
     keep_columns = np.flatnonzero(counts.sum(axis=0)).tolist()
     shown = counts[np.ix_(keep_rows, keep_columns)]
-    figure = Figure(figsize=size, layout="constrained")
+    size = [ROOM_FOR_NAMES + CELL * len(kept) for kept in (keep_columns, keep_rows)]
+    figure = Figure(figsize=(size[0], size[1]), layout="constrained")
     axes = figure.add_subplot()
     axes.set_xlabel("diagnosed")
     axes.set_ylabel("true")

@@ -73,7 +73,7 @@ def robustness_section(disturbance: str, pairs: Sequence[PairOfScores]) -> Secti
             ),
             _share_table(found),
             _verdict_table(pairs),
-            _changed_table(pairs),
+            _changed(pairs),
         ],
     )
 
@@ -136,7 +136,8 @@ def _verdict_table(pairs: Sequence[PairOfScores]) -> Table:
     return Table(columns=["Undisturbed", *VERDICTS], rows=rows, caption="Verdicts, disturbed.")
 
 
-def _changed_table(pairs: Sequence[PairOfScores]) -> Table:
+def _changed(pairs: Sequence[PairOfScores]) -> Table | Text:
+    """The trials whose answer changed, or a sentence that there are none."""
     rows = [
         [
             f"{pair.before.number:04d}",
@@ -147,5 +148,7 @@ def _changed_table(pairs: Sequence[PairOfScores]) -> Table:
         for pair in pairs
         if not pair.same_first_cause or pair.before.verdict != pair.after.verdict
     ]
+    if not rows:
+        return Text(text="No trial's answer changed.")
     columns = ["Trial", "kind", "truth", "undisturbed", "disturbed"]
     return Table(columns=columns, rows=rows, caption="Trials whose answer changed.")

@@ -1,0 +1,135 @@
+"""Times in a struct of their own, as points in time and at different rates give the campaign back."""
+
+import json
+
+import numpy as np
+import pytest
+
+from epv_env.plant.parameters import Parameters
+from identification.bench.programmes import REPORT_SUITE
+from identification.bench.session import run_bench
+from identification.importing.formats.source_file import ImportingError
+from identification.importing.formats.time_stamps import points_in_time, seconds
+from identification.importing.import_campaign import import_campaign, read_files
+from identification.recordings.campaign_files import read_campaign
+from identification.recordings.recording import CHANNELS
+from tests.identification.importing.dialects import text
+from tests.identification.importing.timed_files import (
+    LEAD,
+    SAME_RATE,
+    TWO_RATES,
+    channels_of,
+    mat5,
+    structs,
+    tdms,
+)
+
+
+@pytest.fixture(scope="module")
+def bench():
+    """The validation and the record at rest of the virtual bench."""
+    return run_bench((REPORT_SUITE[-2], REPORT_SUITE[-1]), Parameters.calibrated(), seed=12)
+
+
+@pytest.mark.parametrize("kind", SAME_RATE)
+def test_every_kind_of_time_gives_the_campaign_back(bench, kind, tmp_path):
+    files = [SAME_RATE[kind](tmp_path / r.name, r) for r in bench.recordings]
+    import_campaign(files, tmp_path / "campaign", ambient_bar=1.0)
+    campaign = read_campaign(tmp_path / "campaign")
+    for made, true in zip(campaign.recordings, bench.recordings, strict=True):
+        assert (made.name, made.role, made.period) == (true.name, true.role, true.period)
+        for name in CHANNELS:
+            atol = 1.0 if name.startswith("p") else 1e-5
+            np.testing.assert_allclose(made.channel(name), true.channel(name), rtol=0, atol=atol)
+
+
+@pytest.mark.parametrize("kind", TWO_RATES)
+def test_channels_of_two_rates_come_to_the_slower_one(bench, kind, tmp_path):
+    files = [TWO_RATES[kind](tmp_path / r.name, r) for r in bench.recordings]
+    imported = import_campaign(files, tmp_path / "campaign", ambient_bar=1.0)
+    assert set(imported.files[0].gridded.resampled) == {"I", "U"}
+    for made, true in zip(
+        read_campaign(tmp_path / "campaign").recordings, bench.recordings, strict=True
+    ):
+        assert made.period == 2 * true.period
+        for name in ("p1", "p2", "p3"):
+            np.testing.assert_allclose(made.channel(name), true.channel(name)[::2], rtol=0, atol=1.0)
+
+
+@pytest.mark.parametrize("waveform", [False, True])
+def test_channels_that_start_apart_stay_in_step(bench, waveform, tmp_path):
+    true = bench.recordings[0]
+    path = tdms(tmp_path / true.name, true, waveform=waveform, lead=LEAD)
+    made = read_files([path], ambient_bar=1.0).campaign.recordings[0]
+    for name in CHANNELS:
+        atol = 1.0 if name.startswith("p") else 1e-5
+        np.testing.assert_allclose(made.channel(name), true.channel(name)[LEAD:], rtol=0, atol=atol)
+
+
+def test_a_mapping_file_names_each_channels_times(bench, tmp_path):
+    true = bench.recordings[0]
+    columns = {
+        "time": (true.time, "s"),
+        **channels_of(true),
+        "time of p": (true.time + true.period * LEAD, "s"),
+    }
+    path = text(tmp_path / "validation.csv", columns)
+    with pytest.raises(ImportingError, match=r"'time \[s\]' or 'time of p \[s\]' may hold the times"):
+        read_files([path])
+    content = {
+        "format": "epv-mapping/1",
+        "channels": {
+            "time": {"source": "time"},
+            **{name: {"source": name, "time": "time of p"} for name in ("p1", "p2", "p3")},
+        },
+    }
+    (tmp_path / "map.json").write_text(json.dumps(content))
+    made = read_files([path], mapping=tmp_path / "map.json", ambient_bar=1.0).campaign.recordings[0]
+    np.testing.assert_allclose(made.p3, true.p3[:-LEAD], rtol=0, atol=1.0)
+    np.testing.assert_allclose(made.I, true.I[LEAD:], rtol=0, atol=1e-5)
+
+
+def test_a_mapping_file_gives_the_unit_of_times_in_structs(bench, tmp_path):
+    true = bench.recordings[0]
+    content = {name: {**one, "time": one["time"] * 1e3} for name, one in structs(true).items()}
+    path = mat5(tmp_path / "validation", content)
+    with pytest.raises(ImportingError, match=r"give the right unit of time in a mapping file"):
+        read_files([path])
+    mapping = {"format": "epv-mapping/1", "channels": {"time": {"source": "time", "unit": "ms"}}}
+    (tmp_path / "map.json").write_text(json.dumps(mapping))
+    made = read_files([path], mapping=tmp_path / "map.json", ambient_bar=1.0).campaign.recordings[0]
+    assert made.period == true.period
+
+
+def test_points_in_time_are_read_to_the_nanosecond_and_zones_are_taken_off():
+    same = [
+        "2026-03-01T12:00:00.000000001Z",
+        "20260301T140000,000000001+0200",
+        "2026-03-01 08:30:00.000000001-03:30",
+    ]
+    assert set(points_in_time("a", same)) == {np.datetime64("2026-03-01T12:00:00.000000001", "ns")}
+    values, begin = seconds(points_in_time("a", ["2026-03-01T12:00", "", "2026-03-01T12:00:00.5"]))
+    np.testing.assert_array_equal(values, [0.0, np.nan, 0.5])
+    assert begin == np.datetime64("2026-03-01T12:00")
+    with pytest.raises(ImportingError, match="a day or time that does not exist"):
+        points_in_time("a", ["2026-02-30T12:00"])
+    with pytest.raises(ImportingError, match="no point in time"):
+        points_in_time("a", ["2026-03-01T12:00", "yesterday"])
+
+
+def test_channels_with_and_without_a_known_begin_are_not_put_side_by_side(bench, tmp_path):
+    from nptdms import ChannelObject, TdmsWriter
+
+    true = bench.recordings[0]
+    with TdmsWriter(tmp_path / "a.tdms") as writer:
+        for name, (values, unit) in channels_of(true).items():
+            start = {"wf_start_time": np.datetime64("2026-03-01T12:00:00", "us")} if name == "I" else {}
+            properties = {
+                "unit_string": unit,
+                "wf_increment": true.period,
+                "wf_start_offset": 0.0,
+                **start,
+            }
+            writer.write_segment([ChannelObject("bench", name, values, properties=properties)])
+    with pytest.raises(ImportingError, match="export all with the same kind of time"):
+        read_files([tmp_path / "a.tdms"])
