@@ -73,6 +73,7 @@ results: tradeoff ## compare all controllers, and write docs/results/comparison.
 
 benchmark: $(VENV)/.installed ## train seven algorithms of stable-baselines3 and sb3-contrib, and score them (half an hour of one core)
 	$(PY) training/benchmark.py --algo ppo a2c trpo dqn qrdqn td3 sac --out runs/benchmark --images docs/images --pages docs/results/benchmark.md $(ARGS)
+	cp runs/benchmark/benchmark.json docs/results/
 
 robustness: $(VENV)/.installed ## sweep parameters, effects and conditions, and write docs/results/robustness.md's figures
 	$(PY) training/sweep.py --controllers "hysteresis, extrapolating" PWM pulse "pulse, adaptive" PPO=$(POLICIES)/plain/seed-0 \

@@ -117,7 +117,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Command line; returns the exit status."""
     chosen = parse(arguments)
     check_tracking(chosen.track)
-    check_pages(chosen.pages, list(MAX_EPISODE_STEPS))
+    check_pages(chosen.pages, chosen.env)
     others = [read_results(path) for path in chosen.beside]
     with only_writer(chosen.out):
         return benchmark(chosen, others)
@@ -145,17 +145,16 @@ def _results(found: list[Any], size: Size) -> Results:
 
 
 def report(results: Results, chosen: argparse.Namespace) -> None:
-    """Print the tables, and write pages and figure."""
+    """Print the chosen environments' tables, and write pages and figure."""
     from training.evaluation.plots import save_figure
     from training.studies.benchmark.score_figure import score_figure
 
-    tables = {
-        environment: score_table(results.entries, environment) for environment in MAX_EPISODE_STEPS
-    }
+    shown = [entry for entry in results.entries if entry.environment in chosen.env]
+    tables = {environment: score_table(shown, environment) for environment in chosen.env}
     for page in chosen.pages:
         fill(page, tables)
     folder = chosen.images or chosen.out
-    save_figure(score_figure(results.entries), folder / FIGURE_FILE)
+    save_figure(score_figure(shown), folder / FIGURE_FILE)
     for environment in chosen.env:
         print(f"{environment}\n\n{tables[environment]}\n")
     print(f"results in {chosen.out}")
