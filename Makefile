@@ -71,7 +71,7 @@ results: tradeoff ## compare all controllers, and write docs/results/comparison.
 	$(PY) training/compare.py --recurrent $(POLICIES)/recurrent --policies $(POLICIES)/plain --tradeoff $(POLICIES)/tradeoff \
 		--out runs/comparison --images docs/images --pages docs/results/comparison.md README.md $(ARGS)
 
-benchmark: $(VENV)/.installed ## train seven algorithms of stable-baselines3 and sb3-contrib, and score them (half an hour of one core)
+benchmark: $(VENV)/.installed ## train seven algorithms of stable-baselines3 and sb3-contrib, and score them (half an hour of one free core)
 	$(PY) training/benchmark.py --algo ppo a2c trpo dqn qrdqn td3 sac --out runs/benchmark --images docs/images --pages docs/results/benchmark.md $(ARGS)
 	cp runs/benchmark/benchmark.json docs/results/
 

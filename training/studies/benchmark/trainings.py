@@ -91,6 +91,7 @@ def progress_bar(trainings: Sequence[Training], timesteps: int) -> Iterator[Prog
     with tqdm(
         total=max(total, 1), desc=f"{len(trainings)} trainings", file=sys.stderr,
         mininterval=0.5 if sys.stderr.isatty() else 10.0,
+        disable=not trainings,
         bar_format="{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}{postfix}",
     ) as bar:  # fmt: skip
         yield _Bar(bar)
