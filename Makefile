@@ -10,7 +10,7 @@ PACKAGES := epv_env identification controllers training
 
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help venv train test test-oldest identify gap blind real-bench sim-to-real pictures bench tune tradeoff results robustness export gif docs lint check format wheel clean
+.PHONY: help venv train test test-oldest identify gap blind real-bench sim-to-real pictures bench tune tradeoff results benchmark robustness export gif docs lint check format wheel clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z][a-z-]*\):.*## /\1	/p' Makefile | while IFS='	' read -r name text; do \
@@ -70,6 +70,10 @@ tradeoff: $(VENV)/.installed ## optimise controllers at several prices of switch
 results: tradeoff ## compare all controllers, and write docs/results/comparison.md's figures (trains what is missing)
 	$(PY) training/compare.py --recurrent $(POLICIES)/recurrent --policies $(POLICIES)/plain --tradeoff $(POLICIES)/tradeoff \
 		--out runs/comparison --images docs/images --pages docs/results/comparison.md README.md $(ARGS)
+
+benchmark: $(VENV)/.installed ## train seven algorithms of stable-baselines3 and sb3-contrib, and score them (half an hour of one free core)
+	$(PY) training/benchmark.py --algo ppo a2c trpo dqn qrdqn td3 sac --out runs/benchmark --images docs/images --pages docs/results/benchmark.md $(ARGS)
+	cp runs/benchmark/benchmark.json docs/results/
 
 robustness: $(VENV)/.installed ## sweep parameters, effects and conditions, and write docs/results/robustness.md's figures
 	$(PY) training/sweep.py --controllers "hysteresis, extrapolating" PWM pulse "pulse, adaptive" PPO=$(POLICIES)/plain/seed-0 \

@@ -46,6 +46,7 @@ from training.learners.policy_folders import (
 from training.learners.provenance import Configuration, configuration
 from training.learners.run_folder import forget_failed_start, make_free, why_taken
 from training.learners.run_state import check_checkpoint, new_run
+from training.learners.tracking import HELP, check_tracking, tracked
 
 SAME_WHEN_RESUMED = (
     "seed", "plant", "scenario", "parameters", "switching_price", "memory", "end_to_end",
@@ -103,6 +104,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--device", default="cpu", help="torch device; cpu is fastest for so small a net"
     )
+    parser.add_argument("--track", action="store_true", help=HELP)
     again = parser.add_mutually_exclusive_group()
     again.add_argument("--resume", action="store_true", help="go on from the folder's checkpoint")
     again.add_argument(
@@ -177,6 +179,7 @@ def main(arguments: list[str] | None = None) -> int:
     chosen = parse(arguments)
     plant = load_plant(chosen.plant)
     check_scenario(chosen.scenario)
+    check_tracking(chosen.track)
     with only_writer(chosen.out):
         run = identity(chosen)
         try:
@@ -223,10 +226,11 @@ def train_and_compare(chosen: argparse.Namespace, plant: Plant, run: str) -> int
         "timesteps": chosen.timesteps, "seed": chosen.seed, "device": chosen.device,
         "resume": chosen.resume, "run": run,
     }  # fmt: skip
-    if chosen.memory:
-        policy, log = train_recurrent(hyperparameters, distillation, **task)
-    else:
-        policy, log = train(hyperparameters, **task)
+    with tracked(chosen.track, name=chosen.out.name, folder=chosen.out, config=config):
+        if chosen.memory:
+            policy, log = train_recurrent(hyperparameters, distillation, **task)
+        else:
+            policy, log = train(hyperparameters, **task)
     save_policy(policy, chosen.out, control_period=OnOff.default_period, provenance=config)
 
     comparison = evaluate(chosen, plant)

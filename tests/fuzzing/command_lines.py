@@ -13,6 +13,7 @@ from training.console.command import COMMANDS, IDENTIFICATION
 NEEDED: dict[str, list[str]] = {
     "train": ["--plant", "nowhere.json"],
     "compare": ["--tradeoff", "nowhere", "--cluster", "nowhere", "--scenarios", "flood"],
+    "benchmark": ["--algo", "sac", "--env", "EPValve-v0"],
     "hard-scenarios": ["--scenarios", "flood"],
     "regret": ["--episodes", "0"],
     "sweep": ["--plant", "nowhere.json"],

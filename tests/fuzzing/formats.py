@@ -20,6 +20,13 @@ from identification.bench.programmes import REPORT_SUITE
 from identification.importing.mapping_file import read_mapping
 from identification.recordings.columns import REQUIRED_COLUMNS, read_columns
 from identification.recordings.manifest import FILE_NAME, read_manifest
+from training.studies.benchmark.result_file import (
+    Entry,
+    Results,
+    Run,
+    read_results,
+    write_results,
+)
 
 SUBJECT = {"seed": 0}
 
@@ -86,6 +93,12 @@ def _journal(folder: Path) -> None:
         journal.add(f"task {k}", {"value": k})
 
 
+def _results(folder: Path) -> None:
+    run = Run(seed=0, mean_return=-1.0, left_share=0.0, rms_error_bar=0.1, switchings_per_s=5.0)
+    entry = Entry(algorithm="a", environment="EPValve-v0", timesteps=100, runs=[run])
+    write_results(folder / "benchmark.json", Results(entries=[entry]))
+
+
 FORMATS = (
     Format(
         name="plant file", file="plant.json",
@@ -113,6 +126,10 @@ FORMATS = (
         name="configuration", file=CONFIG,
         write=lambda folder: write_options(folder, SUBJECT),
         read=lambda folder: check_options(folder, SUBJECT, "study"),
+    ),
+    Format(
+        name="benchmark", file="benchmark.json", write=_results,
+        read=lambda folder: read_results(folder / "benchmark.json"),
     ),
     Format(
         name="recording", file="recording.csv", write=_table, json=False,

@@ -8,7 +8,7 @@ pytest.importorskip("stable_baselines3")
 
 from controllers.hysteresis import Hysteresis
 from epv_env.plant.plantfile import Plant
-from training import compare, export, sweep
+from training import benchmark, compare, export, sweep
 from training.deploy.settings import SETTINGS
 from training.evaluation import seeds
 from training.learners.distillation import Distillation
@@ -70,6 +70,7 @@ def used() -> dict[str, Span]:
         "states": (seeds.STATES_SEED, SETTINGS.episodes),
         "closed loop": (seeds.CLOSED_LOOP_SEED, exported.episodes),
         "timing": (seeds.TIMING_SEED, 1),
+        "benchmark": (seeds.BENCHMARK_SEED, benchmark.parse([]).episodes),
     }
     spans = {purpose: (first, first + count) for purpose, (first, count) in counted.items()}
     return {**spans, **compared(), "sweep": swept()}

@@ -29,6 +29,9 @@ class Entry(NamedTuple):
 COMMANDS: dict[str, Entry] = {
     "train": Entry("training.train_ppo", "train a policy and compare it with classic controllers"),
     "compare": Entry("training.compare", "compare all controllers on the same unseen episodes"),
+    "benchmark": Entry(
+        "training.benchmark", "train the algorithms of stable-baselines3, and score them"
+    ),
     "regret": Entry("training.regret", "what controllers lose against the causal bound"),
     "hard-scenarios": Entry("training.hard_scenarios", "controllers on scenarios beyond training"),
     "sweep": Entry("training.sweep", "robustness against parameters, effects and conditions"),

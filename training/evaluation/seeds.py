@@ -35,6 +35,9 @@ CLOSED_LOOP_SEED = 8_000_000
 TIMING_SEED = 9_000_000
 """Of the episode in which decisions are timed."""
 
+BENCHMARK_SEED = 10_000_000
+"""On which the benchmark scores algorithms (docs/results/benchmark.md)."""
+
 
 def distillation_seeds(seed: int, count: int) -> range:
     """Of the episodes of a distillation. Raises ValueError if others are swept on them."""

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from stable_baselines3 import PPO
+from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 
 from controllers.base import Controller
@@ -80,7 +81,7 @@ class Selection(BaseCallback):
             self.best = archive_of(self.model)
 
 
-def archive_of(model: PPO) -> bytes:
+def archive_of(model: BaseAlgorithm) -> bytes:
     """stable-baselines3's archive of a model."""
     stream = io.BytesIO()
     model.save(stream)

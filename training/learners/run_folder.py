@@ -14,6 +14,9 @@ MEMORYLESS_FOLDER, STUDENT_FOLDER = "memoryless", "student"
 TENSORBOARD_FOLDER = "tensorboard"
 """Within the folder of a training: what `tensorboard --logdir` shows."""
 
+TRACKING_FOLDER = "wandb"
+"""Within the folder of a training: what the package wandb writes (training/learners/tracking.py)."""
+
 REPORT_FILES = ("table.csv", "table.json", "learning_curve.png", "episode.png", "excursions.png")
 """What the command that trains writes at its end."""
 
@@ -21,7 +24,7 @@ REPORT_FILES = ("table.csv", "table.json", "learning_curve.png", "episode.png", 
 OWN_FILES = (
     CONTRACT_FILE, CHECKPOINT_FILE, CONFIG, WEIGHTS_FILE, *DERIVED_FILES, *REPORT_FILES,
 )  # fmt: skip
-OWN_FOLDERS = (STUDENT_FOLDER, MEMORYLESS_FOLDER, TENSORBOARD_FOLDER)
+OWN_FOLDERS = (STUDENT_FOLDER, MEMORYLESS_FOLDER, TENSORBOARD_FOLDER, TRACKING_FOLDER)
 
 
 def make_free(folder: Path, *, force: bool) -> None:

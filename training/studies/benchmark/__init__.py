@@ -1,0 +1,1 @@
+"""The benchmark of algorithms: result files, tables and figure."""
