@@ -1,6 +1,6 @@
 """Hyperparameters of PPO: the default, and those of the training of recurrent policies."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from epv_env.conditions import CONDITIONS, Conditions
 from epv_env.reward import BAND_BAR, RewardWeights
@@ -89,7 +89,7 @@ class Hyperparameters:
 
 
 FROM_STUDENT = Hyperparameters(
-    band_price=10.0, band_bar=0.32, breakdown_price=0.5, sharpness=3.0, ent_coef=0.0,
+    band_price=10.0, band_bar=0.28, breakdown_price=0.5, sharpness=3.0, ent_coef=0.0,
     learning_rate=4e-4, last_learning_rate=5e-6, batch_size=2048, gae_lambda=0.98,
     validations=5, first_validation=0.2,
 )  # fmt: skip
@@ -119,6 +119,16 @@ END_TO_END = Hyperparameters(
 
 Long episodes teach it to remember. Plants from the region's corners and hard applications are frequent,
 since a good policy leaves the band only where they meet."""
+
+
+def training_weights(weights: RewardWeights, h: Hyperparameters) -> RewardWeights:
+    """Prices of the reward in training: at least those of the hyperparameters, on at most their band."""
+    return replace(
+        weights,
+        band=max(weights.band, h.band_price),
+        band_bar=min(weights.band_bar, h.band_bar),
+        breakdown=max(weights.breakdown, h.breakdown_price),
+    )
 
 
 def switching_is_cheap(weights: RewardWeights) -> bool:
