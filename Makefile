@@ -56,6 +56,8 @@ bench: $(VENV)/.installed ## measure speed and memory (a quarter of an hour); AR
 
 tune: $(VENV)/.installed ## search the classic controllers' settings anew (minutes)
 	$(PY) training/tune.py --out controllers/tuned.json $(ARGS)
+	$(PY) training/tune.py --out controllers/tuned.json --objective margin \
+		--only "hysteresis, adaptive" "cascade, adaptive" "pulse, adaptive" $(ARGS)
 
 # The policies of the comparison, trained once and kept. To train them anew, remove the folder first.
 # Two of them are links to those in the package: controllers/trained.

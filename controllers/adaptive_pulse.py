@@ -1,7 +1,8 @@
 """Adaptive pulse control: the pulse controller on a table that it fits to its valve from its own pulses.
 
-A certainty-equivalent self-tuning regulator: the plan treats what the learner has found out
-(controllers/valve_learner.py) as true, except for a lower aim while the opening pressure is uncertain.
+A self-tuning regulator (Åström and Wittenmark, Adaptive Control, 2nd ed. 1995, chapter 3): the plan
+treats what the learner has found out (controllers/valve_learner.py) as true, with two corrections. It
+aims lower by what is uncertain about the rise, and holds p2 higher where the valve is slow to open.
 """
 
 from dataclasses import dataclass, field
@@ -12,7 +13,14 @@ from numpy.typing import NDArray
 from controllers.pulse_simulation import pulse_table
 from controllers.pulse_table import PulseTable
 from controllers.registration import CHEAP, Range, Registration
-from controllers.valve_learner import ValveLearner
+from controllers.valve_learner import LearntValve, ValveLearner
+from epv_env.common.units import BAR, GRAM
+from epv_env.plant.consumption import SCENARIOS
+
+HARDEST_FLOW = SCENARIOS["emergency"].flow[1] * GRAM
+"""Flow of the hardest application that the reserve is for [kg/s]."""
+MOST_RESERVE = 0.3
+"""Largest reserve: above it a pulse's scatter would leave the band upwards [bar]."""
 
 
 @dataclass(kw_only=True)
@@ -31,6 +39,12 @@ class AdaptivePulse:
     """p2 - target at which a pulse shall end [bar]."""
     caution: float
     """How much lower a pulse aims for each bar of the opening pressure's standard deviation [1]."""
+    doubt: float
+    """Standard deviations of the gain that a pulse allows for in what p2 will still rise [1]."""
+    reserve: float
+    """Rise of trigger and aim for each bar of the expected breakdown beyond `tolerated` [1]."""
+    tolerated: float
+    """Expected breakdown that needs no reserve [bar]."""
     filter_time: float
     """Time in which the weight of a reading of p2 fades by 1/e [s]."""
     look_ahead: float
@@ -60,15 +74,39 @@ class AdaptivePulse:
     def act(self, observations: NDArray) -> NDArray:
         """0 (off) or 1 (on) for each valve, (n,)."""
         valve = self._learner.observe(observations)
+        reserve = self.reserve_for(self.expected_breakdown(valve.opens_from_rest))
         ahead = self.look_ahead * (valve.opens_in + self.table.release_lag)
-        begins = valve.shut & (valve.error + valve.fall * ahead < self.trigger)
-        aim = self.aim - self.caution * valve.offset_deviation
+        begins = valve.fed & valve.shut & (valve.error + valve.fall * ahead < self.trigger + reserve)
+        aim = self.aim + reserve - self._uncertainty(valve)
         asked, slope = (aim - valve.error) / valve.gain, valve.fall / (valve.gain * valve.pace)
         remaining = valve.table.duration(valve.p1, valve.p2, valve.p3, asked, slope) / valve.pace
-        ends = remaining < self.rounding * self.control_period
+        ends = ~valve.fed | (remaining < self.rounding * self.control_period)
         action = np.where(valve.on, np.where(begins, 0, 1), np.where(ends, 1, 0))
         self._learner.decided(valve, action)
         return action
+
+    def expected_breakdown(self, opens_from_rest: NDArray) -> NDArray:
+        """What the hardest application draws from the circuit until the valve opens (n,) [bar].
+
+        opens_from_rest: time until the piston lifts once the control chamber vents (n,) [s].
+        """
+        p = self.table.parameters
+        fall = HARDEST_FLOW * p["R_gas"] * p["T_env"] / p["V2"] / BAR
+        return fall * (self.table.release_lag + opens_from_rest)
+
+    def reserve_for(self, breakdown: NDArray) -> NDArray:
+        """How much higher p2 is held where this breakdown is expected (n,) [bar]."""
+        return np.clip(self.reserve * (breakdown - self.tolerated), 0.0, MOST_RESERVE)
+
+    def _uncertainty(self, valve: LearntValve) -> NDArray:
+        """How much lower a pulse aims (n,) [bar]: two independent errors of the rise, together.
+
+        Another opening pressure moves the rise of any pulse alike. Another gain counts by what p2 would
+        still rise if the coil were switched on now: much, while the valve is wide open.
+        """
+        under_way = valve.table.gained(valve.p1, valve.p2, valve.p3, np.zeros_like(valve.p1))
+        by_gain = self.doubt * valve.gain_deviation * under_way
+        return np.hypot(self.caution * valve.offset_deviation, by_gain)
 
 
 REGISTRATION = Registration(
@@ -81,6 +119,9 @@ REGISTRATION = Registration(
         "trigger": Range(low=-0.3, high=0.1, least=-0.5, most=0.5),
         "aim": Range(low=-0.1, high=0.3, least=-0.5, most=0.5),
         "caution": Range(low=0.0, high=0.6, most=2.0),
+        "doubt": Range(low=0.0, high=1.5, most=4.0),
+        "reserve": Range(low=0.0, high=1.0, most=2.0),
+        "tolerated": Range(low=0.2, high=0.5, least=0.0, most=1.0),
         "filter_time": Range(low=0.004, high=0.04, log=True, least=0.001, most=0.4),
         "look_ahead": Range(low=0.3, high=1.5, least=0.0, most=4.0),
         "rounding": Range(low=0.2, high=1.2, least=0.0, most=2.0),

@@ -20,7 +20,7 @@ from epv_env.plant.primitives.constants import QUARTER_PI
 class BankSettings:
     """What is believed before the first pulse, and how far a pulse is trusted."""
 
-    offsets: NDArray = field(default_factory=lambda: np.linspace(-1.6, 1.6, 33))
+    offsets: NDArray = field(default_factory=lambda: np.linspace(-2.2, 2.2, 45))
     """Assumed offsets of the opening pressure [bar]: three standard deviations with 0.1 bar between."""
     offset_spread: float = 0.5
     """Their standard deviation before the first pulse [bar]: piston, seat and spring within ±10 %."""
@@ -80,6 +80,12 @@ class OpeningBank:
     def gain(self) -> NDArray:
         """Expected factor of the table's gain (n,) [1]."""
         return np.sum(self._probability * self._gain, axis=1)
+
+    @property
+    def gain_deviation(self) -> NDArray:
+        """Standard deviation of the factor (n,) [1]."""
+        around = self._variance + (self._gain - self.gain[:, None]) ** 2
+        return np.sqrt(np.sum(self._probability * around, axis=1))
 
     def learn(self, who: NDArray, foreseen: NDArray, gained: NDArray, lasted: NDArray) -> None:
         """Take in the pulses that ended.

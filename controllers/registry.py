@@ -1,6 +1,7 @@
 """The controllers by kind: one line each. docs/extending.md says how to add one."""
 
 from controllers import (
+    adaptive_cascade,
     adaptive_hysteresis,
     adaptive_mpc,
     adaptive_pulse,
@@ -20,6 +21,7 @@ REGISTRY: tuple[Registration, ...] = (
     hysteresis.EXTRAPOLATING_HYSTERESIS,
     adaptive_hysteresis.REGISTRATION,
     pwm.REGISTRATION,
+    adaptive_cascade.REGISTRATION,
     pulse.REGISTRATION,
     adaptive_pulse.REGISTRATION,
     mpc.REGISTRATION,
@@ -30,9 +32,18 @@ REGISTRY: tuple[Registration, ...] = (
 """In the order of the tables."""
 
 
-def registration(kind: str) -> Registration:
-    """The record of a kind. Raises RegistrationError if there is none."""
-    by_kind = {entry.kind: entry for entry in REGISTRY}
+WITH_MARGIN = ", with margin"
+"""Follows the kind in the name of a controller that was tuned under training's stricter objective."""
+
+
+def kind_of(name: str) -> str:
+    """The kind of a controller by its name in tables and in controllers/tuned.json."""
+    return name.removesuffix(WITH_MARGIN)
+
+
+def registration(name: str) -> Registration:
+    """The record of a controller's kind. Raises RegistrationError if there is none."""
+    by_kind, kind = {entry.kind: entry for entry in REGISTRY}, kind_of(name)
     if kind not in by_kind:
         raise RegistrationError(f"unknown controller {kind!r}: choose one of {', '.join(by_kind)}")
     return by_kind[kind]
@@ -40,7 +51,7 @@ def registration(kind: str) -> Registration:
 
 def cost_class(name: str) -> CostClass:
     """The cost class of a controller by its name in tables; a learned policy is cheap."""
-    return next((entry.cost for entry in REGISTRY if entry.kind == name), CHEAP)
+    return next((entry.cost for entry in REGISTRY if entry.kind == kind_of(name)), CHEAP)
 
 
 def untuned_controllers(plant: Plant) -> list[Controller]:

@@ -29,9 +29,11 @@ class Tuning:
     trials: int
     """Evaluations spent."""
     mean_return: float
-    """Mean return of the best on the tuning scenarios."""
+    """Mean return of the best on the tuning scenarios, under the objective."""
     episodes: int
     """Episodes of one evaluation."""
+    objective: str = "reward"
+    """Whose return was maximised: OBJECTIVES of training/tune.py."""
     widened: dict[str, tuple[float, float]] = field(default_factory=dict)
     """Ranges that ended at a bound and were searched again, by quantity: the last range searched."""
 
@@ -43,11 +45,11 @@ class TuningsFile:
     search: dict[str, Any]
     """How the tunings were searched: method, budget, seed, plants."""
     controllers: dict[str, Tuning]
-    """Tunings by kind."""
+    """Tunings by the controllers' names: kinds, and kinds followed by WITH_MARGIN."""
 
 
 def load_tunings(path: str | PathLike[str] | None = None) -> dict[str, Tuning]:
-    """Tunings by kind, from a file or (None) those that come with the package.
+    """Tunings by name, from a file or (None) those that come with the package.
 
     Raises ControllersFileError.
     """
@@ -73,11 +75,11 @@ def save_tunings(tunings: dict[str, Tuning], path: str | PathLike[str], search: 
     write_json(path, content)
 
 
-def build(kind: str, values: dict[str, Any], plant: Plant) -> Controller:
-    """A controller of one of the registry's kinds from its tuned quantities.
+def build(name: str, values: dict[str, Any], plant: Plant) -> Controller:
+    """A controller from its tuned quantities.
 
     Args:
-        kind: as the registry names it.
+        name: one of the registry's kinds, perhaps followed by WITH_MARGIN; the controller's own then.
         values: tuned quantities by name.
         plant: that it is designed for.
 
@@ -85,11 +87,13 @@ def build(kind: str, values: dict[str, Any], plant: Plant) -> Controller:
         ValueError: the kind is unknown, a quantity is missing or unknown, or quantities contradict each
             other.
     """
-    return registration(kind).built(values, plant)
+    controller = registration(name).built(values, plant)
+    controller.name = name
+    return controller
 
 
 def tuned_controllers(plant: Plant | None = None, *, without: Collection[str] = ()) -> list[Controller]:
     """The classic controllers as tuned, designed for a plant (None: the report's calibration)."""
     described = plant or Plant.calibrated()
     tunings = load_tunings()
-    return [build(kind, tunings[kind].values, described) for kind in tunings if kind not in without]
+    return [build(name, tunings[name].values, described) for name in tunings if name not in without]

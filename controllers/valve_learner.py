@@ -23,7 +23,7 @@ class VentingSettings:
 
     spread: float = 0.2
     """Standard deviation of its factor before the first reading [1]: bore, chamber, contraction."""
-    reading_error: float = 0.03
+    reading_error: float = 0.01
     """Standard deviation of p3 over p3 of a reading [1]."""
     drift: float = 1e-3
     """Growth of the factor's deviation with each reading [1]."""
@@ -34,6 +34,9 @@ class VentingSettings:
 
 
 VENTING = VentingSettings()
+
+LEAST_HEAD = 0.2
+"""p1 - p2 below which the supply does not raise the circuit [bar]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,6 +49,8 @@ class LearntValve:
     """Venting rate over the table's [1]: times of the table are divided by it."""
     gain: NDArray
     """Rise of p2 by a pulse over the table's [1]."""
+    gain_deviation: NDArray
+    """Standard deviation of the learnt gain [1]."""
     offset_deviation: NDArray
     """Standard deviation of the learnt opening pressure [bar]."""
     p1: NDArray
@@ -62,11 +67,22 @@ class LearntValve:
     """Whether the coil is on, bool."""
     opens_in: NDArray
     """Time until the piston lifts, the coil being off from now [s]; 0: it is open."""
+    opens_from_rest: NDArray
+    """The same with the control chamber full, at p1 [s]."""
 
     @property
     def shut(self) -> NDArray:
         """Whether the piston rests on its seat, bool (n,)."""
         return self.opens_in > 0
+
+    @property
+    def fed(self) -> NDArray:
+        """Whether the supply can raise the circuit, bool (n,).
+
+        A valve that stood open meanwhile would let p2 follow a refill of the supply far above the
+        target: its control chamber would be empty, and take long to fill.
+        """
+        return self.p1 - self.p2 > LEAST_HEAD
 
 
 class ValveLearner:
@@ -113,8 +129,9 @@ class ValveLearner:
         self._learn_pulses(p2, on & shut)
         return LearntValve(
             table=table, pace=self._pace, gain=self._bank.gain, p1=p1, p2=p2, p3=p3,
-            offset_deviation=self._bank.offset_deviation, error=self._error,
-            fall=np.minimum(self._slope, 0.0), on=on, opens_in=opens_in,
+            gain_deviation=self._bank.gain_deviation, offset_deviation=self._bank.offset_deviation,
+            error=self._error, fall=np.minimum(self._slope, 0.0), on=on, opens_in=opens_in,
+            opens_from_rest=table.time_to_open(p1, p2, p1) / self._pace,
         )  # fmt: skip
 
     def decided(self, valve: LearntValve, action: NDArray) -> None:

@@ -15,14 +15,17 @@ _RATIOS = np.geomspace(_LEAST, _MOST, _NODES)
 """Pressures over the ambient one [1]. Closer to it than sensors tell, nothing is left to vent."""
 
 
-def _relative_flux(ratio: NDArray) -> NDArray:
-    """Flux over the choked flux of the same chamber (n,) [1]; ratio: pressure over the ambient one."""
-    drop = np.minimum(1 - 1 / ratio, 1 - CRITICAL_RATIO)
+def relative_flux(ratio: NDArray) -> NDArray:
+    """Flux over the choked flux of the same chamber (n,) [1].
+
+    ratio: pressure over the one behind the orifice (n,) [1]; 1.002 at least counts.
+    """
     choked = 1 - CRITICAL_RATIO
+    drop = np.minimum(1 - 1 / np.maximum(ratio, _LEAST), choked)
     return np.sqrt(bracket_over_drop(drop) * drop / (bracket_over_drop(np.array(choked)) * choked))
 
 
-_TIMES = cumulative_trapezoid(1 / _relative_flux(_RATIOS), np.log(_RATIOS), initial=0.0)
+_TIMES = cumulative_trapezoid(1 / relative_flux(_RATIOS), np.log(_RATIOS), initial=0.0)
 
 
 def venting_time(ratio: NDArray) -> NDArray:

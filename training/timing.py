@@ -23,7 +23,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from controllers.base import Controller
-from controllers.tuned import load_tunings
+from controllers.registry import TUNED_KINDS
 from epv_env.common.command_line import check_positive, fail_clearly, writable_folder
 from epv_env.common.files import write_text
 from epv_env.common.json_files import write_json
@@ -104,7 +104,7 @@ def main(arguments: list[str] | None = None) -> int:
     chosen = parse(arguments)
     plant = load_plant(chosen.plant)
     options = {"plant": plant, "scenario": check_scenario(chosen.scenario)}
-    sources = chosen.controllers or list(load_tunings())
+    sources = chosen.controllers or TUNED_KINDS
     controllers, _ = named_controllers(sources, plant)
     table = timing_table(
         {

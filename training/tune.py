@@ -2,8 +2,10 @@
 
     python training/tune.py --trials 100 --out controllers/tuned.json
     python training/tune.py --only pulse --out controllers/tuned.json    # keeps the file's others
+    python training/tune.py --only pulse --objective margin --out controllers/tuned.json    # the same
 
-The objective is the mean return on the training scenarios, the very reward that PPO maximises.
+The objective is the mean return on the training scenarios: of the task's reward, or of the stricter one
+with which a recurrent policy is trained.
 """
 
 import training.console.missing_packages  # noqa: F401 - before what may be missing
@@ -12,6 +14,7 @@ import training.console.missing_packages  # noqa: F401 - before what may be miss
 import argparse
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,7 +24,7 @@ from optuna.trial import Trial
 from tqdm import tqdm
 
 from controllers.registration import Choice, Range, SearchSpace
-from controllers.registry import TUNED_KINDS, registration
+from controllers.registry import TUNED_KINDS, WITH_MARGIN, kind_of, registration
 from controllers.tuned import Tuning, load_search, load_tunings, save_tunings
 from epv_env.common.command_line import (
     check_not_negative,
@@ -30,9 +33,18 @@ from epv_env.common.command_line import (
     writable_file,
 )
 from epv_env.plant.plantfile import Plant
+from epv_env.reward import RewardWeights
 from training.evaluation.rollout import run_episodes
 from training.evaluation.scenarios import TUNING_REGION
 from training.evaluation.seeds import TUNING_SEED
+from training.learners.hyperparameters import FROM_STUDENT, training_weights
+
+OBJECTIVES = {
+    "reward": RewardWeights(),
+    "margin": training_weights(RewardWeights(), FROM_STUDENT),
+}
+"""Prices whose return a search maximises: the task's, or those of a recurrent policy's training, with a
+narrower band and a dearer breakdown."""
 
 WIDENINGS = 2
 """Most repetitions of a kind's search, each wider than the one before. Two quadruple a range, or reach
@@ -146,6 +158,19 @@ def kept(path: Path, search: dict[str, Any]) -> dict[str, Tuning]:
     return load_tunings(path)
 
 
+def named(kind: str, objective: str) -> str:
+    """The name of the controller of a kind that was tuned under an objective."""
+    return kind if objective == "reward" else kind + WITH_MARGIN
+
+
+def ordered(tunings: Mapping[str, Tuning]) -> dict[str, Tuning]:
+    """Tunings by name in the registry's order, each kind's own objective before the stricter one."""
+    return {
+        name: tunings[name]
+        for name in sorted(tunings, key=lambda name: (TUNED_KINDS.index(kind_of(name)), name))
+    }
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Command line; returns the exit status."""
     parser = argparse.ArgumentParser(description="Tune the classic controllers.")
@@ -153,6 +178,10 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--episodes", type=int, default=128, help="episodes of one evaluation")
     parser.add_argument("--duration", type=float, default=6.0, help="length of an episode [s]")
     parser.add_argument("--seed", type=int, default=0, help="of the search")
+    parser.add_argument(
+        "--objective", choices=OBJECTIVES, default="reward",
+        help="whose mean return is maximised; 'margin': the prices of a recurrent policy's training",
+    )  # fmt: skip
     parser.add_argument("--out", type=writable_file, required=True, help="JSON file to write")
     parser.add_argument(
         "--only", choices=TUNED_KINDS, nargs="+", help="kinds to search; --out keeps others"
@@ -161,19 +190,21 @@ def main(arguments: list[str] | None = None) -> int:
     check_positive(parser, chosen, "trials", "episodes", "duration")
     check_not_negative(parser, chosen, "seed")
     optuna.logging.set_verbosity(optuna.logging.ERROR)
-    options = {"parameters": TUNING_REGION}
     settings = {"trials": chosen.trials, "episodes": chosen.episodes, "duration": chosen.duration}
-    search = {"method": "Optuna TPE on the mean return", **settings, "seed": chosen.seed, **options}
-    if chosen.only:
+    region = {"parameters": TUNING_REGION}
+    search = {"method": "Optuna TPE on the mean return", **settings, "seed": chosen.seed, **region}
+    keeps_others = chosen.only or chosen.objective != "reward"
+    if keeps_others:
         kept(chosen.out, search)  # before the work, since it may refuse
+    options = {**region, "weights": OBJECTIVES[chosen.objective]}
     tunings = {
-        kind: tune(kind, **settings, seed=chosen.seed, options=options)
+        named(kind, chosen.objective): replace(
+            tune(kind, **settings, seed=chosen.seed, options=options), objective=chosen.objective
+        )
         for kind in chosen.only or TUNED_KINDS
     }
-    others = kept(chosen.out, search) if chosen.only else {}
-    together = {**others, **tunings}
-    ordered = {kind: together[kind] for kind in TUNED_KINDS if kind in together}
-    save_tunings(ordered, chosen.out, search)
+    others = kept(chosen.out, search) if keeps_others else {}
+    save_tunings(ordered({**others, **tunings}), chosen.out, search)
     for kind, tuning in tunings.items():
         print(f"{kind}: mean return {tuning.mean_return:.1f} with {tuning.values}")
     return 0

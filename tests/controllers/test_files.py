@@ -5,8 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from controllers.registry import SIMULATING_KINDS, TUNED_KINDS
-from controllers.tuned import ControllersFileError, Tuning, load_tunings, save_tunings
+from controllers.registry import SIMULATING_KINDS, TUNED_KINDS, kind_of, registration
+from controllers.tuned import ControllersFileError, Tuning, build, load_tunings, save_tunings
+from epv_env.plant.plantfile import Plant
 
 pytest.importorskip("optuna")
 from training.tune import budget
@@ -22,12 +23,21 @@ def test_tunings_survive_a_round_trip(tmp_path):
 
 def test_every_controller_was_tuned_with_the_same_budget_or_a_stated_smaller_one():
     tunings = load_tunings()
-    assert tuple(tunings) == TUNED_KINDS
-    full = {(t.trials, t.episodes) for kind, t in tunings.items() if kind not in SIMULATING_KINDS}
+    assert tuple(dict.fromkeys(map(kind_of, tunings))) == TUNED_KINDS
+    full = {(t.trials, t.episodes) for name, t in tunings.items() if name not in SIMULATING_KINDS}
     assert full == {(100, 128)}
     assert SIMULATING_KINDS == ("MPC", "MPC, adaptive")
     for kind in SIMULATING_KINDS:
         assert (tunings[kind].trials, tunings[kind].episodes) == budget(kind, 100, 128) == (16, 32)
+
+
+@pytest.mark.parametrize("name", [name for name in load_tunings() if name != kind_of(name)])
+def test_a_tuning_under_the_stricter_objective_stands_beside_its_kinds_own(name):
+    tunings = load_tunings()
+    assert (tunings[name].objective, tunings[kind_of(name)].objective) == ("margin", "reward")
+    controller = build(name, tunings[name].values, Plant.calibrated())
+    assert controller.name == name
+    assert type(controller) is registration(name).controller
 
 
 def test_another_version_is_refused(tmp_path):
@@ -40,7 +50,6 @@ def test_a_written_policy_acts_as_the_model_it_came_from(tmp_path):
     pytest.importorskip("stable_baselines3")
     from controllers.learned import load_policy
     from controllers.policy_contract import PolicyError
-    from epv_env.plant.plantfile import Plant
     from epv_env.reward import RewardWeights
     from training.learners.hyperparameters import Hyperparameters
     from training.learners.policy_files import greedy_policy, save_policy

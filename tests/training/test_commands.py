@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from controllers.learned import TRAINED, load_policy
-from controllers.registry import SIMULATING_KINDS, TUNED_KINDS
+from controllers.registry import SIMULATING_KINDS
+from controllers.tuned import load_tunings
 
 pytest.importorskip("stable_baselines3")
 from training.learners.policy_files import save_policy
@@ -49,7 +50,7 @@ def test_the_short_run_writes_everything_and_prints_the_table(finished):
     for heading in ("C1 stayed", "C2 largest breakdown [bar]", "sensitive_ten_percent", "PPO", "PWM"):
         assert heading in result.stdout
     assert len(json.loads((out / "table.json").read_text())) == 3 * (
-        1 + len(TUNED_KINDS) - len(SIMULATING_KINDS)
+        1 + len(set(load_tunings()) - set(SIMULATING_KINDS))
     )
 
 

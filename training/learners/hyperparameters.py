@@ -1,6 +1,6 @@
 """Hyperparameters of PPO: the default, and those of the training of recurrent policies."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from epv_env.conditions import CONDITIONS, Conditions
 from epv_env.reward import BAND_BAR, RewardWeights
@@ -124,6 +124,16 @@ END_TO_END = Hyperparameters(
 
 Long episodes teach it to remember. Plants from the region's corners and hard applications are frequent,
 since a good policy leaves the band only where they meet."""
+
+
+def training_weights(weights: RewardWeights, h: Hyperparameters) -> RewardWeights:
+    """Prices of the reward in training: at least those of the hyperparameters, on at most their band."""
+    return replace(
+        weights,
+        band=max(weights.band, h.band_price),
+        band_bar=min(weights.band_bar, h.band_bar),
+        breakdown=max(weights.breakdown, h.breakdown_price),
+    )
 
 
 def switching_is_cheap(weights: RewardWeights) -> bool:

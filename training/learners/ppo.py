@@ -3,7 +3,7 @@
 import hashlib
 import io
 import pickle
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from training.learners.batch_ppo import BatchPPO
 from training.learners.checkpoint_selection import Selection, validation_points
-from training.learners.hyperparameters import Hyperparameters
+from training.learners.hyperparameters import Hyperparameters, training_weights
 from training.learners.imitation import imitate
 from training.learners.learning_log import TrainingLog
 from training.learners.policy_files import greedy_policy, policy_bytes, put_layers, put_student
@@ -196,16 +196,6 @@ def _subject(
         **options, "hyperparameters": asdict(h), "plant": plant_digest(plant),
         "student": hashlib.sha256(policy_bytes(student)).hexdigest() if student else None,
     }  # fmt: skip
-
-
-def training_weights(weights: RewardWeights, h: Hyperparameters) -> RewardWeights:
-    """Prices of the reward in training: at least those of the hyperparameters, on at most their band."""
-    return replace(
-        weights,
-        band=max(weights.band, h.band_price),
-        band_bar=min(weights.band_bar, h.band_bar),
-        breakdown=max(weights.breakdown, h.breakdown_price),
-    )
 
 
 def _start(

@@ -164,10 +164,13 @@ def budget_text(c: ComparisonResults) -> str:
     for kind, tuning in tunings.items():
         efforts.setdefault((tuning.trials, tuning.episodes), []).append(kind)
     each = (f"{t} trials of {e} episodes for {'; '.join(kinds)}" for (t, e), kinds in efforts.items())
+    strict = [name for name, tuning in tunings.items() if tuning.objective != "reward"]
     text = (
         f"Tuning: {search['method']}, seed {search['seed']}, episodes of {search['duration']:g} s on "
         f"plants of the region {search['parameters']}. {'. '.join(each)}."
     )
+    if strict:
+        text += f" Under the stricter prices of the policy's training: {'; '.join(strict)}."
     for contender in c.contenders:
         if contender.learned:
             text += (
