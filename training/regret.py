@@ -50,13 +50,8 @@ COST = 200
 """Computing time of an episode of the bound, in those of the others: for the progress bar."""
 
 DEFAULT = (
-<<<<<<< HEAD
     f"PPO, recurrent={TRAINED / 'recurrent' / 'seed-7'}", f"PPO={TRAINED / 'plain' / 'seed-0'}",
-    *(kind for kind in TUNED_KINDS if kind not in SIMULATING_KINDS), INFORMED,
-=======
-    f"PPO, recurrent={TRAINED / 'recurrent' / 'seed-8'}", f"PPO={TRAINED / 'plain' / 'seed-0'}",
     *(name for name in load_tunings() if name not in SIMULATING_KINDS), INFORMED,
->>>>>>> classic
 )  # fmt: skip
 
 QUICK: dict[str, Any] = {"episodes": 2, "duration": 0.6, "controllers": ["pulse"]}
