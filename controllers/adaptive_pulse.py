@@ -16,6 +16,7 @@ from controllers.registration import CHEAP, Range, Registration
 from controllers.valve_learner import LearntValve, ValveLearner
 from epv_env.common.units import BAR, GRAM
 from epv_env.plant.consumption import SCENARIOS
+from epv_env.reward import BAND_BAR
 
 HARDEST_FLOW = SCENARIOS["emergency"].flow[1] * GRAM
 """Flow of the hardest application that the reserve is for [kg/s]."""
@@ -41,16 +42,15 @@ class AdaptivePulse:
     """How much lower a pulse aims for each bar of the opening pressure's standard deviation [1]."""
     doubt: float
     """Standard deviations of the gain that a pulse allows for in what p2 will still rise [1]."""
-    reserve: float
-    """Rise of trigger and aim for each bar of the expected breakdown beyond `tolerated` [1]."""
-    tolerated: float
-    """Expected breakdown that needs no reserve [bar]."""
     filter_time: float
     """Time in which the weight of a reading of p2 fades by 1/e [s]."""
     look_ahead: float
     """Share of the time to open over which p2 is extrapolated [1]."""
     rounding: float
     """Remaining time below which a pulse ends now [control periods]."""
+    tolerated: float = BAND_BAR - 0.1
+    """Expected breakdown that needs no reserve [bar]: what the band allows, less the scatter of p2 at
+    rest. The band is a constraint, so it is kept by design; the search weighs what is left."""
     control_period: float = 5e-3
     """[s]"""
     name: str = "pulse, adaptive"
@@ -96,7 +96,7 @@ class AdaptivePulse:
 
     def reserve_for(self, breakdown: NDArray) -> NDArray:
         """How much higher p2 is held where this breakdown is expected (n,) [bar]."""
-        return np.clip(self.reserve * (breakdown - self.tolerated), 0.0, MOST_RESERVE)
+        return np.clip(breakdown - self.tolerated, 0.0, MOST_RESERVE)
 
     def _uncertainty(self, valve: LearntValve) -> NDArray:
         """How much lower a pulse aims (n,) [bar]: two independent errors of the rise, together.
@@ -120,8 +120,6 @@ REGISTRATION = Registration(
         "aim": Range(low=-0.1, high=0.3, least=-0.5, most=0.5),
         "caution": Range(low=0.0, high=0.6, most=2.0),
         "doubt": Range(low=0.0, high=1.5, most=4.0),
-        "reserve": Range(low=0.0, high=1.0, most=2.0),
-        "tolerated": Range(low=0.2, high=0.5, least=0.0, most=1.0),
         "filter_time": Range(low=0.004, high=0.04, log=True, least=0.001, most=0.4),
         "look_ahead": Range(low=0.3, high=1.5, least=0.0, most=4.0),
         "rounding": Range(low=0.2, high=1.2, least=0.0, most=2.0),

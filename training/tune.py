@@ -94,7 +94,7 @@ def tune(
         if wider == searched:
             break
         print(f"{kind}: the search ended at a bound; searching wider: {_named(searched, wider)}")
-        study, searched = _search(kind, wider, run, trials, seed), wider
+        study, searched = _search(kind, wider, run, trials, seed, study.best_params), wider
     if widened(searched, study.best_params) != searched:
         print(f"{kind}: the search ended at a bound again after {WIDENINGS} wider ones; it is kept")
     return Tuning(
@@ -131,12 +131,15 @@ def _mean_return(kind: str, values: dict[str, Any], **scenarios: Any) -> float:
 
 
 def _search(
-    kind: str, space: SearchSpace, run: Callable[[dict[str, Any]], float], trials: int, seed: int
-) -> optuna.Study:
-    """One search of a space."""
+    kind: str, space: SearchSpace, run: Callable[[dict[str, Any]], float], trials: int, seed: int,
+    first: Mapping[str, Any] | None = None,
+) -> optuna.Study:  # fmt: skip
+    """One search of a space. first: values to try first, so that the outcome is no worse than they."""
     study = optuna.create_study(
         direction="maximize", sampler=optuna.samplers.TPESampler(seed=seed, multivariate=True)
     )
+    if first is not None:
+        study.enqueue_trial(dict(first))
     with tqdm(total=trials, desc=f"{kind:27s}", unit="trial") as bar:
 
         def count(*_: Any) -> None:

@@ -8,7 +8,7 @@ from controllers.tuned import Tuning, load_tunings, save_tunings
 from epv_env.reward import reward_terms
 from training.evaluation.scenarios import TUNING_REGION
 from training.learners.hyperparameters import FROM_STUDENT
-from training.tune import OBJECTIVES, kept, main, widened
+from training.tune import OBJECTIVES, _search, kept, main, widened
 
 pytestmark = pytest.mark.training
 SHORT = ("--trials", "1", "--episodes", "1", "--duration", "0.1")
@@ -64,6 +64,12 @@ def test_another_budget_is_refused_and_the_file_left_alone(tmp_path):
 
 def test_nothing_is_kept_of_a_file_that_is_not_there(tmp_path):
     assert kept(tmp_path / "none.json", SEARCH) == {}
+
+
+def test_a_wider_search_is_no_worse_than_the_one_before():
+    space = {"x": Range(low=-100.0, high=100.0)}
+    study = _search("any", space, lambda values: -abs(values["x"]), 3, 0, {"x": 1e-3})
+    assert study.best_params == {"x": 1e-3}
 
 
 def test_a_search_that_ends_at_a_bound_is_widened_to_its_physical_limit_at_most():
