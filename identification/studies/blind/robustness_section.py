@@ -149,6 +149,6 @@ def _changed(pairs: Sequence[PairOfScores]) -> Table | Text:
         if not pair.same_first_cause or pair.before.verdict != pair.after.verdict
     ]
     if not rows:
-        return Text(text="No trial's answer changed.")
+        return Text(text="All answers stayed the same.")
     columns = ["Trial", "kind", "truth", "undisturbed", "disturbed"]
     return Table(columns=columns, rows=rows, caption="Trials whose answer changed.")

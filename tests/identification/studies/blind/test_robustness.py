@@ -48,7 +48,7 @@ def test_a_wrong_noise_is_told_with_the_same_recordings(study):
     assert not (trial_folder(study, 0) / "campaign-sigma=3").exists()
     content = json.loads((study / "robustness-sigma=3.json").read_text())
     assert content["shares"]["same verdict"]["hits"] == content["trials"] == 1
-    assert "Trials whose answer changed" in (study / "robustness-sigma=3.html").read_text()
+    assert "All answers stayed the same" in (study / "robustness-sigma=3.html").read_text()
 
 
 def test_a_ripple_has_a_campaign_of_its_own_which_a_rerun_keeps(study):
