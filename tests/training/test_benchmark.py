@@ -270,9 +270,11 @@ def test_options_that_cannot_work_are_refused(arguments, words, tmp_path, capsys
     assert not (tmp_path / "out").exists()
 
 
-def test_more_training_seeds_than_there_are_episodes_for_are_refused(tmp_path):
-    with pytest.raises(ValueError, match="would meet episodes kept for tuning"):
+def test_more_training_seeds_than_there_are_episodes_for_are_refused(tmp_path, capsys):
+    with pytest.raises(SystemExit):
         benchmark.main(["--seeds", "70000", "--out", str(tmp_path / "out")])
+    assert "--seeds must be at most 1000" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 def test_the_page_shows_the_published_results():

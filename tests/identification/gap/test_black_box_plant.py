@@ -136,7 +136,7 @@ def test_a_plant_without_equations_is_reported(diagnosed):
 
 def test_an_fmu_without_fmpy_says_what_to_install(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "fmpy", None)
-    with pytest.raises(ImportError, match=r"an FMU needs FMPy.*pip install '.\[fmu\]'"):
+    with pytest.raises(ImportError, match=r"an FMU needs FMPy.*pip install -e '.\[fmu\]'"):
         fmu_simulator(tmp_path / "tank.fmu", {}, ["h"], {})
 
 
