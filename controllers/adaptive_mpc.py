@@ -15,7 +15,7 @@ from controllers.mpc import MPC
 from controllers.mpc import REGISTRATION as NOMINAL
 from controllers.pulse_simulation import pulse_table
 from controllers.pulse_table import PulseTable
-from controllers.registration import SIMULATING, Range
+from controllers.registration import Range
 from controllers.valve_learner import LearntValve, ValveLearner
 
 
@@ -75,6 +75,6 @@ REGISTRATION = replace(
         **(NOMINAL.search_space or {}),
         "filter_time": Range(low=0.004, high=0.04, log=True, least=0.001, most=0.4),
     },
-    cost=replace(SIMULATING, paired_random_episodes=32),
+    cost=replace(NOMINAL.cost, paired_random_episodes=32),
 )  # fmt: skip
 """The MPC that finds out which valve it has."""

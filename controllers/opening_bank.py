@@ -21,7 +21,7 @@ class BankSettings:
     """What is believed before the first pulse, and how far a pulse is trusted."""
 
     offsets: NDArray = field(default_factory=lambda: np.linspace(-2.2, 2.2, 45))
-    """Assumed offsets of the opening pressure [bar]: three standard deviations with 0.1 bar between."""
+    """Assumed offsets of the opening pressure [bar]: 4.4 standard deviations with 0.1 bar between."""
     offset_spread: float = 0.5
     """Their standard deviation before the first pulse [bar]: piston, seat and spring within ±10 %."""
     offset_drift: float = 2e-3

@@ -67,13 +67,16 @@ class LearntValve:
     """Whether the coil is on, bool."""
     opens_in: NDArray
     """Time until the piston lifts, the coil being off from now [s]; 0: it is open."""
-    opens_from_rest: NDArray
-    """The same with the control chamber full, at p1 [s]."""
 
     @property
     def shut(self) -> NDArray:
         """Whether the piston rests on its seat, bool (n,)."""
         return self.opens_in > 0
+
+    @property
+    def opens_from_rest(self) -> NDArray:
+        """`opens_in` with the control chamber full, at p1 (n,) [s]."""
+        return self.table.time_to_open(self.p1, self.p2, self.p1) / self.pace
 
     @property
     def fed(self) -> NDArray:
@@ -131,7 +134,6 @@ class ValveLearner:
             table=table, pace=self._pace, gain=self._bank.gain, p1=p1, p2=p2, p3=p3,
             gain_deviation=self._bank.gain_deviation, offset_deviation=self._bank.offset_deviation,
             error=self._error, fall=np.minimum(self._slope, 0.0), on=on, opens_in=opens_in,
-            opens_from_rest=table.time_to_open(p1, p2, p1) / self._pace,
         )  # fmt: skip
 
     def decided(self, valve: LearntValve, action: NDArray) -> None:

@@ -8,8 +8,8 @@ print(score(controller))  # anything with name, environment, reset(n) and act(ob
 from dataclasses import dataclass
 
 from controllers.base import Controller
-from training.evaluation.metrics import EpisodeMetrics, summary
-from training.evaluation.rollout import run_episodes
+from training.evaluation.metrics import summary
+from training.evaluation.rollout import run_batches
 from training.evaluation.seeds import BENCHMARK_SEED
 
 EPISODES = 128
@@ -54,16 +54,11 @@ def score(
         episodes: fewer are for a quick look only: others score on all of them.
         duration: of an episode [s], likewise.
     """
-    parts = []
-    for first in range(0, episodes, SIDE_BY_SIDE):
-        count = min(SIDE_BY_SIDE, episodes - first)
-        begin = BENCHMARK_SEED + first
-        metrics, _ = run_episodes(
-            controller, seeds=list(range(begin, begin + count)), duration=duration,
-            options={"threads": 1},
-        )  # fmt: skip
-        parts.append(metrics)
-    found = summary(EpisodeMetrics.joined(parts))
+    seeds = range(BENCHMARK_SEED, BENCHMARK_SEED + episodes)
+    metrics = run_batches(
+        controller, seeds=seeds, duration=duration, options={"threads": 1}, size=SIDE_BY_SIDE
+    )
+    found = summary(metrics)
     return {
         "mean_return": found["mean_return"], "left_share": 1.0 - found["C1_stayed"],
         "rms_error_bar": found["rms_error_bar"], "switchings_per_s": found["switchings_per_s"],

@@ -1,6 +1,6 @@
 """Running controllers on scenarios: the same seeds give every controller the same episodes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -130,3 +130,20 @@ def run_episodes(
         target_bar=float(env.task.target[trace_of]), coil=columns[2], consumption_g_per_s=columns[3],
     )  # fmt: skip
     return metrics, trace
+
+
+def run_batches(
+    controller: Controller,
+    *,
+    seeds: Sequence[int],
+    duration: float,
+    options: dict[str, Any],
+    size: int,
+) -> EpisodeMetrics:
+    """`run_episodes` of many seeds, `size` episodes at a time: together they would fill the memory."""
+    parts = []
+    for first in range(0, len(seeds), size):
+        batch = list(seeds[first : first + size])
+        metrics, _ = run_episodes(controller, seeds=batch, duration=duration, options=options)
+        parts.append(metrics)
+    return EpisodeMetrics.joined(parts)

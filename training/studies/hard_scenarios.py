@@ -9,11 +9,11 @@ from epv_env.reward import REFERENCE_PERIOD
 from training.evaluation.effect_levels import effect_levels
 from training.evaluation.hard_scenarios import HARD, HardScenario
 from training.evaluation.metrics import EpisodeMetrics, summary
-from training.evaluation.rollout import run_episodes
+from training.evaluation.rollout import run_batches
 from training.studies.episode_tasks import Study
 
 SIDE_BY_SIDE = 1000
-"""Episodes that are run together: many more would fill the memory."""
+"""Episodes that are run together."""
 
 
 def worn_scenarios() -> dict[str, HardScenario]:
@@ -47,12 +47,9 @@ def run_scenario(
     controller = study.controller(label, period)
     if scenario.fault is not None and not isinstance(controller, Privileged):  # it has no memory
         controller = scenario.fault.around(controller, period)
-    parts = []
-    for first in range(0, len(seeds), SIDE_BY_SIDE):
-        batch = list(seeds[first : first + SIDE_BY_SIDE])
-        metrics, _ = run_episodes(controller, seeds=batch, duration=scenario.duration, options=options)
-        parts.append(metrics)
-    return EpisodeMetrics.joined(parts)
+    return run_batches(
+        controller, seeds=seeds, duration=scenario.duration, options=options, size=SIDE_BY_SIDE
+    )
 
 
 def rows(
