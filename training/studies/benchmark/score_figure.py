@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Picture
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from epv_env import MAX_EPISODE_STEPS
 from training.evaluation.benchmark import FIGURES, Figure
@@ -46,6 +47,10 @@ def score_figure(entries: Sequence[Entry]) -> Picture:
         line[1].set_title(rows[0].entry.environment, fontsize=10)
     for each, panel in zip(axes[-1], PANELS, strict=True):
         each.set(xlabel=panel.label, xscale=panel.scale)
+        if panel.scale == "log":  # whole numbers, few enough to stand side by side
+            each.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            each.xaxis.set_major_formatter(StrMethodFormatter("{x:.0f}"))
+            each.xaxis.set_minor_formatter(NullFormatter())
     return picture
 
 
