@@ -13,15 +13,9 @@ from numpy.typing import NDArray
 from controllers.pulse_simulation import pulse_table
 from controllers.pulse_table import PulseTable
 from controllers.registration import CHEAP, Range, Registration
+from controllers.reserve import expected_breakdown, reserve_for
 from controllers.valve_learner import LearntValve, ValveLearner
-from epv_env.common.units import BAR, GRAM
-from epv_env.plant.consumption import SCENARIOS
 from epv_env.reward import BAND_BAR
-
-HARDEST_FLOW = SCENARIOS["emergency"].flow[1] * GRAM
-"""Flow of the hardest application that the reserve is for [kg/s]."""
-MOST_RESERVE = 0.3
-"""Largest reserve: above it a pulse's scatter would leave the band upwards [bar]."""
 
 
 @dataclass(kw_only=True)
@@ -74,7 +68,9 @@ class AdaptivePulse:
     def act(self, observations: NDArray) -> NDArray:
         """0 (off) or 1 (on) for each valve, (n,)."""
         valve = self._learner.observe(observations)
-        reserve = self.reserve_for(self.expected_breakdown(valve.opens_from_rest))
+        table = self.table
+        breakdown = expected_breakdown(table.parameters, table.release_lag, valve.opens_from_rest)
+        reserve = reserve_for(breakdown, self.tolerated)
         ahead = self.look_ahead * (valve.opens_in + self.table.release_lag)
         begins = valve.fed & valve.shut & (valve.error + valve.fall * ahead < self.trigger + reserve)
         aim = self.aim + reserve - self._uncertainty(valve)
@@ -84,19 +80,6 @@ class AdaptivePulse:
         action = np.where(valve.on, np.where(begins, 0, 1), np.where(ends, 1, 0))
         self._learner.decided(valve, action)
         return action
-
-    def expected_breakdown(self, opens_from_rest: NDArray) -> NDArray:
-        """What the hardest application draws from the circuit until the valve opens (n,) [bar].
-
-        opens_from_rest: time until the piston lifts once the control chamber vents (n,) [s].
-        """
-        p = self.table.parameters
-        fall = HARDEST_FLOW * p["R_gas"] * p["T_env"] / p["V2"] / BAR
-        return fall * (self.table.release_lag + opens_from_rest)
-
-    def reserve_for(self, breakdown: NDArray) -> NDArray:
-        """How much higher p2 is held where this breakdown is expected (n,) [bar]."""
-        return np.clip(breakdown - self.tolerated, 0.0, MOST_RESERVE)
 
     def _uncertainty(self, valve: LearntValve) -> NDArray:
         """How much lower a pulse aims (n,) [bar]: two independent errors of the rise, together.

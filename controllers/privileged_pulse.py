@@ -26,14 +26,16 @@ class PrivilegedPulse:
 
     trigger: float = -0.06
     """Predicted p2 - target below which a pulse begins [bar]."""
-    aim: float = 0.125
+    aim: float = 0.10
     """p2 - target at which a pulse shall end [bar]."""
-    filter_time: float = 0.009
+    filter_time: float = 0.0125
     """Time in which the weight of a reading of p2 fades by 1/e [s]."""
-    look_ahead: float = 1.45
+    look_ahead: float = 1.5
     """Share of the time to open over which p2 is extrapolated [1]."""
-    rounding: float = 0.77
+    rounding: float = 0.8
     """Remaining time below which a pulse ends now [control periods]."""
+    tolerated: float = 0.42
+    """Expected breakdown that needs no reserve [bar]."""
     name: str = "pulse, informed"
     environment: str = "EPValve-v0"
     _pulse: Pulse | None = field(default=None, repr=False)
@@ -51,6 +53,7 @@ class PrivilegedPulse:
         self._pulse = Pulse(
             table=pulse_tables(plants, task.settings.supply_voltage), trigger=self.trigger, aim=self.aim,
             filter_time=self.filter_time, look_ahead=self.look_ahead, rounding=self.rounding,
+                tolerated=self.tolerated,
         )  # fmt: skip
         self._pulse.reset(task.n)
 

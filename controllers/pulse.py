@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from controllers.pulse_simulation import pulse_table
 from controllers.pulse_table import PulseTable
 from controllers.registration import CHEAP, Range, Registration
+from controllers.reserve import expected_breakdown, fed, reserve_for
 from epv_env.observation import decode
 
 
@@ -42,6 +43,8 @@ class Pulse:
     """Share of the time to open over which p2 is extrapolated [1]."""
     rounding: float
     """Remaining time below which a pulse ends now [control periods]: 0.5 rounds, 1 never overshoots."""
+    tolerated: float = np.inf
+    """Expected breakdown that needs no reserve [bar] (controllers/reserve.py); infinite: none does."""
     control_period: float = 5e-3
     """[s]"""
     name: str = "pulse"
@@ -73,7 +76,8 @@ class Pulse:
         opens_in = self.table.time_to_open(p1, p2, p3)
         self._estimate(error, opens_in > 0)
         falls = np.minimum(self._slope, 0.0)  # only consumption moves p2 behind a shut valve
-        return self.decide((p1, p2, p3), opens_in, self._error, falls, coil > 0.5).astype(int)
+        above = self._error - self._reserve(p1, target)
+        return self.decide((p1, p2, p3), opens_in, above, falls, coil > 0.5).astype(int)
 
     def decide(
         self,
@@ -88,15 +92,23 @@ class Pulse:
         Args:
             pressures: p1, p2 and p3 [bar absolute].
             opens_in: the table's time to open at these pressures [s].
-            error: p2 - target [bar].
+            error: p2 - target, less the reserve [bar].
             falls: slope that consumption gives p2, zero or negative [bar/s].
             coil: whether it is energised now.
         """
         ahead = self.look_ahead * (opens_in + self.table.release_lag)
-        begins = (opens_in > 0) & (error + falls * ahead < self.trigger)
+        feeds = fed(*pressures[:2])
+        begins = feeds & (opens_in > 0) & (error + falls * ahead < self.trigger)
         remaining = self.table.duration(*pressures, self.aim - error, falls)
-        ends = remaining < self.rounding * self.control_period
+        ends = ~feeds | (remaining < self.rounding * self.control_period)
         return np.where(coil, ~begins, ends)
+
+    def _reserve(self, p1: NDArray, target: NDArray) -> NDArray:
+        """How much higher p2 is held (n,) [bar]; the control chamber at rest holds p1."""
+        table = self.table
+        opens_from_rest = table.time_to_open(p1, target, p1)
+        breakdown = expected_breakdown(table.parameters, table.release_lag, opens_from_rest)
+        return reserve_for(breakdown, self.tolerated)
 
     def _estimate(self, error: NDArray, shut: NDArray) -> None:
         """Follow p2 - target and its slope while the valve is shut; while it is open keep the slope.

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from controllers.opening_bank import BANK, OpeningBank, shifted
 from controllers.opening_pressure import opening_pressure
 from controllers.pulse_table import PulseTable
+from controllers.reserve import fed
 from epv_env.common.units import BAR
 from epv_env.observation import decode
 
@@ -34,9 +35,6 @@ class VentingSettings:
 
 
 VENTING = VentingSettings()
-
-LEAST_HEAD = 0.2
-"""p1 - p2 below which the supply does not raise the circuit [bar]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,12 +78,8 @@ class LearntValve:
 
     @property
     def fed(self) -> NDArray:
-        """Whether the supply can raise the circuit, bool (n,).
-
-        A valve that stood open meanwhile would let p2 follow a refill of the supply far above the
-        target: its control chamber would be empty, and take long to fill.
-        """
-        return self.p1 - self.p2 > LEAST_HEAD
+        """Whether the supply can raise the circuit, bool (n,)."""
+        return fed(self.p1, self.p2)
 
 
 class ValveLearner:

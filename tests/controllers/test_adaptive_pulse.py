@@ -5,15 +5,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from controllers.adaptive_pulse import HARDEST_FLOW, MOST_RESERVE, AdaptivePulse
+from controllers.adaptive_pulse import AdaptivePulse
 from controllers.opening_bank import BANK, OpeningBank, shifted
 from controllers.opening_pressure import opening_pressure
 from controllers.pulse import Pulse
 from controllers.pulse_simulation import pulse_table
 from epv_env.common.units import BAR
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.simulate import energised
-from epv_env.plant.valves import Valves
 from training.evaluation.hard_scenarios import HARD
 from training.evaluation.rollout import run_episodes
 
@@ -66,29 +64,6 @@ def test_pulses_tell_opening_pressure_and_gain(offset, gain):
     assert bank.gain[0] == pytest.approx(gain, abs=0.2)
     assert bank.offset_deviation[0] < 0.5 * BANK.offset_spread
     assert bank.gain_deviation[0] < OpeningBank(1).gain_deviation[0]
-
-
-def test_the_expected_breakdown_is_the_simulated_valves(table):
-    """From rest, with the hardest application as the coil is switched off, until the piston lifts."""
-    p1, p2, step = 11.0 * BAR, 8.0 * BAR, 0.1e-3
-    valves = Valves(1, threads=1)
-    valves.set_parameters(np.array([0]), PLANT)
-    for field, value in zip(valves.state, energised(PLANT, p1=p1, p2=p2, U=24.0), strict=True):
-        field[:] = value
-    valves.inputs.U[:] = 0.0
-    valves.inputs.sigma_S[:] = HARDEST_FLOW
-    while valves.state.xPV[0] == 0:
-        valves.advance(step)
-    fell = (p2 - valves.state.p2[0]) / BAR
-    rest = (np.array([p1, p2 - fell * BAR, p1]) / BAR)[:, None]  # the opening pressure falls with p2
-    expected = AdaptivePulse(table=table, **ADAPTIVE).expected_breakdown(table.time_to_open(*rest))
-    assert expected[0] == pytest.approx(fell, rel=0.03)
-
-
-def test_the_reserve_grows_with_the_expected_breakdown_beyond_what_is_tolerated(table):
-    controller = AdaptivePulse(table=table, **ADAPTIVE, tolerated=0.4)
-    reserve = controller.reserve_for(np.array([0.1, 0.4, 0.6, 9.0]))
-    np.testing.assert_allclose(reserve, [0.0, 0.0, 0.2, MOST_RESERVE], atol=1e-12)
 
 
 def test_a_refill_after_starvation_does_not_carry_p2_out_of_the_band(table):

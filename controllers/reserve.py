@@ -1,0 +1,53 @@
+"""When p2 is raised without need, and when not in spite of it: a slow valve, and an empty supply.
+
+Until a valve at rest opens, an application draws from the circuit unanswered. What it draws follows from
+the plant alone, so a controller that knows its valve knows the reserve that it needs.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epv_env.common.units import BAR, GRAM
+from epv_env.plant.consumption import SCENARIOS
+
+HARDEST_FLOW = SCENARIOS["emergency"].flow[1] * GRAM
+"""Flow of the hardest application that the reserve is for [kg/s]."""
+MOST_RESERVE = 0.3
+"""Largest reserve: above it a pulse's scatter would leave the band upwards [bar]."""
+LEAST_HEAD = 0.2
+"""p1 - p2 below which the supply does not raise the circuit [bar]."""
+
+
+def expected_breakdown(
+    parameters: Mapping[str, Any], release_lag: float | NDArray, opens_from_rest: NDArray
+) -> NDArray:
+    """What the hardest application draws from the circuit until the valve opens (n,) [bar].
+
+    Args:
+        parameters: of the plant, numbers or arrays (n,) by symbol.
+        release_lag: from switching off to the control chamber's venting [s].
+        opens_from_rest: time until the piston lifts once the control chamber vents (n,) [s].
+    """
+    p = parameters
+    fall = HARDEST_FLOW * p["R_gas"] * p["T_env"] / p["V2"] / BAR
+    return fall * (release_lag + opens_from_rest)
+
+
+def reserve_for(breakdown: NDArray, tolerated: float) -> NDArray:
+    """How much higher p2 is held where this breakdown is expected (n,) [bar].
+
+    tolerated: expected breakdown that needs no reserve [bar].
+    """
+    return np.clip(breakdown - tolerated, 0.0, MOST_RESERVE)
+
+
+def fed(p1: NDArray, p2: NDArray) -> NDArray:
+    """Whether the supply can raise the circuit, bool (n,); p1, p2: [bar] (n,).
+
+    A valve that stood open meanwhile would let p2 follow a refill of the supply far above the target:
+    its control chamber would be empty, and take long to fill.
+    """
+    return p1 - p2 > LEAST_HEAD
