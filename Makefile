@@ -70,7 +70,7 @@ tradeoff: $(VENV)/.installed ## optimise controllers at several prices of switch
 	$(PY) $(TRADEOFF) --prices 0 --timesteps 12000000 --recurrent $(POLICIES)/recurrent
 
 results: tradeoff ## compare all controllers, and write docs/results/comparison.md's figures (trains what is missing)
-	$(PY) training/compare.py --recurrent $(POLICIES)/recurrent --policies $(POLICIES)/plain --tradeoff $(POLICIES)/tradeoff \
+	$(PY) training/compare.py --recurrent $(POLICIES)/recurrent --end-to-end $(POLICIES)/end-to-end --policies $(POLICIES)/plain --tradeoff $(POLICIES)/tradeoff \
 		--out runs/comparison --images docs/images --pages docs/results/comparison.md README.md $(ARGS)
 
 benchmark: $(VENV)/.installed ## train seven algorithms of stable-baselines3 and sb3-contrib, and score them (half an hour of one free core)

@@ -24,8 +24,8 @@ from controllers.policy_contract import (
 from epv_env.common.files import read_bytes
 
 TRAINED = Path(__file__).parent / "trained"
-"""The policies that come with the package, one of each kind: recurrent/seed-7 (with a memory) and
-plain/seed-0 (without one)."""
+"""The policies that come with the package, one of each kind: recurrent/seed-7 (with a memory),
+end-to-end/seed-0 (with one that has learned with PPO, too) and plain/seed-0 (without one)."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -37,6 +37,7 @@ from training.evaluation.rollout import Trace, run_episodes
 from training.evaluation.scenarios import EVALUATION, RANDOM
 from training.evaluation.seeds import EVALUATION_SEED, VALIDATION_SEED
 from training.learners.policy_folders import (
+    END_TO_END_TIMESTEPS,
     RECURRENT_TIMESTEPS,
     seed_folder,
     seed_policies,
@@ -64,6 +65,7 @@ CURVE_FILE = "learning_curve.csv"
 QUICK: dict[str, Any] = {
     "named": 4, "random": 16, "bound": 16, "tuning": 4, "duration": 0.8, "seeds": 1,
     "timesteps": 32_768, "recurrent_seeds": 1, "recurrent_timesteps": 32_768,
+    "end_to_end_seeds": 1, "end_to_end_timesteps": 102_400,
     "scenarios": [RANDOM, "steps", "anti-lock"],
 }  # fmt: skip
 """The defaults under --quick: everything is done, too little to learn or to conclude anything."""
@@ -87,8 +89,8 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     chosen = parse_with_quick(parser, arguments, QUICK)
     check_positive(
         parser, chosen,
-        "seeds", "recurrent_seeds", "timesteps", "recurrent_timesteps", "named", "random", "bound",
-        "tuning", "duration", "workers",
+        "seeds", "recurrent_seeds", "end_to_end_seeds", "timesteps", "recurrent_timesteps",
+        "end_to_end_timesteps", "named", "random", "bound", "tuning", "duration", "workers",
     )  # fmt: skip
     check_not_negative(parser, chosen, "seed")
     if chosen.seed + max(chosen.named, chosen.random, chosen.bound) > VALIDATION_SEED - EVALUATION_SEED:
@@ -123,6 +125,18 @@ def _add_policies(parser: argparse.ArgumentParser) -> None:
         help="PPO's steps for a missing one",
     )
     parser.add_argument(
+        "--end-to-end", type=writable_folder, help="the same for policies whose memory learns with PPO"
+    )
+    parser.add_argument(
+        "--end-to-end-seeds", type=int, default=10, help="training seeds that --end-to-end holds"
+    )
+    parser.add_argument(
+        "--end-to-end-timesteps",
+        type=int,
+        default=END_TO_END_TIMESTEPS,
+        help="PPO's steps for a missing one",
+    )
+    parser.add_argument(
         "--tradeoff", type=Path, help="folder of training/tradeoff.py: its controllers join the front"
     )
 
@@ -145,12 +159,15 @@ def contenders(chosen: argparse.Namespace) -> list[Contender]:
     """Everyone who takes part in all scenarios, the learned ones first and the oracle last."""
     found = []
     recurrent = chosen.recurrent, chosen.recurrent_seeds, chosen.recurrent_timesteps
+    end_to_end = chosen.end_to_end, chosen.end_to_end_seeds, chosen.end_to_end_timesteps
     plain = chosen.policies, chosen.seeds, chosen.timesteps
     kinds = [
-        seed_trainings(folder, count=count, timesteps=timesteps, recurrent=remembers)
-        for (folder, count, timesteps), remembers in ((recurrent, True), (plain, False))
+        seed_trainings(folder, count=count, timesteps=timesteps, recurrent=remembers, end_to_end=learns)
+        for (folder, count, timesteps), remembers, learns in (
+            (recurrent, True, False), (end_to_end, True, True), (plain, False, False),
+        )
         if folder is not None
-    ]
+    ]  # fmt: skip
     train_missing([training for kind in kinds for training in kind], workers=chosen.workers)
     for kind in kinds:
         policies = seed_policies(kind)

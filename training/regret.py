@@ -51,6 +51,7 @@ COST = 200
 
 DEFAULT = (
     f"PPO, recurrent={TRAINED / 'recurrent' / 'seed-7'}", f"PPO={TRAINED / 'plain' / 'seed-0'}",
+    f"PPO, end to end={TRAINED / 'end-to-end' / 'seed-0'}",
     *(name for name in load_tunings() if name not in SIMULATING_KINDS), INFORMED,
 )  # fmt: skip
 

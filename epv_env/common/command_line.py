@@ -76,11 +76,13 @@ MOST = {
     **dict.fromkeys(("named", "random", "bound", "tuning", "joint_episodes", "screened"), 1_000_000),
     "seeds": 1000,  # trainings
     "recurrent_seeds": 1000,
+    "end_to_end_seeds": 1000,
     "generations": 10_000,
     "seed": 2**32 - 1,  # what NumPy's and torch's generators take
     "switching_price": 1000.0,  # a switching would cost more than any excursion
     "timesteps": 10**12,  # years
     "recurrent_timesteps": 10**12,
+    "end_to_end_timesteps": 10**12,
     "trials": 1_000_000,
     "decisions": 10**9,
     "rate": 1e7,  # [Hz] no bench samples pressures faster

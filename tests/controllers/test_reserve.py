@@ -1,9 +1,11 @@
 """A slow valve needs a reserve: what an application draws before it opens."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
-from controllers.privileged_pulse import PrivilegedPulse
+from controllers.privileged_pulse import WITH_RESERVE, PrivilegedPulse
 from controllers.pulse import Pulse
 from controllers.pulse_simulation import pulse_table
 from controllers.reserve import HARDEST_FLOW, MOST_RESERVE, expected_breakdown, reserve_for
@@ -11,6 +13,7 @@ from epv_env.common.units import BAR
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
+from epv_env.reward import BAND_BAR
 
 PLANT = Parameters.calibrated()
 
@@ -43,10 +46,20 @@ def test_the_reserve_grows_with_the_expected_breakdown_beyond_what_is_tolerated(
 
 
 def test_a_pulse_holds_a_reserve_only_if_asked(table):
-    settings = {"trigger": -0.06, "aim": 0.125, "filter_time": 0.009, "look_ahead": 1.5, "rounding": 0.8}
+    settings: dict[str, Any] = {
+        "trigger": -0.06,
+        "aim": 0.125,
+        "filter_time": 0.009,
+        "look_ahead": 1.5,
+        "rounding": 0.8,
+    }
     p1, target = np.array([11.0]), np.array([8.0])
     assert Pulse(table=table, **settings)._reserve(p1, target) == 0
     breakdown = expected_breakdown(PLANT, table.release_lag, table.time_to_open(p1, target, p1))
     careful = Pulse(table=table, **settings, tolerated=float(breakdown[0]) - 0.1)
     np.testing.assert_allclose(careful._reserve(p1, target), 0.1)
-    assert np.isfinite(PrivilegedPulse().tolerated)
+
+
+def test_the_informed_pulse_holds_one_only_with_its_settings():
+    assert PrivilegedPulse().tolerated == np.inf
+    assert PrivilegedPulse(**WITH_RESERVE).tolerated < BAND_BAR

@@ -14,7 +14,8 @@ from training.evaluation.rollout import run_episodes
 ROOT = Path(__file__).parents[2]
 POLICIES = ROOT / "docs" / "results" / "policies"
 """Every policy of the comparison; the package holds one of each kind, to which links lead from here."""
-IN_PACKAGE = ("plain/seed-0", "recurrent/seed-7")
+IN_PACKAGE = ("plain/seed-0", "recurrent/seed-7", "end-to-end/seed-0")
+WITH_MEMORY = ("recurrent", "end-to-end")
 
 FOLDERS = sorted(path.parent for path in POLICIES.rglob(CONTRACT_FILE))
 SEEDS = [folder for folder in FOLDERS if folder.name.startswith("seed-")]
@@ -23,7 +24,7 @@ SEEDS = [folder for folder in FOLDERS if folder.name.startswith("seed-")]
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: str(folder.relative_to(POLICIES)))
 def test_each_can_be_loaded_and_remembers_if_it_should(folder: Path):
     policy = load_policy(folder)
-    assert (policy.cells > 0) == ("recurrent" in folder.parts)
+    assert (policy.cells > 0) == (not {"recurrent", "end-to-end"}.isdisjoint(folder.parts))
 
 
 @pytest.mark.parametrize("folder", SEEDS, ids=lambda folder: str(folder.relative_to(POLICIES)))
@@ -34,13 +35,13 @@ def test_each_was_trained_with_the_seed_that_it_is_named_after(folder: Path):
 
 def test_the_comparison_finds_ten_seeds_of_each_kind_and_two_variants_at_each_price():
     names = {str(folder.relative_to(POLICIES)) for folder in FOLDERS}
-    seeds = {f"{kind}/seed-{seed}" for kind in ("plain", "recurrent") for seed in range(10)}
+    seeds = {f"{kind}/seed-{seed}" for kind in ("plain", *WITH_MEMORY) for seed in range(10)}
     prices = {
         f"tradeoff/price-{price}{kind}"
         for price in ("0", "0.5", "1", "2")
         for kind in ("", "/recurrent")
     }
-    students = {f"recurrent/seed-{seed}/student" for seed in range(10)}
+    students = {f"{kind}/seed-{seed}/student" for kind in WITH_MEMORY for seed in range(10)}
     assert names == seeds | prices | students
 
 
@@ -59,8 +60,9 @@ def test_a_policy_of_the_package_is_the_one_that_is_compared(name: str):
         assert (POLICIES / name / file).resolve() == (TRAINED / name / file).resolve()
 
 
-def test_one_with_a_memory_holds_the_band_on_valves_that_it_does_not_know():
-    policy = load_policy(TRAINED / "recurrent" / "seed-7")
+@pytest.mark.parametrize("name", IN_PACKAGE[1:])
+def test_one_with_a_memory_holds_the_band_on_valves_that_it_does_not_know(name: str):
+    policy = load_policy(TRAINED / name)
     options = {"parameters": "sensitive_ten_percent"}
     metrics, _ = run_episodes(policy, seeds=list(range(64)), duration=5.0, options=options)
     assert metrics.stayed.mean() > 0.95

@@ -109,7 +109,8 @@ def test_a_memory_is_trained_end_to_end(tmp_path):
     learned, student = (load_policy(folder) for folder in (tmp_path, tmp_path / "student"))
     assert learned.cell is not None
     assert student.cell is not None
-    assert learned.cells == student.cells == 64
+    assert learned.cells == student.cells == 32
+    assert learned.name == "PPO, end to end"
     assert not np.array_equal(learned.cell.weight_memory, student.cell.weight_memory)
     assert "was trained with end_to_end True, not False" in command(*where, "--resume").stderr
 

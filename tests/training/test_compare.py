@@ -22,7 +22,7 @@ from training.evaluation.controller_table import PLANTS
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.scenarios import EVALUATION, RANDOM, TUNING_REGION
 from training.learners.policy_files import save_policy
-from training.learners.student import NAME, Student, policy_of
+from training.learners.student import END_TO_END_NAME, NAME, Student, policy_of
 from training.studies.comparison.acceptance_criteria import (
     against_oracle,
     against_rival,
@@ -118,12 +118,15 @@ def finished(tmp_path_factory):
         remembers = policy_of(Student(memory=4, width=8))
         folder = out / "memory" / f"seed-{seed}"
         save_policy(remembers, folder, control_period=5e-3, provenance={})
+    learned = replace(policy_of(Student(memory=4, width=8)), name=END_TO_END_NAME)
+    save_policy(learned, out / "end" / "seed-0", control_period=5e-3, provenance={})
     page = out / "page.md"
     page.write_text("before\n<!-- generated: short -->\nold\n<!-- end: short -->\nafter\n")
     arguments = [
         "--quick", "--duration", "0.6", "--scenarios", RANDOM, "steps", "--workers", "1",
         "--out", str(out), "--policies", str(out / "seeds"), "--seeds", "2",
         "--recurrent", str(out / "memory"), "--recurrent-seeds", "3",
+        "--end-to-end", str(out / "end"),
         "--pages", str(page), "--images", str(out / "i"),
     ]  # fmt: skip
     assert main(arguments) == 0
@@ -136,8 +139,8 @@ def test_the_short_form_writes_everything(finished):
     assert {path.name for path in (out / "i").iterdir()} == {n for n in FIGURES if n.endswith("png")}
     content = json.loads((out / RESULTS_FILE).read_text())
     names = [row["controller"] for row in content["figures"] if row["plants"] == "calibrated"]
-    assert names[:4] == [NAME, f"{NAME}, all seeds", "PPO", "PPO, all seeds"]
-    assert {bar["controller"] for bar in content["bars"]} == {NAME, "PPO"}
+    assert names[:5] == [NAME, f"{NAME}, all seeds", END_TO_END_NAME, "PPO", "PPO, all seeds"]
+    assert {bar["controller"] for bar in content["bars"]} == {NAME, END_TO_END_NAME, "PPO"}
     assert "hysteresis, extrapolating" in names
     assert content["chosen"]["PPO"] in ("PPO, seed 0", "PPO, seed 1")
     assert all(f"# {part}\n" in (out / TABLES_FILE).read_text() for part in PARTS)

@@ -78,3 +78,15 @@ def test_an_episode_that_leaves_is_charged_once():
     charged = np.array(rewards[0]) - np.array(rewards[1])
     assert set(np.round(charged.sum(axis=0), 3)) == {7.0}
     assert np.all(charged[:9] == 0)  # not before the settling time
+
+
+def test_an_episode_that_begins_far_below_leaves_only_once_it_has_arrived():
+    """Shut, it never arrives and is not charged; open, it is charged as it rises beyond the band."""
+    for action, charges in ((1, 0.0), (0, 7.0)):
+        totals = []
+        for charge in (0.0, 7.0):
+            env = wrapped(charge=charge, settling_time=0.01, drop_bar=1.0)
+            env.seed(3)
+            env.reset()
+            totals.append(sum(env.step(np.full(N, action))[1] for _ in range(39)))
+        np.testing.assert_allclose(totals[0] - totals[1], charges, atol=1e-3)

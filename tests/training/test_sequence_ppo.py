@@ -1,5 +1,6 @@
 """PPO through the recurrent unit: the rollout is the policy's, and an interruption changes nothing."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -69,6 +70,13 @@ def test_windows_give_the_probabilities_with_which_the_actions_were_drawn():
         assert whole.all()
         torch.testing.assert_close(found, old, rtol=1e-4, atol=1e-5)
     assert 0 < before.abs().amax(dim=1).count_nonzero() < H.num_envs
+
+
+def test_a_restart_erases_the_memory_between_two_rollouts():
+    for restarts in (0.0, 1.0):
+        model = learner(replace(H, restarts=restarts))
+        roll(model, 2)
+        assert model._before.any() == (restarts == 0)
 
 
 def test_a_window_in_which_another_episode_begins_teaches_the_critic_only():

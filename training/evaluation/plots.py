@@ -16,7 +16,13 @@ from epv_env.reward import BAND_BAR
 from training.evaluation.controller_table import Comparison
 from training.evaluation.rollout import Trace
 
-COLOURS = (*plt.rcParams["axes.prop_cycle"].by_key()["color"], "black", "navy", "darkgoldenrod")
+COLOURS = (
+    *plt.rcParams["axes.prop_cycle"].by_key()["color"],
+    "black",
+    "navy",
+    "darkgoldenrod",
+    "deeppink",
+)
 """Of lines and dots: as many as there are controllers to compare."""
 plt.rcParams["axes.prop_cycle"] = cycler(color=COLOURS)
 

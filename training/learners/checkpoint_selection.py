@@ -44,8 +44,8 @@ class Selection(BaseCallback):
         """
         super().__init__()
         self._points = sorted(points)
-        self._settings = settings
-        self._options = options
+        self.settings = settings
+        self.options = options
         self._controller = controller
         self.rows = rows
         """One for each validation, those of a resumed training's earlier part included."""
@@ -73,9 +73,9 @@ class Selection(BaseCallback):
 
     def _validate(self) -> None:
         assert isinstance(self.model, PPO)
-        metrics = validate(self._controller(self.model), self._settings, self._options)
+        metrics = validate(self._controller(self.model), self.settings, self.options)
         best = max((row["score"] for row in self.rows), default=float("-inf"))
-        row = {"timesteps": float(self.num_timesteps), **figures(metrics, self._settings)}
+        row = {"timesteps": float(self.num_timesteps), **figures(metrics, self.settings)}
         self.rows.append(row)
         if row["score"] > best:
             self.best = archive_of(self.model)

@@ -30,6 +30,8 @@ from training.learners.validation import ValidationSettings, score, validate
 class Distillation(LessonSettings):
     """What defines a distillation: its episodes, and how the student learns from them."""
 
+    reserve: bool = False
+    """Whether the teacher holds p2 higher where a valve is slow (controllers/reserve.py)."""
     memory: int = 32
     """Cells of the gated recurrent unit."""
     width: int = 64
@@ -52,8 +54,8 @@ class Distillation(LessonSettings):
     """Length of a validation episode [s]."""
 
 
-FOR_END_TO_END = Distillation(memory=64, rounds=24)
-"""For a student whose recurrent unit learns on with PPO: larger, and less of it is imitation."""
+FOR_END_TO_END = Distillation(reserve=True)
+"""For a student whose recurrent unit learns on with PPO."""
 
 
 def distil(

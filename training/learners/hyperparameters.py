@@ -37,6 +37,8 @@ class Hyperparameters:
     """Half-width of the band with this price, at most C1's; a narrower one keeps a margin [bar]."""
     breakdown_price: float = 0.0
     """Price of the shortfall below the target in training, unless the reward's own is higher."""
+    switching_price: float = 0.0
+    """Price of a switching in training, unless the reward's own is higher."""
     imitation_epochs: int = 2
     """Passes over the demonstration that the model imitates first (training/learners/imitation.py)."""
     end_to_end: bool = False
@@ -52,6 +54,8 @@ class Hyperparameters:
     """Learning rate of the critic over the actor's [1]."""
     critic_first: int = 0
     """Environment steps in which the critic learns alone."""
+    restarts: float = 0.0
+    """Probability that an episode's control unit restarts, and forgets everything, after a rollout."""
     averaging: float = 0.99
     """Factor by which an actor's weight in the average falls with each update [1]."""
     sharpness: float = 1.0
@@ -66,6 +70,9 @@ class Hyperparameters:
     """Entropy coefficient at the start [1]; it falls linearly to zero."""
     width: int = 64
     """Units of each of the two hidden layers."""
+    reserves_bar: tuple[float, ...] = (0.0,)
+    """Candidates of how much higher than it has learned a policy holds p2, tried on the validation
+    episodes (training/learners/raised_setpoint.py) [bar]."""
     validations: int = 8
     """Number of validated policies, evenly from `first_validation` to the end."""
     first_validation: float = 0.75
@@ -112,18 +119,22 @@ FROM_MEMORYLESS = Hyperparameters(learning_rate=4e-4, breakdown_price=0.6, first
 
 END_TO_END = Hyperparameters(
     end_to_end=True, n_steps=50, batch_size=1600, longest_episode_steps=2000, learning_rate=1.5e-4,
-    last_learning_rate=1e-5, critic_first=1_500_000, clip_range=0.1, gae_lambda=0.98, ent_coef=0.0,
-    sharpness=4.0, leaving_charge=300.0, leaving_margin_bar=0.36, band_price=0.0, breakdown_price=0.5,
-    imitation_epochs=0, validations=5, first_validation=0.6,
+    last_learning_rate=1e-5, critic_first=1_000_000, clip_range=0.1, gae_lambda=0.98, ent_coef=0.0,
+    sharpness=4.0, restarts=0.01, leaving_charge=300.0, leaving_margin_bar=0.38, band_price=10.0,
+    band_bar=0.30, breakdown_price=0.5, switching_price=0.45, imitation_epochs=0,
+    reserves_bar=(-0.03, -0.015, 0.0, 0.015, 0.03), validations=4, first_validation=0.6,
+    validation_episodes=1024, validation_conditions=Conditions(extreme=0.5, braking=0.5),
     conditions=Conditions(
-        extreme=0.5, braking=0.25, far=0.06, vented=0.08, coil_off=0.08, starved=0.08, rest=0.05,
+        extreme=0.5, braking=0.3, far=0.06, vented=0.12, coil_off=0.08, starved=0.12, rest=0.05,
         rest_s=(2.0, 8.0), target_steps=0.1, noisy=0.2, frozen_p3=0.05, biased_p2=0.05, delayed=0.15,
     ),
 )  # fmt: skip
 """For a recurrent policy that goes on from its student, the recurrent unit included.
 
 Long episodes teach it to remember. Plants from the region's corners and hard applications are frequent,
-since a good policy leaves the band only where they meet."""
+since a good policy leaves the band only where they meet. The margin's price alone would make a policy
+keep p3 ready and switch 20 times a second and more; the higher price of a switching keeps it to the
+student's way, rest between applications."""
 
 
 def training_weights(weights: RewardWeights, h: Hyperparameters) -> RewardWeights:
@@ -133,6 +144,7 @@ def training_weights(weights: RewardWeights, h: Hyperparameters) -> RewardWeight
         band=max(weights.band, h.band_price),
         band_bar=min(weights.band_bar, h.band_bar),
         breakdown=max(weights.breakdown, h.breakdown_price),
+        switching=max(weights.switching, h.switching_price),
     )
 
 

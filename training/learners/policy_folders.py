@@ -25,7 +25,7 @@ MEMORYLESS_TIMESTEPS = 5_000_000
 RECURRENT_TIMESTEPS = 8_000_000
 """Environment steps of PPO for a recurrent policy."""
 
-END_TO_END_TIMESTEPS = 16_000_000
+END_TO_END_TIMESTEPS = 8_000_000
 """The same if the recurrent unit learns, too."""
 
 DISTILLATION_STEPS = 15_000_000
@@ -46,6 +46,8 @@ class Training:
     """Prices of the reward."""
     recurrent: bool = False
     """Whether the policy is recurrent (recurrent_training.py)."""
+    end_to_end: bool = False
+    """Whether its recurrent unit learns with PPO, too."""
     student: Path | None = None
     """Folder of the student that a recurrent policy goes on from; None: it is trained, too."""
     memoryless: Path | None = None
@@ -70,7 +72,7 @@ class Training:
 
     def run(self, *, quiet: bool = False) -> None:
         """Train the policy. An interrupted training goes on. quiet: no progress bars."""
-        from training.learners.distillation import Distillation
+        from training.learners.distillation import FOR_END_TO_END, Distillation
         from training.learners.hyperparameters import Hyperparameters, recurrent_hyperparameters
         from training.learners.policy_files import save_policy  # torch takes seconds to import: only now
         from training.learners.ppo import train
@@ -84,8 +86,8 @@ class Training:
         with only_writer(self.folder):
             if self.recurrent:
                 policy, log = train_recurrent(
-                    recurrent_hyperparameters(self.weights),
-                    Distillation(),
+                    recurrent_hyperparameters(self.weights, end_to_end=self.end_to_end),
+                    FOR_END_TO_END if self.end_to_end else Distillation(),
                     student=self.student,
                     memoryless=self.memoryless,
                     **task,
@@ -127,13 +129,16 @@ def seed_folder(folder: Path, seed: int) -> Path:
 
 
 def seed_trainings(
-    folder: Path, *, count: int, timesteps: int, recurrent: bool = False
+    folder: Path, *, count: int, timesteps: int, recurrent: bool = False, end_to_end: bool = False
 ) -> list[Training]:
     """One for each training seed 0, 1, ..."""
     return [
-        Training(folder=seed_folder(folder, seed), timesteps=timesteps, seed=seed, recurrent=recurrent)
+        Training(
+            folder=seed_folder(folder, seed), timesteps=timesteps, seed=seed, recurrent=recurrent,
+            end_to_end=end_to_end,
+        )
         for seed in range(count)
-    ]
+    ]  # fmt: skip
 
 
 def seed_policies(trainings: Sequence[Training]) -> dict[str, Controller]:

@@ -3,7 +3,7 @@
 import hashlib
 import io
 import pickle
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ from training.learners.imitation import imitate
 from training.learners.learning_log import TrainingLog
 from training.learners.policy_files import greedy_policy, policy_bytes, put_layers, put_student
 from training.learners.provenance import plant_digest
+from training.learners.raised_setpoint import best_raised
 from training.learners.recurrent_actor_critic import RecurrentActorCritic
 from training.learners.resumption import restore_progress
 from training.learners.run_folder import TENSORBOARD_FOLDER
@@ -39,6 +40,7 @@ from training.learners.run_state import (
 )
 from training.learners.schedules import FadingEntropy, linear
 from training.learners.sequence_ppo import SequencePPO
+from training.learners.student import END_TO_END_NAME
 from training.learners.training_env import make_training_env, seed_episodes
 from training.learners.validation import ValidationSettings
 
@@ -61,6 +63,7 @@ def make_model(
         kind = SequencePPO
         own = {
             "policy": RecurrentActorCritic, "critic_rate": h.critic_rate, "critic_first": h.critic_first,
+            "restarts": h.restarts,
         }  # fmt: skip
         policy = {
             "memory": cells, "width": h.width, "critic_width": h.critic_width, "averaging": h.averaging,
@@ -174,7 +177,8 @@ def train(
         )
     best_model: Any = io.BytesIO(selection.best)  # stable-baselines3 takes streams, too
     model.set_parameters(best_model, device=device)
-    return greedy(model), log
+    policy = best_raised(greedy(model), h.reserves_bar, selection.settings, selection.options)
+    return (replace(policy, name=END_TO_END_NAME) if learns else policy), log
 
 
 def _restore(model: PPO, checkpoint: Path, *, device: str) -> None:

@@ -51,6 +51,7 @@ class PrivilegedWrapper(VecEnvWrapper):
             scale: factor of the rewards [1].
             charge: price of an episode that leaves the band in training, once.
             margin_bar: deviation from the target, after the settling time, that counts as leaving [bar].
+                An episode that begins below the band leaves it only once it has reached it.
             longest: control periods of the longest episode.
         """
         assert isinstance(env.unwrapped, SB3VectorEnv)
@@ -68,6 +69,8 @@ class PrivilegedWrapper(VecEnvWrapper):
         n = env.num_envs
         self.left = np.zeros(n, dtype=bool)
         """Whether the episode has been charged (n,)."""
+        self.reached = np.zeros(n, dtype=bool)
+        """Whether the episode has reached the band with its margin (n,)."""
         self._taken = np.zeros((n, len(self._times)))
         space = env.observation_space
         assert isinstance(space, Box)
@@ -93,11 +96,13 @@ class PrivilegedWrapper(VecEnvWrapper):
         ended = np.flatnonzero(done).tolist()
         deviation = self._env.last_infos["deviation_bar"].copy()
         deviation[ended] = [infos[i]["deviation_bar"] for i in ended]
-        leaves = (np.abs(deviation) > self._margin_bar) & (before >= self._settled) & ~self.left
+        self.reached |= deviation >= -self._margin_bar
+        outside = (np.abs(deviation) > self._margin_bar) & (before >= self._settled)
+        leaves = outside & self.reached & ~self.left
         self.left |= leaves
         for i in ended:
             infos[i]["terminal_observation"] = self._last(i, before[i] + 1, infos[i])
-        self.left[ended] = False
+        self.left[ended] = self.reached[ended] = False
         self.foresee(np.array(ended, dtype=int))
         return self._shown(observation), self._scale * (reward - self._charge * leaves), done, infos
 

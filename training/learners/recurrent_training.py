@@ -10,7 +10,7 @@ from typing import Any
 
 from controllers.learned import LearnedPolicy, holds_policy, load_policy
 from controllers.policy_contract import read_contract
-from controllers.privileged_pulse import PrivilegedPulse
+from controllers.privileged_pulse import WITH_RESERVE, PrivilegedPulse
 from epv_env.actions import OnOff
 from training.learners.distillation import Distillation, distil
 from training.learners.hyperparameters import Hyperparameters, switching_is_cheap
@@ -94,7 +94,8 @@ def _distil_into(folder: Path, d: Distillation, *, run: str, quiet: bool, **task
     """Train a student. task: `train`'s arguments."""
     options = {name: task[name] for name in ("plant", "scenario", "parameters", "weights")}
     plants = known_plants(d.plants, options, seed=task["seed"], quiet=quiet)
-    policy = distil(d, PrivilegedPulse(), plants, options=options, seed=task["seed"], quiet=quiet)
+    teacher = PrivilegedPulse(**WITH_RESERVE) if d.reserve else PrivilegedPulse()
+    policy = distil(d, teacher, plants, options=options, seed=task["seed"], quiet=quiet)
     provenance = {"run": run, **_distilled_from(d, task["seed"])}
     save_policy(policy, folder, control_period=OnOff.default_period, provenance=provenance)
 

@@ -103,6 +103,7 @@ def _wrapped(model: PPO) -> Iterator[tuple[str, Any, str]]:
             yield "memory", wrapper, "state"
         if isinstance(wrapper, PrivilegedWrapper):
             yield "left", wrapper, "left"
+            yield "reached", wrapper, "reached"
     if isinstance(model, SequencePPO):
         yield "memory", model, "memory"
 

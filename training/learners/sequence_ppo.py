@@ -29,17 +29,26 @@ class SequencePPO(BatchPPO):
 
     policy: RecurrentActorCritic  # type: ignore[assignment]
 
-    def __init__(self, *arguments: Any, critic_rate: float = 1.0, critic_first: int = 0, **options: Any):
+    def __init__(
+        self,
+        *arguments: Any,
+        critic_rate: float = 1.0,
+        critic_first: int = 0,
+        restarts: float = 0.0,
+        **options: Any,
+    ):
         """
         Args:
             arguments: of PPO.
             critic_rate: the critic's learning rate over the actor's [1].
             critic_first: environment steps in which only the critic learns.
+            restarts: probability that an episode's control unit restarts after a rollout [1].
             options: of PPO.
         """
         self.memory: NDArray = np.zeros((0, 0), dtype=np.float32)
         """Recurrent state of the episodes (n, cells)."""
         self._critic_rate, self._critic_first = critic_rate, critic_first
+        self._restarts = restarts
         super().__init__(*arguments, **options)
 
     def _setup_model(self) -> None:
@@ -58,7 +67,10 @@ class SequencePPO(BatchPPO):
         self.memory[self._last_episode_starts.astype(bool)] = 0.0
         self._before = torch.from_numpy(self.memory.copy())
         self._log_odds: list[torch.Tensor] = []
-        return super().collect_rollouts(env, callback, rollout_buffer, n_rollout_steps)
+        goes_on = super().collect_rollouts(env, callback, rollout_buffer, n_rollout_steps)
+        # Now, not before the next rollout: checkpoints are written between both.
+        self.memory[(torch.rand(self.n_envs) < self._restarts).numpy()] = 0.0
+        return goes_on
 
     def train(self) -> None:
         """Update the networks on the rollout: PPO's clipped objective."""

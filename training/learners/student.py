@@ -12,6 +12,8 @@ from training.learners.hyperparameters import FROM_STUDENT, Hyperparameters
 from training.learners.run_folder import STUDENT_FOLDER
 
 NAME = "PPO, recurrent"
+END_TO_END_NAME = "PPO, end to end"
+"""Of a policy whose recurrent unit has learned with PPO, too."""
 
 
 class Student(torch.nn.Module):

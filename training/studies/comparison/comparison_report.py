@@ -50,6 +50,7 @@ class ComparisonTables:
     ours: Contender | None
     """The first learned contender, if one takes part."""
     paired: pd.DataFrame
+    """Of every learned contender against all others."""
     criteria: list[Criterion]
     lost: list[dict[str, str | float]]
     """Where a model-based rival is better."""
@@ -66,7 +67,9 @@ def comparison_tables(c: ComparisonResults, *, trade_off_episodes: int) -> Compa
         trade_off=score_tables.trade_off(c, trade_off_episodes),
         life=score_tables.switching_life(c),
         ours=ours,
-        paired=pd.DataFrame() if ours is None else score_tables.paired_comparisons(c, ours),
+        paired=pd.concat(
+            [score_tables.paired_comparisons(c, each) for each in learned] or [pd.DataFrame()]
+        ),
         criteria=[criterion for each in learned for criterion in criteria(c, each)],
         lost=[] if ours is None else lost_to_model_based(c, ours),
     )
@@ -103,10 +106,10 @@ def _parts(c: ComparisonResults, tables: ComparisonTables) -> dict[str, str]:
     """The text of each of PARTS."""
     against_rivals = (NOBODY, NOBODY)
     if tables.ours is not None:
-        paired = markdown_tables.paired_comparison_table(tables.paired, tables.ours.name)
         against_rivals = (
-            markdown_tables.criteria_table(tables.criteria, tables.lost), paired + _image(PAIRED)
-        )  # fmt: skip
+            markdown_tables.criteria_table(tables.criteria, tables.lost),
+            markdown_tables.paired_comparison_tables(tables.paired) + _image(PAIRED),
+        )
     texts = (
         markdown_tables.results_table(tables.figures),
         markdown_tables.short_table(tables.figures),
@@ -159,6 +162,8 @@ def _drawn(tables: ComparisonTables, curves: Mapping[str, pd.DataFrame]) -> Iter
     yield MEANS, comparison_figures.aggregate(tables.means)
     yield "tradeoff", comparison_figures.trade_off_figure(tables.trade_off)
     if tables.ours is not None:
-        yield PAIRED, comparison_figures.paired_comparison_figure(tables.paired, tables.ours.name)
+        ours = tables.ours.name
+        against = tables.paired.query("ours == @ours")
+        yield PAIRED, comparison_figures.paired_comparison_figure(against, ours)
     if curves:
         yield "learning_curve", comparison_figures.learning_curves(curves)

@@ -27,10 +27,10 @@ FIGURES = {
 """Columns of the main table, and where `summary` has them."""
 README_CONTROLLERS = (
     "PPO, recurrent",
+    "PPO, end to end",
     "pulse, adaptive",
     "hysteresis, extrapolating",
     "PWM",
-    "MPC",
     "pulse, informed",
 )
 """Rows of the README's table, by the names that the main table shows."""
@@ -85,8 +85,14 @@ def iqm_table(means: pd.DataFrame) -> str:
     return markdown(["plants", "controller", *SCORES.values()], rows)
 
 
-def paired_comparison_table(paired: pd.DataFrame, ours: str) -> str:
-    """Paired differences, and the probability that ours is better."""
+def paired_comparison_tables(paired: pd.DataFrame) -> str:
+    """For each learned controller the paired differences, and the probability that it is better."""
+    return "\n\n".join(
+        _paired_comparison_table(rows, str(ours)) for ours, rows in paired.groupby("ours", sort=False)
+    )
+
+
+def _paired_comparison_table(paired: pd.DataFrame, ours: str) -> str:
     rows = []
     for (plants, rival), cells in _grouped(paired, "rival").items():
         shown = [

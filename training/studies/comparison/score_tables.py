@@ -132,10 +132,12 @@ def paired_comparisons(c: ComparisonResults, ours: Contender) -> pd.DataFrame:
     """A row per plant set, rival and score: ours against the rival, paired by episode.
 
     A rival that has learned too is its chosen run: its training seeds have nothing to do with ours.
-    Columns: difference (ours - rival's) and probability that ours is better, each with its interval.
+    Columns: ours, plants, rival, score; difference (ours - rival's) and probability that ours is better,
+    each with its interval.
     """
     return _rows(
         {
+            "ours": ours.name,
             "plants": plants,
             "rival": rival.name,
             "score": field,
