@@ -26,7 +26,11 @@ from training.studies.benchmark.result_file import Entry, Run
 
 REFERENCE_KINDS = ("hysteresis", "hysteresis, extrapolating", "pulse, adaptive", "PWM")
 """Tuned controllers that stand beside the algorithms."""
-REFERENCE_POLICIES = {"packaged PPO": "plain/seed-0", "packaged recurrent PPO": "recurrent/seed-7"}
+REFERENCE_POLICIES = {
+    "packaged PPO": "plain/seed-0",
+    "packaged recurrent PPO": "recurrent/seed-7",
+    "packaged end-to-end PPO": "end-to-end/seed-0",
+}
 """Policies of the package by their names in tables."""
 
 _PACKAGES = {"stable_baselines3": "stable-baselines3", "sb3_contrib": "sb3-contrib"}
