@@ -15,8 +15,7 @@ from training.learners.validation import ValidationSettings, score, validate
 
 ERROR = INDEX["p2_error"]
 VIOLATION_PRICE = 3000.0
-"""Loss of score by an episode with a constraint violation: band first. It outweighs what a reserve of
-15 mbar costs in return as soon as that saves two of a thousand hard episodes from leaving."""
+"""Loss of score by an episode with a constraint violation, beside its return: the band comes first."""
 
 
 def raised(policy: LearnedPolicy, by_bar: float) -> LearnedPolicy:
