@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from controllers.pulse_simulation import pulse_table
 from controllers.pulse_table import PulseTable
 from controllers.registration import CHEAP, Range, Registration
-from controllers.reserve import expected_breakdown, reserve_for
+from controllers.reserve import reserve_of
 from controllers.valve_learner import LearntValve, ValveLearner
 from epv_env.reward import BAND_BAR
 
@@ -68,9 +68,7 @@ class AdaptivePulse:
     def act(self, observations: NDArray) -> NDArray:
         """0 (off) or 1 (on) for each valve, (n,)."""
         valve = self._learner.observe(observations)
-        table = self.table
-        breakdown = expected_breakdown(table.parameters, table.release_lag, valve.opens_from_rest)
-        reserve = reserve_for(breakdown, self.tolerated)
+        reserve = reserve_of(self.table, valve.opens_from_rest, self.tolerated)
         ahead = self.look_ahead * (valve.opens_in + self.table.release_lag)
         begins = valve.fed & valve.shut & (valve.error + valve.fall * ahead < self.trigger + reserve)
         aim = self.aim + reserve - self._uncertainty(valve)

@@ -61,7 +61,7 @@ class PrivilegedPulse:
         self._pulse = Pulse(
             table=pulse_tables(plants, task.settings.supply_voltage), trigger=self.trigger, aim=self.aim,
             filter_time=self.filter_time, look_ahead=self.look_ahead, rounding=self.rounding,
-                tolerated=self.tolerated,
+            tolerated=self.tolerated,
         )  # fmt: skip
         self._pulse.reset(task.n)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from controllers.pulse_simulation import pulse_table
 from controllers.pulse_table import PulseTable
 from controllers.registration import CHEAP, Range, Registration
-from controllers.reserve import expected_breakdown, fed, reserve_for
+from controllers.reserve import fed, reserve_of
 from epv_env.observation import decode
 
 
@@ -103,12 +103,11 @@ class Pulse:
         ends = ~feeds | (remaining < self.rounding * self.control_period)
         return np.where(coil, ~begins, ends)
 
-    def _reserve(self, p1: NDArray, target: NDArray) -> NDArray:
+    def _reserve(self, p1: NDArray, target: NDArray) -> NDArray | float:
         """How much higher p2 is held (n,) [bar]; the control chamber at rest holds p1."""
-        table = self.table
-        opens_from_rest = table.time_to_open(p1, target, p1)
-        breakdown = expected_breakdown(table.parameters, table.release_lag, opens_from_rest)
-        return reserve_for(breakdown, self.tolerated)
+        if np.isinf(self.tolerated):
+            return 0.0
+        return reserve_of(self.table, self.table.time_to_open(p1, target, p1), self.tolerated)
 
     def _estimate(self, error: NDArray, shut: NDArray) -> None:
         """Follow p2 - target and its slope while the valve is shut; while it is open keep the slope.

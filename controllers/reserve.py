@@ -1,4 +1,4 @@
-"""When p2 is raised without need, and when not in spite of it: a slow valve, and an empty supply.
+"""Limits of raising p2: a slow valve needs a reserve above the target, an empty supply cannot raise p2.
 
 Until a valve at rest opens, an application draws from the circuit unanswered. What it draws follows from
 the plant alone, so a controller that knows its valve knows the reserve that it needs.
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from controllers.pulse_table import PulseTable
 from epv_env.common.units import BAR, GRAM
 from epv_env.plant.consumption import SCENARIOS
 
@@ -42,6 +43,13 @@ def reserve_for(breakdown: NDArray, tolerated: float) -> NDArray:
     tolerated: expected breakdown that needs no reserve [bar].
     """
     return np.clip(breakdown - tolerated, 0.0, MOST_RESERVE)
+
+
+def reserve_of(table: PulseTable, opens_from_rest: NDArray, tolerated: float) -> NDArray:
+    """`reserve_for` what is expected of a table's valve (n,) [bar]; opens_from_rest: (n,) [s]."""
+    return reserve_for(
+        expected_breakdown(table.parameters, table.release_lag, opens_from_rest), tolerated
+    )
 
 
 def fed(p1: NDArray, p2: NDArray) -> NDArray:

@@ -114,28 +114,17 @@ def _add_policies(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seeds", type=int, default=10, help="training seeds that --policies holds")
     parser.add_argument("--timesteps", type=int, default=2_000_000, help="steps to train a missing one")
-    parser.add_argument("--recurrent", type=writable_folder, help="the same for policies with a memory")
-    parser.add_argument(
-        "--recurrent-seeds", type=int, default=10, help="training seeds that --recurrent holds"
-    )
-    parser.add_argument(
-        "--recurrent-timesteps",
-        type=int,
-        default=RECURRENT_TIMESTEPS,
-        help="PPO's steps for a missing one",
-    )
-    parser.add_argument(
-        "--end-to-end", type=writable_folder, help="the same for policies whose memory learns with PPO"
-    )
-    parser.add_argument(
-        "--end-to-end-seeds", type=int, default=10, help="training seeds that --end-to-end holds"
-    )
-    parser.add_argument(
-        "--end-to-end-timesteps",
-        type=int,
-        default=END_TO_END_TIMESTEPS,
-        help="PPO's steps for a missing one",
-    )
+    for option, whose, timesteps in (
+        ("--recurrent", "policies with a memory", RECURRENT_TIMESTEPS),
+        ("--end-to-end", "policies whose memory learns with PPO", END_TO_END_TIMESTEPS),
+    ):
+        parser.add_argument(option, type=writable_folder, help=f"the same for {whose}")
+        parser.add_argument(
+            f"{option}-seeds", type=int, default=10, help=f"training seeds that {option} holds"
+        )
+        parser.add_argument(
+            f"{option}-timesteps", type=int, default=timesteps, help="PPO's steps for a missing one"
+        )
     parser.add_argument(
         "--tradeoff", type=Path, help="folder of training/tradeoff.py: its controllers join the front"
     )

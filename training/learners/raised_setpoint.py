@@ -1,8 +1,8 @@
 """How much higher than it has learned a policy holds p2: the last thing that training settles.
 
-A learned policy leaves the band downwards, where a slow valve meets an emergency, far more often than
-upwards. Such episodes are so rare that PPO hardly feels them. How high p2 is held can be changed without
-learning: the policy is shown a lower p2. So a few heights are tried on the validation episodes.
+Some training seeds leave the band more often downwards, others upwards, and both are so rare that PPO
+hardly feels them. How high p2 is held can be changed without learning: the policy is shown a lower or
+higher p2. So a few heights are tried on the validation episodes.
 """
 
 from collections.abc import Sequence
