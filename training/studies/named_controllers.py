@@ -10,6 +10,8 @@ from controllers.learned import load_policy
 from controllers.p3_check import P3Check
 from controllers.policy_contract import CONTRACT_FILE, WEIGHTS_FILE
 from controllers.privileged_pulse import PrivilegedPulse
+from controllers.pulse_simulation import pulse_table
+from controllers.supervisor import Supervisor
 from controllers.tuned import build, load_tunings
 from epv_env.plant.plantfile import Plant
 from training.studies.fingerprint import fingerprint
@@ -32,6 +34,15 @@ def p3_checked(controller: Controller, plant: Plant) -> Controller:
     """
     values = load_tunings()[FALLBACK].values
     return P3Check(main=controller, fallback=build(FALLBACK, values, plant))
+
+
+def supervised(controller: Controller, plant: Plant) -> Controller:
+    """The controller under a supervisor that learns its valve, beginning with the plant's table.
+
+    Raises ValueError for a controller with other actions, and for one that reads no sensor.
+    """
+    table = pulse_table(plant.parameters, supply_voltage=plant.voltage)
+    return Supervisor(main=controller, table=table)
 
 
 def named_controllers(

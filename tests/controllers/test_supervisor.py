@@ -1,0 +1,102 @@
+"""The supervisor moves the setpoint with the valve's slowness, shuts unfed valves, and holds the band."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from controllers.hysteresis import Hysteresis
+from controllers.learned import TRAINED, load_policy
+from controllers.privileged_pulse import PrivilegedPulse
+from controllers.pulse_simulation import pulse_table
+from controllers.supervisor import Supervisor
+from epv_env.observation import LAYOUT, decode, encode
+from epv_env.plant.plantfile import Plant
+from training.evaluation.hard_scenarios import HARD
+from training.evaluation.rollout import run_episodes
+
+
+@dataclass(kw_only=True)
+class Recorder:
+    """Always switches off, and keeps what it was shown."""
+
+    name: str = "off"
+    environment: str = "EPValve-v0"
+
+    def reset(self, n: int) -> None:
+        self.shown: list[np.ndarray] = []
+
+    def act(self, observations):
+        self.shown.append(observations)
+        return np.zeros(len(observations), dtype=int)
+
+
+def supervisor(main, **settings) -> Supervisor:
+    plant = Plant.calibrated()
+    table = pulse_table(plant.parameters, supply_voltage=plant.voltage)
+    return Supervisor(main=main, table=table, **settings)
+
+
+def at_rest(**values):
+    """Readings of three valves at rest: coil on, p3 at p1, p2 at the target of 8 bar."""
+    usual = {"target": 8.0, "p1": 11.0, "p3": 11.0, "action": 1.0, "p2_error": 0.0}
+    mine = {quantity.name: np.full(3, quantity.centre) for quantity in LAYOUT}
+    chosen = {name: np.broadcast_to(np.asarray(v, float), 3) for name, v in (usual | values).items()}
+    return encode(mine | chosen)
+
+
+def test_the_setpoint_rises_with_the_expected_breakdown():
+    control = supervisor(Recorder())
+    control.reset(3)
+    valve = control._learner.observe(at_rest())
+    slower = replace(valve, pace=valve.pace * np.array([1.25, 1.0, 0.8]))
+    shifts = control.shift(slower)
+    assert shifts[0] < shifts[1] < shifts[2]
+    assert np.all(np.abs(shifts) <= control.most)
+
+
+def test_the_policy_is_shown_a_p2_that_is_lower_by_the_shift():
+    main = Recorder()
+    control = supervisor(main, typical=0.0, share=0.1)
+    control.reset(3)
+    observations = at_rest()
+    control.act(observations)
+    lowered = decode(observations, "p2_error") - decode(main.shown[0], "p2_error")
+    assert np.all((lowered > 0.01) & (lowered <= control.most))
+    assert np.array_equal(observations, at_rest())  # the caller's array is left alone
+
+
+def test_a_valve_that_the_supply_cannot_feed_is_kept_shut():
+    control = supervisor(Recorder())
+    control.reset(3)
+    assert control.act(at_rest(p1=[11.0, 8.1, 7.0], p3=[11.0, 8.1, 7.0])).tolist() == [0, 1, 1]
+
+
+def test_a_pulse_that_would_rise_beyond_the_ceiling_ends():
+    control = supervisor(Recorder())
+    control.reset(3)
+    open_valves = at_rest(p3=1.5, action=0.0, p2_error=[-3.0, -0.2, 0.2])
+    assert control.act(open_valves).tolist() == [0, 1, 1]
+
+
+@pytest.mark.parametrize("name", ["restart", "latency of 5 ms"])
+def test_the_supervised_policy_leaves_less_often(name):
+    scenario = HARD[name]
+    policy = load_policy(TRAINED / "end-to-end" / "seed-0")
+    left = []
+    for control in (policy, supervisor(policy)):
+        faulty = scenario.fault.around(control, 5e-3) if scenario.fault else control
+        metrics, _ = run_episodes(
+            faulty, seeds=list(range(3_500_000, 3_500_256)), duration=6.0,
+            options={"plant": Plant.calibrated(), "scenario": "mixed", **scenario.all_options},
+        )  # fmt: skip
+        left.append(np.sum(~metrics.stayed))
+    assert left[1] < left[0] / 2
+
+
+def test_controllers_without_pulses_or_sensors_are_refused():
+    other = Hysteresis(open_below=-0.1, shut_above=0.0, environment="EPValvePWM-v0")
+    with pytest.raises(ValueError, match="give a controller for EPValve-v0"):
+        supervisor(other)
+    with pytest.raises(ValueError, match="reads no sensor"):
+        supervisor(PrivilegedPulse())
