@@ -1,8 +1,9 @@
 """A supervisor around a learned policy: what the valve's own pulses tell corrects what the policy does.
 
-A learner of the valve (controllers/valve_learner.py) estimates how long the valve takes to open, and how
-far a pulse under way still raises p2. The supervisor moves the policy's setpoint by the first (a reference
-governor: Garone, Di Cairano and Kolmanovsky, Automatica 75 (2017)) and ends pulses by the second.
+A learner of the valve (controllers/valve_learner.py) estimates how long the valve takes to open, and
+how far a pulse under way still raises p2. The supervisor moves the policy's setpoint by the first (a
+reference governor: Garone, Di Cairano and Kolmanovsky, Automatica 75 (2017)) and ends pulses by the
+second.
 """
 
 from dataclasses import dataclass, field
@@ -55,8 +56,8 @@ class Supervisor:
             )
         if self.main.environment != "EPValve-v0":
             raise ValueError(
-                f"{self.main.name!r} is for {self.main.environment}: a supervisor ends pulses of the coil, "
-                "give a controller for EPValve-v0"
+                f"{self.main.name!r} is for {self.main.environment}: a supervisor ends pulses of the "
+                "coil, give a controller for EPValve-v0"
             )
         self.name, self.environment = f"{self.main.name}, supervised", self.main.environment
         self._learner = ValveLearner(

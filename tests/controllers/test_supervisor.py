@@ -1,4 +1,4 @@
-"""The supervisor moves the setpoint with the valve's slowness, shuts unfed valves, and holds the band."""
+"""The supervisor suits the setpoint to the valve, shuts unfed valves, and ends long pulses."""
 
 from dataclasses import dataclass, replace
 
