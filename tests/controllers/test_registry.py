@@ -19,11 +19,13 @@ from controllers.learned import LearnedPolicy
 from controllers.p3_check import P3Check
 from controllers.registration import CHEAP, Choice, Range, Registration, RegistrationError, SearchSpace
 from controllers.registry import REGISTRY, cost_class, registration
+from controllers.supervisor import Supervisor
 from controllers.tuned import Tuning, build, load_tunings
 from epv_env.plant.plantfile import Plant
 
 UNREGISTERED = {
     LearnedPolicy: "training writes it into folders, each of which names itself",
+    Supervisor: "worn around a controller, which has a record of its own",
     P3Check: "worn around a controller, which has a record of its own",
     CausalBound: "a yardstick of training/regret.py, too slow for the comparison",
 }
