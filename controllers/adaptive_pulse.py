@@ -85,8 +85,7 @@ class AdaptivePulse:
         Another opening pressure moves the rise of any pulse alike. Another gain counts by what p2 would
         still rise if the coil were switched on now: much, while the valve is wide open.
         """
-        under_way = valve.table.gained(valve.p1, valve.p2, valve.p3, np.zeros_like(valve.p1))
-        by_gain = self.doubt * valve.gain_deviation * under_way
+        by_gain = self.doubt * valve.gain_deviation * valve.under_way
         return np.hypot(self.caution * valve.offset_deviation, by_gain)
 
 

@@ -1,6 +1,7 @@
 """The protocol of all controllers: observations of a batch in, actions of a batch out."""
 
-from typing import Protocol, runtime_checkable
+from dataclasses import replace
+from typing import Any, Protocol, runtime_checkable
 
 from numpy.typing import NDArray
 
@@ -34,3 +35,9 @@ class Privileged(Controller, Protocol):
     def watch(self, task: LimitingTask) -> None:
         """Take in the episodes that have just begun; called after the environment's reset."""
         ...
+
+
+def with_period(controller: Controller, period: float) -> Controller:
+    """The controller for another control period [s], if it has a setting for it."""
+    own: Any = controller
+    return replace(own, control_period=period) if hasattr(own, "control_period") else own

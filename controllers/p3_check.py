@@ -5,13 +5,12 @@ pressure. A reading far from that end that stands still contradicts the coil. Fr
 that does not read p3 takes over.
 """
 
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.base import Controller, Privileged
+from controllers.base import Controller, Privileged, with_period
 from epv_env.observation import LONGEST_WAIT, decode
 
 CHANGE = "p3_change_4"
@@ -51,8 +50,8 @@ class P3Check:
                 f"{self.fallback.name!r} is for {self.fallback.environment} and {self.main.name!r} for "
                 f"{self.main.environment}: the one that takes over must act in the same environment"
             )
-        self.main = _with_period(self.main, self.control_period)
-        self.fallback = _with_period(self.fallback, self.control_period)
+        self.main = with_period(self.main, self.control_period)
+        self.fallback = with_period(self.fallback, self.control_period)
         self.name, self.environment = f"{self.main.name}, p3 checked", self.main.environment
 
     @property
@@ -86,9 +85,3 @@ class P3Check:
         known = np.minimum(lasted, self._periods * self.control_period)
         waited = known > min(self.wait, LONGEST_WAIT) - self.control_period / 2  # whole periods
         return waited & (np.abs(change) < self.still) & (remains > self.margin)
-
-
-def _with_period(controller: Controller, period: float) -> Controller:
-    """The controller for another control period [s], if it has a setting for it."""
-    own: Any = controller
-    return replace(own, control_period=period) if hasattr(own, "control_period") else own

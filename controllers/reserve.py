@@ -4,9 +4,6 @@ Until a valve at rest opens, an application draws from the circuit unanswered. W
 the plant alone, so a controller that knows its valve knows the reserve that it needs.
 """
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,19 +19,16 @@ LEAST_HEAD = 0.2
 """p1 - p2 below which the supply does not raise the circuit [bar]."""
 
 
-def expected_breakdown(
-    parameters: Mapping[str, Any], release_lag: float | NDArray, opens_from_rest: NDArray
-) -> NDArray:
+def expected_breakdown(table: PulseTable, opens_from_rest: NDArray) -> NDArray:
     """What the hardest application draws from the circuit until the valve opens (n,) [bar].
 
     Args:
-        parameters: of the plant, numbers or arrays (n,) by symbol.
-        release_lag: from switching off to the control chamber's venting [s].
+        table: of the valve, or of each.
         opens_from_rest: time until the piston lifts once the control chamber vents (n,) [s].
     """
-    p = parameters
+    p = table.parameters
     fall = HARDEST_FLOW * p["R_gas"] * p["T_env"] / p["V2"] / BAR
-    return fall * (release_lag + opens_from_rest)
+    return fall * (table.release_lag + opens_from_rest)
 
 
 def reserve_for(breakdown: NDArray, tolerated: float) -> NDArray:
@@ -47,9 +41,7 @@ def reserve_for(breakdown: NDArray, tolerated: float) -> NDArray:
 
 def reserve_of(table: PulseTable, opens_from_rest: NDArray, tolerated: float) -> NDArray:
     """`reserve_for` what is expected of a table's valve (n,) [bar]; opens_from_rest: (n,) [s]."""
-    return reserve_for(
-        expected_breakdown(table.parameters, table.release_lag, opens_from_rest), tolerated
-    )
+    return reserve_for(expected_breakdown(table, opens_from_rest), tolerated)
 
 
 def fed(p1: NDArray, p2: NDArray) -> NDArray:

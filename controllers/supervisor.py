@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.base import Controller, Privileged
+from controllers.base import Controller, Privileged, with_period
 from controllers.pulse_table import PulseTable
 from controllers.reserve import expected_breakdown
 from controllers.valve_learner import LearntValve, ValveLearner
@@ -59,6 +59,7 @@ class Supervisor:
                 f"{self.main.name!r} is for {self.main.environment}: a supervisor ends pulses of the "
                 "coil, give a controller for EPValve-v0"
             )
+        self.main = with_period(self.main, self.control_period)
         self.name, self.environment = f"{self.main.name}, supervised", self.main.environment
         self._learner = ValveLearner(
             self.table, filter_time=self.filter_time, control_period=self.control_period
@@ -80,17 +81,13 @@ class Supervisor:
 
     def shift(self, valve: LearntValve) -> NDArray:
         """How much higher p2 is held (n,) [bar]; none while the supply cannot raise it."""
-        expected = expected_breakdown(
-            self.table.parameters, self.table.release_lag, valve.opens_from_rest
-        )
+        expected = expected_breakdown(self.table, valve.opens_from_rest)
         wanted = np.clip(self.share * (expected - self.typical), -self.most, self.most)
         return np.where(valve.fed, wanted, 0.0)
 
     def _must_shut(self, valve: LearntValve) -> NDArray:
         """Whether the coil has to be on, bool (n,): no supply, or p2 would rise beyond the ceiling."""
-        under_way = valve.gain * valve.table.gained(
-            valve.p1, valve.p2, valve.p3, np.zeros_like(valve.p1)
-        )
-        uncertain = np.hypot(self.caution * valve.offset_deviation, valve.gain_deviation * under_way)
-        too_far = ~valve.shut & (valve.error + under_way + uncertain > self.ceiling)
+        rise = valve.gain * valve.under_way
+        uncertain = np.hypot(self.caution * valve.offset_deviation, valve.gain_deviation * rise)
+        too_far = ~valve.shut & (valve.error + rise + uncertain > self.ceiling)
         return ~valve.fed | too_far

@@ -77,6 +77,11 @@ class LearntValve:
         return self.table.time_to_open(self.p1, self.p2, self.p1) / self.pace
 
     @property
+    def under_way(self) -> NDArray:
+        """What p2 still rises by the table if the coil is switched on now (n,) [bar]."""
+        return self.table.gained(self.p1, self.p2, self.p3, np.zeros_like(self.p1))
+
+    @property
     def fed(self) -> NDArray:
         """Whether the supply can raise the circuit, bool (n,)."""
         return fed(self.p1, self.p2)

@@ -36,7 +36,7 @@ def test_the_expected_breakdown_is_the_simulated_valves(table):
         valves.advance(step)
     fell = (p2 - valves.state.p2[0]) / BAR
     rest = (np.array([p1, p2 - fell * BAR, p1]) / BAR)[:, None]  # the opening pressure falls with p2
-    expected = expected_breakdown(PLANT, table.release_lag, table.time_to_open(*rest))
+    expected = expected_breakdown(table, table.time_to_open(*rest))
     assert expected[0] == pytest.approx(fell, rel=0.03)
 
 
@@ -55,7 +55,7 @@ def test_a_pulse_holds_a_reserve_only_if_asked(table):
     }
     p1, target = np.array([11.0]), np.array([8.0])
     assert Pulse(table=table, **settings)._reserve(p1, target) == 0
-    breakdown = expected_breakdown(PLANT, table.release_lag, table.time_to_open(p1, target, p1))
+    breakdown = expected_breakdown(table, table.time_to_open(p1, target, p1))
     careful = Pulse(table=table, **settings, tolerated=float(breakdown[0]) - 0.1)
     np.testing.assert_allclose(careful._reserve(p1, target), 0.1)
 

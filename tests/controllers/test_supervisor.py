@@ -8,8 +8,10 @@ import pytest
 from controllers.hysteresis import Hysteresis
 from controllers.learned import TRAINED, load_policy
 from controllers.privileged_pulse import PrivilegedPulse
+from controllers.pulse import Pulse
 from controllers.pulse_simulation import pulse_table
 from controllers.supervisor import Supervisor
+from controllers.tuned import build, load_tunings
 from epv_env.observation import LAYOUT, decode, encode
 from epv_env.plant.plantfile import Plant
 from training.evaluation.hard_scenarios import HARD
@@ -92,6 +94,13 @@ def test_the_supervised_policy_leaves_less_often(name):
         )  # fmt: skip
         left.append(np.sum(~metrics.stayed))
     assert left[1] < left[0] / 2
+
+
+def test_the_policy_gets_the_control_period():
+    pulse = build("pulse", load_tunings()["pulse"].values, Plant.calibrated())
+    main = supervisor(pulse, control_period=4e-3).main
+    assert isinstance(main, Pulse)
+    assert main.control_period == 4e-3
 
 
 def test_controllers_without_pulses_or_sensors_are_refused():
