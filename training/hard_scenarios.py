@@ -33,9 +33,9 @@ from training.studies.hard_scenarios import all_scenarios, rows
 from training.studies.named_controllers import (
     DEFAULT,
     FALLBACK,
+    HELP,
     named_controllers,
     p3_checked,
-    supervised,
 )
 
 RESULT = "hard_scenarios.json"
@@ -52,17 +52,13 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--out", type=writable_folder, default=Path("runs/hard"))
     parser.add_argument(
         "--controllers", nargs="+", default=list(load_tunings()), metavar="KIND|FOLDER",
-        help="tuned kinds, folders of policies, or LABEL=FOLDER; default: every tuned kind",
+        help=f"{HELP}; default: every tuned kind",
     )  # fmt: skip
     parser.add_argument(
         "--scenarios", nargs="+", default=known, metavar="NAME", help="only these; default: all"
     )
     parser.add_argument("--episodes", type=int, default=256, help="of each scenario and controller")
     parser.add_argument("--plant", default=None, help="plant file; default: the report's calibration")
-    parser.add_argument(
-        "--supervised", action="store_true",
-        help="each controller under a supervisor that learns its valve (controllers/supervisor.py)",
-    )  # fmt: skip
     parser.add_argument(
         "--p3-check", action="store_true",
         help=f"{FALLBACK!r} takes over from each controller once p3 is implausible",
@@ -89,8 +85,6 @@ def main(arguments: list[str] | None = None) -> int:
     plant = load_plant(chosen.plant)
     controllers, digests = named_controllers(chosen.controllers, plant)
     scenarios = {name: all_scenarios()[name] for name in chosen.scenarios}
-    if chosen.supervised:
-        controllers = {label: supervised(each, plant) for label, each in controllers.items()}
     if chosen.p3_check:
         controllers = {label: p3_checked(each, plant) for label, each in controllers.items()}
     study = Study(controllers=controllers, plant=plant, scenario=MIXED, duration=10.0)

@@ -40,7 +40,7 @@ from training.studies.comparison.episode_blocks import Block, block_results
 from training.studies.episode_tasks import Study
 from training.studies.fingerprint import fingerprint
 from training.studies.generated_pages import markdown
-from training.studies.named_controllers import INFORMED, named_controllers, supervised
+from training.studies.named_controllers import HELP, INFORMED, named_controllers
 from training.studies.parallel_run import task_runner
 from training.studies.result_files import records
 
@@ -83,13 +83,8 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description="Regret of controllers against the causal bound.")
     parser.add_argument("--out", type=writable_folder, default=Path("runs/regret"))
     parser.add_argument(
-        "--controllers", nargs="+", default=list(DEFAULT), metavar="KIND|FOLDER",
-        help="tuned kinds, folders of policies, LABEL=FOLDER, or MODULE:CLASS",
-    )  # fmt: skip
-    parser.add_argument(
-        "--supervised", nargs="+", default=[], metavar="FOLDER",
-        help="as well: controllers named in the same way, under a supervisor",
-    )  # fmt: skip
+        "--controllers", nargs="+", default=list(DEFAULT), metavar="KIND|FOLDER", help=HELP
+    )
     parser.add_argument("--episodes", type=int, default=64, help="that every controller runs")
     parser.add_argument("--duration", type=float, default=6.0, help="of an episode [s]")
     parser.add_argument("--workers", type=int, default=available_cores(), help="processes")
@@ -150,8 +145,6 @@ def main(arguments: list[str] | None = None) -> int:
     plant = Plant.calibrated()
     bound = CausalBound()
     named, _ = named_controllers(chosen.controllers, plant)
-    watched, _ = named_controllers(chosen.supervised, plant)
-    named |= {f"{label}, supervised": supervised(each, plant) for label, each in watched.items()}
     controllers = {bound.name: bound, **named}
     blocks = [b for name, c in controllers.items() for b in blocks_of(name, c, chosen.episodes)]
     study = Study(controllers=controllers, plant=plant, scenario=MIXED, duration=chosen.duration)

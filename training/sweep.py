@@ -34,7 +34,7 @@ from training.evaluation.seeds import CALIBRATION_SEED, SWEEP_SEED
 from training.learners.provenance import plant_digest
 from training.studies.episode_tasks import Study
 from training.studies.generated_pages import check_pages
-from training.studies.named_controllers import DEFAULT, named_controllers
+from training.studies.named_controllers import DEFAULT, HELP, named_controllers
 from training.studies.parallel_run import run_tasks, task_runner
 from training.studies.sweeps.computing_cost import cost, episode_cpu, overhead
 from training.studies.sweeps.episode_plan import Size, cells, chosen_points, searches
@@ -82,10 +82,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
 
 def _add_plan(parser: argparse.ArgumentParser) -> None:
     """Options that say what is run."""
-    parser.add_argument(
-        "--controllers", nargs="+", default=list(DEFAULT), metavar="NAME",
-        help="kinds of controllers/tuned.json, folders of policies, or LABEL=FOLDER",
-    )  # fmt: skip
+    parser.add_argument("--controllers", nargs="+", default=list(DEFAULT), metavar="NAME", help=HELP)
     parser.add_argument("--designs", nargs="+", choices=DESIGNS, default=list(DESIGNS))
     parser.add_argument(
         "--factors", nargs="+", default=[], help="change only these, one at a time; default: all"

@@ -32,7 +32,7 @@ from epv_env.plant.plantfile import load_plant
 from epv_env.reward import REFERENCE_PERIOD
 from training.evaluation.rollout import begin_episodes, make_env
 from training.evaluation.seeds import TIMING_SEED
-from training.studies.named_controllers import named_controllers
+from training.studies.named_controllers import HELP, named_controllers
 from training.studies.result_files import records
 
 WARM_UP_DECISIONS = 50
@@ -89,7 +89,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--out", type=writable_folder, default=Path("runs/timing"))
     parser.add_argument(
         "--controllers", nargs="+", default=None, metavar="KIND|FOLDER",
-        help="tuned kinds, and folders of policies; default: every tuned kind",
+        help=f"{HELP}; default: every tuned kind",
     )  # fmt: skip
     parser.add_argument("--decisions", type=int, default=4000, help="of each controller")
     parser.add_argument("--scenario", default="steps", help="consumption of the episode")

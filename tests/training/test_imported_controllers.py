@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 import docs.examples.relay
+from controllers.supervisor import Supervisor
 from epv_env.plant.plantfile import Plant
 from training import compare
 from training.evaluation.rollout import run_episodes
@@ -94,3 +95,18 @@ def test_wrong_options_are_refused(arguments, capsys):
         compare.parse(arguments)
     assert stop.value.code == 2
     assert arguments[0] in capsys.readouterr().err
+
+
+def test_a_name_may_ask_for_a_supervisor(folder):
+    (folder / "my_relay.py").write_text(RELAY)
+    sources = ["my_relay:Relay", "supervised:my_relay:Relay"]
+    controllers, digests = named_controllers(sources, Plant.calibrated())
+    plain, watched = controllers.values()
+    assert isinstance(watched, Supervisor)
+    assert watched.name == f"{plain.name}, supervised"
+    assert len(set(digests.values())) == 2
+
+
+def test_a_controller_that_cannot_be_supervised_is_refused():
+    with pytest.raises(ValueError, match="give a controller for EPValve-v0"):
+        named_controllers(["supervised:PWM"], Plant.calibrated())

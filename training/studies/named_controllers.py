@@ -23,6 +23,15 @@ DEFAULT = ("hysteresis, extrapolating", "pulse", "PWM")
 INFORMED = PrivilegedPulse.name
 """Knows each valve's parameters, and needs no tuning: a reference, not a rival."""
 
+SUPERVISED = "supervised:"
+"""Before the name of a controller: it acts under a supervisor (controllers/supervisor.py)."""
+
+HELP = (
+    "tuned kinds, folders of policies, LABEL=FOLDER, or MODULE:CLASS; "
+    f"{SUPERVISED}NAME puts one under a supervisor"
+)
+"""Of the options that take controllers by name."""
+
 FALLBACK = "hysteresis, extrapolating"
 """Takes over where p3 is implausible: the best of those that do not read it."""
 
@@ -36,22 +45,13 @@ def p3_checked(controller: Controller, plant: Plant) -> Controller:
     return P3Check(main=controller, fallback=build(FALLBACK, values, plant))
 
 
-def supervised(controller: Controller, plant: Plant) -> Controller:
-    """The controller under a supervisor that learns its valve, beginning with the plant's table.
-
-    Raises ValueError for a controller with other actions, and for one that reads no sensor.
-    """
-    table = pulse_table(plant.parameters, supply_voltage=plant.voltage)
-    return Supervisor(main=controller, table=table)
-
-
 def named_controllers(
     sources: Sequence[str], plant: Plant
 ) -> tuple[dict[str, Controller], dict[str, str]]:
     """Controllers by label, and a digest of what each was made from.
 
     sources: a tuned kind (controllers/tuned.json), "pulse, informed", a folder that training
-    wrote, LABEL=FOLDER, or MODULE:CLASS.
+    wrote, LABEL=FOLDER, or MODULE:CLASS; or SUPERVISED and one of these.
     plant: that the classic ones are designed for. Raises ValueError.
     """
     controllers: dict[str, Controller] = {}
@@ -67,6 +67,11 @@ def named_controllers(
 
 def _named(source: str, plant: Plant) -> tuple[str, Controller, bytes]:
     """Label, controller, and the bytes that define it."""
+    if source.startswith(SUPERVISED):
+        label, main, content = _named(source.removeprefix(SUPERVISED), plant)
+        table = pulse_table(plant.parameters, supply_voltage=plant.voltage)
+        own = Supervisor(main=main, table=table)
+        return f"{label}, supervised", own, SUPERVISED.encode() + content
     tunings = load_tunings()
     if source in tunings:
         values = tunings[source].values
