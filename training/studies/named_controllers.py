@@ -83,7 +83,7 @@ def _named(source: str, plant: Plant) -> tuple[str, Controller, bytes]:
         return controller.name, controller, fingerprint(controller).encode()
     label, _, folder = source.rpartition("=")
     path = Path(folder)
-    if not path.is_dir():
+    if not folder or not path.is_dir():
         raise ValueError(
             f"no controller {source!r}: give a folder that training wrote, MODULE:CLASS, or one of "
             f"{', '.join(tunings)}"
