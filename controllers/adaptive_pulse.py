@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from controllers.pulse_simulation import pulse_table
 from controllers.pulse_table import PulseTable
 from controllers.registration import CHEAP, Range, Registration
-from controllers.reserve import reserve_of
+from controllers.reserve import TOLERATED, reserve_of
 from controllers.valve_learner import LearntValve, ValveLearner
-from epv_env.reward import BAND_BAR
 
 
 @dataclass(kw_only=True)
@@ -42,9 +41,8 @@ class AdaptivePulse:
     """Share of the time to open over which p2 is extrapolated [1]."""
     rounding: float
     """Remaining time below which a pulse ends now [control periods]."""
-    tolerated: float = BAND_BAR - 0.1
-    """Expected breakdown that needs no reserve [bar]: what the band allows, less the scatter of p2 at
-    rest. The band is a constraint, so it is kept by design; the search weighs what is left."""
+    tolerated: float = TOLERATED
+    """Expected breakdown that needs no reserve [bar]."""
     control_period: float = 5e-3
     """[s]"""
     name: str = "pulse, adaptive"

@@ -37,6 +37,15 @@ class Privileged(Controller, Protocol):
         ...
 
 
+@runtime_checkable
+class Graded(Controller, Protocol):
+    """A controller that says how clearly it prefers an action: a policy."""
+
+    def logits(self, observations: NDArray) -> NDArray:
+        """Of each action (n, actions); `act` takes the largest. Advances a memory as `act` does."""
+        ...
+
+
 def with_period(controller: Controller, period: float) -> Controller:
     """The controller for another control period [s], if it has a setting for it."""
     own: Any = controller

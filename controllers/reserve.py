@@ -10,11 +10,15 @@ from numpy.typing import NDArray
 from controllers.pulse_table import PulseTable
 from epv_env.common.units import BAR, GRAM
 from epv_env.plant.consumption import SCENARIOS
+from epv_env.reward import BAND_BAR
 
 HARDEST_FLOW = SCENARIOS["emergency"].flow[1] * GRAM
 """Flow of the hardest application that the reserve is for [kg/s]."""
 MOST_RESERVE = 0.3
 """Largest reserve: above it a pulse's scatter would leave the band upwards [bar]."""
+TOLERATED = BAND_BAR - 0.1
+"""Expected breakdown that needs no reserve [bar]: what the band allows, less the scatter of p2 at rest.
+The band is a constraint, so a reserve is kept by design; a search weighs what is left."""
 LEAST_HEAD = 0.2
 """p1 - p2 below which the supply does not raise the circuit [bar]."""
 

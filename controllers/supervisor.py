@@ -11,39 +11,62 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.base import Controller, Privileged, with_period
+from controllers.base import Controller, Graded, Privileged, with_period
 from controllers.pulse_table import PulseTable
-from controllers.reserve import expected_breakdown
+from controllers.reserve import TOLERATED, reserve_of
 from controllers.valve_learner import LearntValve, ValveLearner
 from epv_env.observation import INDEX, LAYOUT
+from epv_env.reward import BAND_BAR
 
 ERROR = INDEX["p2_error"]
 
 
-@dataclass(kw_only=True)
-class Supervisor:
-    """Lets `main` act on a setpoint that suits the valve, and ends what would rise too far.
+@dataclass(frozen=True, kw_only=True)
+class SupervisorSettings:
+    """How a supervisor corrects its policy.
 
-    The settings were chosen by hand on development episodes of two policies: the packaged recurrent one
-    and one trained end to end.
+    Training settles `height` and `reluctance` for each policy (training/learners/supervision.py). The
+    others were chosen by hand on development episodes of policies that were trained end to end.
     """
 
-    main: Controller
-    """For the on/off environment."""
-    table: PulseTable
-    """Of the nominal plant."""
-    share: float = 0.3
-    """Rise of the setpoint for each bar of expected breakdown beyond `typical` [1]."""
-    typical: float = 0.36
-    """Expected breakdown that leaves the setpoint as it is [bar]."""
-    most: float = 0.12
-    """Largest shift of the setpoint, either way [bar]."""
-    ceiling: float = 0.15
+    height: float = 0.0
+    """How much higher than the policy alone p2 is held at any valve [bar]."""
+    reluctance: float = 0.0
+    """By how much the policy's logit of switching off must exceed that of leaving on before a pulse
+    begins [1]: a policy that is undecided switches needlessly."""
+    share: float = 0.5
+    """Share of the reserve that a valve needs beyond that [1]: the policy keeps some by itself."""
+    tolerated: float = TOLERATED
+    """Expected breakdown that needs no reserve [bar]."""
+    ceiling: float = 0.11
     """Expected p2 - target, with its uncertainty, above which a pulse ends [bar]."""
     caution: float = 0.42
     """Rise allowed for by a bar of the opening pressure's standard deviation [1]."""
     filter_time: float = 0.025
     """Time in which the weight of a reading of p2 fades by 1/e [s]."""
+
+    def __post_init__(self) -> None:
+        if not abs(self.height) <= BAND_BAR:
+            raise ValueError(f"height = {self.height:g} bar: give one within ±{BAND_BAR:g} bar")
+        for name in ("reluctance", "share", "caution"):
+            if not 0 <= getattr(self, name) < float("inf"):
+                raise ValueError(f"{name} = {getattr(self, name):g}: give a number from 0")
+        if not self.filter_time > 0:
+            raise ValueError(f"filter_time = {self.filter_time:g} s: give a positive time")
+
+
+SETTINGS = SupervisorSettings()
+
+
+@dataclass(kw_only=True)
+class Supervisor:
+    """Lets `main` act on a setpoint that suits the valve, and ends what would rise too far."""
+
+    main: Controller
+    """For the on/off environment."""
+    table: PulseTable
+    """Of the nominal plant."""
+    settings: SupervisorSettings = SETTINGS
     control_period: float = 5e-3
     """[s]"""
     name: str = field(init=False)
@@ -63,7 +86,7 @@ class Supervisor:
         self.main = with_period(self.main, self.control_period)
         self.name, self.environment = f"{self.main.name}, supervised", self.main.environment
         self._learner = ValveLearner(
-            self.table, filter_time=self.filter_time, control_period=self.control_period
+            self.table, filter_time=self.settings.filter_time, control_period=self.control_period
         )
 
     def reset(self, n: int) -> None:
@@ -76,19 +99,25 @@ class Supervisor:
         valve = self._learner.observe(observations)
         shown = observations.copy()
         shown[:, ERROR] -= (self.shift(valve) / LAYOUT[ERROR].scale).astype(shown.dtype)
-        action = np.where(self._must_shut(valve), 1, self.main.act(shown))
+        action = np.where(self._must_shut(valve), 1, self._asked(shown, valve.on))
         self._learner.decided(valve, action)
         return action
 
+    def _asked(self, shown: NDArray, on: NDArray) -> NDArray:
+        """What the policy asks for, (n,); a pulse has to be wanted clearly. on: the coils, bool (n,)."""
+        if not isinstance(self.main, Graded):
+            return self.main.act(shown)
+        logits = self.main.logits(shown)
+        return np.where(logits[:, 1] - logits[:, 0] > -self.settings.reluctance * on, 1, 0)
+
     def shift(self, valve: LearntValve) -> NDArray:
         """How much higher p2 is held (n,) [bar]; none while the supply cannot raise it."""
-        expected = expected_breakdown(self.table, valve.opens_from_rest)
-        wanted = np.clip(self.share * (expected - self.typical), -self.most, self.most)
-        return np.where(valve.fed, wanted, 0.0)
+        reserve = reserve_of(self.table, valve.opens_from_rest, self.settings.tolerated)
+        return np.where(valve.fed, self.settings.height + self.settings.share * reserve, 0.0)
 
     def _must_shut(self, valve: LearntValve) -> NDArray:
         """Whether the coil has to be on, bool (n,): no supply, or p2 would rise beyond the ceiling."""
         rise = valve.gain * valve.under_way
-        uncertain = np.hypot(self.caution * valve.offset_deviation, valve.gain_deviation * rise)
-        too_far = ~valve.shut & (valve.error + rise + uncertain > self.ceiling)
+        uncertain = np.hypot(self.settings.caution * valve.offset_deviation, valve.gain_deviation * rise)
+        too_far = ~valve.shut & (valve.error + rise + uncertain > self.settings.ceiling)
         return ~valve.fed | too_far

@@ -12,12 +12,14 @@ import training.console.missing_packages  # noqa: F401 - before what may be miss
 # isort: split
 import argparse
 import sys
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
+from controllers.base import Controller
 from controllers.oracle import Oracle
 from controllers.registry import untuned_controllers
 from controllers.tuned import tuned_controllers
@@ -42,8 +44,10 @@ from training.learners.policy_folders import (
     seed_folder,
     seed_policies,
     seed_trainings,
+    supervised_policies,
     train_missing,
 )
+from training.learners.supervision import QUICK_SETTLING, SETTLING, settle_missing
 from training.studies.comparison.comparison_report import (
     PARTS,
     comparison_tables,
@@ -146,23 +150,22 @@ def _add_episodes(parser: argparse.ArgumentParser) -> None:
 
 def contenders(chosen: argparse.Namespace) -> list[Contender]:
     """Everyone who takes part in all scenarios, the learned ones first and the oracle last."""
-    found = []
     recurrent = chosen.recurrent, chosen.recurrent_seeds, chosen.recurrent_timesteps
     end_to_end = chosen.end_to_end, chosen.end_to_end_seeds, chosen.end_to_end_timesteps
     plain = chosen.policies, chosen.seeds, chosen.timesteps
     kinds = [
         seed_trainings(folder, count=count, timesteps=timesteps, recurrent=remembers, end_to_end=learns)
         for (folder, count, timesteps), remembers, learns in (
-            (recurrent, True, False), (end_to_end, True, True), (plain, False, False),
+            (end_to_end, True, True), (recurrent, True, False), (plain, False, False),
         )
         if folder is not None
     ]  # fmt: skip
     train_missing([training for kind in kinds for training in kind], workers=chosen.workers)
-    for kind in kinds:
-        policies = seed_policies(kind)
-        name = next(iter(policies.values())).name
-        runs = {f"{name}, {seed}": policy for seed, policy in policies.items()}
-        found.append(Contender(name=name, runs=runs, learned=True))
+    with_memory = [kind for kind in kinds if kind[0].recurrent]
+    folders = [training.folder for kind in with_memory for training in kind]
+    settle_missing(folders, workers=chosen.workers, search=QUICK_SETTLING if chosen.quick else SETTLING)
+    found = [_learned(supervised_policies(kind)) for kind in with_memory]
+    found += [_learned(seed_policies(kind)) for kind in kinds]
     own = [imported_controller(source) for source in chosen.controllers]
     others = [*own, *tuned_controllers(), *untuned_controllers(Plant.calibrated())]
     found += [Contender(name=c.name, runs={c.name: c}) for c in others]
@@ -170,6 +173,13 @@ def contenders(chosen: argparse.Namespace) -> list[Contender]:
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise ValueError(f"two controllers are called {twice[0]!r}: give yours another name")
     return found
+
+
+def _learned(policies: Mapping[str, Controller]) -> Contender:
+    """The policies of one kind, by the names of their seeds, as one contender."""
+    name = next(iter(policies.values())).name
+    runs = {f"{name}, {seed}": policy for seed, policy in policies.items()}
+    return Contender(name=name, runs=runs, learned=True)
 
 
 def limit_at_least_price(variants: list[Contender]) -> list[Contender]:

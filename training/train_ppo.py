@@ -19,6 +19,7 @@ from tqdm import tqdm
 from controllers.learned import load_policy
 from controllers.pwm import PWM
 from controllers.registry import SIMULATING_KINDS
+from controllers.supervised import load_supervised, save_settings
 from controllers.tuned import tuned_controllers
 from epv_env.actions import OnOff
 from epv_env.common.command_line import (
@@ -98,8 +99,8 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         help="a policy with a memory, which first imitates a controller that knows each valve's plant",
     )  # fmt: skip
     parser.add_argument(
-        "--end-to-end", action="store_true",
-        help="the memory learns with PPO, too, under a critic that sees the true state (6 minutes)",
+        "--end-to-end", action=argparse.BooleanOptionalAction, default=True,
+        help="the memory learns with PPO, too, under a critic that sees the true state",
     )  # fmt: skip
     parser.add_argument(
         "--device", default="cpu", help="torch device; cpu is fastest for so small a net"
@@ -111,11 +112,10 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         "--force", action="store_true", help="begin anew in a folder that holds a training already"
     )
     chosen = parse_with_quick(parser, arguments, QUICK)
+    chosen.end_to_end &= chosen.memory
     if chosen.timesteps is None:
         recurrent = END_TO_END_TIMESTEPS if chosen.end_to_end else RECURRENT_TIMESTEPS
         chosen.timesteps = recurrent if chosen.memory else MEMORYLESS_TIMESTEPS
-    if chosen.end_to_end and not chosen.memory:
-        parser.error("--end-to-end trains a memory: leave --no-memory out")
     check_positive(parser, chosen, "timesteps", "episodes", "duration")
     check_not_negative(parser, chosen, "seed", "switching_price")
     return chosen
@@ -149,8 +149,10 @@ def _replace_asked(folder: Path) -> bool:
 
 def evaluate(chosen: argparse.Namespace, plant: Plant) -> Comparison:
     """The comparison on unseen scenarios, with a progress bar."""
+    alone = load_policy(chosen.out)
     contenders = [
-        load_policy(chosen.out),
+        *([load_supervised(chosen.out, plant)] if alone.cells else []),
+        alone,
         *tuned_controllers(plant, without=SIMULATING_KINDS),
     ]
     with tqdm(
@@ -206,6 +208,7 @@ def train_and_compare(chosen: argparse.Namespace, plant: Plant, run: str) -> int
     from training.learners.policy_files import save_policy
     from training.learners.ppo import train
     from training.learners.recurrent_training import train_recurrent
+    from training.learners.supervision import QUICK_SETTLING, SETTLING, settle
 
     check_device(chosen.device)
     weights = RewardWeights(switching=chosen.switching_price)
@@ -232,7 +235,11 @@ def train_and_compare(chosen: argparse.Namespace, plant: Plant, run: str) -> int
         else:
             policy, log = train(hyperparameters, **task)
     save_policy(policy, chosen.out, control_period=OnOff.default_period, provenance=config)
-
+    if chosen.memory:
+        print("settling the supervisor (a minute)", file=sys.stderr)
+        episodes = {"scenario": chosen.scenario, "parameters": chosen.parameters, "weights": weights}
+        search = QUICK_SETTLING if chosen.quick else SETTLING
+        save_settings(settle(policy, plant, episodes, search), chosen.out)
     comparison = evaluate(chosen, plant)
     report(comparison, log.rows, chosen.out)
     return 0

@@ -9,6 +9,7 @@ pytest.importorskip("safetensors")
 
 from controllers.learned import TRAINED, load_policy
 from controllers.policy_contract import CONTRACT_FILE, WEIGHTS_FILE
+from controllers.supervised import SUPERVISOR_FILE, load_settings
 from training.evaluation.rollout import run_episodes
 
 ROOT = Path(__file__).parents[2]
@@ -51,13 +52,20 @@ def test_the_packages_hold_one_policy_of_each_kind_and_nothing_else():
     weights = {path.parent for package in packages for path in package.rglob("*.safetensors")}
     assert weights == {TRAINED / name for name in IN_PACKAGE}
     files = {str(path.relative_to(TRAINED)) for path in TRAINED.rglob("*") if path.is_file()}
-    assert files == {f"{name}/{file}" for name in IN_PACKAGE for file in (CONTRACT_FILE, WEIGHTS_FILE)}
+    expected = {f"{name}/{file}" for name in IN_PACKAGE for file in (CONTRACT_FILE, WEIGHTS_FILE)}
+    assert files == expected | {f"{name}/{SUPERVISOR_FILE}" for name in IN_PACKAGE[1:]}
 
 
 @pytest.mark.parametrize("name", IN_PACKAGE)
 def test_a_policy_of_the_package_is_the_one_that_is_compared(name: str):
-    for file in (CONTRACT_FILE, WEIGHTS_FILE):
-        assert (POLICIES / name / file).resolve() == (TRAINED / name / file).resolve()
+    for file in (TRAINED / name).iterdir():
+        assert (POLICIES / name / file.name).resolve() == file.resolve()
+
+
+@pytest.mark.parametrize("kind", WITH_MEMORY)
+def test_each_seed_with_a_memory_has_a_supervisor(kind: str):
+    for seed in range(10):
+        assert load_settings(POLICIES / kind / f"seed-{seed}") is not None
 
 
 @pytest.mark.parametrize("name", IN_PACKAGE[1:])

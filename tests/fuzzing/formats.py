@@ -10,6 +10,8 @@ import numpy as np
 
 from controllers.learned import TRAINED, load_policy
 from controllers.policy_contract import CONTRACT_FILE, WEIGHTS_FILE
+from controllers.supervised import SUPERVISOR_FILE, SupervisorFile, load_settings, save_settings
+from controllers.supervisor import SETTINGS
 from controllers.tuned import TUNED_FILE, load_tunings
 from epv_env.common.files import write_bytes
 from epv_env.common.journal import Journal
@@ -117,6 +119,11 @@ FORMATS = (
     ),
     Format(name="policy's contract", file=CONTRACT_FILE, write=_copied, read=load_policy),
     Format(name="policy's weights", file=WEIGHTS_FILE, write=_copied, read=load_policy, json=False),
+    Format(
+        name="supervisor's settings", file=SUPERVISOR_FILE,
+        write=lambda folder: save_settings(SupervisorFile(settings=SETTINGS), folder),
+        read=load_settings,
+    ),
     Format(
         name="tuned controllers", file="tuned.json",
         write=lambda folder: write_bytes(folder / "tuned.json", TUNED_FILE.read_bytes()),

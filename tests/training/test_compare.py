@@ -44,10 +44,12 @@ from training.studies.comparison.score_tables import (
     ComparisonResults,
     figures,
     paired_comparisons,
+    seed_differences,
     trade_off,
 )
 from training.studies.episode_tasks import Study
 from training.studies.generated_pages import check_pages, fill, markdown
+from training.studies.result_files import records
 from training.tradeoff import variant
 
 pytestmark = pytest.mark.training
@@ -139,8 +141,13 @@ def test_the_short_form_writes_everything(finished):
     assert {path.name for path in (out / "i").iterdir()} == {n for n in FIGURES if n.endswith("png")}
     content = json.loads((out / RESULTS_FILE).read_text())
     names = [row["controller"] for row in content["figures"] if row["plants"] == "calibrated"]
-    assert names[:5] == [NAME, f"{NAME}, all seeds", END_TO_END_NAME, "PPO", "PPO, all seeds"]
-    assert {bar["controller"] for bar in content["bars"]} == {NAME, END_TO_END_NAME, "PPO"}
+    watched = [f"{END_TO_END_NAME}, supervised", f"{NAME}, supervised"]
+    alone = [END_TO_END_NAME, NAME, "PPO"]
+    several = [watched[1], *alone[1:]]
+    assert [name for name in names if not name.endswith(", all seeds")][:5] == watched + alone
+    assert {f"{name}, all seeds" for name in several} < set(names)
+    assert {bar["controller"] for bar in content["bars"]} == {*watched, *alone}
+    assert [row["run"] for row in content["seeds"]] == [f"{watched[0]}, seed 0"]
     assert "hysteresis, extrapolating" in names
     assert content["chosen"]["PPO"] in ("PPO, seed 0", "PPO, seed 1")
     assert all(f"# {part}\n" in (out / TABLES_FILE).read_text() for part in PARTS)
@@ -158,6 +165,17 @@ def test_a_second_run_takes_what_is_there_and_says_the_same(finished):
     before = {name: (out / name).read_bytes() for name in (RESULTS_FILE, "blocks.jsonl", "page.md")}
     assert main(arguments) == 0
     assert {name: (out / name).read_bytes() for name in before} == before
+
+
+def test_each_seed_is_set_against_the_rival_in_the_same_episodes():
+    """In half of the episodes the rival's rms error is 20 mbar larger, and it leaves in three."""
+    own = replace(episodes(8), rms_bar=np.tile([0.08, 0.10], 4))
+    c = comparison_of(PPO=own, rival=episodes(10, left=3, rms=0.1))
+    (row,) = records(seed_differences(c, c.contenders[0], "rival"))
+    assert (row["left"], row["rival_left"], row["episodes"]) == (0, 3, 8)
+    assert row["rms_bar"] == pytest.approx(-0.01)
+    assert -0.02 <= row["rms_bar_low"] < row["rms_bar"] < row["rms_bar_high"] <= 0.0
+    assert row["switchings_per_s"] == row["switchings_per_s_high"] == 0.0
 
 
 def counted(blocks):

@@ -11,6 +11,7 @@ from tqdm import tqdm
 
 from controllers.base import Controller
 from controllers.learned import holds_policy, load_policy
+from controllers.supervised import load_supervised
 from epv_env.actions import OnOff
 from epv_env.common.folder_lock import only_writer
 from epv_env.plant.consumption import MIXED
@@ -144,3 +145,8 @@ def seed_trainings(
 def seed_policies(trainings: Sequence[Training]) -> dict[str, Controller]:
     """The policies of finished trainings, by the name of their seed."""
     return {f"seed {training.seed}": load_policy(training.folder) for training in trainings}
+
+
+def supervised_policies(trainings: Sequence[Training]) -> dict[str, Controller]:
+    """The same under their supervisors."""
+    return {f"seed {training.seed}": load_supervised(training.folder) for training in trainings}

@@ -4,6 +4,7 @@ import shutil
 from pathlib import Path
 
 from controllers.policy_contract import CONTRACT_FILE, WEIGHTS_FILE
+from controllers.supervised import SUPERVISOR_FILE
 from epv_env.common.folder_lock import LOCK_FILE
 from epv_env.common.results_folder import CONFIG
 from training.learners.run_state import CHECKPOINT_FILE, DERIVED_FILES, RunError
@@ -22,7 +23,7 @@ REPORT_FILES = ("table.csv", "table.json", "learning_curve.png", "episode.png", 
 
 # The contract first: a folder without it holds no policy, and without a checkpoint no run to resume.
 OWN_FILES = (
-    CONTRACT_FILE, CHECKPOINT_FILE, CONFIG, WEIGHTS_FILE, *DERIVED_FILES, *REPORT_FILES,
+    CONTRACT_FILE, CHECKPOINT_FILE, CONFIG, WEIGHTS_FILE, SUPERVISOR_FILE, *DERIVED_FILES, *REPORT_FILES,
 )  # fmt: skip
 OWN_FOLDERS = (STUDENT_FOLDER, MEMORYLESS_FOLDER, TENSORBOARD_FOLDER, TRACKING_FOLDER)
 

@@ -3,15 +3,16 @@
 import hashlib
 import json
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 from controllers.base import Controller
-from controllers.learned import load_policy
+from controllers.learned import LearnedPolicy, load_policy
 from controllers.p3_check import P3Check
 from controllers.policy_contract import CONTRACT_FILE, WEIGHTS_FILE
 from controllers.privileged_pulse import PrivilegedPulse
-from controllers.pulse_simulation import pulse_table
-from controllers.supervisor import Supervisor
+from controllers.supervised import load_settings, supervised
+from controllers.supervisor import SETTINGS
 from controllers.tuned import build, load_tunings
 from epv_env.plant.plantfile import Plant
 from training.studies.fingerprint import fingerprint
@@ -68,10 +69,7 @@ def named_controllers(
 def _named(source: str, plant: Plant) -> tuple[str, Controller, bytes]:
     """Label, controller, and the bytes that define it."""
     if source.startswith(SUPERVISED):
-        label, main, content = _named(source.removeprefix(SUPERVISED), plant)
-        table = pulse_table(plant.parameters, supply_voltage=plant.voltage)
-        own = Supervisor(main=main, table=table)
-        return f"{label}, supervised", own, SUPERVISED.encode() + content
+        return _supervised(source.removeprefix(SUPERVISED), plant)
     tunings = load_tunings()
     if source in tunings:
         values = tunings[source].values
@@ -81,7 +79,7 @@ def _named(source: str, plant: Plant) -> tuple[str, Controller, bytes]:
     if is_import(source):
         controller = imported_controller(source)
         return controller.name, controller, fingerprint(controller).encode()
-    label, _, folder = source.rpartition("=")
+    label, folder = _label_and_folder(source)
     path = Path(folder)
     if not folder or not path.is_dir():
         raise ValueError(
@@ -91,3 +89,23 @@ def _named(source: str, plant: Plant) -> tuple[str, Controller, bytes]:
     policy = load_policy(path)
     content = (path / CONTRACT_FILE).read_bytes() + (path / WEIGHTS_FILE).read_bytes()
     return label or policy.name, policy, content
+
+
+def _label_and_folder(source: str) -> tuple[str, str]:
+    """The parts of LABEL=FOLDER; no label if there is a folder only."""
+    label, _, folder = source.rpartition("=")
+    return label, folder
+
+
+def _supervised(source: str, plant: Plant) -> tuple[str, Controller, bytes]:
+    """`_named` under a supervisor, with the settings that lie in the folder if it is one's."""
+    label, main, content = _named(source, plant)
+    _, folder = _label_and_folder(source)
+    found = load_settings(folder) if isinstance(main, LearnedPolicy) else None
+    settings = found.settings if found else SETTINGS
+    digest = json.dumps(asdict(settings), sort_keys=True).encode()
+    return (
+        f"{label}, supervised",
+        supervised(main, plant, settings),
+        SUPERVISED.encode() + digest + content,
+    )

@@ -24,7 +24,7 @@ RESULTS_FILE, TABLES_FILE = "results.json", "tables.md"
 
 PARTS = (
     "results", "short", "bars", "duels", "means", "trade", "life", "scenarios", "tuning",
-    "episodes",
+    "episodes", "seeds",
 )  # fmt: skip
 """Generated parts that a page can ask for: "bars" are the acceptance criteria, "duels" the paired
 comparisons, under the names that pages and results.json have for them."""
@@ -33,6 +33,9 @@ SCENARIO_MAPS = "comparison-scenarios"
 MEANS = "comparison-means"
 PAIRED = "comparison-paired"
 """Names of the figures that generated parts show, as pages beside the folder `images` find them."""
+
+RIVAL = "pulse, adaptive"
+"""Whom each training seed is set against: the best of the classic controllers."""
 
 NOBODY = "No learned controller took part in this comparison."
 
@@ -51,6 +54,8 @@ class ComparisonTables:
     """The first learned contender, if one takes part."""
     paired: pd.DataFrame
     """Of every learned contender against all others."""
+    seeds: pd.DataFrame
+    """Each training seed of `ours` against RIVAL; empty if one of them takes no part."""
     criteria: list[Criterion]
     lost: list[dict[str, str | float]]
     """Where a model-based rival is better."""
@@ -70,9 +75,16 @@ def comparison_tables(c: ComparisonResults, *, trade_off_episodes: int) -> Compa
         paired=pd.concat(
             [score_tables.paired_comparisons(c, each) for each in learned] or [pd.DataFrame()]
         ),
+        seeds=_seeds(c, ours),
         criteria=[criterion for each in learned for criterion in criteria(c, each)],
         lost=[] if ours is None else lost_to_model_based(c, ours),
     )
+
+
+def _seeds(c: ComparisonResults, ours: Contender | None) -> pd.DataFrame:
+    if ours is None or RIVAL not in c.chosen:
+        return pd.DataFrame()
+    return score_tables.seed_differences(c, ours, RIVAL)
 
 
 def write_tables(
@@ -91,7 +103,7 @@ def write_tables(
         "settings": dict(settings), "tuning": markdown_tables.budget_text(c), "chosen": c.chosen,
         "figures": records(tables.figures), "scenarios": records(tables.scenarios),
         "interquartile_means": records(tables.means), "duels": records(tables.paired),
-        "trade": records(tables.trade_off), "life": records(tables.life),
+        "seeds": records(tables.seeds), "trade": records(tables.trade_off), "life": records(tables.life),
         "bars": [each.as_record() for each in tables.criteria], "lost": tables.lost,
     }  # fmt: skip
     write_json(out / RESULTS_FILE, content)
@@ -120,6 +132,7 @@ def _parts(c: ComparisonResults, tables: ComparisonTables) -> dict[str, str]:
         markdown_tables.scenario_table(c.scenarios),
         markdown_tables.budget_text(c),
         markdown_tables.episodes_text(c) + _image(SCENARIO_MAPS),
+        markdown_tables.seeds_table(tables.seeds, RIVAL),
     )
     return dict(zip(PARTS, texts, strict=True))
 

@@ -26,8 +26,8 @@ FIGURES = {
 }
 """Columns of the main table, and where `summary` has them."""
 README_CONTROLLERS = (
-    "PPO, recurrent",
-    "PPO, end to end",
+    "PPO, end to end, supervised",
+    "PPO, recurrent, supervised",
     "pulse, adaptive",
     "hysteresis, extrapolating",
     "PWM",
@@ -102,6 +102,30 @@ def _paired_comparison_table(paired: pd.DataFrame, ours: str) -> str:
         ]
         rows.append([plants, rival, *shown])
     return markdown(["plants", f"{ours} against", *SCORES.values()], rows)
+
+
+SEED_FIGURES = {
+    "rms error [mbar]": ("rms_bar", 1e3),
+    "breakdown per event [mbar]": ("event_breakdown_bar", 1e3),
+    "switchings [1/s]": ("switchings_per_s", 1.0),
+    "return": ("episode_return", 1.0),
+}
+"""Columns of the table of training seeds: field and factor."""
+
+
+def seeds_table(differences: pd.DataFrame, rival: str) -> str:
+    """Each training seed against a rival: rows of `score_tables.seed_differences`."""
+    if differences.empty:
+        return f"{rival} did not take part."
+    rows = []
+    for row in records(differences):
+        shown = []
+        for score, factor in SEED_FIGURES.values():
+            value, low, high = (factor * row[score + end] for end in ("", "_low", "_high"))
+            shown.append(f"{value:+.2f} ({low:+.2f} to {high:+.2f})")
+        left = f"{row['left']} against {row['rival_left']} of {row['episodes']}"
+        rows.append([row["run"], left, *shown])
+    return markdown([f"against {rival}", "left the band", *SEED_FIGURES], rows)
 
 
 def _grouped(table: pd.DataFrame, column: str) -> dict[tuple[str, str], list[dict[str, Any]]]:

@@ -16,6 +16,7 @@ from training.evaluation.scenarios import RANDOM
 from training.evaluation.statistics import (
     Estimate,
     bootstrap_estimate,
+    mean_interval,
     paired_difference,
     pareto_front,
     probability_of_improvement,
@@ -174,6 +175,32 @@ def _named(name: str, of: Estimate) -> dict[str, float]:
 def _rows(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
     """A table of rows that are made one by one."""
     return pd.DataFrame(list(rows))
+
+
+SEED_SCORES = ("rms_bar", "event_breakdown_bar", "switchings_per_s", "episode_return")
+"""Fields of EpisodeMetrics in which each training seed is set against a rival."""
+
+
+def seed_differences(c: ComparisonResults, ours: Contender, rival: str) -> pd.DataFrame:
+    """A row per run of ours: run - rival in the random episodes on TRADE_OFF_ON, paired by episode.
+
+    Columns: run; episodes; left and rival_left, how many of them left the band; each of SEED_SCORES with
+    its interval.
+    """
+    its = c.metrics(rival, TRADE_OFF_ON)
+    return _rows(_seed_difference(run, c.results[run, TRADE_OFF_ON, RANDOM], its) for run in ours.runs)
+
+
+def _seed_difference(run: str, own: EpisodeMetrics, its: EpisodeMetrics) -> dict[str, Any]:
+    fewest = min(len(own), len(its))
+    own, its = own.first(fewest), its.first(fewest)
+    row: dict[str, Any] = {"run": run, "episodes": fewest}
+    row |= {"left": int((~own.stayed).sum()), "rival_left": int((~its.stayed).sum())}
+    for score in SEED_SCORES:
+        difference = getattr(own, score) - getattr(its, score)
+        low, high = mean_interval(difference)
+        row |= _named(score, Estimate(value=float(difference.mean()), low=low, high=high))
+    return row
 
 
 def switching_life(c: ComparisonResults) -> pd.DataFrame:

@@ -1,0 +1,72 @@
+"""A policy under its supervisor, from a folder: the supervisor's settings lie beside the weights."""
+
+from dataclasses import asdict, dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from controllers.base import Controller
+from controllers.learned import load_policy
+from controllers.pulse_simulation import pulse_table
+from controllers.supervisor import SETTINGS, Supervisor, SupervisorSettings
+from epv_env.common.json_files import JSONFileError, read_json, write_json
+from epv_env.plant.plantfile import Plant
+
+FORMAT = "epv-supervisor/1"
+SUPERVISOR_FILE = "supervisor.json"
+
+
+class SupervisorFileError(ValueError):
+    """A file of a supervisor's settings cannot be used: the message says why and what to do."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SupervisorFile:
+    """The content of a file of a supervisor's settings."""
+
+    settings: SupervisorSettings
+    """What the search settled, and what it left as it is."""
+    search: dict[str, Any] = field(default_factory=dict)
+    """How it searched."""
+
+
+def supervised(
+    controller: Controller, plant: Plant, settings: SupervisorSettings = SETTINGS
+) -> Supervisor:
+    """A controller for the on/off environment under a supervisor that knows this nominal plant.
+
+    Raises ValueError for a controller with other actions, and for one that reads no sensor.
+    """
+    table = pulse_table(plant.parameters, supply_voltage=plant.voltage)
+    return Supervisor(main=controller, table=table, settings=settings)
+
+
+def load_supervised(folder: str | PathLike[str], plant: Plant | None = None) -> Supervisor:
+    """The policy of a folder under its supervisor; the default settings if the folder has none.
+
+    Args:
+        folder: with policy.json, policy.safetensors, and perhaps supervisor.json.
+        plant: nominal plant; None: the report's calibration.
+
+    Raises PolicyError or SupervisorFileError if a file cannot be used.
+    """
+    found = load_settings(folder)
+    settings = SETTINGS if found is None else found.settings
+    return supervised(load_policy(folder), plant or Plant.calibrated(), settings)
+
+
+def load_settings(folder: str | PathLike[str]) -> SupervisorFile | None:
+    """A folder's settings of a supervisor; None if it has no such file. Raises SupervisorFileError."""
+    path = Path(folder) / SUPERVISOR_FILE
+    if not path.exists():
+        return None
+    remedy = "train the policy anew, or remove the file for the default settings"
+    try:
+        return read_json(path, SupervisorFile, version=FORMAT, remedy=remedy)
+    except JSONFileError as error:
+        raise SupervisorFileError(str(error)) from None
+
+
+def save_settings(content: SupervisorFile, folder: str | PathLike[str]) -> None:
+    """Write a supervisor's settings into a policy's folder, whole or not at all."""
+    write_json(Path(folder) / SUPERVISOR_FILE, {"format": FORMAT, **asdict(content)}, allow_nan=False)

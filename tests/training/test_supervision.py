@@ -1,0 +1,85 @@
+"""Height and reluctance are settled where the largest ratio to the adaptive pulse's figures is least."""
+
+from dataclasses import replace
+
+import pytest
+
+pytest.importorskip("joblib")
+pytest.importorskip("scipy")
+
+from controllers.learned import TRAINED, load_policy
+from controllers.supervised import load_settings, supervised
+from controllers.supervisor import SETTINGS
+from epv_env.plant.plantfile import Plant
+from tests.training.policies import random_layers, write_policy
+from training.evaluation.metrics import summary
+from training.learners import supervision
+from training.learners.supervision import QUICK_SETTLING, SETTLING, settle, settle_missing
+from training.learners.validation import ValidationSettings, validate
+
+pytestmark = pytest.mark.training
+
+
+def figures_by_settings(rms, breakdown, switchings):
+    """Stands for episodes: the rival's figures are 1, ours follow from height and reluctance."""
+
+    def figures(controller, validation, options):
+        if controller.name == "pulse, adaptive":
+            return [1.0, 1.0, 1.0]
+        at = controller.settings
+        return [f(at.height, at.reluctance) for f in (rms, breakdown, switchings)]
+
+    return figures
+
+
+@pytest.fixture(scope="module")
+def policy():
+    return load_policy(TRAINED / "end-to-end" / "seed-0")
+
+
+def test_the_settings_are_where_the_three_ratios_are_equal(policy, monkeypatch):
+    """1 + 5 h, 0.9 - 5 h + r/100 and 1.1 - r/100 are all 1 at h = 0 and r = 10."""
+    figures = figures_by_settings(
+        lambda h, r: 1 + 5 * h, lambda h, r: 0.9 - 5 * h + r / 100, lambda h, r: 1.1 - r / 100
+    )
+    monkeypatch.setattr(supervision, "_figures", figures)
+    found = settle(policy, Plant.calibrated(), {}, replace(SETTLING, evaluations=60))
+    assert found.settings.height == pytest.approx(0.0, abs=0.004)
+    assert found.settings.reluctance == pytest.approx(10.0, abs=1.5)
+    changed = {"height": found.settings.height, "reluctance": found.settings.reluctance}
+    assert found.settings == replace(SETTINGS, **changed)
+    assert found.search["largest_ratio"] == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_figure_that_the_rival_has_none_of_counts_as_equal():
+    assert supervision._ratios([5.0, 1.0], [0.0, 2.0]) == [1.0, 0.5]
+
+
+def test_a_higher_setpoint_breaks_down_less_and_errs_more(policy):
+    """What the search presumes, on the plant itself."""
+    plant, settings = Plant.calibrated(), ValidationSettings(episodes=64, duration=3.0)
+    low, high = (
+        summary(validate(supervised(policy, plant, replace(SETTINGS, height=h)), settings, {}))
+        for h in (-0.03, 0.04)
+    )
+    assert high["C2_event_breakdown_bar"] < low["C2_event_breakdown_bar"] - 0.03
+    assert high["rms_error_bar"] > low["rms_error_bar"]
+
+
+def test_a_reluctant_policy_switches_less(policy):
+    plant, settings = Plant.calibrated(), ValidationSettings(episodes=64, duration=3.0)
+    eager, reluctant = (
+        summary(validate(supervised(policy, plant, replace(SETTINGS, reluctance=r)), settings, {}))
+        for r in (0.0, 12.0)
+    )
+    assert reluctant["switchings_per_s"] < 0.95 * eager["switchings_per_s"]
+
+
+def test_missing_supervisors_are_settled_alike_by_one_worker_or_two(tmp_path):
+    folders = [tmp_path / name for name in ("a", "b", "c")]
+    for folder in folders:
+        write_policy(random_layers(seed=3, widths=(8, 8)), folder)
+    settle_missing(folders[:1], workers=1, search=QUICK_SETTLING)
+    before = load_settings(folders[0])
+    settle_missing(folders, workers=2, search=QUICK_SETTLING)
+    assert [load_settings(folder) for folder in folders] == [before] * 3
