@@ -11,6 +11,7 @@ from epv_env.observation import decode
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
 from training.studies.episode_tasks import Study
+from training.studies.sweeps import worst_case_search
 from training.studies.sweeps.worst_case_search import Effort, Search
 
 pytestmark = pytest.mark.training
@@ -44,7 +45,8 @@ class MadeUp:
         return SimpleNamespace(excursion_bar=excursion), None
 
 
-def test_a_weak_spot_among_thirteen_parameters_is_found():
+def test_a_weak_spot_among_thirteen_parameters_is_found(monkeypatch):
+    monkeypatch.setattr(worst_case_search, "bound_excursion", lambda study, found: 0.1)
     study: Any = MadeUp(spot=0.8)
     found = search("sensitive_ten_percent", Effort(screened=1024, generations=15)).run(study)
     stages = list(found["stages_bar"].values())
@@ -78,3 +80,4 @@ def test_a_weakness_of_a_controller_is_found_on_the_valve():
     each = {"scenario": ["steps"], "parameters": [found["parameters"]]}
     metrics, _ = study.run("c", [found["seed"]], {}, each)  # the one that is shown
     assert metrics.excursion_bar[0] == pytest.approx(found["excursion_bar"], abs=1e-6)
+    assert found["bound_bar"] < 0.5  # a better controller holds the band there

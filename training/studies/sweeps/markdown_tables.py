@@ -83,14 +83,15 @@ def worst_table(worst: Sequence[Mapping[str, Any]], nominal: Mapping[str, float]
             [
                 each["region"], each["controller"],
                 " → ".join(f"{bar:.3f}" for bar in each["stages_bar"].values()),
+                f"{each['bound_bar']:.3f}",
                 f"{each['scenario']}, {each['seed']}",
                 ", ".join(f"{symbol} {off[symbol]:+.2g} %" for symbol in farthest),
                 f"{each['episodes']}",
             ]
         )  # fmt: skip
     headings = (
-        "region", "controller", "worst excursion after each stage [bar]", "scenario, seed",
-        "farthest off", "episodes searched",
+        "region", "controller", "worst excursion after each stage [bar]", "causal bound there [bar]",
+        "scenario, seed", "farthest off", "episodes searched",
     )  # fmt: skip
     return markdown(headings, rows)
 

@@ -7,15 +7,20 @@ The search has four stages, each a few large batches:
 2. In these episodes, differential evolution (Storn and Price 1997) varies the plant over the region.
 3. Differential evolution varies the plant close to the worst one.
 4. The worst plant meets as many new episodes as the first stage had.
+
+The causal bound (controllers/causal_bound.py) then runs the worst episode: its excursion shows how much
+of the searched controller's is the plant's and the consumption's.
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 
+from controllers.causal_bound import CausalBound
 from epv_env.arguments import as_region
 from epv_env.plant.consumption import MIXED, SCENARIOS
 from training.studies.episode_tasks import EXCURSION_DECIMALS, Study
@@ -104,8 +109,17 @@ class Search:
         return self.effort.episodes
 
     def run(self, study: Study) -> dict[str, Any]:
-        """The worst plant, scenario and seed, its excursion, and the worst after each stage."""
-        return _RunningSearch(self, study).result()
+        """The worst plant, scenario and seed, its excursion, each stage's, and the bound's."""
+        found = _RunningSearch(self, study).result()
+        return {**found, "bound_bar": bound_excursion(study, found)}
+
+
+def bound_excursion(study: Study, found: Mapping[str, Any]) -> float:
+    """Excursion of the causal bound in the episode that a search found [bar]."""
+    bound = replace(study, controllers={"bound": CausalBound()})
+    each = {"scenario": [found["scenario"]], "parameters": [found["parameters"]]}
+    metrics, _ = bound.run("bound", [found["seed"]], {}, each)
+    return round(float(metrics.excursion_bar[0]), EXCURSION_DECIMALS)
 
 
 class _RunningSearch:
