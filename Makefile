@@ -49,7 +49,7 @@ test: $(VENV)/.installed ## run the tests, files side by side; options in ARGS="
 # Its own numba cache: the two numba versions would overwrite each other's files.
 test-oldest: $(OLDEST)/.installed ## run the plant and environment tests on the oldest core packages
 	NUMBA_CACHE_DIR=$(CURDIR)/$(OLDEST)/numba-cache \
-		$(OLDEST)/bin/python -m pytest tests/common tests/plant tests/env -m "not training"
+		$(OLDEST)/bin/python -m pytest tests/common tests/plant tests/env -m "not training and not slow"
 
 bench: $(VENV)/.installed ## measure speed and memory (a quarter of an hour); ARGS="--against HEAD~1" pairs with a commit
 	$(PY) -m tests.benchmarks $(ARGS)

@@ -19,6 +19,8 @@ from epv_env.observation import INDEX, LAYOUT
 from epv_env.reward import BAND_BAR
 
 ERROR = INDEX["p2_error"]
+SLOW = 0.1
+"""Reserve from which a valve is so slow that no pulse may wait [bar]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,13 +44,15 @@ class SupervisorSettings:
     """Expected p2 - target, with its uncertainty, above which a pulse ends [bar]."""
     caution: float = 0.42
     """Rise allowed for by a bar of the opening pressure's standard deviation [1]."""
+    doubt: float = 1.5
+    """Standard deviations of the gain that are allowed for in what p2 will still rise [1]."""
     filter_time: float = 0.025
     """Time in which the weight of a reading of p2 fades by 1/e [s]."""
 
     def __post_init__(self) -> None:
         if not abs(self.height) <= BAND_BAR:
             raise ValueError(f"height = {self.height:g} bar: give one within ±{BAND_BAR:g} bar")
-        for name in ("reluctance", "share", "caution"):
+        for name in ("reluctance", "share", "caution", "doubt"):
             if not 0 <= getattr(self, name) < float("inf"):
                 raise ValueError(f"{name} = {getattr(self, name):g}: give a number from 0")
         if not self.filter_time > 0:
@@ -97,27 +101,32 @@ class Supervisor:
     def act(self, observations: NDArray) -> NDArray:
         """0 (off) or 1 (on) for each valve, (n,)."""
         valve = self._learner.observe(observations)
+        reserve = reserve_of(self.table, valve.opens_from_rest, self.settings.tolerated)
         shown = observations.copy()
-        shown[:, ERROR] -= (self.shift(valve) / LAYOUT[ERROR].scale).astype(shown.dtype)
-        action = np.where(self._must_shut(valve), 1, self._asked(shown, valve.on))
+        shown[:, ERROR] -= (self.shift(valve, reserve) / LAYOUT[ERROR].scale).astype(shown.dtype)
+        action = np.where(self._must_shut(valve), 1, self._asked(shown, valve.on, reserve))
         self._learner.decided(valve, action)
         return action
 
-    def _asked(self, shown: NDArray, on: NDArray) -> NDArray:
-        """What the policy asks for, (n,); a pulse has to be wanted clearly. on: the coils, bool (n,)."""
+    def _asked(self, shown: NDArray, on: NDArray, reserve: NDArray) -> NDArray:
+        """What the policy asks for, (n,): the more reserve a valve needs, the less it may hesitate."""
         if not isinstance(self.main, Graded):
             return self.main.act(shown)
         logits = self.main.logits(shown)
-        return np.where(logits[:, 1] - logits[:, 0] > -self.settings.reluctance * on, 1, 0)
+        slow = np.clip(reserve / SLOW, 0.0, 1.0)
+        asked = self.settings.reluctance * (1 - slow) * on
+        return np.where(logits[:, 1] - logits[:, 0] > -asked, 1, 0)
 
-    def shift(self, valve: LearntValve) -> NDArray:
+    def shift(self, valve: LearntValve, reserve: NDArray) -> NDArray:
         """How much higher p2 is held (n,) [bar]; none while the supply cannot raise it."""
-        reserve = reserve_of(self.table, valve.opens_from_rest, self.settings.tolerated)
         return np.where(valve.fed, self.settings.height + self.settings.share * reserve, 0.0)
 
     def _must_shut(self, valve: LearntValve) -> NDArray:
         """Whether the coil has to be on, bool (n,): no supply, or p2 would rise beyond the ceiling."""
         rise = valve.gain * valve.under_way
-        uncertain = np.hypot(self.settings.caution * valve.offset_deviation, valve.gain_deviation * rise)
+        uncertain = np.hypot(
+            self.settings.caution * valve.offset_deviation,
+            self.settings.doubt * valve.gain_deviation * rise,
+        )
         too_far = ~valve.shut & (valve.error + rise + uncertain > self.settings.ceiling)
         return ~valve.fed | too_far

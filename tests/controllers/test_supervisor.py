@@ -9,6 +9,7 @@ from controllers.hysteresis import Hysteresis
 from controllers.learned import TRAINED, load_policy
 from controllers.privileged_pulse import PrivilegedPulse
 from controllers.pulse import Pulse
+from controllers.reserve import reserve_of
 from controllers.supervised import supervised
 from controllers.supervisor import Supervisor, SupervisorSettings
 from controllers.tuned import build, load_tunings
@@ -45,12 +46,17 @@ def at_rest(**values):
     return encode(mine | chosen)
 
 
+def needed(control, valve):
+    """Reserve of each valve [bar]."""
+    return reserve_of(control.table, valve.opens_from_rest, control.settings.tolerated)
+
+
 def test_the_setpoint_rises_with_the_expected_breakdown():
     control = supervisor(Recorder())
     control.reset(3)
     valve = control._learner.observe(at_rest())
     slower = replace(valve, pace=valve.pace * np.array([1.25, 0.8, 0.6]))
-    shifts = control.shift(slower)
+    shifts = control.shift(slower, needed(control, slower))
     assert shifts[0] == 0.0  # a fast valve needs no reserve
     assert 0.0 < shifts[1] < shifts[2]
 
@@ -60,7 +66,8 @@ def test_the_height_shifts_every_setpoint_alike():
     for control in controls:
         control.reset(3)
     valve = controls[0]._learner.observe(at_rest())
-    assert controls[0].shift(valve) - controls[1].shift(valve) == pytest.approx(0.03)
+    high, low = (control.shift(valve, needed(control, valve)) for control in controls)
+    assert high - low == pytest.approx(0.03)
 
 
 def test_the_policy_is_shown_a_p2_that_is_lower_by_the_shift():
@@ -100,6 +107,13 @@ def test_a_pulse_begins_only_where_it_is_wanted_clearly(reluctance, action):
     control.reset(3)
     assert np.all(control.act(at_rest()) == action)
     assert np.all(control.act(at_rest(action=0.0)) == 0)  # one under way goes on
+
+
+def test_a_slow_valve_may_not_hesitate():
+    """At a tolerated breakdown of nothing every valve needs all the reserve that there is."""
+    control = supervisor(Undecided(), reluctance=3.0, tolerated=0.0)
+    control.reset(3)
+    assert np.all(control.act(at_rest()) == 0)
 
 
 def test_without_reluctance_a_policy_acts_as_alone():

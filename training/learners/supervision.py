@@ -36,16 +36,16 @@ FIGURES = ("rms_error_bar", "C2_event_breakdown_bar", "switchings_per_s")
 class SettlingSearch:
     """A Nelder-Mead search of height and reluctance."""
 
-    simplex: tuple[tuple[float, float], ...] = ((0.0, 4.0), (0.02, 8.0), (-0.02, 12.0))
+    simplex: tuple[tuple[float, float], ...] = ((0.0, 4.0), (0.03, 12.0), (-0.02, 20.0))
     """First heights [bar] and reluctances [1]."""
     heights: tuple[float, float] = (-0.1, 0.1)
     """Lowest and highest [bar]."""
     reluctances: tuple[float, float] = (0.0, 60.0)
     """Least and greatest [1]."""
-    evaluations: int = 30
+    evaluations: int = 24
     """Most evaluations."""
     validation: ValidationSettings = field(
-        default_factory=lambda: ValidationSettings(episodes=1024, duration=6.0)
+        default_factory=lambda: ValidationSettings(episodes=512, duration=6.0)
     )
     """Episodes of an evaluation."""
 

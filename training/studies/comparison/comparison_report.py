@@ -55,7 +55,7 @@ class ComparisonTables:
     paired: pd.DataFrame
     """Of every learned contender against all others."""
     seeds: pd.DataFrame
-    """Each training seed of `ours` against RIVAL; empty if one of them takes no part."""
+    """Each training seed of the supervised policies against RIVAL; empty if it takes no part."""
     criteria: list[Criterion]
     lost: list[dict[str, str | float]]
     """Where a model-based rival is better."""
@@ -75,16 +75,16 @@ def comparison_tables(c: ComparisonResults, *, trade_off_episodes: int) -> Compa
         paired=pd.concat(
             [score_tables.paired_comparisons(c, each) for each in learned] or [pd.DataFrame()]
         ),
-        seeds=_seeds(c, ours),
+        seeds=_seeds(c, [each for each in learned if each.supervised]),
         criteria=[criterion for each in learned for criterion in criteria(c, each)],
         lost=[] if ours is None else lost_to_model_based(c, ours),
     )
 
 
-def _seeds(c: ComparisonResults, ours: Contender | None) -> pd.DataFrame:
-    if ours is None or RIVAL not in c.chosen:
+def _seeds(c: ComparisonResults, supervised: Sequence[Contender]) -> pd.DataFrame:
+    if not supervised or RIVAL not in c.chosen:
         return pd.DataFrame()
-    return score_tables.seed_differences(c, ours, RIVAL)
+    return pd.concat([score_tables.seed_differences(c, each, RIVAL) for each in supervised])
 
 
 def write_tables(

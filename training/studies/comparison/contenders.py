@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from controllers.base import Controller, Privileged
 from controllers.registry import REGISTRY, cost_class
+from controllers.supervisor import Supervisor
 from epv_env.conditions import Conditions
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.scenarios import RANDOM, TUNING_REGION
@@ -95,6 +96,11 @@ class Contender:
     def privileged(self) -> bool:
         """Whether it uses privileged information, which no ECU can measure: a limit, not a rival."""
         return isinstance(next(iter(self.runs.values())), Privileged)
+
+    @property
+    def supervised(self) -> bool:
+        """Whether its runs are policies under a supervisor."""
+        return isinstance(next(iter(self.runs.values())), Supervisor)
 
     @property
     def model_based(self) -> bool:
