@@ -42,9 +42,9 @@ $(OLDEST)/.installed: $(OLDEST)/.locked pyproject.toml
 train: $(VENV)/.installed ## train the PPO controller; options in ARGS="..."
 	$(PY) training/train_ppo.py $(ARGS)
 
-# The matrices are small: threads of the linear algebra would only wait for each other.
+# The matrices are small: threads of the linear algebra and of torch would only wait for each other.
 test: $(VENV)/.installed ## run the tests, files side by side; options in ARGS="..."
-	OPENBLAS_NUM_THREADS=1 $(PY) -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile $(ARGS)
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(PY) -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile $(ARGS)
 
 # Its own numba cache: the two numba versions would overwrite each other's files.
 test-oldest: $(OLDEST)/.installed ## run the plant and environment tests on the oldest core packages

@@ -69,22 +69,29 @@ class AdaptivePulse:
         reserve = reserve_of(self.table, valve.opens_from_rest, self.tolerated)
         ahead = self.look_ahead * (valve.opens_in + self.table.release_lag)
         begins = valve.fed & valve.shut & (valve.error + valve.fall * ahead < self.trigger + reserve)
-        aim = self.aim + reserve - self._uncertainty(valve)
-        asked, slope = (aim - valve.error) / valve.gain, valve.fall / (valve.gain * valve.pace)
-        remaining = valve.table.duration(valve.p1, valve.p2, valve.p3, asked, slope) / valve.pace
-        ends = ~valve.fed | (remaining < self.rounding * self.control_period)
-        action = np.where(valve.on, np.where(begins, 0, 1), np.where(ends, 1, 0))
+        action = np.where(begins, 0, 1)
+        off = np.flatnonzero(~valve.on)
+        action[off] = np.where(self._ends(valve, reserve, off), 1, 0)
         self._learner.decided(valve, action)
         return action
 
-    def _uncertainty(self, valve: LearntValve) -> NDArray:
-        """How much lower a pulse aims (n,) [bar]: two independent errors of the rise, together.
+    def _ends(self, valve: LearntValve, reserve: NDArray, who: NDArray) -> NDArray:
+        """Whether the pulses of the valves at these indices (m,) end now, bool."""
+        gain, pace = valve.gain[who], valve.pace[who]
+        aim = self.aim + reserve[who] - self._uncertainty(valve, who)
+        asked, slope = (aim - valve.error[who]) / gain, valve.fall[who] / (gain * pace)
+        at = valve.p1[who], valve.p2[who], valve.p3[who]
+        remaining = valve.table.of(who).duration(*at, asked, slope) / pace
+        return ~valve.fed[who] | (remaining < self.rounding * self.control_period)
+
+    def _uncertainty(self, valve: LearntValve, who: NDArray) -> NDArray:
+        """How much lower a pulse aims (m,) [bar]: two independent errors of the rise, together.
 
         Another opening pressure moves the rise of any pulse alike. Another gain counts by what p2 would
         still rise if the coil were switched on now: much, while the valve is wide open.
         """
-        by_gain = self.doubt * valve.gain_deviation * valve.under_way
-        return np.hypot(self.caution * valve.offset_deviation, by_gain)
+        by_gain = self.doubt * valve.gain_deviation[who] * valve.under_way(who)
+        return np.hypot(self.caution * valve.offset_deviation[who], by_gain)
 
 
 REGISTRATION = Registration(

@@ -8,8 +8,8 @@ p2/p1, the age of the venting (since p3 stood 5 % above the opening pressure) an
 stays off.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -73,6 +73,11 @@ class PulseTable:
     """From now until the valve has shut again [s]; the same shape."""
     grid: PulseGrid = GRID
 
+    def of(self, who: NDArray) -> "PulseTable":
+        """The table of some of the valves, indices (m,), where parameters differ between them."""
+        own = {s: v[who] if isinstance(v, np.ndarray) else v for s, v in self.parameters.items()}
+        return replace(self, parameters=own)
+
     def venting_age(self, p1: NDArray, p2: NDArray, p3: NDArray) -> NDArray:
         """Time since p3 stood at the grid's start ratio [s], (n,); negative: it is yet to come."""
         opening = opening_pressure(self.parameters, p1 * BAR, p2 * BAR) / BAR
@@ -98,6 +103,13 @@ class PulseTable:
         row = np.arange(len(curve))
         return curve[row, node] * (1 - share) + curve[row, node + 1] * share
 
+    def gained_at_once(self, p1: NDArray, p2: NDArray, p3: NDArray) -> NDArray:
+        """`gained` without stay and slope (n,) [bar]: what is under way if the coil is switched on."""
+        gain = np.zeros(len(p1))
+        for weight, nodes in self._corners(p1, p2, self.venting_age(p1, p2, p3)):
+            gain += weight * self._rows(self.gain[..., 0], nodes)
+        return gain
+
     def duration(
         self, p1: NDArray, p2: NDArray, p3: NDArray, asked: NDArray, slope: NDArray | float = 0.0
     ) -> NDArray:
@@ -118,21 +130,27 @@ class PulseTable:
 
     def _curve(self, p1: NDArray, p2: NDArray, age: NDArray, slope: NDArray | float) -> NDArray:
         """Change of p2 over the nodes of stay (n, stay), linear between the nodes of the other axes."""
-        grid = self.grid
-        axes = ((grid.supply, p1 * BAR), (grid.ratio, p2 / p1), (grid.age, age))
-        places = [_place(axis, value) for axis, value in axes]
-        gain, lasts = np.zeros((2, len(p1), len(grid.stay)))
-        for corner in np.ndindex(2, 2, 2):
-            weight = np.ones(len(p1))
-            for (_, share), upper in zip(places, corner, strict=True):
-                weight = weight * (share if upper else 1 - share)
-            nodes = tuple(node + upper for (node, _), upper in zip(places, corner, strict=True))
+        gain, lasts = np.zeros((2, len(p1), len(self.grid.stay)))
+        for weight, nodes in self._corners(p1, p2, age):
             gain += weight[:, None] * self._rows(self.gain, nodes)
             lasts += weight[:, None] * self._rows(self.lasts, nodes)
         return gain + np.reshape(slope, (-1, 1)) * (lasts - np.minimum(age, 0.0)[:, None])
 
+    def _corners(
+        self, p1: NDArray, p2: NDArray, age: NDArray
+    ) -> Iterator[tuple[NDArray, tuple[NDArray, ...]]]:
+        """Weights (n,) and nodes (n,) of the cells' eight corners on the axes supply, ratio and age."""
+        grid = self.grid
+        axes = ((grid.supply, p1 * BAR), (grid.ratio, p2 / p1), (grid.age, age))
+        places = [_place(axis, value) for axis, value in axes]
+        for corner in np.ndindex(2, 2, 2):
+            weight = np.ones(len(p1))
+            for (_, share), upper in zip(places, corner, strict=True):
+                weight = weight * (share if upper else 1 - share)
+            yield weight, tuple(node + upper for (node, _), upper in zip(places, corner, strict=True))
+
     def _rows(self, table: NDArray, nodes: tuple[NDArray, ...]) -> NDArray:
-        """The table's rows (n, stay) at nodes (n,) of the other axes."""
+        """The table at nodes (n,) of its axes supply, ratio and age: rows (n, stay), or (n,)."""
         return table[nodes]
 
 

@@ -123,10 +123,12 @@ class Supervisor:
 
     def _must_shut(self, valve: LearntValve) -> NDArray:
         """Whether the coil has to be on, bool (n,): no supply, or p2 would rise beyond the ceiling."""
-        rise = valve.gain * valve.under_way
+        must = ~valve.fed
+        who = np.flatnonzero(valve.fed & ~valve.shut)
+        rise = valve.gain[who] * valve.under_way(who)
         uncertain = np.hypot(
-            self.settings.caution * valve.offset_deviation,
-            self.settings.doubt * valve.gain_deviation * rise,
+            self.settings.caution * valve.offset_deviation[who],
+            self.settings.doubt * valve.gain_deviation[who] * rise,
         )
-        too_far = ~valve.shut & (valve.error + rise + uncertain > self.settings.ceiling)
-        return ~valve.fed | too_far
+        must[who] = valve.error[who] + rise + uncertain > self.settings.ceiling
+        return must

@@ -76,10 +76,9 @@ class LearntValve:
         """`opens_in` with the control chamber full, at p1 (n,) [s]."""
         return self.table.time_to_open(self.p1, self.p2, self.p1) / self.pace
 
-    @property
-    def under_way(self) -> NDArray:
-        """What p2 still rises by the table if the coil is switched on now (n,) [bar]."""
-        return self.table.gained(self.p1, self.p2, self.p3, np.zeros_like(self.p1))
+    def under_way(self, who: NDArray) -> NDArray:
+        """What p2 of the valves at these indices (m,) still rises by the table if shut now [bar]."""
+        return self.table.of(who).gained_at_once(self.p1[who], self.p2[who], self.p3[who])
 
     @property
     def fed(self) -> NDArray:
@@ -188,8 +187,7 @@ class ValveLearner:
                 return np.repeat(values, members)
 
             assumed = shifted(self._nominal, np.tile(BANK.offsets, len(who)))
-            stay = np.zeros(members * len(who))
-            foreseen = assumed.gained(each(p1), each(before), each(p3), stay).reshape(-1, members)
+            foreseen = assumed.gained_at_once(each(p1), each(before), each(p3)).reshape(-1, members)
             self._bank.learn(who, foreseen, p2[who] - before - slope * lasted, lasted)
         self._measuring[who] = False
         self._measuring &= self._on_periods > 0

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from controllers.opening_bank import shifted
 from controllers.opening_pressure import opening_pressure
 from controllers.pulse_simulation import pulse_table
 from controllers.pulse_table import GRID
@@ -95,6 +96,21 @@ def test_consumption_during_a_pulse_is_allowed_for(table, cases):
     assert np.all(longer > table.duration(p1, p2, p3, np.full(len(p1), 0.1)))
     back = table.gained(p1, p2, p3, longer, -2.0)
     assert back == pytest.approx(0.1, abs=1e-9)
+
+
+def test_what_is_under_way_is_the_gain_without_a_stay_to_the_bit(table, cases):
+    p1, p2, p3 = cases
+    p3 = p3 * np.linspace(0.2, 1.0, len(p3))
+    at_once = table.gained_at_once(p1, p2, p3)
+    assert np.ptp(at_once) > 0.1
+    assert np.array_equal(at_once, table.gained(p1, p2, p3, np.zeros(len(p1))))
+
+
+def test_the_table_of_some_valves_answers_as_that_of_all(table, cases):
+    each = shifted(table, np.linspace(-0.5, 0.5, len(cases[0])))
+    some = np.array([3, 1])
+    few = each.of(some).time_to_open(*(values[some] for values in cases))
+    assert np.array_equal(few, each.time_to_open(*cases)[some])
 
 
 def test_nothing_is_to_be_added_where_enough_is_under_way(table):
