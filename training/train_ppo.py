@@ -77,8 +77,8 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     )
     parser.add_argument(
         "--timesteps", type=int,
-        help=f"environment steps of PPO; default: {RECURRENT_TIMESTEPS}, without memory "
-        f"{MEMORYLESS_TIMESTEPS}, end to end {END_TO_END_TIMESTEPS}",
+        help=f"environment steps of PPO; default: {END_TO_END_TIMESTEPS}, without memory "
+        f"{MEMORYLESS_TIMESTEPS}, not end to end {RECURRENT_TIMESTEPS}",
     )  # fmt: skip
     parser.add_argument("--episodes", type=int, default=256, help="evaluation episodes per plant set")
     parser.add_argument("--duration", type=float, default=10.0, help="length of one of them [s]")
@@ -99,8 +99,8 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         help="a policy with a memory, which first imitates a controller that knows each valve's plant",
     )  # fmt: skip
     parser.add_argument(
-        "--end-to-end", action="store_true",
-        help="the memory learns with PPO, too, under a critic that sees the true state (7 minutes)",
+        "--end-to-end", action=argparse.BooleanOptionalAction, default=True,
+        help="the memory learns with PPO, too, under a critic that sees the true state",
     )  # fmt: skip
     parser.add_argument(
         "--device", default="cpu", help="torch device; cpu is fastest for so small a net"
@@ -112,11 +112,10 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         "--force", action="store_true", help="begin anew in a folder that holds a training already"
     )
     chosen = parse_with_quick(parser, arguments, QUICK)
+    chosen.end_to_end &= chosen.memory
     if chosen.timesteps is None:
         recurrent = END_TO_END_TIMESTEPS if chosen.end_to_end else RECURRENT_TIMESTEPS
         chosen.timesteps = recurrent if chosen.memory else MEMORYLESS_TIMESTEPS
-    if chosen.end_to_end and not chosen.memory:
-        parser.error("--end-to-end trains a memory: leave --no-memory out")
     check_positive(parser, chosen, "timesteps", "episodes", "duration")
     check_not_negative(parser, chosen, "seed", "switching_price")
     return chosen

@@ -95,7 +95,7 @@ def test_a_resumed_run_never_hands_out_another_runs_policy(finished, tmp_path):
 
 
 def test_a_policy_with_a_memory_is_trained_in_the_short_form_too(tmp_path):
-    result = command("--quick", "--timesteps", "16384", "--out", tmp_path)
+    result = command("--quick", "--no-end-to-end", "--timesteps", "16384", "--out", tmp_path)
     assert result.returncode == 0, result.stderr
     assert "PPO, recurrent, supervised" in result.stdout
     assert load_settings(tmp_path) is not None
@@ -106,7 +106,7 @@ def test_a_policy_with_a_memory_is_trained_in_the_short_form_too(tmp_path):
 
 def test_a_memory_is_trained_end_to_end(tmp_path):
     where = ("--quick", "--timesteps", "16384", "--out", tmp_path)
-    result = command(*where, "--end-to-end")
+    result = command(*where)
     assert result.returncode == 0, result.stderr
     learned, student = (load_policy(folder) for folder in (tmp_path, tmp_path / "student"))
     assert learned.cell is not None
@@ -114,7 +114,8 @@ def test_a_memory_is_trained_end_to_end(tmp_path):
     assert learned.cells == student.cells == 32
     assert learned.name == "PPO, end to end"
     assert not np.array_equal(learned.cell.weight_memory, student.cell.weight_memory)
-    assert "was trained with end_to_end True, not False" in command(*where, "--resume").stderr
+    again = command(*where, "--resume", "--no-end-to-end")
+    assert "was trained with end_to_end True, not False" in again.stderr
 
 
 def test_resuming_with_another_seed_is_refused(finished):
@@ -134,7 +135,6 @@ def test_resuming_with_another_seed_is_refused(finished):
         (["--seed", "-1"], "--seed must not be negative"),
         (["--out", "/dev/null/x"], "is not a folder"),
         (["--resume"], "nothing to resume"),
-        (["--end-to-end", "--no-memory"], "--end-to-end trains a memory"),
     ],
 )
 def test_wrong_input_gets_one_sentence_and_leaves_nothing(arguments, words, tmp_path):
