@@ -79,7 +79,7 @@ benchmark: $(VENV)/.installed ## train seven algorithms of stable-baselines3 and
 
 robustness: $(VENV)/.installed ## sweep parameters, effects and conditions, and write docs/results/robustness.md's figures
 	$(PY) training/sweep.py --controllers "hysteresis, extrapolating" PWM pulse "pulse, adaptive" PPO=$(POLICIES)/plain/seed-0 \
-		"PPO, recurrent=$(POLICIES)/recurrent/seed-7" \
+		"supervised:PPO, recurrent=$(POLICIES)/recurrent/seed-7" "supervised:PPO, end to end=$(POLICIES)/end-to-end/seed-0" \
 		--out runs/robustness --images docs/images --pages docs/results/robustness.md docs/results/speed.md $(ARGS)
 
 export: $(VENV)/.installed ## turn the policy of `make train` into C and ONNX (needs a C compiler)

@@ -156,7 +156,7 @@ def contenders(chosen: argparse.Namespace) -> list[Contender]:
     kinds = [
         seed_trainings(folder, count=count, timesteps=timesteps, recurrent=remembers, end_to_end=learns)
         for (folder, count, timesteps), remembers, learns in (
-            (recurrent, True, False), (end_to_end, True, True), (plain, False, False),
+            (end_to_end, True, True), (recurrent, True, False), (plain, False, False),
         )
         if folder is not None
     ]  # fmt: skip

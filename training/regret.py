@@ -40,7 +40,7 @@ from training.studies.comparison.episode_blocks import Block, block_results
 from training.studies.episode_tasks import Study
 from training.studies.fingerprint import fingerprint
 from training.studies.generated_pages import markdown
-from training.studies.named_controllers import HELP, INFORMED, named_controllers
+from training.studies.named_controllers import HELP, INFORMED, SUPERVISED, named_controllers
 from training.studies.parallel_run import task_runner
 from training.studies.result_files import records
 
@@ -49,9 +49,12 @@ BLOCK = 8
 COST = 200
 """Computing time of an episode of the bound, in those of the others: for the progress bar."""
 
-DEFAULT = (
-    f"PPO, recurrent={TRAINED / 'recurrent' / 'seed-7'}", f"PPO={TRAINED / 'plain' / 'seed-0'}",
+POLICIES = (
     f"PPO, end to end={TRAINED / 'end-to-end' / 'seed-0'}",
+    f"PPO, recurrent={TRAINED / 'recurrent' / 'seed-7'}",
+)
+DEFAULT = (
+    *(SUPERVISED + policy for policy in POLICIES), *POLICIES, f"PPO={TRAINED / 'plain' / 'seed-0'}",
     *(name for name in load_tunings() if name not in SIMULATING_KINDS), INFORMED,
 )  # fmt: skip
 

@@ -141,13 +141,13 @@ def test_the_short_form_writes_everything(finished):
     assert {path.name for path in (out / "i").iterdir()} == {n for n in FIGURES if n.endswith("png")}
     content = json.loads((out / RESULTS_FILE).read_text())
     names = [row["controller"] for row in content["figures"] if row["plants"] == "calibrated"]
-    watched = [f"{NAME}, supervised", f"{END_TO_END_NAME}, supervised"]
-    alone = [NAME, END_TO_END_NAME, "PPO"]
-    several = [watched[0], NAME, "PPO"]
+    watched = [f"{END_TO_END_NAME}, supervised", f"{NAME}, supervised"]
+    alone = [END_TO_END_NAME, NAME, "PPO"]
+    several = [watched[1], NAME, "PPO"]
     assert [name for name in names if not name.endswith(", all seeds")][:5] == watched + alone
     assert {f"{name}, all seeds" for name in several} < set(names)
     assert {bar["controller"] for bar in content["bars"]} == {*watched, *alone}
-    runs = [f"{watched[0]}, seed {k}" for k in range(3)] + [f"{watched[1]}, seed 0"]
+    runs = [f"{watched[0]}, seed 0"] + [f"{watched[1]}, seed {k}" for k in range(3)]
     assert [row["run"] for row in content["seeds"]] == runs
     assert "hysteresis, extrapolating" in names
     assert content["chosen"]["PPO"] in ("PPO, seed 0", "PPO, seed 1")

@@ -26,8 +26,8 @@ FIGURES = {
 }
 """Columns of the main table, and where `summary` has them."""
 README_CONTROLLERS = (
-    "PPO, recurrent, supervised",
     "PPO, end to end, supervised",
+    "PPO, recurrent, supervised",
     "pulse, adaptive",
     "hysteresis, extrapolating",
     "PWM",
