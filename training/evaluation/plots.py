@@ -22,6 +22,9 @@ COLOURS = (
     "navy",
     "darkgoldenrod",
     "deeppink",
+    "turquoise",
+    "lawngreen",
+    "indigo",
 )
 """Of lines and dots: as many as there are controllers to compare."""
 plt.rcParams["axes.prop_cycle"] = cycler(color=COLOURS)
