@@ -38,9 +38,7 @@ def scenario_maps(rows: pd.DataFrame, plants: str) -> Figure:
         for (i, j), value in np.ndenumerate(cells.to_numpy()):
             axes.text(j, i, format(value, spec), ha="center", va="center", fontsize=8,
                       color="white" if value > 0.7 * top else "black")  # fmt: skip
-        axes.set_xticks(
-            range(len(names)), [str(n).replace(", ", ",\n") for n in names], fontsize=7, rotation=45
-        )
+        axes.set_xticks(range(len(names)), [str(n) for n in names], fontsize=8, rotation=90)
         axes.set_yticks(range(len(scenarios)), scenarios)
         axes.set_title(f"{label}; {plants}", fontsize=10)
     return figure
