@@ -1,5 +1,6 @@
 """The worst-case search finds what is planted, on a made-up valve and on the real one."""
 
+import json
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,6 +14,7 @@ from epv_env.plant.region import Region
 from training.studies.episode_tasks import Study
 from training.studies.sweeps import worst_case_search
 from training.studies.sweeps.worst_case_search import Effort, Search
+from training.sweep import main
 
 pytestmark = pytest.mark.training
 
@@ -81,3 +83,13 @@ def test_a_weakness_of_a_controller_is_found_on_the_valve():
     metrics, _ = study.run("c", [found["seed"]], {}, each)  # the one that is shown
     assert metrics.excursion_bar[0] == pytest.approx(found["excursion_bar"], abs=1e-6)
     assert found["bound_bar"] < 0.5  # a better controller holds the band there
+
+
+def test_a_search_alone_writes_its_table(tmp_path):
+    """No point is run, so the other tables are empty."""
+    short = ("--screened", "8", "--generations", "1", "--duration", "0.6", "--workers", "1")
+    asked = ("--designs", "worst", "--controllers", "hysteresis, extrapolating")
+    assert main([*asked, *short, "--out", str(tmp_path)]) == 0
+    worst = json.loads((tmp_path / "results.json").read_text())["worst"]
+    assert [each["region"] for each in worst] == ["confidence", "sensitive_ten_percent"]
+    assert all(each["bound_bar"] > 0 for each in worst)
