@@ -49,9 +49,8 @@ def harmful_changes_table(points: pd.DataFrame) -> str:
     A change hurts if its exact interval lies above that of the plant as it is.
     """
     rows = []
-    for controller in dict.fromkeys(
-        points.get("controller", [])
-    ):  # none in a search for the worst alone
+    controllers: Any = () if points.empty else points["controller"]
+    for controller in dict.fromkeys(controllers):
         mine = points.loc[points["controller"] == controller]
         exact = mine.loc[mine["level"] == "exact", "left_high"]
         bound = float(exact.iloc[0]) if len(exact) else 0.0
