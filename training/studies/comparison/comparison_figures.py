@@ -28,7 +28,7 @@ def scenario_maps(rows: pd.DataFrame, plants: str) -> Figure:
     """A cell per scenario and controller: the violation rate, and the rms error."""
     rows = rows.loc[rows["plants"] == plants].assign(C1_left=lambda r: 1 - r["C1_stayed"])
     names, scenarios = rows["controller"].unique(), rows["scenario"].unique()
-    size = (13, 1.2 + 0.33 * len(scenarios))
+    size = (13, 3.0 + 0.33 * len(scenarios))  # the names stand upright below
     figure, panels = plt.subplots(1, len(HEAT_MAPS), figsize=size, layout="constrained", sharey=True)
     for axes, (column, (label, factor, spec)) in zip(panels, HEAT_MAPS.items(), strict=True):
         cells = factor * rows.pivot(index="scenario", columns="controller", values=column)
