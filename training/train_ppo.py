@@ -99,8 +99,8 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         help="a policy with a memory, which first imitates a controller that knows each valve's plant",
     )  # fmt: skip
     parser.add_argument(
-        "--end-to-end", action=argparse.BooleanOptionalAction, default=True,
-        help="the memory learns with PPO, too, under a critic that sees the true state",
+        "--end-to-end", action=argparse.BooleanOptionalAction, default=None,
+        help="the memory learns with PPO, too, under a critic that sees the true state; default: yes",
     )  # fmt: skip
     parser.add_argument(
         "--device", default="cpu", help="torch device; cpu is fastest for so small a net"
@@ -112,7 +112,10 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         "--force", action="store_true", help="begin anew in a folder that holds a training already"
     )
     chosen = parse_with_quick(parser, arguments, QUICK)
-    chosen.end_to_end &= chosen.memory
+    if chosen.end_to_end and not chosen.memory:
+        parser.error("--end-to-end trains a memory: leave --no-memory out")
+    if chosen.end_to_end is None:
+        chosen.end_to_end = chosen.memory
     if chosen.timesteps is None:
         recurrent = END_TO_END_TIMESTEPS if chosen.end_to_end else RECURRENT_TIMESTEPS
         chosen.timesteps = recurrent if chosen.memory else MEMORYLESS_TIMESTEPS
@@ -236,7 +239,6 @@ def train_and_compare(chosen: argparse.Namespace, plant: Plant, run: str) -> int
             policy, log = train(hyperparameters, **task)
     save_policy(policy, chosen.out, control_period=OnOff.default_period, provenance=config)
     if chosen.memory:
-        print("settling the supervisor (a minute)", file=sys.stderr)
         episodes = {"scenario": chosen.scenario, "parameters": chosen.parameters, "weights": weights}
         search = QUICK_SETTLING if chosen.quick else SETTLING
         save_settings(settle(policy, plant, episodes, search), chosen.out)

@@ -135,6 +135,7 @@ def test_resuming_with_another_seed_is_refused(finished):
         (["--seed", "-1"], "--seed must not be negative"),
         (["--out", "/dev/null/x"], "is not a folder"),
         (["--resume"], "nothing to resume"),
+        (["--end-to-end", "--no-memory"], "--end-to-end trains a memory"),
     ],
 )
 def test_wrong_input_gets_one_sentence_and_leaves_nothing(arguments, words, tmp_path):

@@ -2,8 +2,8 @@
 
 A higher p2 means a smaller breakdown and a larger rms error, more reluctance fewer switchings and a
 larger breakdown. The adaptive pulse, the best of the classic controllers, shows on the same validation
-episodes what is usual of all three. The largest of the three ratios to its figures is minimised (a
-reference point: Miettinen, Nonlinear Multiobjective Optimization, Kluwer 1999, part II, section 3.5).
+episodes what is usual of all three. The largest of the three ratios to its figures is minimised (an
+achievement scalarising function: Miettinen, Nonlinear Multiobjective Optimization, Kluwer 1999).
 """
 
 from collections.abc import Sequence
@@ -56,7 +56,12 @@ QUICK_SETTLING = SettlingSearch(evaluations=4, validation=ValidationSettings(epi
 
 
 def settle(
-    policy: LearnedPolicy, plant: Plant, options: dict[str, Any], search: SettlingSearch = SETTLING
+    policy: LearnedPolicy,
+    plant: Plant,
+    options: dict[str, Any],
+    search: SettlingSearch = SETTLING,
+    *,
+    quiet: bool = False,
 ) -> SupervisorFile:
     """The settings of the policy's supervisor.
 
@@ -65,6 +70,7 @@ def settle(
         plant: nominal plant.
         options: of the validation episodes, without the plant.
         search: what defines the search.
+        quiet: no progress bar.
     """
     episodes = {"plant": plant, **options}
     rival = build(REGISTRATION.kind, load_tunings()[REGISTRATION.kind].values, plant)
@@ -72,13 +78,15 @@ def settle(
 
     def worst_ratio(at: NDArray) -> float:
         own = supervised(policy, plant, _settings(at))
+        bar.update()
         return max(_ratios(_figures(own, search.validation, episodes), usual))
 
-    bounds = search.heights, search.reluctances
-    found: Any = minimize(
-        worst_ratio, search.simplex[0], method="Nelder-Mead", bounds=bounds,
-        options={"initial_simplex": search.simplex, "maxfev": search.evaluations},
-    )  # fmt: skip
+    with tqdm(total=search.evaluations, desc="supervisor", unit="trial", disable=quiet) as bar:
+        found: Any = minimize(
+            worst_ratio, search.simplex[0], method="Nelder-Mead",
+            bounds=(search.heights, search.reluctances),
+            options={"initial_simplex": search.simplex, "maxfev": search.evaluations},
+        )  # fmt: skip
     how = {**asdict(search), "largest_ratio": float(found.fun)}
     return SupervisorFile(settings=_settings(found.x), search=how)
 
@@ -111,5 +119,5 @@ def settle_missing(folders: Sequence[Path], *, workers: int, search: SettlingSea
 
 def _settle_into(folder: Path, search: SettlingSearch) -> None:
     options = {"scenario": MIXED, "parameters": TUNING_REGION, "threads": 1}
-    found = settle(load_policy(folder), Plant.calibrated(), options, search)
+    found = settle(load_policy(folder), Plant.calibrated(), options, search, quiet=True)
     save_settings(found, folder)
