@@ -50,9 +50,13 @@ def load_supervised(folder: str | PathLike[str], plant: Plant | None = None) -> 
 
     Raises PolicyError or SupervisorFileError if a file cannot be used.
     """
+    return supervised(load_policy(folder), plant or Plant.calibrated(), settings_for(folder))
+
+
+def settings_for(folder: str | PathLike[str]) -> SupervisorSettings:
+    """The settings for a folder's policy: its own, or the default. Raises SupervisorFileError."""
     found = load_settings(folder)
-    settings = SETTINGS if found is None else found.settings
-    return supervised(load_policy(folder), plant or Plant.calibrated(), settings)
+    return SETTINGS if found is None else found.settings
 
 
 def load_settings(folder: str | PathLike[str]) -> SupervisorFile | None:

@@ -11,7 +11,7 @@ from controllers.learned import LearnedPolicy, load_policy
 from controllers.p3_check import P3Check
 from controllers.policy_contract import CONTRACT_FILE, WEIGHTS_FILE
 from controllers.privileged_pulse import PrivilegedPulse
-from controllers.supervised import load_settings, supervised
+from controllers.supervised import settings_for, supervised
 from controllers.supervisor import SETTINGS
 from controllers.tuned import build, load_tunings
 from epv_env.plant.plantfile import Plant
@@ -79,7 +79,7 @@ def _named(source: str, plant: Plant) -> tuple[str, Controller, bytes]:
     if is_import(source):
         controller = imported_controller(source)
         return controller.name, controller, fingerprint(controller).encode()
-    label, folder = _label_and_folder(source)
+    label, _, folder = source.rpartition("=")
     path = Path(folder)
     if not folder or not path.is_dir():
         raise ValueError(
@@ -91,21 +91,11 @@ def _named(source: str, plant: Plant) -> tuple[str, Controller, bytes]:
     return label or policy.name, policy, content
 
 
-def _label_and_folder(source: str) -> tuple[str, str]:
-    """The parts of LABEL=FOLDER; no label if there is a folder only."""
-    label, _, folder = source.rpartition("=")
-    return label, folder
-
-
 def _supervised(source: str, plant: Plant) -> tuple[str, Controller, bytes]:
     """`_named` under a supervisor, with the settings that lie in the folder if it is one's."""
     label, main, content = _named(source, plant)
-    _, folder = _label_and_folder(source)
-    found = load_settings(folder) if isinstance(main, LearnedPolicy) else None
-    settings = found.settings if found else SETTINGS
+    is_policy = isinstance(main, LearnedPolicy)
+    settings = settings_for(source.rpartition("=")[-1]) if is_policy else SETTINGS
     digest = json.dumps(asdict(settings), sort_keys=True).encode()
-    return (
-        f"{label}, supervised",
-        supervised(main, plant, settings),
-        SUPERVISED.encode() + digest + content,
-    )
+    own = supervised(main, plant, settings)
+    return f"{label}, supervised", own, SUPERVISED.encode() + digest + content

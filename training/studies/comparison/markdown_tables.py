@@ -9,7 +9,7 @@ from controllers.tuned import load_search, load_tunings
 from training.evaluation.controller_table import PLANTS
 from training.evaluation.scenarios import EVALUATION, NAMED
 from training.studies.comparison.acceptance_criteria import Criterion
-from training.studies.comparison.score_tables import FRONT, SCORES, ComparisonResults
+from training.studies.comparison.score_tables import FRONT, SCORES, SEED_SCORES, ComparisonResults
 from training.studies.generated_pages import markdown
 from training.studies.result_files import records
 
@@ -104,28 +104,19 @@ def _paired_comparison_table(paired: pd.DataFrame, ours: str) -> str:
     return markdown(["plants", f"{ours} against", *SCORES.values()], rows)
 
 
-SEED_FIGURES = {
-    "rms error [mbar]": ("rms_bar", 1e3),
-    "breakdown per event [mbar]": ("event_breakdown_bar", 1e3),
-    "switchings [1/s]": ("switchings_per_s", 1.0),
-    "return": ("episode_return", 1.0),
-}
-"""Columns of the table of training seeds: field and factor."""
-
-
 def seeds_table(differences: pd.DataFrame, rival: str) -> str:
     """Each training seed against a rival: rows of `score_tables.seed_differences`."""
     if differences.empty:
-        return f"{rival} did not take part."
+        return f"No supervised policy met the controller {rival!r} in this comparison."
     rows = []
     for row in records(differences):
         shown = []
-        for score, factor in SEED_FIGURES.values():
+        for score, (_, factor) in SEED_SCORES.items():
             value, low, high = (factor * row[score + end] for end in ("", "_low", "_high"))
             shown.append(f"{value:+.2f} ({low:+.2f} to {high:+.2f})")
         left = f"{row['left']} against {row['rival_left']} of {row['episodes']}"
         rows.append([row["run"], left, *shown])
-    return markdown([f"against {rival}", "left the band", *SEED_FIGURES], rows)
+    return markdown([f"against {rival}", "left the band", *(h for h, _ in SEED_SCORES.values())], rows)
 
 
 def _grouped(table: pd.DataFrame, column: str) -> dict[tuple[str, str], list[dict[str, Any]]]:

@@ -16,7 +16,6 @@ from training.evaluation.scenarios import RANDOM
 from training.evaluation.statistics import (
     Estimate,
     bootstrap_estimate,
-    mean_interval,
     paired_difference,
     pareto_front,
     probability_of_improvement,
@@ -177,8 +176,13 @@ def _rows(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
     return pd.DataFrame(list(rows))
 
 
-SEED_SCORES = ("rms_bar", "event_breakdown_bar", "switchings_per_s", "episode_return")
-"""Fields of EpisodeMetrics in which each training seed is set against a rival."""
+SEED_SCORES = {
+    "rms_bar": ("rms error [mbar]", 1e3),
+    "event_breakdown_bar": ("breakdown per event [mbar]", 1e3),
+    "switchings_per_s": ("switchings [1/s]", 1.0),
+    "episode_return": ("return", 1.0),
+}
+"""Fields of EpisodeMetrics in which each training seed is set against a rival: heading and factor."""
 
 
 def seed_differences(c: ComparisonResults, ours: Contender, rival: str) -> pd.DataFrame:
@@ -193,13 +197,11 @@ def seed_differences(c: ComparisonResults, ours: Contender, rival: str) -> pd.Da
 
 def _seed_difference(run: str, own: EpisodeMetrics, its: EpisodeMetrics) -> dict[str, Any]:
     fewest = min(len(own), len(its))
-    own, its = own.first(fewest), its.first(fewest)
-    row: dict[str, Any] = {"run": run, "episodes": fewest}
-    row |= {"left": int((~own.stayed).sum()), "rival_left": int((~its.stayed).sum())}
+    left, rival_left = (int((~each.stayed[:fewest]).sum()) for each in (own, its))
+    row: dict[str, Any] = {"run": run, "episodes": fewest, "left": left, "rival_left": rival_left}
     for score in SEED_SCORES:
-        difference = getattr(own, score) - getattr(its, score)
-        low, high = mean_interval(difference)
-        row |= _named(score, Estimate(value=float(difference.mean()), low=low, high=high))
+        pair = (getattr(each, score)[None, None] for each in (own, its))
+        row |= _named(score, paired_difference(*pair))
     return row
 
 
