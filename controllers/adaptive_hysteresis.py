@@ -53,8 +53,7 @@ class AdaptiveHysteresis:
     def act(self, observations: NDArray) -> NDArray:
         """0 (off) or 1 (on) for each valve, (n,)."""
         valve = self._learner.observe(observations)
-        ahead = self.look_ahead * (valve.opens_in + self.table.release_lag)
-        opens = valve.fed & valve.shut & (valve.error + valve.fall * ahead < self.open_below)
+        opens = valve.fed & valve.shut & (valve.forecast(self.look_ahead) < self.open_below)
         rises = valve.table.gained(valve.p1, valve.p2, valve.p3, np.zeros_like(valve.p1))
         shuts = ~valve.fed | (valve.error + valve.gain * rises > self.shut_above)
         action = np.where(valve.on, np.where(opens, 0, 1), np.where(shuts, 1, 0))

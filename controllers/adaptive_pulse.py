@@ -67,8 +67,7 @@ class AdaptivePulse:
         """0 (off) or 1 (on) for each valve, (n,)."""
         valve = self._learner.observe(observations)
         reserve = reserve_of(self.table, valve.opens_from_rest, self.tolerated)
-        ahead = self.look_ahead * (valve.opens_in + self.table.release_lag)
-        begins = valve.fed & valve.shut & (valve.error + valve.fall * ahead < self.trigger + reserve)
+        begins = valve.fed & valve.shut & (valve.forecast(self.look_ahead) < self.trigger + reserve)
         action = np.where(begins, 0, 1)
         off = np.flatnonzero(~valve.on)
         action[off] = np.where(self._ends(valve, reserve, off), 1, 0)

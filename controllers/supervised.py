@@ -12,7 +12,7 @@ from controllers.supervisor import SETTINGS, Supervisor, SupervisorSettings
 from epv_env.common.json_files import JSONFileError, read_json, write_json
 from epv_env.plant.plantfile import Plant
 
-FORMAT = "epv-supervisor/1"
+FORMAT = "epv-supervisor/2"
 SUPERVISOR_FILE = "supervisor.json"
 
 

@@ -1,9 +1,9 @@
 """A supervisor around a learned policy: it corrects the policy by what it learns about the valve.
 
-A learner of the valve (controllers/valve_learner.py) estimates how long the valve takes to open, and
-how far a pulse under way still raises p2. The supervisor moves the policy's setpoint by the first (a
-reference governor: Garone, Di Cairano and Kolmanovsky, Automatica 75 (2017)) and ends pulses by the
-second.
+A learner of the valve (controllers/valve_learner.py) estimates how long the valve takes to open, how
+low p2 will be then, and how far a pulse under way still raises p2. The supervisor moves the policy's
+setpoint by the first (a reference governor: Garone, Di Cairano and Kolmanovsky, Automatica 75 (2017)),
+holds back needless pulses by the second, and ends pulses by the third.
 """
 
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from controllers.base import Controller, Graded, Privileged, with_period
 from controllers.pulse_table import PulseTable
-from controllers.reserve import TOLERATED, reserve_of
+from controllers.reserve import TOLERATED, expected_breakdown, reserve_for
 from controllers.valve_learner import LearntValve, ValveLearner
 from epv_env.observation import INDEX, LAYOUT
 from epv_env.reward import BAND_BAR
@@ -27,32 +27,39 @@ SLOW = 0.1
 class SupervisorSettings:
     """How a supervisor corrects its policy.
 
-    Training settles `height` and `reluctance` for each policy (training/learners/supervision.py). The
-    others were chosen by hand on development episodes of policies that were trained end to end.
+    Training settles `height`, `free_below` and `reluctance` for each policy
+    (training/learners/supervision.py). The others were chosen by hand on development episodes.
     """
 
     height: float = 0.0
     """How much higher than the policy alone p2 is held at any valve [bar]."""
+    free_below: float = 0.0
+    """Forecast of p2 - target, for when the valve would open, up to which the policy alone decides
+    whether a pulse begins [bar]."""
     reluctance: float = 0.0
-    """By how much the policy's logit of switching off must exceed that of leaving on before a pulse
-    begins [1]: a policy that is undecided switches needlessly."""
+    """For each bar of the forecast above that, by how much the policy's logit of switching off must
+    exceed that of leaving on before a pulse begins [1/bar]: such a pulse is needed only if it is wanted
+    clearly."""
     share: float = 0.5
     """Share of the reserve that a valve needs beyond that [1]: the policy keeps some by itself."""
     tolerated: float = TOLERATED
     """Expected breakdown that needs no reserve [bar]."""
+    wariness: float = 0.1
+    """Breakdown expected in addition for a bar of the opening pressure's standard deviation [1]."""
     ceiling: float = 0.11
     """Expected p2 - target, with its uncertainty, above which a pulse ends [bar]."""
     caution: float = 0.42
     """Rise allowed for by a bar of the opening pressure's standard deviation [1]."""
-    doubt: float = 1.5
+    doubt: float = 2.2
     """Standard deviations of the gain that are allowed for in what p2 will still rise [1]."""
     filter_time: float = 0.025
     """Time in which the weight of a reading of p2 fades by 1/e [s]."""
 
     def __post_init__(self) -> None:
-        if not abs(self.height) <= BAND_BAR:
-            raise ValueError(f"height = {self.height:g} bar: give one within ±{BAND_BAR:g} bar")
-        for name in ("reluctance", "share", "caution", "doubt"):
+        for name in ("height", "free_below"):
+            if not abs(value := getattr(self, name)) <= BAND_BAR:
+                raise ValueError(f"{name} = {value:g} bar: give one within ±{BAND_BAR:g} bar")
+        for name in ("reluctance", "share", "wariness", "caution", "doubt"):
             if not 0 <= getattr(self, name) < float("inf"):
                 raise ValueError(f"{name} = {getattr(self, name):g}: give a number from 0")
         if not self.filter_time > 0:
@@ -101,21 +108,28 @@ class Supervisor:
     def act(self, observations: NDArray) -> NDArray:
         """0 (off) or 1 (on) for each valve, (n,)."""
         valve = self._learner.observe(observations)
-        reserve = reserve_of(self.table, valve.opens_from_rest, self.settings.tolerated)
+        reserve = self.reserve(valve)
         shown = observations.copy()
         shown[:, ERROR] -= (self.shift(valve, reserve) / LAYOUT[ERROR].scale).astype(shown.dtype)
-        action = np.where(self._must_shut(valve), 1, self._asked(shown, valve.on, reserve))
+        action = np.where(self._must_shut(valve), 1, self._asked(shown, valve, reserve))
         self._learner.decided(valve, action)
         return action
 
-    def _asked(self, shown: NDArray, on: NDArray, reserve: NDArray) -> NDArray:
-        """What the policy asks for, (n,): the more reserve a valve needs, the less it may hesitate."""
+    def _asked(self, shown: NDArray, valve: LearntValve, reserve: NDArray) -> NDArray:
+        """What the policy asks for clearly (n,): the slower a valve, the less it may hesitate."""
         if not isinstance(self.main, Graded):
             return self.main.act(shown)
         logits = self.main.logits(shown)
         slow = np.clip(reserve / SLOW, 0.0, 1.0)
-        asked = self.settings.reluctance * (1 - slow) * on
+        needless = np.maximum(valve.forecast() - self.settings.free_below, 0.0)
+        asked = self.settings.reluctance * needless * (1 - slow) * valve.on
         return np.where(logits[:, 1] - logits[:, 0] > -asked, 1, 0)
+
+    def reserve(self, valve: LearntValve) -> NDArray:
+        """Reserve that each valve needs (n,) [bar]: the more, the less is known about it."""
+        expected = expected_breakdown(self.table, valve.opens_from_rest)
+        doubtful = self.settings.wariness * valve.offset_deviation
+        return reserve_for(expected + doubtful, self.settings.tolerated)
 
     def shift(self, valve: LearntValve, reserve: NDArray) -> NDArray:
         """How much higher p2 is held (n,) [bar]; none while the supply cannot raise it."""

@@ -76,6 +76,13 @@ class LearntValve:
         """`opens_in` with the control chamber full, at p1 (n,) [s]."""
         return self.table.time_to_open(self.p1, self.p2, self.p1) / self.pace
 
+    def forecast(self, look_ahead: float = 1.0) -> NDArray:
+        """p2 - target when the valve opens, if the coil is switched off now (n,) [bar].
+
+        look_ahead: share of the time until then over which p2 is extrapolated [1].
+        """
+        return self.error + self.fall * (look_ahead * (self.opens_in + self.table.release_lag))
+
     def under_way(self, who: NDArray) -> NDArray:
         """What p2 of the valves at these indices (m,) still rises by the table if shut now [bar]."""
         return self.table.of(who).gained_at_once(self.p1[who], self.p2[who], self.p3[who])

@@ -9,7 +9,6 @@ from controllers.hysteresis import Hysteresis
 from controllers.learned import TRAINED, load_policy
 from controllers.privileged_pulse import PrivilegedPulse
 from controllers.pulse import Pulse
-from controllers.reserve import reserve_of
 from controllers.supervised import supervised
 from controllers.supervisor import Supervisor, SupervisorSettings
 from controllers.tuned import build, load_tunings
@@ -46,19 +45,25 @@ def at_rest(**values):
     return encode(mine | chosen)
 
 
-def needed(control, valve):
-    """Reserve of each valve [bar]."""
-    return reserve_of(control.table, valve.opens_from_rest, control.settings.tolerated)
-
-
 def test_the_setpoint_rises_with_the_expected_breakdown():
     control = supervisor(Recorder())
     control.reset(3)
     valve = control._learner.observe(at_rest())
     slower = replace(valve, pace=valve.pace * np.array([1.25, 0.8, 0.6]))
-    shifts = control.shift(slower, needed(control, slower))
+    shifts = control.shift(slower, control.reserve(slower))
     assert shifts[0] == 0.0  # a fast valve needs no reserve
     assert 0.0 < shifts[1] < shifts[2]
+
+
+def test_a_valve_that_is_known_less_needs_more_reserve():
+    control = supervisor(Recorder(), wariness=0.2)
+    control.reset(3)
+    valve = replace(control._learner.observe(at_rest()), pace=np.full(3, 0.8))
+    known, unknown = (
+        control.reserve(replace(valve, offset_deviation=np.full(3, deviation)))
+        for deviation in (0.0, 0.5)
+    )
+    assert unknown - known == pytest.approx(0.1)
 
 
 def test_the_height_shifts_every_setpoint_alike():
@@ -66,7 +71,7 @@ def test_the_height_shifts_every_setpoint_alike():
     for control in controls:
         control.reset(3)
     valve = controls[0]._learner.observe(at_rest())
-    high, low = (control.shift(valve, needed(control, valve)) for control in controls)
+    high, low = (control.shift(valve, control.reserve(valve)) for control in controls)
     assert high - low == pytest.approx(0.03)
 
 
@@ -85,6 +90,7 @@ def test_the_policy_is_shown_a_p2_that_is_lower_by_the_shift():
     ("settings", "words"),
     [
         ({"height": 0.6}, "height = 0.6 bar"), ({"height": float("nan")}, "height"),
+        ({"free_below": -0.7}, "free_below = -0.7 bar"), ({"reluctance": -1.0}, "reluctance = -1"),
         ({"share": -1.0}, "share = -1"), ({"filter_time": 0.0}, "filter_time = 0 s"),
     ],
 )  # fmt: skip
@@ -101,19 +107,28 @@ class Undecided(Recorder):
         return np.tile([2.0, 0.0], (len(observations), 1))
 
 
-@pytest.mark.parametrize(("reluctance", "action"), [(1.0, 0), (3.0, 1)])
-def test_a_pulse_begins_only_where_it_is_wanted_clearly(reluctance, action):
-    control = supervisor(Undecided(), reluctance=reluctance)
+def test_the_farther_p2_is_above_what_sets_a_pulse_free_the_more_clearly_it_has_to_be_wanted():
+    """At 50/bar a preference of 2 suffices up to 0.04 bar above."""
+    control = supervisor(Undecided(), reluctance=50.0, free_below=-0.02)
     control.reset(3)
-    assert np.all(control.act(at_rest()) == action)
-    assert np.all(control.act(at_rest(action=0.0)) == 0)  # one under way goes on
+    assert control.act(at_rest(p2_error=[-0.03, 0.01, 0.03])).tolist() == [0, 0, 1]
+    assert np.all(control.act(at_rest(p2_error=0.03, action=0.0)) == 0)  # one under way goes on
+
+
+def test_consumption_sets_a_pulse_free_before_p2_is_low():
+    """p2 falls by 10 mbar a period, or not at all, and is above the target when a pulse is asked for."""
+    control = supervisor(Undecided(), reluctance=1000.0, free_below=-0.02)
+    control.reset(3)
+    actions = [control.act(at_rest(p2_error=[0.12 - 0.01 * k, 0.03, 0.03])) for k in range(10)]
+    assert actions[-1].tolist() == [0, 1, 1]
 
 
 def test_a_slow_valve_may_not_hesitate():
     """At a tolerated breakdown of nothing every valve needs all the reserve that there is."""
-    control = supervisor(Undecided(), reluctance=3.0, tolerated=0.0)
-    control.reset(3)
-    assert np.all(control.act(at_rest()) == 0)
+    for tolerated, action in ((0.0, 0), (10.0, 1)):
+        control = supervisor(Undecided(), reluctance=100.0, free_below=-0.1, tolerated=tolerated)
+        control.reset(3)
+        assert np.all(control.act(at_rest()) == action)
 
 
 def test_without_reluctance_a_policy_acts_as_alone():

@@ -1,4 +1,4 @@
-"""Height and reluctance are settled where the largest ratio to the adaptive pulse's figures is least."""
+"""A supervisor is settled where the largest ratio to the adaptive pulse's figures is least."""
 
 from dataclasses import replace
 
@@ -21,13 +21,13 @@ pytestmark = pytest.mark.training
 
 
 def figures_by_settings(rms, breakdown, switchings):
-    """Stands for episodes: the rival's figures are 1, ours follow from height and reluctance."""
+    """Stands for episodes: the rival's figures are 1, ours follow from height and `free_below`."""
 
     def figures(controller, validation, options):
         if controller.name == "pulse, adaptive":
             return [1.0, 1.0, 1.0]
         at = controller.settings
-        return [f(at.height, at.reluctance) for f in (rms, breakdown, switchings)]
+        return [f(at.height, at.free_below) for f in (rms, breakdown, switchings)]
 
     return figures
 
@@ -38,16 +38,18 @@ def policy():
 
 
 def test_the_settings_are_where_the_three_ratios_are_equal(policy, monkeypatch):
-    """1 + 5 h, 0.9 - 5 h + r/100 and 1.1 - r/100 are all 1 at h = 0 and r = 10."""
+    """1 + 5 h, 0.9 - 5 h - f and 1.1 + f are all 1 at h = 0 and f = -0.1."""
     figures = figures_by_settings(
-        lambda h, r: 1 + 5 * h, lambda h, r: 0.9 - 5 * h + r / 100, lambda h, r: 1.1 - r / 100
+        lambda h, f: 1 + 5 * h, lambda h, f: 0.9 - 5 * h - f, lambda h, f: 1.1 + f
     )
     monkeypatch.setattr(supervision, "_figures", figures)
-    found = settle(policy, Plant.calibrated(), {}, replace(SETTLING, evaluations=60))
+    found = settle(policy, Plant.calibrated(), {}, replace(SETTLING, evaluations=120))
     assert found.settings.height == pytest.approx(0.0, abs=0.004)
-    assert found.settings.reluctance == pytest.approx(10.0, abs=1.5)
-    changed = {"height": found.settings.height, "reluctance": found.settings.reluctance}
+    assert found.settings.free_below == pytest.approx(-0.1, abs=0.015)
+    settled = ("height", "free_below", "reluctance")
+    changed = {name: getattr(found.settings, name) for name in settled}
     assert found.settings == replace(SETTINGS, **changed)
+    assert 10.0 <= found.settings.reluctance <= 10_000.0
     assert found.search["largest_ratio"] == pytest.approx(1.0, abs=0.02)
 
 
@@ -68,9 +70,10 @@ def test_a_higher_setpoint_breaks_down_less_and_errs_more(policy):
 
 def test_a_reluctant_policy_switches_less(policy):
     plant, settings = Plant.calibrated(), ValidationSettings(episodes=64, duration=3.0)
+    cautious = replace(SETTINGS, free_below=-0.06)
     eager, reluctant = (
-        summary(validate(supervised(policy, plant, replace(SETTINGS, reluctance=r)), settings, {}))
-        for r in (0.0, 12.0)
+        summary(validate(supervised(policy, plant, replace(cautious, reluctance=r)), settings, {}))
+        for r in (0.0, 400.0)
     )
     assert reluctant["switchings_per_s"] < 0.95 * eager["switchings_per_s"]
 

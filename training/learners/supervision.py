@@ -1,6 +1,6 @@
-"""What training settles last: how high a policy's supervisor holds p2, and how reluctantly it opens.
+"""What training settles last: how high a policy's supervisor holds p2, and which pulses it holds back.
 
-A higher p2 means a smaller breakdown and a larger rms error, more reluctance fewer switchings and a
+A higher p2 means a smaller breakdown and a larger rms error, fewer pulses mean fewer switchings and a
 larger breakdown. The adaptive pulse, the best of the classic controllers, shows on the same validation
 episodes what is usual of all three. The largest of the three ratios to its figures is minimised (an
 achievement scalarising function: Miettinen, Nonlinear Multiobjective Optimization, Kluwer 1999).
@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 from scipy.optimize import minimize
@@ -24,28 +25,27 @@ from controllers.supervisor import SETTINGS, SupervisorSettings
 from controllers.tuned import build, load_tunings
 from epv_env.plant.consumption import MIXED
 from epv_env.plant.plantfile import Plant
-from training.evaluation.metrics import summary
+from training.evaluation.metrics import EpisodeMetrics, summary
 from training.evaluation.scenarios import TUNING_REGION
 from training.learners.validation import ValidationSettings, validate
-
-FIGURES = ("rms_error_bar", "C2_event_breakdown_bar", "switchings_per_s")
-"""Of `summary`: those that height and reluctance trade against each other."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SettlingSearch:
-    """A Nelder-Mead search of height and reluctance."""
+    """A Nelder-Mead search of height, of the forecast that sets a pulse free, and of reluctance."""
 
-    simplex: tuple[tuple[float, float], ...] = ((0.0, 4.0), (0.03, 12.0), (-0.02, 20.0))
-    """First heights [bar] and reluctances [1]."""
-    heights: tuple[float, float] = (-0.1, 0.1)
-    """Lowest and highest [bar]."""
-    reluctances: tuple[float, float] = (0.0, 60.0)
-    """Least and greatest [1]."""
-    evaluations: int = 24
+    simplex: tuple[tuple[float, float, float], ...] = (
+        (-0.01, -0.05, 2.6), (0.015, -0.07, 2.6), (-0.03, -0.03, 2.7), (-0.01, -0.07, 2.2),
+    )  # fmt: skip
+    """First heights [bar], `free_below` [bar], and decimal logarithms of the reluctance [1/bar]."""
+    least: tuple[float, float, float] = (-0.1, -0.3, 1.0)
+    """Of each."""
+    greatest: tuple[float, float, float] = (0.1, 0.3, 4.0)
+    """Of each."""
+    evaluations: int = 30
     """Most evaluations."""
     validation: ValidationSettings = field(
-        default_factory=lambda: ValidationSettings(episodes=512, duration=6.0)
+        default_factory=lambda: ValidationSettings(episodes=768, duration=6.0)
     )
     """Episodes of an evaluation."""
 
@@ -84,7 +84,7 @@ def settle(
     with tqdm(total=search.evaluations, desc="supervisor", unit="trial", disable=quiet) as bar:
         found: Any = minimize(
             worst_ratio, search.simplex[0], method="Nelder-Mead",
-            bounds=(search.heights, search.reluctances),
+            bounds=tuple(zip(search.least, search.greatest, strict=True)),
             options={"initial_simplex": search.simplex, "maxfev": search.evaluations},
         )  # fmt: skip
     how = {**asdict(search), "largest_ratio": float(found.fun)}
@@ -92,15 +92,27 @@ def settle(
 
 
 def _settings(at: NDArray) -> SupervisorSettings:
-    height, reluctance = at
-    return replace(SETTINGS, height=round(float(height), 4), reluctance=round(float(reluctance), 2))
+    height, free_below, magnitude = map(float, at)
+    return replace(
+        SETTINGS, height=round(height, 4), free_below=round(free_below, 4),
+        reluctance=round(10**magnitude, 1),
+    )  # fmt: skip
 
 
 def _figures(
     controller: Controller, validation: ValidationSettings, options: dict[str, Any]
 ) -> list[float]:
-    found = summary(validate(controller, validation, options))
-    return [found[name] for name in FIGURES]
+    return _traded(validate(controller, validation, options))
+
+
+def _traded(metrics: EpisodeMetrics) -> list[float]:
+    """The figures that the settings trade against each other: means over episodes or events.
+
+    An rms error of all episodes together would hide most of them behind the few worst.
+    """
+    found = summary(metrics)
+    breakdown, switchings = found["C2_event_breakdown_bar"], found["switchings_per_s"]
+    return [float(np.mean(metrics.rms_bar)), breakdown, switchings]
 
 
 def _ratios(own: Sequence[float], usual: Sequence[float]) -> list[float]:
