@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 
-from epv_env.reward import BAND_BAR
+from epv_env.reward import BAND_BAR, RewardWeights
 from training.evaluation.plots import COLOURS, LEGEND_COLUMNS, plt
 from training.studies.comparison.score_tables import FRONT, HIGHER_IS_BETTER, JUDGED_ON, SCORES
 from training.studies.result_files import records
@@ -105,13 +105,13 @@ def paired_comparison_figure(table: pd.DataFrame, ours: str) -> Figure:
 def trade_off_figure(traded: pd.DataFrame) -> Figure:
     """Excursion, breakdown and rms error over switchings; the line is the Pareto front.
 
-    Small numbers: prices of switching, where there are several. What lies above a panel is named there.
+    Small numbers: prices of switching that are not the reward's. What lies above a panel is named there.
     """
     figure, panels = plt.subplots(1, len(FRONT), figsize=(12, 3.8), layout="constrained")
     for axes, (column, label) in zip(panels, FRONT.items(), strict=True):
         for name, rows in traded.groupby("controller", sort=False):
             axes.plot(rows["switchings_per_s"], rows[column], "o", label=name)
-        for row in records(traded) if len(set(traded["switching_price"])) > 1 else []:
+        for row in records(traded.loc[traded["switching_price"] != RewardWeights().switching]):
             axes.annotate(
                 f"{row['switching_price']:g}", (row["switchings_per_s"], row[column]),
                 xytext=(4, 4), textcoords="offset points", fontsize=7, color="0.4",
