@@ -38,7 +38,7 @@ class SettlingSearch:
         (-0.01, -0.05, 2.6), (0.015, -0.07, 2.6), (-0.03, -0.03, 2.7), (-0.01, -0.07, 2.2),
     )  # fmt: skip
     """First heights [bar], `free_below` [bar], and decimal logarithms of the reluctance [1/bar]."""
-    least: tuple[float, float, float] = (-0.1, -0.3, 1.0)
+    least: tuple[float, float, float] = (-0.1, -0.3, -1.0)
     """Of each."""
     greatest: tuple[float, float, float] = (0.1, 0.3, 4.0)
     """Of each."""
