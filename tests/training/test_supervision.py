@@ -49,7 +49,7 @@ def test_the_settings_are_where_the_three_ratios_are_equal(policy, monkeypatch):
     settled = ("height", "free_below", "reluctance")
     changed = {name: getattr(found.settings, name) for name in settled}
     assert found.settings == replace(SETTINGS, **changed)
-    assert 0.1 <= found.settings.reluctance <= 10_000.0
+    assert 10 ** SETTLING.least[2] <= found.settings.reluctance <= 10 ** SETTLING.greatest[2]
     assert found.search["largest_ratio"] == pytest.approx(1.0, abs=0.02)
 
 

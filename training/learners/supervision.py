@@ -25,7 +25,7 @@ from controllers.supervisor import SETTINGS, SupervisorSettings
 from controllers.tuned import build, load_tunings
 from epv_env.plant.consumption import MIXED
 from epv_env.plant.plantfile import Plant
-from training.evaluation.metrics import EpisodeMetrics, summary
+from training.evaluation.metrics import summary
 from training.evaluation.scenarios import TUNING_REGION
 from training.learners.validation import ValidationSettings, validate
 
@@ -102,14 +102,11 @@ def _settings(at: NDArray) -> SupervisorSettings:
 def _figures(
     controller: Controller, validation: ValidationSettings, options: dict[str, Any]
 ) -> list[float]:
-    return _traded(validate(controller, validation, options))
+    """What the settings trade against each other: rms error, breakdown of an event, switchings.
 
-
-def _traded(metrics: EpisodeMetrics) -> list[float]:
-    """The figures that the settings trade against each other: means over episodes or events.
-
-    An rms error of all episodes together would hide most of them behind the few worst.
+    The rms error is a mean over the episodes: that of all together would hide most behind the few worst.
     """
+    metrics = validate(controller, validation, options)
     found = summary(metrics)
     breakdown, switchings = found["C2_event_breakdown_bar"], found["switchings_per_s"]
     return [float(np.mean(metrics.rms_bar)), breakdown, switchings]
