@@ -37,7 +37,8 @@ class P3Check:
     """Pressure that the chamber empties to [bar]."""
     control_period: float = 5e-3
     """[s]"""
-    name: str = field(init=False)
+    name: str = ""
+    """Default: that of `main`, with a word about the check."""
     environment: str = field(init=False)
     _failed: NDArray = field(default_factory=lambda: np.zeros(0, dtype=bool), repr=False)
     _periods: int = field(default=0, repr=False)
@@ -52,7 +53,8 @@ class P3Check:
             )
         self.main = with_period(self.main, self.control_period)
         self.fallback = with_period(self.fallback, self.control_period)
-        self.name, self.environment = f"{self.main.name}, p3 checked", self.main.environment
+        self.name = self.name or f"{self.main.name}, p3 checked"
+        self.environment = self.main.environment
 
     @property
     def failed(self) -> NDArray:

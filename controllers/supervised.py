@@ -1,19 +1,28 @@
-"""A policy under its supervisor, from a folder: the supervisor's settings lie beside the weights."""
+"""A policy under its supervisor, from a folder: the supervisor's settings lie beside the weights.
 
-from dataclasses import asdict, dataclass, field
+The supervisor believes p3, so it comes with a check of that sensor: once p3 is implausible, a controller
+takes over that does not read it.
+"""
+
+from dataclasses import asdict, dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from controllers.base import Controller
+from controllers.hysteresis import EXTRAPOLATING_HYSTERESIS
 from controllers.learned import load_policy
+from controllers.p3_check import P3Check
 from controllers.pulse_simulation import pulse_table
 from controllers.supervisor import SETTINGS, Supervisor, SupervisorSettings
+from controllers.tuned import build, load_tunings
 from epv_env.common.json_files import JSONFileError, read_json, write_json
 from epv_env.plant.plantfile import Plant
 
-FORMAT = "epv-supervisor/2"
+FORMAT = "epv-supervisor/3"
 SUPERVISOR_FILE = "supervisor.json"
+FALLBACK = EXTRAPOLATING_HYSTERESIS.kind
+"""Takes over where p3 is implausible: the best of those that do not read it."""
 
 
 class SupervisorFileError(ValueError):
@@ -30,18 +39,26 @@ class SupervisorFile:
     """How it searched."""
 
 
-def supervised(
-    controller: Controller, plant: Plant, settings: SupervisorSettings = SETTINGS
-) -> Supervisor:
+def supervised(controller: Controller, plant: Plant, settings: SupervisorSettings = SETTINGS) -> P3Check:
     """A controller for the on/off environment under a supervisor that knows this nominal plant.
 
     Raises ValueError for a controller with other actions, and for one that reads no sensor.
     """
     table = pulse_table(plant.parameters, supply_voltage=plant.voltage)
-    return Supervisor(main=controller, table=table, settings=settings)
+    supervisor = Supervisor(main=controller, table=table, settings=settings)
+    return replace(p3_checked(supervisor, plant), name=supervisor.name)
 
 
-def load_supervised(folder: str | PathLike[str], plant: Plant | None = None) -> Supervisor:
+def p3_checked(controller: Controller, plant: Plant) -> P3Check:
+    """The controller with a check of p3, the best controller that does not read p3 behind it.
+
+    Raises ValueError for a controller with other actions, and for one that reads no sensor.
+    """
+    fallback = build(FALLBACK, load_tunings()[FALLBACK].values, plant)
+    return P3Check(main=controller, fallback=fallback)
+
+
+def load_supervised(folder: str | PathLike[str], plant: Plant | None = None) -> P3Check:
     """The policy of a folder under its supervisor; the default settings if the folder has none.
 
     Args:

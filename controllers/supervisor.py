@@ -1,9 +1,10 @@
 """A supervisor around a learned policy: it corrects the policy by what it learns about the valve.
 
 A learner of the valve (controllers/valve_learner.py) estimates how long the valve takes to open, how
-low p2 will be then, and how far a pulse under way still raises p2. The supervisor moves the policy's
+low p2 will be then, and how far a pulse under way may still raise p2. The supervisor moves the policy's
 setpoint by the first (a reference governor: Garone, Di Cairano and Kolmanovsky, Automatica 75 (2017)),
-holds back needless pulses by the second, and ends pulses by the third.
+holds back needless pulses by the second, and ends pulses by the third. A pulse of a valve that is hardly
+known ends before it may rise too far, so the first pulses probe when the valve opens.
 """
 
 from dataclasses import dataclass, field
@@ -44,14 +45,16 @@ class SupervisorSettings:
     """Share of the reserve that a valve needs beyond that [1]: the policy keeps some by itself."""
     tolerated: float = TOLERATED
     """Expected breakdown that needs no reserve [bar]."""
-    wariness: float = 0.1
+    wariness: float = 0.15
     """Breakdown expected in addition for a bar of the opening pressure's standard deviation [1]."""
-    ceiling: float = 0.11
-    """Expected p2 - target, with its uncertainty, above which a pulse ends [bar]."""
-    caution: float = 0.42
-    """Rise allowed for by a bar of the opening pressure's standard deviation [1]."""
-    doubt: float = 2.2
-    """Standard deviations of the gain that are allowed for in what p2 will still rise [1]."""
+    ceiling: float = 0.15
+    """p2 - target that a pulse may reach if the valve opens early, or else it ends [bar]."""
+    confidence: float = 0.95
+    """Probability that the valve opens no earlier than is allowed for there [1]."""
+    doubt: float = 0.75
+    """Standard deviations of the gain that are allowed for there [1]."""
+    horizon: float = 0.1
+    """Time over which consumption lowers p2 there [s]: an overshoot in an emergency does not last."""
     filter_time: float = 0.025
     """Time in which the weight of a reading of p2 fades by 1/e [s]."""
 
@@ -59,9 +62,11 @@ class SupervisorSettings:
         for name in ("height", "free_below"):
             if not abs(value := getattr(self, name)) <= BAND_BAR:
                 raise ValueError(f"{name} = {value:g} bar: give one within ±{BAND_BAR:g} bar")
-        for name in ("reluctance", "share", "wariness", "caution", "doubt"):
+        for name in ("reluctance", "share", "wariness", "doubt", "horizon"):
             if not 0 <= getattr(self, name) < float("inf"):
                 raise ValueError(f"{name} = {getattr(self, name):g}: give a number from 0")
+        if not 0 < self.confidence < 1:
+            raise ValueError(f"confidence = {self.confidence:g}: give a number between 0 and 1")
         if not self.filter_time > 0:
             raise ValueError(f"filter_time = {self.filter_time:g} s: give a positive time")
 
@@ -83,6 +88,7 @@ class Supervisor:
     name: str = field(init=False)
     environment: str = field(init=False)
     _learner: ValveLearner = field(init=False, repr=False)
+    _ended: NDArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if isinstance(self.main, Privileged):
@@ -104,6 +110,7 @@ class Supervisor:
         """Forget the valves; n episodes begin."""
         self.main.reset(n)
         self._learner.reset(n)
+        self._ended = np.zeros(n, dtype=bool)
 
     def act(self, observations: NDArray) -> NDArray:
         """0 (off) or 1 (on) for each valve, (n,)."""
@@ -136,13 +143,22 @@ class Supervisor:
         return np.where(valve.fed, self.settings.height + self.settings.share * reserve, 0.0)
 
     def _must_shut(self, valve: LearntValve) -> NDArray:
-        """Whether the coil has to be on, bool (n,): no supply, or p2 would rise beyond the ceiling."""
-        must = ~valve.fed
-        who = np.flatnonzero(valve.fed & ~valve.shut)
-        rise = valve.gain[who] * valve.under_way(who)
-        uncertain = np.hypot(
-            self.settings.caution * valve.offset_deviation[who],
-            self.settings.doubt * valve.gain_deviation[who] * rise,
-        )
-        must[who] = valve.error[who] + rise + uncertain > self.settings.ceiling
-        return must
+        """Whether the coil has to be on, bool (n,): no supply, a pulse that would rise too far, or one
+        that was ended for this and is not measured yet, since nothing new is known about the valve."""
+        too_far = self._rises_too_far(valve)
+        self._ended = (self._ended & self._learner.measuring) | (too_far & ~valve.on)
+        return ~valve.fed | too_far | self._ended
+
+    def _rises_too_far(self, valve: LearntValve) -> NDArray:
+        """Whether p2 passes the ceiling if the valve opens early and stays open for a period (n,)."""
+        early = self._learner.earliest(self.settings.confidence)
+        fall_of_log_p3 = self.table.vent_rate * valve.pace * self.control_period
+        p3 = valve.p3 * np.where(valve.on, 1.0, np.exp(-fall_of_log_p3))
+        may_be_open = early.time_to_open(valve.p1, valve.p2, p3) <= 0
+        who = np.flatnonzero(valve.fed & may_be_open)
+        gain = valve.gain[who] + self.settings.doubt * valve.gain_deviation[who]
+        rise = gain * early.of(who).gained_at_once(valve.p1[who], valve.p2[who], p3[who])
+        highest = valve.error[who] + valve.fall[who] * self.settings.horizon + rise
+        too_far = np.zeros(len(p3), dtype=bool)
+        too_far[who] = highest > self.settings.ceiling
+        return too_far

@@ -141,6 +141,18 @@ class ValveLearner:
             error=self._error, fall=np.minimum(self._slope, 0.0), on=on, opens_in=opens_in,
         )  # fmt: skip
 
+    def earliest(self, probability: float) -> PulseTable:
+        """The table of valves that open as early as the learnt ones may: earlier ones are improbable.
+
+        probability: that a valve opens no earlier.
+        """
+        return shifted(self._nominal, self._bank.offset_quantile(probability))
+
+    @property
+    def measuring(self) -> NDArray:
+        """Whether the gain of the last pulse is still being measured, bool (n,)."""
+        return self._measuring
+
     def decided(self, valve: LearntValve, action: NDArray) -> None:
         """Take in the decisions (n,) of this period: the end of a pulse is measured later."""
         ended = ~valve.on & (action == 1)

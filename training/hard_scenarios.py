@@ -17,6 +17,7 @@ from typing import Any
 import pandas as pd
 from tqdm import tqdm
 
+from controllers.supervised import FALLBACK, p3_checked
 from controllers.tuned import load_tunings
 from epv_env.common.command_line import (
     check_positive,
@@ -32,10 +33,8 @@ from training.studies.episode_tasks import Study
 from training.studies.hard_scenarios import all_scenarios, rows
 from training.studies.named_controllers import (
     DEFAULT,
-    FALLBACK,
     HELP,
     named_controllers,
-    p3_checked,
 )
 
 RESULT = "hard_scenarios.json"

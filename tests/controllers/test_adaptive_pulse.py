@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from controllers.adaptive_pulse import AdaptivePulse
 from controllers.opening_bank import BANK, OpeningBank, shifted
@@ -55,6 +56,13 @@ def test_before_any_pulse_the_bank_expects_the_nominal_valve():
     np.testing.assert_allclose(bank.offset, 0.0, atol=1e-12)
     np.testing.assert_allclose(bank.gain, 1.0)
     np.testing.assert_allclose(bank.offset_deviation, BANK.offset_spread, rtol=0.02)
+
+
+@pytest.mark.parametrize("probability", [0.05, 0.5, 0.9, 0.95])
+def test_before_any_pulse_the_quantiles_are_the_normal_distribution_s(probability):
+    quantile = OpeningBank(2).offset_quantile(probability)
+    expected = norm.ppf(probability, scale=BANK.offset_spread)
+    assert quantile == pytest.approx(expected, abs=BANK.offsets[1] - BANK.offsets[0])
 
 
 @pytest.mark.parametrize(("offset", "gain"), [(0.6, 1.2), (-0.3, 0.8)])

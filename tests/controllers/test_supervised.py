@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from controllers.learned import TRAINED
+from controllers.p3_check import P3Check
 from controllers.supervised import (
     SUPERVISOR_FILE,
     SupervisorFile,
@@ -15,7 +16,8 @@ from controllers.supervised import (
     load_supervised,
     save_settings,
 )
-from controllers.supervisor import SETTINGS, SupervisorSettings
+from controllers.supervisor import SETTINGS, Supervisor, SupervisorSettings
+from training.evaluation.hard_scenarios import HARD
 from training.evaluation.rollout import run_episodes
 
 PACKAGED = TRAINED / "end-to-end" / "seed-0"
@@ -28,16 +30,21 @@ def folder(tmp_path):
     return tmp_path
 
 
+def settings_of(control: P3Check) -> SupervisorSettings:
+    assert isinstance(control.main, Supervisor)
+    return control.main.settings
+
+
 def test_settings_come_back_as_they_were_written(folder):
     content = SupervisorFile(settings=SupervisorSettings(height=-0.02), search={"episodes": 8})
     save_settings(content, folder)
     assert load_settings(folder) == content
-    assert load_supervised(folder).settings.height == -0.02
+    assert settings_of(load_supervised(folder)).height == -0.02
 
 
 def test_a_folder_without_settings_gets_the_default(folder):
     assert load_settings(folder) is None
-    assert load_supervised(folder).settings == SETTINGS
+    assert settings_of(load_supervised(folder)) == SETTINGS
 
 
 @pytest.mark.parametrize(
@@ -65,3 +72,17 @@ def test_the_packaged_policy_holds_the_band_under_its_supervisor():
     metrics, _ = run_episodes(control, seeds=list(range(64)), duration=5.0, options=options)
     assert np.all(metrics.stayed)
     assert metrics.rms_bar.mean() < 0.1
+
+
+def test_it_survives_a_p3_that_freezes_as_often_as_the_controller_behind_the_check():
+    scenario = HARD["p3 frozen"]
+    control = load_supervised(PACKAGED)
+    left = []
+    for each in (control.main, control):
+        metrics, _ = run_episodes(
+            each, seeds=list(range(3_500_000, 3_500_064)), duration=6.0,
+            options={"scenario": "mixed", **scenario.all_options},
+        )  # fmt: skip
+        left.append(np.sum(~metrics.stayed))
+    assert left[0] > 16
+    assert left[1] < 8

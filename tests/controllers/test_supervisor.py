@@ -12,6 +12,7 @@ from controllers.pulse import Pulse
 from controllers.supervised import supervised
 from controllers.supervisor import Supervisor, SupervisorSettings
 from controllers.tuned import build, load_tunings
+from controllers.valve_learner import ValveLearner
 from epv_env.observation import LAYOUT, decode, encode
 from epv_env.plant.plantfile import Plant
 from training.evaluation.hard_scenarios import HARD
@@ -34,7 +35,9 @@ class Recorder:
 
 
 def supervisor(main, **settings) -> Supervisor:
-    return supervised(main, Plant.calibrated(), SupervisorSettings(**settings))
+    control = supervised(main, Plant.calibrated(), SupervisorSettings(**settings)).main
+    assert isinstance(control, Supervisor)
+    return control
 
 
 def at_rest(**values):
@@ -92,6 +95,7 @@ def test_the_policy_is_shown_a_p2_that_is_lower_by_the_shift():
         ({"height": 0.6}, "height = 0.6 bar"), ({"height": float("nan")}, "height"),
         ({"free_below": -0.7}, "free_below = -0.7 bar"), ({"reluctance": -1.0}, "reluctance = -1"),
         ({"share": -1.0}, "share = -1"), ({"filter_time": 0.0}, "filter_time = 0 s"),
+        ({"confidence": 1.0}, "confidence = 1"), ({"horizon": -0.1}, "horizon = -0.1"),
     ],
 )  # fmt: skip
 def test_settings_without_a_meaning_are_refused(settings, words):
@@ -152,6 +156,40 @@ def test_a_pulse_that_would_rise_beyond_the_ceiling_ends():
     control.reset(3)
     open_valves = at_rest(p3=1.5, action=0.0, p2_error=[-3.0, -0.2, 0.2])
     assert control.act(open_valves).tolist() == [0, 1, 1]
+
+
+def under_way(p2_error, **settings):
+    """What is decided of three unknown valves at p3 = 6.9 bar: the nominal one opens at 6.5 bar."""
+    control = supervisor(Recorder(), **settings)
+    control.reset(3)
+    return control.act(at_rest(p3=6.9, action=0.0, p2_error=p2_error)).tolist()
+
+
+def test_a_pulse_ends_before_the_nominal_valve_opens_if_an_earlier_one_would_rise_too_far():
+    valve = ValveLearner(supervisor(Recorder()).table, filter_time=0.025, control_period=5e-3)
+    valve.reset(3)
+    assert np.all(valve.observe(at_rest(p3=6.9, action=0.0)).shut)
+    assert under_way([-0.6, -0.1, 0.1]) == [0, 1, 1]
+    assert under_way([-0.6, -0.1, 0.1], confidence=0.5) == [0, 0, 0]  # as of a nominal valve
+
+
+def test_an_emergency_goes_on_where_the_same_p2_at_rest_would_end_the_pulse():
+    """p2 falls by 15 mbar a period, or stands still, until both are 0.2 bar below the target."""
+    control = supervisor(Recorder())
+    control.reset(3)
+    for k in range(10):
+        falling = -0.2 + 0.015 * (9 - k)
+        control.act(at_rest(p2_error=[falling, -0.2, -0.2]))
+    assert control.act(at_rest(p2_error=-0.2, p3=6.7, action=0.0)).tolist() == [0, 1, 1]
+
+
+def test_a_pulse_that_was_ended_is_measured_before_the_next_one():
+    control = supervisor(Recorder())
+    control.reset(3)
+    ended = control.act(at_rest(p3=6.9, action=0.0))
+    waits = control.act(at_rest(p3=7.5, action=1.0))
+    measured = [control.act(at_rest(p3=p3, action=1.0)) for p3 in (9.0, 10.0)]
+    assert [int(actions[0]) for actions in (ended, waits, measured[-1])] == [1, 1, 0]
 
 
 @pytest.mark.parametrize("name", ["restart", "latency of 5 ms"])

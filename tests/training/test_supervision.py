@@ -1,7 +1,8 @@
-"""A supervisor is settled where the largest ratio to the adaptive pulse's figures is least."""
+"""A supervisor is settled where no figure's ratio to the adaptive pulse's is large."""
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 pytest.importorskip("joblib")
@@ -14,10 +15,21 @@ from epv_env.plant.plantfile import Plant
 from tests.training.policies import random_layers, write_policy
 from training.evaluation.metrics import summary
 from training.learners import supervision
-from training.learners.supervision import QUICK_SETTLING, SETTLING, settle, settle_missing
+from training.learners.supervision import (
+    QUICK_SETTLING,
+    SETTLING,
+    Figures,
+    settle,
+    settle_missing,
+)
 from training.learners.validation import ValidationSettings, validate
 
 pytestmark = pytest.mark.training
+
+
+def exactly(*mean: float) -> Figures:
+    """Figures without errors."""
+    return Figures(mean=np.array(mean), error=np.zeros(3))
 
 
 def figures_by_settings(rms, breakdown, switchings):
@@ -25,9 +37,9 @@ def figures_by_settings(rms, breakdown, switchings):
 
     def figures(controller, validation, options):
         if controller.name == "pulse, adaptive":
-            return [1.0, 1.0, 1.0]
-        at = controller.settings
-        return [f(at.height, at.free_below) for f in (rms, breakdown, switchings)]
+            return exactly(1.0, 1.0, 1.0)
+        at = controller.main.settings
+        return exactly(*(f(at.height, at.free_below) for f in (rms, breakdown, switchings)))
 
     return figures
 
@@ -54,7 +66,19 @@ def test_the_settings_are_where_the_three_ratios_are_equal(policy, monkeypatch):
 
 
 def test_a_figure_that_the_rival_has_none_of_counts_as_equal():
-    assert supervision._ratios([5.0, 1.0], [0.0, 2.0]) == [1.0, 0.5]
+    own, usual = exactly(1.0, 5.0, 1.0), exactly(1.0, 0.0, 2.0)
+    assert supervision._upper_ratios(own, usual) == [1.0, 1.0, 0.5]
+
+
+def test_the_upper_end_of_a_ratio_is_that_of_its_interval():
+    """In 2.5 % of many repetitions the true ratio of 0.9 is above the end: the estimate errs."""
+    rng, above = np.random.default_rng(0), 0
+    for _ in range(4000):
+        mine, its = 9.0 + 0.2 * rng.standard_normal(3), 10.0 + 0.3 * rng.standard_normal(3)
+        own = Figures(mean=mine, error=np.full(3, 0.2))
+        usual = Figures(mean=its, error=np.full(3, 0.3))
+        above += np.sum(np.array(supervision._upper_ratios(own, usual)) < 0.9)
+    assert above / 12000 == pytest.approx(0.025, abs=0.006)
 
 
 def test_a_higher_setpoint_breaks_down_less_and_errs_more(policy):

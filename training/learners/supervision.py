@@ -1,9 +1,10 @@
 """What training settles last: how high a policy's supervisor holds p2, and which pulses it holds back.
 
 A higher p2 means a smaller breakdown and a larger rms error, fewer pulses mean fewer switchings and a
-larger breakdown. The adaptive pulse, the best of the classic controllers, shows on the same validation
-episodes what is usual of all three. The largest of the three ratios to its figures is minimised (an
-achievement scalarising function: Miettinen, Nonlinear Multiobjective Optimization, Kluwer 1999).
+larger breakdown. The adaptive pulse, the best of the classic controllers, shows on validation episodes
+what is usual of all three. Each figure's ratio to the rival's has a 95 % interval, wider for switchings
+than for breakdown; the largest of the three upper ends is minimised (an achievement scalarising
+function: Miettinen, Nonlinear Multiobjective Optimization, Kluwer 1999).
 """
 
 from collections.abc import Sequence
@@ -25,7 +26,6 @@ from controllers.supervisor import SETTINGS, SupervisorSettings
 from controllers.tuned import build, load_tunings
 from epv_env.plant.consumption import MIXED
 from epv_env.plant.plantfile import Plant
-from training.evaluation.metrics import summary
 from training.evaluation.scenarios import TUNING_REGION
 from training.learners.validation import ValidationSettings, validate
 
@@ -42,17 +42,35 @@ class SettlingSearch:
     """Of each."""
     greatest: tuple[float, float, float] = (0.1, 0.3, 4.0)
     """Of each."""
-    evaluations: int = 30
+    evaluations: int = 24
     """Most evaluations."""
     validation: ValidationSettings = field(
-        default_factory=lambda: ValidationSettings(episodes=768, duration=6.0)
+        default_factory=lambda: ValidationSettings(episodes=1024, duration=10.0)
     )
     """Episodes of an evaluation."""
+    rival: ValidationSettings = field(
+        default_factory=lambda: ValidationSettings(episodes=4096, duration=10.0)
+    )
+    """Episodes of the adaptive pulse, whose switchings differ most between episodes."""
 
 
 SETTLING = SettlingSearch()
-QUICK_SETTLING = SettlingSearch(evaluations=4, validation=ValidationSettings(episodes=8, duration=1.0))
+QUICK_SETTLING = SettlingSearch(
+    evaluations=4, validation=ValidationSettings(episodes=8, duration=1.0),
+    rival=ValidationSettings(episodes=8, duration=1.0),
+)  # fmt: skip
 """For --quick: too few episodes to find the best."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Figures:
+    """What the settings trade against each other: rms error [bar], breakdown of an event [bar] and
+    switchings [1/s]. Means over episodes: the few worst would hide the others in a common rms error."""
+
+    mean: NDArray
+    """(3,)."""
+    error: NDArray
+    """Their standard errors (3,)."""
 
 
 def settle(
@@ -61,6 +79,7 @@ def settle(
     options: dict[str, Any],
     search: SettlingSearch = SETTLING,
     *,
+    usual: Figures | None = None,
     quiet: bool = False,
 ) -> SupervisorFile:
     """The settings of the policy's supervisor.
@@ -70,18 +89,18 @@ def settle(
         plant: nominal plant.
         options: of the validation episodes, without the plant.
         search: what defines the search.
+        usual: `usual_figures` of these arguments; None: they are measured first.
         quiet: no progress bar.
     """
     episodes = {"plant": plant, **options}
-    rival = build(REGISTRATION.kind, load_tunings()[REGISTRATION.kind].values, plant)
-    usual = _figures(rival, search.validation, episodes)
 
     def worst_ratio(at: NDArray) -> float:
-        own = supervised(policy, plant, _settings(at))
+        own = _figures(supervised(policy, plant, _settings(at)), search.validation, episodes)
         bar.update()
-        return max(_ratios(_figures(own, search.validation, episodes), usual))
+        return max(_upper_ratios(own, rival))
 
     with tqdm(total=search.evaluations, desc="supervisor", unit="trial", disable=quiet) as bar:
+        rival = usual or usual_figures(plant, options, search)
         found: Any = minimize(
             worst_ratio, search.simplex[0], method="Nelder-Mead",
             bounds=tuple(zip(search.least, search.greatest, strict=True)),
@@ -89,6 +108,12 @@ def settle(
         )  # fmt: skip
     how = {**asdict(search), "largest_ratio": float(found.fun)}
     return SupervisorFile(settings=_settings(found.x), search=how)
+
+
+def usual_figures(plant: Plant, options: dict[str, Any], search: SettlingSearch = SETTLING) -> Figures:
+    """The figures of the tuned adaptive pulse; arguments as those of `settle`."""
+    rival = build(REGISTRATION.kind, load_tunings()[REGISTRATION.kind].values, plant)
+    return _figures(rival, search.rival, {"plant": plant, **options})
 
 
 def _settings(at: NDArray) -> SupervisorSettings:
@@ -99,34 +124,42 @@ def _settings(at: NDArray) -> SupervisorSettings:
     )  # fmt: skip
 
 
-def _figures(
-    controller: Controller, validation: ValidationSettings, options: dict[str, Any]
-) -> list[float]:
-    """What the settings trade against each other: rms error, breakdown of an event, switchings.
-
-    The rms error is a mean over the episodes: that of all together would hide most behind the few worst.
-    """
+def _figures(controller: Controller, validation: ValidationSettings, options: dict[str, Any]) -> Figures:
+    """A controller's figures on the validation episodes."""
     metrics = validate(controller, validation, options)
-    found = summary(metrics)
-    breakdown, switchings = found["C2_event_breakdown_bar"], found["switchings_per_s"]
-    return [float(np.mean(metrics.rms_bar)), breakdown, switchings]
+    each = np.stack([metrics.rms_bar, metrics.event_breakdown_bar, metrics.switchings_per_s])
+    return Figures(mean=each.mean(axis=1), error=each.std(axis=1) / np.sqrt(len(metrics)))
 
 
-def _ratios(own: Sequence[float], usual: Sequence[float]) -> list[float]:
-    """Each figure over the rival's; one that the rival has none of, as without consumption, is equal."""
-    return [mine / its if its > 0 else 1.0 for mine, its in zip(own, usual, strict=True)]
+def _upper_ratios(own: Figures, usual: Figures) -> list[float]:
+    """Upper 95 % ends of each figure over the rival's, of a normal distribution; one that the rival has
+    none of, as without consumption, is equal."""
+    ratios = []
+    for mine, my_error, its, its_error in zip(own.mean, own.error, usual.mean, usual.error, strict=True):
+        if its > 0:
+            ratio = mine / its
+            ratios.append(float(ratio + 1.96 * np.hypot(my_error, ratio * its_error) / its))
+        else:
+            ratios.append(1.0)
+    return ratios
 
 
 def settle_missing(folders: Sequence[Path], *, workers: int, search: SettlingSearch = SETTLING) -> None:
     """Settle the supervisors of policies that have none, for the report's plant within ±10 %."""
     missing = [folder for folder in folders if load_settings(folder) is None]
+    if not missing:
+        return
+    usual = usual_figures(Plant.calibrated(), EPISODES, search)
     pool: Any = Parallel(n_jobs=workers, return_as="generator_unordered")
-    jobs = (delayed(_settle_into)(folder, search) for folder in missing)
-    for _ in tqdm(pool(jobs), total=len(missing), desc="supervisors", disable=not missing):
+    jobs = (delayed(_settle_into)(folder, search, usual) for folder in missing)
+    for _ in tqdm(pool(jobs), total=len(missing), desc="supervisors"):
         pass
 
 
-def _settle_into(folder: Path, search: SettlingSearch) -> None:
-    options = {"scenario": MIXED, "parameters": TUNING_REGION, "threads": 1}
-    found = settle(load_policy(folder), Plant.calibrated(), options, search, quiet=True)
-    save_settings(found, folder)
+EPISODES: dict[str, Any] = {"scenario": MIXED, "parameters": TUNING_REGION, "threads": 1}
+"""Options of the episodes for the kept policies."""
+
+
+def _settle_into(folder: Path, search: SettlingSearch, usual: Figures) -> None:
+    plant, policy = Plant.calibrated(), load_policy(folder)
+    save_settings(settle(policy, plant, EPISODES, search, usual=usual, quiet=True), folder)

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from controllers.base import Controller
 from controllers.learned import LearnedPolicy, load_policy
-from controllers.p3_check import P3Check
 from controllers.policy_contract import CONTRACT_FILE, WEIGHTS_FILE
 from controllers.privileged_pulse import PrivilegedPulse
 from controllers.supervised import settings_for, supervised
@@ -32,18 +31,6 @@ HELP = (
     f"{SUPERVISED}NAME puts one under a supervisor"
 )
 """Of the options that take controllers by name."""
-
-FALLBACK = "hysteresis, extrapolating"
-"""Takes over where p3 is implausible: the best of those that do not read it."""
-
-
-def p3_checked(controller: Controller, plant: Plant) -> Controller:
-    """The controller with a plausibility check of p3, FALLBACK's tuning for the plant behind it.
-
-    Raises ValueError for a controller with other actions, and for one that reads no sensor.
-    """
-    values = load_tunings()[FALLBACK].values
-    return P3Check(main=controller, fallback=build(FALLBACK, values, plant))
 
 
 def named_controllers(

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from controllers.base import Controller, Privileged
+from controllers.p3_check import P3Check
 from controllers.registry import REGISTRY, cost_class
 from controllers.supervisor import Supervisor
 from epv_env.conditions import Conditions
@@ -100,7 +101,8 @@ class Contender:
     @property
     def supervised(self) -> bool:
         """Whether its runs are policies under a supervisor."""
-        return isinstance(next(iter(self.runs.values())), Supervisor)
+        first = next(iter(self.runs.values()))
+        return isinstance(first, P3Check) and isinstance(first.main, Supervisor)
 
     @property
     def model_based(self) -> bool:
