@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 import docs.examples.relay
+from controllers.p3_check import P3Check
 from controllers.supervisor import Supervisor
 from epv_env.plant.plantfile import Plant
 from training import compare
@@ -102,7 +103,8 @@ def test_a_name_may_ask_for_a_supervisor(folder):
     sources = ["my_relay:Relay", "supervised:my_relay:Relay"]
     controllers, digests = named_controllers(sources, Plant.calibrated())
     plain, watched = controllers.values()
-    assert isinstance(watched, Supervisor)
+    assert isinstance(watched, P3Check)
+    assert isinstance(watched.main, Supervisor)
     assert watched.name == f"{plain.name}, supervised"
     assert len(set(digests.values())) == 2
 
