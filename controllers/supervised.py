@@ -4,7 +4,7 @@ The supervisor believes p3, so it comes with a check of that sensor: once p3 is 
 takes over that does not read it.
 """
 
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -46,16 +46,18 @@ def supervised(controller: Controller, plant: Plant, settings: SupervisorSetting
     """
     table = pulse_table(plant.parameters, supply_voltage=plant.voltage)
     supervisor = Supervisor(main=controller, table=table, settings=settings)
-    return replace(p3_checked(supervisor, plant), name=supervisor.name)
+    return p3_checked(supervisor, plant, name=supervisor.name)
 
 
-def p3_checked(controller: Controller, plant: Plant) -> P3Check:
+def p3_checked(controller: Controller, plant: Plant, *, name: str = "") -> P3Check:
     """The controller with a check of p3, the best controller that does not read p3 behind it.
+
+    name: of both together; default: that of `P3Check`.
 
     Raises ValueError for a controller with other actions, and for one that reads no sensor.
     """
     fallback = build(FALLBACK, load_tunings()[FALLBACK].values, plant)
-    return P3Check(main=controller, fallback=fallback)
+    return P3Check(main=controller, fallback=fallback, name=name)
 
 
 def load_supervised(folder: str | PathLike[str], plant: Plant | None = None) -> P3Check:

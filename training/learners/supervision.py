@@ -61,6 +61,9 @@ QUICK_SETTLING = SettlingSearch(
 )  # fmt: skip
 """For --quick: too few episodes to find the best."""
 
+EPISODES: dict[str, Any] = {"scenario": MIXED, "parameters": TUNING_REGION, "threads": 1}
+"""Options of the episodes for the kept policies."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Figures:
@@ -154,10 +157,6 @@ def settle_missing(folders: Sequence[Path], *, workers: int, search: SettlingSea
     jobs = (delayed(_settle_into)(folder, search, usual) for folder in missing)
     for _ in tqdm(pool(jobs), total=len(missing), desc="supervisors"):
         pass
-
-
-EPISODES: dict[str, Any] = {"scenario": MIXED, "parameters": TUNING_REGION, "threads": 1}
-"""Options of the episodes for the kept policies."""
 
 
 def _settle_into(folder: Path, search: SettlingSearch, usual: Figures) -> None:
