@@ -4,10 +4,12 @@ The supervisor believes p3, so it comes with a check of that sensor: once p3 is 
 takes over that does not read it.
 """
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from os import PathLike
 from pathlib import Path
 from typing import Any
+
+import msgspec
 
 from controllers.base import Controller
 from controllers.hysteresis import EXTRAPOLATING_HYSTERESIS
@@ -16,7 +18,7 @@ from controllers.p3_check import P3Check
 from controllers.pulse_simulation import pulse_table
 from controllers.supervisor import SETTINGS, Supervisor, SupervisorSettings
 from controllers.tuned import build, load_tunings
-from epv_env.common.json_files import JSONFileError, read_json, write_json
+from epv_env.common.json_files import checked, read_json, write_json
 from epv_env.plant.plantfile import Plant
 
 FORMAT = "epv-supervisor/3"
@@ -52,10 +54,14 @@ def supervised(controller: Controller, plant: Plant, settings: SupervisorSetting
 def p3_checked(controller: Controller, plant: Plant, *, name: str = "") -> P3Check:
     """The controller with a check of p3, the best controller that does not read p3 behind it.
 
+    One that checks p3 already stays as it is.
+
     name: of both together; default: that of `P3Check`.
 
     Raises ValueError for a controller with other actions, and for one that reads no sensor.
     """
+    if isinstance(controller, P3Check):
+        return controller
     fallback = build(FALLBACK, load_tunings()[FALLBACK].values, plant)
     return P3Check(main=controller, fallback=fallback, name=name)
 
@@ -85,9 +91,21 @@ def load_settings(folder: str | PathLike[str]) -> SupervisorFile | None:
         return None
     remedy = "train the policy anew, or remove the file for the default settings"
     try:
-        return read_json(path, SupervisorFile, version=FORMAT, remedy=remedy)
-    except JSONFileError as error:
+        found = read_json(path, _Stored, version=FORMAT, remedy=remedy)
+        for name in sorted(found.settings.keys() ^ {each.name for each in fields(SupervisorSettings)}):
+            wrong = "is no setting" if name in found.settings else "is missing"
+            raise ValueError(f"{path}, settings: {name!r} {wrong}: {remedy}")
+        settings = checked(found.settings, SupervisorSettings, where=f"{path}, settings", remedy=remedy)
+    except ValueError as error:
         raise SupervisorFileError(str(error)) from None
+    return SupervisorFile(settings=settings, search=found.search)
+
+
+class _Stored(msgspec.Struct, kw_only=True):
+    """`SupervisorFile` before its names are checked: a misspelt setting must not get its default."""
+
+    settings: dict[str, Any]
+    search: dict[str, Any] = {}
 
 
 def save_settings(content: SupervisorFile, folder: str | PathLike[str]) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import asdict
 
 import numpy as np
 import pytest
@@ -14,12 +15,15 @@ from controllers.supervised import (
     SupervisorFileError,
     load_settings,
     load_supervised,
+    p3_checked,
     save_settings,
 )
 from controllers.supervisor import SETTINGS, Supervisor, SupervisorSettings
+from epv_env.plant.plantfile import Plant
 from training.evaluation.hard_scenarios import HARD
 from training.evaluation.rollout import run_episodes
 
+ALL = asdict(SETTINGS)
 PACKAGED = TRAINED / "end-to-end" / "seed-0"
 
 
@@ -51,9 +55,11 @@ def test_a_folder_without_settings_gets_the_default(folder):
     ("change", "words"),
     [
         ({"format": "epv-supervisor/9"}, "this version reads"),
-        ({"settings": {"height": "low"}}, "height"),
-        ({"settings": {"height": 7.0}}, "height = 7 bar"),
-        ({"settings": {"filter_time": 0}}, "filter_time = 0 s"),
+        ({"settings": ALL | {"height": "low"}}, "settings, height: expected float"),
+        ({"settings": ALL | {"height": 7.0}}, "height = 7 bar"),
+        ({"settings": ALL | {"filter_time": 0}}, "filter_time = 0 s"),
+        ({"settings": ALL | {"hieght": 0.0}}, "'hieght' is no setting"),
+        ({"settings": {"height": 0.0}}, "'ceiling' is missing"),
     ],
 )
 def test_wrong_files_get_one_sentence(folder, change, words):
@@ -63,6 +69,11 @@ def test_wrong_files_get_one_sentence(folder, change, words):
     with pytest.raises(SupervisorFileError, match=words) as refusal:
         load_supervised(folder)
     assert "\n" not in str(refusal.value)
+
+
+def test_a_controller_whose_p3_is_checked_gets_no_second_check(folder):
+    control = load_supervised(folder)
+    assert p3_checked(control, Plant.calibrated()) is control
 
 
 def test_the_packaged_policy_holds_the_band_under_its_supervisor():

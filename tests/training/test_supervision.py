@@ -58,11 +58,20 @@ def test_the_settings_are_where_the_three_ratios_are_equal(policy, monkeypatch):
     found = settle(policy, Plant.calibrated(), {}, replace(SETTLING, evaluations=120))
     assert found.settings.height == pytest.approx(0.0, abs=0.004)
     assert found.settings.free_below == pytest.approx(-0.1, abs=0.015)
-    settled = ("height", "free_below", "reluctance")
-    changed = {name: getattr(found.settings, name) for name in settled}
+    changed = {name: getattr(found.settings, name) for name in supervision.SETTLED}
     assert found.settings == replace(SETTINGS, **changed)
     assert 10 ** SETTLING.least[2] <= found.settings.reluctance <= 10 ** SETTLING.greatest[2]
     assert found.search["largest_ratio"] == pytest.approx(1.0, abs=0.02)
+    assert found.search["at_bound"] == []
+
+
+def test_a_search_that_ends_at_a_bound_says_so(policy, monkeypatch, capsys):
+    """The lower the better: the height ends at the least that is searched."""
+    figures = figures_by_settings(lambda h, f: 1 + h, lambda h, f: 1 + h, lambda h, f: 1 + h)
+    monkeypatch.setattr(supervision, "_figures", figures)
+    found = settle(policy, Plant.calibrated(), {}, replace(SETTLING, evaluations=120), quiet=True)
+    assert found.search["at_bound"] == ["height"]
+    assert "height ended at a bound" in capsys.readouterr().err
 
 
 def test_a_figure_that_the_rival_has_none_of_counts_as_equal():

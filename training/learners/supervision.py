@@ -7,6 +7,7 @@ than for breakdown; the largest of the three upper ends is minimised (an achieve
 function: Miettinen, Nonlinear Multiobjective Optimization, Kluwer 1999).
 """
 
+import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -28,6 +29,9 @@ from epv_env.plant.consumption import MIXED
 from epv_env.plant.plantfile import Plant
 from training.evaluation.scenarios import TUNING_REGION
 from training.learners.validation import ValidationSettings, validate
+
+SETTLED = ("height", "free_below", "reluctance")
+"""The settings that are searched."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,8 +113,21 @@ def settle(
             bounds=tuple(zip(search.least, search.greatest, strict=True)),
             options={"initial_simplex": search.simplex, "maxfev": search.evaluations},
         )  # fmt: skip
-    how = {**asdict(search), "largest_ratio": float(found.fun)}
+    ended = _at_bounds(found.x, search)
+    if ended:
+        tqdm.write(
+            f"the supervisor's {', '.join(ended)} ended at a bound of the search: widen SettlingSearch",
+            file=sys.stderr,
+        )
+    how = {**asdict(search), "largest_ratio": float(found.fun), "at_bound": ended}
     return SupervisorFile(settings=_settings(found.x), search=how)
+
+
+def _at_bounds(at: NDArray, search: SettlingSearch) -> list[str]:
+    """Names of the settings that ended within a thousandth of their range from one of its ends."""
+    near = 1e-3 * np.subtract(search.greatest, search.least)
+    beyond = (at < search.least + near) | (at > search.greatest - near)
+    return [name for name, ended in zip(SETTLED, beyond, strict=True) if ended]
 
 
 def usual_figures(plant: Plant, options: dict[str, Any], search: SettlingSearch = SETTLING) -> Figures:
