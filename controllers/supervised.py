@@ -89,12 +89,14 @@ def load_settings(folder: str | PathLike[str]) -> SupervisorFile | None:
     path = Path(folder) / SUPERVISOR_FILE
     if not path.exists():
         return None
-    remedy = "train the policy anew, or remove the file for the default settings"
+    remedy = "correct the file, train the policy anew, or remove the file for the default settings"
     try:
         found = read_json(path, _Stored, version=FORMAT, remedy=remedy)
-        for name in sorted(found.settings.keys() ^ {each.name for each in fields(SupervisorSettings)}):
-            wrong = "is no setting" if name in found.settings else "is missing"
-            raise ValueError(f"{path}, settings: {name!r} {wrong}: {remedy}")
+        known = {each.name for each in fields(SupervisorSettings)}
+        for name in sorted(found.settings.keys() - known):
+            raise ValueError(f"{path}, settings: {name!r} is no setting: {remedy}")
+        for name in sorted(known - found.settings.keys()):
+            raise ValueError(f"{path}, settings: {name!r} is missing: {remedy}")
         settings = checked(found.settings, SupervisorSettings, where=f"{path}, settings", remedy=remedy)
     except ValueError as error:
         raise SupervisorFileError(str(error)) from None

@@ -59,6 +59,7 @@ def test_a_folder_without_settings_gets_the_default(folder):
         ({"settings": ALL | {"height": 7.0}}, "height = 7 bar"),
         ({"settings": ALL | {"filter_time": 0}}, "filter_time = 0 s"),
         ({"settings": ALL | {"hieght": 0.0}}, "'hieght' is no setting"),
+        ({"settings": {"hieght": 0.0}}, "'hieght' is no setting"),
         ({"settings": {"height": 0.0}}, "'ceiling' is missing"),
     ],
 )

@@ -71,7 +71,7 @@ def test_a_search_that_ends_at_a_bound_says_so(policy, monkeypatch, capsys):
     monkeypatch.setattr(supervision, "_figures", figures)
     found = settle(policy, Plant.calibrated(), {}, replace(SETTLING, evaluations=120), quiet=True)
     assert found.search["at_bound"] == ["height"]
-    assert "height ended at a bound" in capsys.readouterr().err
+    assert "search of height ended at a bound" in capsys.readouterr().err
 
 
 def test_a_figure_that_the_rival_has_none_of_counts_as_equal():

@@ -116,7 +116,8 @@ def settle(
     ended = _at_bounds(found.x, search)
     if ended:
         tqdm.write(
-            f"the supervisor's {', '.join(ended)} ended at a bound of the search: widen SettlingSearch",
+            f"supervisor of {policy.name!r}: the search of {', '.join(ended)} ended at a bound, so "
+            "better settings may lie beyond: widen SettlingSearch (training/learners/supervision.py)",
             file=sys.stderr,
         )
     how = {**asdict(search), "largest_ratio": float(found.fun), "at_bound": ended}
