@@ -82,7 +82,7 @@ class AdaptiveCascade:
         favour = np.where(valve.on, 0.5, -0.5) * self.reluctance
         switched_on = np.abs(on - wanted) < np.abs(off - wanted) + favour
         action = np.where(rests | switched_on, 1, 0)
-        self._learner.decided(valve, action)
+        self._learner.decided(action)
         return action
 
     def _wanted(self, valve: LearntValve, rests: NDArray) -> NDArray:

@@ -57,7 +57,7 @@ class AdaptiveHysteresis:
         rises = valve.table.gained(valve.p1, valve.p2, valve.p3, np.zeros_like(valve.p1))
         shuts = ~valve.fed | (valve.error + valve.gain * rises > self.shut_above)
         action = np.where(valve.on, np.where(opens, 0, 1), np.where(shuts, 1, 0))
-        self._learner.decided(valve, action)
+        self._learner.decided(action)
         return action
 
 

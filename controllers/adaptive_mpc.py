@@ -46,7 +46,7 @@ class AdaptiveMPC(MPC):
         valve = self._learner.observe(observations)
         self._estimator.assume(learnt_parameters(self.parameters, valve))
         action = super().act(observations)
-        self._learner.decided(valve, action)
+        self._learner.decided(action)
         return action
 
 

@@ -71,7 +71,7 @@ class AdaptivePulse:
         action = np.where(begins, 0, 1)
         off = np.flatnonzero(~valve.on)
         action[off] = np.where(self._ends(valve, reserve, off), 1, 0)
-        self._learner.decided(valve, action)
+        self._learner.decided(action)
         return action
 
     def _ends(self, valve: LearntValve, reserve: NDArray, who: NDArray) -> NDArray:

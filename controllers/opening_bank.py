@@ -6,7 +6,9 @@ each pulse sets its probability (multiple-model estimation: Magill, IEEE Trans. 
 (1965); Simon, Optimal State Estimation (Wiley 2006), section 10.2).
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +66,11 @@ class OpeningBank:
         self._probability = np.tile(prior, (n, 1))  # (n, members)
         self._gain = np.ones((n, len(prior)))
         self._variance = np.full((n, len(prior)), settings.gain_spread**2)
+
+    def arrays(self) -> Iterator[tuple[str, Any, str]]:
+        """Name, owner and attribute of each array (n, members) that is kept between pulses."""
+        for name in ("probability", "gain", "variance"):
+            yield name, self, f"_{name}"
 
     @property
     def offset(self) -> NDArray:

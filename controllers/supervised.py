@@ -16,7 +16,9 @@ from controllers.hysteresis import EXTRAPOLATING_HYSTERESIS
 from controllers.learned import load_policy
 from controllers.p3_check import P3Check
 from controllers.pulse_simulation import pulse_table
-from controllers.supervisor import SETTINGS, Supervisor, SupervisorSettings
+from controllers.pulse_table import PulseTable
+from controllers.supervisor import Supervisor
+from controllers.supervisor_settings import SETTINGS, SupervisorSettings
 from controllers.tuned import build, load_tunings
 from epv_env.common.json_files import checked, read_json, write_json
 from epv_env.plant.plantfile import Plant
@@ -46,9 +48,13 @@ def supervised(controller: Controller, plant: Plant, settings: SupervisorSetting
 
     Raises ValueError for a controller with other actions, and for one that reads no sensor.
     """
-    table = pulse_table(plant.parameters, supply_voltage=plant.voltage)
-    supervisor = Supervisor(main=controller, table=table, settings=settings)
+    supervisor = Supervisor(main=controller, table=nominal_table(plant), settings=settings)
     return p3_checked(supervisor, plant, name=supervisor.name)
+
+
+def nominal_table(plant: Plant) -> PulseTable:
+    """The table that a supervisor of this nominal plant's valves starts from."""
+    return pulse_table(plant.parameters, supply_voltage=plant.voltage)
 
 
 def p3_checked(controller: Controller, plant: Plant, *, name: str = "") -> P3Check:

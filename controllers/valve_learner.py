@@ -5,7 +5,9 @@ A table of the nominal plant is fitted to each valve (Åström and Wittenmark, A
 (controllers/opening_bank.py), the venting rate of the control chamber from the fall of ln p3.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,7 +118,25 @@ class ValveLearner:
         self._off_periods = np.zeros(n, dtype=np.int64)
         self._on_periods = np.zeros(n, dtype=np.int64)
         self._measuring = np.zeros(n, dtype=bool)
-        self._at_end = np.zeros((4, n))  # p1, p2, p3 and slope when the pulse was ended
+        self._now, self._at_end = np.zeros((2, n, 4))  # p1, p2, p3, fall; the same as the pulse ended
+
+    def forget(self, who: NDArray) -> None:
+        """Forget consumption and valve of these episodes, indices (m,): others begin in their place."""
+        new = ValveLearner(
+            self._nominal, filter_time=self._filter_time, control_period=self._control_period
+        )
+        new.reset(len(who))
+        for (_, mine, name), (_, fresh, _) in zip(self.arrays(), new.arrays(), strict=True):
+            getattr(mine, name)[who] = getattr(fresh, name)
+
+    def arrays(self) -> Iterator[tuple[str, Any, str]]:
+        """Name, owner and attribute of each array (n, ...) that is kept between control periods."""
+        for name in (
+            "pace", "pace_variance", "error", "slope", "was_shut", "off_periods", "on_periods",
+            "measuring", "now", "at_end",
+        ):  # fmt: skip
+            yield name, self, f"_{name}"
+        yield from self._bank.arrays()
 
     def observe(self, observations: NDArray) -> LearntValve:
         """Take in observations (n, entries); what is known then."""
@@ -135,10 +155,12 @@ class ValveLearner:
         self._follow(error, shut)
         self._learn_venting(p3, p3_change, shut)
         self._learn_pulses(p2, on & shut)
+        fall = np.minimum(self._slope, 0.0)
+        self._now = np.stack([p1, p2, p3, fall], axis=1)
         return LearntValve(
             table=table, pace=self._pace, gain=self._bank.gain, p1=p1, p2=p2, p3=p3,
             gain_deviation=self._bank.gain_deviation, offset_deviation=self._bank.offset_deviation,
-            error=self._error, fall=np.minimum(self._slope, 0.0), on=on, opens_in=opens_in,
+            error=self._error, fall=fall, on=on, opens_in=opens_in,
         )  # fmt: skip
 
     def earliest(self, probability: float) -> PulseTable:
@@ -153,11 +175,10 @@ class ValveLearner:
         """Whether the gain of the last pulse is still being measured, bool (n,)."""
         return self._measuring
 
-    def decided(self, valve: LearntValve, action: NDArray) -> None:
+    def decided(self, action: NDArray) -> None:
         """Take in the decisions (n,) of this period: the end of a pulse is measured later."""
-        ended = ~valve.on & (action == 1)
-        state = np.stack([valve.p1, valve.p2, valve.p3, valve.fall])
-        self._at_end = np.where(ended, state, self._at_end)
+        ended = (self._on_periods == 0) & (action == 1)
+        self._at_end = np.where(ended[:, None], self._now, self._at_end)
         self._measuring |= ended
 
     def _follow(self, error: NDArray, shut: NDArray) -> None:
@@ -198,7 +219,7 @@ class ValveLearner:
         """
         who = np.flatnonzero(self._measuring & shut_again & (self._on_periods > 1))
         if len(who):
-            p1, before, p3, slope = self._at_end[:, who]
+            p1, before, p3, slope = self._at_end[who].T
             lasted = self._on_periods[who] * self._control_period
             members = len(BANK.offsets)
 

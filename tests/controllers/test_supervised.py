@@ -18,7 +18,8 @@ from controllers.supervised import (
     p3_checked,
     save_settings,
 )
-from controllers.supervisor import SETTINGS, Supervisor, SupervisorSettings
+from controllers.supervisor import Supervisor
+from controllers.supervisor_settings import SETTINGS, SupervisorSettings
 from epv_env.plant.plantfile import Plant
 from training.evaluation.hard_scenarios import HARD
 from training.evaluation.rollout import run_episodes

@@ -10,7 +10,8 @@ from controllers.learned import TRAINED, load_policy
 from controllers.privileged_pulse import PrivilegedPulse
 from controllers.pulse import Pulse
 from controllers.supervised import supervised
-from controllers.supervisor import Supervisor, SupervisorSettings
+from controllers.supervisor import Supervisor
+from controllers.supervisor_settings import SupervisorSettings
 from controllers.tuned import build, load_tunings
 from controllers.valve_learner import ValveLearner
 from epv_env.observation import LAYOUT, decode, encode
@@ -51,9 +52,9 @@ def at_rest(**values):
 def test_the_setpoint_rises_with_the_expected_breakdown():
     control = supervisor(Recorder())
     control.reset(3)
-    valve = control._learner.observe(at_rest())
+    valve = control.governor._learner.observe(at_rest())
     slower = replace(valve, pace=valve.pace * np.array([1.25, 0.8, 0.6]))
-    shifts = control.shift(slower, control.reserve(slower))
+    shifts = control.governor.shift(slower, control.governor.reserve(slower))
     assert shifts[0] == 0.0  # a fast valve needs no reserve
     assert 0.0 < shifts[1] < shifts[2]
 
@@ -61,9 +62,9 @@ def test_the_setpoint_rises_with_the_expected_breakdown():
 def test_a_valve_that_is_known_less_needs_more_reserve():
     control = supervisor(Recorder(), wariness=0.2)
     control.reset(3)
-    valve = replace(control._learner.observe(at_rest()), pace=np.full(3, 0.8))
+    valve = replace(control.governor._learner.observe(at_rest()), pace=np.full(3, 0.8))
     known, unknown = (
-        control.reserve(replace(valve, offset_deviation=np.full(3, deviation)))
+        control.governor.reserve(replace(valve, offset_deviation=np.full(3, deviation)))
         for deviation in (0.0, 0.5)
     )
     assert unknown - known == pytest.approx(0.1)
@@ -73,8 +74,8 @@ def test_the_height_shifts_every_setpoint_alike():
     controls = [supervisor(Recorder(), height=height) for height in (0.0, -0.03)]
     for control in controls:
         control.reset(3)
-    valve = controls[0]._learner.observe(at_rest())
-    high, low = (control.shift(valve, control.reserve(valve)) for control in controls)
+    valve = controls[0].governor._learner.observe(at_rest())
+    high, low = (control.governor.shift(valve, control.governor.reserve(valve)) for control in controls)
     assert high - low == pytest.approx(0.03)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from controllers.learned import TRAINED, load_policy
 from controllers.policy_contract import CONTRACT_FILE, WEIGHTS_FILE
 from controllers.supervised import SUPERVISOR_FILE, SupervisorFile, load_settings, save_settings
-from controllers.supervisor import SETTINGS
+from controllers.supervisor_settings import SETTINGS
 from controllers.tuned import TUNED_FILE, load_tunings
 from epv_env.common.files import write_bytes
 from epv_env.common.journal import Journal

@@ -10,7 +10,7 @@ pytest.importorskip("scipy")
 
 from controllers.learned import TRAINED, load_policy
 from controllers.supervised import load_settings, supervised
-from controllers.supervisor import SETTINGS
+from controllers.supervisor_settings import SETTINGS
 from epv_env.plant.plantfile import Plant
 from tests.training.policies import random_layers, write_policy
 from training.evaluation.metrics import summary

@@ -23,7 +23,7 @@ from controllers.adaptive_pulse import REGISTRATION
 from controllers.base import Controller
 from controllers.learned import LearnedPolicy, load_policy
 from controllers.supervised import SupervisorFile, load_settings, save_settings, supervised
-from controllers.supervisor import SETTINGS, SupervisorSettings
+from controllers.supervisor_settings import SETTINGS, SupervisorSettings
 from controllers.tuned import build, load_tunings
 from epv_env.plant.consumption import MIXED
 from epv_env.plant.plantfile import Plant

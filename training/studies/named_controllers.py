@@ -11,7 +11,7 @@ from controllers.learned import LearnedPolicy, load_policy
 from controllers.policy_contract import CONTRACT_FILE, WEIGHTS_FILE
 from controllers.privileged_pulse import PrivilegedPulse
 from controllers.supervised import settings_for, supervised
-from controllers.supervisor import SETTINGS
+from controllers.supervisor_settings import SETTINGS
 from controllers.tuned import build, load_tunings
 from epv_env.plant.plantfile import Plant
 from training.studies.fingerprint import fingerprint

@@ -1,0 +1,132 @@
+"""What corrects a learned policy by what is learnt about its valve, whoever asks the policy.
+
+A learner of the valve (controllers/valve_learner.py) estimates how long the valve takes to open, how
+low p2 will be then, and how far a pulse under way may still raise p2. The governor moves the policy's
+setpoint by the first (a reference governor: Garone, Di Cairano and Kolmanovsky, Automatica 75 (2017)),
+holds back needless pulses by the second, and ends pulses by the third. A pulse of a valve that is hardly
+known ends before it may rise too far, so the first pulses probe when the valve opens.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controllers.pulse_table import PulseTable
+from controllers.reserve import expected_breakdown, reserve_for
+from controllers.supervisor_settings import SETTINGS, SupervisorSettings
+from controllers.valve_learner import LearntValve, ValveLearner
+from epv_env.observation import INDEX, LAYOUT
+
+ERROR = INDEX["p2_error"]
+SLOW = 0.1
+"""Reserve from which a valve is so slow that no pulse may wait [bar]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Advice:
+    """The corrections of n valves in this control period."""
+
+    shift: NDArray
+    """How much lower the policy is shown p2 (n,) [bar]."""
+    must_shut: NDArray
+    """Whether the coil has to be on, bool (n,)."""
+    margin: NDArray
+    """By how much the logit of switching off must exceed that of leaving on (n,) [1]."""
+
+    def shown(self, observations: NDArray) -> NDArray:
+        """Observations (n, entries or more) as the policy is shown them: a copy."""
+        shown = observations.copy()
+        shown[:, ERROR] -= (self.shift / LAYOUT[ERROR].scale).astype(shown.dtype)
+        return shown
+
+    def corrected(self, actions: NDArray) -> NDArray:
+        """Actions (n,), 0 (off) or 1 (on), with the coil on where it has to be."""
+        return np.where(self.must_shut, 1, actions)
+
+
+class Governor:
+    """Advises in every control period: `advise` before the decisions, `decided` after them."""
+
+    def __init__(
+        self, table: PulseTable, settings: SupervisorSettings = SETTINGS, *, control_period: float
+    ):
+        """
+        Args:
+            table: of the nominal plant.
+            settings: of the supervisor.
+            control_period: [s].
+        """
+        self._table, self._settings, self._control_period = table, settings, control_period
+        self._learner = ValveLearner(
+            table, filter_time=settings.filter_time, control_period=control_period
+        )
+        self.reset(0)
+
+    def reset(self, n: int) -> None:
+        """Forget the valves; n episodes begin."""
+        self._learner.reset(n)
+        self._ended = np.zeros(n, dtype=bool)
+
+    def forget(self, who: NDArray) -> None:
+        """Forget the valves with these indices (m,), whose episodes have ended."""
+        self._learner.forget(who)
+        self._ended[who] = False
+
+    def arrays(self) -> Iterator[tuple[str, Any, str]]:
+        """Name, owner and attribute of each array that is kept between control periods."""
+        yield "ended", self, "_ended"
+        yield from self._learner.arrays()
+
+    def advise(self, observations: NDArray) -> Advice:
+        """Take in observations (n, entries or more); the corrections for them."""
+        valve = self._learner.observe(observations)
+        reserve = self.reserve(valve)
+        return Advice(
+            shift=self.shift(valve, reserve), must_shut=self._must_shut(valve),
+            margin=self._margin(valve, reserve),
+        )  # fmt: skip
+
+    def decided(self, actions: NDArray) -> None:
+        """Take in what has been decided (n,)."""
+        self._learner.decided(actions)
+
+    def reserve(self, valve: LearntValve) -> NDArray:
+        """Reserve that each valve needs (n,) [bar]: the more, the less is known about it."""
+        expected = expected_breakdown(self._table, valve.opens_from_rest)
+        doubtful = self._settings.wariness * valve.offset_deviation
+        return reserve_for(expected + doubtful, self._settings.tolerated)
+
+    def shift(self, valve: LearntValve, reserve: NDArray) -> NDArray:
+        """How much higher p2 is held (n,) [bar]; none while the supply cannot raise it."""
+        return np.where(valve.fed, self._settings.height + self._settings.share * reserve, 0.0)
+
+    def _margin(self, valve: LearntValve, reserve: NDArray) -> NDArray:
+        """How clearly a pulse has to be wanted (n,) [1]: a slow valve may hesitate less."""
+        slow = np.clip(reserve / SLOW, 0.0, 1.0)
+        needless = np.maximum(valve.forecast() - self._settings.free_below, 0.0)
+        return self._settings.reluctance * needless * (1 - slow) * valve.on
+
+    def _must_shut(self, valve: LearntValve) -> NDArray:
+        """Whether the coil has to be on, bool (n,): no supply, a pulse that would rise too far, or one
+        that was ended for this and is not measured yet, since nothing new is known about the valve."""
+        too_far = self._rises_too_far(valve)
+        self._ended = (self._ended & self._learner.measuring) | (too_far & ~valve.on)
+        return ~valve.fed | too_far | self._ended
+
+    def _rises_too_far(self, valve: LearntValve) -> NDArray:
+        """Whether p2 passes the ceiling if the valve opens early and stays open for a period (n,)."""
+        settings = self._settings
+        early = self._learner.earliest(settings.confidence)
+        fall_of_log_p3 = self._table.vent_rate * valve.pace * self._control_period
+        p3 = valve.p3 * np.where(valve.on, 1.0, np.exp(-fall_of_log_p3))
+        may_be_open = early.time_to_open(valve.p1, valve.p2, p3) <= 0
+        who = np.flatnonzero(valve.fed & may_be_open)
+        gain = valve.gain[who] + settings.doubt * valve.gain_deviation[who]
+        rise = gain * early.of(who).gained_at_once(valve.p1[who], valve.p2[who], p3[who])
+        highest = valve.error[who] + valve.fall[who] * settings.horizon + rise
+        too_far = np.zeros(len(p3), dtype=bool)
+        too_far[who] = highest > settings.ceiling
+        return too_far
