@@ -33,7 +33,7 @@ class SupervisorSettings:
     """p2 - target that a pulse may reach if the valve opens early, or else it ends [bar]."""
     confidence: float = 0.95
     """Probability that the valve opens no earlier than is allowed for there [1]."""
-    doubt: float = 0.75
+    doubt: float = 2.0
     """Standard deviations of the gain that are allowed for there [1]."""
     horizon: float = 0.1
     """Time over which consumption lowers p2 there [s]: an overshoot in an emergency does not last."""

@@ -175,13 +175,13 @@ def test_a_pulse_ends_before_the_nominal_valve_opens_if_an_earlier_one_would_ris
 
 
 def test_an_emergency_goes_on_where_the_same_p2_at_rest_would_end_the_pulse():
-    """p2 falls by 15 mbar a period, or stands still, until both are 0.2 bar below the target."""
+    """p2 falls by 15 mbar a period, or stands still, until both are 0.3 bar below the target."""
     control = supervisor(Recorder())
     control.reset(3)
     for k in range(10):
-        falling = -0.2 + 0.015 * (9 - k)
-        control.act(at_rest(p2_error=[falling, -0.2, -0.2]))
-    assert control.act(at_rest(p2_error=-0.2, p3=6.7, action=0.0)).tolist() == [0, 1, 1]
+        falling = -0.3 + 0.015 * (9 - k)
+        control.act(at_rest(p2_error=[falling, -0.3, -0.3]))
+    assert control.act(at_rest(p2_error=-0.3, p3=6.7, action=0.0)).tolist() == [0, 1, 1]
 
 
 def test_a_pulse_that_was_ended_is_measured_before_the_next_one():
@@ -221,3 +221,23 @@ def test_controllers_without_pulses_or_sensors_are_refused():
         supervisor(other)
     with pytest.raises(ValueError, match="reads no sensor"):
         supervisor(PrivilegedPulse())
+
+
+def test_a_governor_forgets_only_the_valves_whose_episodes_end():
+    """After ended pulses and their measurements, one valve is as new and the others are as they were."""
+    governor = supervisor(Recorder()).governor
+    governor.reset(3)
+    readings = [at_rest(p3=p3, action=0.0, p2_error=-0.1) for p3 in (9.0, 7.5, 6.9)]
+    readings += [at_rest(p3=p3, p2_error=0.1) for p3 in (9.0, 10.0, 11.0)]
+    for observations in readings:
+        governor.decided(governor.advise(observations).corrected(np.zeros(3, dtype=int)))
+    before = {name: getattr(owner, own).copy() for name, owner, own in governor.arrays()}
+    governor.forget(np.array([1]))
+    new = supervisor(Recorder()).governor
+    new.reset(3)
+    fresh = {name: getattr(owner, own) for name, owner, own in new.arrays()}
+    for name, owner, own in governor.arrays():
+        now = getattr(owner, own)
+        assert np.array_equal(now[[0, 2]], before[name][[0, 2]])
+        assert np.array_equal(now[1], fresh[name][1])
+    assert not np.array_equal(before["probability"], fresh["probability"])

@@ -18,28 +18,30 @@ from training.learners import supervision
 from training.learners.supervision import (
     QUICK_SETTLING,
     SETTLING,
-    Figures,
     settle,
     settle_missing,
+    tail,
+    upper_ratio,
 )
 from training.learners.validation import ValidationSettings, validate
 
 pytestmark = pytest.mark.training
 
 
-def exactly(*mean: float) -> Figures:
-    """Figures without errors."""
-    return Figures(mean=np.array(mean), error=np.zeros(3))
+def exactly(*figures: float) -> np.ndarray:
+    """The same figures in two episodes."""
+    return np.repeat(np.array(figures)[:, None], 2, axis=1)
 
 
-def figures_by_settings(rms, breakdown, switchings):
+def figures_by_settings(rms, breakdown, switchings, excursion=lambda h, f: 0.0):
     """Stands for episodes: the rival's figures are 1, ours follow from height and `free_below`."""
 
     def figures(controller, validation, options):
         if controller.name == "pulse, adaptive":
-            return exactly(1.0, 1.0, 1.0)
+            return exactly(1.0, 1.0, 1.0, 1.0)
         at = controller.main.settings
-        return exactly(*(f(at.height, at.free_below) for f in (rms, breakdown, switchings)))
+        ours = (rms, breakdown, switchings, excursion)
+        return exactly(*(f(at.height, at.free_below) for f in ours))
 
     return figures
 
@@ -55,7 +57,9 @@ def test_the_settings_are_where_the_three_ratios_are_equal(policy, monkeypatch):
         lambda h, f: 1 + 5 * h, lambda h, f: 0.9 - 5 * h - f, lambda h, f: 1.1 + f
     )
     monkeypatch.setattr(supervision, "_figures", figures)
-    found = settle(policy, Plant.calibrated(), {}, replace(SETTLING, evaluations=120))
+    found = settle(
+        policy, Plant.calibrated(), {}, replace(SETTLING, evaluations=120)
+    )
     assert found.settings.height == pytest.approx(0.0, abs=0.004)
     assert found.settings.free_below == pytest.approx(-0.1, abs=0.015)
     changed = {name: getattr(found.settings, name) for name in supervision.SETTLED}
@@ -69,25 +73,61 @@ def test_a_search_that_ends_at_a_bound_says_so(policy, monkeypatch, capsys):
     """The lower the better: the height ends at the least that is searched."""
     figures = figures_by_settings(lambda h, f: 1 + h, lambda h, f: 1 + h, lambda h, f: 1 + h)
     monkeypatch.setattr(supervision, "_figures", figures)
-    found = settle(policy, Plant.calibrated(), {}, replace(SETTLING, evaluations=120), quiet=True)
+    found = settle(
+        policy,
+        Plant.calibrated(),
+        {},
+        replace(SETTLING, evaluations=120),
+        quiet=True,
+    )
     assert found.search["at_bound"] == ["height"]
     assert "search of height ended at a bound" in capsys.readouterr().err
 
 
+def test_the_worst_episodes_bound_what_the_means_ask_for(policy, monkeypatch):
+    """The lower the better but for the excursion: 0.46 + 2 h and 1 - h have equal ratios at h = 0."""
+    def lower(h, f):
+        return 1 - h
+
+    figures = figures_by_settings(lower, lower, lower, lambda h, f: 0.46 * (1 + 2 * h))
+    monkeypatch.setattr(supervision, "_figures", figures)
+    found = settle(
+        policy,
+        Plant.calibrated(),
+        {},
+        replace(SETTLING, evaluations=120),
+        quiet=True,
+    )
+    assert found.settings.height == pytest.approx(0.0, abs=0.004)
+
+
 def test_a_figure_that_the_rival_has_none_of_counts_as_equal():
-    own, usual = exactly(1.0, 5.0, 1.0), exactly(1.0, 0.0, 2.0)
-    assert supervision._upper_ratios(own, usual) == [1.0, 1.0, 0.5]
+    own, usual = exactly(1.0, 5.0, 1.0, 0.23), exactly(1.0, 0.0, 2.0, 9.0)
+    assert supervision._ratios(own, usual, 0.46) == [1.0, 1.0, 0.5, 0.5]
 
 
 def test_the_upper_end_of_a_ratio_is_that_of_its_interval():
     """In 2.5 % of many repetitions the true ratio of 0.9 is above the end: the estimate errs."""
     rng, above = np.random.default_rng(0), 0
     for _ in range(4000):
-        mine, its = 9.0 + 0.2 * rng.standard_normal(3), 10.0 + 0.3 * rng.standard_normal(3)
-        own = Figures(mean=mine, error=np.full(3, 0.2))
-        usual = Figures(mean=its, error=np.full(3, 0.3))
-        above += np.sum(np.array(supervision._upper_ratios(own, usual)) < 0.9)
-    assert above / 12000 == pytest.approx(0.025, abs=0.006)
+        usual = 10.0 + 3.0 * rng.standard_normal(400)
+        own = 9.0 + 2.0 * (usual[:100] - 10.0) / 3.0 + rng.standard_normal(100)
+        above += upper_ratio(own, usual) < 0.9
+    assert above / 4000 == pytest.approx(0.025, abs=0.008)
+
+
+def test_pairs_of_episodes_narrow_the_interval():
+    rng = np.random.default_rng(1)
+    usual = 10.0 + 3.0 * rng.standard_normal(400)
+    own = 0.9 * usual[:100] + 0.1 * rng.standard_normal(100)
+    strangers = 0.9 * rng.permutation(usual)[:100]
+    assert 0.9 < upper_ratio(own, usual) < 0.91
+    assert upper_ratio(strangers, usual) > upper_ratio(own, usual) + 0.01
+
+
+def test_the_tail_is_the_mean_of_the_worst_hundredth():
+    assert tail(np.arange(300.0)) == 298.0
+    assert tail(np.array([1.0, 3.0, 2.0])) == 3.0  # one at least
 
 
 def test_a_higher_setpoint_breaks_down_less_and_errs_more(policy):

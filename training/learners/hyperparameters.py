@@ -43,7 +43,8 @@ class Hyperparameters:
     """Passes over the demonstration that the model imitates first (training/learners/imitation.py)."""
     end_to_end: bool = False
     """Whether gradients go through a student's recurrent unit (training/learners/sequence_ppo.py). The
-    critic then sees more than the actor, the fields up to `averaging` count, and `ent_coef` does not."""
+    critic then sees more than the actor, a governor corrects the actions, the fields up to `averaging`
+    count, and `ent_coef` does not."""
     leaving_charge: float = 0.0
     """Price of a training episode that leaves the band with a margin, once."""
     leaving_margin_bar: float = BAND_BAR
@@ -70,9 +71,6 @@ class Hyperparameters:
     """Entropy coefficient at the start [1]; it falls linearly to zero."""
     width: int = 64
     """Units of each of the two hidden layers."""
-    reserves_bar: tuple[float, ...] = (0.0,)
-    """Candidates of how much higher than it has learned a policy holds p2, tried on the validation
-    episodes (training/learners/raised_setpoint.py) [bar]."""
     validations: int = 8
     """Number of validated policies, evenly from `first_validation` to the end."""
     first_validation: float = 0.75
@@ -118,12 +116,12 @@ FROM_MEMORYLESS = Hyperparameters(learning_rate=4e-4, breakdown_price=0.6, first
 """For a recurrent policy that goes on from a policy without memory, where switching is cheap."""
 
 END_TO_END = Hyperparameters(
-    end_to_end=True, n_steps=50, batch_size=1600, longest_episode_steps=2000, learning_rate=1.5e-4,
+    end_to_end=True, n_steps=50, batch_size=1600, longest_episode_steps=2000, learning_rate=3e-4,
     last_learning_rate=1e-5, critic_first=1_000_000, clip_range=0.1, gae_lambda=0.98, ent_coef=0.0,
     sharpness=4.0, restarts=0.01, leaving_charge=300.0, leaving_margin_bar=0.38, band_price=10.0,
-    band_bar=0.30, breakdown_price=0.5, switching_price=0.45, imitation_epochs=0,
-    reserves_bar=(-0.03, -0.015, 0.0, 0.015, 0.03), validations=4, first_validation=0.6,
-    validation_episodes=1024, validation_conditions=Conditions(extreme=0.5, braking=0.5),
+    band_bar=0.30, breakdown_price=0.5, switching_price=1.0, imitation_epochs=0,
+    validations=4, first_validation=0.6, validation_episodes=1024,
+    validation_conditions=Conditions(extreme=0.5, braking=0.5),
     conditions=Conditions(
         extreme=0.5, braking=0.3, far=0.06, vented=0.12, coil_off=0.08, starved=0.12, rest=0.05,
         rest_s=(2.0, 8.0), target_steps=0.1, noisy=0.2, frozen_p3=0.05, biased_p2=0.05, delayed=0.15,
@@ -134,7 +132,7 @@ END_TO_END = Hyperparameters(
 Long episodes teach it to remember. Plants from the region's corners and hard applications are frequent,
 since a good policy leaves the band only where they meet. The margin's price alone would make a policy
 keep p3 ready and switch 20 times a second and more; the higher price of a switching keeps it to the
-student's way, rest between applications."""
+student's way, rest between applications. It learns under the governor that it will act with."""
 
 
 def training_weights(weights: RewardWeights, h: Hyperparameters) -> RewardWeights:

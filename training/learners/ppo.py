@@ -15,6 +15,7 @@ from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
 from controllers.learned import LearnedPolicy
+from controllers.supervised import supervised
 from controllers.tuned import build, load_tunings
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
@@ -25,7 +26,6 @@ from training.learners.imitation import imitate
 from training.learners.learning_log import TrainingLog
 from training.learners.policy_files import greedy_policy, policy_bytes, put_layers, put_student
 from training.learners.provenance import plant_digest
-from training.learners.raised_setpoint import best_raised
 from training.learners.recurrent_actor_critic import RecurrentActorCritic
 from training.learners.resumption import restore_progress
 from training.learners.run_folder import TENSORBOARD_FOLDER
@@ -154,7 +154,7 @@ def train(
         points=validation_points(timesteps, first_share=h.first_validation, count=h.validations),
         settings=ValidationSettings(episodes=h.validation_episodes, duration=h.validation_duration),
         options={**task, "conditions": h.validation_conditions},
-        controller=greedy,
+        controller=lambda model: supervised(greedy(model), plant) if learns else greedy(model),
         rows=with_nan(begun.validations),
         best=found.best if found else None,
     )
@@ -177,7 +177,7 @@ def train(
         )
     best_model: Any = io.BytesIO(selection.best)  # stable-baselines3 takes streams, too
     model.set_parameters(best_model, device=device)
-    policy = best_raised(greedy(model), h.reserves_bar, selection.settings, selection.options)
+    policy = greedy(model)
     return (replace(policy, name=END_TO_END_NAME) if learns else policy), log
 
 

@@ -14,6 +14,7 @@ from stable_baselines3.common.vec_env import VecEnvWrapper, VecMonitor
 
 from epv_env.saved_state import SavedState, restore_state, save_state
 from epv_env.sb3 import SB3VectorEnv
+from training.learners.governed_wrapper import GovernedWrapper
 from training.learners.privileged_wrapper import PrivilegedWrapper
 from training.learners.recurrent_state_wrapper import RecurrentStateWrapper
 from training.learners.run_state import RunError
@@ -104,6 +105,11 @@ def _wrapped(model: PPO) -> Iterator[tuple[str, Any, str]]:
         if isinstance(wrapper, PrivilegedWrapper):
             yield "left", wrapper, "left"
             yield "reached", wrapper, "reached"
+        if isinstance(wrapper, GovernedWrapper):
+            yield "shift", wrapper, "shift"
+            yield "must_shut", wrapper, "must_shut"
+            for name, owner, attribute in wrapper.governor.arrays():
+                yield f"governor_{name}", owner, attribute
     if isinstance(model, SequencePPO):
         yield "memory", model, "memory"
 

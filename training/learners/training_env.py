@@ -3,11 +3,15 @@
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
+from controllers.governor import Governor
 from controllers.learned import GatedUnit
+from controllers.supervised import nominal_table
+from epv_env.actions import OnOff
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from epv_env.sb3 import make_sb3_env
 from training.evaluation.seeds import training_seeds
+from training.learners.governed_wrapper import GovernedWrapper
 from training.learners.hyperparameters import Hyperparameters
 from training.learners.privileged_wrapper import PrivilegedWrapper
 from training.learners.recurrent_state_wrapper import RecurrentStateWrapper
@@ -61,8 +65,9 @@ def make_training_env(
         seed: of the training.
         weights: prices of the reward.
         cell: a unit whose state ends the observations (training/learners/recurrent_state_wrapper.py).
-        privileged: whether observations end with a critic's view instead, and leaving the band is
-            charged (training/learners/privileged_wrapper.py).
+        privileged: whether observations end with a critic's view instead, leaving the band is charged
+            (training/learners/privileged_wrapper.py), and a supervisor's governor corrects the actions
+            (training/learners/governed_wrapper.py).
 
     Raises:
         ValueError: the seed is too large (training/evaluation/seeds.py).
@@ -81,9 +86,11 @@ def make_training_env(
     )
     seed_episodes(env, seed)
     if privileged:
-        return PrivilegedWrapper(
+        judged = PrivilegedWrapper(
             VecMonitor(env), scale=h.reward_scale, charge=h.leaving_charge,
             margin_bar=h.leaving_margin_bar, longest=max(lengths),
         )  # fmt: skip
+        period = OnOff.default_period
+        return GovernedWrapper(judged, Governor(nominal_table(plant), control_period=period))
     scaled = ScaledReward(VecMonitor(env), h.reward_scale)
     return RecurrentStateWrapper(scaled, cell) if cell else scaled
