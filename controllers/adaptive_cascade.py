@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.opening_pressure import opening_pressure
-from controllers.pulse_simulation import pulse_table
+from controllers.pulse_simulation import nominal_table
 from controllers.pulse_table import PulseTable
 from controllers.pwm_linearisation import switching_lag
 from controllers.registration import CHEAP, Range, Registration
@@ -137,7 +137,7 @@ class AdaptiveCascade:
 
 def build(values: Mapping[str, Any], plant: Plant) -> AdaptiveCascade:
     """The controller for a plant; values: quantities of the search space by name."""
-    table = pulse_table(plant.parameters, supply_voltage=plant.voltage)
+    table = nominal_table(plant)
     later = switching_lag(plant.parameters, p1=11.5 * BAR, p2=8.0 * BAR, supply_voltage=plant.voltage)
     return AdaptiveCascade(table=table, pull_in_lag=float(table.release_lag) + later, **values)
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.pulse_simulation import pulse_table
+from controllers.pulse_simulation import nominal_table
 from controllers.pulse_table import PulseTable
 from controllers.registration import CHEAP, Range, Registration
 from controllers.valve_learner import ValveLearner
@@ -64,9 +64,7 @@ class AdaptiveHysteresis:
 REGISTRATION = Registration(
     kind="hysteresis, adaptive",
     controller=AdaptiveHysteresis,
-    build=lambda values, plant: AdaptiveHysteresis(
-        table=pulse_table(plant.parameters, supply_voltage=plant.voltage), **values
-    ),
+    build=lambda values, plant: AdaptiveHysteresis(table=nominal_table(plant), **values),
     search_space={
         "open_below": Range(low=-0.3, high=0.1, least=-0.5, most=0.5),
         "shut_above": Range(low=-0.3, high=0.3, least=-0.5, most=0.5),

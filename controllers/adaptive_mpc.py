@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from controllers.mpc import MPC
 from controllers.mpc import REGISTRATION as NOMINAL
-from controllers.pulse_simulation import pulse_table
+from controllers.pulse_simulation import nominal_table
 from controllers.pulse_table import PulseTable
 from controllers.registration import Range
 from controllers.valve_learner import LearntValve, ValveLearner
@@ -68,7 +68,7 @@ REGISTRATION = replace(
     kind="MPC, adaptive",
     controller=AdaptiveMPC,
     build=lambda values, plant: AdaptiveMPC(
-        table=pulse_table(plant.parameters, supply_voltage=plant.voltage),
+        table=nominal_table(plant),
         parameters=plant.parameters, supply_voltage=plant.voltage, threads=1, **values,
     ),
     search_space={

@@ -36,15 +36,12 @@ class Advice:
     margin: NDArray
     """By how much the logit of switching off must exceed that of leaving on (n,) [1]."""
 
-    def shown(self, observations: NDArray) -> NDArray:
-        """Observations (n, entries or more) as the policy is shown them: a copy."""
-        shown = observations.copy()
-        shown[:, ERROR] -= (self.shift / LAYOUT[ERROR].scale).astype(shown.dtype)
-        return shown
 
-    def corrected(self, actions: NDArray) -> NDArray:
-        """Actions (n,), 0 (off) or 1 (on), with the coil on where it has to be."""
-        return np.where(self.must_shut, 1, actions)
+def lowered(observations: NDArray, shift: NDArray) -> NDArray:
+    """A copy of observations (n, entries or more) whose p2 is lower by `shift` (n,) [bar]."""
+    shown = observations.copy()
+    shown[:, ERROR] -= (shift / LAYOUT[ERROR].scale).astype(shown.dtype)
+    return shown
 
 
 class Governor:

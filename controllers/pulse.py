@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.pulse_simulation import pulse_table
+from controllers.pulse_simulation import nominal_table
 from controllers.pulse_table import PulseTable
 from controllers.registration import CHEAP, Range, Registration
 from controllers.reserve import fed, reserve_of
@@ -127,9 +127,7 @@ class Pulse:
 REGISTRATION = Registration(
     kind="pulse",
     controller=Pulse,
-    build=lambda values, plant: Pulse(
-        table=pulse_table(plant.parameters, supply_voltage=plant.voltage), **values
-    ),
+    build=lambda values, plant: Pulse(table=nominal_table(plant), **values),
     search_space={
         "trigger": Range(low=-0.3, high=0.1, least=-0.5, most=0.5),
         "aim": Range(low=-0.1, high=0.3, least=-0.5, most=0.5),

@@ -11,6 +11,7 @@ from controllers.opening_pressure import opening_pressure
 from controllers.pulse_table import GRID, PulseTable, PulseTables
 from epv_env.common.units import BAR
 from epv_env.plant.equations import State
+from epv_env.plant.plantfile import Plant
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
 
@@ -61,6 +62,11 @@ def pulse_table(
     )  # fmt: skip
 
 
+def nominal_table(plant: Plant) -> PulseTable:
+    """The table that a controller of this nominal plant starts from. A plant's table is made once."""
+    return _cached_table(tuple(plant.parameters.items()), plant.voltage)
+
+
 def pulse_tables(plants: Sequence[Mapping[str, float]], supply_voltage: float = 24.0) -> PulseTables:
     """The tables of n plants (parameters by symbol), in their order. A plant's table is made once.
 
@@ -78,7 +84,7 @@ def pulse_tables(plants: Sequence[Mapping[str, float]], supply_voltage: float = 
 
 @lru_cache(maxsize=1024)
 def _cached_table(plant: tuple[tuple[str, float], ...], supply_voltage: float) -> PulseTable:
-    """The table of a plant. Searches and lessons meet the same plants again and again."""
+    """The table of a plant. Searches, lessons and evaluations meet the same plants again and again."""
     return pulse_table(dict(plant), supply_voltage=supply_voltage)
 
 

@@ -15,8 +15,7 @@ from controllers.base import Controller
 from controllers.hysteresis import EXTRAPOLATING_HYSTERESIS
 from controllers.learned import load_policy
 from controllers.p3_check import P3Check
-from controllers.pulse_simulation import pulse_table
-from controllers.pulse_table import PulseTable
+from controllers.pulse_simulation import nominal_table
 from controllers.supervisor import Supervisor
 from controllers.supervisor_settings import SETTINGS, SupervisorSettings
 from controllers.tuned import build, load_tunings
@@ -50,11 +49,6 @@ def supervised(controller: Controller, plant: Plant, settings: SupervisorSetting
     """
     supervisor = Supervisor(main=controller, table=nominal_table(plant), settings=settings)
     return p3_checked(supervisor, plant, name=supervisor.name)
-
-
-def nominal_table(plant: Plant) -> PulseTable:
-    """The table that a supervisor of this nominal plant's valves starts from."""
-    return pulse_table(plant.parameters, supply_voltage=plant.voltage)
 
 
 def p3_checked(controller: Controller, plant: Plant, *, name: str = "") -> P3Check:

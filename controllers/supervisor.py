@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.base import Controller, Graded, Privileged, with_period
-from controllers.governor import Advice, Governor
+from controllers.governor import Advice, Governor, lowered
 from controllers.pulse_table import PulseTable
 from controllers.supervisor_settings import SETTINGS, SupervisorSettings
 
@@ -48,7 +48,8 @@ class Supervisor:
     def act(self, observations: NDArray) -> NDArray:
         """0 (off) or 1 (on) for each valve, (n,)."""
         advice = self.governor.advise(observations)
-        actions = advice.corrected(self._asked(advice.shown(observations), advice))
+        asked = self._asked(lowered(observations, advice.shift), advice)
+        actions = np.where(advice.must_shut, 1, asked)
         self.governor.decided(actions)
         return actions
 

@@ -230,7 +230,7 @@ def test_a_governor_forgets_only_the_valves_whose_episodes_end():
     readings = [at_rest(p3=p3, action=0.0, p2_error=-0.1) for p3 in (9.0, 7.5, 6.9)]
     readings += [at_rest(p3=p3, p2_error=0.1) for p3 in (9.0, 10.0, 11.0)]
     for observations in readings:
-        governor.decided(governor.advise(observations).corrected(np.zeros(3, dtype=int)))
+        governor.decided(np.where(governor.advise(observations).must_shut, 1, 0))
     before = {name: getattr(owner, own).copy() for name, owner, own in governor.arrays()}
     governor.forget(np.array([1]))
     new = supervisor(Recorder()).governor

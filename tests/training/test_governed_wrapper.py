@@ -9,7 +9,7 @@ pytest.importorskip("stable_baselines3")
 from stable_baselines3.common.vec_env import VecMonitor
 
 from controllers.governor import Governor
-from controllers.supervised import nominal_table
+from controllers.pulse_simulation import nominal_table
 from controllers.supervisor import Supervisor
 from controllers.supervisor_settings import SupervisorSettings
 from epv_env.observation import INDEX, LAYOUT, decode

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
-from controllers.governor import Advice, Governor
+from controllers.governor import Governor, lowered
 
 
 class GovernedWrapper(VecEnvWrapper):
@@ -19,7 +19,7 @@ class GovernedWrapper(VecEnvWrapper):
         """
         Args:
             env: n episodes of the on/off environment, whose observations begin with an ECU's.
-            governor: its settings without reluctance, which is no correction of an action.
+            governor: its margin is left out, since PPO draws actions by the policy's own logits.
         """
         super().__init__(env)
         self.governor = governor
@@ -37,7 +37,7 @@ class GovernedWrapper(VecEnvWrapper):
 
     def step_async(self, actions: NDArray) -> None:
         """Start a control period with the corrected actions (n,)."""
-        corrected = self._advice().corrected(actions)
+        corrected = np.where(self.must_shut, 1, actions)
         self.governor.decided(corrected)
         self.venv.step_async(corrected)
 
@@ -50,18 +50,14 @@ class GovernedWrapper(VecEnvWrapper):
         ended = np.flatnonzero(done)
         if len(ended):
             last = np.stack([infos[i]["terminal_observation"] for i in ended])
-            for i, shown in zip(ended, self._advice(ended).shown(last), strict=True):
+            for i, shown in zip(ended, lowered(last, self.shift[ended]), strict=True):
                 infos[i]["terminal_observation"] = shown
             self.governor.forget(ended)
         return self._advised(observation), reward, done, infos
 
-    def _advice(self, who: NDArray | slice = slice(None)) -> Advice:
-        """The advice of this period for some of the episodes."""
-        shift = self.shift[who]
-        return Advice(shift=shift, must_shut=self.must_shut[who], margin=np.zeros(len(shift)))
-
     def _advised(self, observation: VecEnvObs) -> NDArray:
+        """Observations (n, entries) as the policy is shown them; takes note of the governor's advice."""
         assert isinstance(observation, np.ndarray)
         advice = self.governor.advise(observation)
         self.shift, self.must_shut = advice.shift, advice.must_shut
-        return advice.shown(observation)
+        return lowered(observation, self.shift)

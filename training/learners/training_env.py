@@ -5,7 +5,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepR
 
 from controllers.governor import Governor
 from controllers.learned import GatedUnit
-from controllers.supervised import nominal_table
+from controllers.pulse_simulation import nominal_table
 from epv_env.actions import OnOff
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
