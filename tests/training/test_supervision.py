@@ -57,9 +57,7 @@ def test_the_settings_are_where_the_three_ratios_are_equal(policy, monkeypatch):
         lambda h, f: 1 + 5 * h, lambda h, f: 0.9 - 5 * h - f, lambda h, f: 1.1 + f
     )
     monkeypatch.setattr(supervision, "_figures", figures)
-    found = settle(
-        policy, Plant.calibrated(), {}, replace(SETTLING, evaluations=120)
-    )
+    found = settle(policy, Plant.calibrated(), {}, replace(SETTLING, evaluations=120))
     assert found.settings.height == pytest.approx(0.0, abs=0.004)
     assert found.settings.free_below == pytest.approx(-0.1, abs=0.015)
     changed = {name: getattr(found.settings, name) for name in supervision.SETTLED}
@@ -73,31 +71,20 @@ def test_a_search_that_ends_at_a_bound_says_so(policy, monkeypatch, capsys):
     """The lower the better: the height ends at the least that is searched."""
     figures = figures_by_settings(lambda h, f: 1 + h, lambda h, f: 1 + h, lambda h, f: 1 + h)
     monkeypatch.setattr(supervision, "_figures", figures)
-    found = settle(
-        policy,
-        Plant.calibrated(),
-        {},
-        replace(SETTLING, evaluations=120),
-        quiet=True,
-    )
+    found = settle(policy, Plant.calibrated(), {}, replace(SETTLING, evaluations=120), quiet=True)
     assert found.search["at_bound"] == ["height"]
     assert "search of height ended at a bound" in capsys.readouterr().err
 
 
 def test_the_worst_episodes_bound_what_the_means_ask_for(policy, monkeypatch):
-    """The lower the better but for the excursion: 0.46 + 2 h and 1 - h have equal ratios at h = 0."""
+    """The lower the better but for the excursion: the ratios 1 + 2 h and 1 - h are equal at h = 0."""
+
     def lower(h, f):
         return 1 - h
 
     figures = figures_by_settings(lower, lower, lower, lambda h, f: 0.46 * (1 + 2 * h))
     monkeypatch.setattr(supervision, "_figures", figures)
-    found = settle(
-        policy,
-        Plant.calibrated(),
-        {},
-        replace(SETTLING, evaluations=120),
-        quiet=True,
-    )
+    found = settle(policy, Plant.calibrated(), {}, replace(SETTLING, evaluations=120), quiet=True)
     assert found.settings.height == pytest.approx(0.0, abs=0.004)
 
 
