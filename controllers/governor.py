@@ -4,7 +4,8 @@ A learner of the valve (controllers/valve_learner.py) estimates how long the val
 low p2 will be then, and how far a pulse under way may still raise p2. The governor moves the policy's
 setpoint by the first (a reference governor: Garone, Di Cairano and Kolmanovsky, Automatica 75 (2017)),
 holds back needless pulses by the second, and ends pulses by the third. A pulse of a valve that is hardly
-known ends before it may rise too far, so the first pulses probe when the valve opens.
+known ends before it may rise too far, so the first pulses probe when the valve opens. After a near miss,
+a breakdown deep into the band, p2 is held higher and fewer pulses are held back.
 """
 
 from collections.abc import Iterator
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from controllers.breakdown_memory import BreakdownMemory
 from controllers.pulse_table import PulseTable
 from controllers.reserve import expected_breakdown, reserve_for
 from controllers.supervisor_settings import SETTINGS, SupervisorSettings
@@ -23,6 +25,8 @@ from epv_env.observation import INDEX, LAYOUT
 ERROR = INDEX["p2_error"]
 SLOW = 0.1
 """Reserve from which a valve is so slow that no pulse may wait [bar]."""
+DEEP = 0.1
+"""How far a breakdown exceeds a near miss from which no pulse may wait [bar]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,30 +64,36 @@ class Governor:
         self._learner = ValveLearner(
             table, filter_time=settings.filter_time, control_period=control_period
         )
+        self._breakdowns = BreakdownMemory(lasts=settings.remembers, control_period=control_period)
         self.reset(0)
 
     def reset(self, n: int) -> None:
         """Forget the valves; n episodes begin."""
         self._learner.reset(n)
+        self._breakdowns.reset(n)
         self._ended = np.zeros(n, dtype=bool)
 
     def forget(self, who: NDArray) -> None:
         """Forget the valves with these indices (m,), whose episodes have ended."""
         self._learner.forget(who)
+        self._breakdowns.forget(who)
         self._ended[who] = False
 
     def arrays(self) -> Iterator[tuple[str, Any, str]]:
         """Name, owner and attribute of each array that is kept between control periods."""
         yield "ended", self, "_ended"
         yield from self._learner.arrays()
+        yield from self._breakdowns.arrays()
 
     def advise(self, observations: NDArray) -> Advice:
         """Take in observations (n, entries or more); the corrections for them."""
         valve = self._learner.observe(observations)
         reserve = self.reserve(valve)
+        deepest = self._breakdowns.observe(valve.error, valve.fed)
+        too_deep = np.maximum(deepest - self._settings.near_miss, 0.0)
         return Advice(
-            shift=self.shift(valve, reserve), must_shut=self._must_shut(valve),
-            margin=self._margin(valve, reserve),
+            shift=self.shift(valve, reserve, too_deep), must_shut=self._must_shut(valve),
+            margin=self._margin(valve, reserve, too_deep),
         )  # fmt: skip
 
     def decided(self, actions: NDArray) -> None:
@@ -96,15 +106,24 @@ class Governor:
         doubtful = self._settings.wariness * valve.offset_deviation
         return reserve_for(expected + doubtful, self._settings.tolerated)
 
-    def shift(self, valve: LearntValve, reserve: NDArray) -> NDArray:
-        """How much higher p2 is held (n,) [bar]; none while the supply cannot raise it."""
-        return np.where(valve.fed, self._settings.height + self._settings.share * reserve, 0.0)
+    def shift(self, valve: LearntValve, reserve: NDArray, too_deep: NDArray) -> NDArray:
+        """How much higher p2 is held (n,) [bar]; none while the supply cannot raise it.
 
-    def _margin(self, valve: LearntValve, reserve: NDArray) -> NDArray:
-        """How clearly a pulse has to be wanted (n,) [1]: a slow valve may hesitate less."""
-        slow = np.clip(reserve / SLOW, 0.0, 1.0)
+        Args:
+            valve: what is known of each.
+            reserve: that each needs (n,) [bar].
+            too_deep: by how much the deepest breakdown lately exceeds a near miss (n,) [bar].
+        """
+        settings = self._settings
+        higher = settings.height + settings.share * reserve + settings.raises * too_deep
+        return np.where(valve.fed, higher, 0.0)
+
+    def _margin(self, valve: LearntValve, reserve: NDArray, too_deep: NDArray) -> NDArray:
+        """How clearly a pulse has to be wanted (n,) [1]: a slow valve may hesitate less, and one that
+        let p2 break down deep."""
+        slow, deep = np.clip(reserve / SLOW, 0.0, 1.0), np.clip(too_deep / DEEP, 0.0, 1.0)
         needless = np.maximum(valve.forecast() - self._settings.free_below, 0.0)
-        return self._settings.reluctance * needless * (1 - slow) * valve.on
+        return self._settings.reluctance * needless * (1 - slow) * (1 - deep) * valve.on
 
     def _must_shut(self, valve: LearntValve) -> NDArray:
         """Whether the coil has to be on, bool (n,): no supply, a pulse that would rise too far, or one

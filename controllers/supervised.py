@@ -22,7 +22,7 @@ from controllers.tuned import build, load_tunings
 from epv_env.common.json_files import checked, read_json, write_json
 from epv_env.plant.plantfile import Plant
 
-FORMAT = "epv-supervisor/3"
+FORMAT = "epv-supervisor/4"
 SUPERVISOR_FILE = "supervisor.json"
 FALLBACK = EXTRAPOLATING_HYSTERESIS.kind
 """Takes over where p3 is implausible: the best of those that do not read it."""

@@ -10,8 +10,8 @@ from epv_env.reward import BAND_BAR
 class SupervisorSettings:
     """How a supervisor corrects its policy.
 
-    Training settles `height`, `free_below` and `reluctance` for each policy
-    (training/learners/supervision.py). The others were chosen by hand on development episodes.
+    Training settles `height`, `free_below`, `reluctance` and `ceiling` for each policy, and sets
+    `raises` (training/learners/supervision.py). The others were chosen by hand on development episodes.
     """
 
     height: float = 0.0
@@ -23,6 +23,12 @@ class SupervisorSettings:
     """For each bar of the forecast above that, by how much the policy's logit of switching off must
     exceed that of leaving on before a pulse begins [1/bar]: such a pulse is needed only if it is wanted
     clearly."""
+    raises: float = 0.0
+    """Share of a breakdown beyond `near_miss` by which p2 is held higher afterwards [1]."""
+    near_miss: float = 0.25
+    """Breakdown below the target from which p2 is held higher and pulses are held back less [bar]."""
+    remembers: float = 60.0
+    """Time in which such a breakdown is forgotten by 1/e [s]."""
     share: float = 0.5
     """Share of the reserve that a valve needs beyond that [1]: the policy keeps some by itself."""
     tolerated: float = TOLERATED
@@ -44,13 +50,14 @@ class SupervisorSettings:
         for name in ("height", "free_below"):
             if not abs(value := getattr(self, name)) <= BAND_BAR:
                 raise ValueError(f"{name} = {value:g} bar: give one within ±{BAND_BAR:g} bar")
-        for name in ("reluctance", "share", "wariness", "doubt", "horizon"):
+        for name in ("reluctance", "raises", "near_miss", "share", "wariness", "doubt", "horizon"):
             if not 0 <= getattr(self, name) < float("inf"):
                 raise ValueError(f"{name} = {getattr(self, name):g}: give a number from 0")
         if not 0 < self.confidence < 1:
             raise ValueError(f"confidence = {self.confidence:g}: give a number between 0 and 1")
-        if not self.filter_time > 0:
-            raise ValueError(f"filter_time = {self.filter_time:g} s: give a positive time")
+        for name in ("remembers", "filter_time"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} = {getattr(self, name):g} s: give a positive time")
 
 
 SETTINGS = SupervisorSettings()

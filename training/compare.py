@@ -47,7 +47,8 @@ from training.learners.policy_folders import (
     supervised_policies,
     train_missing,
 )
-from training.learners.supervision import QUICK_SETTLING, SETTLING, settle_missing
+from training.learners.settling_search import QUICK_SETTLING, SETTLING
+from training.learners.supervision import settle_missing
 from training.studies.comparison.comparison_report import (
     PARTS,
     comparison_tables,

@@ -211,7 +211,8 @@ def train_and_compare(chosen: argparse.Namespace, plant: Plant, run: str) -> int
     from training.learners.policy_files import save_policy
     from training.learners.ppo import train
     from training.learners.recurrent_training import train_recurrent
-    from training.learners.supervision import QUICK_SETTLING, SETTLING, settle
+    from training.learners.settling_search import QUICK_SETTLING, SETTLING
+    from training.learners.supervision import settle
 
     check_device(chosen.device)
     weights = RewardWeights(switching=chosen.switching_price)

@@ -54,7 +54,7 @@ def test_the_setpoint_rises_with_the_expected_breakdown():
     control.reset(3)
     valve = control.governor._learner.observe(at_rest())
     slower = replace(valve, pace=valve.pace * np.array([1.25, 0.8, 0.6]))
-    shifts = control.governor.shift(slower, control.governor.reserve(slower))
+    shifts = control.governor.shift(slower, control.governor.reserve(slower), np.zeros(3))
     assert shifts[0] == 0.0  # a fast valve needs no reserve
     assert 0.0 < shifts[1] < shifts[2]
 
@@ -75,7 +75,10 @@ def test_the_height_shifts_every_setpoint_alike():
     for control in controls:
         control.reset(3)
     valve = controls[0].governor._learner.observe(at_rest())
-    high, low = (control.governor.shift(valve, control.governor.reserve(valve)) for control in controls)
+    high, low = (
+        control.governor.shift(valve, control.governor.reserve(valve), np.zeros(3))
+        for control in controls
+    )
     assert high - low == pytest.approx(0.03)
 
 
@@ -97,6 +100,8 @@ def test_the_policy_is_shown_a_p2_that_is_lower_by_the_shift():
         ({"free_below": -0.7}, "free_below = -0.7 bar"), ({"reluctance": -1.0}, "reluctance = -1"),
         ({"share": -1.0}, "share = -1"), ({"filter_time": 0.0}, "filter_time = 0 s"),
         ({"confidence": 1.0}, "confidence = 1"), ({"horizon": -0.1}, "horizon = -0.1"),
+        ({"raises": -0.1}, "raises = -0.1"), ({"near_miss": -0.1}, "near_miss = -0.1"),
+        ({"remembers": 0.0}, "remembers = 0 s"),
     ],
 )  # fmt: skip
 def test_settings_without_a_meaning_are_refused(settings, words):
@@ -134,6 +139,27 @@ def test_a_slow_valve_may_not_hesitate():
         control = supervisor(Undecided(), reluctance=100.0, free_below=-0.1, tolerated=tolerated)
         control.reset(3)
         assert np.all(control.act(at_rest()) == action)
+
+
+def test_after_a_near_miss_no_pulse_waits():
+    """The circuits break down by 0.1, 0.3 and 0.4 bar, and are at the target again afterwards."""
+    control = supervisor(Undecided(), reluctance=50.0, free_below=-0.1, near_miss=0.2)
+    control.reset(3)
+    assert control.act(at_rest()).tolist() == [1, 1, 1]
+    for _ in range(40):
+        control.act(at_rest(p2_error=[-0.1, -0.3, -0.4]))
+    actions = [control.act(at_rest()) for _ in range(40)]  # the slope of p2 fades
+    assert actions[-1].tolist() == [1, 0, 0]
+
+
+def test_after_a_near_miss_p2_is_held_higher():
+    main = Recorder()
+    control = supervisor(main, raises=0.5, near_miss=0.2, tolerated=10.0)
+    control.reset(3)
+    control.act(at_rest())
+    control.act(at_rest(p2_error=[-0.1, -0.3, -0.4], action=0.0, p3=1.0))  # open: p2 is not filtered
+    control.act(at_rest())
+    np.testing.assert_allclose(decode(main.shown[-1], "p2_error"), [0.0, -0.05, -0.1], atol=1e-3)
 
 
 def test_without_reluctance_a_policy_acts_as_alone():

@@ -15,9 +15,8 @@ from epv_env.plant.plantfile import Plant
 from tests.training.policies import random_layers, write_policy
 from training.evaluation.metrics import summary
 from training.learners import supervision
+from training.learners.settling_search import QUICK_SETTLING, SETTLED, SETTLING
 from training.learners.supervision import (
-    QUICK_SETTLING,
-    SETTLING,
     settle,
     settle_missing,
     tail,
@@ -60,11 +59,27 @@ def test_the_settings_are_where_the_three_ratios_are_equal(policy, monkeypatch):
     found = settle(policy, Plant.calibrated(), {}, replace(SETTLING, evaluations=120))
     assert found.settings.height == pytest.approx(0.0, abs=0.004)
     assert found.settings.free_below == pytest.approx(-0.1, abs=0.015)
-    changed = {name: getattr(found.settings, name) for name in supervision.SETTLED}
-    assert found.settings == replace(SETTINGS, **changed)
+    changed = {name: getattr(found.settings, name) for name in SETTLED}
+    assert found.settings == replace(SETTINGS, raises=SETTLING.raises, **changed)
     assert 10 ** SETTLING.least[2] <= found.settings.reluctance <= 10 ** SETTLING.greatest[2]
     assert found.search["largest_ratio"] == pytest.approx(1.0, abs=0.02)
     assert found.search["at_bound"] == []
+
+
+def test_a_search_that_has_not_come_far_goes_on(policy, monkeypatch):
+    """The optimum of 1 at h = -0.08 and f = 0.2 is far from the start."""
+    figures = figures_by_settings(
+        lambda h, f: 1 + 5 * abs(h + 0.08), lambda h, f: 1 + 2 * abs(f - 0.2), lambda h, f: 0.9
+    )
+    monkeypatch.setattr(supervision, "_figures", figures)
+    once, twice = (
+        settle(
+            policy, Plant.calibrated(), {}, replace(SETTLING, evaluations=7, rounds=n), quiet=True
+        ).search["largest_ratio"]
+        for n in (1, 2)
+    )  # fmt: skip
+    assert once > SETTLING.again_above
+    assert twice < once
 
 
 def test_a_search_that_ends_at_a_bound_says_so(policy, monkeypatch, capsys):

@@ -1,82 +1,41 @@
-"""What training settles last: how high a policy's supervisor holds p2, and which pulses it holds back.
+"""What training settles last: how high a policy's supervisor holds p2, which pulses it holds back, and
+which it ends.
 
-A higher p2 means a smaller breakdown and a larger rms error, fewer pulses mean fewer switchings and a
-larger breakdown. The adaptive pulse, the best of the classic controllers, shows on validation episodes
-what is usual of all three. Each figure's ratio to the rival's has a 95 % interval. The three upper ends
-alone would let the policy come closer to the band's ends, so a fourth ratio bounds the excursion of the
-worst episodes. The largest of the four is minimised (an achievement scalarising function: Miettinen,
-Nonlinear Multiobjective Optimization, Kluwer 1999), as a variable that none of them may exceed: each
-ratio is smooth in the settings, their largest is not.
+A higher p2 means a smaller breakdown and a larger rms error. Fewer pulses mean fewer switchings and a
+larger breakdown, pulses that end early a smaller rms error and more switchings. The adaptive pulse, the
+best of the classic controllers, shows on validation episodes what is usual of all three. Each figure's
+ratio to the rival's has a 95 % interval. The three upper ends alone would let the policy come closer to
+the band's ends, so a fourth ratio bounds the excursion of the worst episodes. The largest of the four is
+minimised (an achievement scalarising function: Miettinen, Nonlinear Multiobjective Optimization, Kluwer
+1999), as a variable that none of them may exceed: each ratio is smooth in the settings, their largest is
+not.
 """
 
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
-from scipy.optimize import NonlinearConstraint, minimize
 from tqdm import tqdm
 
 from controllers.adaptive_pulse import REGISTRATION
 from controllers.base import Controller
 from controllers.learned import LearnedPolicy, load_policy
 from controllers.supervised import SupervisorFile, load_settings, save_settings, supervised
-from controllers.supervisor_settings import SETTINGS, SupervisorSettings
+from controllers.supervisor_settings import SupervisorSettings
 from controllers.tuned import build, load_tunings
 from epv_env.plant.consumption import MIXED
 from epv_env.plant.plantfile import Plant
 from training.evaluation.scenarios import TUNING_REGION
+from training.learners.settling_search import SETTLING, SettlingSearch, Trials, at_bounds
 from training.learners.validation import ValidationSettings, validate
-
-SETTLED = ("height", "free_below", "reluctance")
-"""The settings that are searched."""
 
 FIGURES = ("rms_bar", "event_breakdown_bar", "switchings_per_s", "excursion_bar")
 """What the settings trade against each other, as `EpisodeMetrics` calls it."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class SettlingSearch:
-    """A search of height, of the forecast that sets a pulse free, and of reluctance.
-
-    COBYLA (Powell, in: Advances in Optimization and Numerical Analysis, Kluwer 1994) follows linear
-    models of the ratios.
-    """
-
-    start: tuple[float, float, float] = (0.02, -0.07, 2.6)
-    """First height [bar], `free_below` [bar], and decimal logarithm of the reluctance [1/bar]."""
-    step: tuple[float, float, float] = (0.02, 0.03, 0.4)
-    """First change of each."""
-    least: tuple[float, float, float] = (-0.1, -0.3, -1.0)
-    """Of each."""
-    greatest: tuple[float, float, float] = (0.1, 0.3, 5.0)
-    """Of each."""
-    ratio_step: float = 0.05
-    """First change of the largest ratio [1]."""
-    evaluations: int = 14
-    """Most evaluations, 5 at least."""
-    worst_bar: float = 0.46
-    """Mean excursion of the worst hundredth of the episodes that is as bad as a ratio of 1 [bar]."""
-    validation: ValidationSettings = field(
-        default_factory=lambda: ValidationSettings(episodes=1024, duration=10.0)
-    )
-    """Episodes of an evaluation."""
-    rival: ValidationSettings = field(
-        default_factory=lambda: ValidationSettings(episodes=4096, duration=10.0)
-    )
-    """Episodes of the adaptive pulse: those of an evaluation and more."""
-
-
-SETTLING = SettlingSearch()
-QUICK_SETTLING = SettlingSearch(
-    evaluations=5, validation=ValidationSettings(episodes=8, duration=1.0),
-    rival=ValidationSettings(episodes=8, duration=1.0),
-)  # fmt: skip
-"""For --quick: too few episodes to find the best."""
 
 EPISODES: dict[str, Any] = {"scenario": MIXED, "parameters": TUNING_REGION, "threads": 1}
 """Options of the episodes for the kept policies."""
@@ -101,64 +60,39 @@ def settle(
         usual: `usual_figures` of these arguments; None: they are measured first.
         quiet: no progress bar.
     """
-    episodes = {"plant": plant, **options}
-    start, step = np.array(search.start), np.array(search.step)
-    tried: dict[SupervisorSettings, list[float]] = {}
-
-    def settings_at(place: NDArray) -> SupervisorSettings:
-        return _settings(np.clip(start + step * place[:3], search.least, search.greatest))
-
-    def excess(place: NDArray) -> NDArray:
-        """By how much each ratio exceeds the variable that bounds them (4,)."""
-        settings = settings_at(place)
-        if settings not in tried:
-            own = _figures(supervised(policy, plant, settings), search.validation, episodes)
-            tried[settings] = _ratios(own, rival, search.worst_bar)
-            bar.update()
-        return np.array(tried[settings]) - 1 - search.ratio_step * place[3]
-
-    with tqdm(total=search.evaluations, desc="supervisor", unit="trial", disable=quiet) as bar:
+    most = search.evaluations * search.rounds
+    with tqdm(total=most, desc="supervisor", unit="trial", disable=quiet) as bar:
         rival = usual_figures(plant, options, search) if usual is None else usual
-        ends = ((np.array(end) - start) / step for end in (search.least, search.greatest))
-        bounds: Any = [*zip(*ends, strict=True), (None, None)]
-        first = max(excess(np.zeros(4))) / search.ratio_step
-        minimize(
-            lambda place: place[3], [0.0, 0.0, 0.0, first], method="COBYLA",
-            constraints=NonlinearConstraint(excess, -np.inf, 0.0),
-            bounds=bounds, options={"maxiter": search.evaluations + 1, "tol": 0.05},
-        )  # fmt: skip
-    best = min(tried, key=lambda settings: max(tried[settings]))
-    ended = _at_bounds(best, search)
+
+        def ratios(settings: SupervisorSettings) -> list[float]:
+            own = _figures(
+                supervised(policy, plant, settings), search.validation, {"plant": plant, **options}
+            )
+            bar.update()
+            return _ratios(own, rival, search.worst_bar)
+
+        trials = Trials(ratios, search)
+        for _ in range(search.rounds):
+            trials.search_on()
+            if trials.largest(trials.best) <= search.again_above:
+                break
+    best = trials.best
+    ended = at_bounds(best, search)
     if ended:
         tqdm.write(
-            f"supervisor of {policy.name!r}: the search of {', '.join(ended)} ended at a bound, so "
-            "better settings may lie beyond: widen SettlingSearch (training/learners/supervision.py)",
+            f"supervisor of {policy.name!r}: the search of {', '.join(ended)} ended at a bound, "
+            "so better settings may lie beyond: widen SettlingSearch "
+            "(training/learners/settling_search.py)",
             file=sys.stderr,
         )
-    how = {**asdict(search), "largest_ratio": max(tried[best]), "at_bound": ended}
+    how = {**asdict(search), "largest_ratio": trials.largest(best), "at_bound": ended}
     return SupervisorFile(settings=best, search=how)
-
-
-def _at_bounds(settings: SupervisorSettings, search: SettlingSearch) -> list[str]:
-    """Names of the settings that ended within a thousandth of their range from one of its ends."""
-    at = np.array([settings.height, settings.free_below, np.log10(settings.reluctance)])
-    near = 1e-3 * np.subtract(search.greatest, search.least)
-    beyond = (at < search.least + near) | (at > search.greatest - near)
-    return [name for name, ended in zip(SETTLED, beyond, strict=True) if ended]
 
 
 def usual_figures(plant: Plant, options: dict[str, Any], search: SettlingSearch = SETTLING) -> NDArray:
     """FIGURES of the tuned adaptive pulse in each episode (4, n); arguments as those of `settle`."""
     rival = build(REGISTRATION.kind, load_tunings()[REGISTRATION.kind].values, plant)
     return _figures(rival, search.rival, {"plant": plant, **options})
-
-
-def _settings(at: NDArray) -> SupervisorSettings:
-    height, free_below, magnitude = map(float, at)
-    return replace(
-        SETTINGS, height=round(height, 4), free_below=round(free_below, 4),
-        reluctance=round(10**magnitude, 1),
-    )  # fmt: skip
 
 
 def _figures(controller: Controller, validation: ValidationSettings, options: dict[str, Any]) -> NDArray:
