@@ -19,13 +19,13 @@ class BreakdownMemory:
     again after the supply failed.
     """
 
-    def __init__(self, *, lasts: float, control_period: float):
+    def __init__(self, *, memory_time: float, control_period: float):
         """
         Args:
-            lasts: time in which a shortfall is forgotten by 1/e [s].
+            memory_time: time in which the memory of a shortfall fades by 1/e [s].
             control_period: [s].
         """
-        self._fading = np.exp(-control_period / lasts)
+        self._fading = np.exp(-control_period / memory_time)
         self.reset(0)
 
     def reset(self, n: int) -> None:

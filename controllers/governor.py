@@ -26,7 +26,7 @@ ERROR = INDEX["p2_error"]
 SLOW = 0.1
 """Reserve from which a valve is so slow that no pulse may wait [bar]."""
 DEEP = 0.1
-"""How far a breakdown exceeds a near miss from which no pulse may wait [bar]."""
+"""Breakdown beyond `near_miss` from which no pulse may wait [bar]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +64,9 @@ class Governor:
         self._learner = ValveLearner(
             table, filter_time=settings.filter_time, control_period=control_period
         )
-        self._breakdowns = BreakdownMemory(lasts=settings.remembers, control_period=control_period)
+        self._breakdowns = BreakdownMemory(
+            memory_time=settings.memory_time, control_period=control_period
+        )
         self.reset(0)
 
     def reset(self, n: int) -> None:
@@ -115,7 +117,7 @@ class Governor:
             too_deep: by how much the deepest breakdown lately exceeds a near miss (n,) [bar].
         """
         settings = self._settings
-        higher = settings.height + settings.share * reserve + settings.raises * too_deep
+        higher = settings.height + settings.share * reserve + settings.near_miss_share * too_deep
         return np.where(valve.fed, higher, 0.0)
 
     def _margin(self, valve: LearntValve, reserve: NDArray, too_deep: NDArray) -> NDArray:

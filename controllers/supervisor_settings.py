@@ -11,7 +11,8 @@ class SupervisorSettings:
     """How a supervisor corrects its policy.
 
     Training settles `height`, `free_below`, `reluctance` and `ceiling` for each policy, and sets
-    `raises` (training/learners/supervision.py). The others were chosen by hand on development episodes.
+    `near_miss_share` (training/learners/supervision.py). The others were chosen by hand on development
+    episodes.
     """
 
     height: float = 0.0
@@ -23,12 +24,12 @@ class SupervisorSettings:
     """For each bar of the forecast above that, by how much the policy's logit of switching off must
     exceed that of leaving on before a pulse begins [1/bar]: such a pulse is needed only if it is wanted
     clearly."""
-    raises: float = 0.0
+    near_miss_share: float = 0.0
     """Share of a breakdown beyond `near_miss` by which p2 is held higher afterwards [1]."""
     near_miss: float = 0.25
     """Breakdown below the target from which p2 is held higher and pulses are held back less [bar]."""
-    remembers: float = 60.0
-    """Time in which such a breakdown is forgotten by 1/e [s]."""
+    memory_time: float = 60.0
+    """Time in which the memory of a breakdown fades by 1/e [s]."""
     share: float = 0.5
     """Share of the reserve that a valve needs beyond that [1]: the policy keeps some by itself."""
     tolerated: float = TOLERATED
@@ -50,12 +51,20 @@ class SupervisorSettings:
         for name in ("height", "free_below"):
             if not abs(value := getattr(self, name)) <= BAND_BAR:
                 raise ValueError(f"{name} = {value:g} bar: give one within ±{BAND_BAR:g} bar")
-        for name in ("reluctance", "raises", "near_miss", "share", "wariness", "doubt", "horizon"):
+        for name in (
+            "reluctance",
+            "near_miss_share",
+            "near_miss",
+            "share",
+            "wariness",
+            "doubt",
+            "horizon",
+        ):
             if not 0 <= getattr(self, name) < float("inf"):
                 raise ValueError(f"{name} = {getattr(self, name):g}: give a number from 0")
         if not 0 < self.confidence < 1:
             raise ValueError(f"confidence = {self.confidence:g}: give a number between 0 and 1")
-        for name in ("remembers", "filter_time"):
+        for name in ("memory_time", "filter_time"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} = {getattr(self, name):g} s: give a positive time")
 

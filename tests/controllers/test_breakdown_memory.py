@@ -8,9 +8,9 @@ from controllers.breakdown_memory import BreakdownMemory
 FED = np.ones(1, dtype=bool)
 
 
-def memory(lasts: float = 60.0) -> BreakdownMemory:
+def memory(memory_time: float = 60.0) -> BreakdownMemory:
     """Of one circuit."""
-    remembered = BreakdownMemory(lasts=lasts, control_period=5e-3)
+    remembered = BreakdownMemory(memory_time=memory_time, control_period=5e-3)
     remembered.reset(1)
     return remembered
 
@@ -29,7 +29,7 @@ def test_the_way_up_to_the_target_is_no_breakdown():
 
 def test_the_largest_shortfall_is_kept_and_fades():
     assert deepest(memory(), 0.0, -0.4, -0.1, 0.2) == pytest.approx(0.4, rel=1e-3)
-    assert deepest(memory(lasts=1.0), 0.0, -0.4, *[0.0] * 200) == pytest.approx(0.4 / np.e)
+    assert deepest(memory(memory_time=1.0), 0.0, -0.4, *[0.0] * 200) == pytest.approx(0.4 / np.e)
 
 
 def test_a_shortfall_counts_as_that_of_the_band_at_most():
@@ -44,7 +44,7 @@ def test_what_a_missing_supply_causes_does_not_count():
 
 
 def test_circuits_are_forgotten_one_by_one():
-    remembered = BreakdownMemory(lasts=60.0, control_period=5e-3)
+    remembered = BreakdownMemory(memory_time=60.0, control_period=5e-3)
     remembered.reset(2)
     fed = np.ones(2, dtype=bool)
     remembered.observe(np.zeros(2), fed)

@@ -100,8 +100,8 @@ def test_the_policy_is_shown_a_p2_that_is_lower_by_the_shift():
         ({"free_below": -0.7}, "free_below = -0.7 bar"), ({"reluctance": -1.0}, "reluctance = -1"),
         ({"share": -1.0}, "share = -1"), ({"filter_time": 0.0}, "filter_time = 0 s"),
         ({"confidence": 1.0}, "confidence = 1"), ({"horizon": -0.1}, "horizon = -0.1"),
-        ({"raises": -0.1}, "raises = -0.1"), ({"near_miss": -0.1}, "near_miss = -0.1"),
-        ({"remembers": 0.0}, "remembers = 0 s"),
+        ({"near_miss_share": -0.1}, "near_miss_share = -0.1"), ({"near_miss": -0.1}, "near_miss = -0.1"),
+        ({"memory_time": 0.0}, "memory_time = 0 s"),
     ],
 )  # fmt: skip
 def test_settings_without_a_meaning_are_refused(settings, words):
@@ -154,7 +154,7 @@ def test_after_a_near_miss_no_pulse_waits():
 
 def test_after_a_near_miss_p2_is_held_higher():
     main = Recorder()
-    control = supervisor(main, raises=0.5, near_miss=0.2, tolerated=10.0)
+    control = supervisor(main, near_miss_share=0.5, near_miss=0.2, tolerated=10.0)
     control.reset(3)
     control.act(at_rest())
     control.act(at_rest(p2_error=[-0.1, -0.3, -0.4], action=0.0, p3=1.0))  # open: p2 is not filtered

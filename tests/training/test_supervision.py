@@ -60,7 +60,7 @@ def test_the_settings_are_where_the_three_ratios_are_equal(policy, monkeypatch):
     assert found.settings.height == pytest.approx(0.0, abs=0.004)
     assert found.settings.free_below == pytest.approx(-0.1, abs=0.015)
     changed = {name: getattr(found.settings, name) for name in SETTLED}
-    assert found.settings == replace(SETTINGS, raises=SETTLING.raises, **changed)
+    assert found.settings == replace(SETTINGS, near_miss_share=SETTLING.near_miss_share, **changed)
     assert 10 ** SETTLING.least[2] <= found.settings.reluctance <= 10 ** SETTLING.greatest[2]
     assert found.search["largest_ratio"] == pytest.approx(1.0, abs=0.02)
     assert found.search["at_bound"] == []

@@ -40,8 +40,8 @@ class SettlingSearch:
     """Most rounds."""
     again_above: float = 1.05
     """Largest ratio above which another round begins, at the best settings so far."""
-    raises: float = 0.3
-    """`SupervisorSettings.raises`, which is not searched [1]."""
+    near_miss_share: float = 0.3
+    """`SupervisorSettings.near_miss_share`, which is not searched [1]."""
     worst_bar: float = 0.46
     """Mean excursion of the worst hundredth of the episodes that is as bad as a ratio of 1 [bar]."""
     validation: ValidationSettings = field(
@@ -89,7 +89,7 @@ class Trials:
         """Largest ratio of settings that were tried."""
         return max(self._ratios[settings])
 
-    def search_on(self) -> None:
+    def run_round(self) -> None:
         """A round of the search, from the best settings so far."""
         search, first = self._search, self._places[self.best].copy()
         first[-1] = (self.largest(self.best) - 1) / search.ratio_step
@@ -105,7 +105,7 @@ class Trials:
         """By how much each ratio exceeds the variable that bounds them (4,)."""
         search = self._search
         at = np.clip(self._start + self._step * place[:-1], search.least, search.greatest)
-        settings = _settings(at, search.raises)
+        settings = _settings(at, search.near_miss_share)
         if settings not in self._ratios:
             self._ratios[settings] = self._measure(settings)
             self._places[settings] = place.copy()
@@ -121,9 +121,9 @@ def at_bounds(settings: SupervisorSettings, search: SettlingSearch) -> list[str]
     return [name for name, ended in zip(SETTLED, beyond, strict=True) if ended]
 
 
-def _settings(at: NDArray, raises: float) -> SupervisorSettings:
+def _settings(at: NDArray, near_miss_share: float) -> SupervisorSettings:
     height, free_below, magnitude, ceiling = map(float, at)
     return replace(
         SETTINGS, height=round(height, 4), free_below=round(free_below, 4),
-        reluctance=round(10**magnitude, 1), ceiling=round(ceiling, 4), raises=raises,
+        reluctance=round(10**magnitude, 1), ceiling=round(ceiling, 4), near_miss_share=near_miss_share,
     )  # fmt: skip

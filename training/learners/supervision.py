@@ -60,8 +60,7 @@ def settle(
         usual: `usual_figures` of these arguments; None: they are measured first.
         quiet: no progress bar.
     """
-    most = search.evaluations * search.rounds
-    with tqdm(total=most, desc="supervisor", unit="trial", disable=quiet) as bar:
+    with tqdm(total=search.evaluations, desc="supervisor", unit="trial", disable=quiet) as bar:
         rival = usual_figures(plant, options, search) if usual is None else usual
 
         def ratios(settings: SupervisorSettings) -> list[float]:
@@ -72,10 +71,12 @@ def settle(
             return _ratios(own, rival, search.worst_bar)
 
         trials = Trials(ratios, search)
-        for _ in range(search.rounds):
-            trials.search_on()
+        trials.run_round()
+        for _ in range(1, search.rounds):
             if trials.largest(trials.best) <= search.again_above:
                 break
+            bar.total += search.evaluations
+            trials.run_round()
     best = trials.best
     ended = at_bounds(best, search)
     if ended:
