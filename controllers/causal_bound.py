@@ -99,6 +99,8 @@ class CausalBound:
         valves, owner = self._valves, self._owner
         for own, true in zip(valves.state, task.valves.state, strict=True):
             own[:] = true[owner]
+        for name in ("acting_U", "delay_left"):  # of a coil that follows its command late
+            valves.memory[name][: valves.n] = task.valves.memory[name][owner]
         target, coil = task.target[owner], task.coil[owner]
         delivery = np.array([supply.delivery for supply in task.supplies]) * task.compressor
         valves.inputs.refill[:] = delivery[owner]

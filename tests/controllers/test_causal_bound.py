@@ -76,6 +76,21 @@ def test_it_does_not_disturb_what_it_watches():
     np.testing.assert_array_equal(rewards[:20], rewards[20:])
 
 
+@pytest.mark.parametrize("delay", [0.0, 8e-3])
+def test_a_trial_of_one_period_ends_where_the_plant_does(delay):
+    """Even while the coil still has its former voltage."""
+    effects = {"command_delay": {"t_delay": delay}} if delay else None
+    env = EPValveVectorEnv(1, autoreset_mode="Disabled", threads=1, scenario="none", effects=effects)
+    observation, _ = env.reset(seed=3)
+    bound = CausalBound(draws=1, horizon=1)
+    bound.watch(env.task)
+    for action in (0, 0, 0, 0, 1, 1, 1):
+        bound.act(observation)
+        env.task.step(*env.action.decode(np.array([action])))
+        assert bound._valves.state.p3[action] == env.task.valves.state.p3[0]
+        assert bound._valves.state.I[action] == env.task.valves.state.I[0]
+
+
 def test_it_has_to_watch():
     with pytest.raises(ValueError, match="call watch"):
         CausalBound().act(np.zeros((1, 13)))
