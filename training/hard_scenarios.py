@@ -57,6 +57,10 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         "--scenarios", nargs="+", default=known, metavar="NAME", help="only these; default: all"
     )
     parser.add_argument("--episodes", type=int, default=256, help="of each scenario and controller")
+    parser.add_argument(
+        "--seeds", type=int, nargs="+", default=None, metavar="SEED",
+        help="the episodes with these seeds instead, as `left_seeds` of an earlier result names them",
+    )  # fmt: skip
     parser.add_argument("--plant", default=None, help="plant file; default: the report's calibration")
     parser.add_argument(
         "--p3-check", action="store_true",
@@ -66,6 +70,9 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     check_positive(parser, chosen, "episodes")
     if chosen.episodes > VALIDATION_SEED - EVALUATION_SEED:
         parser.error(f"--episodes must be at most {VALIDATION_SEED - EVALUATION_SEED}")
+    for seed in chosen.seeds or ():
+        if not EVALUATION_SEED <= seed < VALIDATION_SEED:
+            parser.error(f"--seeds: {seed} is none from {EVALUATION_SEED} to {VALIDATION_SEED - 1}")
     if unknown := [name for name in chosen.scenarios if name not in known]:
         parser.error(f"no scenario {unknown[0]!r}: choose from {', '.join(known)}")
     return chosen
@@ -87,11 +94,11 @@ def main(arguments: list[str] | None = None) -> int:
     if chosen.p3_check:
         controllers = {label: p3_checked(each, plant) for label, each in controllers.items()}
     study = Study(controllers=controllers, plant=plant, scenario=MIXED, duration=10.0)
-    seeds = range(EVALUATION_SEED, EVALUATION_SEED + chosen.episodes)
+    seeds = chosen.seeds or range(EVALUATION_SEED, EVALUATION_SEED + chosen.episodes)
     count = len(scenarios) * len(controllers)
     found = list(tqdm(rows(study, scenarios, seeds), total=count, file=sys.stderr))
     content = {
-        "format": FORMAT, "plant": plant.name, "episodes": chosen.episodes, "controllers": digests,
+        "format": FORMAT, "plant": plant.name, "episodes": len(seeds), "controllers": digests,
         "scenarios": {name: scenario.meaning for name, scenario in scenarios.items()}, "rows": found,
     }  # fmt: skip
     write_json(chosen.out / RESULT, content, allow_nan=False)

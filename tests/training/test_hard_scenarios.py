@@ -119,6 +119,24 @@ def test_the_command_writes_a_table(tmp_path, capsys):
     assert "restart" in capsys.readouterr().out
 
 
+def test_the_episodes_that_left_are_named_and_leave_again(tmp_path):
+    """It leaves in some of six episodes; those alone leave in a second run."""
+    rows = []
+    for chosen in (["--episodes", "6"], ["--seeds"]):
+        seeds = [str(seed) for row in rows for seed in row["left_seeds"]]
+        scenario = ["--scenarios", "target steps", "--controllers", "hysteresis, extrapolating"]
+        assert hard_scenarios.main(["--out", str(tmp_path), *scenario, *chosen, *seeds]) == 0
+        rows = json.loads((tmp_path / hard_scenarios.RESULT).read_text())["rows"]
+    assert 0 < len(rows[0]["left_seeds"]) < 6
+    assert rows[0]["episodes"] == len(rows[0]["left_seeds"])
+
+
+def test_only_evaluation_seeds_are_taken(tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        hard_scenarios.parse(["--out", str(tmp_path), "--seeds", "7"])
+    assert "--seeds: 7 is none from 2000000 to 2999999" in capsys.readouterr().err
+
+
 def test_the_command_names_an_unknown_scenario(tmp_path, capsys):
     with pytest.raises(SystemExit):
         hard_scenarios.parse(["--out", str(tmp_path), "--scenarios", "no such"])

@@ -3,6 +3,8 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from controllers.base import Privileged
 from epv_env.plant.effects.registry import EFFECTS
 from epv_env.reward import REFERENCE_PERIOD
@@ -14,6 +16,8 @@ from training.studies.episode_tasks import Study
 
 SIDE_BY_SIDE = 1000
 """Episodes that are run together."""
+LISTED = 100
+"""Episodes that leave the band are named up to this many."""
 
 
 def worn_scenarios() -> dict[str, HardScenario]:
@@ -55,8 +59,13 @@ def run_scenario(
 def rows(
     study: Study, scenarios: Mapping[str, HardScenario], seeds: Sequence[int]
 ) -> Iterator[dict[str, Any]]:
-    """`summary` of each scenario under each controller, as it is finished."""
+    """`summary` of each scenario under each controller, as it is finished, and whose episodes left.
+
+    `left_seeds` are the seeds of the first `LISTED` episodes that left the band.
+    """
     for name, scenario in scenarios.items():
         for label in study.controllers:
             metrics = run_scenario(study, label, scenario, seeds)
-            yield {"scenario": name, "controller": label, **summary(metrics)}
+            left = np.array(seeds)[~metrics.stayed][:LISTED]
+            found = {"scenario": name, "controller": label, **summary(metrics)}
+            yield {**found, "left_seeds": left.tolist()}
