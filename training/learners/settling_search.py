@@ -28,7 +28,7 @@ class SettlingSearch:
     [bar]."""
     step: tuple[float, float, float, float] = (0.02, 0.03, 0.4, 0.03)
     """First change of each."""
-    least: tuple[float, float, float, float] = (-0.1, -0.3, -1.0, 0.05)
+    least: tuple[float, float, float, float] = (-0.1, -0.5, -1.0, 0.05)
     """Of each."""
     greatest: tuple[float, float, float, float] = (0.1, 0.3, 5.0, 0.4)
     """Of each."""
