@@ -4,8 +4,9 @@ A learner of the valve (controllers/valve_learner.py) estimates how long the val
 low p2 will be then, and how far a pulse under way may still raise p2. The governor moves the policy's
 setpoint by the first (a reference governor: Garone, Di Cairano and Kolmanovsky, Automatica 75 (2017)),
 holds back needless pulses by the second, and ends pulses by the third. A pulse of a valve that is hardly
-known ends before it may rise too far, so the first pulses probe when the valve opens. After a near miss,
-a breakdown deep into the band, p2 is held higher and fewer pulses are held back.
+known ends before it may rise too far, so the first pulses probe when the valve opens; in an emergency
+that nears the band's lower end none is ended. After a near miss, a breakdown deep into the band, p2 is
+held higher and fewer pulses are held back.
 """
 
 from collections.abc import Iterator
@@ -27,6 +28,14 @@ SLOW = 0.1
 """Reserve from which a valve is so slow that no pulse may wait [bar]."""
 DEEP = 0.1
 """Breakdown beyond `near_miss` from which no pulse may wait [bar]."""
+LARGE = 0.4
+"""Rise from which the gain is doubted more, twice as much at double this rise: small pulses do not tell
+how long a valve stays open whose control chamber is empty [bar]."""
+URGENT_DEPTH = 0.35
+"""Shortfall from which no pulse is ended while p2 falls faster than `URGENT_FALL` [bar]: the band's end
+is near, and a valve that opens later than feared would lose the time to vent again."""
+URGENT_FALL = 1.0
+"""[bar/s]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,10 +138,12 @@ class Governor:
 
     def _must_shut(self, valve: LearntValve) -> NDArray:
         """Whether the coil has to be on, bool (n,): no supply, a pulse that would rise too far, or one
-        that was ended for this and is not measured yet, since nothing new is known about the valve."""
+        that was ended for this and is not measured yet, since nothing new is known about the valve.
+        In an emergency that nears the band's lower end no pulse is ended."""
         too_far = self._rises_too_far(valve)
         self._ended = (self._ended & self._learner.measuring) | (too_far & ~valve.on)
-        return ~valve.fed | too_far | self._ended
+        urgent = (valve.error < -URGENT_DEPTH) & (valve.fall < -URGENT_FALL)
+        return ~valve.fed | ((too_far | self._ended) & ~urgent)
 
     def _rises_too_far(self, valve: LearntValve) -> NDArray:
         """Whether p2 passes the ceiling if the valve opens early and stays open for a period (n,)."""
@@ -142,9 +153,10 @@ class Governor:
         p3 = valve.p3 * np.where(valve.on, 1.0, np.exp(-fall_of_log_p3))
         may_be_open = early.time_to_open(valve.p1, valve.p2, p3) <= 0
         who = np.flatnonzero(valve.fed & may_be_open)
-        gain = valve.gain[who] + settings.doubt * valve.gain_deviation[who]
-        rise = gain * early.of(who).gained_at_once(valve.p1[who], valve.p2[who], p3[who])
-        highest = valve.error[who] + valve.fall[who] * settings.horizon + rise
+        rise = early.of(who).gained_at_once(valve.p1[who], valve.p2[who], p3[who])
+        doubt = settings.doubt * (1 + np.clip(rise / LARGE - 1, 0.0, 1.0))
+        gain = valve.gain[who] + doubt * valve.gain_deviation[who]
+        highest = valve.error[who] + valve.fall[who] * settings.horizon + gain * rise
         too_far = np.zeros(len(p3), dtype=bool)
         too_far[who] = highest > settings.ceiling
         return too_far

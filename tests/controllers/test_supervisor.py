@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from controllers.governor import LARGE
 from controllers.hysteresis import Hysteresis
 from controllers.learned import TRAINED, load_policy
 from controllers.privileged_pulse import PrivilegedPulse
@@ -181,7 +182,7 @@ def test_a_valve_that_the_supply_cannot_feed_is_kept_shut():
 def test_a_pulse_that_would_rise_beyond_the_ceiling_ends():
     control = supervisor(Recorder())
     control.reset(3)
-    open_valves = at_rest(p3=1.5, action=0.0, p2_error=[-3.0, -0.2, 0.2])
+    open_valves = at_rest(p3=1.5, action=0.0, p2_error=[-4.5, -0.2, 0.2])
     assert control.act(open_valves).tolist() == [0, 1, 1]
 
 
@@ -208,6 +209,32 @@ def test_an_emergency_goes_on_where_the_same_p2_at_rest_would_end_the_pulse():
         falling = -0.3 + 0.015 * (9 - k)
         control.act(at_rest(p2_error=[falling, -0.3, -0.3]))
     assert control.act(at_rest(p2_error=-0.3, p3=6.7, action=0.0)).tolist() == [0, 1, 1]
+
+
+def test_in_an_emergency_near_the_end_of_the_band_no_pulse_is_ended():
+    """p2 falls by 15 mbar a period, or stands still, until it is 0.3 or 0.4 bar below the target."""
+    control = supervisor(Recorder(), ceiling=-0.3, horizon=0.0)
+    control.reset(3)
+    for k in range(10):
+        above = 0.015 * (9 - k)
+        control.act(at_rest(p2_error=[above - 0.4, -0.4, above - 0.3]))
+    assert control.act(at_rest(p2_error=[-0.4, -0.4, -0.3], p3=6.0, action=0.0)).tolist() == [0, 1, 1]
+
+
+def test_a_large_rise_is_doubted_twice_as_much(monkeypatch):
+    """A vented valve closes late: with the usual doubt of a gain, the rise would end at the ceiling."""
+    probe = supervisor(Recorder()).governor._learner
+    probe.reset(3)
+    valve = probe.observe(at_rest(p3=1.0, action=0.0, p2_error=-3.0))
+    rise = probe.earliest(0.95).gained_at_once(valve.p1, valve.p2, valve.p3)[0]
+    usual = 1.0 + 2.0 * valve.gain_deviation[0]
+    assert rise > 2 * LARGE
+    reading = at_rest(p3=1.0, action=0.0, p2_error=-3.0)
+    for large, action in ((LARGE, 1), (100.0, 0)):
+        monkeypatch.setattr("controllers.governor.LARGE", large)
+        control = supervisor(Recorder(), ceiling=usual * rise - 3.0 + 0.1)
+        control.reset(3)
+        assert np.all(control.act(reading) == action)
 
 
 def test_a_pulse_that_was_ended_is_measured_before_the_next_one():
