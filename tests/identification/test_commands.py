@@ -2,6 +2,7 @@
 
 import json
 import re
+from functools import partial
 from typing import Any
 
 import gymnasium
@@ -13,7 +14,10 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import load_plant
 from identification.__main__ import main
 from identification.calibration import multi_start as starts
+from identification.commands import campaign_options
+from identification.pipeline.settings import IdentificationSettings
 from identification.recordings.campaign_files import read_campaign
+from identification.sensitivity.settings import SensitivitySettings
 from tests.identification.browser import DESK, PHONE, box, check_layout, opened
 
 
@@ -29,9 +33,13 @@ def campaign(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def finished(campaign, tmp_path_factory):
-    """A folder in which `run` has worked on it."""
+    """A folder in which `run` has worked on it; with few valves, on which only the indices depend."""
     out = tmp_path_factory.mktemp("run")
-    assert main(["run", str(campaign), "--out", str(out), "--starts", "2"]) == 0
+    few = SensitivitySettings(trajectories=4, samples=16, scatter_points=3)
+    short = partial(IdentificationSettings, sensitivity=few)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(campaign_options, "IdentificationSettings", short)
+        assert main(["run", str(campaign), "--out", str(out), "--starts", "2"]) == 0
     return out
 
 

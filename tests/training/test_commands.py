@@ -4,6 +4,9 @@ import json
 import shutil
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
+from functools import partial
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -13,15 +16,19 @@ from controllers.learned import TRAINED, load_policy
 from controllers.registry import SIMULATING_KINDS
 from controllers.supervised import load_settings
 from controllers.tuned import load_tunings
+from epv_env.common.command_line import fail_clearly
 
 pytest.importorskip("stable_baselines3")
+from training import tradeoff, train_ppo, tune
 from training.learners.policy_files import save_policy
+from training.learners.policy_folders import Training
 from training.learners.student import Student, policy_of
-from training.tradeoff import finished_variants
 
 pytestmark = pytest.mark.training
 
 ROOT = Path(__file__).parents[2]
+SHORT = ("--quick", "--timesteps", 16384, "--episodes", 4, "--duration", 0.55)
+"""A training and an evaluation that are shorter than those of --quick."""
 WRITTEN = (
     "checkpoint.zip", "config.json", "episode.png", "excursions.png", "learning_curve.csv",
     "learning_curve.png", "model.zip", "policy.json", "policy.safetensors", "table.csv", "table.json",
@@ -37,10 +44,21 @@ def command(*arguments, script="training/train_ppo.py"):
     )  # fmt: skip
 
 
+def command_here(*arguments, script=train_ppo):
+    """The same without a new interpreter, which takes seconds to import torch."""
+    words, out, errors = [str(argument) for argument in arguments], StringIO(), StringIO()
+    with redirect_stdout(out), redirect_stderr(errors):
+        try:
+            status = fail_clearly(lambda: script.main(words))
+        except SystemExit as refusal:  # argparse's
+            status = int(refusal.code or 0)
+    return subprocess.CompletedProcess(words, status, out.getvalue(), errors.getvalue())
+
+
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
     out = tmp_path_factory.mktemp("run")
-    result = command("--quick", "--no-memory", "--out", out)
+    result = command(*SHORT, "--no-memory", "--out", out)
     assert result.returncode == 0, result.stderr
     return out, result
 
@@ -58,7 +76,7 @@ def test_the_short_run_writes_everything_and_prints_the_table(finished):
 def test_a_run_resumes_from_its_checkpoint(finished):
     out, _ = finished
     before = (out / "learning_curve.csv").read_text().splitlines()
-    result = command("--quick", "--no-memory", "--out", out, "--resume")
+    result = command_here(*SHORT, "--no-memory", "--out", out, "--resume")
     assert result.returncode == 0, result.stderr
     assert (out / "learning_curve.csv").read_text().splitlines()[: len(before)] == before
 
@@ -74,7 +92,7 @@ def test_a_run_has_one_identity_in_all_that_it_writes(finished):
 def test_a_finished_run_is_not_overwritten_unasked(finished):
     out, _ = finished
     before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
-    result = command("--quick", "--no-memory", "--out", out, "--seed", "5")
+    result = command_here("--quick", "--no-memory", "--out", out, "--seed", "5")
     assert (result.returncode, result.stderr.count("\n")) == (2, 1)
     assert "holds a finished training: give --force to replace it" in result.stderr
     assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
@@ -87,7 +105,7 @@ def test_a_resumed_run_never_hands_out_another_runs_policy(finished, tmp_path):
     config["run"], config["options"]["seed"] = "0" * 32, 5
     (tmp_path / "config.json").write_text(json.dumps(config))
     shutil.copy(out / "checkpoint.zip", tmp_path)
-    result = command("--quick", "--no-memory", "--out", tmp_path, "--resume", "--seed", "5")
+    result = command_here("--quick", "--no-memory", "--out", tmp_path, "--resume", "--seed", "5")
     assert (result.returncode, result.stderr.count("\n")) == (2, 1)
     assert "belongs to the training run" in result.stderr
     assert {path.name for path in tmp_path.iterdir()} == {"config.json", "checkpoint.zip"}
@@ -95,18 +113,18 @@ def test_a_resumed_run_never_hands_out_another_runs_policy(finished, tmp_path):
 
 
 def test_a_policy_with_a_memory_is_trained_in_the_short_form_too(tmp_path):
-    result = command("--quick", "--no-end-to-end", "--timesteps", "16384", "--out", tmp_path)
+    result = command_here(*SHORT, "--no-end-to-end", "--out", tmp_path)
     assert result.returncode == 0, result.stderr
     assert "PPO, recurrent, supervised" in result.stdout
     assert load_settings(tmp_path) is not None
     assert json.loads((tmp_path / "policy.json").read_text())["memory"]["unit"] == "GRU"
-    result = command("--quick", "--no-memory", "--out", tmp_path, "--resume")
+    result = command_here("--quick", "--no-memory", "--out", tmp_path, "--resume")
     assert "was trained with memory True, not False" in result.stderr
 
 
 def test_a_memory_is_trained_end_to_end(tmp_path):
-    where = ("--quick", "--timesteps", "16384", "--out", tmp_path)
-    result = command(*where)
+    where = (*SHORT, "--out", tmp_path)
+    result = command_here(*where)
     assert result.returncode == 0, result.stderr
     learned, student = (load_policy(folder) for folder in (tmp_path, tmp_path / "student"))
     assert learned.cell is not None
@@ -114,7 +132,7 @@ def test_a_memory_is_trained_end_to_end(tmp_path):
     assert learned.cells == student.cells == 32
     assert learned.name == "PPO, end to end"
     assert not np.array_equal(learned.cell.weight_memory, student.cell.weight_memory)
-    again = command(*where, "--resume", "--no-end-to-end")
+    again = command_here(*where, "--resume", "--no-end-to-end")
     assert "was trained with end_to_end True, not False" in again.stderr
 
 
@@ -141,7 +159,7 @@ def test_resuming_with_another_seed_is_refused(finished):
 def test_wrong_input_gets_one_sentence_and_leaves_nothing(arguments, words, tmp_path):
     out = tmp_path / "out"
     where = [] if "--out" in arguments else ["--out", out]
-    result = command("--quick", *arguments, *where)
+    result = command_here("--quick", *arguments, *where)
     assert result.returncode == 2
     assert words in result.stderr
     assert "Traceback" not in result.stderr
@@ -157,9 +175,9 @@ def test_tuning_in_its_shortest_form(tmp_path):
     assert json.loads(out.read_text())["search"]["trials"] == 2
 
 
-@pytest.mark.parametrize("script", ["training/tune.py", "training/tradeoff.py"])
+@pytest.mark.parametrize("script", [tune, tradeoff])
 def test_tuning_without_a_trial_is_refused(script, tmp_path):
-    result = command("--trials", 0, "--out", tmp_path / "out", script=script)
+    result = command_here("--trials", 0, "--out", tmp_path / "out", script=script)
     assert result.returncode == 2
     assert "--trials must be positive" in result.stderr
     assert not (tmp_path / "out").exists()
@@ -184,23 +202,29 @@ def save_recurrent(student, folder):
         save_policy(student, kept, control_period=5e-3, provenance={})
 
 
-def test_the_tradeoff_in_its_shortest_form_keeps_what_is_done(tmp_path):
+def test_the_tradeoff_in_its_shortest_form_keeps_what_is_done(tmp_path, monkeypatch):
+    """In this process: the command has no short form, and its trainings are long."""
+    monkeypatch.setattr(tradeoff, "Training", partial(Training, unusual=train_ppo.QUICK_HYPERPARAMETERS))
     student = policy_of(Student(memory=4, width=64))
     save_recurrent(student, tmp_path / "memory")
-    short = ("--recurrent", tmp_path / "memory", "--prices", 0.2, "--timesteps", 16384, "--trials", 1)
-    script = "training/tradeoff.py"
-    first = command(*short, "--out", tmp_path, script=script)
+
+    def run(trials):
+        options = ("--recurrent", tmp_path / "memory", "--prices", 0.2, "--timesteps", 16384,
+                   "--trials", trials, "--workers", 1, "--out", tmp_path)  # fmt: skip
+        return command_here(*options, script=tradeoff)
+
+    first = run(trials=1)
     assert first.returncode == 0, first.stderr
     folder = tmp_path / "price-0.2"
-    variants = {next(iter(each.runs)) for each in finished_variants(tmp_path)}
+    variants = {next(iter(each.runs)) for each in tradeoff.finished_variants(tmp_path)}
     assert variants == {
         f"{name}, price 0.2" for name in ("PPO", "PPO, recurrent", "hysteresis, extrapolating")
     }
     written = ("policy.safetensors", "tuned.json", "recurrent/policy.safetensors")
     before = [(folder / name).read_bytes() for name in written]
     assert json.loads(before[1])["search"]["switching_price"] == 0.2
-    assert command(*short, "--out", tmp_path, script=script).returncode == 0
+    assert run(trials=1).returncode == 0
     assert [(folder / name).read_bytes() for name in written] == before
-    other = command(*short[:-1], 2, "--out", tmp_path, script=script)
+    other = run(trials=2)
     assert other.returncode == 2
     assert "choose another --out" in other.stderr

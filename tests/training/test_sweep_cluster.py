@@ -38,14 +38,14 @@ def cluster(tmp_path):
 def test_a_lost_worker_changes_nothing(cluster, tmp_path):
     address, workers = cluster
     policy = write_policy(tmp_path / "policy")
-    chosen = ("--controllers", "hysteresis, extrapolating", f"P={policy}")
+    chosen = ("--controllers", f"P={policy}")
     alone = sweep(tmp_path / "alone", *chosen, "--workers", 1)
     out = tmp_path / "together"
     process = sweep_process(out, *chosen, "--cluster", address)
-    while len(finished(out)) < 4 and process.poll() is None:
+    while not finished(out) and process.poll() is None:
         time.sleep(0.02)
     workers[0].kill()
-    in_the_middle = len(finished(out)) < 2 * TASKS
+    in_the_middle = len(finished(out)) < TASKS
     try:
         _, errors = process.communicate(timeout=600)
     finally:

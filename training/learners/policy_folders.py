@@ -1,8 +1,8 @@
 """Folders of learned policies: missing policies are trained in parallel, finished ones are loaded."""
 
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +54,8 @@ class Training:
     memoryless: Path | None = None
     """Folder of the policy without memory that PPO goes on from where switching is cheap; None: it is
     trained, too."""
+    unusual: Mapping[str, Any] = field(default_factory=dict)
+    """Hyperparameters of PPO that differ from the usual ones, by name: those of a short training."""
 
     @property
     def finished(self) -> bool:
@@ -86,15 +88,16 @@ class Training:
         }  # fmt: skip
         with only_writer(self.folder):
             if self.recurrent:
+                usual = recurrent_hyperparameters(self.weights, end_to_end=self.end_to_end)
                 policy, log = train_recurrent(
-                    recurrent_hyperparameters(self.weights, end_to_end=self.end_to_end),
+                    replace(usual, **self.unusual),
                     FOR_END_TO_END if self.end_to_end else Distillation(),
                     student=self.student,
                     memoryless=self.memoryless,
                     **task,
                 )
             else:
-                policy, log = train(Hyperparameters(), **task)
+                policy, log = train(Hyperparameters(**self.unusual), **task)
             provenance = {
                 "run": log.run.run, "timesteps": self.timesteps, "seed": self.seed,
                 "switching_price": self.weights.switching,

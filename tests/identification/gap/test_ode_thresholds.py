@@ -1,5 +1,7 @@
 """Thresholds: a block with Coulomb friction turns and sticks as events in scipy make it."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -33,7 +35,8 @@ def swings(time) -> np.ndarray:
         s, begin, sign = float(found.y[0, -1]), begin + half, -sign
 
 
-def errors(steps: int, thresholds: bool, mode="compiled") -> float:
+@cache  # compiling a block takes seconds
+def errors(steps: int, thresholds: bool, mode: str = "compiled") -> float:
     run = quiet_run(0.1, round(END / 0.1), pull=np.zeros(round(END / 0.1)))
     y = block([run], mode, steps, thresholds).outputs({"k": np.array([K])}, [0])[0][0, :, 0]
     return float(np.max(np.abs(y - swings(run.time))))
