@@ -35,7 +35,7 @@ URGENT_DEPTH = 0.35
 """Shortfall from which no pulse is ended while p2 falls faster than `URGENT_FALL` [bar]: the band's end
 is near, and a valve that opens later than feared would lose the time to vent again."""
 URGENT_FALL = 1.0
-"""[bar/s]"""
+"""Fall of p2 that makes such a shortfall urgent [bar/s]: without consumption there is time to probe."""
 
 
 @dataclass(frozen=True, kw_only=True)
