@@ -42,14 +42,15 @@ $(OLDEST)/.installed: $(OLDEST)/.locked pyproject.toml
 train: $(VENV)/.installed ## train the PPO controller; options in ARGS="..."
 	$(PY) training/train_ppo.py $(ARGS)
 
+SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile
 # The matrices are small: threads of the linear algebra and of torch would only wait for each other.
 test: $(VENV)/.installed ## run the tests, files side by side; options in ARGS="..."
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(PY) -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile $(ARGS)
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(PY) -m pytest $(SIDE_BY_SIDE) $(ARGS)
 
 # Its own numba cache: the two numba versions would overwrite each other's files.
 test-oldest: $(OLDEST)/.installed ## run the plant and environment tests on the oldest core packages
 	NUMBA_CACHE_DIR=$(CURDIR)/$(OLDEST)/numba-cache \
-		$(OLDEST)/bin/python -m pytest tests/common tests/plant tests/env -m "not training and not slow"
+		$(OLDEST)/bin/python -m pytest $(SIDE_BY_SIDE) tests/common tests/plant tests/env -m "not training and not slow"
 
 bench: $(VENV)/.installed ## measure speed and memory (a quarter of an hour); ARGS="--against HEAD~1" pairs with a commit
 	$(PY) -m tests.benchmarks $(ARGS)
