@@ -7,6 +7,7 @@ VENV := .venv
 OLDEST := .venv-oldest
 PY := $(VENV)/bin/python
 PACKAGES := epv_env identification controllers training
+SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile
 
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
@@ -42,7 +43,6 @@ $(OLDEST)/.installed: $(OLDEST)/.locked pyproject.toml
 train: $(VENV)/.installed ## train the PPO controller; options in ARGS="..."
 	$(PY) training/train_ppo.py $(ARGS)
 
-SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile
 # The matrices are small: threads of the linear algebra and of torch would only wait for each other.
 test: $(VENV)/.installed ## run the tests, files side by side; options in ARGS="..."
 	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(PY) -m pytest $(SIDE_BY_SIDE) $(ARGS)

@@ -52,14 +52,8 @@ class SupervisorSettings:
             if not abs(value := getattr(self, name)) <= BAND_BAR:
                 raise ValueError(f"{name} = {value:g} bar: give one within ±{BAND_BAR:g} bar")
         for name in (
-            "reluctance",
-            "near_miss_share",
-            "near_miss",
-            "share",
-            "wariness",
-            "doubt",
-            "horizon",
-        ):
+            "reluctance", "near_miss_share", "near_miss", "share", "wariness", "doubt", "horizon",
+        ):  # fmt: skip
             if not 0 <= getattr(self, name) < float("inf"):
                 raise ValueError(f"{name} = {getattr(self, name):g}: give a number from 0")
         if not 0 < self.confidence < 1:

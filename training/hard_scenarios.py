@@ -72,7 +72,10 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         parser.error(f"--episodes must be at most {VALIDATION_SEED - EVALUATION_SEED}")
     for seed in chosen.seeds or ():
         if not EVALUATION_SEED <= seed < VALIDATION_SEED:
-            parser.error(f"--seeds: {seed} is none from {EVALUATION_SEED} to {VALIDATION_SEED - 1}")
+            parser.error(
+                f"--seeds: {seed} is none from {EVALUATION_SEED} to {VALIDATION_SEED - 1}: "
+                "give seeds of the evaluation"
+            )
     if unknown := [name for name in chosen.scenarios if name not in known]:
         parser.error(f"no scenario {unknown[0]!r}: choose from {', '.join(known)}")
     return chosen

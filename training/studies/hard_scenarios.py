@@ -67,5 +67,5 @@ def rows(
         for label in study.controllers:
             metrics = run_scenario(study, label, scenario, seeds)
             left = np.array(seeds)[~metrics.stayed][:LISTED]
-            found = {"scenario": name, "controller": label, **summary(metrics)}
-            yield {**found, "left_seeds": left.tolist()}
+            named = {"scenario": name, "controller": label}
+            yield {**named, **summary(metrics), "left_seeds": left.tolist()}
