@@ -56,8 +56,9 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--scenarios", nargs="+", default=known, metavar="NAME", help="only these; default: all"
     )
-    parser.add_argument("--episodes", type=int, default=256, help="of each scenario and controller")
-    parser.add_argument(
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--episodes", type=int, default=256, help="of each scenario and controller")
+    which.add_argument(
         "--seeds", type=int, nargs="+", default=None, metavar="SEED",
         help="the episodes with these seeds instead, as `left_seeds` of an earlier result names them",
     )  # fmt: skip

@@ -137,6 +137,12 @@ def test_only_evaluation_seeds_are_taken(tmp_path, capsys):
     assert "--seeds: 7 is none from 2000000 to 2999999" in capsys.readouterr().err
 
 
+def test_seeds_and_a_number_of_episodes_exclude_each_other(tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        hard_scenarios.parse(["--out", str(tmp_path), "--seeds", "2000001", "--episodes", "6"])
+    assert "--episodes: not allowed with argument --seeds" in capsys.readouterr().err
+
+
 def test_the_command_names_an_unknown_scenario(tmp_path, capsys):
     with pytest.raises(SystemExit):
         hard_scenarios.parse(["--out", str(tmp_path), "--scenarios", "no such"])
