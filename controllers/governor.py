@@ -28,6 +28,12 @@ SLOW = 0.1
 """Reserve from which a valve is so slow that no pulse may wait [bar]."""
 DEEP = 0.1
 """Breakdown beyond `near_miss` from which no pulse may wait [bar]."""
+UNKNOWN_DEVIATION = 0.45
+"""Standard deviation of the opening pressure above which a valve is unknown [bar]: hardly less than
+before the first pulse (controllers/opening_bank.py)."""
+UNKNOWN_CONFIDENCE = 0.99
+"""`SupervisorSettings.confidence` of such a valve [1]: it is known better after a pulse, so that this
+costs hardly any switchings."""
 LARGE = 0.4
 """Rise from which the gain is doubted more, twice as much at double this rise: small pulses do not tell
 how long a valve stays open whose control chamber is empty [bar]."""
@@ -148,7 +154,8 @@ class Governor:
     def _rises_too_far(self, valve: LearntValve) -> NDArray:
         """Whether p2 passes the ceiling if the valve opens early and stays open for a period (n,)."""
         settings = self._settings
-        early = self._learner.earliest(settings.confidence)
+        unknown = valve.offset_deviation > UNKNOWN_DEVIATION
+        early = self._learner.earliest(np.where(unknown, UNKNOWN_CONFIDENCE, settings.confidence))
         fall_of_log_p3 = self._table.vent_rate * valve.pace * self._control_period
         p3 = valve.p3 * np.where(valve.on, 1.0, np.exp(-fall_of_log_p3))
         may_be_open = early.time_to_open(valve.p1, valve.p2, p3) <= 0

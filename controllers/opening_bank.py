@@ -83,9 +83,13 @@ class OpeningBank:
         around = self._settings.offsets - self.offset[:, None]
         return np.sqrt(np.sum(self._probability * around**2, axis=1))
 
-    def offset_quantile(self, probability: float) -> NDArray:
-        """The least member's offset that the valve's exceeds at most with 1 - probability (n,) [bar]."""
-        below = np.sum(np.cumsum(self._probability, axis=1) < probability, axis=1)
+    def offset_quantile(self, probability: float | NDArray) -> NDArray:
+        """The least member's offset that the valve's exceeds at most with 1 - probability (n,) [bar].
+
+        probability: a number or (n,).
+        """
+        enough = np.reshape(probability, (-1, 1))
+        below = np.sum(np.cumsum(self._probability, axis=1) < enough, axis=1)
         return self._settings.offsets[np.minimum(below, len(self._settings.offsets) - 1)]
 
     @property

@@ -163,10 +163,10 @@ class ValveLearner:
             error=self._error, fall=fall, on=on, opens_in=opens_in,
         )  # fmt: skip
 
-    def earliest(self, probability: float) -> PulseTable:
+    def earliest(self, probability: float | NDArray) -> PulseTable:
         """The table of valves that open as early as the learnt ones may: earlier ones are improbable.
 
-        probability: that a valve opens no earlier.
+        probability: that a valve opens no earlier, a number or (n,).
         """
         return shifted(self._nominal, self._bank.offset_quantile(probability))
 
