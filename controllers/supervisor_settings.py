@@ -39,7 +39,8 @@ class SupervisorSettings:
     ceiling: float = 0.15
     """p2 - target that a pulse may reach if the valve opens early, or else it ends [bar]."""
     confidence: float = 0.95
-    """Probability that the valve opens no earlier than is allowed for there [1]."""
+    """Probability that the valve opens no earlier than is allowed for there [1]. While a valve is
+    unknown, it is `UNKNOWN_CONFIDENCE` (controllers/governor.py)."""
     doubt: float = 2.0
     """Standard deviations of the gain that are allowed for there [1]."""
     horizon: float = 0.1
