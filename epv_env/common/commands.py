@@ -1,0 +1,137 @@
+"""Commands by name. A command is one module of a package of commands; nothing lists the modules.
+
+A command's module has
+
+- its help line as the first line of its docstring,
+- `add_options(parser)`, which adds the options to an argparse parser,
+- `run(options)`, which raises ValueError or OSError with one sentence for what it cannot use,
+- `QUICK` if it has a short form: what `--quick` sets, as {option: value}.
+
+The file's name is the command's: `sim_to_real.py` is `sim-to-real`, `import_.py` is `import`.
+An option `out` is a folder of results, which one process at a time writes.
+"""
+
+import argparse
+import ast
+import difflib
+import importlib
+import pkgutil
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
+from pathlib import Path
+from types import ModuleType
+
+from epv_env.common.command_line import fail_clearly, parse_with_quick
+from epv_env.common.extras import missing_package
+
+
+def main(packages: Sequence[str], *, program: str, arguments: Sequence[str] | None = None) -> int:
+    """Run the command that the first argument names; returns the exit status.
+
+    Args:
+        packages: names of packages of commands.
+        program: what the user types before the command's name.
+        arguments: None for those of the process.
+    """
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    return fail_clearly(lambda: _run_named(commands(packages), program, given))
+
+
+def main_of(module: str, *, program: str, arguments: Sequence[str] | None = None) -> int:
+    """Run the command of one module, such as "training.commands.train"; returns the exit status."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    return fail_clearly(lambda: _run(module, program, given))
+
+
+def commands(packages: Sequence[str]) -> dict[str, str]:
+    """Modules of all commands by the commands' names, in alphabetical order."""
+    found = {
+        name.strip("_").replace("_", "-"): f"{package}.{name}"
+        for package in packages
+        for name in _module_names(package)
+        if {"add_options", "run"} <= _functions(f"{package}.{name}")
+    }
+    return dict(sorted(found.items()))
+
+
+def help_line(module: str) -> str:
+    """First line of a module's docstring, without an import: its packages may be missing."""
+    return (ast.get_docstring(_parsed(module)) or "").partition("\n")[0]
+
+
+def parser_of(module: ModuleType, program: str) -> argparse.ArgumentParser:
+    """The parser of a command."""
+    parser = argparse.ArgumentParser(
+        prog=program,
+        description=module.__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    module.add_options(parser)
+    return parser
+
+
+def _run_named(known: Mapping[str, str], program: str, arguments: list[str]) -> int:
+    if not arguments or arguments[0] in ("-h", "--help"):
+        print(_overview(known, program))
+        return 0
+    name, *rest = arguments
+    if name not in known:
+        close = difflib.get_close_matches(name, known, n=1)
+        hint = f"did you mean {close[0]!r}?" if close else f"`{program}` lists them"
+        raise ValueError(f"there is no command {name!r}: {hint}")
+    return _run(known[name], f"{program} {name}", rest)
+
+
+def _overview(known: Mapping[str, str], program: str) -> str:
+    width = max(map(len, known))
+    lines = [f"  {name:{width}}  {help_line(module)}" for name, module in known.items()]
+    last = f"{program} COMMAND --help lists its options"
+    return "\n".join([f"usage: {program} COMMAND [options]", "", *lines, "", last])
+
+
+def _run(name: str, program: str, arguments: list[str]) -> int:
+    try:
+        module = importlib.import_module(name)
+        parser = parser_of(module, program)
+        quick = getattr(module, "QUICK", None)
+        options = (
+            parser.parse_args(arguments)
+            if quick is None
+            else parse_with_quick(parser, arguments, quick)
+        )
+        _alone(module.run, options)
+    except ModuleNotFoundError as error:
+        extra = name.partition(".")[0]  # named as the package
+        sentence = missing_package(error.name or "", preferred=extra)
+        if sentence is None:
+            raise
+        raise ValueError(f"{program}: {sentence}") from None
+    return 0
+
+
+def _alone(run: Callable[[argparse.Namespace], None], options: argparse.Namespace) -> None:
+    """Run a command while no other process writes into its folder."""
+    from threadpoolctl import threadpool_limits
+
+    from epv_env.common.folder_lock import only_writer
+
+    out = getattr(options, "out", None)
+    # The matrices are small: threads of the linear algebra would only wait for each other.
+    with threadpool_limits(1, user_api="blas"), nullcontext() if out is None else only_writer(out):
+        run(options)
+
+
+def _module_names(package: str) -> list[str]:
+    path = importlib.import_module(package).__path__
+    return [module.name for module in pkgutil.iter_modules(path)]
+
+
+def _functions(module: str) -> set[str]:
+    return {node.name for node in _parsed(module).body if isinstance(node, ast.FunctionDef)}
+
+
+def _parsed(module: str) -> ast.Module:
+    package, _, name = module.rpartition(".")
+    folder = Path(next(iter(importlib.import_module(package).__path__)))
+    return ast.parse((folder / f"{name}.py").read_text(encoding="utf-8"))

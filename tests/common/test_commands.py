@@ -1,0 +1,81 @@
+"""A command is a module: it is found, listed, parsed and run alone; wrong input is one sentence."""
+
+import sys
+
+import pytest
+
+from epv_env.common.commands import commands, main, main_of
+from epv_env.common.folder_lock import only_writer
+
+GREET = '''"""Write a greeting.
+
+More about it.
+"""
+
+from pathlib import Path
+
+QUICK = {"times": 1}
+
+
+def add_options(parser):
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--times", type=int, default=3)
+
+
+def run(options):
+    if options.times < 1:
+        raise ValueError("--times must be positive")
+    (options.out / "greeting.txt").write_text("hello " * options.times)
+'''
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    folder = tmp_path / "greeting_commands"
+    folder.mkdir()
+    (folder / "__init__.py").touch()
+    (folder / "say_hello_.py").write_text(GREET)
+    (folder / "shared.py").write_text("def run():\n    pass\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    yield "greeting_commands"
+    for name in [name for name in sys.modules if name.startswith("greeting_commands")]:
+        del sys.modules[name]
+
+
+def test_a_file_is_a_command_and_its_docstring_the_help(package, capsys):
+    assert commands([package]) == {"say-hello": "greeting_commands.say_hello_"}
+    assert main([package], program="epv", arguments=[]) == 0
+    assert "  say-hello  Write a greeting.\n" in capsys.readouterr().out
+
+
+def test_a_command_runs_with_its_options(package, tmp_path):
+    out = tmp_path / "results"
+    assert main([package], program="epv", arguments=["say-hello", "--out", str(out)]) == 0
+    assert (out / "greeting.txt").read_text() == "hello hello hello "
+    module = "greeting_commands.say_hello_"
+    assert main_of(module, program="greet", arguments=["--quick", "--out", str(out)]) == 0
+    assert (out / "greeting.txt").read_text() == "hello "
+
+
+def test_wrong_input_is_one_sentence(package, tmp_path, capsys):
+    arguments = ["say-hello", "--out", str(tmp_path / "none"), "--times", "0"]
+    assert main([package], program="epv", arguments=arguments) == 2
+    assert capsys.readouterr().err == "error: --times must be positive\n"
+    assert not (tmp_path / "none").exists()
+    assert main([package], program="epv", arguments=["say-hallo"]) == 2
+    assert "no command 'say-hallo': did you mean 'say-hello'?" in capsys.readouterr().err
+
+
+def test_a_second_process_is_refused(package, tmp_path, capsys):
+    with only_writer(tmp_path / "busy"):
+        arguments = ["say-hello", "--out", str(tmp_path / "busy")]
+        assert main([package], program="epv", arguments=arguments) == 2
+    assert "another process writes into" in capsys.readouterr().err
+
+
+def test_a_missing_package_is_named_with_its_extra(package, tmp_path, capsys):
+    (tmp_path / package / "needs.py").write_text(
+        f'"""Need torch."""\nraise ModuleNotFoundError("none", name="torch")\n{GREET}'
+    )
+    assert main([package], program="epv", arguments=["needs"]) == 2
+    assert "epv needs: this needs the package torch" in capsys.readouterr().err

@@ -1,0 +1,1 @@
+"""Commands of training, comparison, sweeps and deployment: one module each."""
