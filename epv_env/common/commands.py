@@ -96,9 +96,7 @@ def _run(name: str, program: str, arguments: list[str]) -> int:
         parser = parser_of(module, program)
         quick = getattr(module, "QUICK", None)
         options = (
-            parser.parse_args(arguments)
-            if quick is None
-            else parse_with_quick(parser, arguments, quick)
+            parser.parse_args(arguments) if quick is None else parse_with_quick(parser, arguments, quick)
         )
         _alone(module.run, options)
     except ModuleNotFoundError as error:
