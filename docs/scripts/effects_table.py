@@ -8,11 +8,12 @@ writes the part between the page's markers.
 import sys
 from pathlib import Path
 
+from docs.studies.common import fill
+from docs.studies.common import table as markdown_table
 from epv_env.common.command_line import fail_clearly
 from epv_env.plant.effects.record import Size
 from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.parameters import table
-from training.studies.generated_pages import fill, markdown
 
 PAGE = Path(__file__).parents[1] / "explanation" / "effects.md"
 PART = "effects"
@@ -30,7 +31,7 @@ def effects_table() -> str:
         ]
         for effect in EFFECTS
     ]
-    return markdown(["Effect", "Component", "Size, range, unit", "Form", "Source"], rows)
+    return markdown_table(["Effect", "Component", "Size, range, unit", "Form", "Source"], rows)
 
 
 def _size(size: Size) -> str:

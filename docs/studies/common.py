@@ -1,0 +1,99 @@
+"""What the studies share: their two options, result files, and pages with generated parts.
+
+A generated part of a page stands between two markers:
+
+    <!-- generated: NAME -->
+    ... whatever the study last wrote ...
+    <!-- end: NAME -->
+"""
+
+import argparse
+import json
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from epv_env.common.files import write_text
+
+ROOT = Path(__file__).parents[2]
+"""The repository's root."""
+PAGE = "README.md"
+"""Name of a study's page."""
+
+
+def study_parser(description: str, folder: Path) -> argparse.ArgumentParser:
+    """A parser with the options that every study has: --quick and --out. `study_options` reads it.
+
+    Args:
+        description: the study's docstring; its first line becomes the help.
+        folder: of the study, where results and page stand.
+    """
+    parser = argparse.ArgumentParser(description=description.strip().splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="a short run that shows that all works")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        help="folder of the results and the page (default: the study's; runs/NAME-quick with --quick)",
+    )
+    parser.set_defaults(folder=folder)
+    return parser
+
+
+def study_options(
+    parser: argparse.ArgumentParser, arguments: Sequence[str] | None = None
+) -> argparse.Namespace:
+    """The options. Another folder than the study's gets a copy of the page, so a trial run changes
+    nothing that is published."""
+    options = parser.parse_args(arguments)
+    if options.out is None:
+        quick = ROOT / "runs" / f"{options.folder.name}-quick"
+        options.out = quick if options.quick else options.folder
+    options.out.mkdir(parents=True, exist_ok=True)
+    page = options.folder / PAGE
+    if options.out.resolve() != options.folder.resolve() and page.exists():
+        shutil.copy(page, options.out / PAGE)
+    return options
+
+
+def write_result(path: Path, result: Mapping[str, Any]) -> None:
+    """Write a study's result file as JSON, whole or not at all."""
+    write_text(path, json.dumps(result, indent=1) + "\n")
+
+
+def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A Markdown table."""
+    lines = [headings, ["---"] * len(headings), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def check_page(page: Path, parts: Sequence[str]) -> None:
+    """Raises ValueError if `fill` could not fill one of the parts of these names."""
+    if not page.is_file():
+        raise ValueError(f"no page {page}: give a Markdown file with generated parts")
+    text = page.read_text(encoding="utf-8")
+    for name in parts:
+        if _end(name) not in text.partition(_begin(name))[2]:
+            raise ValueError(f"{page}: put {_begin(name)} and {_end(name)} where this part belongs")
+
+
+def fill(page: Path, parts: Mapping[str, str]) -> None:
+    """Write a page's generated parts, given by name; the rest of the page stays as it is.
+
+    Raises ValueError as `check_page`, before anything is written.
+    """
+    check_page(page, list(parts))
+    text = page.read_text(encoding="utf-8")
+    for name, part in parts.items():
+        before, begin, rest = text.partition(_begin(name))
+        _, end, after = rest.partition(_end(name))
+        text = f"{before}{begin}\n{part.strip()}\n{end}{after}"
+    write_text(page, text)
+
+
+def _begin(name: str) -> str:
+    return f"<!-- generated: {name} -->"
+
+
+def _end(name: str) -> str:
+    return f"<!-- end: {name} -->"
