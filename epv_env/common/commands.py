@@ -22,7 +22,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from types import ModuleType
 
-from epv_env.common.command_line import fail_clearly, parse_with_quick
+from epv_env.common.command_line import fail_clearly
 from epv_env.common.extras import missing_package
 
 
@@ -61,14 +61,26 @@ def help_line(module: str) -> str:
 
 
 def parser_of(module: ModuleType, program: str) -> argparse.ArgumentParser:
-    """The parser of a command."""
+    """The parser of a command, with `--quick` if it has a short form."""
     parser = argparse.ArgumentParser(
         prog=program,
         description=module.__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     module.add_options(parser)
+    if hasattr(module, "QUICK"):
+        parser.add_argument(
+            "--quick", action="store_true", help="a short run that shows that all works"
+        )
     return parser
+
+
+def parse(module: ModuleType, program: str, arguments: Sequence[str]) -> argparse.Namespace:
+    """The options. With --quick, QUICK are the defaults: what is given beside it still holds."""
+    parser = parser_of(module, program)
+    if hasattr(module, "QUICK") and parser.parse_known_args(arguments)[0].quick:
+        parser.set_defaults(**module.QUICK)
+    return parser.parse_args(arguments)
 
 
 def _run_named(known: Mapping[str, str], program: str, arguments: list[str]) -> int:
@@ -93,12 +105,7 @@ def _overview(known: Mapping[str, str], program: str) -> str:
 def _run(name: str, program: str, arguments: list[str]) -> int:
     try:
         module = importlib.import_module(name)
-        parser = parser_of(module, program)
-        quick = getattr(module, "QUICK", None)
-        options = (
-            parser.parse_args(arguments) if quick is None else parse_with_quick(parser, arguments, quick)
-        )
-        _alone(module.run, options)
+        _alone(module.run, parse(module, program, arguments))
     except ModuleNotFoundError as error:
         extra = name.partition(".")[0]  # named as the package
         sentence = missing_package(error.name or "", preferred=extra)
