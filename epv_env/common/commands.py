@@ -69,9 +69,7 @@ def parser_of(module: ModuleType, program: str) -> argparse.ArgumentParser:
     )
     module.add_options(parser)
     if hasattr(module, "QUICK"):
-        parser.add_argument(
-            "--quick", action="store_true", help="a short run that shows that all works"
-        )
+        parser.add_argument("--quick", action="store_true", help="a short run that shows that all works")
     return parser
 
 
