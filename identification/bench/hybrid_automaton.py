@@ -1,20 +1,145 @@
-"""One valve as a hybrid automaton: the modes of its movers and the events that change them."""
+"""One valve on a schedule as a hybrid automaton: the modes of its movers and the events."""
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
 
+import numba
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from epv_env.plant.coefficients import coefficients
+from epv_env.plant.effects.coil import coil_current
 from epv_env.plant.effects.registry import effect_constants, has_effects
-from epv_env.plant.equations import Coefficients, Inputs, State
+from epv_env.plant.equations import Coefficients, Inputs, State, derivative
+from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at, store_state
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.primitives.compiled import FLAGS, source_digest
 from epv_env.plant.stepping import STICK_SPEED
-from identification.bench.right_hand_side import (
-    COMPILED_RIGHT_HAND_SIDES,
-    RightHandSide,
-    terminal_currents,
-)
-from identification.bench.schedule import Schedule
+
+
+@dataclass(frozen=True, kw_only=True)
+class Schedule:
+    """A valve, its state at time 0, and inputs that hold from one border to the next. SI units."""
+
+    parameters: Parameters
+    initial: State
+    borders: NDArray
+    """Times at which inputs change [s], from 0 to the end of the run, shape (segments + 1,)."""
+    inputs: Inputs
+    """One value per segment, shape (segments,)."""
+    reservoir_volume: float = np.inf
+    """Volume that feeds the input chamber [m^3]; infinite: p1 follows its inputs alone."""
+
+    @property
+    def duration(self) -> float:
+        """Length of the run [s]."""
+        return float(self.borders[-1])
+
+
+def piecewise_schedule(
+    parameters: Parameters,
+    initial: State,
+    borders: ArrayLike,
+    *,
+    U: ArrayLike,
+    sigma_S: ArrayLike = 0.0,
+    p1_slope: ArrayLike = 0.0,
+    refill: ArrayLike = 0.0,
+    reservoir_volume: float = np.inf,
+) -> Schedule:
+    """A Schedule; scalars hold throughout, and borders between equal inputs are dropped.
+
+    Args:
+        borders: times [s], (segments + 1,), from 0 to the end of the run.
+        U: coil voltage [V], () or (segments,).
+        sigma_S: air consumed from the circuit [kg/s], () or (segments,).
+        p1_slope: rate of the supply pressure [Pa/s], () or (segments,).
+        refill: air fed to the reservoir [kg/s], () or (segments,).
+        reservoir_volume: [m^3].
+    """
+    times = np.asarray(borders, dtype=float)
+    rows = np.stack(
+        np.broadcast_arrays(*np.atleast_1d(U, sigma_S, p1_slope, refill), times[:-1])[:4]
+    ).astype(float)
+    changes = np.concatenate([[True], np.any(np.diff(rows, axis=1) != 0, axis=0)])
+    return Schedule(
+        parameters=parameters,
+        initial=initial,
+        borders=np.append(times[:-1][changes], times[-1]),
+        inputs=Inputs(*rows[:, changes], *np.zeros((len(Inputs._fields) - 4, np.sum(changes)))),
+        reservoir_volume=reservoir_volume,
+    )
+
+
+def delayed_schedule(schedule: Schedule, delay: float) -> Schedule:
+    """The schedule with every change of its inputs but the first later by `delay` [s].
+
+    Only the voltage may change: inputs that act at once have no place in a delayed schedule.
+    """
+    if delay == 0 or len(schedule.borders) == 2:
+        return schedule
+    end = schedule.duration
+    borders = np.concatenate([[0.0], np.minimum(schedule.borders[1:-1] + delay, end), [end]])
+    return replace(schedule, borders=borders)
+
+
+RightHandSide = Callable[[NDArray, NDArray, NDArray, NDArray, float, float], NDArray]
+"""(state, inputs, coefficients, effects, free_PV, free_MV) -> rates and both forces."""
+
+TerminalCurrents = Callable[[float, NDArray, NDArray, NDArray, NDArray], NDArray]
+"""(voltage, state I, state coil_heat, coefficients, effects) -> currents."""
+
+
+# Closed over by the compiled functions: a change of any inlined source changes their key in the cache.
+_DIGEST = source_digest(Path(__file__))
+
+
+def _terminal_currents(digest: str) -> TerminalCurrents:
+    @numba.njit(cache=True, **FLAGS)
+    def terminal_currents(U, current, coil_heat, coefficients, effects):
+        out = np.empty_like(current)
+        if digest == "":  # keeps the digest in the closure
+            return out
+        c, e = coefficients_at(coefficients, 0, 0), effects_at(effects, 0, 0)
+        for k in range(current.size):
+            out[k] = coil_current(U, current[k], c.R, coil_heat[k], e)
+        return out
+
+    return terminal_currents
+
+
+terminal_currents = _terminal_currents(_DIGEST)
+"""Currents at the coil's terminals, (samples,) [A].
+
+U: coil voltage [V]. current: state I, (samples,) [A]. coil_heat: state, (samples,) [K].
+coefficients, effects: tables of one valve, as epv_env.plant.coefficients makes them.
+"""
+
+
+def compiled_right_hand_side(extended: bool, digest: str = _DIGEST) -> RightHandSide:
+    """`derivative` for one valve as a compiled function of arrays."""
+
+    @numba.njit(cache=True, **FLAGS)
+    def rates_and_forces(y, u, c, e, free_PV, free_MV):
+        if digest == "":
+            return np.zeros(0)
+        q = state_at(y.reshape(-1, 1), 0, 0)
+        inputs = inputs_at(u.reshape(-1, 1), 0, 0)
+        rates, force_PV, force_MV = derivative(
+            q, inputs, coefficients_at(c, 0, 0), effects_at(e, 0, 0), free_PV, free_MV, extended
+        )
+        out = np.empty(y.size + 2)
+        store_state(out.reshape(-1, 1), 0, 0, rates)
+        out[-2], out[-1] = force_PV, force_MV
+        return out
+
+    return rates_and_forces
+
+
+COMPILED_RIGHT_HAND_SIDES = {extended: compiled_right_hand_side(extended) for extended in (False, True)}
+"""Compiled on first use."""
+
 
 OVERSHOOT = 1e-12
 """A stop counts as reached this far beyond it [m], so that leaving it is no landing on it."""

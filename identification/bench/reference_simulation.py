@@ -13,9 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
 from epv_env.plant.equations import State
-from identification.bench.hybrid_automaton import HybridAutomaton
-from identification.bench.right_hand_side import RightHandSide
-from identification.bench.schedule import Schedule
+from identification.bench.hybrid_automaton import HybridAutomaton, RightHandSide, Schedule
 
 RTOL = 1e-9
 """Relative tolerance of the solver."""

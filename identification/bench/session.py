@@ -1,15 +1,135 @@
-"""A whole session on the virtual bench: a suite of programmes run and measured."""
+"""A session on the virtual bench: true trajectories, what the sensors make of them, disturbances."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from epv_env.common.progress import progress
+from epv_env.plant.data_acquisition import Sensor
+from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
-from identification.bench.measurement import measured_campaign, run_programme
+from epv_env.plant.readings import readings
+from epv_env.plant.sensors import SENSORS
+from epv_env.plant.simulate import energised
+from identification.bench.hybrid_automaton import delayed_schedule, piecewise_schedule
 from identification.bench.programmes import Programme
+from identification.bench.reference_simulation import simulate_reference
 from identification.bench.settings import BENCH, BenchSettings
-from identification.recordings.recording import Campaign
+from identification.recordings.recording import (
+    CHANNELS,
+    PRESSURES,
+    UNITS,
+    Campaign,
+    CampaignError,
+    Recording,
+)
 from identification.recordings.rules import RULES, RecordingRules
 from identification.report_2003.cases import SAMPLING_RATE
+
+RESERVOIR_VOLUME = 0.08
+"""The bench's two reservoirs of 40 litres (section 3) [m^3]; air drawn from them lowers p1."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrueSignals:
+    """What really happened in one recording."""
+
+    programme: Programme
+    period: float
+    """Time between samples [s]."""
+    channels: Mapping[str, NDArray]
+    """By name as recording.CHANNELS, each (samples,) [SI]."""
+
+
+def run_programme(
+    parameters: Parameters,
+    programme: Programme,
+    *,
+    rate: float = SAMPLING_RATE,
+    reservoir: float = RESERVOIR_VOLUME,
+    settings: BenchSettings = BENCH,
+) -> TrueSignals:
+    """The true signals of one recording.
+
+    rate: samples per second [1/s]. reservoir: volume that feeds p1 [m^3]. Raises RuntimeError where the
+    solver fails.
+    """
+    U = programme.case.voltage(programme.U_on, rate)
+    time = np.arange(len(U)) / rate
+    start = initial_state(parameters, programme)
+    # Switching takes effect at the sample at which the voltage is first read, or later.
+    schedule = piecewise_schedule(parameters, start, time, U=U[:-1], reservoir_volume=reservoir)
+    delayed = delayed_schedule(schedule, parameters["t_delay"])
+    state = simulate_reference(delayed, time, rtol=settings.relative_tolerance).state
+    channels = {"U": U, **readings(state, parameters)}
+    return TrueSignals(programme=programme, period=1.0 / rate, channels=channels)
+
+
+def measured_recording(
+    truth: TrueSignals,
+    rng: np.random.Generator,
+    offsets: Mapping[str, float] | None = None,
+    sensors: Mapping[str, Sensor] = SENSORS,
+) -> Recording:
+    """A recording of the truth by the sensors of Tables 1 to 3: offset, trend, noise, 12 bit.
+
+    offsets: by channel [bar, A, V], a channel that is left out has none; None: the sensors' own.
+    sensors: of the bench, by channel [bar absolute, A or V].
+    """
+    if offsets is None:
+        offsets = {name: sensor.offset for name, sensor in sensors.items()}
+    readings = {}
+    for channel in CHANNELS:
+        value = truth.channels[channel] / UNITS[channel][1]
+        time = np.arange(len(value)) * truth.period
+        drifted = value + offsets.get(channel, 0.0) + sensors[channel].trend * time
+        reading = sensors[channel].measure(drifted, rng.standard_normal(len(value)))
+        readings[channel] = reading * UNITS[channel][1]
+    return Recording(
+        name=truth.programme.name,
+        role=truth.programme.role,
+        period=truth.period,
+        sigma_S=np.zeros_like(truth.channels["U"]),
+        **readings,
+    )
+
+
+def measured_campaign(
+    truths: Sequence[TrueSignals],
+    parameters: Parameters,
+    *,
+    seed: int,
+    name: str = "virtual bench",
+    offsets: Mapping[str, float] | None = None,
+    rules: RecordingRules = RULES,
+) -> Campaign:
+    """A campaign of the truths; each recording's noise has a generator of its own, from the seed.
+
+    rules: by which the recordings are read, with the bench's sensors.
+    """
+    generators = [np.random.default_rng([seed, index]) for index in range(len(truths))]
+    return Campaign(
+        name=name,
+        temperature=parameters["T_env"],
+        pressure=parameters["p_env"],
+        rules=rules,
+        recordings=tuple(
+            measured_recording(t, rng, offsets, rules.sensors)
+            for t, rng in zip(truths, generators, strict=True)
+        ),
+    )
+
+
+def initial_state(parameters: Parameters, programme: Programme) -> State:
+    """Steady state in which a recording begins; without voltage every chamber is at ambient pressure."""
+    if programme.U_on == 0:
+        rest = energised(parameters, p1=parameters["p_env"], p2=parameters["p_env"], U=0.0)
+        return rest._replace(xMV=0.0)
+    return energised(parameters, p1=programme.p1, p2=programme.p2, U=programme.U_on)
 
 
 def run_bench(
@@ -37,3 +157,81 @@ def run_bench(
         for programme in progress(suite, what="bench: recordings", total=len(suite))
     ]
     return measured_campaign(truths, truth, seed=seed, rules=rules)
+
+
+def add_ripple(
+    campaign: Campaign, *, sd: Mapping[str, float], correlation_time: float, seed: int
+) -> Campaign:
+    """The campaign with a slow random ripple on some channels, as supply pulsation or wiring gives it.
+
+    An Ornstein-Uhlenbeck process that is stationary from the first sample, in whole steps of the
+    sensor's converter. sd: its standard deviation by channel, in the channel's unit [bar, A, V].
+    correlation_time: in which its autocorrelation falls to 1/e [s]. seed: each recording and channel
+    has a generator of its own. Raises CampaignError for another channel, a negative standard deviation
+    or a correlation time that is not positive.
+    """
+    _check_ripple(sd, correlation_time)
+    recordings = []
+    for number, recording in enumerate(campaign.recordings):
+        changed = {}
+        for channel in sd:
+            rng = np.random.default_rng([seed, number, CHANNELS.index(channel)])
+            ripple = sd[channel] * _ornstein_uhlenbeck(
+                rng.standard_normal(len(recording)), recording.period / correlation_time
+            )
+            steps = _in_steps(ripple, SENSORS[channel].resolution)
+            changed[channel] = recording.channel(channel) + steps * UNITS[channel][1]
+        recordings.append(_changed(recording, changed))
+    return replace(campaign, recordings=tuple(recordings))
+
+
+def round_pressures(campaign: Campaign, step: float) -> Campaign:
+    """The campaign with p1, p2 and p3 in multiples of `step` [bar], as a vehicle's bus gives them.
+
+    Raises CampaignError for a step that is not positive.
+    """
+    if not step > 0:
+        raise CampaignError(f"step is {step:g} bar: give a positive step, such as 0.05")
+    return replace(
+        campaign,
+        recordings=tuple(
+            _changed(
+                recording,
+                {
+                    name: _in_steps(recording.channel(name) / UNITS[name][1], step) * UNITS[name][1]
+                    for name in PRESSURES
+                },
+            )
+            for recording in campaign.recordings
+        ),
+    )
+
+
+def _changed(recording: Recording, signals: Mapping[str, Any]) -> Recording:
+    """With other signals, by channel, (samples,) [SI]; no longer what a file holds."""
+    return replace(recording, sha256="", **signals)
+
+
+def _in_steps(values: NDArray, step: float) -> NDArray:
+    return np.rint(values / step) * step
+
+
+def _ornstein_uhlenbeck(white: NDArray, period: float) -> NDArray:
+    """A process of variance 1 from white noise, (samples,); period: per correlation time."""
+    memory = np.exp(-period)
+    drive = np.sqrt(1.0 - memory**2) * white
+    drive[0] = white[0]
+    return np.asarray(lfilter([1.0], [1.0, -memory], drive))
+
+
+def _check_ripple(sd: Mapping[str, float], correlation_time: float) -> None:
+    if not correlation_time > 0:
+        raise CampaignError(
+            f"correlation_time is {correlation_time:g} s: give a positive time, such as 0.02"
+        )
+    for channel, deviation in sd.items():
+        if channel not in CHANNELS or not deviation >= 0:
+            raise CampaignError(
+                f"sd is {deviation:g} for {channel!r}: give standard deviations of 0 or more for "
+                f"channels among {', '.join(CHANNELS)}"
+            )

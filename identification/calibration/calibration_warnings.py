@@ -8,7 +8,7 @@ from identification.calibration.multi_start import METHODS, best_search, reached
 from identification.calibration.problem import CalibrationProblem
 from identification.calibration.search_methods import SearchResult
 from identification.calibration.settings import CALIBRATION, CalibrationSettings
-from identification.recordings.reading_steps import coarse_step_warnings
+from identification.recordings.noise import coarse_step_warnings
 
 
 def calibration_warnings(

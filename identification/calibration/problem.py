@@ -7,8 +7,7 @@ from epv_env.plant.free_parameters import FREE_PARAMETERS, Freedom, check_free
 from epv_env.plant.parameters import Parameters
 from identification.quality.assessment import SensorOffset, assess_recording, sensor_offsets
 from identification.quality.settings import QUALITY, QualitySettings
-from identification.recordings.noise_estimation import pooled_noise
-from identification.recordings.reading_steps import campaign_steps
+from identification.recordings.noise import campaign_steps, pooled_noise
 from identification.recordings.recording import Campaign, CampaignError, Recording
 from identification.replay.model_inputs import without_offsets
 from identification.replay.parameter_vector import ParameterVector

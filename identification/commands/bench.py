@@ -9,14 +9,12 @@ from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import Domains, Parameters, written_value
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from epv_env.plant.region import Region
-from identification.bench.programme_file import load_programmes
-from identification.bench.programmes import SUITES, Programme, at_voltage
+from identification.bench.programmes import SUITES, Programme, at_voltage, load_programmes
 from identification.bench.session import run_bench
 from identification.commands.command import Command
 from identification.commands.options import add_out, add_plant, add_seed
 from identification.recordings.campaign_files import check_vacant, write_campaign
-from identification.recordings.rules import RULES
-from identification.recordings.valve_rules import rules_of
+from identification.recordings.rules import RULES, rules_of
 from identification.report_2003.cases import SAMPLING_RATE
 
 

@@ -8,8 +8,7 @@ from identification.commands.options import add_count, add_out, add_plant, add_s
 from identification.pipeline.identification import Identification
 from identification.pipeline.settings import IdentificationSettings
 from identification.recordings.campaign_files import read_campaign
-from identification.recordings.rules import RULES
-from identification.recordings.valve_rules import rules_of
+from identification.recordings.rules import RULES, rules_of
 
 JOURNAL = "searches.jsonl"
 """File of the finished searches in the folder of results."""

@@ -7,12 +7,15 @@ from epv_env.common.command_line import check_positive
 from epv_env.plant.plantfile import load_plant
 from identification.commands.command import Command
 from identification.commands.options import add_out, add_plant
-from identification.importing.findings import import_text, source_table
-from identification.importing.formats.registry import read_source
-from identification.importing.import_campaign import check_imported, read_files
+from identification.importing.import_campaign import (
+    check_imported,
+    import_text,
+    read_files,
+    read_source,
+    source_table,
+)
 from identification.recordings.campaign_files import check_vacant, write_campaign
-from identification.recordings.rules import RULES
-from identification.recordings.valve_rules import rules_of
+from identification.recordings.rules import RULES, rules_of
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -5,7 +5,7 @@ import argparse
 from identification.commands.campaign_options import add_options, chosen_identification
 from identification.commands.command import Command
 from identification.pipeline.stages import STAGES, Stage
-from identification.recordings.campaign_facts import campaign_facts
+from identification.recordings.recording import campaign_facts
 from identification.report.result_files import as_text, write_results
 
 

@@ -1,18 +1,51 @@
-"""One uniform grid of times for the channels of a recording."""
+"""One uniform grid of times for the channels of a recording, without delay or aliases.
 
+Channels of other rates and jittering times are resampled in three steps. A cubic spline through the
+samples at their true times gives values on a fine uniform grid; it takes jitter out. A symmetric
+low-pass (Kaiser window) on the fine grid removes what the lower of both rates cannot carry; being
+symmetric about each sample it delays nothing. Every n-th value is kept.
+"""
+
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.signal import firwin, kaiserord, oaconvolve
 
-from identification.importing.formats.source_file import ImportingError
-from identification.importing.mapping import MappedChannel
-from identification.importing.resampling import resampled, usual_rate
-from identification.importing.settings import IMPORT, ImportSettings
+from identification.importing.channels import MappedChannel
+from identification.importing.source_file import ImportingError
+from identification.recordings.columns import sampling_period
 from identification.recordings.recording import CampaignError
 from identification.recordings.rules import RULES
-from identification.recordings.sampling_times import sampling_period
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImportSettings:
+    """The defaults suit benches that sample at 500 Hz to 100 kHz."""
+
+    most_step: float = 1.75
+    """Longest step over the usual one. A missing sample makes 2; jitter of a third of a period, 1.67."""
+    resampling_margin: int = 4
+    """Least density of the fine grid over a channel's own rate: the spline is smooth on it."""
+    passband: float = 0.35
+    """End of the passband over the lower of both rates; the switching of the coil stays sharp."""
+    stopband: float = 0.5
+    """Begin of the stopband over the lower of both rates: from Nyquist's frequency on nothing folds."""
+    stop_attenuation: float = 70.0
+    """Attenuation of what would fold [dB]: below a step of 12 bits."""
+    same_time: float = 1e-3
+    """Part of a period by which times may differ and count as the same samples."""
+    greatest_rate: float = 20_000.0
+    """Greatest rate of a campaign [1/s]; a faster bench is brought down to it. Valve and sensors are
+    slower, and longer files only cost time."""
+
+
+IMPORT = ImportSettings()
+"""The default settings."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,3 +169,45 @@ def _first_sample(
     apart = channel.time[0] + first * own - grid[0]
     fits = first >= 0 and first + len(grid) <= len(channel.time)
     return first if fits and abs(apart) <= settings.same_time * period else None
+
+
+def usual_rate(time: NDArray) -> float:
+    """Samples per second of times (samples,) [s] that may jitter [1/s]."""
+    return (len(time) - 1) / float(time[-1] - time[0])
+
+
+def resampled(
+    time: NDArray, values: NDArray, grid: NDArray, settings: ImportSettings = IMPORT
+) -> NDArray:
+    """Values on a uniform grid, (grid,), in the unit of `values`.
+
+    Args:
+        time: of the samples, increasing, (samples,) [s]; it covers the grid.
+        values: (samples,), any unit.
+        grid: wanted times, uniform, (grid,) [s].
+        settings: pass- and stopband, attenuation.
+    """
+    period = float(grid[-1] - grid[0]) / (len(grid) - 1)
+    own = usual_rate(time)
+    dense = max(1, math.ceil(settings.resampling_margin * own * period))
+    taps = _low_pass(min(own, 1.0 / period), dense / period, settings)
+    half = len(taps) // 2
+    fine = grid[0] + np.arange(-half, dense * (len(grid) - 1) + half + 1) * (period / dense)
+    filtered = oaconvolve(_mirrored_spline(time, values, fine), taps, mode="valid")
+    return np.asarray(filtered)[::dense]
+
+
+def _low_pass(rate: float, fine_rate: float, settings: ImportSettings) -> NDArray:
+    """Taps of a symmetric filter of unit gain, odd in number; rates [1/s]."""
+    width = (settings.stopband - settings.passband) * rate
+    count, beta = kaiserord(settings.stop_attenuation, width / (0.5 * fine_rate))
+    cut = 0.5 * (settings.passband + settings.stopband) * rate
+    window: Any = ("kaiser", beta)
+    return np.asarray(firwin(count | 1, cut, window=window, fs=fine_rate))
+
+
+def _mirrored_spline(time: NDArray, values: NDArray, at: NDArray) -> NDArray:
+    """The spline through the samples; beyond the ends, where the filter looks, their mirror image."""
+    inside = time[0] + np.abs(at - time[0])
+    inside = time[-1] - np.abs(time[-1] - inside)
+    return CubicSpline(time, values)(np.clip(inside, time[0], time[-1]))

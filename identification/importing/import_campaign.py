@@ -1,5 +1,6 @@
 """`import_campaign`: measurement files of a bench become a campaign."""
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
@@ -10,12 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.common.units import BAR
-from identification.importing.common_grid import GriddedSignals, on_common_grid
-from identification.importing.formats.registry import read_source
-from identification.importing.formats.source_file import ImportingError, SourceFile
-from identification.importing.mapping import MappedChannel, mapped_channels, supply_pair_mean
-from identification.importing.mapping_file import MappingFile, RecordingEntry, read_mapping
-from identification.importing.settings import IMPORT, ImportSettings
+from identification.importing.binary_files import read_matlab, read_mdf, read_parquet, read_tdms
+from identification.importing.channels import MappedChannel, mapped_channels, supply_pair_mean
+from identification.importing.common_grid import (
+    IMPORT,
+    GriddedSignals,
+    ImportSettings,
+    on_common_grid,
+    usual_rate,
+)
+from identification.importing.mapping_file import MappingFile, RecordingEntry, meaning, read_mapping
+from identification.importing.source_file import ImportingError, SourceChannel, SourceFile
+from identification.importing.text_files import read_text
 from identification.recordings.campaign_files import check_campaign, write_campaign
 from identification.recordings.recording import Campaign, Recording
 from identification.recordings.recording_checks import switches
@@ -205,3 +212,97 @@ def _channel_provenance(channel: MappedChannel, gridded: GriddedSignals) -> Mapp
         "to_SI": channel.conversion,
         "resampled": channel.name in gridded.resampled,
     }
+
+
+FORMATS = (
+    ("MDF", read_mdf, (".mf4", ".mdf", ".dat")),
+    ("MATLAB", read_matlab, (".mat",)),
+    ("TDMS", read_tdms, (".tdms",)),
+    ("Parquet", read_parquet, (".parquet", ".pq")),
+    ("text", read_text, (".csv", ".txt", ".tsv", ".asc")),
+)
+"""Name, reader and suffixes of every format. A new one is a reader and a line here.
+
+A reader takes a path and returns the version or dialect, and the channels; it may raise ImportingError.
+"""
+
+
+def read_source(path: Path) -> SourceFile:
+    """The channels of a measurement file. Raises ImportingError."""
+    known = {suffix: (name, read) for name, read, suffixes in FORMATS for suffix in suffixes}
+    if path.suffix.lower() not in known:
+        raise ImportingError(
+            f"{path}: unknown kind of file {path.suffix!r}: give one of {', '.join(sorted(known))}"
+        )
+    if not path.is_file():
+        state = "is no regular file" if path.exists() else "does not exist"
+        raise ImportingError(f"{path} {state}: give the path of a measurement file")
+    kind, read = known[path.suffix.lower()]
+    try:
+        with path.open("rb") as stream:
+            sha256 = hashlib.file_digest(stream, "sha256").hexdigest()
+        version, channels = read(path)
+    except ImportingError:
+        raise
+    except OSError as error:
+        reason = error.strerror or str(error).splitlines()[0][:160]
+        raise ImportingError(f"{path} cannot be read ({reason}): export it anew") from None
+    except Exception as error:  # the formats' packages raise whatever they like on damaged files
+        reason = (str(error).splitlines() or [type(error).__name__])[0][:160]
+        raise ImportingError(f"{path} is damaged or no {kind} file ({reason}): export it anew") from None
+    if not channels:
+        raise ImportingError(f"{path}: no series of numbers in it: export the channels as numbers")
+    return SourceFile(path=path, format=version, sha256=sha256, channels=tuple(channels))
+
+
+def source_table(source: SourceFile) -> str:
+    """The channels of a file: name, unit, range, rate, and what its name means."""
+    rows = [_source_row(channel) for channel in source.channels]
+    title = f"{source.path} ({source.format})"
+    return f"{title}\n{_aligned(('channel', 'unit', 'range', 'rate', 'proposed'), rows)}"
+
+
+def import_text(imported: ImportedCampaign) -> str:
+    """What every file becomes, and what was assumed."""
+    parts = [_file_text(file) for file in imported.files]
+    parts += [f"assumed: {sentence}" for sentence in imported.assumptions]
+    return "\n\n".join(parts[: len(imported.files)]) + "\n\n" + "\n".join(parts[len(imported.files) :])
+
+
+def _file_text(file: ImportedFile) -> str:
+    rows = [
+        (
+            channel.name,
+            channel.source.name,
+            f"{channel.unit.text} {channel.reference}".strip(),
+            channel.conversion,
+            f"{usual_rate(channel.time):.6g} Hz",
+            "resampled" if channel.name in file.gridded.resampled else "as recorded",
+        )
+        for channel in file.channels
+    ]
+    recording = file.recording
+    title = (
+        f"{file.source.path.name} -> {recording.name}.csv, role {recording.role}, "
+        f"{len(recording)} samples at {1 / recording.period:.6g} Hz"
+    )
+    heads = ("becomes", "channel", "unit", "to SI", "rate", "samples")
+    return f"{title}\n{_aligned(heads, rows)}"
+
+
+def _source_row(channel: SourceChannel) -> tuple[str, ...]:
+    values = channel.values[np.isfinite(channel.values)]
+    span = f"{np.min(values):.5g} to {np.max(values):.5g}" if len(values) else "empty"
+    timed = channel.time is not None and len(channel.time) > 1 and np.ptp(channel.time) > 0
+    rate = f"{usual_rate(channel.time):.6g} Hz" if timed and channel.time is not None else ""
+    return channel.name, channel.unit, span, rate, meaning(channel) or ""
+
+
+def _aligned(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Columns as wide as their widest cell."""
+    lines = [heads, *rows]
+    widths = [max(len(line[column]) for line in lines) for column in range(len(heads))]
+    return "\n".join(
+        "  " + "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
+        for line in lines
+    )

@@ -1,13 +1,101 @@
-"""The mapping file: what the channels of the measurement files are, where names do not say it."""
+"""What names of channels mean, and the mapping file, which says what names do not."""
 
+import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import msgspec
 
 from epv_env.common.json_files import read_json
-from identification.importing.channel_names import QUANTITY
-from identification.importing.formats.source_file import ImportingError
+from identification.importing.source_file import ImportingError, SourceChannel, SourceFile
+from identification.importing.units import parsed_unit
 from identification.recordings.recording import ROLES
+
+QUANTITY: Mapping[str, str] = {
+    "time": "time",
+    "I": "current",
+    "U": "voltage",
+    "p1": "pressure",
+    "p1a": "pressure",
+    "p1b": "pressure",
+    "p2": "pressure",
+    "p3": "pressure",
+    "sigma_S": "mass flow",
+}
+"""What an import looks for, with its quantity. p1a and p1b, two sensors, may stand for p1."""
+
+NAMES: Mapping[str, tuple[str, ...]] = {
+    "time": ("time", "t", "zeit", "timestamp", "timestamps", "timechannel", "abszeit", "messzeit"),
+    "I": ("i", "current", "strom", "icoil", "imv", "coilcurrent", "solenoidcurrent", "magnetstrom",
+          "spulenstrom", "istrom", "currentcoil", "imagnet", "isolenoid"),
+    "U": ("u", "v", "voltage", "spannung", "ucoil", "umv", "vcoil", "coilvoltage", "solenoidvoltage",
+          "magnetspannung", "spulenspannung", "voltagecoil", "umagnet", "usolenoid"),
+    "p1": ("p1", "pin", "pinput", "inputpressure", "supplypressure", "psupply", "eingangsdruck",
+           "vorratsdruck", "pvorrat", "reservoirpressure", "preservoir", "druck1", "pressure1",
+           "druckeingang", "inputchamberpressure", "pressuresupply"),
+    "p1a": ("p1a", "p11", "reservoir1", "pressure1a", "druck1a"),
+    "p1b": ("p1b", "p12", "reservoir2", "pressure1b", "druck1b"),
+    "p2": ("p2", "pout", "poutput", "outputpressure", "circuitpressure", "pcircuit", "ausgangsdruck",
+           "kreisdruck", "bremsdruck", "pkreis", "druck2", "pressure2", "druckausgang",
+           "outputchamberpressure", "pressurecircuit"),
+    "p3": ("p3", "pcontrol", "controlpressure", "pctrl", "steuerdruck", "pst", "psteuer", "druck3",
+           "pressure3", "drucksteuer", "controlchamberpressure", "pressurecontrol", "steuerkammerdruck"),
+    "sigma_S": ("sigmas", "consumption", "verbrauch", "massflow", "massenstrom", "consumedair",
+                "luftverbrauch"),
+}  # fmt: skip
+"""Names in lower case, without anything but letters and digits; English and German."""
+
+BRACKETED = re.compile(r"^(.*?)\s*(?:[\[({]\s*([^\])}]+?)\s*[\])}]|\s(?:in|/)\s(\S+)|/(\S+))\s*$")
+"""A name with its unit: "p1 [bar]", "p1 (bar)", "p1 in bar", "p1/bar"."""
+
+
+def split_name(name: str) -> tuple[str, str]:
+    """A channel's name without its unit, and the unit in it, empty if there is none."""
+    found = BRACKETED.match(name)
+    if found:
+        unit = next(part for part in found.groups()[1:] if part)
+        if parsed_unit(unit) is not None:
+            return found[1], unit
+    for place in (i for i, sign in enumerate(name) if sign == "_"):
+        unit = parsed_unit(name[place + 1 :].replace("_per_", "/").replace("_", " "))
+        if place and unit is not None and unit.quantity in QUANTITY.values():
+            return name[:place], unit.text
+    return name, ""
+
+
+def meaning(channel: SourceChannel) -> str | None:
+    """The channel of a recording that a channel's name and unit mean; None if they mean none."""
+    bare, inside = split_name(channel.name.rpartition(".")[2].split("\\")[0])
+    plain = re.sub(r"[^a-z0-9]", "", bare.lower())
+    unit = parsed_unit(channel.unit or inside)
+    for name, known in NAMES.items():
+        if plain in known and (unit is None or unit.quantity == QUANTITY[name]):
+            return name
+    return None
+
+
+def proposed(channels: Sequence[SourceChannel]) -> dict[str, list[SourceChannel]]:
+    """The channels of a file that names and units propose, by what they mean; several: ambiguous."""
+    found: dict[str, list[SourceChannel]] = {}
+    for channel in channels:
+        name = meaning(channel)
+        if name is not None:
+            found.setdefault(name, []).append(channel)
+    return found
+
+
+def named_channel(source: SourceFile, wanted: str) -> SourceChannel:
+    """The one channel that a mapping file calls by this name. Raises ImportingError."""
+    found = [channel for channel in source.channels if channel.name == wanted]
+    found = found or [c for c in source.channels if split_name(c.name)[0] == wanted]
+    if len(found) != 1:
+        count = "no channel" if not found else f"{len(found)} channels"
+        known = ", ".join(channel.name for channel in source.channels[:20])
+        raise ImportingError(
+            f"{source.path}: {count} of the name {wanted!r}; there are {known}: mend the mapping file"
+        )
+    return found[0]
+
 
 FORMAT = "epv-mapping/1"
 """Version of the file, in its field `format`."""

@@ -11,7 +11,7 @@ from epv_env.plant.plantfile import Plant, save_plant
 from identification.pipeline.identification import ESTIMATOR, Identification
 from identification.pipeline.stages import STAGES, Result, result_or_omission
 from identification.pipeline.summary import summary_section
-from identification.recordings.campaign_facts import campaign_facts
+from identification.recordings.recording import campaign_facts
 from identification.report.page import Section
 from identification.report.result_files import write_results
 

@@ -7,10 +7,10 @@ from typing import Any
 from identification.calibration.calibration_section import calibration_json, calibration_section
 from identification.confidence.confidence_section import confidence_json, confidence_section
 from identification.pipeline.identification import Identification
-from identification.quality import quality_export
+from identification.quality import section as quality_export
 from identification.quality.assessment import assess_recording
-from identification.quality.quality_section import quality_section
-from identification.recordings.reading_steps import campaign_steps
+from identification.quality.section import quality_section
+from identification.recordings.noise import campaign_steps
 from identification.recordings.recording import CampaignError
 from identification.report.page import Section, Verdict
 from identification.sensitivity import sensitivity_export

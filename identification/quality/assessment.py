@@ -9,9 +9,9 @@ from types import MappingProxyType
 from epv_env.plant.data_acquisition import Sensor
 from epv_env.plant.sensors import SENSORS
 from identification.quality.channel import ChannelAssessment, assess_channel
-from identification.quality.correlation_tests import PairCorrelation, assess_correlation
+from identification.quality.noise_tests import PairCorrelation, assess_correlation
 from identification.quality.settings import QUALITY, QualitySettings
-from identification.recordings.reading_steps import rounding_error
+from identification.recordings.noise import rounding_error
 from identification.recordings.recording import CHANNELS, PRESSURES, UNITS, CampaignError, Recording
 
 FINE: Mapping[str, float] = MappingProxyType({})

@@ -1,20 +1,215 @@
-"""A result per channel and check: good, doubt or bad, with the figures and what to do."""
+"""A result per channel and check: good, doubt or bad, with the figures and what to do.
+
+A departure counts if it is statistically significant and large enough to matter. With 10 000 samples
+the first alone would condemn every real bench.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy import stats
 
 from identification.quality.assessment import QualityAssessment
 from identification.quality.channel import ChannelAssessment
-from identification.quality.judgements import SEVERITY, Judgement
-from identification.quality.noise_checks import check_correlation, check_normality, check_whiteness
-from identification.quality.reading_checks import (
-    check_noise,
-    check_offset,
-    check_outliers,
-    check_resolution,
-    check_trend,
-)
+from identification.quality.noise_tests import PairCorrelation, WhitenessTest
+from identification.quality.settings import QualitySettings
+from identification.recordings.recording import PRESSURES
 from identification.report.page import Verdict
+
+SEVERITY = ("note", "good", "doubt", "bad")
+"""Statuses from harmless to worst; a note says that something could not be judged."""
+
+
+class Judgement(NamedTuple):
+    """What one check says."""
+
+    status: str
+    """One of SEVERITY."""
+    text: str
+    """One sentence: the figures and, unless good, what to do."""
+
+
+def graded_status(value: float, levels: tuple[float, float]) -> str:
+    """Good below the first level, bad from the second on, in doubt between."""
+    return SEVERITY[1 + sum(value >= limit for limit in levels)]
+
+
+def judgement_of(status: str, figures: str, advice: str) -> Judgement:
+    """The figures and, unless all is well, what to do."""
+    return Judgement(status, figures if status == "good" else f"{figures}; {advice}")
+
+
+def p_value_text(value: float) -> str:
+    """A p-value, which may be too small to print."""
+    return f"p = {value:.2g}" if value > 1e-99 else "p < 1e-99"
+
+
+def milli_text(channel: ChannelAssessment, value: float) -> str:
+    """A small value in mA, mV or mbar."""
+    return f"{1e3 * value:.3g} m{channel.unit}"
+
+
+def check_offset(quality: QualityAssessment, channel: ChannelAssessment) -> Judgement:
+    """Is the mean reading within Table 1's accuracy of the rest value?"""
+    pressure = channel.name in PRESSURES
+    if not (quality.vented if pressure else quality.coil_off):
+        return _no_offset(channel, "the chambers are not vented" if pressure else "the coil is on")
+    return judgement_of(
+        "good" if abs(channel.offset) <= channel.accuracy else "bad",
+        f"offset {milli_text(channel, channel.offset)} against an accuracy of "
+        f"±{milli_text(channel, channel.accuracy)}",
+        f"{'vent this chamber' if pressure else 'switch the coil off'} and record again, "
+        "or have the sensor calibrated",
+    )
+
+
+def _no_offset(channel: ChannelAssessment, reason: str) -> Judgement:
+    mean = f"the mean reading is {channel.rest + channel.offset:.4g} {channel.unit}, but {reason}"
+    return Judgement("note", f"{mean}, so no offset can be read off; record at rest for it")
+
+
+def check_trend(quality: QualityAssessment, channel: ChannelAssessment) -> Judgement:
+    """Is the drift over the record small against the accuracy?"""
+    ratio, deviations = abs(channel.drift) / channel.accuracy, channel.trend_deviations
+    significant = deviations > stats.norm.isf(channel.settings.significance / 2)
+    return judgement_of(
+        graded_status(ratio, channel.settings.drift_levels) if significant else "good",
+        f"drift {milli_text(channel, channel.drift)} in {channel.duration:.3g} s, "
+        f"{deviations:.1f} standard errors and {100 * ratio:.2g} % of the accuracy",
+        "let the bench settle, look for a leak or a warming sensor, and record again",
+    )
+
+
+def check_noise(quality: QualityAssessment, channel: ChannelAssessment) -> Judgement:
+    """Is the noise as small as the report's?"""
+    deviation = channel.normality.standard_deviation
+    ratio = deviation / channel.sensor.noise
+    quiet = graded_status(1.0 / max(ratio, 1e-9), channel.settings.quiet_levels)
+    if channel.dithered and quiet != "good":
+        return Judgement(
+            quiet,
+            f"noise {milli_text(channel, deviation)} before rounding, only {ratio:.2g} times the usual; "
+            "check the unit and scaling of the channel, since a reading too small has noise too small",
+        )
+    return judgement_of(
+        graded_status(ratio, channel.settings.noise_levels),
+        f"noise {milli_text(channel, deviation)} before rounding, {ratio:.2f} times the usual, "
+        f"signal-to-noise ratio {channel.description.signal_to_noise:.1f} dB",
+        "check shielding, ground and supply of the sensor",
+    )
+
+
+def check_resolution(quality: QualityAssessment, channel: ChannelAssessment) -> Judgement:
+    """Do the readings move, in steps no coarser than Table 1's range in twelve bits?"""
+    if channel.whiteness is None and channel.quantum:
+        return judgement_of(
+            "doubt",
+            f"every sample reads {channel.readings[0]:.6g} {channel.unit}, in steps of "
+            f"{milli_text(channel, channel.quantum)}, which may hide the noise of a live sensor",
+            "record with finer steps, since a dead sensor would read the same",
+        )
+    if channel.whiteness is None:
+        figures = f"every sample reads {channel.readings[0]:.6g} {channel.unit}"
+        return judgement_of("bad", figures, "check the sensor's cable and the acquisition")
+    if channel.longest_run > channel.run_limit:
+        return _stands_still(quality, channel)
+    ratio = channel.quantum / channel.sensor.resolution
+    steps = channel.normality.standard_deviation / channel.quantum if channel.quantum else np.inf
+    return judgement_of(
+        "doubt" if ratio > channel.settings.coarse_step or not channel.dithered else "good",
+        f"one step is {milli_text(channel, channel.quantum)}, {ratio:.2f} times the usual range in 12 "
+        f"bits, and the noise is {steps:.2g} steps",
+        "check the converter's range and bits, since rounding errors do not average out",
+    )
+
+
+def _stands_still(quality: QualityAssessment, channel: ChannelAssessment) -> Judgement:
+    still, allowed = (1e3 * quality.period * n for n in (channel.longest_run, channel.run_limit))
+    return judgement_of(
+        "bad",
+        f"one reading lasts {still:.3g} ms, where independent noise stays below {allowed:.3g} ms",
+        "check the sensor's cable and the acquisition",
+    )
+
+
+def check_outliers(quality: QualityAssessment, channel: ChannelAssessment) -> Judgement:
+    """Does the outlier factor (eq. 18) stay below what normal noise reaches?"""
+    factor, limit = channel.description.outlier_factor, channel.outlier_limit
+    at = int(np.argmax(np.abs(channel.residual))) * quality.period
+    return judgement_of(
+        graded_status(factor / limit, channel.settings.outlier_levels),
+        f"greatest outlier {factor:.2f} standard deviations, at {at:.4g} s; 99.9 % of normal records "
+        f"stay below {limit:.2f}",
+        "look for switching interference and loose contacts, and record again",
+    )
+
+
+def check_normality(quality: QualityAssessment, channel: ChannelAssessment) -> Judgement:
+    """Do the counts per code follow a normal distribution?"""
+    test = channel.normality
+    if test.degrees < 1:
+        return Judgement("note", "the record holds too few codes to test their distribution")
+    return judgement_of(
+        graded_status(test.effect, quality.settings.effect_levels)
+        if test.probability < quality.settings.significance
+        else "good",
+        f"counts per code against normal: chi-square {test.statistic:.1f} with {test.degrees} "
+        f"degrees of freedom, {p_value_text(test.probability)}, effect {test.effect:.2f}, "
+        f"kurtosis {channel.description.kurtosis:.2f}, skewness {channel.description.skewness:.2f}",
+        "look at the probability plot, and trust no interval that assumes normal noise",
+    )
+
+
+def check_whiteness(quality: QualityAssessment, channel: ChannelAssessment) -> Judgement:
+    """Are the samples independent of each other?"""
+    test = channel.whiteness
+    if test is None:
+        return Judgement("note", "the signal never changes, so there is nothing to correlate")
+    frequency = test.peak_frequency / (2 * quality.period)
+    return judgement_of(
+        _dependence_status(test, quality.settings)
+        if test.probability < quality.settings.significance
+        else "good",
+        f"Ljung-Box {p_value_text(test.probability)}, greatest autocorrelation {test.peak:.3f}, a "
+        f"mean has {test.inflation:.2f} times the variance of independent samples",
+        f"most power is near {frequency:.3g} Hz: mains hum if that is 50 or 60 Hz, else a filter or a "
+        "moving signal",
+    )
+
+
+def _dependence_status(test: WhitenessTest, settings: QualitySettings) -> str:
+    """The worse status of the greatest autocorrelation and of the variance of a mean."""
+    peak = graded_status(test.peak, settings.effect_levels)
+    inflation = graded_status(test.inflation, settings.inflation_levels)
+    return max(peak, inflation, key=SEVERITY.index)
+
+
+def check_correlation(quality: QualityAssessment, channel: ChannelAssessment) -> Judgement:
+    """Is the noise independent of the other channels', at any lag?"""
+    partners = _partners(quality, channel.name)
+    if not partners:
+        return Judgement("note", "no other channel changes, so there is nothing to correlate with")
+    other, pair = max(partners.items(), key=lambda item: abs(item[1].peak))
+    family_wise = min(1.0, pair.peak_probability * len(quality.pairs))
+    return judgement_of(
+        graded_status(abs(pair.peak), quality.settings.effect_levels)
+        if family_wise < quality.settings.significance
+        else "good",
+        f"greatest cross-correlation {pair.peak:.3f}, with {other} at a lag of "
+        f"{1e3 * quality.period * abs(pair.peak_lag):.3g} ms, family-wise {p_value_text(family_wise)}",
+        "look for crosstalk, a shared ground or a shared supply",
+    )
+
+
+def _partners(quality: QualityAssessment, name: str) -> dict[str, PairCorrelation]:
+    return {
+        first if second == name else second: pair
+        for (first, second), pair in quality.pairs.items()
+        if name in (first, second)
+    }
+
 
 CHECKS: Mapping[str, Callable[[QualityAssessment, ChannelAssessment], Judgement]] = {
     "offset": check_offset,

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.common.units import BAR
 from epv_env.plant.channels import CHANNEL, MEASURED_CHANNELS
 from identification.recordings.rules import RULES, RecordingRules
 
@@ -103,3 +104,18 @@ class Campaign:
     def with_role(self, role: str) -> tuple[Recording, ...]:
         """The recordings with one of ROLES."""
         return tuple(recording for recording in self.recordings if recording.role == role)
+
+
+def campaign_facts(campaign: Campaign) -> dict[str, str]:
+    """Facts by name, ready to read."""
+    listed = "; ".join(
+        f"{', '.join(recording.name for recording in recordings)} ({role})"
+        for role in ROLES
+        if (recordings := campaign.with_role(role))
+    )
+    samples = sum(len(recording) for recording in campaign.recordings)
+    return {
+        "Campaign": campaign.name,
+        "Recordings": f"{listed}; {samples:,} samples",
+        "Environment": f"{campaign.temperature:.1f} K, {campaign.pressure / BAR:.3f} bar",
+    }

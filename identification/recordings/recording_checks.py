@@ -11,10 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.data_acquisition import Sensor
-from identification.recordings.columns import CHANNEL_OF, TIME_COLUMN, line_number
+from identification.recordings.columns import (
+    CHANNEL_OF,
+    TIME_COLUMN,
+    check_rate,
+    line_number,
+    sampling_period,
+)
 from identification.recordings.recording import HOLD, CampaignError
 from identification.recordings.rules import RULES, RecordingRules
-from identification.recordings.sampling_times import check_rate, sampling_period
 from identification.recordings.unit_diagnosis import check_units
 
 

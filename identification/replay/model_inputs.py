@@ -14,7 +14,7 @@ from scipy.interpolate import make_smoothing_spline
 from scipy.signal import savgol_filter
 from scipy.stats import chi2
 
-from identification.recordings.reading_steps import reading_step, rounding_error
+from identification.recordings.noise import reading_step, rounding_error
 from identification.recordings.recording import HOLD, Recording
 from identification.replay.settings import REPLAY, ReplaySettings
 

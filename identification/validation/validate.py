@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from epv_env.plant.parameters import Parameters
 from identification.calibration.problem import CalibrationProblem
-from identification.quality.correlation_tests import WhitenessTest, assess_whiteness
+from identification.quality.noise_tests import WhitenessTest, assess_whiteness
 from identification.recordings.recording import OUTPUTS, CampaignError
 from identification.replay.responses import Response, responses
 from identification.validation.settings import VALIDATION, ValidationSettings

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from identification.quality.correlation_tests import white_noise_band
+from identification.quality.noise_tests import white_noise_band
 from identification.recordings.recording import OUTPUTS
 from identification.replay.error_tables import error_table, errors_as_json, percent
 from identification.replay.response_figures import error_figure, response_figure

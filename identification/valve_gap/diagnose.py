@@ -13,18 +13,15 @@ from scipy.stats import chi2
 from epv_env.common.journal import Journal
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from epv_env.plant.region import Region
-from identification.bench.programme_file import save_programmes
-from identification.bench.programmes import at_voltage
+from identification.bench.programmes import at_voltage, save_programmes
 from identification.gap.diagnosis import Diagnosis, diagnose, hypothesis_label
 from identification.gap.fit.fit_cache import FitCache
 from identification.gap.report.parameter_intervals import fitted_values, parameter_covariance
 from identification.gap.report.result_files import write_results
 from identification.gap.report.sections import sections
-from identification.recordings.campaign_facts import campaign_facts
 from identification.recordings.campaign_files import read_campaign
-from identification.recordings.recording import Campaign
-from identification.recordings.rules import RULES
-from identification.recordings.valve_rules import rules_of
+from identification.recordings.recording import Campaign, campaign_facts
+from identification.recordings.rules import RULES, rules_of
 from identification.report.page import write_page
 from identification.valve_gap.programmes import CANDIDATES, next_experiment
 from identification.valve_gap.programmes import FILE_NAME as PROGRAMME

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.recordings.reading_steps import reliable_step, rounding_error
+from identification.recordings.noise import reliable_step, rounding_error
 from identification.recordings.recording import Recording
 from identification.valve_gap.settings import VALVE, ValveSettings
 

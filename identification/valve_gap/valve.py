@@ -13,7 +13,7 @@ from identification.calibration.problem import calibration_problem
 from identification.gap.model.free_parameter import NuisanceParameter
 from identification.gap.model.recorded_run import Channel, Run
 from identification.gap.model.state_equation import StateEquation, StateTrace
-from identification.recordings.reading_steps import coarse_step_warnings, rounding_error
+from identification.recordings.noise import coarse_step_warnings, rounding_error
 from identification.recordings.recording import OUTPUTS, UNITS, Campaign, Recording
 from identification.replay.batch_simulation import Replay
 from identification.replay.model_inputs import model_inputs

@@ -10,9 +10,7 @@ from scipy.integrate import solve_ivp
 from epv_env.plant.coefficients import coefficients
 from epv_env.plant.effects.registry import effect_constants
 from epv_env.plant.equations import Inputs
-from identification.bench.hybrid_automaton import POSITIONS
-from identification.bench.right_hand_side import COMPILED_RIGHT_HAND_SIDES
-from identification.bench.schedule import Schedule
+from identification.bench.hybrid_automaton import COMPILED_RIGHT_HAND_SIDES, POSITIONS, Schedule
 
 RTOL, ATOL = 1e-6, 1e-9
 MOST_EVALUATIONS = 300_000

@@ -14,8 +14,8 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from epv_env.plant.parameters import Parameters
-from identification.bench.measurement import TrueSignals, measured_campaign, run_programme
 from identification.bench.programmes import DIAGNOSIS_SUITE, REPORT_SUITE
+from identification.bench.session import TrueSignals, measured_campaign, run_programme
 from identification.calibration.problem import CalibrationProblem, calibration_problem
 from identification.calibration.search_methods import SearchResult, nelder_mead, weighted_least_squares
 from identification.recordings.campaign_files import write_campaign

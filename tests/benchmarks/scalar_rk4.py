@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.primitives.flow import LAMINAR_DROP
-from identification.bench.schedule import Schedule
+from identification.bench.hybrid_automaton import Schedule
 
 STEP = 50e-6
 SYMBOLS = (

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised
-from identification.bench.measurement import RESERVOIR_VOLUME
+from identification.bench.hybrid_automaton import piecewise_schedule
 from identification.bench.reference_simulation import simulate_reference
-from identification.bench.schedule import piecewise_schedule
+from identification.bench.session import RESERVOIR_VOLUME
 from identification.calibration.problem import CalibrationProblem
 from identification.replay.batch_simulation import Replay
 from identification.replay.model_inputs import ModelInputs

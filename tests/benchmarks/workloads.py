@@ -6,7 +6,7 @@ from epv_env.plant.equations import Inputs
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
-from identification.bench.schedule import Schedule, piecewise_schedule
+from identification.bench.hybrid_automaton import Schedule, piecewise_schedule
 
 PERIOD = 5e-3
 """Time between decisions [s]."""

@@ -17,11 +17,10 @@ from epv_env.common.files import write_bytes
 from epv_env.common.journal import Journal
 from epv_env.common.results_folder import CONFIG, check_options, write_options
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
-from identification.bench.programme_file import load_programmes, save_programmes
-from identification.bench.programmes import REPORT_SUITE
+from identification.bench.programmes import REPORT_SUITE, load_programmes, save_programmes
 from identification.importing.mapping_file import read_mapping
+from identification.recordings.campaign_files import FILE_NAME, read_manifest
 from identification.recordings.columns import REQUIRED_COLUMNS, read_columns
-from identification.recordings.manifest import FILE_NAME, read_manifest
 from training.studies.benchmark.result_file import (
     Entry,
     Results,

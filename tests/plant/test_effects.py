@@ -71,8 +71,8 @@ def test_sizes_of_zero_are_no_effects():
 
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_the_kernel_agrees_with_scipy_on_every_effect(name):
+    from identification.bench.hybrid_automaton import delayed_schedule
     from identification.bench.reference_simulation import simulate_reference
-    from identification.bench.schedule import delayed_schedule
 
     p = sized(name, 0.3)
     schedule = delayed_schedule(pulses(p, opening=0.1, count=1, duration=0.3), p["t_delay"])

@@ -12,7 +12,7 @@ from epv_env.plant.integrate import DEFAULT_STEP
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
-from identification.bench.schedule import Schedule, piecewise_schedule
+from identification.bench.hybrid_automaton import Schedule, piecewise_schedule
 
 MOST_STEPS = 5000
 """Steps that one `advance` is asked for; well below integrate.MAX_STEPS."""

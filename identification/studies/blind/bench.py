@@ -11,16 +11,15 @@ from epv_env.plant.effects.registry import effect_constants
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.readings import readings
-from identification.bench.measurement import (
+from identification.bench.hybrid_automaton import RightHandSide, Schedule, piecewise_schedule
+from identification.bench.programmes import DIAGNOSIS_SUITE, Programme
+from identification.bench.reference_simulation import simulate_reference
+from identification.bench.session import (
     RESERVOIR_VOLUME,
     TrueSignals,
     initial_state,
     measured_campaign,
 )
-from identification.bench.programmes import DIAGNOSIS_SUITE, Programme
-from identification.bench.reference_simulation import simulate_reference
-from identification.bench.right_hand_side import RightHandSide
-from identification.bench.schedule import Schedule, piecewise_schedule
 from identification.recordings.recording import Campaign
 from identification.report_2003.cases import SAMPLING_RATE
 from identification.studies.blind.bench_rates import right_hand_side, terminal_currents

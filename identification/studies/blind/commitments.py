@@ -11,7 +11,7 @@ import numpy as np
 
 from epv_env.common.files import write_bytes
 from epv_env.common.json_files import write_json
-from identification.bench.measurement import TrueSignals
+from identification.bench.session import TrueSignals
 from identification.recordings.recording import OUTPUTS
 from identification.studies.blind.kinds import NOMINAL, TWO_EFFECTS
 from identification.studies.blind.noise_free_gap import (

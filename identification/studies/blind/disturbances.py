@@ -1,7 +1,7 @@
 """Disturbances under which the trials of a blind check are diagnosed again."""
 
 from epv_env.plant.sensors import SENSORS
-from identification.bench.disturbances import add_ripple, round_pressures
+from identification.bench.session import add_ripple, round_pressures
 from identification.recordings.recording import OUTPUTS, Campaign
 from identification.studies.blind.noise_free_gap import noise_deviation
 from identification.studies.blind.settings import DEFAULTS, BlindSettings

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from identification.recordings.campaign_files import read_campaign, write_campaign
-from identification.recordings.manifest import FILE_NAME
+from identification.recordings.campaign_files import FILE_NAME, read_campaign, write_campaign
 from identification.report.page import Section
 from identification.report.result_files import write_results
 from identification.studies.blind.commitments import open_commitment

@@ -14,9 +14,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from epv_env.common.files import write_text
-from identification.bench.measurement import TrueSignals
-from identification.recordings.campaign_files import write_campaign
-from identification.recordings.manifest import FILE_NAME
+from identification.bench.session import TrueSignals
+from identification.recordings.campaign_files import FILE_NAME, write_campaign
 from identification.studies.blind.bench import blind_campaign, true_recordings
 from identification.studies.blind.commitments import (
     LABEL_FILE,

@@ -17,8 +17,8 @@ from epv_env.common.journal import Journal
 from epv_env.common.progress import progress
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.valves import available_cores
-from identification.bench.measurement import TrueSignals, measured_campaign, run_programme
 from identification.bench.programmes import REPORT_SUITE
+from identification.bench.session import TrueSignals, measured_campaign, run_programme
 from identification.calibration.problem import calibration_problem
 from identification.calibration.search_methods import nelder_mead, weighted_least_squares
 from identification.confidence.covariance import estimate_covariance

@@ -4,7 +4,7 @@ import numpy as np
 from scipy import stats
 
 from epv_env.plant.sensors import SENSORS
-from identification.quality.printed_statistics import (
+from identification.quality.section import (
     REPORT_CHANNELS,
     SAMPLES,
     STATISTICS,

@@ -8,8 +8,8 @@ from identification.bench.programmes import REPORT_SUITE
 from identification.bench.session import run_bench
 from identification.pipeline.identification import Identification
 from identification.quality.assessment import assess_recording
-from identification.quality.quality_export import as_json as quality_json
-from identification.quality.quality_section import quality_section
+from identification.quality.section import as_json as quality_json
+from identification.quality.section import quality_section
 from identification.report.page import Section
 from identification.report.result_files import write_results
 from identification.sensitivity.printed_agreement import sensitivity_tables

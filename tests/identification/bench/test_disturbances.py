@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from epv_env.plant.sensors import SENSORS
-from identification.bench.disturbances import add_ripple, round_pressures
+from identification.bench.session import add_ripple, round_pressures
 from identification.recordings.recording import CHANNELS, UNITS, CampaignError
 from tests.identification.twins import twin
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from epv_env.plant.sensors import SENSORS
-from identification.bench.measurement import (
+from identification.bench.programmes import DIAGNOSIS_SUITE, SUITES
+from identification.bench.session import (
     measured_campaign,
     measured_recording,
 )
-from identification.bench.programmes import DIAGNOSIS_SUITE, SUITES
 from identification.recordings.campaign_files import read_campaign, write_campaign
 from identification.recordings.recording import CHANNELS, UNITS
 from tests.identification.twins import REPORT, TRUE, truth, twin

@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from identification.__main__ import main
-from identification.bench.programme_file import (
+from identification.bench.programmes import (
+    DIAGNOSIS_SUITE,
     FORMAT,
+    Programme,
     ProgrammeError,
     load_programmes,
     save_programmes,
 )
-from identification.bench.programmes import DIAGNOSIS_SUITE, Programme
 from identification.recordings.campaign_files import read_campaign
 from identification.report_2003.cases import Case
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from epv_env.plant.simulate import energised, simulate
-from identification.bench.measurement import RESERVOIR_VOLUME, run_programme
 from identification.bench.programmes import DIAGNOSIS_SUITE, REPORT_SUITE
+from identification.bench.session import RESERVOIR_VOLUME, run_programme
 from identification.recordings.recording import HOLD
 from tests.identification.twins import PROGRAMMES, SWITCHING, TRUE, truth
 

@@ -8,12 +8,12 @@ import pytest
 
 from epv_env.plant.parameters import ParameterError
 from epv_env.plant.plantfile import Plant, load_plant
-from identification.bench.measurement import measured_campaign, run_programme
 from identification.bench.programmes import REPORT_SUITE, at_voltage
+from identification.bench.session import measured_campaign, run_programme
 from identification.calibration.problem import CalibrationProblem, calibration_problem
 from identification.calibration.search_methods import weighted_least_squares
 from identification.confidence.covariance import estimate_covariance
-from identification.recordings.valve_rules import rules_of
+from identification.recordings.rules import rules_of
 
 HALF_SIZE = Path(__file__).parents[3] / "docs/examples/half_size/half-size.json"
 TRUE_VALUES = {"alphaMV": 0.66, "alphaPV": 0.33, "RML": 3.2e7, "R": 12.4}

@@ -10,10 +10,10 @@ from epv_env.plant.parameters import Parameters
 from identification.__main__ import main
 from identification.bench.programmes import REPORT_SUITE
 from identification.bench.session import run_bench
-from identification.importing.formats.physical_units import parsed_unit
-from identification.importing.formats.source_file import ImportingError
+from identification.importing.common_grid import resampled
 from identification.importing.import_campaign import import_campaign
-from identification.importing.resampling import resampled
+from identification.importing.source_file import ImportingError
+from identification.importing.units import parsed_unit
 from identification.quality.assessment import assess_recording
 from identification.quality.verdicts import channel_verdict
 from identification.recordings.campaign_files import read_campaign

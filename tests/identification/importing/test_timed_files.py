@@ -8,9 +8,8 @@ import pytest
 from epv_env.plant.parameters import Parameters
 from identification.bench.programmes import REPORT_SUITE
 from identification.bench.session import run_bench
-from identification.importing.formats.source_file import ImportingError
-from identification.importing.formats.time_stamps import points_in_time, seconds
 from identification.importing.import_campaign import import_campaign, read_files
+from identification.importing.source_file import ImportingError, points_in_time, seconds
 from identification.recordings.campaign_files import read_campaign
 from identification.recordings.recording import CHANNELS
 from tests.identification.importing.dialects import text

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.sensors import SENSORS
-from identification.quality.printed_statistics import TREND_OFFSETS
+from identification.quality.section import TREND_OFFSETS
 from identification.recordings.recording import CHANNELS, UNITS, Recording
 
 PERIOD = 1 / 2000

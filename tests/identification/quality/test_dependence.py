@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from identification.quality.correlation_tests import (
+from identification.quality.noise_tests import (
     assess_correlation,
     assess_whiteness,
     spectrum,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from identification.quality.normality import assess_normality, probability_plot
+from identification.quality.noise_tests import assess_normality, probability_plot
 
 SAMPLES = 10_000
 

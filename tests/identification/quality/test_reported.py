@@ -5,8 +5,8 @@ import pytest
 from scipy import stats
 
 from epv_env.plant.sensors import SENSORS
-from identification.quality.correlation_tests import white_noise_band
-from identification.quality.printed_statistics import (
+from identification.quality.noise_tests import white_noise_band
+from identification.quality.section import (
     CORRELATIONS,
     SAMPLES,
     STATISTICS,

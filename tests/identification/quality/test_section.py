@@ -6,11 +6,16 @@ from functools import cache
 import numpy as np
 import pytest
 
-from identification.quality import quality_figures as figures
+from identification.quality import figures as figures
 from identification.quality.assessment import assess_recording
-from identification.quality.printed_statistics import CORRELATIONS, STATISTICS, TREND_SLOPES
-from identification.quality.quality_export import as_json, as_text
-from identification.quality.quality_section import quality_section
+from identification.quality.section import (
+    CORRELATIONS,
+    STATISTICS,
+    TREND_SLOPES,
+    as_json,
+    as_text,
+    quality_section,
+)
 from identification.recordings.recording import CHANNELS
 from identification.report.page import Picture, Section, Table, write_page
 from tests.identification.quality.records import AMBIENT, rest_record, with_channel

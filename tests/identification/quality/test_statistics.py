@@ -4,8 +4,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from identification.quality.quantisation import longest_run, run_limit
-from identification.quality.statistics import descriptive_statistics, fit_trend, outlier_limit
+from identification.quality.channel import (
+    descriptive_statistics,
+    fit_trend,
+    longest_run,
+    outlier_limit,
+    run_limit,
+)
 
 TIME = np.arange(10_000) / 2000
 

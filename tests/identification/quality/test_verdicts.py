@@ -9,7 +9,7 @@ from scipy import signal
 
 from epv_env.plant.sensors import SENSORS
 from identification.quality.assessment import assess_recording, sensor_offsets
-from identification.quality.printed_statistics import STATISTICS, TREND_OFFSETS
+from identification.quality.section import STATISTICS, TREND_OFFSETS
 from identification.quality.verdicts import CHECKS, channel_verdict, check_results, worst_status
 from identification.recordings.recording import CHANNELS, UNITS, CampaignError
 from tests.identification.quality.records import (

@@ -12,8 +12,8 @@ from scipy.signal import lfilter
 
 import identification.recordings.campaign_files as campaign_files
 from identification.recordings.campaign_files import read_campaign, write_campaign
+from identification.recordings.columns import sampling_period
 from identification.recordings.recording import CampaignError
-from identification.recordings.sampling_times import sampling_period
 from tests.identification.recordings.good_campaign import campaign_of, good_campaign, resting, switching
 
 BLIND = Path(__file__).parents[4] / "shared" / "blind" / "round-1"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from epv_env.plant.sensors import SENSORS
-from identification.recordings.noise_estimation import (
+from identification.recordings.noise import (
     energised_start_length,
     noise_of_energised_start,
     pooled_noise,

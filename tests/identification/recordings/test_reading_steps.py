@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.bench.disturbances import round_pressures
+from identification.bench.session import round_pressures
 from identification.recordings.campaign_files import read_campaign, write_campaign
-from identification.recordings.noise_estimation import pooled_noise
-from identification.recordings.reading_steps import (
+from identification.recordings.noise import (
     campaign_steps,
     coarse_step_warnings,
+    pooled_noise,
     reading_step,
     reliable_step,
 )

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.bench.disturbances import round_pressures
+from identification.bench.session import round_pressures
 from identification.valve_gap.valve import Valve
 from tests.identification.twins import twin
 

@@ -13,8 +13,8 @@ import epv_env  # noqa: F401 - registers EPValve-v0
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import load_plant
 from identification.__main__ import main
-from identification.bench.measurement import measured_campaign, run_programme
 from identification.bench.programmes import DIAGNOSIS_SUITE
+from identification.bench.session import measured_campaign, run_programme
 from identification.recordings.campaign_files import write_campaign
 from identification.recordings.recording import Campaign, CampaignError, Recording
 from identification.valve_gap import diagnose as module

@@ -6,9 +6,8 @@ import pytest
 
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.sensors import SENSORS
-from identification.bench.disturbances import add_ripple, round_pressures
-from identification.bench.measurement import measured_campaign, run_programme
 from identification.bench.programmes import DIAGNOSIS_SUITE
+from identification.bench.session import add_ripple, measured_campaign, round_pressures, run_programme
 from identification.gap.rank.ranking import Ranking, rank_hypotheses
 from identification.gap.rank.settings import RankingSettings
 from identification.recordings.recording import Campaign

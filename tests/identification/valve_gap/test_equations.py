@@ -7,8 +7,8 @@ import pytest
 
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.parameters import Parameters
-from identification.bench.measurement import measured_campaign, run_programme
 from identification.bench.programmes import DIAGNOSIS_SUITE
+from identification.bench.session import measured_campaign, run_programme
 from identification.valve_gap.equations import EQUATIONS, FORCINGS
 from identification.valve_gap.valve import Valve
 

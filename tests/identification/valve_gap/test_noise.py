@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from epv_env.plant.sensors import SENSORS
-from identification.bench.disturbances import add_ripple
+from identification.bench.session import add_ripple
 from identification.recordings.recording import Campaign, Recording
 from identification.valve_gap.noise import noise_of
 

@@ -8,9 +8,8 @@ import pytest
 
 from epv_env.common.units import BAR
 from epv_env.plant.parameters import Parameters
-from identification.bench.measurement import measured_campaign, run_programme
-from identification.bench.programme_file import load_programmes, save_programmes
-from identification.bench.programmes import DIAGNOSIS_SUITE, Programme
+from identification.bench.programmes import DIAGNOSIS_SUITE, Programme, load_programmes, save_programmes
+from identification.bench.session import measured_campaign, run_programme
 from identification.gap.design.rivals import Rivals
 from identification.gap.rank.ranking import Ranking, rank_hypotheses
 from identification.gap.rank.verdict import PARTIAL

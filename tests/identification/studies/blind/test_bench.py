@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from epv_env.plant.parameters import Parameters
-from identification.bench import measurement as bench
+from identification.bench import session as bench
 from identification.recordings.recording import OUTPUTS
 from identification.studies.blind.bench import blind_suite, run_programme, true_recordings
 from identification.studies.blind.commitments import (

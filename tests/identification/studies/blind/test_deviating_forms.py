@@ -8,7 +8,7 @@ from epv_env.plant.effects.registry import EFFECTS as RECORDS
 from epv_env.plant.effects.registry import effect, effect_constants
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.parameters import Parameters
-from identification.bench.right_hand_side import COMPILED_RIGHT_HAND_SIDES
+from identification.bench.hybrid_automaton import COMPILED_RIGHT_HAND_SIDES
 from identification.studies.blind.bench_rates import right_hand_side, terminal_currents
 from identification.studies.blind.truth import EFFECTS
 

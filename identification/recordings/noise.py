@@ -1,4 +1,4 @@
-"""The steps in which readings come, as the readings show them, and what coarse ones mean.
+"""The noise of each channel, and the steps in which readings come, as the readings show them.
 
 A converter, a file's few digits or a vehicle's bus rounds readings. Where the step is coarse against the
 sensor's noise, a live channel may read the same throughout, and rounding is the noise.
@@ -10,7 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.channels import CHANNEL
-from identification.recordings.recording import PRESSURES, UNITS, Recording
+from identification.recordings.recording import (
+    CHANNELS,
+    HOLD,
+    PRESSURES,
+    UNITS,
+    Campaign,
+    CampaignError,
+    Recording,
+)
 from identification.recordings.rules import RULES, RecordingRules
 
 
@@ -99,3 +107,69 @@ def _shared(readings: NDArray, coarsest: float, rules: RecordingRules) -> float:
     codes = np.unique(readings) / coarsest if coarsest else np.array([])
     off_grid = np.abs(codes - codes[:1] - np.rint(codes - codes[:1]))
     return coarsest if codes.size and np.max(off_grid) < rules.grid_error else 0.0
+
+
+def pooled_noise(campaign: Campaign) -> dict[str, float]:
+    """Standard deviation of each channel's readings about the true value [A, V, Pa], pooled.
+
+    From the quality recordings if there are any, otherwise from the holds that the other recordings
+    start with. Raises CampaignError if a hold is too short.
+    """
+    steady = campaign.with_role("quality")
+    stretches = [(r, len(r)) for r in steady] or [
+        (r, energised_start_length(r)) for r in campaign.recordings
+    ]
+    return _pooled(campaign.recordings, stretches, campaign.rules)
+
+
+def noise_of_energised_start(recording: Recording, rules: RecordingRules = RULES) -> dict[str, float]:
+    """As `pooled_noise`, from the energised steady start of one recording [A, V, Pa]."""
+    stretch = (recording, energised_start_length(recording))
+    return _pooled([recording], [stretch], rules)
+
+
+def energised_start_length(recording: Recording) -> int:
+    """Length of the energised start [samples]. Raises CampaignError if it lasts less than HOLD."""
+    energised = recording.energised
+    samples = len(recording) if np.all(energised) else int(np.argmin(energised))
+    if samples * recording.period < HOLD * (1 - 1e-9):
+        raise CampaignError(
+            f"{recording.name}: energised for the first {1e3 * samples * recording.period:.3g} ms only; "
+            f"the noise is read off {1e3 * HOLD:.0f} ms or more: start recordings in steady state"
+        )
+    return samples
+
+
+def _pooled(
+    recordings: Sequence[Recording], stretches: Sequence[tuple[Recording, int]], rules: RecordingRules
+) -> dict[str, float]:
+    """The noise by channel [SI] in stretches, at least the error by which the recordings are rounded."""
+    coarse = campaign_steps(recordings, rules)
+    finest = {name: rules.sensors[name].resolution * UNITS[name][1] for name in CHANNELS}
+    least = {**finest, **coarse}
+    return {
+        name: max(_deviation(name, stretches, rules.noise_block), rounding_error(least[name]))
+        for name in CHANNELS
+    }
+
+
+def _deviation(name: str, stretches: Sequence[tuple[Recording, int]], block: float) -> float:
+    """Root of the summed squares over the summed degrees of freedom [SI]."""
+    parts = [
+        _about_lines(recording.channel(name)[:samples], recording.period, block)
+        for recording, samples in stretches
+    ]
+    variance = sum(squares for squares, _ in parts) / sum(degrees for _, degrees in parts)
+    return float(np.sqrt(variance))
+
+
+def _about_lines(signal: NDArray, period: float, block: float) -> tuple[float, int]:
+    """Sum of squares and degrees of freedom about one straight line per block, (samples,)."""
+    blocks = np.array_split(signal, max(1, int(len(signal) * period / block)))
+    return sum(_squares(part) for part in blocks), len(signal) - 2 * len(blocks)
+
+
+def _squares(block: NDArray) -> float:
+    time = np.arange(len(block)) - (len(block) - 1) / 2
+    slope = time @ block / (time @ time)
+    return float(np.sum((block - np.mean(block) - slope * time) ** 2))

@@ -1,12 +1,68 @@
-"""Points in time (ISO 8601) and durations as seconds."""
+"""What a measurement file holds, before anybody has said what it means."""
 
+import importlib
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.importing.formats.source_file import ImportingError
+from epv_env.common.extras import how_to_install
+
+
+class ImportingError(ValueError):
+    """A measurement file cannot become a recording: what, where, the rule, the remedy."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SourceChannel:
+    """One series of numbers in a file, as it stands there."""
+
+    name: str
+    """As in the file."""
+    unit: str
+    """As in the file; empty where it says none."""
+    values: NDArray
+    """(samples,), in that unit; NaN where a row has no value."""
+    time: NDArray | None = None
+    """Times of the samples, (samples,) [s]; None: another channel of the table holds them."""
+    begin: np.datetime64 | None = None
+    """The point in time at which `time`, or a channel that holds times, is 0; None: not told."""
+    table: str = ""
+    """Channels of one table share their rows; the name of a group, sheet or struct, dots between the
+    names of structs within structs."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SourceFile:
+    """A measurement file that was read."""
+
+    path: Path
+    format: str
+    """Name of the format, with its version or dialect."""
+    sha256: str
+    """Of the file's bytes."""
+    channels: tuple[SourceChannel, ...]
+    """In the order of the file."""
+
+
+EXTRA = "bench-files"
+"""Extra of pyproject.toml that holds the packages of all formats."""
+
+
+def needed_package(name: str, purpose: str) -> ModuleType:
+    """A package of the extra. Raises ImportingError that names the extra if it is not installed."""
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        package = name.partition(".")[0]
+        raise ImportingError(
+            f"{purpose} need the package {package}, which is not installed: {how_to_install(EXTRA)}"
+        ) from None
+
 
 STAMP = re.compile(
     r"(\d{4})-?(\d\d)-?(\d\d)[T ](\d\d):?(\d\d)(?::?(\d\d(?:[.,]\d+)?))?\s*(?:Z|([+-])(\d\d):?(\d\d)?)?"

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from identification.importing.formats.file_format import needed_package
-from identification.importing.formats.source_file import ImportingError
+from identification.importing.source_file import ImportingError, needed_package
 
 QUANTITIES = {"time": "s", "current": "A", "voltage": "V", "pressure": "Pa", "mass flow": "kg/s"}
 """Quantities of a recording with their SI units."""

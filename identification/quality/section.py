@@ -1,17 +1,19 @@
-"""Section 4 of the report for one recording: verdicts, Tables 2 to 4 and Figures 4 to 9."""
+"""Section 4 of the report for one recording: verdicts, Tables 2 to 4, Figures 4 to 9, and JSON."""
 
 import math
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import asdict, fields
+from itertools import combinations
+from typing import Any
 
-from identification.quality import printed_statistics as reported
-from identification.quality import quality_figures as figures
+from identification.quality import figures as figures
 from identification.quality.assessment import QualityAssessment, sensor_offsets
-from identification.quality.correlation_tests import white_noise_band
-from identification.quality.statistics import DescriptiveStatistics
+from identification.quality.channel import ChannelAssessment, DescriptiveStatistics
+from identification.quality.noise_tests import white_noise_band
 from identification.quality.verdicts import CHECKS, channel_verdict, check_results, worst_status
 from identification.recordings.recording import CHANNELS, UNITS
 from identification.report.page import Picture, Section, Table, Text
+from identification.report_2003.printed_values import correlation_matrix
 
 NOT_PRINTED = "–"
 """Stands where the report has no value."""
@@ -70,8 +72,8 @@ def _trends(quality: QualityAssessment, report_2003: bool) -> Table:
     offsets = [_estimate(trend.offset, trend.offset_error) for trend in trends]
     rows = [["factor [unit/s]", *slopes], ["offset [unit]", *offsets]]
     if report_2003:
-        rows.insert(1, ["  the report's", *_printed_trends(reported.TREND_SLOPES)])
-        rows.append(["  the report's", *_printed_trends(reported.TREND_OFFSETS)])
+        rows.insert(1, ["  the report's", *_printed_trends(TREND_SLOPES)])
+        rows.append(["  the report's", *_printed_trends(TREND_OFFSETS)])
     return Table(
         columns=["Parameter", *UNIT_COLUMNS],
         rows=rows,
@@ -87,7 +89,7 @@ def _printed_trends(values: Mapping[str, float]) -> list[str]:
 
 def _printed_statistics(field: str) -> list[str]:
     """A row of Table 3 for each channel."""
-    printed = reported.STATISTICS
+    printed = STATISTICS
     return [_cell(printed[name], field) if name in printed else NOT_PRINTED for name in CHANNELS]
 
 
@@ -99,7 +101,7 @@ def _statistics(quality: QualityAssessment, report_2003: bool) -> Table:
     statistics = {name: channel.description for name, channel in quality.channels.items()}
     rows = []
     for field in fields(DescriptiveStatistics):
-        label = reported.STATISTIC_NAMES[field.name]
+        label = STATISTIC_NAMES[field.name]
         rows.append([label, *(_cell(statistics[name], field.name) for name in CHANNELS)])
         if report_2003:
             rows.append(["  the report's", *_printed_statistics(field.name)])
@@ -120,7 +122,7 @@ def _cell(description: DescriptiveStatistics, name: str) -> str:
 
 def _printed_correlation(first: str, second: str) -> str:
     """The report's correlation of two channels (Table 4)."""
-    printed = reported.CORRELATIONS.get((first, second))
+    printed = CORRELATIONS.get((first, second))
     return NOT_PRINTED if printed is None else f"{printed:.4f}"
 
 
@@ -151,3 +153,117 @@ def _pictures(quality: QualityAssessment) -> list[Picture]:
         Picture(figure=draw(quality), caption=text, printed=printed)
         for draw, (text, printed) in figures.CAPTIONS.items()
     ]
+
+
+REPORT_CHANNELS = ("I", "U", "p1", "p2", "p3")
+"""Channels of the report's bench, in the order of Table 1."""
+
+STATISTIC_NAMES = {
+    "arithmetic_mean": "arithmetic mean",
+    "trimmed_mean": "trimmed mean [by 5 %]",
+    "median": "median",
+    "standard_deviation": "standard deviation",
+    "interquartile_range": "interquartile range",
+    "absolute_deviation": "absolute deviation",
+    "range": "range",
+    "signal_to_noise": "SNR [dB]",
+    "outlier_factor": "outlier factor",
+    "kurtosis": "kurtosis",
+    "skewness": "skewness",
+}
+"""Rows of Table 3, by field of DescriptiveStatistics."""
+
+TREND_SLOPES = {"I": -6e-6, "U": 5.8e-5, "p1": 7.9e-5, "p2": -1.16e-4, "p3": -8.2e-5}
+"""Table 2 [unit/s]."""
+
+TREND_OFFSETS = {"I": -0.000235, "U": 0.001837, "p1": 1.000909, "p2": 0.99272, "p3": 0.996888}
+"""Table 2 [unit]."""
+
+_TABLE_3 = {
+    "I": (0.0, 0.0, 0.0003, 0.0008, 0.001, 0.0006, 0.0049, 62.916, 3.513, 2.5794, 0.0825),
+    "U": (0.0, -0.0001, -0.0009, 0.0122, 0.016, 0.0089, 0.0921, 66.953, 3.8362, 2.7138, 0.0972),
+    "p1": (0.0, 0.0, 0.0007, 0.0068, 0.0074, 0.0055, 0.0507, 67.227, 3.7353, 3.052, 0.0583),
+    "p2": (0.0, 0.0, 0.0017, 0.0098, 0.0093, 0.0078, 0.0733, 64.25, 3.9119, 3.1001, 0.0193),
+    "p3": (0.0, 0.0, -0.0044, 0.0075, 0.0093, 0.0065, 0.0459, 66.995, 3.0882, 2.6351, 0.115),
+}
+
+STATISTICS = {
+    name: DescriptiveStatistics(**dict(zip(STATISTIC_NAMES, column, strict=True)))
+    for name, column in _TABLE_3.items()
+}
+"""Table 3 by channel."""
+
+CORRELATIONS = {
+    (REPORT_CHANNELS[row], REPORT_CHANNELS[column]): correlation_matrix()[row][column]
+    for row, column in combinations(range(len(REPORT_CHANNELS)), 2)
+}
+"""Table 4, above the diagonal."""
+
+SAMPLES = 10_000
+"""Of the report's record: 5 s at 2000 Hz."""
+
+
+def as_json(quality: QualityAssessment) -> dict[str, Any]:
+    """Figures in A, V and bar (sensor_offsets in SI units) and findings; None for what is undefined."""
+    return {
+        "recording": quality.name,
+        "samples": quality.samples,
+        "period_s": quality.period,
+        "at_rest": quality.at_rest,
+        "sensor_offsets_SI": {n: _finite(asdict(o)) for n, o in sensor_offsets(quality).items()},
+        "channels": {name: _channel_json(quality, name) for name in CHANNELS},
+        "correlations": [
+            {
+                "channels": list(names),
+                "correlation": pair.correlation,
+                "adjusted_p": quality.adjusted[names],
+                "peak": pair.peak,
+                "peak_lag_s": pair.peak_lag * quality.period,
+            }
+            for names, pair in quality.pairs.items()
+        ],
+    }
+
+
+def as_text(quality: QualityAssessment) -> str:
+    """A line per channel: its worst status, then the status of each check."""
+    widths = {check: max(len(check), 5) for check in CHECKS}
+    lines = ["channel  verdict  " + "  ".join(check.ljust(widths[check]) for check in CHECKS)]
+    for name in CHANNELS:
+        statuses = {result.check: result.status for result in check_results(quality, name)}
+        cells = "  ".join(statuses.get(check, "-").ljust(width) for check, width in widths.items())
+        lines.append(f"{name:7}  {worst_status(check_results(quality, name)):7}  {cells}")
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def _channel_json(quality: QualityAssessment, name: str) -> dict[str, Any]:
+    channel = quality.channels[name]
+    results = check_results(quality, name)
+    return {
+        "unit": channel.unit,
+        "status": worst_status(results),
+        "findings": [
+            {"check": result.check, "status": result.status, "text": result.text} for result in results
+        ],
+        "trend": _finite(asdict(channel.trend)),
+        "statistics": _finite(asdict(channel.description)),
+        "normality": _finite(asdict(channel.normality)),
+        "offset": channel.offset,
+        "quantum": channel.quantum,
+        "whiteness": _whiteness_json(channel),
+    }
+
+
+def _whiteness_json(channel: ChannelAssessment) -> dict[str, float] | None:
+    test = channel.whiteness
+    if test is None:
+        return None
+    return {
+        "ljung_box_p": test.probability,
+        "greatest_autocorrelation": test.peak,
+        "variance_inflation": test.inflation,
+    }
+
+
+def _finite(figures: dict[str, float]) -> dict[str, float | None]:
+    return {name: value if math.isfinite(value) else None for name, value in figures.items()}

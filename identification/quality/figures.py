@@ -10,8 +10,7 @@ from scipy import stats
 
 from identification.quality.assessment import QualityAssessment
 from identification.quality.channel import ChannelAssessment
-from identification.quality.correlation_tests import WhitenessTest, white_noise_band
-from identification.quality.normality import probability_plot
+from identification.quality.noise_tests import WhitenessTest, probability_plot, white_noise_band
 
 MARK = {"color": "tab:blue", "linewidth": 0.8}
 """Line of a computed curve."""

@@ -1,1 +1,0 @@
-"""The formats of measurement files: one file each, one line in the registry."""
