@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from identification.gap.diagnosis import Diagnosis
 from identification.gap.fit.prediction import predict
-from identification.gap.report.localisation_figures import missing_term_figure
-from identification.gap.report.remainder import drawn_term
+from identification.gap.gap_json import drawn_term
+from identification.gap.report_figures import missing_term_figure
 
 RECALIBRATED, WITH_CAUSES, MEASURED = "tab:orange", "tab:blue", "black"
 

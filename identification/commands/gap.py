@@ -7,8 +7,8 @@ from epv_env.common.command_line import writable_folder
 from epv_env.common.json_files import decoded
 from identification.commands.command import Command
 from identification.commands.options import add_out, add_plant, add_seed
-from identification.gap.report import result_files
-from identification.gap.report.verdict_sentences import verdict_sentence
+from identification.gap.gap_json import GAP as GAP_FILE
+from identification.gap.sentences import verdict_sentence
 from identification.report.result_files import as_text
 from identification.studies.error_tables.error_table_study import error_table_study
 from identification.valve_gap import diagnose
@@ -53,9 +53,9 @@ def _diagnose_campaign(chosen: argparse.Namespace) -> None:
     diagnosis = diagnose_campaign(
         chosen.campaign, chosen.out, plant=chosen.plant, without=chosen.without, seed=chosen.seed
     )
-    content = decoded(chosen.out / result_files.GAP, remedy="diagnose again")
+    content = decoded(chosen.out / GAP_FILE, remedy="diagnose again")
     print(verdict_sentence(diagnosis, content["next_experiment"])[1])
-    written = (diagnose.REPORT, result_files.GAP, diagnose.PLANT)
+    written = (diagnose.REPORT, GAP_FILE, diagnose.PLANT)
     print(f"written: {', '.join(str(chosen.out / name) for name in written)}")
 
 

@@ -2,31 +2,45 @@
 
 from dataclasses import dataclass, replace
 
+from identification.block_bootstrap import Interval
+from identification.gap.cause_search import HypothesisPool, search_causes
+from identification.gap.evidence import EvaluatedHypothesis, evaluate_linearised
 from identification.gap.fit.fit_cache import FitCache
+from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.fit.hypothesis import Estimate, Hypothesis
-from identification.gap.locate.fault_localisation import Localisation, locate
+from identification.gap.fit.linearisation import linearise
+from identification.gap.fit.settings import FitSettings
+from identification.gap.held_out import (
+    NOMINAL,
+    RECALIBRATED,
+    DiscrepancyReduction,
+    measure_discrepancy_reduction,
+)
+from identification.gap.localisation import Localisation, locate
 from identification.gap.model.checks import check
 from identification.gap.model.grey_box import GreyBox
 from identification.gap.model.prepared_plant import prepared
-from identification.gap.rank.evidence import EvaluatedHypothesis
-from identification.gap.rank.ranking import Ranking, rank_hypotheses
-from identification.gap.rank.verdict import (
+from identification.gap.posterior import Posterior
+from identification.gap.rank.settings import RankingSettings
+from identification.gap.recalibration import (
+    recalibrate,
+    with_disturbance,
+    with_own_nuisances,
+    with_seen_noise,
+)
+from identification.gap.reduce.settings import ReductionSettings
+from identification.gap.screening import Separability, assess_separability, simulate_signatures
+from identification.gap.settings import DiagnosisSettings
+from identification.gap.verdict import (
     AMBIGUOUS,
     KNOWN,
     PARTIAL,
     UNKNOWN,
     Conclusion,
     RankedCause,
+    Ranking,
     conclude,
 )
-from identification.gap.reduce.block_bootstrap import Interval
-from identification.gap.reduce.discrepancy_reduction import (
-    NOMINAL,
-    RECALIBRATED,
-    DiscrepancyReduction,
-    measure_discrepancy_reduction,
-)
-from identification.gap.settings import DiagnosisSettings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -193,3 +207,86 @@ def _warnings(
         for cause in judged
         if not cause.hypothesis.converged and cause.probability > mentioned_probability
     ]
+
+
+def rank_hypotheses(
+    plant: GreyBox,
+    cache: FitCache | None = None,
+    settings: RankingSettings | None = None,
+    fit_settings: FitSettings | None = None,
+    floor: ReductionSettings | None = None,
+) -> Ranking:
+    """Refit the promising hypotheses and weigh them; a fit that does not converge is weighed as it is.
+
+    Args:
+        plant: the model, its recordings and its catalogue of causes.
+        cache: runs the fits; None keeps nothing.
+        settings: judgement of the ranking; None: the defaults.
+        fit_settings: judgement of the fits; None: the defaults.
+        floor: how noise is seen in residuals; None: the defaults.
+    """
+    settings, cache, plant = settings or RankingSettings(), cache or FitCache(plant), prepared(plant)
+    fit_settings = fit_settings or FitSettings()
+    if len(plant.causes) <= settings.multi_start_causes:
+        fit_settings = fit_settings.thorough
+    problem, base = recalibrate(plant, cache, fit_settings)
+    corrected = with_seen_noise(problem, base, settings, floor or ReductionSettings())
+    if corrected is not plant:
+        problem, base = recalibrate(corrected, cache, fit_settings, "with the noise seen: ")
+    ranking = _searched(problem, base, cache, settings)
+    weighted = with_disturbance(corrected, ranking.discrepancies, settings)
+    if weighted is corrected:
+        return ranking
+    cache = cache.named("with the disturbance: ")
+    return _searched(*recalibrate(weighted, cache, fit_settings), cache, settings)
+
+
+def _searched(
+    problem: FittingProblem, base: Estimate, cache: FitCache, settings: RankingSettings
+) -> Ranking:
+    """The search for causes beside a recalibrated model, and what it found.
+
+    Args:
+        problem: readings and settings of the fits.
+        base: the recalibrated model.
+        cache: runs the fits.
+        settings: judgement.
+    """
+    runs = linearise(problem, [base], problem.all_runs)[0]
+    base_runs = [runs[r] for r in problem.fitted_runs]
+    signatures = simulate_signatures(problem, base, problem.plant.causes)
+    separability = assess_separability(
+        base_runs, signatures, problem.settings.largest_deviation, settings
+    )
+    evaluated = evaluate_linearised(problem, base, runs, settings)
+    step = "recalibration: own nuisances"
+    recalibrated = with_own_nuisances(problem, [evaluated], step, cache, settings)[0]
+    pool = HypothesisPool(problem, recalibrated, cache, settings)
+    search_causes(pool, base, base_runs, signatures, separability)
+    hypotheses, found = pool.posterior()
+    return _ranking(problem, recalibrated, hypotheses, found, separability, settings)
+
+
+def _ranking(
+    problem: FittingProblem,
+    recalibrated: EvaluatedHypothesis,
+    hypotheses: list[EvaluatedHypothesis],
+    found: Posterior,
+    separability: Separability,
+    settings: RankingSettings,
+) -> Ranking:
+    """Hypotheses by falling probability; equal ones by their scores."""
+    keys = zip(found.probabilities, found.scores, strict=True)
+    order = [i for i, _ in sorted(enumerate(keys), key=lambda item: item[1], reverse=True)]
+    return Ranking(
+        problem=problem,
+        recalibrated=recalibrated,
+        hypotheses=[hypotheses[i] for i in order],
+        probabilities=[found.probabilities[i] for i in order],
+        no_cause=found.no_cause,
+        unknown=found.unknown,
+        shares_left=[found.shares_left[i] for i in order],
+        discrepancies=found.discrepancies,
+        separability=separability,
+        settings=settings,
+    )

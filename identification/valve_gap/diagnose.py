@@ -16,9 +16,8 @@ from epv_env.plant.region import Region
 from identification.bench.programmes import at_voltage, save_programmes
 from identification.gap.diagnosis import Diagnosis, diagnose, hypothesis_label
 from identification.gap.fit.fit_cache import FitCache
-from identification.gap.report.parameter_intervals import fitted_values, parameter_covariance
-from identification.gap.report.result_files import write_results
-from identification.gap.report.sections import sections
+from identification.gap.gap_json import fitted_values, parameter_covariance, write_results
+from identification.gap.report_page import sections
 from identification.recordings.campaign_files import read_campaign
 from identification.recordings.recording import Campaign, campaign_facts
 from identification.recordings.rules import RULES, rules_of

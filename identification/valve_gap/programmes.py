@@ -8,12 +8,15 @@ import numpy as np
 
 from epv_env.common.units import BAR
 from identification.bench.programmes import Programme
-from identification.gap.design.expected_information import expected_information
-from identification.gap.design.information_gain import InformationGain, odds_text
-from identification.gap.design.rivals import Rivals, select_rivals
 from identification.gap.design.settings import DesignSettings
-from identification.gap.rank.ranking import Ranking
-from identification.gap.rank.verdict import PARTIAL, UNKNOWN
+from identification.gap.experiment_design import (
+    InformationGain,
+    Rivals,
+    expected_information,
+    odds_text,
+    select_rivals,
+)
+from identification.gap.verdict import PARTIAL, UNKNOWN, Ranking
 from identification.recordings.recording import CHANNELS, Recording
 from identification.replay.batch_simulation import Replay
 from identification.replay.model_inputs import ModelInputs

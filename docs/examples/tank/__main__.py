@@ -8,10 +8,10 @@ from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import read_runs, virtual_recordings, write_runs
 from epv_env.common.command_line import fail_clearly, writable_folder
 from identification.gap.diagnosis import diagnose
-from identification.gap.report.localisation_figures import missing_term_figure
-from identification.gap.report.result_files import write_results
-from identification.gap.report.sections import sections
-from identification.gap.report.verdict_sentences import verdict_sentence
+from identification.gap.gap_json import write_results
+from identification.gap.report_figures import missing_term_figure
+from identification.gap.report_page import sections
+from identification.gap.sentences import verdict_sentence
 from identification.report.page import write_page
 
 LEAKING = {"c": 0.021, "leak": 4e-3}

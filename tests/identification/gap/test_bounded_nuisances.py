@@ -9,13 +9,13 @@ from scipy.optimize import lsq_linear
 
 from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import virtual_recordings
+from identification.gap.evidence import evaluate
 from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.fit.hypothesis import Estimate
 from identification.gap.fit.linearisation import linearise
 from identification.gap.fit.variable_projection import normal_equations, without_run_nuisances
-from identification.gap.rank.evidence import evaluate
-from identification.gap.rank.refinement import recalibrate
 from identification.gap.rank.settings import RankingSettings
+from identification.gap.recalibration import recalibrate
 
 SD = 5e-4
 """Of the gauge's zero in a run [m]."""

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.gap.cause_search import HypothesisPool, _leave_causes_out
+from identification.gap.diagnosis import rank_hypotheses
+from identification.gap.evidence import evaluate
 from identification.gap.fit.fit_cache import FitCache
 from identification.gap.fit.gauss_newton import fit
 from identification.gap.fit.hypothesis import Hypothesis
-from identification.gap.rank.cause_search import _leave_causes_out
-from identification.gap.rank.evidence import evaluate
-from identification.gap.rank.hypothesis_pool import HypothesisPool
-from identification.gap.rank.ranking import Ranking, rank_hypotheses
-from identification.gap.rank.refinement import recalibrate
 from identification.gap.rank.settings import RankingSettings
+from identification.gap.recalibration import recalibrate
+from identification.gap.verdict import Ranking
 from tests.identification.gap.drives import Drive
 
 SMALL = RankingSettings()

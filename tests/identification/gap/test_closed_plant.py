@@ -8,11 +8,11 @@ import pytest
 from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import virtual_recordings
 from identification.gap.diagnosis import Diagnosis, diagnose
-from identification.gap.locate.regime_gaps import WHOLE
-from identification.gap.locate.sensor_faults import reading_faults
+from identification.gap.gap_json import as_json
+from identification.gap.gaps import WHOLE
 from identification.gap.locate.settings import LocalisationSettings
-from identification.gap.report.json_export import as_json
-from identification.gap.report.sections import sections
+from identification.gap.report_page import sections
+from identification.gap.sensor_faults import reading_faults
 from identification.report.page import Picture
 
 

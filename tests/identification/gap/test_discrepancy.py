@@ -7,12 +7,12 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from identification.gap.model.recorded_run import Channel, Run
-from identification.gap.rank.discrepancy import (
+from identification.gap.discrepancy import (
     ChannelDiscrepancy,
     channel_discrepancies,
     white_variance,
 )
+from identification.gap.model.recorded_run import Channel, Run
 from identification.gap.rank.settings import RankingSettings
 from tests.identification.gap.drives import Drive
 

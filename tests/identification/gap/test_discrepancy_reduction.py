@@ -12,12 +12,12 @@ from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.fit.gauss_newton import fit
 from identification.gap.fit.hypothesis import Estimate, Hypothesis
 from identification.gap.fit.prediction import percentage_errors, predict
-from identification.gap.rank.refinement import recalibrate
-from identification.gap.reduce.discrepancy_reduction import (
+from identification.gap.held_out import (
     DiscrepancyReduction,
     measure_discrepancy_reduction,
 )
-from identification.gap.report.reduction_figures import gap_figure, share_figure
+from identification.gap.recalibration import recalibrate
+from identification.gap.report_figures import gap_figure, share_figure
 
 
 def estimates(tank: Tank, causes: tuple[str, ...]) -> tuple[FittingProblem, dict[str, Estimate]]:

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.gap.evidence import EvaluatedHypothesis, _covariance
 from identification.gap.fit.variable_projection import LinearisedRun, normal_equations
-from identification.gap.rank.evidence import EvaluatedHypothesis, _covariance
 from identification.gap.rank.settings import RankingSettings
 from tests.identification.gap.tanks import diagnosed
 

@@ -11,23 +11,26 @@ from scipy.integrate import quad
 from scipy.special import expit, logsumexp
 from scipy.stats import norm
 
-from identification.gap.design.expected_information import expected_information
-from identification.gap.design.information_gain import (
+from identification.gap.design.settings import DesignSettings
+from identification.gap.diagnosis import rank_hypotheses
+from identification.gap.experiment_design import (
+    ParameterPosterior,
+    Rivals,
+    expected_information,
     information_gain,
     kullback_leibler_divergences,
     odds_text,
+    outcome_distributions,
+    parameter_posteriors,
+    select_rivals,
 )
-from identification.gap.design.outcome_distribution import outcome_distributions
-from identification.gap.design.parameter_posterior import ParameterPosterior, parameter_posteriors
-from identification.gap.design.rivals import Rivals, select_rivals
-from identification.gap.design.settings import DesignSettings
 from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.fit.linearisation import linearise, nuisance_slopes
 from identification.gap.fit.variable_projection import LinearisedRun, normal_equations
 from identification.gap.model.cause import Cause
 from identification.gap.model.free_parameter import FreeParameter, NuisanceParameter
 from identification.gap.model.recorded_run import Channel, Run
-from identification.gap.rank.ranking import Ranking, rank_hypotheses
+from identification.gap.verdict import Ranking
 
 NOISE, SAMPLES, PERIOD = 0.02, 40, 1e-3
 SUPPLIES = (12.0, 10.0, 8.0, 6.0, 4.0)

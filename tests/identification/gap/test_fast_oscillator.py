@@ -5,13 +5,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from identification.gap.locate.fault_localisation import Localisation, MissingTerm, locate
+from identification.gap.evidence import evaluate
+from identification.gap.forcing import most_windows, resolving_edges
+from identification.gap.localisation import Localisation, MissingTerm, locate
 from identification.gap.locate.settings import LocalisationSettings
-from identification.gap.locate.windows import most_windows, resolving_edges
 from identification.gap.model.state_equation import StateTrace
-from identification.gap.rank.evidence import evaluate
-from identification.gap.rank.refinement import recalibrate
 from identification.gap.rank.settings import RankingSettings
+from identification.gap.recalibration import recalibrate
 from tests.identification.gap.oscillators import swung
 
 SETTINGS = LocalisationSettings()

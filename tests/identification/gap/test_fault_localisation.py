@@ -7,21 +7,19 @@ import pytest
 
 from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import virtual_recordings
+from identification.gap.evidence import evaluate
 from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.fit.hypothesis import Estimate
-from identification.gap.locate.fault_localisation import Localisation, locate
-from identification.gap.locate.forcing import quadratic_forms
-from identification.gap.locate.forcing_processes import fit_processes
-from identification.gap.locate.regime_gaps import RegimeGap, regime_gaps
+from identification.gap.forcing import quadratic_forms, window_edges
+from identification.gap.gaps import RegimeGap, regime_gaps
+from identification.gap.localisation import Localisation, fit_processes, locate
 from identification.gap.locate.settings import LocalisationSettings
-from identification.gap.locate.windows import window_edges
 from identification.gap.model.grey_box import noise_weighted
 from identification.gap.model.state_equation import StateTrace
-from identification.gap.rank.evidence import evaluate
-from identification.gap.rank.refinement import recalibrate
 from identification.gap.rank.settings import RankingSettings
+from identification.gap.recalibration import recalibrate
 from identification.gap.reduce.settings import ReductionSettings
-from identification.gap.report.localisation_figures import (
+from identification.gap.report_figures import (
     forcing_figure,
     heat_map,
     missing_term_figure,

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.report.json_export import (
+from identification.gap.gap_json import (
     as_json,
     magnitudes,
     remaining_location,

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.rank.missing_cause import log_completeness, with_hidden_causes
-from identification.gap.rank.ranking import Ranking, rank_hypotheses
+from identification.gap.diagnosis import rank_hypotheses
+from identification.gap.posterior import log_completeness, with_hidden_causes
 from identification.gap.rank.settings import RankingSettings
+from identification.gap.verdict import Ranking
 from tests.identification.gap.drives import Drive
 
 SETTINGS = RankingSettings()

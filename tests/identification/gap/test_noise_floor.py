@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from identification.gap.reduce.gaps import GapDraws
+from identification.gap.gaps import GapDraws
 from identification.gap.reduce.settings import ReductionSettings
 
 SETTINGS = ReductionSettings(draws=300)

@@ -6,7 +6,7 @@ import pytest
 from docs.examples.tank.recordings import PERIOD
 from docs.examples.tank.simulator import AREA, START, levels
 from identification.gap.diagnosis import diagnose
-from identification.gap.locate.regime_gaps import WHOLE
+from identification.gap.gaps import WHOLE
 from identification.gap.model.cause import Cause
 from identification.gap.model.grey_box import GreyBox
 from identification.gap.model.recorded_run import Run

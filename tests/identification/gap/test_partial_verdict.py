@@ -5,8 +5,8 @@ from functools import cache
 import pytest
 
 from identification.gap.diagnosis import Diagnosis, diagnose
-from identification.gap.rank.verdict import NO_GAP, PARTIAL
-from identification.gap.report.verdict_sentences import verdict_sentence
+from identification.gap.sentences import verdict_sentence
+from identification.gap.verdict import NO_GAP, PARTIAL
 from tests.identification.gap.drives import Drive
 from tests.identification.gap.tanks import diagnosed, leaking, without_gap
 from tests.identification.gap.test_ranking import stating

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.rank.evidence import EvaluatedHypothesis
-from identification.gap.rank.posterior import Posterior, credibility, misfit_beyond_noise, posterior
-from identification.gap.rank.ranking import Ranking, rank_hypotheses
+from identification.gap.diagnosis import rank_hypotheses
+from identification.gap.evidence import EvaluatedHypothesis
+from identification.gap.posterior import Posterior, credibility, misfit_beyond_noise, posterior
 from identification.gap.rank.settings import RankingSettings
+from identification.gap.verdict import Ranking
 from tests.identification.gap.drives import Drive
 
 SETTINGS = RankingSettings()

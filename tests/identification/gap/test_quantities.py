@@ -2,8 +2,8 @@
 
 import pytest
 
-from identification.gap.reduce.block_bootstrap import Interval
-from identification.gap.report.quantities import (
+from identification.block_bootstrap import Interval
+from identification.gap.quantities import (
     gap_with_interval,
     probability_text,
     quantity,

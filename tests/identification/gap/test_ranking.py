@@ -7,8 +7,9 @@ import pytest
 
 from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import virtual_recordings
-from identification.gap.rank.ranking import Ranking, rank_hypotheses
-from identification.gap.rank.refinement import recalibrate
+from identification.gap.diagnosis import rank_hypotheses
+from identification.gap.recalibration import recalibrate
+from identification.gap.verdict import Ranking
 from tests.identification.gap.tanks import disturbed, leaking, without_gap
 
 

@@ -10,17 +10,22 @@ import pytest
 
 from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import virtual_recordings
+from identification.block_bootstrap import Interval
 from identification.gap.diagnosis import Diagnosis, diagnose, hypothesis_label
-from identification.gap.rank.posterior import variance_inflation
-from identification.gap.rank.verdict import NO_GAP, PARTIAL, UNKNOWN
-from identification.gap.reduce.block_bootstrap import Interval
-from identification.gap.reduce.discrepancy_reduction import RECALIBRATED
-from identification.gap.report.json_export import as_json
-from identification.gap.report.parameter_intervals import parameter_covariance
-from identification.gap.report.remainder import remainder, term_table
-from identification.gap.report.result_files import GAP, TERM, write_results
-from identification.gap.report.sections import sections
-from identification.gap.report.verdict_sentences import verdict_sentence
+from identification.gap.gap_json import (
+    GAP,
+    TERM,
+    as_json,
+    parameter_covariance,
+    remainder,
+    term_table,
+    write_results,
+)
+from identification.gap.held_out import RECALIBRATED
+from identification.gap.posterior import variance_inflation
+from identification.gap.report_page import sections
+from identification.gap.sentences import verdict_sentence
+from identification.gap.verdict import NO_GAP, PARTIAL, UNKNOWN
 from identification.report.page import Picture, Table
 
 

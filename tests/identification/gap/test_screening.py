@@ -15,12 +15,12 @@ from identification.gap.fit.linearisation import linearise
 from identification.gap.fit.variable_projection import LinearisedRun
 from identification.gap.model.cause import Cause
 from identification.gap.model.free_parameter import FreeParameter
-from identification.gap.rank.pair_screening import promising_pairs
-from identification.gap.rank.refinement import recalibrate, refit
-from identification.gap.rank.screening import (
+from identification.gap.recalibration import recalibrate, refit
+from identification.gap.screening import (
     CauseSignature,
     Start,
     _predicted,
+    promising_pairs,
     screen_causes,
     simulate_signatures,
     with_cause,

@@ -10,18 +10,18 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
+from identification.gap import report_figures as ranking_figures
 from identification.gap.diagnosis import Diagnosis
-from identification.gap.report import ranking_figures
-from identification.gap.report.json_export import as_json
-from identification.gap.report.quantities import probability_text, quantity
-from identification.gap.report.sections import sections
-from identification.gap.report.sentences import (
+from identification.gap.gap_json import as_json
+from identification.gap.quantities import probability_text, quantity
+from identification.gap.report_page import sections
+from identification.gap.sentences import (
     hidden_causes_sentence,
     look_alikes,
     parameters_at_bounds,
     reduction_sentence,
+    verdict_sentence,
 )
-from identification.gap.report.verdict_sentences import verdict_sentence
 from identification.report.page import Picture, Section, Table, write_page
 from tests.identification.gap.tanks import TANKS, diagnosed
 

@@ -9,15 +9,15 @@ from pathlib import Path
 import pytest
 
 import identification.gap
-from identification.gap.design.expected_information import expected_information
 from identification.gap.design.settings import DesignSettings
 from identification.gap.diagnosis import diagnose
+from identification.gap.experiment_design import expected_information
 from identification.gap.fit.settings import FitSettings
+from identification.gap.gap_json import as_json
 from identification.gap.locate.settings import LocalisationSettings
 from identification.gap.model.settings import PreparationSettings, TimeScaleSettings
 from identification.gap.rank.settings import RankingSettings
 from identification.gap.reduce.settings import ReductionSettings
-from identification.gap.report.json_export import as_json
 from identification.gap.settings import DiagnosisSettings, ReportSettings
 from tests.identification.gap.tanks import without_gap
 from tests.identification.gap.test_expected_information import Gauge, diagnosed, two

@@ -6,19 +6,19 @@ from itertools import combinations
 import numpy as np
 import pytest
 
+from identification.gap.evidence import EvaluatedHypothesis
 from identification.gap.fit.hypothesis import Hypothesis
-from identification.gap.locate.fault_localisation import ForcingEstimate, Localisation
+from identification.gap.localisation import ForcingEstimate, Localisation
 from identification.gap.model.cause import Cause
 from identification.gap.model.state_equation import StateEquation
-from identification.gap.rank.evidence import EvaluatedHypothesis
-from identification.gap.rank.ranking import Ranking
-from identification.gap.rank.verdict import (
+from identification.gap.verdict import (
     AMBIGUOUS,
     KNOWN,
     NO_GAP,
     PARTIAL,
     UNKNOWN,
     RankedCause,
+    Ranking,
     causes_by_name,
     component_probabilities,
     conclude,

@@ -7,10 +7,9 @@ import pytest
 from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import virtual_recordings
 from identification.gap.diagnosis import diagnose
-from identification.gap.report.calibrated_values import calibrated_values
-from identification.gap.report.json_export import as_json
-from identification.gap.report.names import in_words
-from identification.gap.report.sections import sections
+from identification.gap.gap_json import as_json
+from identification.gap.report_page import calibrated_values, sections
+from identification.gap.sentences import in_words
 from identification.report.page import Section, Table, Text
 from tests.identification.gap.tanks import diagnosed
 

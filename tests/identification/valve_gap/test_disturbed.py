@@ -8,8 +8,9 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.sensors import SENSORS
 from identification.bench.programmes import DIAGNOSIS_SUITE
 from identification.bench.session import add_ripple, measured_campaign, round_pressures, run_programme
-from identification.gap.rank.ranking import Ranking, rank_hypotheses
+from identification.gap.diagnosis import rank_hypotheses
 from identification.gap.rank.settings import RankingSettings
+from identification.gap.verdict import Ranking
 from identification.recordings.recording import Campaign
 from identification.valve_gap.valve import Valve
 from tests.identification.valve_gap.test_diagnose import campaign as short_campaign

@@ -10,9 +10,9 @@ from epv_env.common.units import BAR
 from epv_env.plant.parameters import Parameters
 from identification.bench.programmes import DIAGNOSIS_SUITE, Programme, load_programmes, save_programmes
 from identification.bench.session import measured_campaign, run_programme
-from identification.gap.design.rivals import Rivals
-from identification.gap.rank.ranking import Ranking, rank_hypotheses
-from identification.gap.rank.verdict import PARTIAL
+from identification.gap.diagnosis import rank_hypotheses
+from identification.gap.experiment_design import Rivals
+from identification.gap.verdict import PARTIAL, Ranking
 from identification.report_2003.cases import Case
 from identification.valve_gap.programmes import (
     CANDIDATES,

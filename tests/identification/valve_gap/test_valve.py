@@ -9,7 +9,7 @@ from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import Parameters
 from identification.bench.programmes import DIAGNOSIS_SUITE
 from identification.bench.session import measured_campaign, run_programme
-from identification.gap.rank.ranking import rank_hypotheses
+from identification.gap.diagnosis import rank_hypotheses
 from identification.recordings.recording import Campaign
 from identification.replay.responses import responses
 from identification.valve_gap.causes import effects, parameters

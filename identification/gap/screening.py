@@ -1,7 +1,8 @@
-"""Screening: which causes are worth a refit, and from which values, by simulation."""
+"""Screening: which causes are worth a refit, from which values, and which look alike, by simulation."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,8 +10,9 @@ from numpy.typing import NDArray
 from identification.gap.fit.changed_run import ChangedRuns
 from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.fit.hypothesis import Estimate, Hypothesis
-from identification.gap.fit.variable_projection import LinearisedRun, NormalEquations
+from identification.gap.fit.variable_projection import LinearisedRun, NormalEquations, normal_equations
 from identification.gap.model.cause import Cause
+from identification.gap.rank.settings import RankingSettings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +60,45 @@ class CauseSignature:
         ends = np.array([(p.low, p.high) for p in parameters]) - nominal[:, None]
         shares = ends / (self.trial - nominal)[:, None]
         return float(np.max(np.min(shares, axis=1))), float(np.min(np.max(shares, axis=1)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Separability:
+    """Signatures of n causes, less what calibrated and nuisance parameters absorb of them."""
+
+    labels: tuple[str, ...]
+    """Labels of the causes, (n,)."""
+    signature_norms: NDArray
+    """Length of each signature at the cause's first trial value, (n,) [noise deviations]."""
+    correlation: NDArray
+    """Correlations of the signatures, (n, n) [1]: near 1 or -1 for causes that look alike."""
+    settings: RankingSettings
+    """Thresholds of detection and of likeness."""
+
+    @property
+    def absorbed(self) -> tuple[str, ...]:
+        """Causes that recalibration hides."""
+        least = self.settings.detectable_signature
+        pairs = zip(self.labels, self.signature_norms, strict=True)
+        return tuple(label for label, norm in pairs if norm < least)
+
+    def twins(self, label: str) -> tuple[str, ...]:
+        """Causes that the campaign hardly tells from one cause, the most alike first."""
+        return self.alike(label, self.settings.twin_correlation)
+
+    def alike(self, label: str, least_correlation: float) -> tuple[str, ...]:
+        """Detectable causes with a higher absolute correlation with one cause, the most alike first."""
+        if label not in self.labels:
+            return ()
+        row = np.abs(self.correlation[self.labels.index(label)])
+        order = np.argsort(-row, kind="stable")
+        return tuple(
+            self.labels[i]
+            for i in order
+            if row[i] > least_correlation
+            and self.labels[i] != label
+            and self.signature_norms[i] >= self.settings.detectable_signature
+        )
 
 
 def trial_estimates(
@@ -232,3 +273,79 @@ def _bounded_last_step(equations: NormalEquations, low: float, high: float) -> t
     step = float(np.clip(slope / max(curvature, 1e-12), low, high))
     left = equations.least - gradient[:k] @ solved[:, 0] - 2 * step * slope + step * step * curvature
     return step, float(left)
+
+
+def promising_pairs(
+    base_runs: Sequence[LinearisedRun],
+    signatures: Sequence[CauseSignature],
+    largest_deviation: float,
+) -> list[frozenset[str]]:
+    """Pairs of labels by falling decrease of chi-square, both changes taken as linear in their sizes.
+
+    A negative size is none where the range begins at off.
+
+    Args:
+        base_runs: the base estimate linearised in the fitted runs.
+        signatures: from `simulate_signatures` beside the same base; the first of each cause counts.
+        largest_deviation: bound of nuisance parameters [standard deviations].
+    """
+    first: dict[str, CauseSignature] = {}
+    for signature in signatures:
+        first.setdefault(signature.cause.label, signature)
+    labels, causes = list(first), [signature.cause for signature in first.values()]
+    least = np.array([signature.shares[0] for signature in first.values()])
+    runs = [
+        replace(run, slopes=np.column_stack([run.slopes, *(s.changes[r] for s in first.values())]))
+        for r, run in enumerate(base_runs)
+    ]
+    equations = normal_equations(runs, largest_deviation)
+    k = base_runs[0].slopes.shape[1]
+    hessian, gradient = equations.hessian, equations.gradient
+    own = hessian[:k, :k] + 1e-9 * np.eye(k)
+    solved = np.linalg.solve(own, np.column_stack([gradient[:k], hessian[:k, k:]]))
+    moment = gradient[k:] - hessian[k:, :k] @ solved[:, 0]
+    gram = hessian[k:, k:] - hessian[k:, :k] @ solved[:, 1:]
+    gains: dict[frozenset[str], float] = {}
+    for i, j in combinations(range(len(labels)), 2):
+        pair = [i, j]
+        matrix = gram[np.ix_(pair, pair)] + 1e-9 * np.eye(2)
+        sizes = np.linalg.solve(matrix, moment[pair])
+        possible = np.all((sizes > 0) | (least[pair] < 0))
+        if causes[i].name != causes[j].name and possible:
+            gains[frozenset((labels[i], labels[j]))] = float(sizes @ moment[pair])
+    return sorted(gains, key=lambda pair: -gains[pair])
+
+
+def assess_separability(
+    base_runs: Sequence[LinearisedRun],
+    signatures: Sequence[CauseSignature],
+    largest_deviation: float,
+    settings: RankingSettings,
+) -> Separability:
+    """Separability of the causes at their first trial values.
+
+    Args:
+        base_runs: the base estimate linearised in the fitted runs.
+        signatures: from `simulate_signatures` beside the same base.
+        largest_deviation: bound of nuisance parameters [standard deviations].
+        settings: thresholds that the result keeps.
+    """
+    first: dict[str, CauseSignature] = {}
+    for signature in signatures:
+        first.setdefault(signature.cause.label, signature)
+    runs = [
+        replace(run, slopes=np.column_stack([run.slopes, *(s.changes[r] for s in first.values())]))
+        for r, run in enumerate(base_runs)
+    ]
+    hessian = normal_equations(runs, largest_deviation).hessian
+    k = base_runs[0].slopes.shape[1]
+    cross = hessian[:k, k:]
+    gram = hessian[k:, k:] - cross.T @ np.linalg.solve(hessian[:k, :k] + 1e-9 * np.eye(k), cross)
+    norms = np.sqrt(np.maximum(np.diag(gram), 0.0))
+    divisors = np.maximum(norms, np.sqrt(np.finfo(float).tiny))
+    return Separability(
+        labels=tuple(first),
+        signature_norms=norms,
+        correlation=gram / np.outer(divisors, divisors),
+        settings=settings,
+    )

@@ -3,13 +3,57 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from identification.gap.locate.fault_localisation import Localisation
-from identification.gap.rank.evidence import EvaluatedHypothesis
-from identification.gap.rank.ranking import Ranking
+from identification.gap.discrepancy import ChannelDiscrepancy
+from identification.gap.evidence import EvaluatedHypothesis
+from identification.gap.fit.fitting_problem import FittingProblem
+from identification.gap.localisation import Localisation
+from identification.gap.posterior import variance_inflation
+from identification.gap.rank.settings import RankingSettings
+from identification.gap.screening import Separability
 
 NO_GAP, KNOWN, AMBIGUOUS = "no_gap", "known", "ambiguous"
+
 PARTIAL, UNKNOWN = "partial", "unknown"
 """Verdicts as gap.json has them."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ranking:
+    """Every hypothesis that was refitted, and the probability of each."""
+
+    problem: FittingProblem
+    recalibrated: EvaluatedHypothesis
+    """The model without a cause."""
+    hypotheses: list[EvaluatedHypothesis]
+    """Single causes and sets of causes, the most probable first."""
+    probabilities: list[float]
+    """Probabilities of `hypotheses`; with the two following they sum to 1."""
+    no_cause: float
+    """Probability that no cause acts."""
+    unknown: float
+    """Probability that what acts has no name in the catalogue."""
+    shares_left: list[float]
+    """Share of the misfit beyond noise that each of `hypotheses` leaves [1]."""
+    discrepancies: list[ChannelDiscrepancy]
+    """Noise and discrepancy of each channel under the best hypothesis."""
+    separability: Separability
+    """What the recordings could tell apart, whatever the residual."""
+    settings: RankingSettings
+
+    @property
+    def inclusion(self) -> Mapping[str, float]:
+        """Probability that each effect is part of the gap, alone or beside others, the highest first."""
+        total: dict[str, float] = {}
+        for hypothesis, probability in zip(self.hypotheses, self.probabilities, strict=True):
+            for name in {cause.name for cause in hypothesis.estimate.hypothesis.causes}:
+                total[name] = total.get(name, 0.0) + probability
+        return dict(sorted(total.items(), key=lambda pair: -pair[1]))
+
+    @property
+    def inflation(self) -> float:
+        """`variance_inflation` of the best hypothesis [1]."""
+        best = self.hypotheses[0] if self.hypotheses else self.recalibrated
+        return variance_inflation(best, self.discrepancies)
 
 
 @dataclass(frozen=True, kw_only=True)

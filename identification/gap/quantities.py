@@ -3,9 +3,10 @@
 import re
 from collections.abc import Sequence
 
-from identification.gap.reduce.block_bootstrap import Interval
+from identification.block_bootstrap import Interval
 
 PREFIXES = {"M": 1e6, "k": 1e3, "": 1.0, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
+
 POWER_PREFIXES = {"": 1.0, "d": 1e-1, "c": 1e-2, "m": 1e-3, "u": 1e-6}
 """Prefixes of units, and of units with a power of two or three."""
 

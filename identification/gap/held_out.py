@@ -11,15 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.block_bootstrap import Interval, block_starts
+from identification.gap.black_box import Learner, predict_residuals, ridge_learner
 from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.fit.hypothesis import Estimate
 from identification.gap.fit.prediction import Prediction, percentage_errors, predict
+from identification.gap.gaps import FLOOR, Gap, GapDraws, block_samples
 from identification.gap.model.grey_box import GreyBox
 from identification.gap.model.time_scale import time_scale
-from identification.gap.reduce.black_box import Learner, predict_residuals, ridge_learner
-from identification.gap.reduce.block_bootstrap import Interval
-from identification.gap.reduce.gaps import FLOOR, Gap, GapDraws
-from identification.gap.reduce.predictability import p_value
 from identification.gap.reduce.settings import ReductionSettings
 
 NOMINAL, RECALIBRATED = "nominal", "recalibrated"
@@ -91,7 +90,9 @@ def measure_discrepancy_reduction(
     }
     boxes = {label: _helpful(predictions[label].residuals, box, plant) for label, box in boxes.items()}
     draws = GapDraws(plant, _all_residuals(predictions, boxes), seed, settings, scale)
-    significance = p_value(plant, predictions[best].residuals, boxes[best], seed, settings, scale)
+    significance = p_value(
+        plant, predictions[best].residuals, boxes[best], seed, scale, settings.permutations
+    )
     ratios = zip(plant.channels, draws.noise[0], strict=True)
     return DiscrepancyReduction(
         gaps={
@@ -173,3 +174,49 @@ def _unexplained(draws: GapDraws, best: str, significance: float) -> Unexplained
 def _share(part: float, whole: float) -> float:
     """Between 0 and 1 [1]; 0 of nothing."""
     return float(min(max(part / whole, 0.0), 1.0)) if whole > 0 else 0.0
+
+
+def p_value(
+    plant: GreyBox,
+    residuals: Sequence[NDArray],
+    predicted: Sequence[NDArray],
+    seed: int,
+    scale: float,
+    permutations: int,
+) -> float:
+    """Probability that blocks of the residual in random order agree as well with the prediction.
+
+    Whole blocks move, within their run and all channels together. So correlations in time and between
+    channels stay.
+
+    Args:
+        plant: the plant with its recordings; its held-out runs count.
+        residuals: per run (channels, samples) [noise deviations].
+        predicted: per run (channels, samples) [noise deviations].
+        seed: of the permutations.
+        scale: the plant's time scale [s].
+        permutations: number of random orders.
+
+    Returns:
+        1 where nothing is predicted.
+    """
+    rng = np.random.default_rng(seed)
+    agreement = np.zeros(permutations + 1)
+    for run, residual, prediction in zip(plant.runs, residuals, predicted, strict=True):
+        if not run.held_out:
+            continue
+        blocks = [_blocks(series, block_samples(run, scale)) for series in (prediction, residual)]
+        products = blocks[0] @ blocks[1].T
+        order = np.arange(len(products))
+        agreement[0] += np.trace(products)
+        agreement[1:] += [products[order, rng.permutation(order)].sum() for _ in range(permutations)]
+    if not any(np.any(prediction) for prediction in predicted):
+        return 1.0
+    return float(np.mean(agreement >= agreement[0]))
+
+
+def _blocks(series: NDArray, length: int) -> NDArray:
+    """Series (channels, samples) as (blocks, channels x length), all as long as the shortest block."""
+    starts = block_starts(series.shape[1], length)
+    length = starts[1] if len(starts) > 1 else series.shape[1]
+    return np.stack([series[:, start : start + length].ravel() for start in starts])

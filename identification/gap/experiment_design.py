@@ -1,0 +1,365 @@
+"""Which experiment next: the one with the highest expected information about the rival hypotheses.
+
+A planned experiment is a run in which nothing has been measured yet (Bayesian experimental design:
+Chaloner and Verdinelli 1995). Each rival predicts a Gaussian around its best fit. Noise, the open part
+of the rival's parameters, and the run's own offsets give its width. So a difference that recalibration
+within the posterior absorbs tells no rivals apart. Nor does a difference within the error of the forms,
+which all rivals share: the experiment does not ask whether a form errs. In each short segment a cause's
+effect may be off by a Gaussian random share, which is integrated out in closed form.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+from scipy.special import log_softmax
+
+from identification.gap.design.settings import DesignSettings
+from identification.gap.fit.fitting_problem import FittingProblem
+from identification.gap.fit.hypothesis import Estimate, cause_places, nominal_vector
+from identification.gap.fit.linearisation import linearise, nuisance_slopes
+from identification.gap.fit.variable_projection import (
+    LinearisedRun,
+    normal_equations,
+    tolerances_as_slopes,
+)
+from identification.gap.model.grey_box import GreyBox
+from identification.gap.verdict import Ranking
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rivals:
+    """Hypotheses between which an experiment is to decide, the most probable first."""
+
+    estimates: tuple[Estimate, ...]
+    probability: tuple[float, ...]
+    """Before the experiment, (rivals,); sums to 1."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names for files."""
+        return tuple(" + ".join(each.hypothesis.labels) or "no cause" for each in self.estimates)
+
+    @property
+    def titles(self) -> tuple[str, ...]:
+        """Names for people."""
+        return tuple(" + ".join(each.hypothesis.titles) or "no cause" for each in self.estimates)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParameterPosterior:
+    """A Gaussian of an estimate's scaled vector, less its present value, and of all tolerances.
+
+    k parameters [1] and m tolerances [standard deviations].
+    """
+
+    mean: NDArray
+    """(k + m,)."""
+    factor: NDArray
+    """F of the covariance F F', (k + m, k + m)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class InformationGain:
+    """What one experiment is expected to tell about n rivals."""
+
+    expected_probability: tuple[float, ...]
+    """Expected probability of each rival after the experiment, if that rival is right, (n,)."""
+    expected_best: float
+    """Expected probability, after the experiment, of the rival that is then the most probable."""
+    expected_entropy: float
+    """Expected entropy of the rivals' probabilities after the experiment [nats]."""
+    log_bayes_factor: NDArray
+    """Expected log Bayes factor of the right rival (row) against another (column), (n, n) [nats]."""
+
+    @property
+    def sort_key(self) -> tuple[float, float]:
+        """Lower is better: the entropy; where none is left, the pair that is hardest to tell apart."""
+        n = len(self.expected_probability)
+        of_pairs = self.log_bayes_factor + np.diag(np.full(n, np.inf))
+        return self.expected_entropy, -float(np.min(of_pairs))
+
+
+def expected_information(
+    problem: FittingProblem,
+    plan: GreyBox,
+    rivals: Rivals,
+    settings: DesignSettings | None = None,
+) -> list[InformationGain]:
+    """Expected information of each run of a plan; none where a rival cannot simulate the run.
+
+    Args:
+        problem: of the campaign, whose fitted runs give the rivals' posteriors.
+        plan: the campaign's plant with the experiments as its runs; their readings are not used.
+        rivals: hypotheses between which the experiment is to decide.
+        settings: judgement of the design; None: the defaults.
+    """
+    settings = settings or DesignSettings()
+    posteriors = parameter_posteriors(problem, rivals.estimates)
+    planned, estimates = _planned_problem(problem, plan, rivals.estimates)
+    predictions = linearise(planned, estimates, planned.all_runs)
+    effects = _simulated_effects(planned, estimates, predictions)
+    gains = []
+    for r, run in enumerate(plan.runs):
+        own = [runs[r] for runs in predictions]
+        if any(np.any(line.residual == planned.settings.failed_residual) for line in own):
+            means, covariances = np.zeros((len(own), 1)), np.ones((len(own), 1, 1))
+        else:
+            channels, period = run.measured.shape[0], float(run.time[1])
+            means, covariances = outcome_distributions(
+                own, posteriors, effects[r], channels, period, settings
+            )
+        gains.append(information_gain(means, covariances, rivals.probability, settings.outcomes))
+    return gains
+
+
+def _planned_problem(
+    problem: FittingProblem, plan: GreyBox, estimates: Sequence[Estimate]
+) -> tuple[FittingProblem, list[Estimate]]:
+    """The plan with nuisance slopes at the first rival, and the rivals in the plan's runs."""
+    planned = [_planned(estimate, plan) for estimate in estimates]
+    rough = FittingProblem(plan, settings=problem.settings)
+    slopes = nuisance_slopes(rough, planned[:1], [np.zeros(len(plan.tolerances))])[0]
+    return FittingProblem(plan, slopes, problem.settings), planned
+
+
+def _planned(estimate: Estimate, plan: GreyBox) -> Estimate:
+    """The estimate in the plan's runs, whose run parameters have their expected values."""
+    centres = [nuisance.centre for nuisance in estimate.hypothesis.run_parameters]
+    return replace(estimate, run_values=np.tile(np.array(centres), (len(plan.runs), 1)), slopes=None)
+
+
+def _simulated_effects(
+    planned: FittingProblem,
+    estimates: Sequence[Estimate],
+    predictions: Sequence[Sequence[LinearisedRun]],
+) -> list[NDArray]:
+    """Effects of all rivals' causes of uncertain form, per run (values, causes) [noise deviations].
+
+    Each effect is the difference between simulations with and without the cause. A
+    linear effect holds near the campaign; a planned run may drive the plant beyond it.
+    """
+    without, rivals = [], []
+    for index, estimate in enumerate(estimates):
+        for cause, place, _ in cause_places(estimate):
+            if not cause.exact_form:
+                vector = estimate.vector.copy()
+                vector[place] = nominal_vector(cause)
+                without.append(replace(estimate, vector=vector))
+                rivals.append(index)
+    if not without:
+        return [np.zeros((len(measured), 0)) for measured in planned.measured]
+    return [
+        residuals - np.stack([predictions[index][r].residual for index in rivals], axis=1)
+        for r, residuals in enumerate(planned.residuals(without, planned.all_runs))
+    ]
+
+
+def select_rivals(ranking: Ranking, settings: DesignSettings | None = None) -> Rivals:
+    """The most probable hypotheses of a diagnosis, the recalibrated model among them."""
+    settings = settings or DesignSettings()
+    named = [
+        (hypothesis.estimate, probability)
+        for hypothesis, probability in zip(ranking.hypotheses, ranking.probabilities, strict=True)
+    ]
+    named.append((ranking.recalibrated.estimate, ranking.no_cause))
+    named.sort(key=lambda pair: -pair[1])
+    total = max(sum(p for _, p in named), np.finfo(float).tiny)
+    share = np.cumsum([p for _, p in named]) / total
+    enough = np.searchsorted(share, settings.probability_held_by_rivals) + 1
+    count = int(np.clip(enough, 2, min(settings.most_rivals, len(named))))
+    chosen = np.array([p for _, p in named[:count]])
+    chosen = chosen / np.sum(chosen) if np.any(chosen) else np.full(count, 1.0 / count)
+    return Rivals(
+        estimates=tuple(estimate for estimate, _ in named[:count]), probability=tuple(chosen.tolist())
+    )
+
+
+def parameter_posteriors(
+    problem: FittingProblem, estimates: Sequence[Estimate]
+) -> list[ParameterPosterior]:
+    """Posteriors of the estimates, linearised, given the campaign's fitted runs.
+
+    Before the data a parameter is uniform over its range; the Gaussian prior has that variance.
+    """
+    posteriors = []
+    linearised = linearise(problem, estimates, problem.fitted_runs)
+    for estimate, runs in zip(estimates, linearised, strict=True):
+        equations = normal_equations(
+            [tolerances_as_slopes(run) for run in runs], problem.settings.largest_deviation
+        )
+        parameters = problem.parameters(estimate)
+        widths = np.array([(p.high - p.low) / p.scale for p in parameters])
+        prior = np.concatenate([12.0 / widths**2, np.ones(runs[0].tolerance_slopes.shape[1])])
+        precision = equations.hessian + np.diag(prior)
+        factor = np.linalg.inv(np.linalg.cholesky(precision)).T
+        posteriors.append(
+            ParameterPosterior(mean=factor @ (factor.T @ equations.gradient), factor=factor)
+        )
+    return posteriors
+
+
+def outcome_distributions(
+    runs: Sequence[LinearisedRun],
+    posteriors: Sequence[ParameterPosterior],
+    effects: NDArray,
+    channels: int,
+    period: float,
+    settings: DesignSettings,
+) -> tuple[NDArray, NDArray]:
+    """Each rival's Gaussian of the outcome of one run.
+
+    The d coordinates hold all predictions and their derivatives. Noise, errors of form included, is
+    white and of unit variance in them; the first rival's mean is the origin.
+
+    Args:
+        runs: each rival's prediction, as a residual, and its derivatives.
+        posteriors: of each rival's parameters.
+        effects: effects of all rivals' causes of uncertain form, (values, causes) [noise deviations].
+        channels: number of channels.
+        period: of sampling [s].
+        settings: directions that count, size and segments of errors of form.
+
+    Returns:
+        Means (rivals, d) and covariances (rivals, d, d) [1].
+    """
+    n = len(runs)
+    slopes = [tolerances_as_slopes(run).slopes for run in runs]
+    expected = [
+        own @ posterior.mean - run.residual
+        for run, own, posterior in zip(runs, slopes, posteriors, strict=True)
+    ]
+    means = np.stack(expected, axis=1) - expected[0][:, None]
+    spreads = [
+        np.column_stack([own @ posterior.factor, run.run_slopes * run.run_sd])
+        for run, own, posterior in zip(runs, slopes, posteriors, strict=True)
+    ]
+    columns = np.column_stack([means, *spreads])
+    gram = columns.T @ columns
+    if effects.shape[1]:
+        errors = settings.form_error / np.sqrt(n) * effects
+        gram -= explained_by_form_errors(columns, errors, channels, period, settings.segment_duration)
+    coordinates = _coordinates(gram, settings.least_variance)
+    ends = np.cumsum([n, *(spread.shape[1] for spread in spreads)])
+    own = np.split(coordinates, ends[:-1], axis=1)
+    covariances = [np.eye(len(coordinates)) + spread @ spread.T for spread in own[1:]]
+    return own[0].T, np.stack(covariances)
+
+
+def _coordinates(gram: NDArray, least_variance: float) -> NDArray:
+    """Columns with these products (n, n) in the fewest coordinates, (d, n)."""
+    values, vectors = np.linalg.eigh(gram)
+    wide = values > least_variance * values[-1]
+    return np.sqrt(values[wide])[:, None] * vectors[:, wide].T
+
+
+def segments(series: NDArray, period: float, duration: float) -> NDArray:
+    """A series (samples,) of any unit in segments (segments, samples of one), the last one zero-padded.
+
+    period: of sampling [s]. duration: of a segment [s].
+    """
+    length = max(1, round(duration / period))
+    count = -(-len(series) // length)
+    padded = np.zeros(count * length)
+    padded[: len(series)] = series
+    return padded.reshape(count, length)
+
+
+def segment_columns(columns: NDArray, period: float, duration: float) -> NDArray:
+    """Columns (samples, n) of any unit in segments, (segments, samples of one, n).
+
+    period: of sampling [s]. duration: of a segment [s].
+    """
+    return np.stack([segments(column, period, duration) for column in columns.T], axis=2)
+
+
+def explained_by_form_errors(
+    columns: NDArray, errors: NDArray, channels: int, period: float, duration: float
+) -> NDArray:
+    """Part of the products of columns that errors of form explain, (n, n) [1].
+
+    Args:
+        columns: predictions and derivatives, (channels x samples, n) [noise deviations].
+        errors: effects of causes times the size of their form error, (channels x samples, causes).
+        channels: number of channels.
+        period: of sampling [s].
+        duration: of a segment, in which an error is constant [s].
+    """
+    total = np.zeros((columns.shape[1], columns.shape[1]))
+    for own_columns, own_errors in zip(
+        np.split(columns, channels), np.split(errors, channels), strict=True
+    ):
+        parts = segment_columns(own_columns, period, duration)
+        effects = segment_columns(own_errors, period, duration)
+        gram = np.eye(effects.shape[2]) + effects.transpose(0, 2, 1) @ effects
+        products = np.linalg.solve(np.linalg.cholesky(gram), effects.transpose(0, 2, 1) @ parts)
+        flat = products.reshape(-1, products.shape[2])
+        total += flat.T @ flat
+    return total
+
+
+def information_gain(
+    means: NDArray, covariances: NDArray, probability: Sequence[float], outcomes: int
+) -> InformationGain:
+    """Expected information by simulated outcomes, in antithetic pairs.
+
+    Args:
+        means: of each rival's Gaussian, (rivals, d) [1].
+        covariances: of each rival's Gaussian, (rivals, d, d) [1].
+        probability: of each rival before the experiment, (rivals,).
+        outcomes: number of simulated outcomes of each rival.
+    """
+    prior = np.array(probability)
+    n, d = means.shape
+    factors = np.linalg.cholesky(covariances)
+    noise = np.random.default_rng(0).standard_normal((outcomes // 2, d))
+    log_after = np.empty((n, 2 * len(noise), n))
+    for right in range(n):
+        spread = noise @ factors[right].T
+        simulated = means[right] + np.concatenate([spread, -spread])
+        likelihoods = [
+            log_density(simulated - mean, factor) for mean, factor in zip(means, factors, strict=True)
+        ]
+        weighed = np.stack(likelihoods, axis=1) + np.log(np.maximum(prior, np.finfo(float).tiny))
+        log_after[right] = log_softmax(weighed, axis=1)
+    own = log_after[np.arange(n), :, np.arange(n)]
+    return InformationGain(
+        expected_probability=tuple(np.mean(np.exp(own), axis=1).tolist()),
+        expected_best=float(prior @ np.mean(np.exp(np.max(log_after, axis=2)), axis=1)),
+        expected_entropy=float(-prior @ np.mean(own, axis=1)),
+        log_bayes_factor=kullback_leibler_divergences(means, factors),
+    )
+
+
+def log_density(deviations: NDArray, factor: NDArray) -> NDArray:
+    """Log density of a Gaussian but for a constant, (draws,) [nats].
+
+    deviations: from the mean, (draws, d) [1]. factor: Cholesky factor of the covariance, (d, d) [1].
+    """
+    white = solve_triangular(factor, deviations.T, lower=True)
+    return -0.5 * np.sum(white**2, axis=0) - np.sum(np.log(np.diag(factor)))
+
+
+def kullback_leibler_divergences(means: NDArray, factors: NDArray) -> NDArray:
+    """Divergences of Gaussians, of each (row) from each other (column), (n, n) [nats].
+
+    means: (n, d) [1]. factors: Cholesky factors of the covariances, (n, d, d) [1].
+    """
+    n, d = means.shape
+    divergences = np.zeros((n, n))
+    for right in range(n):
+        for other in range(n):
+            spread = solve_triangular(factors[other], factors[right], lower=True)
+            of_mean = log_density((means[right] - means[other])[None], factors[other])[0]
+            own = -np.sum(np.log(np.diag(factors[right])))
+            divergences[right, other] = own - of_mean + 0.5 * (np.sum(spread**2) - d)
+    return divergences
+
+
+def odds_text(probability: float) -> str:
+    """A probability as odds in a hundred: 98:2."""
+    if probability > 0.99:
+        return "better than 99:1"
+    return f"{round(100 * probability)}:{100 - round(100 * probability)}"

@@ -1,0 +1,365 @@
+"""The files of a diagnosis for programs: gap.json and, where one was found, the missing term.
+
+Format epv-gap/2, described in docs/reference/gap-json.md.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from epv_env.common.json_files import write_json
+from identification.block_bootstrap import Interval
+from identification.gap.diagnosis import Diagnosis, hypothesis_label
+from identification.gap.evidence import EvaluatedHypothesis
+from identification.gap.gaps import FLOOR
+from identification.gap.held_out import NOMINAL, RECALIBRATED
+from identification.gap.localisation import Localisation, MissingTerm
+from identification.gap.posterior import variance_inflation
+from identification.gap.verdict import RankedCause
+
+GAP, TERM = "gap.json", "missing_term.json"
+
+TERM_FORMAT = "epv-term/1"
+"""Format of the file that holds a missing term."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Remainder:
+    """What no named cause explains."""
+
+    share: Interval
+    """Of the explainable gap on held-out recordings [1]; 0 where there is nothing to explain."""
+    component: Mapping[str, float]
+    """Probability that it lies there, by component; empty where it was not located."""
+    equation: Mapping[str, float]
+    """Probability that it lies there, by equation or reading; empty where it was not located."""
+    location: Localisation | None
+    """Of the remainder; None where nothing is left to locate."""
+    term: MissingTerm | None
+    """The missing term over a state; None where no state explains enough of it."""
+
+
+def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = None) -> dict[str, Any]:
+    """The content of gap.json.
+
+    Args:
+        diagnosis: what to write.
+        next_experiment: a sentence, empty where none was sought.
+        term: name of the file beside gap.json that holds the missing term; None where none was written.
+    """
+    conclusion = diagnosis.conclusion
+    causes = conclusion.causes[: diagnosis.settings.report.listed_causes]
+    separability = diagnosis.ranking.separability
+    return {
+        "format": "epv-gap/2",
+        "verdict": conclusion.verdict,
+        "where": _where(diagnosis),
+        "causes": [_cause(diagnosis, cause) for cause in causes],
+        "ambiguity_set": [list(cause.effects) for cause in conclusion.ambiguity_set],
+        "gap": _gap(diagnosis),
+        "unexplained": _unexplained(diagnosis),
+        "inclusion": inclusion(diagnosis),
+        "remainder": _remainder(diagnosis, term),
+        "discrepancy": discrepancy(diagnosis),
+        "parameters": _parameters(diagnosis),
+        "next_experiment": next_experiment,
+        "probability": {
+            "no_cause": diagnosis.ranking.no_cause,
+            "unknown": diagnosis.ranking.unknown,
+        },
+        "twins": {
+            label: list(twins)
+            for cause in diagnosis.judged
+            for label in cause.hypothesis.labels
+            if (twins := separability.twins(label))
+        },
+        "absorbed": list(separability.absorbed),
+        "warnings": diagnosis.warnings,
+    }
+
+
+def inclusion(diagnosis: Diagnosis) -> dict[str, float]:
+    """Probability that each effect is part of the gap, of effects with a noticeable one."""
+    least = diagnosis.settings.report.listed_inclusion
+    found = diagnosis.ranking.inclusion.items()
+    return {name: min(float(probability), 1.0) for name, probability in found if probability >= least}
+
+
+def discrepancy(diagnosis: Diagnosis) -> dict[str, dict[str, float]]:
+    """By channel: what model and recordings differ by beyond noise, and how long it is correlated.
+
+    Its standard deviation [unit of the channel] and its time scale [s]; 0 where nothing is seen.
+    """
+    ranking = diagnosis.ranking
+    channels = zip(ranking.problem.plant.channels, ranking.discrepancies, strict=True)
+    return {
+        channel.name: {
+            "sd": float(seen.sd * (channel.noise or 0.0) / channel.scale),
+            "time_scale_s": float(seen.time_scale),
+        }
+        for channel, seen in channels
+    }
+
+
+def magnitudes(diagnosis: Diagnosis, cause: RankedCause) -> dict[str, tuple[float, float, float]]:
+    """Value and ends of the interval of each parameter of a cause, by symbol_unit [SI]."""
+    parameters = cause.hypothesis.estimate.hypothesis.parameters
+    intervals = parameter_intervals(diagnosis, cause.hypothesis)
+    return {
+        f"{p.symbol}_{unit_name(p.unit)}": interval
+        for p, interval in zip(parameters, intervals, strict=True)
+    }
+
+
+def unit_name(unit: str) -> str:
+    """A unit as part of a name: K/J becomes K_per_J, m^2 becomes m2, none 1."""
+    named = unit.replace("^", "").replace("/", "_per_").replace("-", "1")
+    return re.sub(r"[^A-Za-z0-9]+", "_", named).strip("_") or "1"
+
+
+def remaining_location(diagnosis: Diagnosis) -> str | None:
+    """Component and equation of what the best cause leaves; None where nothing is left."""
+    if diagnosis.remaining is None or not diagnosis.remaining.forcings:
+        return None
+    equation = diagnosis.remaining.likeliest.equation
+    return f"{equation.component}: {equation.name}"
+
+
+def _unexplained(diagnosis: Diagnosis) -> dict[str, Any]:
+    unexplained = diagnosis.reduction.unexplained
+    return {
+        "fraction": unexplained.fraction,
+        "still_predictable": unexplained.still_predictable,
+        "p_value": unexplained.p_value,
+        "location": remaining_location(diagnosis),
+    }
+
+
+def _remainder(diagnosis: Diagnosis, term: str | None) -> dict[str, Any]:
+    found = remainder(diagnosis)
+    return {
+        "fraction": found.share.value,
+        "low": found.share.low,
+        "high": found.share.high,
+        "component": dict(found.component),
+        "equation": dict(found.equation),
+        "term": term,
+    }
+
+
+def _where(diagnosis: Diagnosis) -> dict[str, Any]:
+    localisation = diagnosis.localisation
+    return {
+        "component": diagnosis.conclusion.component_probabilities,
+        "equation": dict(localisation.equation_probabilities),
+        "channel": dict(localisation.channel_gaps),
+        "regimes": [
+            {
+                "channel": gap.channel,
+                "regime": gap.regime,
+                "gap": gap.gap,
+                "low": gap.low,
+                "high": gap.high if np.isfinite(gap.high) else None,
+            }
+            for gap in localisation.regime_gaps
+        ],
+    }
+
+
+def _cause(diagnosis: Diagnosis, cause: RankedCause) -> dict[str, Any]:
+    entry: dict[str, Any] = {
+        "effects": list(cause.effects),
+        "probability": cause.probability,
+        "magnitude": {name: list(values) for name, values in magnitudes(diagnosis, cause).items()},
+        "converged": cause.hypothesis.converged,
+    }
+    label = hypothesis_label(cause.hypothesis)
+    if label in diagnosis.reduction.shares_closed:
+        share = diagnosis.reduction.shares_closed[label]
+        entry["shrink"] = {"fraction": share.value, "low": share.low, "high": share.high}
+        entry["gap"] = diagnosis.reduction.gaps[label].overall.value
+    return entry
+
+
+def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
+    gaps, best = diagnosis.reduction.gaps, _best_label(diagnosis)
+    labels = {"nominal": NOMINAL, "recalibrated": RECALIBRATED, "with_cause": best}
+    overall = {name: gaps[label].overall for name, label in labels.items()}
+    overall["black_box_floor"] = diagnosis.reduction.black_box.overall
+    return {
+        "floor": FLOOR,
+        **{name: interval.value for name, interval in overall.items()},
+        "interval": {name: [i.low, i.high] for name, i in overall.items()},
+        "channel": {
+            name: {channel: i.value for channel, i in gaps[label].channels.items()}
+            for name, label in labels.items()
+        },
+        "report_metric_percent": {
+            name: (gaps[label].percent or {}).get("overall") for name, label in labels.items()
+        },
+    }
+
+
+def _parameters(diagnosis: Diagnosis) -> dict[str, Any]:
+    recalibrated, best = diagnosis.ranking.recalibrated, diagnosis.best
+    return {
+        "nominal": diagnosis.ranking.problem.values(diagnosis.nominal),
+        "recalibrated": fitted_values(diagnosis, recalibrated),
+        "with_cause": fitted_values(diagnosis, best.hypothesis if best else recalibrated),
+    }
+
+
+def _best_label(diagnosis: Diagnosis) -> str:
+    """Label of the model that the verdict leaves in force."""
+    return hypothesis_label(diagnosis.best.hypothesis) if diagnosis.best else RECALIBRATED
+
+
+def write_results(
+    diagnosis: Diagnosis, folder: Path, next_experiment: str = "", **further: Any
+) -> dict[str, Any]:
+    """Write gap.json and, where a state explains what remains, missing_term.json.
+
+    A missing term of an earlier diagnosis in the folder is removed.
+
+    Args:
+        diagnosis: what to write.
+        folder: where to; made where it is missing.
+        next_experiment: a sentence, empty where none was sought.
+        further: other fields of gap.json.
+
+    Returns:
+        The content of gap.json.
+    """
+    (folder / TERM).unlink(missing_ok=True)
+    term = remainder(diagnosis).term
+    if term:
+        write_json(folder / TERM, term_table(term), allow_nan=False)
+    content = {**as_json(diagnosis, next_experiment, TERM if term else None), **further}
+    write_json(folder / GAP, content, allow_nan=False)
+    return content
+
+
+def remainder(diagnosis: Diagnosis) -> Remainder:
+    """What the verdict's first cause leaves; the whole gap where the verdict names none."""
+    location = diagnosis.remaining if diagnosis.named else _unnamed(diagnosis)
+    return Remainder(
+        share=_share_left(diagnosis),
+        component=_component_probabilities(location),
+        equation=dict(location.equation_probabilities) if location else {},
+        location=location,
+        term=drawn_term(diagnosis, location),
+    )
+
+
+def drawn_term(diagnosis: Diagnosis, location: Localisation | None) -> MissingTerm | None:
+    """The missing term, where one state explains enough of it to be drawn."""
+    term = location.missing_term if location else None
+    return term if term and term.explained >= diagnosis.settings.report.drawn_term_share else None
+
+
+def term_table(term: MissingTerm) -> dict[str, Any]:
+    """The content of the file that holds a missing term; lists of one number per window."""
+    return {
+        "format": TERM_FORMAT,
+        "equation": term.equation.name,
+        "component": term.equation.component,
+        "state": term.state,
+        "state_unit": term.state_unit,
+        "unit": term.equation.unit,
+        "explained": term.explained,
+        "columns": {
+            "state": term.x.tolist(),
+            "forcing": term.y.tolist(),
+            "sd": term.sd.tolist(),
+            "single_window": term.scatter.tolist(),
+        },
+    }
+
+
+def _unnamed(diagnosis: Diagnosis) -> Localisation | None:
+    """Where the gap lies of which nothing is named; None where there is no gap."""
+    return diagnosis.localisation if _explainable(diagnosis) else None
+
+
+def _explainable(diagnosis: Diagnosis) -> bool:
+    """Whether recalibration leaves more than noise."""
+    return diagnosis.reduction.gaps[RECALIBRATED].overall.low > FLOOR
+
+
+def _share_left(diagnosis: Diagnosis) -> Interval:
+    """Share of the explainable gap that no named cause closes [1]."""
+    whole = 1.0 if _explainable(diagnosis) else 0.0
+    if not diagnosis.named:
+        return Interval(value=whole, low=whole, high=whole)
+    closed = diagnosis.share_closed(diagnosis.named)
+    left = diagnosis.reduction.unexplained.fraction
+    return Interval(value=left, low=min(1.0 - closed.high, left), high=max(1.0 - closed.low, left))
+
+
+def _component_probabilities(location: Localisation | None) -> dict[str, float]:
+    """Of the equations and readings of each component together, the highest first."""
+    total: dict[str, float] = {}
+    for forcing in location.forcings if location else ():
+        component, name = forcing.equation.component, forcing.equation.name
+        share = location.equation_probabilities[name] if location else 0.0
+        total[component] = total.get(component, 0.0) + share
+    return dict(sorted(total.items(), key=lambda pair: -pair[1]))
+
+
+def fitted_values(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis) -> dict[str, float]:
+    """Calibrated parameters, parameters of causes and the unit's tolerances by symbol [SI].
+
+    A cause's parameter that is also a tolerance includes its own scatter.
+    """
+    problem = diagnosis.ranking.problem
+    values = problem.values(hypothesis.estimate)
+    pairs = zip(problem.plant.tolerances, hypothesis.tolerances, strict=True)
+    for tolerance, deviation in pairs:
+        own = values.get(tolerance.symbol, tolerance.centre)
+        values[tolerance.symbol] = float(own + deviation * tolerance.sd)
+    return values
+
+
+def parameter_intervals(
+    diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis
+) -> list[tuple[float, float, float]]:
+    """Value and ends of the interval of each parameter of the hypothesis' causes [SI].
+
+    No interval leaves the parameter's physical range.
+    """
+    quantile = norm.ppf(0.5 + diagnosis.settings.reduction.interval_level / 2)
+    estimate = hypothesis.estimate
+    covariance = parameter_covariance(diagnosis, hypothesis)
+    deviations = np.sqrt(np.diag(covariance))[estimate.cause_start :]
+    intervals = []
+    for p, scaled, sd in zip(
+        estimate.hypothesis.parameters, estimate.cause_vector, deviations, strict=True
+    ):
+        value, margin = float(scaled * p.scale), float(quantile * sd)
+        low, high = sorted((p.low, p.high))
+        intervals.append((value, max(value - margin, low), min(value + margin, high)))
+    return intervals
+
+
+def parameter_covariance(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis) -> NDArray:
+    """Covariance of calibrated parameters and parameters of causes, (k, k) [SI].
+
+    Noise and discrepancy of the readings, as large and as correlated as they are, and errors of form
+    that no recording shows.
+    """
+    systematic_form_error = diagnosis.settings.report.systematic_form_error
+    inflation = variance_inflation(hypothesis, diagnosis.ranking.discrepancies)
+    estimate = hypothesis.estimate
+    deviations = np.zeros(len(estimate.vector))
+    exact = [cause.exact_form for cause in estimate.hypothesis.causes for _ in cause.parameters]
+    pairs = zip(estimate.hypothesis.parameters, exact, strict=True)
+    for i, (p, known) in enumerate(pairs, start=estimate.cause_start):
+        acting = estimate.vector[i] * p.scale - p.nominal
+        deviations[i] = 0.0 if known else systematic_form_error * acting
+    return inflation * hypothesis.covariance + np.diag(deviations**2)

@@ -1,1 +1,0 @@
-"""The diagnosis as HTML sections, figures, sentences and JSON."""

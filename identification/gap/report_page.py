@@ -1,0 +1,396 @@
+"""The report of a diagnosis as sections of the HTML page: sentences, tables and figures."""
+
+from functools import partial
+
+import numpy as np
+from scipy.stats import norm
+
+from identification.gap.diagnosis import Diagnosis, hypothesis_title
+from identification.gap.evidence import EvaluatedHypothesis
+from identification.gap.gap_json import discrepancy, drawn_term, inclusion, parameter_covariance
+from identification.gap.gaps import FLOOR, Gap, regimes_of
+from identification.gap.localisation import Localisation
+from identification.gap.model.free_parameter import FreeParameter
+from identification.gap.quantities import (
+    gap_text,
+    gap_with_interval,
+    probability_text,
+    quantity,
+    quantity_with_interval,
+)
+from identification.gap.report_figures import (
+    forcing_figure,
+    gap_figure,
+    heat_map,
+    location_figure,
+    missing_term_figure,
+    parameter_change_figure,
+    ranking_figure,
+    residual_figure,
+    share_figure,
+    size_figure,
+)
+from identification.gap.sentences import (
+    disturbance_sentence,
+    hidden_causes_sentence,
+    in_words,
+    location_sentence,
+    look_alikes,
+    parameters_at_bounds,
+    reduction_sentence,
+    remainder_sentence,
+    share_closed,
+    sizes_with_intervals,
+    verdict_sentence,
+)
+from identification.gap.verdict import AMBIGUOUS, KNOWN, NO_GAP
+from identification.report.page import ANSWERS, Block, Picture, Section, Table, Text, Verdict
+
+
+def sections(diagnosis: Diagnosis, next_experiment: str = "") -> list[Section]:
+    """The whole report: verdict, localisation, ranking, reduction, remainder, next experiment, warnings.
+
+    next_experiment: a sentence or two; empty where none was sought.
+    """
+    parts = [
+        _verdict(diagnosis, next_experiment),
+        _localisation(diagnosis),
+        _ranking(diagnosis),
+        _reduction(diagnosis),
+        _remainder(diagnosis),
+    ]
+    if next_experiment:
+        plan = Verdict(status="note", text=next_experiment)
+        parts.append(Section(title="Next experiment", verdicts=[plan], blocks=[]))
+    return [*parts, _warnings(diagnosis)]
+
+
+def _verdict(diagnosis: Diagnosis, next_experiment: str) -> Section:
+    status, text = verdict_sentence(diagnosis, next_experiment)
+    explanation = (
+        "The gap is the root mean square of (model - measured)/noise on recordings that were never "
+        "fitted to: 1 is noise alone. The nominal model has the parameters as given. The recalibrated "
+        "model has its calibrated parameters refitted. With a cause, both are refitted together. "
+        f"Intervals hold {level_text(diagnosis)}."
+    )
+    return Section(
+        title="Verdict",
+        summary=True,
+        verdicts=[Verdict(status=status, text=text)],
+        blocks=[calibrated_values(diagnosis, status), Text(text=explanation)],
+    )
+
+
+def _localisation(diagnosis: Diagnosis) -> Section:
+    localisation = diagnosis.localisation
+    largest = diagnosis.settings.report.heat_map_range
+    blocks: list[Block] = [
+        Picture(
+            figure=heat_map(localisation.regime_gaps, largest),
+            caption="Gap after recalibration, by channel and regime; regimes may overlap.",
+        ),
+        residual(diagnosis, diagnosis.ranking.recalibrated, "Residual after recalibration"),
+        Picture(
+            figure=location_figure(diagnosis),
+            caption="Left: the equation or reading in which something is missing, from the residual "
+            "alone, whatever the catalogue. Right: the component at fault, from the named causes and "
+            "the equations.",
+        ),
+    ]
+    verdicts = [Verdict(status="note", text=location_sentence(diagnosis))]
+    if localisation.missing_term:
+        blocks += missing_term(diagnosis, localisation, "The recalibrated model")
+    return Section(title="Where the gap lies", verdicts=verdicts, blocks=blocks)
+
+
+def _ranking(diagnosis: Diagnosis) -> Section:
+    ambiguity_set = diagnosis.conclusion.ambiguity_set
+    verdicts = [Verdict(status="note", text=hidden_causes_sentence(diagnosis))]
+    if ambiguity_set:
+        names = ", ".join(hypothesis_title(cause.hypothesis) for cause in ambiguity_set)
+        share = percent(diagnosis.ranking.settings.ambiguity_share)
+        text = f"The fewest causes that hold {share} of the probability of all causes: {names}."
+        status = "good" if len(ambiguity_set) == 1 else "doubt"
+        verdicts.insert(0, Verdict(status=status, text=text))
+    blocks: list[Block] = [
+        Picture(
+            figure=ranking_figure(diagnosis),
+            caption="Probability of each hypothesis; blue: the ambiguity set.",
+        )
+    ]
+    if diagnosis.judged:
+        blocks += [
+            inclusion_table(diagnosis),
+            ranking_table(diagnosis),
+            Picture(
+                figure=size_figure(diagnosis),
+                caption=f"Fitted sizes with {level_text(diagnosis)} intervals in their physical range.",
+            ),
+        ]
+    return Section(title="Which cause it is", verdicts=verdicts, blocks=blocks)
+
+
+def _reduction(diagnosis: Diagnosis) -> Section:
+    reduction, words = diagnosis.reduction, partial(in_words, diagnosis)
+    blocks: list[Block] = [
+        Picture(
+            figure=gap_figure(reduction, words),
+            caption="Gap of every model on held-out recordings with "
+            f"{level_text(diagnosis)} intervals; red: noise alone.",
+        )
+    ]
+    if reduction.shares_closed and diagnosis.conclusion.verdict != NO_GAP:
+        blocks.append(
+            Picture(
+                figure=share_figure(reduction, words),
+                caption="Share that each cause closes of the gap between recalibration and noise.",
+            )
+        )
+    blocks.append(gap_table(diagnosis))
+    if diagnosis.best and diagnosis.conclusion.verdict in (KNOWN, AMBIGUOUS):
+        best = diagnosis.best.hypothesis
+        blocks.append(residual(diagnosis, best, f"Residual with {hypothesis_title(best)}"))
+    blocks += [
+        Picture(
+            figure=parameter_change_figure(diagnosis),
+            caption="Changes of the calibrated parameters: they absorb part of what the model lacks.",
+        ),
+        parameter_table(diagnosis),
+    ]
+    return Section(
+        title="How far the gap shrinks",
+        verdicts=[Verdict(status="note", text=reduction_sentence(diagnosis))],
+        blocks=blocks,
+    )
+
+
+def _remainder(diagnosis: Diagnosis) -> Section:
+    """What no named cause explains: how much, where, of which shape, and what is only disturbance."""
+    blocks: list[Block] = []
+    if diagnosis.remaining and diagnosis.best:
+        name = hypothesis_title(diagnosis.best.hypothesis)
+        blocks += missing_term(diagnosis, diagnosis.remaining, f"The model with {name}")
+        blocks.append(residual(diagnosis, diagnosis.best.hypothesis, f"Residual with {name}"))
+    text = remainder_sentence(diagnosis)
+    if not diagnosis.remaining:
+        text = f"{text} {disturbance_sentence(diagnosis)}".strip()
+    return Section(
+        title="What remains",
+        verdicts=[Verdict(status="note", text=text)],
+        blocks=[*blocks, discrepancy_table(diagnosis)],
+    )
+
+
+def _warnings(diagnosis: Diagnosis) -> Section:
+    texts = [*diagnosis.warnings, *parameters_at_bounds(diagnosis)]
+    verdicts = [Verdict(status="doubt", text=f"{text}.") for text in texts]
+    if not verdicts:
+        text = "Every relevant fit has converged, and no fitted parameter is at an end of its range."
+        verdicts = [Verdict(status="good", text=text)]
+    return Section(title="Warnings", verdicts=verdicts, blocks=[])
+
+
+def ranking_table(diagnosis: Diagnosis) -> Table:
+    """Judged causes with their sizes, the share that each closes, and look-alikes."""
+    return Table(
+        columns=["Cause", "component", "probability", "size (90 %)", "closes", "looks like"],
+        rows=[
+            [
+                hypothesis_title(cause.hypothesis),
+                ", ".join(
+                    dict.fromkeys(
+                        c.component.replace("_", " ")
+                        for c in cause.hypothesis.estimate.hypothesis.causes
+                    )
+                ),
+                probability_text(cause.probability),
+                "; ".join(sizes_with_intervals(diagnosis, cause)),
+                share_closed(diagnosis, cause),
+                look_alikes(diagnosis, cause),
+            ]
+            for cause in diagnosis.judged
+        ],
+        caption="'Looks like': causes that these recordings hardly tell apart from this one, with the "
+        "correlation of both effects; from the model's sensitivities alone, whatever the residual.",
+    )
+
+
+def inclusion_table(diagnosis: Diagnosis) -> Table:
+    """Probability that each effect is part of the gap, alone or beside others."""
+    components = {cause.name: cause.component for cause in diagnosis.ranking.problem.plant.causes}
+    least = diagnosis.settings.report.mentioned_probability
+    rows = [
+        [
+            in_words(diagnosis, name),
+            components[name].replace("_", " "),
+            probability_text(probability),
+            "yes" if name in diagnosis.conclusion.held else "-",
+        ]
+        for name, probability in inclusion(diagnosis).items()
+        if probability >= least
+    ]
+    sure = diagnosis.ranking.settings.sure_inclusion
+    return Table(
+        columns=["Effect", "component", "part of the gap", "held"],
+        rows=rows or [["none", "-", "-", "-"]],
+        caption="Probability that an effect is part of the gap, alone or beside others, so that the "
+        f"figures need not add to 100 %. Held: {100 * sure:g} % or more, and the verdict names causes.",
+    )
+
+
+def discrepancy_table(diagnosis: Diagnosis) -> Table:
+    """What model and recordings differ by beyond noise under the best hypothesis, by channel."""
+    channels = {channel.name: channel for channel in diagnosis.ranking.problem.plant.channels}
+    return Table(
+        columns=["Channel", "noise", "discrepancy", "correlated over"],
+        rows=[
+            [
+                name,
+                quantity((channels[name].noise or 0.0) / channels[name].scale, channels[name].unit),
+                quantity(seen["sd"], channels[name].unit) if seen["sd"] else "none seen",
+                quantity(seen["time_scale_s"], "s") if seen["sd"] else "-",
+            ]
+            for name, seen in discrepancy(diagnosis).items()
+        ],
+        caption="Standard deviations of the sensor noise and of what differs beyond it under the best "
+        "hypothesis: errors of its form, and disturbances.",
+    )
+
+
+def gap_table(diagnosis: Diagnosis) -> Table:
+    """Gap of every model in noise deviations, and in percent where defined."""
+    models = {**diagnosis.reduction.gaps, "black box": diagnosis.reduction.black_box}
+    channels = list(diagnosis.reduction.noise_ratios)
+    columns = ["overall", *channels]
+    shown = columns if any(model.percent for model in models.values()) else []
+    caption = f"Noise deviations; {FLOOR:g} is noise alone."
+    if shown:
+        caption = (
+            f"Left: noise deviations, {FLOOR:g} is noise alone. Right: mean distance of model and "
+            "recording in percent of the recording's mean, every run with nominal offsets."
+        )
+    return Table(
+        columns=["Model", *(f"{c} [noise]" for c in columns), *(f"{c} [%]" for c in shown)],
+        rows=[
+            [in_words(diagnosis, name), *_noise_units(model, channels), *_percent(model, shown)]
+            for name, model in models.items()
+        ],
+        caption=caption,
+    )
+
+
+def _noise_units(model: Gap, channels: list[str]) -> list[str]:
+    return [
+        gap_with_interval(model.overall),
+        *(gap_text(model.channels[channel].value) for channel in channels),
+    ]
+
+
+def _percent(model: Gap, columns: list[str]) -> list[str]:
+    return [f"{model.percent[column]:.2f}" if model.percent else "-" for column in columns]
+
+
+def parameter_table(diagnosis: Diagnosis) -> Table:
+    """Calibrated parameters of each model."""
+    problem = diagnosis.ranking.problem
+    estimates = {
+        "nominal": diagnosis.nominal,
+        "recalibrated": diagnosis.ranking.recalibrated.estimate,
+    }
+    if diagnosis.best:
+        best = diagnosis.best.hypothesis
+        estimates[f"with {hypothesis_title(best)}"] = best.estimate
+    values = [problem.values(estimate) for estimate in estimates.values()]
+    return Table(
+        columns=["Parameter", *estimates],
+        rows=[
+            [p.symbol, *(quantity(own[p.symbol], p.unit) for own in values)]
+            for p in problem.plant.parameters
+        ],
+        caption="Calibrated parameters.",
+    )
+
+
+def calibrated_values(diagnosis: Diagnosis, status: str) -> Table:
+    """Calibrated parameters of the model to use, with intervals; status: of the verdict."""
+    problem, kept = diagnosis.ranking.problem, diagnosis.kept
+    fitted = problem.values(kept.estimate)
+    level = diagnosis.settings.reduction.interval_level
+    quantile = float(norm.ppf(0.5 + level / 2))
+    margins = quantile * np.sqrt(np.diag(parameter_covariance(diagnosis, kept)))
+    rows, statuses = [], []
+    for parameter, margin in zip(problem.plant.parameters, margins, strict=False):
+        value = fitted[parameter.symbol]
+        low, high = sorted((parameter.low, parameter.high))
+        ends = max(value - margin, low), min(value + margin, high)
+        own = "bad" if _at_an_end(diagnosis, parameter, value) else status
+        why = ": at an end of its range" if own != status else ""
+        rows.append(
+            [
+                parameter.title,
+                quantity(parameter.nominal, parameter.unit),
+                quantity_with_interval(value, *ends, parameter.unit),
+                ANSWERS[own] + why,
+            ]
+        )
+        statuses.append(own)
+    model = f"with {hypothesis_title(kept)}" if kept.labels else "recalibrated, without a cause"
+    return Table(
+        columns=["Parameter", "nominal", f"fitted ({100 * level:g} % interval)", "trust it"],
+        rows=rows,
+        statuses=statuses,
+        caption=f"Calibrated parameters of the model to use: {model}.",
+    )
+
+
+def _at_an_end(diagnosis: Diagnosis, parameter: FreeParameter, value: float) -> bool:
+    """Whether a fitted value [SI] lies at an end of its physical range."""
+    apart = min(abs(value - parameter.low), abs(value - parameter.high))
+    tolerance = diagnosis.settings.report.bound_tolerance
+    return apart <= tolerance * abs(parameter.high - parameter.low)
+
+
+def missing_term(diagnosis: Diagnosis, localisation: Localisation, model: str) -> list[Block]:
+    """The missing term over time, and over a state where one explains it."""
+    if not localisation.likeliest.windows:
+        return []
+    forcing, level = localisation.likeliest, diagnosis.settings.reduction.interval_level
+    plant = diagnosis.ranking.problem.plant
+    blocks: list[Block] = [
+        Picture(
+            figure=forcing_figure(plant, forcing, level),
+            caption=f"{model} lacks this term in {forcing.equation.title}: the forcing with which it "
+            "meets the recordings.",
+        )
+    ]
+    term = drawn_term(diagnosis, localisation)
+    if term:
+        picture = missing_term_figure(term, level)
+        caption = "The missing term over the state that explains it best."
+        blocks.append(Picture(figure=picture, caption=caption))
+    return blocks
+
+
+def residual(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis, name: str) -> Picture:
+    """Residual of the held-out run that recalibration misses most."""
+    problem = diagnosis.ranking.problem
+    recalibrated = diagnosis.ranking.recalibrated.residuals
+    held_out = [r for r, run in enumerate(problem.plant.runs) if run.held_out]
+    run = max(held_out, key=lambda r: np.mean(recalibrated[r] ** 2))
+    masks = regimes_of(problem.plant, problem.candidate(hypothesis.estimate), run)
+    level = diagnosis.settings.reduction.interval_level
+    return Picture(
+        figure=residual_figure(problem.plant, run, hypothesis.residuals[run], masks, level),
+        caption=f"{name}, on the held-out recording that recalibration misses most. Grey: where "
+        f"{level_text(diagnosis)} of the noise lies.",
+    )
+
+
+def level_text(diagnosis: Diagnosis) -> str:
+    """Probability within the intervals."""
+    return percent(diagnosis.settings.reduction.interval_level)
+
+
+def percent(share: float) -> str:
+    """A share [1] in percent, ready to read."""
+    return f"{100 * share:g} %"

@@ -1,0 +1,379 @@
+"""The diagnosis in sentences that a project leader can act on."""
+
+from collections.abc import Sequence
+
+from identification.gap.diagnosis import Diagnosis, hypothesis_label, hypothesis_title
+from identification.gap.gap_json import Remainder, discrepancy, parameter_intervals, remainder
+from identification.gap.gaps import FLOOR
+from identification.gap.held_out import NOMINAL, RECALIBRATED
+from identification.gap.quantities import (
+    gap_text,
+    gap_with_interval,
+    listed,
+    probability_text,
+    quantity,
+    quantity_with_interval,
+    share_text,
+)
+from identification.gap.verdict import AMBIGUOUS, KNOWN, NO_GAP, PARTIAL, RankedCause
+
+
+def verdict_sentence(diagnosis: Diagnosis, next_experiment: str) -> tuple[str, str]:
+    """Status for the page ('good', 'doubt' or 'bad'), and the verdict in a few sentences.
+
+    next_experiment: a sentence for an ambiguous verdict; empty where none was sought.
+    """
+    conclusion, no_warning = diagnosis.conclusion, not diagnosis.warnings
+    if conclusion.verdict == NO_GAP:
+        likely = diagnosis.ranking.no_cause > diagnosis.settings.report.likely_probability
+        return ("good" if likely and no_warning else "doubt"), _no_gap(diagnosis)
+    if conclusion.verdict == KNOWN:
+        complete = not diagnosis.reduction.unexplained.still_predictable
+        helps = diagnosis.surely_helps(diagnosis.judged[0])
+        return ("good" if complete and helps and no_warning else "doubt"), _known(diagnosis)
+    if conclusion.verdict == AMBIGUOUS:
+        return "doubt", f"{_ambiguous(diagnosis)} {_with_full_stop(next_experiment)}".strip()
+    if conclusion.verdict == PARTIAL:
+        return "doubt", _partial(diagnosis)
+    return "bad", _unknown(diagnosis)
+
+
+def _known(diagnosis: Diagnosis) -> str:
+    best = diagnosis.conclusion.ambiguity_set[0]
+    single = len(best.effects) == 1
+    explain, them = ("explains", "it") if single else ("together explain", "them")
+    text = (
+        f"{listed(best.hypothesis.titles)} {explain} the gap "
+        f"({probability_text(best.probability)}): adding {them} with {sizes_text(diagnosis, best)} "
+        f"closes {share_closed(diagnosis, best)} of the gap on recordings never fitted to"
+    )
+    if not diagnosis.surely_helps(best):
+        return f"{text}: {add_or_not(diagnosis, best)}."
+    return f"{text}; {_rest(diagnosis)}."
+
+
+def _rest(diagnosis: Diagnosis) -> str:
+    """What a known cause leaves."""
+    if not diagnosis.reduction.unexplained.still_predictable:
+        return "nothing predictable is left"
+    left = remainder(diagnosis)
+    return (
+        f"{share_text(left.share)} of the gap is left and still predictable{remainder_place(left)}, so "
+        "something smaller is missing too"
+    )
+
+
+def _partial(diagnosis: Diagnosis) -> str:
+    """Effects that are surely there, what they close, and what remains."""
+    best, held = diagnosis.conclusion.ambiguity_set[0], diagnosis.conclusion.held
+    inclusion = diagnosis.ranking.inclusion
+    chances = ", ".join(probability_text(inclusion[name]) for name in held)
+    are, them = ("is", "it") if len(held) == 1 else ("are", "them")
+    faint = [
+        f"{in_words(diagnosis, name)} ({probability_text(inclusion[name])})"
+        for name in best.effects
+        if name not in held
+    ]
+    together = f" together with {listed(faint)}, less sure," if faint else ""
+    left = remainder(diagnosis)
+    drawn = left.location and left.location.missing_term
+    look = ", and look at the missing term" if drawn else ""
+    named = listed([in_words(diagnosis, name) for name in held])
+    return (
+        f"{named} {are} part of the gap ({chances}): adding {them}{together} with "
+        f"{sizes_text(diagnosis, best)} closes {share_closed(diagnosis, best)} of it on recordings "
+        f"never fitted to. {share_text(left.share)} remains{remainder_place(left)}: "
+        f"{add_or_not(diagnosis, best)}{look}."
+    )
+
+
+def _ambiguous(diagnosis: Diagnosis) -> str:
+    rivals = diagnosis.conclusion.ambiguity_set
+    labels = [cause.hypothesis.titles for cause in rivals]
+    common = [label for label in labels[0] if all(label in others for others in labels)]
+    rests = [" + ".join(label for label in own if label not in common) for own in labels]
+    choices = " or ".join(
+        f"{_beside(rest, common)} ({probability_text(cause.probability)})"
+        for rest, cause in zip(rests, rivals, strict=True)
+    )
+    explain, close = ("explain", "close") if len(common) > 1 else ("explains", "closes")
+    text = (
+        f"{listed(common)} {explain} the gap, {choices}," if common else f"{choices} {explain} the gap"
+    )
+    shares = " or ".join(dict.fromkeys(share_closed(diagnosis, cause) for cause in rivals))
+    doubt = "which" if all(rests) else "whether another cause acts or the form of the first one errs"
+    text += f" and {close} {shares} of it; these recordings cannot tell {doubt}."
+    if any(diagnosis.surely_helps(cause) for cause in rivals):
+        return text
+    return f"{text} None of them surely helps on recordings never fitted to: add none yet."
+
+
+def _beside(rest: str, common: Sequence[str]) -> str:
+    """What a rival adds to the causes that all rivals share."""
+    if not common:
+        return rest
+    return f"with {rest}" if rest else "alone"
+
+
+def _no_gap(diagnosis: Diagnosis) -> str:
+    gaps, settings = diagnosis.reduction.gaps, diagnosis.settings
+    recalibrated = gaps[RECALIBRATED].overall
+    disturbance = disturbance_sentence(diagnosis)
+    if disturbance:
+        text = "There is no gap beyond noise and disturbances after recalibration"
+    elif recalibrated.low <= FLOOR + settings.reduction.least_gap_closed:
+        text = "There is no gap beyond noise after recalibration"
+    else:
+        text = "Recalibration leaves a small gap of which no cause can be named"
+    text += (
+        f": on recordings never fitted to, the gap is {gap_with_interval(recalibrated)} noise "
+        f"deviations, and {gap_text(gaps[NOMINAL].overall.value)} before. {disturbance}Use the "
+        "recalibrated parameters and add nothing."
+    )
+    likely = diagnosis.ranking.no_cause > settings.report.likely_probability
+    return text if likely else f"{text} {_possible_cause(diagnosis)}"
+
+
+def _possible_cause(diagnosis: Diagnosis) -> str:
+    """The cause that may act all the same, and why the verdict does not name it."""
+    ranking = diagnosis.ranking
+    probabilities = {
+        hypothesis_title(cause.hypothesis): cause.probability for cause in diagnosis.conclusion.causes
+    }
+    probabilities["something outside the catalogue"] = ranking.unknown
+    name = max(probabilities, key=probabilities.__getitem__)
+    return (
+        f"In doubt: {name} may act ({probability_text(probabilities[name])}), but that no cause acts "
+        f"({probability_text(ranking.no_cause)}) cannot be ruled out."
+    )
+
+
+def _unknown(diagnosis: Diagnosis) -> str:
+    unknown = diagnosis.ranking.unknown
+    found = (
+        f"Nothing in the catalogue explains the gap ({probability_text(unknown)}): something is missing"
+        if unknown > 0.5
+        else "No cause in the catalogue is probable enough to be named: it may be one of them, or "
+        f"something that is missing ({probability_text(unknown)})"
+    )
+    text = (
+        f"{found}, most likely in {component_at_fault(diagnosis)}"
+        f"{', see its shape' if diagnosis.localisation.missing_term else ''}."
+    )
+    return f"{text} {nearest_cause(diagnosis, diagnosis.best)}" if diagnosis.best else text
+
+
+def _with_full_stop(text: str) -> str:
+    return text if not text or text.endswith(".") else f"{text}."
+
+
+def add_or_not(diagnosis: Diagnosis, cause: RankedCause) -> str:
+    """The advice on a cause that the verdict names."""
+    if diagnosis.surely_helps(cause):
+        return f"add {listed(cause.hypothesis.titles)}"
+    them = "it" if len(cause.effects) == 1 else "them"
+    return f"that this helps on recordings never fitted to is not sure, so do not add {them} yet"
+
+
+def nearest_cause(diagnosis: Diagnosis, cause: RankedCause) -> str:
+    """The advice on the nearest cause, which is not the true one as far as one can tell.
+
+    Whether it helps is one question, whether it is true another.
+    """
+    name, share = hypothesis_title(cause.hypothesis), share_closed(diagnosis, cause)
+    if diagnosis.surely_helps(cause):
+        true = "it is the true cause" if len(cause.effects) == 1 else "they are the true causes"
+        return (
+            f"Adding {name} would reduce the gap on recordings never fitted to by {share}, but that "
+            f"{true} is doubtful ({probability_text(cause.probability)})."
+        )
+    gaps = diagnosis.reduction.gaps
+    before, after = (
+        gaps[RECALIBRATED].overall.value,
+        gaps[hypothesis_label(cause.hypothesis)].overall.value,
+    )
+    if after > before:
+        return (
+            f"The nearest cause, {name}, makes recordings never fitted to worse (from "
+            f"{gap_text(before)} to {gap_text(after)} noise deviations): do not add it."
+        )
+    return (
+        f"The nearest cause, {name}, closes {share} of the gap on recordings never fitted to: do not "
+        "add it."
+    )
+
+
+def remainder_place(left: Remainder) -> str:
+    """Where the remainder lies, as the end of a clause; empty where the recordings do not show it."""
+    if not left.location or not left.location.forcings:
+        return ""
+    equation = left.location.likeliest.equation
+    probability = left.equation[equation.name]
+    if probability <= left.location.nothing_missing:
+        return ""
+    return (
+        f", most likely in {equation.title} of {equation.component.replace('_', ' ')} "
+        f"({probability_text(probability)})"
+    )
+
+
+def remainder_sentence(diagnosis: Diagnosis) -> str:
+    """How much of the explainable gap remains, and where."""
+    left = remainder(diagnosis)
+    if not left.share.value:
+        return "No named cause leaves any of the gap on recordings never fitted to."
+    if not diagnosis.named:
+        return f"No cause is named, so the whole gap remains{remainder_place(left)}."
+    return (
+        f"{hypothesis_title(diagnosis.named.hypothesis)} leaves {share_text(left.share)} of the gap on "
+        f"recordings never fitted to{remainder_place(left)}."
+    )
+
+
+def disturbance_sentence(diagnosis: Diagnosis) -> str:
+    """Disturbances that are seen beside the noise, with a blank at the end; empty where none is seen."""
+    least = diagnosis.settings.report.mentioned_discrepancy
+    ranking, seen = diagnosis.ranking, discrepancy(diagnosis)
+    channels = zip(ranking.problem.plant.channels, ranking.discrepancies, strict=True)
+    texts = [
+        f"{quantity(seen[channel.name]['sd'], channel.unit)} in {channel.name}, correlated over "
+        f"{quantity(seen[channel.name]['time_scale_s'], 's')}"
+        for channel, own in channels
+        if own.sd >= least
+    ]
+    if not texts:
+        return ""
+    are = "is a disturbance" if len(texts) == 1 else "are disturbances"
+    return f"Beside the noise there {are} of {listed(texts)}, that no model input explains. "
+
+
+def component_at_fault(diagnosis: Diagnosis) -> str:
+    """The component that is most probably at fault, and its likeliest equation or reading."""
+    component, probability = next(iter(diagnosis.conclusion.component_probabilities.items()))
+    localisation = diagnosis.localisation
+    equations = [
+        forcing.equation.name
+        for forcing in localisation.forcings
+        if forcing.equation.component == component
+    ]
+    equation = max(equations, key=lambda name: localisation.equation_probabilities[name], default="")
+    meaning = next(
+        (f.equation.meaning for f in localisation.forcings if f.equation.name == equation), ""
+    )
+    named = "".join(f"{part}, " for part in (meaning, equation) if part)
+    return f"{component.replace('_', ' ')} ({named}{probability_text(probability)})"
+
+
+def location_sentence(diagnosis: Diagnosis) -> str:
+    """Where most of the gap lies."""
+    worst = max(diagnosis.localisation.regime_gaps, key=lambda gap: gap.gap)
+    text = (
+        f"After recalibration the gap is largest in {worst.channel} during "
+        f"{worst.regime.replace('_', ' ')}: {gap_text(worst.gap)} noise deviations, where {FLOOR:g} is "
+        "noise alone."
+    )
+    if diagnosis.conclusion.verdict == NO_GAP:
+        return text
+    return f"{text} Most likely at fault: {component_at_fault(diagnosis)}."
+
+
+def reduction_sentence(diagnosis: Diagnosis) -> str:
+    """The gap of every model, from the nominal one to the black box."""
+    gaps = diagnosis.reduction.gaps
+    models = {"nominal": gaps[NOMINAL], "recalibrated": gaps[RECALIBRATED]}
+    if diagnosis.best:
+        name = hypothesis_label(diagnosis.best.hypothesis)
+        models[f"with {hypothesis_title(diagnosis.best.hypothesis)}"] = gaps[name]
+    models["with a black box on top of recalibration"] = diagnosis.reduction.black_box
+    listed = "; ".join(f"{name} {gap_with_interval(gap.overall)}" for name, gap in models.items())
+    text = (
+        f"Gap on recordings never fitted to, in noise deviations ({FLOOR:g} is noise alone): {listed}."
+    )
+    if diagnosis.reduction.black_box_helps:
+        return text
+    return (
+        f"{text} The black box finds nothing in what recalibration leaves that holds on these "
+        "recordings: the recalibrated model itself is the floor."
+    )
+
+
+def hidden_causes_sentence(diagnosis: Diagnosis) -> str:
+    """Causes that the recordings cannot show, whatever the residual."""
+    absorbed = [in_words(diagnosis, label) for label in diagnosis.ranking.separability.absorbed]
+    if not absorbed:
+        return "At its usual size every cause of the catalogue would show in these recordings."
+    return (
+        f"At the usual size these recordings would not show {', '.join(absorbed)}: recalibration, run "
+        "offsets and the scatter of units absorb these causes. The diagnosis says nothing about them."
+    )
+
+
+def look_alikes(diagnosis: Diagnosis, cause: RankedCause) -> str:
+    """Causes that the recordings hardly tell from one cause, with the signatures' correlation."""
+    separability = diagnosis.ranking.separability
+    place = separability.labels.index
+    twins = [
+        f"{in_words(diagnosis, twin)} ({abs(separability.correlation[place(label), place(twin)]):.3f})"
+        for label in cause.hypothesis.labels
+        for twin in separability.twins(label)
+    ]
+    return ", ".join(twins) or "-"
+
+
+def parameters_at_bounds(diagnosis: Diagnosis) -> list[str]:
+    """Fitted parameters at an end of their physical range, after recalibration and of likely causes."""
+    problem = diagnosis.ranking.problem
+    estimates = {RECALIBRATED: diagnosis.ranking.recalibrated.estimate}
+    estimates |= {
+        hypothesis_title(cause.hypothesis): cause.hypothesis.estimate
+        for cause in mentioned_causes(diagnosis)
+    }
+    tolerance = diagnosis.settings.report.bound_tolerance
+    return [
+        f"{name}: {p.symbol} is at an end of its physical range ({quantity(value, p.unit)})"
+        for name, estimate in estimates.items()
+        for p in problem.parameters(estimate)
+        for value in [problem.values(estimate)[p.symbol]]
+        if min(abs(value - p.low), abs(value - p.high)) <= tolerance * abs(p.high - p.low)
+    ]
+
+
+def mentioned_causes(diagnosis: Diagnosis) -> Sequence[RankedCause]:
+    """Judged causes with a noticeable probability."""
+    least = diagnosis.settings.report.mentioned_probability
+    return [cause for cause in diagnosis.judged if cause.probability >= least]
+
+
+def share_closed(diagnosis: Diagnosis, cause: RankedCause) -> str:
+    """The share of the gap that a cause closes, with its interval."""
+    return share_text(diagnosis.share_closed(cause))
+
+
+def sizes_with_intervals(diagnosis: Diagnosis, cause: RankedCause) -> list[str]:
+    """Each fitted parameter of a cause with its interval."""
+    parameters = cause.hypothesis.estimate.hypothesis.parameters
+    intervals = parameter_intervals(diagnosis, cause.hypothesis)
+    return [
+        f"{p.symbol} = {quantity_with_interval(*interval, p.unit)}"
+        for p, interval in zip(parameters, intervals, strict=True)
+    ]
+
+
+def sizes_text(diagnosis: Diagnosis, cause: RankedCause) -> str:
+    """Each fitted parameter of a cause, without its interval."""
+    values = diagnosis.ranking.problem.values(cause.hypothesis.estimate)
+    return " and ".join(
+        f"{p.symbol} = {quantity(values[p.symbol], p.unit)}"
+        for p in cause.hypothesis.estimate.hypothesis.parameters
+    )
+
+
+def in_words(diagnosis: Diagnosis, label: str) -> str:
+    """A cause's name or label, or several joined by ' + ', for people; any other text unchanged."""
+    words = {
+        name: cause.words
+        for cause in diagnosis.ranking.problem.plant.causes
+        if cause.words
+        for name in (cause.name, cause.label)
+    }
+    return " + ".join(words.get(part, part) for part in label.split(" + "))
