@@ -10,11 +10,6 @@ ROOT = Path(__file__).parents[1]
 SHORT_FORMS: dict[str, str] = {
     "python -m identification bench": "tests/identification/test_commands.py",
     "python -m identification import": "tests/identification/importing",
-    "python -m identification quality": "tests/identification/test_commands.py",
-    "python -m identification sensitivity": "tests/identification/test_commands.py",
-    "python -m identification calibrate": "tests/identification/test_commands.py",
-    "python -m identification confidence": "tests/identification/test_commands.py",
-    "python -m identification validate": "tests/identification/test_commands.py",
     "python -m identification run": "tests/identification/test_commands.py",
     "python -m identification coverage": "tests/identification/studies/coverage",
     "python -m identification reproduce": "tests/identification/studies/reproduction",

@@ -1,1 +1,1 @@
-"""The commands of `python -m identification`: one file each, and their registry."""
+"""The commands of `python -m identification`: a module each (epv_env/common/commands.py)."""

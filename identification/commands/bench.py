@@ -1,4 +1,4 @@
-"""`python -m identification bench`: write a campaign of a virtual bench."""
+"""Write a campaign of a virtual bench whose truth is known."""
 
 import argparse
 from collections.abc import Sequence
@@ -11,7 +11,6 @@ from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from epv_env.plant.region import Region
 from identification.bench.programmes import SUITES, Programme, at_voltage, load_programmes
 from identification.bench.session import run_bench
-from identification.commands.command import Command
 from identification.commands.options import add_out, add_plant, add_seed
 from identification.recordings.campaign_files import check_vacant, write_campaign
 from identification.recordings.rules import RULES, rules_of
@@ -40,32 +39,34 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--truth", type=Path, default=None, help="plant file to write the truth to")
 
 
-def run(chosen: argparse.Namespace) -> None:
+def run(options: argparse.Namespace) -> None:
     """Write the campaign. Raises ValueError for a wrong value, or a folder that holds a campaign."""
-    check_vacant(chosen.out)
-    plant = load_plant(chosen.plant)
-    rules = rules_of(plant) if chosen.plant else RULES
-    truth = _with_values(plant.parameters, chosen.set)
-    truth = _with_effects(truth, chosen.effect)
-    campaign = run_bench(_suite(chosen, plant), truth, seed=chosen.seed, rate=chosen.rate, rules=rules)
-    write_campaign(campaign, chosen.out)
-    if chosen.truth is not None:
-        _save_truth(truth, chosen)
-    print(f"{len(campaign.recordings)} recordings in {chosen.out}")
+    check_vacant(options.out)
+    plant = load_plant(options.plant)
+    rules = rules_of(plant) if options.plant else RULES
+    truth = _with_values(plant.parameters, options.set)
+    truth = _with_effects(truth, options.effect)
+    campaign = run_bench(
+        _suite(options, plant), truth, seed=options.seed, rate=options.rate, rules=rules
+    )
+    write_campaign(campaign, options.out)
+    if options.truth is not None:
+        _save_truth(truth, options)
+    print(f"{len(campaign.recordings)} recordings in {options.out}")
 
 
-def _suite(chosen: argparse.Namespace, plant: Plant) -> Sequence[Programme]:
+def _suite(options: argparse.Namespace, plant: Plant) -> Sequence[Programme]:
     """The recordings to make, at the voltage of the plant's coil."""
-    if chosen.programme:
-        return load_programmes(chosen.programme, plant.sensors)
-    return at_voltage(SUITES[chosen.suite], plant.voltage)
+    if options.programme:
+        return load_programmes(options.programme, plant.sensors)
+    return at_voltage(SUITES[options.suite], plant.voltage)
 
 
-def _save_truth(truth: Parameters, chosen: argparse.Namespace) -> None:
+def _save_truth(truth: Parameters, options: argparse.Namespace) -> None:
     """Write the true parameters as a plant file whose region is that one point."""
-    plant = load_plant(chosen.plant)
+    plant = load_plant(options.plant)
     truthful = replace(plant, parameters=truth, region=Region(centre=truth), name="truth", provenance={})
-    save_plant(truthful, chosen.truth)
+    save_plant(truthful, options.truth)
 
 
 def _with_values(parameters: Parameters, settings: list[str]) -> Parameters:
@@ -109,12 +110,3 @@ def _number(text: str, rule: str, example: str) -> float:
         return float(text)
     except ValueError:
         raise ValueError(f"{rule} with a number in SI units, as in {example}") from None
-
-
-BENCH = Command(
-    name="bench",
-    help="write a campaign of a virtual bench whose truth is known",
-    add_options=add_options,
-    run=run,
-)
-"""The command, for the registry."""

@@ -1,11 +1,10 @@
-"""`python -m identification blind`: how often the diagnosis is right on sealed campaigns."""
+"""How often the diagnosis is right on campaigns whose cause is sealed."""
 
 import argparse
 from typing import Any
 
 from epv_env.common.command_line import writable_folder
 from epv_env.plant.valves import available_cores
-from identification.commands.command import Command
 from identification.commands.options import add_count, add_out, add_seed, add_workers
 from identification.report.page import Section
 from identification.report.result_files import as_text
@@ -48,40 +47,31 @@ def _deviations() -> str:
     return "; ".join(f"{name} {low:.0f} to {high:.0f} %%" for name, (low, high) in ranges.items())
 
 
-def run(chosen: argparse.Namespace) -> None:
+def run(options: argparse.Namespace) -> None:
     """Run the study, or diagnose it again under disturbances.
 
     Raises ValueError for a folder of another seed or other forms, or of too few trials for disturbances.
     """
-    if chosen.disturb:
-        for disturbance in chosen.disturb:
-            section = robustness_check(chosen.out, disturbance, **_common(chosen))
-            _tell(section, f"{chosen.out}/robustness-{disturbance}")
+    if options.disturb:
+        for disturbance in options.disturb:
+            section = robustness_check(options.out, disturbance, **_common(options))
+            _tell(section, f"{options.out}/robustness-{disturbance}")
     else:
-        section = blind_check(chosen.out, images=chosen.images, **_common(chosen))
-        _tell(section, f"{chosen.out}/{RESULTS}")
+        section = blind_check(options.out, images=options.images, **_common(options))
+        _tell(section, f"{options.out}/{RESULTS}")
 
 
-def _common(chosen: argparse.Namespace) -> dict[str, Any]:
+def _common(options: argparse.Namespace) -> dict[str, Any]:
     """Arguments that both kinds of study take."""
     return {
-        "trials": chosen.trials,
-        "seed": chosen.seed,
-        "workers": chosen.workers or available_cores(),
+        "trials": options.trials,
+        "seed": options.seed,
+        "workers": options.workers or available_cores(),
         "diagnosis": diagnose_campaign,
-        "settings": FORMS[chosen.forms],
+        "settings": FORMS[options.forms],
     }
 
 
 def _tell(section: Section, files: str) -> None:
     print(as_text([section]))
     print(f"\nwritten: {files}.json and .html")
-
-
-BLIND = Command(
-    name="blind",
-    help="how often the diagnosis is right on campaigns whose cause is sealed",
-    add_options=add_options,
-    run=run,
-)
-"""The command, for the registry."""

@@ -1,11 +1,13 @@
-"""`python -m identification gap`: diagnose a campaign, or the report's own error tables."""
+"""Which effect causes the gap between model and recordings.
+
+The guide is docs/how-to/diagnose-a-gap.md.
+"""
 
 import argparse
 from pathlib import Path
 
 from epv_env.common.command_line import writable_folder
 from epv_env.common.json_files import decoded
-from identification.commands.command import Command
 from identification.commands.options import add_out, add_plant, add_seed
 from identification.gap.gap_json import GAP as GAP_FILE
 from identification.gap.sentences import verdict_sentence
@@ -31,39 +33,29 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--images", type=writable_folder, default=None, help="of --tables: its figure")
 
 
-def run(chosen: argparse.Namespace) -> None:
+def run(options: argparse.Namespace) -> None:
     """Diagnose what is chosen. Raises ValueError for options that exclude each other."""
-    if chosen.tables:
-        _diagnose_tables(chosen)
+    if options.tables:
+        _diagnose_tables(options)
     else:
-        _diagnose_campaign(chosen)
+        _diagnose_campaign(options)
 
 
-def _diagnose_tables(chosen: argparse.Namespace) -> None:
-    if chosen.plant or chosen.without:
+def _diagnose_tables(options: argparse.Namespace) -> None:
+    if options.plant or options.without:
         raise ValueError("--plant and --without belong to a campaign: leave them out with --tables")
-    sections = error_table_study(chosen.out, seed=chosen.seed, images=chosen.images)
+    sections = error_table_study(options.out, seed=options.seed, images=options.images)
     print(as_text(sections))
-    print(f"\nwritten: {chosen.out}/tables.json and tables.html")
+    print(f"\nwritten: {options.out}/tables.json and tables.html")
 
 
-def _diagnose_campaign(chosen: argparse.Namespace) -> None:
-    if chosen.images:
+def _diagnose_campaign(options: argparse.Namespace) -> None:
+    if options.images:
         raise ValueError("--images belongs to --tables: a campaign's figures are in its report.html")
     diagnosis = diagnose_campaign(
-        chosen.campaign, chosen.out, plant=chosen.plant, without=chosen.without, seed=chosen.seed
+        options.campaign, options.out, plant=options.plant, without=options.without, seed=options.seed
     )
-    content = decoded(chosen.out / GAP_FILE, remedy="diagnose again")
+    content = decoded(options.out / GAP_FILE, remedy="diagnose again")
     print(verdict_sentence(diagnosis, content["next_experiment"])[1])
     written = (diagnose.REPORT, GAP_FILE, diagnose.PLANT)
-    print(f"written: {', '.join(str(chosen.out / name) for name in written)}")
-
-
-GAP = Command(
-    name="gap",
-    help="which effect causes the gap between model and recordings",
-    guide="docs/how-to/diagnose-a-gap.md",
-    add_options=add_options,
-    run=run,
-)
-"""The command, for the registry."""
+    print(f"written: {', '.join(str(options.out / name) for name in written)}")

@@ -1,6 +1,7 @@
 """Options that several commands share, with the checks of their values."""
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -22,12 +23,12 @@ def add_plant(parser: argparse.ArgumentParser, *, help: str) -> None:
 
 def add_seed(parser: argparse.ArgumentParser, *, help: str) -> None:
     """Add --seed, a whole number from 0 up; help: what the seed draws."""
-    parser.add_argument("--seed", type=int, action=_Seed, default=0, help=help)
+    add_number(parser, "--seed", kind=int, low=0, high=MOST["seed"], default=0, help=help)
 
 
 def add_count(parser: argparse.ArgumentParser, option: str, *, default: int | None, help: str) -> None:
     """Add a whole number that is at least 1, such as --trials."""
-    parser.add_argument(option, type=int, action=_AtLeastOne, default=default, help=help)
+    add_number(parser, option, kind=int, low=1, high=MOST_COUNTED, default=default, help=help)
 
 
 def add_workers(parser: argparse.ArgumentParser) -> None:
@@ -35,27 +36,32 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
     add_count(parser, "--workers", default=None, help="processes; default: all cores")
 
 
-class _AtLeastOne(argparse.Action):
-    """Stores a number; ends with one sentence if it is below 1."""
+def add_number(
+    parser: argparse.ArgumentParser,
+    option: str,
+    *,
+    kind: Callable[[str], float],
+    low: float,
+    high: float,
+    default: float | None = None,
+    help: str,
+) -> None:
+    """Add a number from `low` to `high`; one outside ends the command with a sentence."""
+    parser.add_argument(
+        option, type=kind, action=_InRange, low=low, high=high, default=default, help=help
+    )
+
+
+class _InRange(argparse.Action):
+    """Stores a number if it lies in its range."""
+
+    def __init__(self, *args: Any, low: float, high: float, **options: Any):
+        super().__init__(*args, **options)
+        self.low, self.high = low, high
 
     def __call__(
-        self, parser: argparse.ArgumentParser, chosen: argparse.Namespace, value: Any, option: Any = None
+        self, parser: argparse.ArgumentParser, options: argparse.Namespace, value: Any, name: Any = None
     ) -> None:
-        if value < 1:
-            parser.error(f"{self.option_strings[0]} must be at least 1")
-        if value > MOST_COUNTED:
-            parser.error(f"{self.option_strings[0]} must be at most {MOST_COUNTED}")
-        setattr(chosen, self.dest, value)
-
-
-class _Seed(argparse.Action):
-    """Stores a number; ends with one sentence if it is no seed of a generator."""
-
-    def __call__(
-        self, parser: argparse.ArgumentParser, chosen: argparse.Namespace, value: Any, option: Any = None
-    ) -> None:
-        if value < 0:
-            parser.error(f"{self.option_strings[0]} must not be negative")
-        if value > MOST["seed"]:
-            parser.error(f"{self.option_strings[0]} must be at most {MOST['seed']}")
-        setattr(chosen, self.dest, value)
+        if not self.low <= value <= self.high:  # true for NaN, too
+            parser.error(f"{self.option_strings[0]} must be from {self.low:.10g} to {self.high:.10g}")
+        setattr(options, self.dest, value)

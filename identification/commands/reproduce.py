@@ -1,8 +1,7 @@
-"""`python -m identification reproduce`: the report's tables beside the recomputed ones."""
+"""The report's tables beside ours."""
 
 import argparse
 
-from identification.commands.command import Command
 from identification.commands.options import add_out, add_seed
 from identification.report.result_files import as_text
 from identification.studies.reproduction.reproduction import reproduce
@@ -14,14 +13,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_seed(parser, help="of the virtual bench's noise")
 
 
-def run(chosen: argparse.Namespace) -> None:
+def run(options: argparse.Namespace) -> None:
     """Compute every table and write both files."""
-    sections = reproduce(chosen.out, seed=chosen.seed)
+    sections = reproduce(options.out, seed=options.seed)
     print(as_text(sections))
-    print(f"\nwritten: {chosen.out}/reproduce.json and reproduce.html")
-
-
-REPRODUCE = Command(
-    name="reproduce", help="the report's tables beside ours", add_options=add_options, run=run
-)
-"""The command, for the registry."""
+    print(f"\nwritten: {options.out}/reproduce.json and reproduce.html")

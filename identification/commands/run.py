@@ -1,21 +1,85 @@
-"""`python -m identification run`: every stage, the plant file and the report."""
+"""Identify the valve from a campaign: plant.json and report.html, or one stage of them.
+
+The stages are data quality, sensitivity, calibration, confidence and validation. Finished searches are
+kept in the folder of results, so that stages which are run one by one share them.
+"""
 
 import argparse
 
-from identification.commands.campaign_options import add_options, chosen_identification
-from identification.commands.command import Command
+from epv_env.plant.plantfile import load_plant
+from identification.calibration.settings import CALIBRATION, CalibrationSettings
+from identification.commands.options import add_count, add_out, add_plant, add_seed
 from identification.pipeline import run as pipeline
+from identification.pipeline.identification import Identification
+from identification.pipeline.settings import IdentificationSettings
+from identification.pipeline.stages import STAGES
+from identification.recordings.campaign_files import read_campaign
+from identification.recordings.recording import campaign_facts
+from identification.recordings.rules import RULES, rules_of
+from identification.report.result_files import as_text, write_results
+
+JOURNAL = "searches.jsonl"
+"""File of the finished searches in the folder of results."""
 
 
-def run(chosen: argparse.Namespace) -> None:
-    """Run all stages on the campaign. Raises CampaignError."""
-    plant = pipeline.run(chosen_identification(chosen), chosen.out)
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the campaign, the folder of results, the stage, the seed and the number of starts."""
+    parser.add_argument(
+        "campaign", help="folder with campaign.json and the recordings (docs/reference/files.md)"
+    )
+    add_out(parser)
+    stages = "; ".join(f"{stage.name}: {stage.help}" for stage in STAGES)
+    parser.add_argument(
+        "--stage",
+        choices=[stage.name for stage in STAGES],
+        default=None,
+        help=f"write the page and the JSON file of this stage only ({stages})",
+    )
+    add_plant(parser, help="plant file of another valve than the report's, as its data sheet has it")
+    add_seed(parser, help="of starts, draws and resampling")
+    add_count(parser, "--starts", default=CALIBRATION.starts, help="searches of each method")
+    parser.add_argument(
+        "--report-2003", action="store_true", help="show the figures of the report SCL-001/2003 beside"
+    )
+
+
+def run(options: argparse.Namespace) -> None:
+    """Run all stages on the campaign, or one. Raises CampaignError."""
+    identification = _identification(options)
+    if options.stage:
+        _run_stage(options, identification)
+        return
+    plant = pipeline.run(identification, options.out)
     for symbol in plant.region.symbols:
         print(f"{symbol:8} {plant.parameters[symbol]:.7g}")
-    print(f"written: {chosen.out / pipeline.PLANT_FILE}, {chosen.out}/report.html and report.json")
+    print(f"written: {options.out / pipeline.PLANT_FILE}, {options.out}/report.html and report.json")
 
 
-RUN = Command(
-    name="run", help="all of these: plant.json and report.html", add_options=add_options, run=run
-)
-"""The command, for the registry."""
+def _identification(options: argparse.Namespace) -> Identification:
+    plant = load_plant(options.plant) if options.plant else None
+    campaign = read_campaign(options.campaign, rules_of(plant) if plant else RULES)
+    settings = IdentificationSettings(calibration=CalibrationSettings(starts=options.starts))
+    return Identification(
+        campaign,
+        options.out / JOURNAL,
+        seed=options.seed,
+        plant=plant,
+        settings=settings,
+        report_2003=options.report_2003,
+    )
+
+
+def _run_stage(options: argparse.Namespace, identification: Identification) -> None:
+    stage = next(stage for stage in STAGES if stage.name == options.stage)
+    result = stage.compute(identification)
+    write_results(
+        options.out,
+        stage.name,
+        title=f"{stage.name}: {options.campaign}",
+        sections=result.sections,
+        content=result.content,
+        facts=campaign_facts(identification.campaign),
+        report_2003=options.report_2003,
+    )
+    print(as_text(result.sections))
+    print(f"\nwritten: {options.out / stage.name}.html and .json")

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from epv_env.common.commands import commands
 from training.console.command import COMMANDS, IDENTIFICATION
 
 NEEDED: dict[str, list[str]] = {
@@ -29,11 +30,6 @@ NEEDED: dict[str, list[str]] = {
     "coverage": ["--campaigns", "0"],
     "reproduce": ["--seed", "-1"],
     "blind": ["--trials", "0"],
-    "quality": ["nowhere"],
-    "sensitivity": ["nowhere"],
-    "calibrate": ["nowhere"],
-    "confidence": ["nowhere"],
-    "validate": ["nowhere"],
     "run": ["nowhere"],
     "gap": ["nowhere"],
 }
@@ -73,7 +69,8 @@ def import_commands() -> None:
     """Import every command's module: that takes seconds, which no input is to blame for."""
     for entry in COMMANDS.values():
         importlib.import_module(entry.module)
-    importlib.import_module("identification.commands.registry")
+    for module in commands(["identification.commands"]).values():
+        importlib.import_module(module)
 
 
 def left_files(folder: Path) -> list[str]:

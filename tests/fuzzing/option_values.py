@@ -9,18 +9,18 @@ from functools import cache
 from typing import Any, NoReturn
 from unittest.mock import patch
 
-from identification.commands.registry import COMMANDS as IDENTIFICATION_COMMANDS
+from epv_env.common.commands import commands, parser_of
 from training.console.command import COMMANDS, IDENTIFICATION
 
 NO_VALUES = ("-1", "nan", "inf", "1e999", "9" * 400, "", "x", "1,5", "0x10")
 """What no option takes: negative, infinite, far beyond sense, or no number."""
 
-STAGES = ("quality", "sensitivity", "calibrate", "confidence", "validate", "run", "gap")
 OPERANDS = {
     "export": ("nowhere",),
     "export-fmu": ("plant",),
     "import": ("nowhere.csv",),
-    **dict.fromkeys(STAGES, ("nowhere",)),
+    "run": ("nowhere",),
+    "gap": ("nowhere",),
 }
 """What a command needs beside its options."""
 
@@ -66,12 +66,10 @@ def says(sentence: str, option: str) -> bool:
 
 
 def _parser_of(name: str) -> argparse.ArgumentParser:
-    """The parser of a command; one of the identification has it in its record."""
-    for command in IDENTIFICATION_COMMANDS:
-        if command.name == name:
-            parser = argparse.ArgumentParser()
-            command.add_options(parser)
-            return parser
+    """The parser of a command."""
+    module = commands(["identification.commands"]).get(name)
+    if module is not None:
+        return parser_of(importlib.import_module(module), name)
 
     def take(parser: argparse.ArgumentParser, *_: Any, **__: Any) -> NoReturn:
         raise _Taken(parser)

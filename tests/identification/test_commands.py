@@ -1,5 +1,7 @@
 """The command line as a user meets it: files written, refusals, the same again, on to the env."""
 
+import argparse
+import importlib
 import json
 import re
 from functools import partial
@@ -10,11 +12,12 @@ import numpy as np
 import pytest
 
 import epv_env  # noqa: F401 - registers the environments
+from epv_env.common.commands import commands, help_line, parser_of
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import load_plant
 from identification.__main__ import main
 from identification.calibration import multi_start as starts
-from identification.commands import campaign_options
+from identification.commands import run as run_command
 from identification.pipeline.settings import IdentificationSettings
 from identification.recordings.campaign_files import read_campaign
 from identification.sensitivity.settings import SensitivitySettings
@@ -38,7 +41,7 @@ def finished(campaign, tmp_path_factory):
     few = SensitivitySettings(trajectories=4, samples=16, scatter_points=3)
     short = partial(IdentificationSettings, sensitivity=few)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(campaign_options, "IdentificationSettings", short)
+        patch.setattr(run_command, "IdentificationSettings", short)
         assert main(["run", str(campaign), "--out", str(out), "--starts", "2"]) == 0
     return out
 
@@ -94,7 +97,9 @@ def test_the_report_of_a_bench_says_nothing_of_2003_unless_asked(finished, campa
         r'<style>.*?</style>|src="[^"]*"', "", (finished / "report.html").read_text(), flags=re.S
     )
     assert re.findall(printed, page) == []
-    assert main(["quality", str(campaign), "--out", str(tmp_path), "--report-2003"]) == 0
+    assert (
+        main(["run", str(campaign), "--stage", "quality", "--out", str(tmp_path), "--report-2003"]) == 0
+    )
     asked = (tmp_path / "quality.html").read_text()
     assert "(Table 3 of SCL-001/2003)" in asked
     assert "the report&#39;s" in asked
@@ -135,13 +140,13 @@ def test_a_second_run_gives_the_same_plant_and_searches_nothing(finished, campai
     monkeypatch.setattr(starts, "nelder_mead", search)
     monkeypatch.setattr(starts, "weighted_least_squares", search)
     arguments = [str(campaign), "--out", str(finished), "--starts", "2"]
-    assert main(["confidence", *arguments]) == 0
+    assert main(["run", "--stage", "confidence", *arguments]) == 0
     assert (finished / "plant.json").read_bytes() == before
     with pytest.raises(AssertionError, match="done again"):  # another seed has other starts
-        main(["calibrate", *arguments, "--seed", "1"])
+        main(["run", "--stage", "calibrate", *arguments, "--seed", "1"])
 
 
-def test_a_campaign_that_lacks_recordings_is_still_identified(campaign, tmp_path):
+def test_a_campaign_that_lacks_recordings_is_still_identified(campaign, tmp_path, capsys):
     folder = tmp_path / "four"
     folder.mkdir()
     content = json.loads((campaign / "campaign.json").read_text())
@@ -149,11 +154,11 @@ def test_a_campaign_that_lacks_recordings_is_still_identified(campaign, tmp_path
     (folder / "campaign.json").write_text(json.dumps(content))
     for recording in content["recordings"]:
         (folder / recording["file"]).write_bytes((campaign / recording["file"]).read_bytes())
-    with pytest.raises(ValueError, match="no recording with role 'quality'"):
-        main(["quality", str(folder), "--out", str(tmp_path / "out")])
-    with pytest.raises(ValueError, match="no recording with role 'validation'"):
-        main(["validate", str(folder), "--out", str(tmp_path / "out"), "--starts", "1"])
-    assert main(["calibrate", str(folder), "--out", str(tmp_path / "out"), "--starts", "1"]) == 0
+    stage = ["run", str(folder), "--out", str(tmp_path / "out"), "--starts", "1", "--stage"]
+    for name, role in (("quality", "quality"), ("validate", "validation")):
+        assert main([*stage, name]) == 2
+        assert f"no recording with role '{role}'" in capsys.readouterr().err
+    assert main([*stage, "calibrate"]) == 0
     page = (tmp_path / "out" / "calibrate.html").read_text()
     assert "No record at rest shows the sensors" in page
 
@@ -171,26 +176,22 @@ def test_a_campaign_that_lacks_recordings_is_still_identified(campaign, tmp_path
         (["bench", "--effect", "circuit_leak=1"], "outside its domain"),
         (["bench", "--rate", "100"], "sampling rate 100"),
         (["bench", "--plant", "/no/plant.json"], "cannot read plant file"),
-        (["quality", "/no/campaign"], "cannot read"),
         (["run", "/no/campaign"], "cannot read"),
     ],
 )
-def test_a_wrong_value_is_refused_in_one_sentence(arguments, message, tmp_path):
-    with pytest.raises(ValueError, match=message):
-        main([*arguments, "--out", str(tmp_path / "out")])
+def test_a_wrong_value_is_refused_in_one_sentence(arguments, message, tmp_path, capsys):
+    assert main([*arguments, "--out", str(tmp_path / "out")]) == 2
+    assert message in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(
     "arguments",
     [
-        ["calibrate", "campaign", "--starts", "0"],
-        ["coverage", "--campaigns", "0"],
-        ["coverage", "--workers", "0"],
+        ["run", "campaign", "--starts", "0"],
+        ["run", "campaign", "--stage", "none"],
         ["bench", "--seed", "-1"],
         ["bench", "--suite", "none"],
-        ["nothing"],
-        [],
     ],
 )
 def test_a_wrong_option_is_refused_with_the_usage(arguments, tmp_path, capsys):
@@ -201,8 +202,21 @@ def test_a_wrong_option_is_refused_with_the_usage(arguments, tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_bench_does_not_write_over_a_campaign(campaign):
+def test_a_bench_does_not_write_over_a_campaign(campaign, capsys):
     before = (campaign / "test1.csv").read_bytes()
-    with pytest.raises(ValueError, match="exists already"):
-        main(["bench", "--out", str(campaign), "--seed", "4"])
+    assert main(["bench", "--out", str(campaign), "--seed", "4"]) == 2
+    assert "exists already" in capsys.readouterr().err
     assert (campaign / "test1.csv").read_bytes() == before
+
+
+@pytest.mark.parametrize("module", commands(["identification.commands"]).values())
+def test_every_option_says_what_it_sets_and_counts_are_checked(module, capsys):
+    parser: argparse.ArgumentParser = parser_of(importlib.import_module(module), "epv")
+    assert help_line(module).endswith(".")
+    assert help_line(module) in parser.format_help()
+    for action in parser._actions:
+        assert action.help, action.dest
+        if action.dest in ("starts", "campaigns", "trials", "workers", "seed"):
+            with pytest.raises(SystemExit):
+                parser.parse_args([action.option_strings[0], "-1"])
+            assert f"{action.option_strings[0]} must" in capsys.readouterr().err

@@ -37,7 +37,7 @@ def test_the_command_passes_what_is_chosen(monkeypatch, tmp_path):
 def test_no_trial_is_refused(tmp_path, capsys):
     with pytest.raises(SystemExit):
         main(["blind", "--out", str(tmp_path), "--trials", "0"])
-    assert "--trials must be at least 1" in capsys.readouterr().err
+    assert "--trials must be from 1" in capsys.readouterr().err
 
 
 def test_disturbances_are_passed_one_after_another(monkeypatch, tmp_path, capsys):
