@@ -22,8 +22,7 @@ from controllers.venting_time import relative_flux
 from epv_env.common.units import BAR
 from epv_env.observation import decode
 from epv_env.plant.plantfile import Plant
-from epv_env.plant.primitives.constants import QUARTER_PI
-from epv_env.plant.primitives.flow import mass_flux
+from epv_env.plant.primitives import QUARTER_PI, mass_flux
 
 
 @dataclass(kw_only=True)

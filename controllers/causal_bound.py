@@ -19,8 +19,7 @@ from epv_env.common.units import BAR
 from epv_env.plant.consumption import Scenario
 from epv_env.plant.equations import State
 from epv_env.plant.valves import Valves
-from epv_env.reward import reward_terms
-from epv_env.settings import EMPTY_CIRCUIT_BAR
+from epv_env.reward import EMPTY_CIRCUIT_BAR, reward_terms
 from epv_env.task import LimitingTask
 
 

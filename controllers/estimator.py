@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 
 from epv_env.common.units import BAR
 from epv_env.observation import decode
+from epv_env.plant.channels import MEASURED, SENSORS, Sensor
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.readings import MEASURED
-from epv_env.plant.sensors import SENSORS, Sensor
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from controllers.pulse_table import PulseTable
 from epv_env.common.units import BAR
-from epv_env.plant.primitives.constants import QUARTER_PI
+from epv_env.plant.primitives import QUARTER_PI
 
 
 @dataclass(frozen=True, kw_only=True)

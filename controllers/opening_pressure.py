@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from numpy.typing import NDArray
 
-from epv_env.plant.primitives.constants import QUARTER_PI
+from epv_env.plant.primitives import QUARTER_PI
 
 
 def opening_pressure(p: Mapping[str, float], p1: NDArray, p2: NDArray) -> NDArray:

@@ -10,8 +10,7 @@ from controllers.oracle_nodes import MERGE_TOLERANCE, MergeTolerance, Nodes
 from epv_env.common.units import BAR
 from epv_env.plant.equations import State
 from epv_env.plant.valves import Valves
-from epv_env.reward import RewardWeights, reward_terms
-from epv_env.settings import EMPTY_CIRCUIT_BAR
+from epv_env.reward import EMPTY_CIRCUIT_BAR, RewardWeights, reward_terms
 from epv_env.task import LimitingTask
 
 

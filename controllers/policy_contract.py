@@ -8,7 +8,7 @@ import msgspec
 from numpy.typing import NDArray
 
 from epv_env import MAX_EPISODE_STEPS
-from epv_env.common.json_files import JSONFileError, read_json
+from epv_env.common.files import JSONFileError, read_json
 from epv_env.observation import LAYOUT, contract
 
 FORMAT = "epv-policy/1"

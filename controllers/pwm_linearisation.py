@@ -16,8 +16,7 @@ from scipy.optimize import root_scalar
 from epv_env.plant.coefficients import coefficients
 from epv_env.plant.equations import Coefficients
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.primitives.constants import QUARTER_PI
-from epv_env.plant.primitives.flow import mass_flux
+from epv_env.plant.primitives import QUARTER_PI, mass_flux
 from epv_env.plant.simulate import energised, simulate
 
 OPENING = 0.05

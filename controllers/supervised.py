@@ -19,7 +19,7 @@ from controllers.pulse_simulation import nominal_table
 from controllers.supervisor import Supervisor
 from controllers.supervisor_settings import SETTINGS, SupervisorSettings
 from controllers.tuned import build, load_tunings
-from epv_env.common.json_files import checked, read_json, write_json
+from epv_env.common.files import checked, read_json, write_json
 from epv_env.plant.plantfile import Plant
 
 FORMAT = "epv-supervisor/4"

@@ -8,7 +8,7 @@ from typing import Any
 
 from controllers.base import Controller
 from controllers.registry import registration
-from epv_env.common.json_files import JSONFileError, read_json, write_json
+from epv_env.common.files import JSONFileError, read_json, write_json
 from epv_env.plant.plantfile import Plant
 
 FORMAT = "epv-controllers/1"

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
-from epv_env.plant.primitives.flow import CRITICAL_RATIO, bracket_over_drop
+from epv_env.plant.primitives import CRITICAL_RATIO, bracket_over_drop
 
 _LEAST, _MOST, _NODES = 1.002, 50.0, 2000
 _RATIOS = np.geomspace(_LEAST, _MOST, _NODES)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
-from epv_env.arguments import PRESSURE_LIMITS_BAR, OptionError, Range, as_range
+from epv_env.signals import PRESSURE_LIMITS_BAR, OptionError, Range, as_range
 
 PROBABILITIES = (
     "starved", "far", "vented", "coil_off", "rest", "target_steps", "noisy", "frozen_p3", "worn",

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from epv_env.actions import PWM, OnOff
 from epv_env.common.units import BAR, GRAM
-from epv_env.infos import step_info, truth
 from epv_env.observation import observation_space
 from epv_env.plant.plantfile import load_plant
 from epv_env.render import Renderer, Snapshot
+from epv_env.result import step_info, truth
 from epv_env.settings import make_settings, with_options
 from epv_env.task import LimitingTask
 
@@ -22,7 +22,7 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
     Observation: Box, float32, the ECU's readings as `epv_env.observation.LAYOUT` lists them. Reward:
     the sum of `epv_env.reward.RewardTerms`. Terminates when the circuit is empty (p2 below 1.5 bar),
     never otherwise; Gymnasium's time limit truncates after 2000 (PWM: 500) control periods, 10 s at the
-    default period. info: see `epv_env.infos`.
+    default period. info: see `epv_env.result`.
 
     Arguments, all optional:
         plant: path of a plant file (docs/reference/files.md), a Plant, or None for the report's
@@ -37,7 +37,7 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
         conditions: what an episode may meet beyond the ordinary: None, "broad", a
             `epv_env.conditions.Conditions`, or a mapping of its fields.
         band_bar: half-width of the band that the reward prices [bar].
-        privileged: whether info shows true state and parameters (`epv_env.infos.truth`).
+        privileged: whether info shows true state and parameters (`epv_env.result.truth`).
         control_period: time between decisions [s].
         supply_voltage, settling_time, sensor_noise, weights, drop_bar: see `epv_env.settings`.
     reset(options=...) takes parameters, effects, supply, scenario, target_bar, p2_bar, p3_bar and

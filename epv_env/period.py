@@ -1,10 +1,25 @@
-"""The rules of one control period for one episode, compiled: drive, judge, measure, observe.
+"""One control period of a batch in one compiled call: drive, integrate, judge, measure, observe.
 
-e: a record of EPISODE. rules: a record of RULES. They are inlined into `epv_env.compiled_step`.
+The rules are functions of one episode, e, a record of EPISODE; rules: a record of RULES. The compiled
+steps at the end call them for all. These take the same arguments, n episodes in `lanes` lanes of the
+plant's tables:
+
+episodes, progress: records of EPISODE (n,) and PROGRESS (n,). rules: a record of RULES (1,).
+noise: standard normal draws times the task's factor, (n, NOISE_BLOCK, 4).
+state, coefficients, effects, lowest, highest, sensors: `Valves.tables`.
+before: the state before the period, (N_STATE, lanes). inputs (2, N_INPUT, lanes), duration (2, lanes):
+of the part with the coil on, if there is one, and of the part with it off.
+record: empty. step: largest integration step [s].
+on_time (n,) [s], action (n,) [-]: what is commanded.
+figures (N_FIGURE, n), observation (n, entries) float32: results.
+first, last: lanes, multiples of LANES.
 """
 
+from collections.abc import Callable
 from dataclasses import fields
+from pathlib import Path
 
+import numba
 import numpy as np
 
 from epv_env.common.units import BAR
@@ -20,14 +35,42 @@ from epv_env.observation import (
     SCALE,
     scaled,
 )
-from epv_env.plant.channels import CHANNEL
-from epv_env.plant.data_acquisition import digitised
-from epv_env.plant.primitives.compiled import exact, generated
-from epv_env.plant.readings import MEASURED
+from epv_env.plant.channels import CHANNEL, MEASURED, digitised
+from epv_env.plant.consumption import mean_flow
+from epv_env.plant.equations import Inputs, State
+from epv_env.plant.integrate import run_nominal
+from epv_env.plant.lanes import N_STATE, STATE, state_at
+from epv_env.plant.primitives import exact, generated, source_digest, wide_vectors
 from epv_env.plant.supply import two_point
-from epv_env.result import DEVIATION, FAILED, N_TERM, REWARD, SUCCEEDED, SWITCHINGS, VENTED
-from epv_env.reward import BAND_BAR, RewardWeights, priced, total
-from epv_env.settings import EMPTY_CIRCUIT_BAR, Settings
+from epv_env.result import CONSUMPTION, DEVIATION, FAILED, N_TERM, REWARD, SUCCEEDED, SWITCHINGS, VENTED
+from epv_env.reward import BAND_BAR, EMPTY_CIRCUIT_BAR, RewardWeights, priced, total
+from epv_env.settings import Settings
+
+EPISODE = np.dtype(
+    [
+        ("target", np.float64),  # [bar absolute]
+        ("steps", np.int64),  # control periods so far
+        ("action", np.float64),  # share of the last period with the coil on [-]
+        ("waited", np.float64),  # since the last switching [s]
+        ("cut_in", np.float64),  # of the compressor [Pa absolute]
+        ("cut_out", np.float64),  # of the compressor [Pa absolute]
+        ("delivery", np.float64),  # of the running compressor [kg/s]
+        ("p1_slope", np.float64),  # of a recorded supply over this period [Pa/s]
+        ("reading", np.float64, (len(MEASURED),)),  # of each sensor [bar, A]
+        ("p2_history", np.float64, (HISTORY,)),  # readings, the newest first [bar]
+        ("p3_history", np.float64, (HISTORY,)),  # the same of p3 [bar]
+        ("coil", np.bool_),  # on at the end of the last period
+        ("compressor", np.bool_),  # running
+        ("idle_until", np.float64),  # when the compressor may start [s]
+        ("noise", np.float64),  # factor on the sensors' noise [-]
+        ("p3_frozen_at", np.float64),  # when the reading of p3 stops changing [s]
+        ("target_steps_at", np.float64, (TARGET_STEPS,)),  # [s]
+        ("target_steps_to", np.float64, (TARGET_STEPS,)),  # [bar absolute]
+        ("violated", np.bool_),  # outside the band after settling
+    ],
+    align=True,
+)
+"""Record of a running episode."""
 
 RULES = np.dtype(
     [
@@ -174,3 +217,133 @@ def observe(e, row):
         _show(row, _P2_CHANGE + k, p2[0] - p2[P2_LAGS[k]])
     for k in range(len(P3_LAGS)):
         _show(row, _P3_CHANGE + k, p3[0] - p3[P3_LAGS[k]])
+
+
+NOISE_BLOCK = 256
+"""Samples of noise drawn at a time for each episode."""
+
+_ROW_P1, _ROW_P2, _ROW_VENTED = (State._fields.index(name) for name in ("p1", "p2", "air_vented"))
+_U, _FLOW, _SLOPE, _REFILL = (
+    Inputs._fields.index(name) for name in ("U", "sigma_S", "p1_slope", "refill")
+)
+
+
+@exact
+def _prepare(episodes, progress, rules, state, before, inputs, duration, lowest, highest, on_time,
+             action, figures, first, last):  # fmt: skip
+    """Set inputs and durations of both parts of the period, and keep the state."""
+    period, voltage = rules[0].control_period, rules[0].supply_voltage
+    before[:, first:last] = state[:, first:last]
+    lowest[first:last] = np.inf
+    highest[first:last] = -np.inf
+    for i in range(first, min(last, len(episodes))):
+        e, on = episodes[i], on_time[i]
+        figures[SWITCHINGS, i] = switched(e, period, on, action[i])
+        begin = e.steps * period
+        flow = mean_flow(progress[i], begin, period)
+        figures[CONSUMPTION, i] = flow
+        refill = refilled(e, state[_ROW_P1, i], begin)
+        follow_target_steps(e, begin + period)
+        for part in range(2):
+            inputs[part, _FLOW, i] = flow
+            inputs[part, _SLOPE, i] = e.p1_slope
+            inputs[part, _REFILL, i] = refill
+        inputs[0, _U, i] = voltage if on > 0.0 else 0.0
+        whole = on <= 0.0 or on >= period
+        duration[0, i] = period if whole else on
+        duration[1, i] = 0.0 if whole else period - on
+
+
+@exact
+def _restore_lost(episodes, state, before, lowest, highest, figures, first, last):
+    """Put valves that could not be integrated back where they were, and mark them as failed.
+
+    A loop of its own: arrays that are handed to a function for every valve are counted every time.
+    """
+    for i in range(first, min(last, len(episodes))):
+        figures[FAILED, i] = 0.0
+        if np.isnan(state[_ROW_P2, i]):
+            figures[FAILED, i] = 1.0
+            for row in range(N_STATE):
+                state[row, i] = before[row, i]
+            lowest[i] = before[_ROW_P2, i]
+            highest[i] = before[_ROW_P2, i]
+
+
+@exact
+def _conclude(episodes, rules, noise, state, before, lowest, highest, sensors, figures, observation,
+              first, last):  # fmt: skip
+    """Judge the period, read the sensors and write the observations."""
+    _restore_lost(episodes, state, before, lowest, highest, figures, first, last)
+    period = rules[0].control_period
+    for i in range(first, min(last, len(episodes))):
+        e = episodes[i]
+        vented = state[_ROW_VENTED, i] - before[_ROW_VENTED, i]
+        judge(e, rules[0], state[_ROW_P2, i], lowest[i], highest[i], vented, figures, i)
+        measure(
+            e, state_at(state, STATE, i), sensors[i], noise[i, e.steps % NOISE_BLOCK], e.steps * period
+        )
+        remember(e)
+        observe(e, observation[i])
+
+
+INLINED = ("period", "episode", "observation", "result", "reward")
+"""Files of this folder whose functions and constants the compiled step takes in."""
+
+# Closed over by the compiled functions: a change of any inlined source changes their key in the cache.
+_DIGEST = source_digest(*(Path(__file__).with_name(f"{name}.py") for name in INLINED))
+
+
+def _compiled(digest):
+    """The step as a whole for nominal valves, and its two ends for others."""
+
+    def compiled(function: Callable[..., None]) -> Callable[..., None]:
+        return numba.njit(function, cache=True, nogil=True, error_model="numpy")
+
+    @compiled
+    def whole(episodes, progress, rules, noise, state, coefficients, effects, lowest, highest, sensors,
+              before, inputs, duration, record, step, on_time, action, figures, observation, first,
+              last):  # fmt: skip
+        if digest == "":  # keeps the digest in the closure
+            return
+        wide_vectors()  # the preference of run_nominal is lost where that is inlined here
+        _prepare(episodes, progress, rules, state, before, inputs, duration, lowest, highest, on_time,
+                 action, figures, first, last)  # fmt: skip
+        parts = 2 if np.any(duration[1, first:last] > 0.0) else 1
+        run_nominal(state, coefficients, effects, inputs[:parts], duration[:parts], lowest, highest,
+                    record, step, first, last)  # fmt: skip
+        _conclude(episodes, rules, noise, state, before, lowest, highest, sensors, figures,
+                  observation, first, last)  # fmt: skip
+
+    @compiled
+    def prepare(episodes, progress, rules, noise, state, coefficients, effects, lowest, highest,
+                sensors, before, inputs, duration, record, step, on_time, action, figures, observation,
+                first, last):  # fmt: skip
+        if digest == "":
+            return
+        _prepare(episodes, progress, rules, state, before, inputs, duration, lowest, highest, on_time,
+                 action, figures, first, last)  # fmt: skip
+
+    @compiled
+    def conclude(episodes, progress, rules, noise, state, coefficients, effects, lowest, highest,
+                 sensors, before, inputs, duration, record, step, on_time, action, figures, observation,
+                 first, last):  # fmt: skip
+        if digest == "":
+            return
+        _conclude(episodes, rules, noise, state, before, lowest, highest, sensors, figures,
+                  observation, first, last)  # fmt: skip
+
+    @compiled
+    def begin(episodes, noise, state, sensors, where, observation):
+        if digest == "":
+            return
+        for i in where:
+            measure(episodes[i], state_at(state, STATE, i), sensors[i], noise[i, 0], 0.0)
+            remember_only(episodes[i])
+        for i in range(len(episodes)):
+            observe(episodes[i], observation[i])
+
+    return whole, prepare, conclude, begin
+
+
+step_whole, step_prepare, step_conclude, observe_first = _compiled(_DIGEST)

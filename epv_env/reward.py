@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 BAND_BAR = 0.5
 """Tolerance of control aim C1 (section 2.3)."""
 
+EMPTY_CIRCUIT_BAR = 1.5
+"""Circuit pressure at which an episode fails: the consumers could no longer draw their flow."""
+
 WIDEST_BAND_BAR = 16.0
 """The sensors' range: no pressure is farther from a target."""
 

@@ -1,35 +1,106 @@
-"""What configures an environment: at construction, and per episode through reset(options=...)."""
+"""What a user may write for an environment's arguments, and the settings that they become."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from epv_env.arguments import (
-    PRESSURE_LIMITS_BAR,
-    OptionError,
-    Range,
-    as_effects,
-    as_range,
-    as_region,
-    as_scenario,
-    as_supply,
-    as_target,
-    as_weights,
-)
 from epv_env.common.units import BAR
 from epv_env.conditions import Conditions, as_conditions
-from epv_env.plant.consumption import MIXED, Scenario
+from epv_env.plant.consumption import MIXED, Scenario, check_scenario
+from epv_env.plant.effects.registry import effect
+from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
 from epv_env.plant.supply import Supply
-from epv_env.reward import RewardWeights
-from epv_env.signals import MovingTarget, RecordedConsumption
+from epv_env.reward import EMPTY_CIRCUIT_BAR, RewardWeights
+from epv_env.signals import (
+    PRESSURE_LIMITS_BAR,
+    MovingTarget,
+    OptionError,
+    Range,
+    RecordedConsumption,
+    as_range,
+)
 
-EMPTY_CIRCUIT_BAR = 1.5
-"""Circuit pressure at which an episode fails: the consumers could no longer draw their flow."""
+
+def as_region(value: Any, plant: Plant) -> Region:
+    """A region from its name, from values and ranges by symbol, from Parameters or a Region."""
+    if isinstance(value, Region):
+        return value
+    if isinstance(value, Parameters):
+        return Region(centre=value)
+    if isinstance(value, Mapping):
+        return Region.from_choices(value, plant.parameters)
+    if value == "confidence":
+        if not plant.region.varies:
+            raise OptionError(
+                f"plant {plant.name!r} has no confidence region: give ranges by symbol, or a plant "
+                "file from identification"
+            )
+        return plant.region
+    return Region.named(value, plant.parameters)
+
+
+def as_supply(value: Any) -> Supply:
+    """A Supply, from itself, a constant pressure or range [bar absolute], or None (reservoirs)."""
+    if value is None:
+        return Supply.reservoirs()
+    if isinstance(value, Supply):
+        return value
+    return Supply.constant(*as_range("supply", value))
+
+
+def as_target(value: Any) -> Range | MovingTarget:
+    """A target from a number, (low, high), a function of the time [s], or a MovingTarget."""
+    if isinstance(value, MovingTarget):
+        return value
+    if callable(value):
+        function: Any = value
+        return MovingTarget(at=function)
+    return as_range("target_bar", value)
+
+
+def as_scenario(value: Any) -> str | Scenario | RecordedConsumption:
+    """A scenario, its name, or a recording of the consumption. Raises ValueError."""
+    return value if isinstance(value, RecordedConsumption) else check_scenario(value)
+
+
+def as_weights(value: Any, band_bar: float | None) -> RewardWeights:
+    """Weights from themselves or from a mapping of some by name; band_bar: the band's half-width."""
+    known = {entry.name for entry in fields(RewardWeights)}
+    if isinstance(value, Mapping):
+        if unknown := sorted(map(str, set(value) - known)):
+            raise OptionError(
+                f"unknown reward weight {unknown[0]!r}: known are {', '.join(sorted(known))}"
+            )
+        value = RewardWeights(**value)
+    if not isinstance(value, RewardWeights):
+        raise OptionError(f"weights is {value!r}: give a RewardWeights, or a mapping of its fields")
+    return value if band_bar is None else replace(value, band_bar=band_bar)
+
+
+def as_effects(value: Any) -> dict[str, Any]:
+    """Sizes of effects by symbol, each a number or (low, high) [SI].
+
+    value: by the effect's name a size, or where it has several a mapping of sizes by symbol.
+    """
+    if not isinstance(value, Mapping):
+        raise OptionError(f"effects is {value!r}: give a mapping from an effect's name to its size")
+    sizes: dict[str, Any] = {}
+    for name, given in value.items():
+        symbols = effect(name).symbols
+        own = given if isinstance(given, Mapping) else dict.fromkeys(symbols, given)
+        if (not isinstance(given, Mapping) and len(symbols) > 1) or set(own) - set(symbols):
+            raise OptionError(
+                f"effect {name} is sized by {', '.join(symbols)}: give a mapping from these symbols to "
+                "values or (low, high)"
+            )
+        sizes |= own
+    return sizes
+
 
 MOST_NOISE = 1000.0
 """Factor of the sensors' noise, at most: beyond, every reading is at an end of its range."""

@@ -1,8 +1,8 @@
-"""Signals of one's own over an episode: a target that moves, and a recorded consumption."""
+"""What may stand for a number: a range, a target that moves, a recorded consumption."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +11,36 @@ from epv_env.common.units import GRAM
 from epv_env.plant.supply import Supply
 
 Signal = TypeVar("Signal")
+
+Range = tuple[float, float]
+"""Least and greatest value."""
+
+PRESSURE_LIMITS_BAR = (1.0, 16.0)
+"""Range of the pressure sensors (Table 1), bar absolute."""
+
+
+class OptionError(ValueError):
+    """An environment option is unknown or out of range: the message says which and the remedy."""
+
+
+def check_count(name: str, value: Any) -> None:
+    """Raises OptionError unless the value is a whole number of at least 1."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
+        raise OptionError(f"{name} = {value!r}: give a whole number of at least 1")
+
+
+def as_range(name: str, value: Any, limits: Range = PRESSURE_LIMITS_BAR) -> Range:
+    """A number or (low, high) as a range inside the limits. Raises OptionError."""
+    try:
+        low, high = (float(end) for end in (value if np.ndim(value) else (value, value)))
+    except (TypeError, ValueError):
+        raise OptionError(f"{name} is {value!r}: give a number or (low, high)") from None
+    if not limits[0] <= low <= high <= limits[1]:
+        raise OptionError(
+            f"{name} = [{low:g}, {high:g}] must satisfy {limits[0]:g} <= low <= high <= {limits[1]:g}"
+        )
+    return low, high
+
 
 LONGEST_SIGNAL = 10_000_000
 """Samples, at most: more is a slip, and would fill the memory."""

@@ -10,28 +10,26 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.arguments import PRESSURE_LIMITS_BAR
-from epv_env.compiled_step import (
+from epv_env.episode import Start, under_conditions
+from epv_env.observation import LAYOUT, LONGEST_WAIT
+from epv_env.period import (
+    EPISODE,
     NOISE_BLOCK,
     observe_first,
+    rules_of,
     step_conclude,
     step_prepare,
     step_whole,
 )
-from epv_env.condition_draws import under_conditions
-from epv_env.episode import EPISODE, Start
-from epv_env.observation import LAYOUT, LONGEST_WAIT
-from epv_env.period import rules_of
+from epv_env.plant.channels import MEASURED
 from epv_env.plant.consumption import Profiles
 from epv_env.plant.lanes import LANES, N_INPUT, N_STATE
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.readings import MEASURED
 from epv_env.plant.simulate import energised
-from epv_env.plant.threads import share
-from epv_env.plant.valves import Valves
+from epv_env.plant.valves import Valves, share
 from epv_env.result import N_FIGURE, StepResult
 from epv_env.settings import Settings
-from epv_env.signals import MovingTarget, RecordedConsumption, Signals, shared
+from epv_env.signals import PRESSURE_LIMITS_BAR, MovingTarget, RecordedConsumption, Signals, shared
 
 PRESSURES = ("p1", "p2", "p3")
 """Pressures with which an episode begins."""

@@ -10,11 +10,11 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from epv_env.actions import PWM, OnOff
-from epv_env.arguments import OptionError, check_count
-from epv_env.infos import KEYS, step_info, truth
 from epv_env.observation import observation_space
 from epv_env.plant.plantfile import load_plant
+from epv_env.result import KEYS, step_info, truth
 from epv_env.settings import make_settings, with_options
+from epv_env.signals import OptionError, check_count
 from epv_env.task import LimitingTask
 
 _MASKS = tuple(f"_{key}" for key in KEYS)

@@ -21,9 +21,8 @@ from epv_env.common.command_line import (
     parse_with_quick,
     writable_folder,
 )
-from epv_env.common.folder_lock import only_writer
-from epv_env.common.journal import Journal
-from epv_env.common.results_folder import check_options, write_options
+from epv_env.common.files import Journal
+from epv_env.common.results_folder import check_options, only_writer, write_options
 from training.evaluation.benchmark import DURATION, EPISODES
 from training.evaluation.seeds import BENCHMARK_SEED, training_seeds
 from training.learners.library_algorithms import ALGORITHMS, NUM_ENVS, described

@@ -30,7 +30,7 @@ from epv_env.common.command_line import (
     parse_with_quick,
     writable_folder,
 )
-from epv_env.common.folder_lock import only_writer
+from epv_env.common.results_folder import only_writer
 from epv_env.plant.consumption import MIXED
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.valves import available_cores

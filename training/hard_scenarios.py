@@ -25,7 +25,7 @@ from epv_env.common.command_line import (
     parse_with_quick,
     writable_folder,
 )
-from epv_env.common.json_files import write_json
+from epv_env.common.files import write_json
 from epv_env.plant.consumption import MIXED
 from epv_env.plant.plantfile import load_plant
 from training.evaluation.seeds import EVALUATION_SEED, VALIDATION_SEED

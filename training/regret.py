@@ -27,11 +27,11 @@ from epv_env.common.command_line import (
     parse_with_quick,
     writable_folder,
 )
-from epv_env.common.folder_lock import only_writer
-from epv_env.common.json_files import write_json
+from epv_env.common.files import write_json
+from epv_env.common.results_folder import only_writer
 from epv_env.plant.consumption import MIXED
 from epv_env.plant.plantfile import Plant
-from epv_env.plant.threads import available_cores
+from epv_env.plant.valves import available_cores
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.scenarios import RANDOM, TUNING_REGION
 from training.evaluation.seeds import EVALUATION_SEED, VALIDATION_SEED

@@ -31,10 +31,8 @@ from epv_env.common.command_line import (
     parse_with_quick,
     writable_folder,
 )
-from epv_env.common.files import write_text
-from epv_env.common.folder_lock import only_writer
-from epv_env.common.json_files import decoded
-from epv_env.common.results_folder import check_options, write_options
+from epv_env.common.files import decoded, write_text
+from epv_env.common.results_folder import check_options, only_writer, write_options
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.reward import RewardWeights
 from identification.__main__ import main as identification

@@ -23,10 +23,8 @@ from epv_env.common.command_line import (
     parse_with_quick,
     writable_folder,
 )
-from epv_env.common.folder_lock import only_writer
-from epv_env.common.journal import Journal
-from epv_env.common.json_files import write_json
-from epv_env.common.results_folder import check_options, write_options
+from epv_env.common.files import Journal, write_json
+from epv_env.common.results_folder import check_options, only_writer, write_options
 from epv_env.plant.consumption import check_scenario
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.valves import available_cores

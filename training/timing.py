@@ -25,8 +25,7 @@ from numpy.typing import NDArray
 from controllers.base import Controller
 from controllers.registry import TUNED_KINDS
 from epv_env.common.command_line import check_positive, fail_clearly, writable_folder
-from epv_env.common.files import write_text
-from epv_env.common.json_files import write_json
+from epv_env.common.files import write_json, write_text
 from epv_env.plant.consumption import check_scenario
 from epv_env.plant.plantfile import load_plant
 from epv_env.reward import REFERENCE_PERIOD

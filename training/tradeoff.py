@@ -28,7 +28,7 @@ from epv_env.common.command_line import (
     fail_clearly,
     writable_folder,
 )
-from epv_env.common.folder_lock import only_writer
+from epv_env.common.results_folder import only_writer
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.valves import available_cores
 from epv_env.reward import RewardWeights

@@ -1,16 +1,95 @@
-"""What the command lines share: checked paths and numbers, --quick, and errors as one sentence."""
+"""What the command lines share: checked paths and numbers, --quick, and errors as one sentence.
+
+Ctrl-C and SIGTERM end a command and its worker processes without a traceback. A first run says that the
+plant is compiled, which takes a minute once and is then read from a cache.
+"""
 
 import argparse
 import math
 import os
+import signal
 import sys
-from collections.abc import Callable, Mapping
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from multiprocessing import active_children
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
-from epv_env.common.compilation import announce_compilation
+from numba.core import event
+
 from epv_env.common.extras import missing_package
-from epv_env.common.interruption import Interrupted, interruptible
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class Interrupted(KeyboardInterrupt):
+    """The user or the system asked the command to end; pools end their workers as on any Ctrl-C."""
+
+    def __init__(self, number: int):
+        """number: of the signal."""
+        super().__init__(signal.Signals(number).name)
+        self.status = 128 + number
+        """Exit status of the command, as shells count it."""
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Both signals raise Interrupted in the main thread; a second signal ends the process at once."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # only the main thread receives signals
+        return
+    before = {number: signal.signal(number, _stop) for number in SIGNALS}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _stop(number: int, _frame: FrameType | None) -> None:
+    for each in SIGNALS:
+        signal.signal(each, signal.SIG_DFL)
+    threading.excepthook = _silent
+    for child in active_children():  # a pool that is left waits for them
+        child.terminate()
+    raise Interrupted(number)
+
+
+def _silent(_: threading.ExceptHookArgs) -> None:
+    """For threads that serve a pool and find its workers ended."""
+
+
+def ignore_interrupts() -> None:
+    """For worker processes: a Ctrl-C in the terminal reaches them too, and their parent ends them."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+KERNELS = ("epv_env.", "controllers.", "identification.")
+"""How the modules begin whose compilation is announced."""
+
+
+class _Announcer(event.Listener):
+    """Says it once, at the first function that no cache holds."""
+
+    def __init__(self) -> None:
+        self._silent = False
+
+    def on_start(self, event: Any) -> None:
+        """numba begins to compile a function."""
+        function = getattr(event.data.get("dispatcher"), "py_func", None)
+        if not self._silent and getattr(function, "__module__", "").startswith(KERNELS):
+            self._silent = True
+            print("compiling for this machine: a minute or two, once", file=sys.stderr)
+
+    def on_end(self, event: Any) -> None:
+        """Nothing is said at the end."""
+
+
+def announce_compilation() -> None:
+    """From now on say when the first function is compiled."""
+    event.register("numba:compile", _Announcer())
 
 
 def fail_clearly(main: Callable[[], int]) -> int:

@@ -117,7 +117,7 @@ def _alone(run: Callable[[argparse.Namespace], None], options: argparse.Namespac
     """Run a command while no other process writes into its folder."""
     from threadpoolctl import threadpool_limits
 
-    from epv_env.common.folder_lock import only_writer
+    from epv_env.common.results_folder import only_writer
 
     out = getattr(options, "out", None)
     # The matrices are small: threads of the linear algebra would only wait for each other.

@@ -1,10 +1,15 @@
-"""A folder of results with its options: a command continues the folder only under the same options."""
+"""A folder of results: its options, its only writer, and how far the work on it is."""
 
-from collections.abc import Mapping
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
-from epv_env.common.json_files import checked, decoded, write_json
+from filelock import FileLock, Timeout
+from tqdm import tqdm
+
+from epv_env.common.files import checked, decoded, write_json
 
 Shape = TypeVar("Shape")
 
@@ -57,3 +62,56 @@ def read_config(folder: Path, shape: type[Shape]) -> Shape | None:
 def write_options(folder: Path, options: Mapping[str, Any]) -> None:
     """Write down what the folder's results depend on."""
     write_json(folder / CONFIG, options)
+
+
+LOCK_FILE = ".lock"
+"""Within a folder that a process writes; the operating system frees it when the process ends."""
+
+
+@contextmanager
+def only_writer(folder: Path) -> Iterator[None]:
+    """Hold a folder of results alone; it is made if it is missing, and removed again if it stays empty.
+
+    Raises ValueError if another process writes into the folder.
+    """
+    made = _missing_parents(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / LOCK_FILE
+    lock = FileLock(path)
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        raise ValueError(
+            f"another process writes into {folder}: wait until it ends, or choose another --out"
+        ) from None
+    try:
+        yield
+    finally:
+        # Removed while it is held: whoever opened it meanwhile sees that it has no name and tries again.
+        with suppress(OSError):
+            path.unlink()
+        lock.release()
+        _remove_empty(made)
+
+
+def _missing_parents(folder: Path) -> list[Path]:
+    """The folder and those above it that do not exist yet, the innermost first."""
+    return [each for each in (folder, *folder.parents) if not each.exists()]
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    """Remove folders that hold nothing, the innermost first."""
+    for folder in folders:
+        try:
+            folder.rmdir()
+        except OSError:
+            return
+
+
+Item = TypeVar("Item")
+
+
+def progress(items: Iterable[Item], *, what: str, total: int | None = None) -> Iterator[Item]:
+    """Yield the items and show a bar; where no terminal reads it, a line every ten seconds."""
+    interval = 0.2 if sys.stderr.isatty() else 10.0
+    yield from tqdm(items, desc=what, total=total, file=sys.stderr, mininterval=interval)

@@ -1,12 +1,68 @@
-"""The measured channels: one record each, from which sensors, readings and recordings are built."""
+"""The measured channels: one record each, from which sensors, readings and recordings are built.
 
+A sensor turns a signal into what the bench's data acquisition gives: range, 12-bit resolution, noise.
+"""
+
+import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
 
 from epv_env.common.units import BAR
-from epv_env.plant.data_acquisition import Sensor
 from epv_env.plant.equations import State
-from epv_env.plant.primitives.values import Value
+from epv_env.plant.parameters import ParameterError
+from epv_env.plant.primitives import Value
+
+ADC_BITS = 12
+"""Resolution of the data acquisition card (section 3)."""
+
+
+def digitised(value, standard_normal, low, noise, resolution, least, greatest):
+    """Reading of a value with noise, in whole steps of the converter from `low` on, within its ends.
+
+    Arguments are numbers or arrays that broadcast; the environment's step compiles this function.
+    """
+    steps = np.rint((value - low + noise * standard_normal) / resolution)
+    return np.minimum(np.maximum(low + steps * resolution, least), greatest)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensor:
+    """The sensor of one channel, in the unit of the report's tables (bar absolute, A or V)."""
+
+    low: float
+    """Least value (Table 1)."""
+    high: float
+    """Greatest value (Table 1)."""
+    accuracy: float
+    """Accuracy as a fraction of the range's greatest value (Table 1); the ADC saturates beyond it."""
+    noise: float
+    """Standard deviation of the noise (Table 3)."""
+    offset: float = 0.0
+    """Reading less truth at the start of a recording (Table 2; pressures less 1 bar)."""
+    trend: float = 0.0
+    """Drift of the reading per second (Table 2)."""
+
+    @property
+    def resolution(self) -> float:
+        """One step of the ADC [unit of the sensor]."""
+        return (self.high - self.low) / 2**ADC_BITS
+
+    def measure(self, value: NDArray, standard_normal: NDArray) -> NDArray:
+        """The readings for true values, any shape [unit of the sensor]; offset and trend not included.
+
+        standard_normal: draws of the same shape [-]. A reading saturates where the range and its
+        accuracy end.
+        """
+        return digitised(value, standard_normal, *self.constants())
+
+    def constants(self) -> tuple[float, float, float, float, float]:
+        """What `digitised` needs: least value, noise, resolution, least and greatest reading."""
+        margin = self.accuracy * self.high
+        return self.low, self.noise, self.resolution, self.low - margin, self.high + margin
+
 
 Reading = Callable[[State, Mapping[str, Value]], Value]
 """From the state and the sensors' parameters by symbol, of any shape, to the reading of that shape."""
@@ -129,3 +185,93 @@ MEASURED_CHANNELS = (P1, P2, P3, CURRENT, VOLTAGE)
 
 CHANNEL = {channel.name: channel for channel in MEASURED_CHANNELS}
 """The records by name."""
+
+
+MEASURED = tuple(channel.name for channel in MEASURED_CHANNELS if channel.observed)
+"""Quantities that the environment measures; the bench measures them, too."""
+
+SENSOR_SYMBOLS = tuple(symbol for channel in MEASURED_CHANNELS for symbol in channel.symbols)
+"""Parameters of the sensors that are not in the plant's equations."""
+
+
+def readings(state: State, p: Mapping[str, Value]) -> dict[str, Value]:
+    """Values before noise and rounding, by channel [SI]; as the state but for effects of sensors.
+
+    state: fields of any shape. p: SENSOR_SYMBOLS, numbers or arrays that broadcast to it. A channel that
+    is an input of the bench (the voltage) has no reading here.
+    """
+    return {
+        channel.name: channel.reading(state, p)
+        for channel in MEASURED_CHANNELS
+        if channel.reading is not None
+    }
+
+
+SENSORS: dict[str, Sensor] = {channel.name: channel.sensor for channel in MEASURED_CHANNELS}
+"""Table 1's range and accuracy, Table 2's offset and trend, Table 3's standard deviation."""
+
+
+MOST_ACCURACY = 0.2
+"""Accuracy, as a fraction of the range, beyond which a sensor measures nothing [-]."""
+
+MOST_NOISE_SHARE = 0.1
+"""Noise, as a share of the range, beyond which a sensor measures nothing [-]."""
+
+
+def own_sensors(changes: Mapping[str, Mapping[str, float]]) -> dict[str, Sensor]:
+    """Every channel's sensor, [bar absolute, A or V]; ParameterError for one that cannot be.
+
+    changes: fields of `Sensor` by channel that differ from Tables 1 to 3.
+    """
+    sensors = dict(SENSORS)
+    for name, fields in changes.items():
+        if name not in SENSORS:
+            raise ParameterError(f"sensors: unknown channel {name!r}: known are {', '.join(SENSORS)}")
+        unknown = sorted(set(fields) - set(asdict(SENSORS[name])))
+        if unknown:
+            raise ParameterError(
+                f"sensors.{name}: unknown field {unknown[0]!r}: known are "
+                f"{', '.join(asdict(SENSORS[name]))}"
+            )
+        sensors[name] = replace(SENSORS[name], **fields)
+        _check(name, sensors[name])
+    return sensors
+
+
+def changed_fields(sensors: Mapping[str, Sensor]) -> dict[str, dict[str, float]]:
+    """What `own_sensors` was given: the fields that differ from Tables 1 to 3, by channel."""
+    changed = {
+        name: {
+            field: value
+            for field, value in asdict(sensor).items()
+            if value != asdict(SENSORS[name])[field]
+        }
+        for name, sensor in sensors.items()
+    }
+    return {name: fields for name, fields in changed.items() if fields}
+
+
+def _check(name: str, sensor: Sensor) -> None:
+    """Raises ParameterError for a sensor that could measure nothing."""
+    place, unit = f"sensors.{name}", CHANNEL[name].unit
+    for field, value in asdict(sensor).items():
+        if not math.isfinite(value):
+            raise ParameterError(f"{place}.{field} is {value}: give a finite number")
+    if not sensor.low < sensor.high or sensor.high <= 0:
+        raise ParameterError(
+            f"{place} has the range [{sensor.low:g}, {sensor.high:g}] {unit}: give low < high, high > 0"
+        )
+    if unit == "bar" and sensor.low < 0:
+        raise ParameterError(
+            f"{place}.low = {sensor.low:g} bar lies below vacuum: give absolute ranges, not gauge"
+        )
+    if not 0 < sensor.accuracy <= MOST_ACCURACY:
+        raise ParameterError(
+            f"{place}.accuracy = {sensor.accuracy:g} must lie in (0, {MOST_ACCURACY:g}]: give it as a "
+            "fraction of the range's end, 0.01 for 1 %"
+        )
+    if not 0 < sensor.noise <= MOST_NOISE_SHARE * (sensor.high - sensor.low):
+        raise ParameterError(
+            f"{place}.noise = {sensor.noise:g} {unit} must be positive and at most "
+            f"{MOST_NOISE_SHARE:g} of the range: give its standard deviation"
+        )

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from epv_env.plant.equations import Coefficients
-from epv_env.plant.primitives.constants import QUARTER_PI
-from epv_env.plant.primitives.values import Value
+from epv_env.plant.primitives import QUARTER_PI, Value
 
 
 def coefficients(p: Mapping[str, ArrayLike], reservoir_volume: ArrayLike = np.inf) -> NDArray:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.common.units import GRAM
-from epv_env.plant.primitives.compiled import exact
+from epv_env.plant.primitives import exact
 
 APPLICATIONS = 128
 """Applications drawn per episode; one that outlasts them meets them again from the first."""

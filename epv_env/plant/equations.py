@@ -23,10 +23,7 @@ from epv_env.plant.effects.friction import (
 from epv_env.plant.effects.magnet import saturated_force, saturation_level
 from epv_env.plant.effects.measurement import lag_rate
 from epv_env.plant.effects.seats import opened
-from epv_env.plant.primitives.compiled import inlined, replacing
-from epv_env.plant.primitives.constants import QUARTER_PI
-from epv_env.plant.primitives.flow import mass_flux
-from epv_env.plant.primitives.values import Value
+from epv_env.plant.primitives import QUARTER_PI, Value, inlined, mass_flux, replacing
 
 
 class State(NamedTuple):

@@ -10,11 +10,11 @@ import numpy as np
 
 from epv_env.common.units import BAR
 from epv_env.plant import equations
+from epv_env.plant.channels import Sensor
 from epv_env.plant.coefficients import folded
-from epv_env.plant.data_acquisition import Sensor
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import ParameterError, Parameters
-from epv_env.plant.primitives.flow import CRITICAL_RATIO, mass_flux
+from epv_env.plant.primitives import CRITICAL_RATIO, mass_flux
 
 
 def check_valve(parameters: Parameters, voltage: float, sensors: Mapping[str, Sensor]) -> None:

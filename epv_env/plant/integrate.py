@@ -1,19 +1,110 @@
 """Compiled, batched, event-exact integration of the valve.
 
 Sixteen valves ("lanes") go through one loop as SIMD registers, each with a clock and a step of its own
-(stepping.py). A lane that has finished goes on with its next period or another valve (schedule.py).
+(stepping.py). A lane that has finished goes on at once with its next period or another valve, and none
+waits for another.
 
 Every valve, alone or in a batch of thousands, runs through the same instructions in a block of
 sixteen; so its trajectory does not depend, to the bit, on its companions or on the number of threads.
 """
 
 import numba
+import numpy as np
 
-from epv_env.plant.lanes import EVENT, LANES, REMAINING, new_workspace
-from epv_env.plant.primitives.compiled import FLAGS, inlined, source_digest, wide_vectors
-from epv_env.plant.schedule import MAX_STEPS, NONE, STEPS, VALVE, go_on, new_queue
-from epv_env.plant.step_control import DEFAULT_STEP as DEFAULT_STEP
-from epv_env.plant.stepping import locate_event, try_steps
+from epv_env.plant.lanes import (
+    COEFFICIENT,
+    EFFECT,
+    EVENT,
+    HIGHEST,
+    HINT,
+    INPUT,
+    LANES,
+    LOCATED,
+    LOWEST,
+    N_COEFFICIENT,
+    N_EFFECT,
+    N_INPUT,
+    N_STATE,
+    REMAINING,
+    STATE,
+    copy_column,
+    new_workspace,
+    state_at,
+)
+from epv_env.plant.primitives import FLAGS, inlined, source_digest, wide_vectors
+from epv_env.plant.runge_kutta import DEFAULT_STEP as DEFAULT_STEP
+from epv_env.plant.stepping import UNLIMITED, locate_event, try_steps
+
+MAX_STEPS = 200_000
+"""Steps per period after which a valve is given up (its state becomes NaN)."""
+
+NONE = -1
+"""Instead of a valve: the lane has nothing left to do."""
+
+VALVE = 0
+"""Row of the lanes' valves in a queue, an array of integers (rows, LANES)."""
+PERIOD = 1
+"""Row of the periods that they are in."""
+STEPS = 2
+"""Row of the steps that they have taken in these periods."""
+WAITING = 3
+"""Row of the next valve and of the end of the valves."""
+
+
+@inlined
+def new_queue(first, last):
+    """A queue of the valves first .. last - 1, with all lanes free."""
+    queue = np.zeros((4, LANES), np.int64)
+    queue[VALVE] = NONE
+    queue[WAITING, 0], queue[WAITING, 1] = first, last
+    return queue
+
+
+# The arrays are arguments, one by one: out of a tuple, each use would count references, atomically.
+@inlined
+def go_on(work, lane, queue, state, coefficients, effects, inputs, duration, lowest, highest, record,
+          extended):  # fmt: skip
+    """Let a lane without time left begin its valve's next period, or the first one of another valve.
+
+    Arguments as of `run_nominal`. A valve that took MAX_STEPS in its period is given up.
+    """
+    periods = inputs.shape[0]
+    while True:
+        valve = queue[VALVE, lane]
+        if valve != NONE:
+            if queue[STEPS, lane] >= MAX_STEPS:
+                for row in range(N_STATE):
+                    work[STATE + row, lane] = np.nan
+            if record.shape[0] > 0:
+                for row in range(N_STATE):
+                    record[queue[PERIOD, lane], row, valve] = work[STATE + row, lane]
+            queue[PERIOD, lane] += 1
+            if queue[PERIOD, lane] == periods:
+                copy_column(work, STATE, lane, state, 0, valve, N_STATE)
+                lowest[valve], highest[valve] = work[LOWEST, lane], work[HIGHEST, lane]
+        if valve == NONE or queue[PERIOD, lane] == periods:
+            valve = queue[WAITING, 0]
+            if valve == queue[WAITING, 1]:
+                queue[VALVE, lane] = NONE
+                work[REMAINING, lane] = 0.0
+                break
+            queue[WAITING, 0] += 1
+            queue[VALVE, lane], queue[PERIOD, lane], queue[STEPS, lane] = valve, 0, 0
+            copy_column(state, 0, valve, work, STATE, lane, N_STATE)
+            copy_column(coefficients, 0, valve, work, COEFFICIENT, lane, N_COEFFICIENT)
+            if extended:
+                copy_column(effects, 0, valve, work, EFFECT, lane, N_EFFECT)
+            p2 = state_at(work, STATE, lane).p2
+            work[LOWEST, lane] = min(lowest[valve], p2)
+            work[HIGHEST, lane] = max(highest[valve], p2)
+        if queue[STEPS, lane] < MAX_STEPS:  # else the valve has been given up
+            queue[STEPS, lane] = 0
+            for row in range(N_INPUT):
+                work[INPUT + row, lane] = inputs[queue[PERIOD, lane], row, valve]
+            work[REMAINING, lane] = duration[queue[PERIOD, lane], valve]
+            work[HINT, lane], work[LOCATED, lane] = UNLIMITED, 0.0
+            if work[REMAINING, lane] > 0.0:
+                break
 
 
 @inlined

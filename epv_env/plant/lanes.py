@@ -8,7 +8,7 @@ import numpy as np
 
 from epv_env.plant.effects.registry import Effects
 from epv_env.plant.equations import Coefficients, Inputs, State
-from epv_env.plant.primitives.compiled import generated, inlined
+from epv_env.plant.primitives import generated, inlined
 
 LANES = 16
 """Valves per block. LLVM vectorises a loop of this known length without run-time checks."""

@@ -9,15 +9,13 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from epv_env.common.json_files import JSONFileError, checked, decoded, write_json
-from epv_env.plant.bench_sensors import changed_fields, own_sensors
-from epv_env.plant.data_acquisition import Sensor
+from epv_env.common.files import JSONFileError, checked, decoded, write_json
+from epv_env.plant.channels import SENSORS, Sensor, changed_fields, own_sensors
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.force_balance import check_valve
 from epv_env.plant.free_parameters import FREE_PARAMETERS, Freedom, check_free
 from epv_env.plant.parameters import ParameterError, Parameters
 from epv_env.plant.region import Region
-from epv_env.plant.sensors import SENSORS
 
 FORMAT = "epv-plant/1"
 """Version of the file, in its field `format`."""

@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from epv_env.plant.effects.coil import COPPER
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.integrate import DEFAULT_STEP
-from epv_env.plant.primitives.flow import CRITICAL_RATIO, LAMINAR_DROP, bracket_over_drop
-from epv_env.plant.primitives.values import Value
+from epv_env.plant.primitives import CRITICAL_RATIO, LAMINAR_DROP, Value, bracket_over_drop
 from epv_env.plant.valves import Valves
 
 BISECTIONS = 40

@@ -1,6 +1,10 @@
-"""A batch of valves: the NumPy side of the compiled integrator."""
+"""A batch of valves: the NumPy side of the compiled integrator, its threads and the coil's delay."""
 
+import os
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -8,14 +12,80 @@ from numpy.typing import ArrayLike, NDArray
 
 from epv_env.common.units import BAR
 from epv_env.plant import integrate
+from epv_env.plant.channels import SENSOR_SYMBOLS, readings
 from epv_env.plant.coefficients import coefficients
-from epv_env.plant.delay import delayed_inputs
 from epv_env.plant.effects.registry import effect_constants, has_effects
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.lanes import LANES, N_INPUT, N_STATE
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.readings import SENSOR_SYMBOLS, readings
-from epv_env.plant.threads import available_cores, share
+
+LANES_PER_TASK = 4 * LANES
+"""Fewest lanes, times periods, worth a thread of their own."""
+
+
+@cache
+def _pool(process_id: int) -> ThreadPoolExecutor:
+    """One pool per process: a forked child must not wait for its parent's threads."""
+    return ThreadPoolExecutor(available_cores(), thread_name_prefix="epv-plant")
+
+
+def available_cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def share(work: Callable[[int, int], None], lanes: int, *, threads: int, periods: int = 1) -> None:
+    """Call work(first, last) for parts of the lanes, one part in each thread, this one included.
+
+    Args:
+        work: of lanes first..last, multiples of LANES.
+        lanes: of the batch.
+        threads: greatest number of parts.
+        periods: that the work goes through; short work is not shared.
+    """
+    tasks = min(threads, lanes // LANES, lanes * periods // LANES_PER_TASK)
+    if tasks <= 1:
+        work(0, lanes)
+        return
+    edges = [lanes // LANES * part // tasks * LANES for part in range(tasks + 1)]
+    others = [_pool(os.getpid()).submit(work, *ends) for ends in pairwise(edges[1:])]
+    try:
+        work(edges[0], edges[1])
+    finally:
+        for other in others:
+            other.result()
+
+
+U_ROW = Inputs._fields.index("U")
+"""Row of the voltage in a table of inputs."""
+
+
+def delayed_inputs(table: NDArray, duration: NDArray, delay: NDArray) -> tuple[NDArray, NDArray]:
+    """Inputs whose voltage acts later, and the durations for which they hold.
+
+    Every period is split in two: the first part still has the former voltage. The first voltage is
+    taken to have acted before.
+
+    Args:
+        table: inputs (periods, rows of Inputs, lanes) [SI].
+        duration: (periods, lanes) [s]; the same in all periods of a lane, or 0.
+        delay: (lanes,) [s].
+
+    Returns:
+        Both with twice the periods; every second one ends where a period of the original ends.
+    """
+    longest = np.max(duration, axis=0)
+    whole = np.floor(delay / np.where(longest > 0, longest, np.inf) + 1e-9).astype(int)
+    rest = np.maximum(delay - whole * longest, 0.0)
+    U = table[:, U_ROW]
+    at = np.arange(len(U))[:, None] - whole
+    parts = np.repeat(table, 2, axis=0)
+    parts[0::2, U_ROW] = np.take_along_axis(U, np.maximum(at - 1, 0), axis=0)
+    parts[1::2, U_ROW] = np.take_along_axis(U, np.maximum(at, 0), axis=0)
+    before = np.minimum(rest, duration)
+    durations = np.empty((2 * len(U), U.shape[1]))
+    durations[0::2], durations[1::2] = before, duration - before
+    return parts, durations
 
 
 class Tables(NamedTuple):

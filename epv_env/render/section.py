@@ -1,26 +1,270 @@
-"""The valve's section: what is drawn in which order, and the words around it."""
+"""The valve's section: gas filled by pressure, solid parts, arrows, and the words around them."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
 
 from epv_env.render import geometry as g
-from epv_env.render.canvas import Canvas, Point
-from epv_env.render.gas import draw_flows, draw_gas
-from epv_env.render.palette import (
+from epv_env.render.canvas import (
     BODY,
     CARD,
     COIL,
+    COIL_COLD,
+    COIL_HOT,
     EDGE,
     HATCH,
     INK,
+    IRON,
     MUTED,
     OUTLINE,
     P1,
     P2,
     P3,
+    RUBBER,
     SCALE_TOP_BAR,
+    STEEL,
+    STEEL_SHADE,
+    WIRE_COLD,
+    WIRE_HOT,
+    Box,
+    Canvas,
     Colour,
+    Point,
+    mix,
     pressure_colour,
 )
-from epv_env.render.parts import draw_coil, draw_magnet_valve, draw_protection_valve
-from epv_env.render.snapshot import Snapshot
+from epv_env.render.geometry import Snapshot
+
+AMBIENT_BAR = 1.0
+"""Ambient pressure [bar absolute]."""
+CHOKED = 0.47
+"""Pressure drop over upstream pressure from which the flow no longer grows [-]."""
+WIDEST_G_PER_S = 5.0
+"""Consumption from which its arrow no longer grows [g/s]."""
+LEAST = 0.04
+"""Strength of flow below which no arrow is drawn [-]."""
+
+
+class Flows(NamedTuple):
+    """How strongly each passage flows, -1..1; positive in the direction of its name."""
+
+    input_to_output: float
+    """Through the seat of the PV."""
+    input_to_control: float
+    """Through the inlet of the MV."""
+    control_to_ambient: float
+    """Through the exhaust of the MV."""
+
+
+def strength(opening: float, upstream_bar: float, downstream_bar: float) -> float:
+    """Flow through a passage as a share of the most it can pass; negative when reversed."""
+    drop = upstream_bar - downstream_bar
+    high = max(upstream_bar, downstream_bar, 1e-9)
+    size = min(max(opening, 0.0), 1.0) * min(1.0, abs(drop) / (CHOKED * high)) ** 0.5
+    return size if drop >= 0.0 else -size
+
+
+def flows(s: Snapshot) -> Flows:
+    """Flows of a snapshot, for the arrows only: the plant computes the true ones."""
+    return Flows(
+        input_to_output=strength(s.xPV_fraction, s.p1_bar, s.p2_bar),
+        input_to_control=strength(s.xMV_fraction, s.p1_bar, s.p3_bar),
+        control_to_ambient=strength(1.0 - s.xMV_fraction, s.p3_bar, AMBIENT_BAR),
+    )
+
+
+def chambers(s: Snapshot, m: g.Movers) -> list[tuple[Box, float]]:
+    """Every box of gas and its pressure [bar absolute]; later ones lie on earlier ones."""
+    left, right = g.PV - g.PISTON, g.PV + g.PISTON
+    control = [
+        g.MV_CHAMBER,
+        (g.MV - g.TUBE, g.CORE_TIP - 8, g.MV + g.TUBE, g.MV_CHAMBER[1] + 1),
+        *g.DUCT,
+    ]
+    control.append((left, g.CEILING, right, m.piston_top))
+    riser = (g.MV - g.BORE, g.INLET_TIP, g.MV + g.BORE, g.INPUT[1] + 1)
+    supply = [g.INPUT, g.NECK, (left, m.piston_bottom, right, g.FLOOR)]
+    bore = (g.PV - g.SEAT_INNER, m.piston_bottom, g.PV + g.SEAT_INNER, g.OUTPUT[1] + 1)
+    exhaust = (g.MV - g.BORE, g.BLOCK[1], g.MV + g.BORE, g.CORE_TIP)
+    return (
+        [(box, s.p1_bar) for box in supply]
+        + [(box, s.p2_bar) for box in (g.OUTPUT, bore)]
+        + [(box, s.p3_bar) for box in control]
+        + [(riser, s.p1_bar), (exhaust, AMBIENT_BAR)]
+    )
+
+
+def draw_gas(canvas: Canvas, s: Snapshot, m: g.Movers) -> None:
+    """Fill the chambers; one rim around all that are joined."""
+    boxes = chambers(s, m)
+    for (left, top, right, bottom), _ in boxes:
+        canvas.rectangle((left - 1.5, top - 1.5, right + 1.5, bottom + 1.5), OUTLINE)
+    for box, p_bar in boxes:
+        canvas.rectangle(box, pressure_colour(p_bar))
+    _open_ports(canvas)
+    _draw_throat(canvas, s, m)
+
+
+def _open_ports(canvas: Canvas) -> None:
+    """Take the rim away where the chambers lead out of the body."""
+    left, top, right, _ = g.BLOCK
+    canvas.rectangle((left - 2, g.INPUT[1] - 2, left, g.INPUT[3] + 2), CARD)
+    canvas.rectangle((right, g.OUTPUT[1] - 2, right + 2, g.OUTPUT[3] + 2), CARD)
+    canvas.rectangle((g.MV - g.BORE - 2, top - 2, g.MV + g.BORE + 2, top), CARD)
+
+
+def _draw_throat(canvas: Canvas, s: Snapshot, m: g.Movers) -> None:
+    """Over the open seat's lip the pressure falls from p1 to p2."""
+    if m.piston_bottom >= g.SEAT:
+        return
+    high, low = pressure_colour(s.p1_bar), pressure_colour(s.p2_bar)
+    outer, steps = g.SEAT_OUTER + 4.0, 12
+    for k in range(steps):
+        half = outer + (g.SEAT_INNER - 12.0 - outer) * k / steps
+        colour = mix(high, low, (k + 1) / steps)
+        canvas.rectangle((g.PV - half, m.piston_bottom, g.PV + half, g.SEAT), colour)
+
+
+def draw_flows(canvas: Canvas, s: Snapshot, m: g.Movers) -> None:
+    """Arrows through every open passage across which there is a pressure drop."""
+    f = flows(s)
+    gap = (m.piston_bottom + g.SEAT) / 2
+    for side in (-1.0, 1.0):
+        width = 2.0 + 6.0 * abs(f.input_to_output)
+        _arrow(canvas, _over_the_seat(side, gap), f.input_to_output, width)
+    _arrow(canvas, [(g.MV, 446), (g.MV, 364)], f.input_to_control, 4.0)
+    into_control = f.input_to_control - f.control_to_ambient
+    _arrow(canvas, [(299, 352), (299, 226)], into_control, 4.0)
+    _draw_port_flows(canvas, s, f)
+
+
+def _draw_port_flows(canvas: Canvas, s: Snapshot, f: Flows) -> None:
+    """Arrows outside the body, in the colour of the gas."""
+    exhaust = [(g.MV, g.BLOCK[1] - 3), (g.MV, 112.0)]
+    _arrow(canvas, exhaust, f.control_to_ambient, 7.0, pressure_colour(s.p3_bar))
+    entering = f.input_to_output + 0.15 * f.input_to_control
+    _arrow(canvas, [(32, 512), (90, 512)], entering, 9.0, pressure_colour(s.p1_bar))
+    if s.sigma_S_g_per_s > 0.0:
+        width = 5.0 + 5.0 * min(1.0, s.sigma_S_g_per_s / WIDEST_G_PER_S)
+        _arrow(canvas, [(597, 556), (652, 556)], 1.0, width, pressure_colour(s.p2_bar))
+
+
+def _over_the_seat(side: float, gap: float) -> list[Point]:
+    """Path from the ring chamber over the lip into the seat's bore, as a rounded corner."""
+    x0, x1 = g.PV + side * 77.0, g.PV + side * 30.0
+    start, end = (x0, g.FLOOR - 12.0), (x1, g.SEAT + 78.0)
+    arch = [_bend((x0, g.SEAT + 6.0), (x0, gap), ((x0 + x1) / 2, gap), k / 5) for k in range(6)]
+    down = [_bend(((x0 + x1) / 2, gap), (x1, gap), (x1, g.SEAT + 12.0), k / 5) for k in range(1, 6)]
+    return [start, *arch, *down, end]
+
+
+def _bend(a: Point, b: Point, c: Point, share: float) -> Point:
+    """Point of the curve that leaves a towards b and reaches c from b."""
+    u, v, w = (1 - share) ** 2, 2 * share * (1 - share), share**2
+    return u * a[0] + v * b[0] + w * c[0], u * a[1] + v * b[1] + w * c[1]
+
+
+def _arrow(
+    canvas: Canvas, points: list[Point], signed: float, width: float, colour: Colour = CARD
+) -> None:
+    if abs(signed) >= LEAST:
+        canvas.arrow(points if signed > 0 else points[::-1], colour, width, INK)
+
+
+FULL_GLOW_A = 0.45
+"""Coil current at which the coil is drawn brightest [A]."""
+
+Profile = Sequence[tuple[float, float]]
+"""Half widths and heights along the outline of a part that turns around an axis [px]."""
+
+
+def draw_coil(canvas: Canvas, s: Snapshot) -> None:
+    """The windings glow with the current; a bright rim says that the coil is commanded on."""
+    glow = abs(s.I_A) / FULL_GLOW_A
+    copper, wire = mix(COIL_COLD, COIL_HOT, glow), mix(WIRE_COLD, WIRE_HOT, glow)
+    for side in (-1, 1):
+        left, right = sorted((g.MV + side * (g.TUBE + 8), g.MV + side * (g.TUBE + 52)))
+        box = (left, g.COIL_TOP, right, g.COIL_BOTTOM)
+        if s.coil_on:
+            rim = (left - 5, g.COIL_TOP - 5, right + 5, g.COIL_BOTTOM + 5)
+            canvas.rectangle(rim, COIL_HOT, radius=6)
+        canvas.rectangle(box, copper, radius=3)
+        for row in range(8):
+            for column in (10, 22, 34):
+                canvas.circle((left + column, g.COIL_TOP + 9 + 15.4 * row), 4.6, wire)
+        canvas.rectangle(box, OUTLINE, radius=3, outline=1.5)
+
+
+def draw_magnet_valve(canvas: Canvas, m: g.Movers) -> None:
+    """Core with the exhaust seat, inlet nozzle, spring, armature."""
+    tip, floor = g.CORE_TIP, g.MV_CHAMBER[3] + 1
+    _spring(canvas, (g.MV, tip - 8, m.armature_top + g.NOSE_LENGTH), 19.0, coils=4, width=3.0)
+    bore = (g.MV - g.BORE, tip - 9, g.MV + g.BORE, tip)
+    canvas.rectangle(bore, pressure_colour(AMBIENT_BAR))
+    core = [(g.BORE, 172), (g.TUBE, 172), (g.TUBE, tip - 9), (12, tip - 9)]
+    _halves(canvas, g.MV, [*core, (g.BORE + 3, tip), (g.BORE, tip)], IRON)
+    nozzle = [(g.BORE, floor), (26, floor), (g.BORE + 4, g.INLET_TIP), (g.BORE, g.INLET_TIP)]
+    _halves(canvas, g.MV, nozzle, IRON)
+    _draw_armature(canvas, m)
+
+
+def _draw_armature(canvas: Canvas, m: g.Movers) -> None:
+    x, top, bottom = g.MV, m.armature_top, m.armature_bottom
+    shoulder = top + g.NOSE_LENGTH
+    profile = [(g.NOSE, top), (g.NOSE, shoulder), (g.ARMATURE, shoulder), (g.ARMATURE, bottom)]
+    _whole(canvas, x, profile, STEEL)
+    canvas.rectangle((x - g.ARMATURE + 4, shoulder + 4, x - g.ARMATURE + 9, bottom - 4), CARD)
+    canvas.rectangle((x - 9, top, x + 9, top + 5), RUBBER)
+    canvas.rectangle((x - 13, bottom - 6, x + 13, bottom), RUBBER)
+
+
+def draw_protection_valve(canvas: Canvas, m: g.Movers) -> None:
+    """Spring, the stop within it, seat and piston."""
+    _spring(canvas, (g.PV, g.CEILING, m.piston_top), 46.0, coils=5, width=5.0)
+    stop = g.SEAT - g.STROKE_PV - g.PISTON_LENGTH - g.BOSS_LENGTH
+    _whole(canvas, g.PV, [(16, g.CEILING - 1), (16, stop)], BODY)
+    foot = [(g.SEAT_INNER, g.FLOOR + 1), (g.SEAT_OUTER, g.FLOOR + 1), (g.SEAT_OUTER, g.SEAT + 22)]
+    _halves(canvas, g.PV, [*foot, (g.LIP, g.SEAT), (g.SEAT_INNER, g.SEAT)], BODY)
+    _draw_piston(canvas, m)
+
+
+def _draw_piston(canvas: Canvas, m: g.Movers) -> None:
+    x, top, bottom = g.PV, m.piston_top, m.piston_bottom
+    _whole(canvas, x, [(16, top - g.BOSS_LENGTH), (16, top + 1)], STEEL_SHADE)
+    _whole(canvas, x, [(g.PISTON, top), (g.PISTON, bottom)], STEEL)
+    canvas.rectangle((x - g.PISTON + 1, bottom - 18, x + g.PISTON - 1, bottom - 1), STEEL_SHADE)
+    canvas.rectangle((x - g.SEAT_OUTER, bottom - 8, x + g.SEAT_OUTER, bottom), RUBBER)
+    for side in (-1.0, 1.0):
+        canvas.circle((x + side * (g.PISTON - 4), top + 26), 5.0, RUBBER)
+    canvas.text("PV piston", (x, top + 26), 19, INK, align=0.5)
+
+
+def _whole(canvas: Canvas, x: float, profile: Profile, colour: Colour) -> None:
+    """A solid part, cut along its axis at x."""
+    right: list[Point] = [(x + half, y) for half, y in profile]
+    left: list[Point] = [(x - half, y) for half, y in reversed(profile)]
+    canvas.polygon(right + left, colour, OUTLINE)
+
+
+def _halves(canvas: Canvas, x: float, profile: Profile, colour: Colour) -> None:
+    """A hollow part, cut along its axis at x: what is seen left and right of the bore."""
+    for side in (-1.0, 1.0):
+        canvas.polygon([(x + side * half, y) for half, y in profile], colour, OUTLINE)
+
+
+def _spring(
+    canvas: Canvas, place: tuple[float, float, float], half: float, *, coils: int, width: float
+) -> None:
+    """A coil spring, place: axis, top, bottom; first the wires behind, then those in front."""
+    x, top, bottom = place
+    pitch = (bottom - top - width) / coils
+    heights = [top + width / 2 + pitch * k for k in range(coils)]
+    for y in heights:
+        canvas.stroke([(x + half, y + pitch / 2), (x - half, y + pitch)], MUTED, width)
+    for y in heights:
+        front = [(x - half, y), (x + half, y + pitch / 2)]
+        canvas.stroke(front, OUTLINE, width + 1.5)
+        canvas.stroke(front, STEEL, width - 1.0)
+
 
 SCALE_BAR = (150.0, 660.0, 536.0, 672.0)
 """Box of the colour scale [px]."""

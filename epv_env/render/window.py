@@ -5,10 +5,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.render.canvas import Box, Canvas, load_pygame
-from epv_env.render.palette import BAD, CARD, EDGE, GOOD, INK, MUTED, PAGE
+from epv_env.render.canvas import BAD, CARD, EDGE, GOOD, INK, MUTED, PAGE, Box, Canvas, load_pygame
+from epv_env.render.geometry import Snapshot
 from epv_env.render.section import draw_section, draw_section_background
-from epv_env.render.snapshot import Snapshot
 from epv_env.render.strip import Strip
 
 if TYPE_CHECKING:

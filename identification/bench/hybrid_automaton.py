@@ -14,7 +14,7 @@ from epv_env.plant.effects.registry import effect_constants, has_effects
 from epv_env.plant.equations import Coefficients, Inputs, State, derivative
 from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at, store_state
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.primitives.compiled import FLAGS, source_digest
+from epv_env.plant.primitives import FLAGS, source_digest
 from epv_env.plant.stepping import STICK_SPEED
 
 

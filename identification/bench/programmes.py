@@ -5,11 +5,10 @@ from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any
 
-from epv_env.common.json_files import JSONFileError, decoded, write_json
+from epv_env.common.files import JSONFileError, decoded, write_json
 from epv_env.common.units import BAR
-from epv_env.plant.data_acquisition import Sensor
+from epv_env.plant.channels import SENSORS, Sensor
 from epv_env.plant.plantfile import VOLTAGE
-from epv_env.plant.sensors import SENSORS
 from identification.bench.settings import BENCH
 from identification.recordings.recording import HOLD, ROLES
 from identification.report_2003.cases import (

@@ -8,12 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from epv_env.common.progress import progress
-from epv_env.plant.data_acquisition import Sensor
+from epv_env.common.results_folder import progress
+from epv_env.plant.channels import SENSORS, Sensor, readings
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.readings import readings
-from epv_env.plant.sensors import SENSORS
 from epv_env.plant.simulate import energised
 from identification.bench.hybrid_automaton import delayed_schedule, piecewise_schedule
 from identification.bench.programmes import Programme

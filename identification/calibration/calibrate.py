@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from epv_env.common.journal import Journal
+from epv_env.common.files import Journal
 from epv_env.plant.parameters import Parameters
 from identification.calibration.calibration_warnings import calibration_warnings
 from identification.calibration.multi_start import best_search, search_from_all_starts, starting_points

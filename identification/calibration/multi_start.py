@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from epv_env.common.journal import Journal
-from epv_env.common.progress import progress
+from epv_env.common.files import Journal
+from epv_env.common.results_folder import progress
 from identification.calibration.problem import CalibrationProblem
 from identification.calibration.search_methods import SearchResult, nelder_mead, weighted_least_squares
 from identification.calibration.settings import CALIBRATION, CalibrationSettings

@@ -7,7 +7,7 @@ import argparse
 from pathlib import Path
 
 from epv_env.common.command_line import writable_folder
-from epv_env.common.json_files import decoded
+from epv_env.common.files import decoded
 from identification.commands.options import add_out, add_plant, add_seed
 from identification.gap.gap_json import GAP as GAP_FILE
 from identification.gap.sentences import verdict_sentence

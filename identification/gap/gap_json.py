@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from epv_env.common.json_files import write_json
+from epv_env.common.files import write_json
 from identification.block_bootstrap import Interval
 from identification.gap.diagnosis import Diagnosis, hypothesis_label
 from identification.gap.evidence import EvaluatedHypothesis

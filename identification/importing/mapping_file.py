@@ -6,7 +6,7 @@ from pathlib import Path
 
 import msgspec
 
-from epv_env.common.json_files import read_json
+from epv_env.common.files import read_json
 from identification.importing.source_file import ImportingError, SourceChannel, SourceFile
 from identification.importing.units import parsed_unit
 from identification.recordings.recording import ROLES

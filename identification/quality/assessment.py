@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from itertools import combinations
 from types import MappingProxyType
 
-from epv_env.plant.data_acquisition import Sensor
-from epv_env.plant.sensors import SENSORS
+from epv_env.plant.channels import SENSORS, Sensor
 from identification.quality.channel import ChannelAssessment, assess_channel
 from identification.quality.noise_tests import PairCorrelation, assess_correlation
 from identification.quality.settings import QUALITY, QualitySettings

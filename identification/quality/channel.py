@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from epv_env.plant.sensors import SENSORS, Sensor
+from epv_env.plant.channels import SENSORS, Sensor
 from identification.quality.noise_tests import (
     UNTESTED,
     Normality,

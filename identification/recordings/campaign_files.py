@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.common.files import read_bytes, write_text
-from epv_env.common.json_files import JSONFileError, decoded, write_json
+from epv_env.common.files import JSONFileError, decoded, read_bytes, write_json, write_text
 from epv_env.common.units import BAR
 from epv_env.plant.channels import CHANNEL, MEASURED_CHANNELS, MeasuredChannel
 from epv_env.plant.parameters import ParameterError, checked_value

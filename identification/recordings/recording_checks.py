@@ -10,7 +10,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.plant.data_acquisition import Sensor
+from epv_env.plant.channels import Sensor
 from identification.recordings.columns import (
     CHANNEL_OF,
     TIME_COLUMN,

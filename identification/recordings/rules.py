@@ -4,10 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import product
 
-from epv_env.plant.data_acquisition import Sensor
+from epv_env.plant.channels import SENSORS, Sensor
 from epv_env.plant.force_balance import venting_rate
 from epv_env.plant.plantfile import VOLTAGE, Plant
-from epv_env.plant.sensors import SENSORS
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from epv_env.plant.channels import readings
 from epv_env.plant.effects.registry import effect_constants, has_effects
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.readings import readings
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
 from identification.recordings.recording import OUTPUTS

@@ -5,7 +5,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from epv_env.common.json_files import write_json
+from epv_env.common.files import write_json
 from identification.report.page import Section, write_page
 
 

@@ -13,8 +13,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.plant.channels import SENSORS
 from epv_env.plant.parameters import table
-from epv_env.plant.sensors import SENSORS
 from identification.recordings.recording import OUTPUTS, UNITS
 from identification.replay.batch_simulation import Replay
 from identification.sensitivity.report_conditions import (

@@ -31,7 +31,7 @@ from epv_env.plant.lanes import (
     state_at,
     store_state,
 )
-from epv_env.plant.primitives.compiled import FLAGS, inlined, replacing, source_digest
+from epv_env.plant.primitives import FLAGS, inlined, replacing, source_digest
 from epv_env.plant.simulate import SimulationError, Trajectory
 
 STAGES = np.array(

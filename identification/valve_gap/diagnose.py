@@ -10,7 +10,7 @@ from time import perf_counter
 
 from scipy.stats import chi2
 
-from epv_env.common.journal import Journal
+from epv_env.common.files import Journal
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from epv_env.plant.region import Region
 from identification.bench.programmes import at_voltage, save_programmes

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.common.units import GRAM, MILLIGRAM
+from epv_env.plant.channels import readings
 from epv_env.plant.equations import Inputs
-from epv_env.plant.readings import readings
 from epv_env.plant.simulate import Trajectory, energised, simulate
 from epv_env.plant.valves import Valves
 from identification.gap.model.state_equation import StateEquation

@@ -7,10 +7,9 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from epv_env.compiled_step import step_conclude, step_prepare
-from epv_env.infos import step_info
+from epv_env.period import step_conclude, step_prepare
 from epv_env.plant.integrate import run_nominal
-from epv_env.result import StepResult
+from epv_env.result import StepResult, step_info
 from tests.benchmarks.interfaces import IDENTIFIER, actions
 from tests.benchmarks.measure import Table
 

@@ -64,13 +64,12 @@ def main() -> None:
     """Count one pass of `try_steps` over a block of valves in the middle of an opening."""
     import numpy as np
 
-    from epv_env.plant import lanes, step_control, stepping
+    from epv_env.plant import lanes, primitives, runge_kutta, stepping
     from epv_env.plant.coefficients import coefficients
     from epv_env.plant.parameters import Parameters
-    from epv_env.plant.primitives import flow
     from epv_env.plant.simulate import energised
 
-    flow.math = SimpleNamespace(sqrt=_square_root)  # type: ignore[assignment]
+    primitives.math = SimpleNamespace(sqrt=_square_root)  # type: ignore[assignment]
     stepping.wide_vectors = lambda: None  # an instruction to the compiler, which is off
     p = Parameters.calibrated()
     work = np.zeros((lanes.N_ROW, lanes.LANES))
@@ -82,7 +81,7 @@ def main() -> None:
     work[lanes.HINT] = stepping.UNLIMITED
     counted = np.vectorize(Counted, otypes=[object])(work)
     COUNTS.clear()
-    stepping.try_steps(counted, Counted(step_control.DEFAULT_STEP), False)
+    stepping.try_steps(counted, Counted(runge_kutta.DEFAULT_STEP), False)
     print(json.dumps({kind: number / lanes.LANES for kind, number in COUNTS.items()}))
 
 

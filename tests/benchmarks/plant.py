@@ -8,7 +8,7 @@ noisy: compare ratios within one run, not figures between runs.
 
 import numpy as np
 
-from epv_env.plant.step_control import DEFAULT_STEP, LONGEST
+from epv_env.plant.runge_kutta import DEFAULT_STEP, LONGEST
 from epv_env.plant.valves import available_cores
 from identification.bench.reference_simulation import simulate_reference
 from tests.benchmarks import startup, workloads

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numba
 import numpy as np
 
-from epv_env.plant.primitives.compiled import FLAGS
+from epv_env.plant.primitives import FLAGS
 from tests.benchmarks.measure import durations, rates
 
 VALUES = 256

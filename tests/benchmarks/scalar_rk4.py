@@ -10,7 +10,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.plant.primitives.flow import LAMINAR_DROP
+from epv_env.plant.primitives import LAMINAR_DROP
 from identification.bench.hybrid_automaton import Schedule
 
 STEP = 50e-6

@@ -5,7 +5,7 @@ import sys
 import pytest
 
 from epv_env.common.commands import commands, main, main_of
-from epv_env.common.folder_lock import only_writer
+from epv_env.common.results_folder import only_writer
 
 GREET = '''"""Write a greeting.
 

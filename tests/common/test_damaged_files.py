@@ -6,9 +6,7 @@ import resource
 
 import pytest
 
-from epv_env.common.files import read_bytes, write_bytes
-from epv_env.common.journal import Journal
-from epv_env.common.json_files import JSONFileError, decoded
+from epv_env.common.files import Journal, JSONFileError, decoded, read_bytes, write_bytes
 
 REMEDY = "write it anew"
 

@@ -8,9 +8,11 @@ import sys
 import pytest
 
 pytest.importorskip("filelock")
-from epv_env.common.folder_lock import only_writer
+from epv_env.common.results_folder import only_writer
 
-HOLD = "import sys, time; from pathlib import Path; from epv_env.common.folder_lock import only_writer\n"
+HOLD = (
+    "import sys, time; from pathlib import Path; from epv_env.common.results_folder import only_writer\n"
+)
 HOLD += "with only_writer(Path(sys.argv[1])): print('held', flush=True); time.sleep(60)"
 
 

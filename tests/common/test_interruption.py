@@ -15,7 +15,7 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from joblib import Parallel, delayed
 from epv_env.common.command_line import fail_clearly
-from epv_env.common.interruption import ignore_interrupts
+from epv_env.common.command_line import ignore_interrupts
 
 def work(path):
     open(os.path.join(path, str(os.getpid())), "w").close()

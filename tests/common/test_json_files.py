@@ -6,7 +6,7 @@ import os
 import msgspec
 import pytest
 
-from epv_env.common.json_files import JSONFileError, read_json
+from epv_env.common.files import JSONFileError, read_json
 
 REMEDY = "write it anew"
 

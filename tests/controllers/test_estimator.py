@@ -8,9 +8,9 @@ import pytest
 from controllers.estimator import Estimator, StateEstimate
 from epv_env.common.units import BAR
 from epv_env.observation import LAYOUT, encode
+from epv_env.plant.channels import SENSORS
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.sensors import SENSORS
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
 

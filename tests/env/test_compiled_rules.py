@@ -5,8 +5,7 @@ import pytest
 
 from epv_env.common.units import BAR
 from epv_env.observation import INDEX, encode
-from epv_env.plant.readings import MEASURED
-from epv_env.plant.sensors import SENSORS
+from epv_env.plant.channels import MEASURED, SENSORS
 from epv_env.reward import RewardTerms, reward_terms
 from tests.env.rollouts import IDS, actions, native
 

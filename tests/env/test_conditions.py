@@ -7,15 +7,14 @@ import gymnasium
 import numpy as np
 import pytest
 
-from epv_env.arguments import OptionError
 from epv_env.common.units import BAR
-from epv_env.condition_draws import WORN, under_conditions
 from epv_env.conditions import CONDITIONS, PROBABILITIES, Conditions
-from epv_env.episode import Start
+from epv_env.episode import WORN, Start, under_conditions
 from epv_env.observation import INDEX
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.settings import make_settings
+from epv_env.signals import OptionError
 from tests.env.rollouts import actions, assert_same, native, run, side_by_side
 
 PERIOD = 5e-3

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from epv_env.plant.consumption import SCENARIOS
-from epv_env.settings import EMPTY_CIRCUIT_BAR
+from epv_env.reward import EMPTY_CIRCUIT_BAR
 from tests.env.rollouts import ENDING, IDS, actions, native
 
 CALM = {"scenario": "none", "supply": 10.0, "target_bar": 8.0, "p2_bar": 8.0}

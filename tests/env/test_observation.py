@@ -7,8 +7,8 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 from epv_env.observation import INDEX, LAYOUT, P2_LAGS, contract, decode, encode, observation_space
+from epv_env.plant.channels import SENSORS
 from epv_env.plant.parameters import table
-from epv_env.plant.sensors import SENSORS
 from tests.env.rollouts import actions, native, run
 
 MEASURED = ("p1", "p3", "I")

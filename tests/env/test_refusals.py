@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from epv_env.actions import ActionError
-from epv_env.arguments import OptionError
 from epv_env.env import EPValveEnv
 from epv_env.plant.parameters import ParameterError
 from epv_env.plant.plantfile import PlantFileError
+from epv_env.signals import OptionError
 from tests.env.rollouts import IDS, native
 
 EITHER_WAY = [

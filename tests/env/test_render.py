@@ -11,8 +11,8 @@ import pytest
 from gymnasium.wrappers import RecordVideo
 from numpy.typing import NDArray
 
-from epv_env.render import Renderer, Snapshot, canvas, gas, geometry, palette, strip, window
-from epv_env.render.axes import SPACING, Label, round_up, run_ends, spread, time_step
+from epv_env.render import Renderer, Snapshot, canvas, geometry, section, strip, window
+from epv_env.render.strip import SPACING, Label, round_up, run_ends, spread, time_step
 
 SHUT = Snapshot(
     time_s=1.0,
@@ -44,7 +44,7 @@ def frame(*snapshots: Snapshot, **options: float) -> NDArray[np.uint8]:
     return images[-1]
 
 
-def pixels_of(image: NDArray[np.uint8], colour: palette.Colour, box: canvas.Box) -> int:
+def pixels_of(image: NDArray[np.uint8], colour: canvas.Colour, box: canvas.Box) -> int:
     """Pixels of exactly this colour within the box."""
     left, top, right, bottom = (int(edge) for edge in box)
     return int(np.all(image[top:bottom, left:right] == colour, axis=2).sum())
@@ -94,7 +94,7 @@ def test_the_piston_lifts_by_its_stroke() -> None:
     assert lift == geometry.STROKE_PV
     column = int(geometry.PV)
     rubber = [
-        np.flatnonzero(np.all(image[:, column] == palette.RUBBER, axis=1)).max()
+        np.flatnonzero(np.all(image[:, column] == canvas.RUBBER, axis=1)).max()
         for image in (frame(SHUT), frame(OPEN))
     ]
     assert rubber[0] - rubber[1] == geometry.STROKE_PV
@@ -104,7 +104,7 @@ def test_a_chamber_has_the_colour_of_its_pressure() -> None:
     for snapshot in (SHUT, OPEN):
         image = frame(snapshot)
         place = int(geometry.CEILING) + 8, int(geometry.PV - geometry.PISTON) + 12
-        assert tuple(image[place]) == palette.pressure_colour(snapshot.p3_bar)
+        assert tuple(image[place]) == canvas.pressure_colour(snapshot.p3_bar)
 
 
 def test_the_band_is_as_high_as_twice_the_tolerance() -> None:
@@ -112,8 +112,8 @@ def test_the_band_is_as_high_as_twice_the_tolerance() -> None:
     heights = []
     for tolerance_bar in (0.5, 1.0):
         image = frame(SHUT, tolerance_bar=tolerance_bar)
-        heights.append(pixels_of(image, palette.BAND, (column, 0, column + 1, window.HEIGHT)))
-    pixels_per_bar = (strip.PRESSURES[3] - strip.PRESSURES[1]) / palette.SCALE_TOP_BAR
+        heights.append(pixels_of(image, canvas.BAND, (column, 0, column + 1, window.HEIGHT)))
+    pixels_per_bar = (strip.PRESSURES[3] - strip.PRESSURES[1]) / canvas.SCALE_TOP_BAR
     # A grid line may lie in the band.
     assert heights == pytest.approx([pixels_per_bar, 2.0 * pixels_per_bar], abs=4.0)
 
@@ -121,8 +121,8 @@ def test_the_band_is_as_high_as_twice_the_tolerance() -> None:
 def test_the_badge_tells_whether_p2_is_within_the_tolerance() -> None:
     badge = (896, 16, 1130, 52)
     inside, outside = frame(SHUT), frame(replace(SHUT, p2_bar=9.1))
-    assert pixels_of(inside, palette.GOOD, badge) > 1000 > pixels_of(inside, palette.BAD, badge)
-    assert pixels_of(outside, palette.BAD, badge) > 1000 > pixels_of(outside, palette.GOOD, badge)
+    assert pixels_of(inside, canvas.GOOD, badge) > 1000 > pixels_of(inside, canvas.BAD, badge)
+    assert pixels_of(outside, canvas.BAD, badge) > 1000 > pixels_of(outside, canvas.GOOD, badge)
 
 
 def test_reset_clears_the_strip_chart() -> None:
@@ -133,7 +133,7 @@ def test_reset_clears_the_strip_chart() -> None:
         images.append(renderer.draw(replace(SHUT, time_s=time_s)))
     renderer.reset()
     images.append(renderer.draw(SHUT))
-    counts = [pixels_of(image, palette.P2, strip.PRESSURES) for image in images if image is not None]
+    counts = [pixels_of(image, canvas.P2, strip.PRESSURES) for image in images if image is not None]
     assert counts[0] == counts[3] == 0
     assert counts[2] > counts[1] > 0
 
@@ -158,9 +158,9 @@ def test_extreme_values_are_drawn() -> None:
 
 
 def test_flow_arrows_follow_the_pressure_drop() -> None:
-    assert gas.strength(1.0, 12.0, 1.0) == 1.0
-    assert gas.strength(1.0, 8.0, 9.0) == -gas.strength(1.0, 9.0, 8.0) < 0.0
-    assert gas.strength(0.0, 12.0, 1.0) == gas.strength(1.0, 9.0, 9.0) == 0.0
+    assert section.strength(1.0, 12.0, 1.0) == 1.0
+    assert section.strength(1.0, 8.0, 9.0) == -section.strength(1.0, 9.0, 8.0) < 0.0
+    assert section.strength(0.0, 12.0, 1.0) == section.strength(1.0, 9.0, 9.0) == 0.0
 
 
 def test_phases_are_told_apart() -> None:
@@ -175,7 +175,7 @@ def test_phases_are_told_apart() -> None:
 
 
 def test_labels_keep_their_distance_and_stay_inside() -> None:
-    labels = [Label(y, "", palette.INK) for y in (100.0, 101.0, 199.0, 200.0)]
+    labels = [Label(y, "", canvas.INK) for y in (100.0, 101.0, 199.0, 200.0)]
     heights = [label.y for label in spread(labels, 100.0, 200.0)]
     assert np.all(np.diff(heights) >= SPACING)
     assert heights[0] >= 100.0

@@ -6,9 +6,9 @@ import pytest
 
 import epv_env  # noqa: F401 - registers the ids
 from epv_env.env import EPValveEnv
-from epv_env.infos import PARAMETER_NAMES, STATE_NAMES
 from epv_env.observation import decode
 from epv_env.plant.consumption import Scenario
+from epv_env.result import PARAMETER_NAMES, STATE_NAMES
 from epv_env.reward import RewardWeights
 from epv_env.signals import MovingTarget, RecordedConsumption
 from epv_env.vector_env import EPValveVectorEnv

@@ -13,8 +13,7 @@ from controllers.policy_contract import CONTRACT_FILE, WEIGHTS_FILE
 from controllers.supervised import SUPERVISOR_FILE, SupervisorFile, load_settings, save_settings
 from controllers.supervisor_settings import SETTINGS
 from controllers.tuned import TUNED_FILE, load_tunings
-from epv_env.common.files import write_bytes
-from epv_env.common.journal import Journal
+from epv_env.common.files import Journal, write_bytes
 from epv_env.common.results_folder import CONFIG, check_options, write_options
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from identification.bench.programmes import REPORT_SUITE, load_programmes, save_programmes

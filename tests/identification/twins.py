@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from epv_env.plant.channels import SENSORS
 from epv_env.plant.free_parameters import Freedom
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.sensors import SENSORS
 from identification.bench.programmes import DIAGNOSIS_SUITE, REPORT_SUITE
 from identification.bench.session import TrueSignals, measured_campaign, run_programme
 from identification.calibration.calibrate import Calibration, calibrate

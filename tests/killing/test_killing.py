@@ -20,7 +20,7 @@ pytestmark = [
 TOY = """
 import argparse, json, time
 from pathlib import Path
-from epv_env.common.journal import Journal
+from epv_env.common.files import Journal
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--honest", action="store_true")

@@ -4,10 +4,17 @@ from dataclasses import fields, replace
 
 import pytest
 
-from epv_env.plant.channels import CURRENT, MEASURED_CHANNELS, P2, VOLTAGE, ChannelError
+from epv_env.plant.channels import (
+    CURRENT,
+    MEASURED,
+    MEASURED_CHANNELS,
+    P2,
+    SENSOR_SYMBOLS,
+    SENSORS,
+    VOLTAGE,
+    ChannelError,
+)
 from epv_env.plant.parameters import table
-from epv_env.plant.readings import MEASURED, SENSOR_SYMBOLS
-from epv_env.plant.sensors import SENSORS
 from identification.recordings.columns import CHANNEL_OF, REQUIRED_COLUMNS, TIME_COLUMN
 from identification.recordings.recording import CHANNELS, OUTPUTS, UNITS, Recording
 

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from epv_env.plant.delay import U_ROW, delayed_inputs
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.lanes import N_INPUT
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised
-from epv_env.plant.valves import Valves
+from epv_env.plant.valves import U_ROW, Valves, delayed_inputs
 
 CALIBRATED = Parameters.calibrated()
 PULSE = np.repeat([24.0, 0.0, 24.0], [4, 20, 12])

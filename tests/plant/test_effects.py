@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, simpson, solve_ivp
 
+from epv_env.plant.channels import readings
 from epv_env.plant.coefficients import coefficients
 from epv_env.plant.effects.chambers import chamber_rates
 from epv_env.plant.effects.coil import COOLING_TIME, COPPER
@@ -21,8 +22,7 @@ from epv_env.plant.equations import (
     reluctance_inverse,
 )
 from epv_env.plant.parameters import Parameters, table
-from epv_env.plant.primitives.flow import CRITICAL_RATIO, KAPPA, mass_flux
-from epv_env.plant.readings import readings
+from epv_env.plant.primitives import CRITICAL_RATIO, KAPPA, mass_flux
 from epv_env.plant.simulate import energised, simulate
 from epv_env.plant.valves import Valves
 from tests.reference.schedule import largest_difference, pulses

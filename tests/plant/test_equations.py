@@ -16,7 +16,7 @@ from epv_env.plant.equations import (
     reluctance_inverse,
 )
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.primitives.flow import MAX_RELATIVE_ERROR
+from epv_env.plant.primitives import MAX_RELATIVE_ERROR
 from epv_env.plant.simulate import energised, simulate
 from identification.bench.hybrid_automaton import COMPILED_RIGHT_HAND_SIDES
 from tests.reference.numpy_rhs import numpy_rates

@@ -5,9 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from epv_env.plant.channels import MEASURED, readings
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.readings import MEASURED, readings
 from epv_env.plant.simulate import Trajectory, energised, simulate
 from epv_env.plant.valves import Valves
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from epv_env.plant.sensors import SENSORS
+from epv_env.plant.channels import SENSORS
 
 TABLE_3 = {"p1": 0.0068, "p2": 0.0098, "p3": 0.0075, "I": 0.0008, "U": 0.0122}
 

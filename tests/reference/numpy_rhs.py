@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.equations import Inputs, State
-from epv_env.plant.primitives.flow import LAMINAR_DROP
+from epv_env.plant.primitives import LAMINAR_DROP
 
 
 def exact_flux(p_a, p_b, p: Mapping[str, float]):

@@ -12,7 +12,7 @@ pytest.importorskip("sb3_contrib")
 
 from controllers.hysteresis import Hysteresis
 from epv_env import MAX_EPISODE_STEPS
-from epv_env.common.json_files import JSONFileError
+from epv_env.common.files import JSONFileError
 from epv_env.sb3 import make_sb3_env
 from training import benchmark
 from training.evaluation.benchmark import FIGURES, score

@@ -107,7 +107,7 @@ class Meter:
         Args:
             reward: (n,).
             failed: whether the circuit has emptied (n,), bool.
-            info: arrays (n,) by name (epv_env.infos).
+            info: arrays (n,) by name (epv_env.result).
         """
         self._steps += 1
         runs = self.running

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import epv_env  # noqa: F401 - registers the ids
 from controllers.base import Controller, Privileged
 from epv_env.common.units import BAR
-from epv_env.infos import step_info
+from epv_env.result import step_info
 from epv_env.vector_env import EPValvePWMVectorEnv, EPValveVectorEnv
 from training.evaluation.metrics import EpisodeMetrics, Meter
 

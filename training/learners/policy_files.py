@@ -11,8 +11,7 @@ from stable_baselines3 import PPO
 
 from controllers.learned import LearnedPolicy
 from controllers.policy_contract import CONTRACT_FILE, FORMAT, WEIGHTS_FILE
-from epv_env.common.files import write_bytes
-from epv_env.common.json_files import write_json
+from epv_env.common.files import write_bytes, write_json
 from epv_env.observation import contract
 from training.learners.recurrent_actor_critic import RecurrentActorCritic
 

@@ -13,7 +13,7 @@ from controllers.base import Controller
 from controllers.learned import holds_policy, load_policy
 from controllers.supervised import load_supervised
 from epv_env.actions import OnOff
-from epv_env.common.folder_lock import only_writer
+from epv_env.common.results_folder import only_writer
 from epv_env.plant.consumption import MIXED
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights

@@ -5,8 +5,7 @@ from pathlib import Path
 
 from controllers.policy_contract import CONTRACT_FILE, WEIGHTS_FILE
 from controllers.supervised import SUPERVISOR_FILE
-from epv_env.common.folder_lock import LOCK_FILE
-from epv_env.common.results_folder import CONFIG
+from epv_env.common.results_folder import CONFIG, LOCK_FILE
 from training.learners.run_state import CHECKPOINT_FILE, DERIVED_FILES, RunError
 
 MEMORYLESS_FOLDER, STUDENT_FOLDER = "memoryless", "student"

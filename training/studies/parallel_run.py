@@ -10,7 +10,7 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from epv_env.common.journal import Journal
+from epv_env.common.files import Journal
 from training.studies.episode_tasks import Study, Task
 
 CLUSTER_TIMEOUT = 60

@@ -10,7 +10,7 @@ from scipy import integrate, optimize
 from docs.scripts.component_data.column_files import Array, columns
 from docs.scripts.component_data.settings import DEFAULTS, ComponentSettings
 from epv_env.common.units import BAR
-from epv_env.plant.primitives.flow import mass_flux
+from epv_env.plant.primitives import mass_flux
 
 LEAKY_CHAMBERS = ("Ultimaker_015", "Ultimaker_020")
 TIGHT_CHAMBERS = ("Aluminium", "Formlabs", "Prusa", "Ultimaker_006", "Ultimaker_010")

@@ -1,7 +1,7 @@
 """Effects on the armature besides friction: elastic stops and the pressures on its seats."""
 
 from epv_env.plant.effects.record import Constant, Effect, Size
-from epv_env.plant.primitives.constants import QUARTER_PI
+from epv_env.plant.primitives import QUARTER_PI
 
 ARMATURE_BOUNCE = Effect(
     name="armature_bounce",

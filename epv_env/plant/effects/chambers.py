@@ -5,11 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.plant.effects.record import Constant, Effect, Size
-from epv_env.plant.effects.time_constants import rate
-from epv_env.plant.primitives.compiled import inlined
-from epv_env.plant.primitives.constants import QUARTER_PI
-from epv_env.plant.primitives.flow import KAPPA, LAMINAR_DROP
+from epv_env.plant.effects.record import Constant, Effect, Size, rate
+from epv_env.plant.primitives import KAPPA, LAMINAR_DROP, QUARTER_PI, inlined
 
 SMALLEST_SHARE = 0.01
 """Share of V2 behind its pipe below which no pipe acts [-]."""

@@ -3,7 +3,7 @@
 import math
 
 from epv_env.plant.effects.record import Constant, Effect, Size
-from epv_env.plant.primitives.compiled import inlined
+from epv_env.plant.primitives import inlined
 
 OFF_VOLTAGE = 1.0
 """Below this voltage the power stage counts as off [V]."""

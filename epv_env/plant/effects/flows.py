@@ -3,8 +3,7 @@
 import math
 
 from epv_env.plant.effects.record import Constant, Effect, Size
-from epv_env.plant.primitives.compiled import inlined
-from epv_env.plant.primitives.flow import CRITICAL_RATIO, KAPPA
+from epv_env.plant.primitives import CRITICAL_RATIO, KAPPA, inlined
 
 FILLING_TIME = 2e-3
 """Time constant with which the pressure before the valve follows the flow through its pipe [s]."""

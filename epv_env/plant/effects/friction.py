@@ -3,7 +3,7 @@
 import math
 
 from epv_env.plant.effects.record import Constant, Effect, Size
-from epv_env.plant.primitives.compiled import inlined
+from epv_env.plant.primitives import inlined
 
 SLIDING_SPEED_MV = 0.02
 """Speed over which the armature's friction rises to its value [m/s]; it flies at 0.3 m/s."""

@@ -5,8 +5,7 @@ from collections.abc import Mapping
 from numpy.typing import NDArray
 
 from epv_env.plant.effects.record import Constant, Effect, Size
-from epv_env.plant.primitives.compiled import inlined
-from epv_env.plant.primitives.constants import QUARTER_PI
+from epv_env.plant.primitives import QUARTER_PI, inlined
 
 GREATEST_CURRENT = 1.0
 """Up to which saturation is followed [A] (Table 1's range)."""

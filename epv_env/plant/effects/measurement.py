@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from epv_env.plant.effects.record import Constant, Effect, Size
-from epv_env.plant.effects.time_constants import rate
-from epv_env.plant.primitives.compiled import inlined
+from epv_env.plant.effects.record import Constant, Effect, Size, rate
+from epv_env.plant.primitives import inlined
 
 
 def _lag_constants(number: int) -> tuple[Constant, ...]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.plant.primitives.values import Value
+from epv_env.plant.primitives import Value
 
 COMPONENTS = (
     "solenoid", "armature", "control_chamber", "protection_valve", "flow", "output_chamber", "supply",
@@ -147,3 +147,12 @@ def _faults(effect: Effect) -> list[str]:
     if not faults and not effect.drawn:
         faults.append("no variant has drawn ranges: give `drawn` to the sizes of one variant")
     return faults
+
+
+SHORTEST_TIME = 1e-4
+"""Time constant below which nothing is felt of a lag or of heat in a chamber, and neither acts [s]."""
+
+
+def rate(time: NDArray) -> NDArray:
+    """1/time [1/s], or 0 where the time [s] is too short to be felt; shape (n,) or ()."""
+    return np.where(time < SHORTEST_TIME, 0.0, 1 / np.maximum(time, SHORTEST_TIME))

@@ -1,7 +1,7 @@
 """Leaks: seats of magnet and protection valve that do not close, and the circuit."""
 
 from epv_env.plant.effects.record import Constant, Effect, Size
-from epv_env.plant.primitives.compiled import inlined
+from epv_env.plant.primitives import inlined
 
 
 def _leak(name: str, component: str, size: Size, constant: str, form: str, source: str) -> Effect:

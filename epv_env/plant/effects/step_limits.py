@@ -11,7 +11,7 @@ from epv_env.plant.effects.flows import FILLING_TIME
 from epv_env.plant.effects.friction import SLIDING_SPEED_MV, SLIDING_SPEED_PV
 from epv_env.plant.effects.magnet import inverse_inductance
 from epv_env.plant.effects.record import Constant, Effect
-from epv_env.plant.primitives.compiled import inlined
+from epv_env.plant.primitives import inlined
 
 STABLE = 1.0
 """Longest step times fastest rate at which the integrator follows an effect well [-]."""

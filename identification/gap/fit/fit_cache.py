@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from epv_env.common.journal import Journal
+from epv_env.common.files import Journal
 from identification.gap.fit.hypothesis import Estimate, Hypothesis
 from identification.gap.model.grey_box import GreyBox
 

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.plant.channels import readings
 from epv_env.plant.coefficients import coefficients
 from epv_env.plant.effects.registry import effect_constants
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.readings import readings
 from identification.bench.hybrid_automaton import RightHandSide, Schedule, piecewise_schedule
 from identification.bench.programmes import DIAGNOSIS_SUITE, Programme
 from identification.bench.reference_simulation import simulate_reference

@@ -12,7 +12,7 @@ from epv_env.plant.effects.coil import coil_current
 from epv_env.plant.effects.registry import Effects
 from epv_env.plant.equations import State, derivative
 from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at, store_state
-from epv_env.plant.primitives.compiled import FLAGS, replacing, source_digest
+from epv_env.plant.primitives import FLAGS, replacing, source_digest
 from identification.bench.hybrid_automaton import RightHandSide
 from identification.studies.blind import deviating_forms, other_forms
 from identification.studies.blind.deviating_forms import IRON_TIME_CONSTANT, deviating_sizes, film_rate

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from epv_env.common.progress import progress
+from epv_env.common.results_folder import progress
 from identification.report.page import Section
 from identification.report.result_files import write_results
 from identification.studies.blind.blind_figures import FIGURES

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from epv_env.common.files import write_bytes
-from epv_env.common.json_files import write_json
+from epv_env.common.files import write_bytes, write_json
 from identification.bench.session import TrueSignals
 from identification.recordings.recording import OUTPUTS
 from identification.studies.blind.kinds import NOMINAL, TWO_EFFECTS

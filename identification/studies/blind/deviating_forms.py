@@ -48,7 +48,7 @@ from epv_env.plant.equations import (
     flow_PV,
     reluctance_inverse,
 )
-from epv_env.plant.primitives.compiled import inlined, replacing
+from epv_env.plant.primitives import inlined, replacing
 
 FILM_THICKNESS = 20e-6
 """Thickness of the air film that an armature squeezes out as it lands [m]."""

@@ -1,6 +1,6 @@
 """Disturbances under which the trials of a blind check are diagnosed again."""
 
-from epv_env.plant.sensors import SENSORS
+from epv_env.plant.channels import SENSORS
 from identification.bench.session import add_ripple, round_pressures
 from identification.recordings.recording import OUTPUTS, Campaign
 from identification.studies.blind.noise_free_gap import noise_deviation

@@ -22,7 +22,7 @@ import numba
 
 from epv_env.plant.effects.magnet import saturated_force, saturation_level
 from epv_env.plant.equations import State, flow_inlet, flow_PV, reluctance_inverse
-from epv_env.plant.primitives.compiled import FLAGS, inlined, replacing
+from epv_env.plant.primitives import FLAGS, inlined, replacing
 from identification.studies.blind.deviating_forms import deviating_sizes
 
 INSTANT_DROP, LANGEVIN = "supply_restriction", "magnetic_saturation"

@@ -10,7 +10,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from epv_env.common.progress import progress
+from epv_env.common.results_folder import progress
 
 
 def run_in_processes(

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
-from epv_env.common.interruption import ignore_interrupts
-from epv_env.common.journal import Journal
-from epv_env.common.progress import progress
+from epv_env.common.command_line import ignore_interrupts
+from epv_env.common.files import Journal
+from epv_env.common.results_folder import progress
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.valves import available_cores
 from identification.bench.programmes import REPORT_SUITE

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from epv_env.plant.channels import SENSORS
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import CALIBRATED_SYMBOLS
-from epv_env.plant.sensors import SENSORS
 from identification.recordings.recording import OUTPUTS, UNITS
 from identification.replay.batch_simulation import Replay
 from identification.replay.model_inputs import ModelInputs

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.common.progress import progress
+from epv_env.common.results_folder import progress
 from identification.studies.error_tables.bench_conditions import Conditions
 from identification.studies.error_tables.candidates import Candidate
 from identification.studies.error_tables.error_prediction import predicted_errors

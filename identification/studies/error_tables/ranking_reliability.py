@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.common.progress import progress
+from epv_env.common.results_folder import progress
 from identification.recordings.recording import OUTPUTS
 from identification.studies.error_tables.pairs import (
     candidate_pair_misfits,

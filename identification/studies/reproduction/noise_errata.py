@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import stats
 
-from epv_env.plant.sensors import SENSORS
+from epv_env.plant.channels import SENSORS
 from identification.quality.section import (
     REPORT_CHANNELS,
     SAMPLES,

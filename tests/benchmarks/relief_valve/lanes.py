@@ -8,9 +8,9 @@ located on the step's cubic by the plant's own functions, the step taken again u
 import numba
 import numpy as np
 
-from epv_env.plant.events import crossing, hermite, turning_point
 from epv_env.plant.lanes import LANES
-from epv_env.plant.primitives.compiled import FLAGS, inlined
+from epv_env.plant.primitives import FLAGS, inlined
+from epv_env.plant.stepping import crossing, hermite, turning_point
 from tests.benchmarks.relief_valve.model import (
     CONVERGED,
     N_IMPACTS,

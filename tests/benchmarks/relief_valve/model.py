@@ -11,7 +11,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.plant.primitives.compiled import inlined
+from epv_env.plant.primitives import inlined
 
 KAPPA, BETA, DELTA, RESTITUTION = 1.25, 20.0, 10.0, 0.8
 START = (0.2, 0.0, 0.0)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from epv_env.plant.sensors import SENSORS
+from epv_env.plant.channels import SENSORS
 from identification.bench.session import add_ripple, round_pressures
 from identification.recordings.recording import CHANNELS, UNITS, CampaignError
 from tests.identification.twins import twin

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from epv_env.plant.sensors import SENSORS
+from epv_env.plant.channels import SENSORS
 from identification.bench.programmes import DIAGNOSIS_SUITE, SUITES
 from identification.bench.session import (
     measured_campaign,

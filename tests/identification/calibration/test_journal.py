@@ -2,7 +2,7 @@
 
 import pytest
 
-from epv_env.common.journal import Journal
+from epv_env.common.files import Journal
 
 SUBJECT = {"recordings": ["a", "b"], "seed": 0}
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from epv_env.common.journal import Journal
+from epv_env.common.files import Journal
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.calibration import multi_start as starts

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from epv_env.plant.channels import SENSORS
 from epv_env.plant.parameters import ParameterError
 from epv_env.plant.region import CALIBRATED_SYMBOLS
-from epv_env.plant.sensors import SENSORS
 from identification.calibration.problem import calibration_problem
 from identification.calibration.search_methods import SearchResult, nelder_mead, weighted_least_squares
 from identification.recordings.recording import CHANNELS, UNITS, CampaignError

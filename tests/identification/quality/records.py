@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.plant.sensors import SENSORS
+from epv_env.plant.channels import SENSORS
 from identification.quality.section import TREND_OFFSETS
 from identification.recordings.recording import CHANNELS, UNITS, Recording
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from epv_env.plant.sensors import SENSORS
+from epv_env.plant.channels import SENSORS
 from identification.quality.noise_tests import white_noise_band
 from identification.quality.section import (
     CORRELATIONS,

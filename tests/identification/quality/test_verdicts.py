@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from epv_env.plant.sensors import SENSORS
+from epv_env.plant.channels import SENSORS
 from identification.quality.assessment import assess_recording, sensor_offsets
 from identification.quality.section import STATISTICS, TREND_OFFSETS
 from identification.quality.verdicts import CHECKS, channel_verdict, check_results, worst_status

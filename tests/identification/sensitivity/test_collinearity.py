@@ -5,8 +5,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from epv_env.plant.channels import SENSORS
 from epv_env.plant.parameters import Parameters, confidence_intervals, sensitive_symbols
-from epv_env.plant.sensors import SENSORS
 from identification.recordings.recording import OUTPUTS, UNITS
 from identification.replay.batch_simulation import Replay
 from identification.replay.model_inputs import ModelInputs

@@ -4,8 +4,8 @@ from functools import cache
 
 import pytest
 
+from epv_env.plant.channels import SENSORS
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.sensors import SENSORS
 from identification.bench.programmes import DIAGNOSIS_SUITE
 from identification.bench.session import add_ripple, measured_campaign, round_pressures, run_programme
 from identification.gap.diagnosis import rank_hypotheses

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from epv_env.plant.sensors import SENSORS
+from epv_env.plant.channels import SENSORS
 from identification.bench.session import add_ripple
 from identification.recordings.recording import Campaign, Recording
 from identification.valve_gap.noise import noise_of

@@ -2,7 +2,7 @@
 
 import pytest
 
-from epv_env.plant.primitives.compiled import inlined
+from epv_env.plant.primitives import inlined
 from training.deploy.fmu.expressions import NUMBER
 from training.deploy.fmu.tracing import Symbol, TranslationError, written
 from training.deploy.fmu.translation import Translation

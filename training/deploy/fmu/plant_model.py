@@ -10,7 +10,6 @@ from epv_env.plant.effects.coil import coil_current
 from epv_env.plant.effects.registry import CONSTANTS, Effects
 from epv_env.plant.effects.step_limits import longest_step
 from epv_env.plant.equations import Coefficients, Inputs, State, derivative
-from epv_env.plant.events import crossing, hermite, release, turning_point
 from epv_env.plant.lanes import moved
 from epv_env.plant.parameters import table
 from epv_env.plant.plantfile import Plant
@@ -21,6 +20,10 @@ from epv_env.plant.stepping import (
     RELEASE_MARGIN,
     SHORTEST_STEP,
     STICK_SPEED,
+    crossing,
+    hermite,
+    release,
+    turning_point,
 )
 from training.deploy.c_sources import TITLE
 from training.deploy.fmu.expressions import NUMBER, TRUTH

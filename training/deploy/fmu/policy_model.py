@@ -5,7 +5,7 @@ from string import Template
 
 import msgspec
 
-from epv_env.common.json_files import JSONFileError, read_json
+from epv_env.common.files import JSONFileError, read_json
 from training.deploy.deployment_contract import FORMAT
 from training.deploy.fmu.files import TEMPLATES
 from training.deploy.fmu.variables import Model, Variable

@@ -8,7 +8,7 @@ import msgspec
 from msgspec import Meta
 
 from epv_env import MAX_EPISODE_STEPS
-from epv_env.common.json_files import JSONFileError, read_json, write_json
+from epv_env.common.files import JSONFileError, read_json, write_json
 from training.evaluation.benchmark import DURATION, EPISODES
 from training.evaluation.seeds import BENCHMARK_SEED
 

@@ -15,7 +15,7 @@ from tqdm import tqdm
 from controllers.base import Controller
 from controllers.learned import TRAINED, load_policy
 from controllers.tuned import build, load_tunings
-from epv_env.common.journal import Journal
+from epv_env.common.files import Journal
 from epv_env.plant.plantfile import Plant
 from training.evaluation.benchmark import score
 from training.learners.library_algorithms import Algorithm, described

@@ -8,8 +8,7 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
-from epv_env.common.files import write_bytes, write_text
-from epv_env.common.json_files import write_json
+from epv_env.common.files import write_bytes, write_json, write_text
 from training.evaluation import plots
 from training.evaluation.controller_table import PLANTS, Comparison
 from training.evaluation.rollout import Trace

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.common.journal import Journal
+from epv_env.common.files import Journal
 from training.evaluation.controller_table import PLANTS, plant_region
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.scenarios import EVALUATION, RANDOM, TUNING_REGION

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from controllers.base import Controller
-from epv_env.common.progress import progress
+from epv_env.common.results_folder import progress
 from epv_env.plant.plantfile import Plant
 from training.evaluation.controller_table import plant_region
 from training.evaluation.metrics import EpisodeMetrics

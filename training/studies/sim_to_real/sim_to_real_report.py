@@ -5,7 +5,7 @@ from typing import Any
 
 import pandas as pd
 
-from epv_env.common.json_files import write_json
+from epv_env.common.files import write_json
 from training.studies.sim_to_real.performance_tables import as_markdown, gap_table, performance_table
 
 

@@ -4,11 +4,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from epv_env.arguments import as_region
 from epv_env.plant.consumption import SCENARIOS
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import table
 from epv_env.plant.plantfile import Plant
+from epv_env.settings import as_region
 from identification.sensitivity.one_at_a_time import changed_values
 from training.evaluation.effect_levels import effect_levels
 from training.studies.sweeps.parameter_space import Space

@@ -8,8 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from epv_env.common.files import write_text
-from epv_env.common.json_files import write_json
+from epv_env.common.files import write_json, write_text
 from training.evaluation.rollout import Trace
 from training.studies.episode_tasks import Study
 from training.studies.generated_pages import fill

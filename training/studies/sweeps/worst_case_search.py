@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 
 from controllers.causal_bound import CausalBound
-from epv_env.arguments import as_region
 from epv_env.plant.consumption import MIXED, SCENARIOS
+from epv_env.settings import as_region
 from training.studies.episode_tasks import EXCURSION_DECIMALS, Study
 from training.studies.sweeps.parameter_space import Space
 

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from epv_env.plant.sensors import SENSORS
+from epv_env.plant.channels import SENSORS
 from identification.recordings.recording import OUTPUTS, UNITS
 from identification.studies.blind.bench import blind_campaign, blind_suite, run_programme
 from identification.studies.blind.disturbances import (

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from epv_env.plant.channels import SENSORS
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import Parameters, table
-from epv_env.plant.sensors import SENSORS
 from identification.report_2003.printed_values import printed_errors
 from identification.studies.error_tables.bench_conditions import drawn_conditions, fitted_conditions
 from identification.studies.error_tables.candidates import Candidate, candidates
