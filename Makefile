@@ -11,7 +11,7 @@ SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile
 
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help venv train test test-oldest identify gap blind real-bench sim-to-real pictures bench tune tradeoff results benchmark robustness export gif docs lint check format wheel clean
+.PHONY: help venv train test test-oldest identify gap sim-to-real bench tune tradeoff results benchmark robustness export gif docs lint check format wheel clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z][a-z-]*\):.*## /\1	/p' Makefile | while IFS='	' read -r name text; do \
@@ -96,17 +96,12 @@ gap: $(VENV)/.installed ## say which effect a virtual bench has that the model l
 	$(PY) -m identification bench --suite diagnosis --effect eddy_current=0.004 --out runs/gap-bench
 	$(PY) -m identification gap runs/gap-bench --out runs/gap $(ARGS)
 
-blind: $(VENV)/.installed ## how often the diagnosis is right on 300 campaigns with hidden causes (an hour)
-	$(PY) -m identification blind --trials 300 --seed 2030 --out runs/blind --images docs/images $(ARGS)
-
-real-bench: $(VENV)/.installed ## ask which effects give the report's printed errors (3 minutes)
-	$(PY) -m identification gap --tables --out runs/real-bench --images docs/images $(ARGS)
-
 sim-to-real: $(VENV)/.installed ## train, deploy on a bench, diagnose, retrain, deploy again (5 minutes)
 	$(PY) training/sim_to_real.py --out runs/sim-to-real --images docs/images $(ARGS)
 
-pictures: $(VENV)/.installed ## draw the figures of docs/explanation/identification.md
-	$(PY) docs/scripts/identification_figures.py --out docs/images --coverage runs/coverage $(ARGS)
+# make study-reproduction, study-coverage ...: the folders of docs/studies
+study-%: $(VENV)/.installed
+	$(PY) -m docs.studies.$*.study $(ARGS)
 
 gif: $(VENV)/.installed ## film the valve for the README
 	SDL_VIDEODRIVER=dummy $(PY) docs/scripts/film.py --out docs/images/valve.gif $(ARGS)

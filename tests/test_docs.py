@@ -215,22 +215,6 @@ def test_the_film_in_its_shortest_form(tmp_path):
     assert out.read_bytes()[:3] == b"GIF"
 
 
-def test_the_pictures_of_the_identification_in_their_shortest_form(tmp_path):
-    options = ("--coverage", tmp_path / "coverage", "--campaigns", "2")
-    done = run(
-        sys.executable,
-        ROOT / "docs/scripts/identification_figures.py",
-        "--out",
-        tmp_path,
-        *options,
-        cwd=tmp_path,
-    )
-    assert done.returncode == 0, done.stderr
-    names = {path.name for path in tmp_path.glob("*.png")}
-    assert names == {"calibration.png", "region.png", "coverage.png"}
-    assert names <= {path.name for path in (ROOT / "docs/images").iterdir()}
-
-
 def test_the_table_of_effects_is_that_of_the_records():
     """Written by `python docs/scripts/effects_table.py`."""
     assert effects_table() in text("docs/explanation/effects.md")

@@ -4,7 +4,7 @@ The report used SIMULINK and sampled at 2 kHz. A fixed step of one sample, 0.5 m
 met at the ends of steps, cannot resolve the armature: its flight takes 2 ms and its speed settles
 within mMV/kMV = 1 ms. The error moves each flight by a fraction of a step, differently for every value
 of mMV, kMV, xMVmax .. and that scatter is most likely what Tables 8 and 9 print for them
-(docs/results/identification.md).
+(docs/studies/reproduction/README.md).
 The method is Dormand and Prince's of order 5 (J. Comput. Appl. Math. 6, 1980), SIMULINK's `ode5`.
 """
 

@@ -23,7 +23,8 @@ from identification.sensitivity.settings import SENSITIVITY, SensitivitySettings
 
 FIXED_STEP_CONDITIONS = replace(REPORT_CONDITIONS, U_on=18.835)
 """The conditions for the fixed step, whose scatter changes within 0.02 V: this voltage, 0.065 V below
-the fitted one, lies amid 0.01 V where every class is as printed (docs/results/identification.md)."""
+the fitted one, lies amid 0.01 V where every class is as printed
+(docs/studies/reproduction/README.md)."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,7 +20,6 @@ from identification.calibration.problem import CalibrationProblem, calibration_p
 from identification.calibration.search_methods import SearchResult, nelder_mead, weighted_least_squares
 from identification.recordings.campaign_files import write_campaign
 from identification.recordings.recording import Campaign
-from identification.studies.coverage.coverage import CAMPAIGNS
 from tests.benchmarks.command_line import run
 from tests.benchmarks.fresh_processes import identification_process
 from tests.benchmarks.measure import CPU, Row, Table, durations
@@ -32,7 +31,7 @@ LARGE_CAMPAIGN = 100
 VALVE_WITH_EFFECTS = TRUE.replace(A_PV=1e-7, G_eddy=2e-3)
 """A valve with two effects, so that a diagnosis has to search pairs."""
 ACCEPTANCE_CRITERIA = {
-    "evaluation": 10.0, "search": 5.0, "run": 60.0, "coverage": 300.0, "diagnosis": 60.0,
+    "evaluation": 10.0, "search": 5.0, "run": 60.0, "diagnosis": 60.0,
     "memory": 2048.0,
 }  # fmt: skip
 """Largest accepted medians [ms, s, s, s, s, MiB]."""
@@ -46,7 +45,6 @@ def benchmark(table: Table, quick: bool) -> None:
         fits(table, calibration_problem(measured_campaign(truths, TRUE, seed=0)), quick)
     with TemporaryDirectory() as folder:
         whole_run(table, Path(folder), 1 if quick else 3, warm=not quick)
-        coverage(table, Path(folder), quick)
         many_recordings(table, Path(folder), truths, quick)
         diagnoses(table, Path(folder), quick)
 
@@ -123,27 +121,6 @@ def whole_run(table: Table, folder: Path, repetitions: int, *, warm: bool) -> No
         "run: the report's campaign", "s", seconds, limit=ACCEPTANCE_CRITERIA["run"], note=found[-1].note
     )
     table.add("  its memory at most", "MiB", [p.peak for p in found])
-
-
-def coverage(table: Table, folder: Path, quick: bool) -> None:
-    """The coverage study; quick: the rest of it at the rate of a few campaigns."""
-    if quick:
-        few, more = 2, 6
-        short, longer = (coverage_seconds(folder, n) for n in (few, more))
-        each = (longer - short) / (more - few)
-        total, note = short + each * (CAMPAIGNS - few), f"estimated from {few} and {more}"
-    else:
-        total = coverage_seconds(folder, CAMPAIGNS)
-        each, note = total / CAMPAIGNS, ""
-    name = f"coverage: {CAMPAIGNS} campaigns, all cores"
-    table.add(name, "s", total, limit=ACCEPTANCE_CRITERIA["coverage"], note=note)
-    table.add("  one campaign", "s", each)
-
-
-def coverage_seconds(folder: Path, campaigns: int) -> float:
-    """Time of a coverage study, its start included [s]."""
-    out = folder / f"coverage{campaigns}"
-    return identification_process("coverage", "--campaigns", campaigns, "--out", out).seconds
 
 
 def many_recordings(table: Table, folder: Path, truths: list[TrueSignals], quick: bool) -> None:

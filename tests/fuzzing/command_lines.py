@@ -27,8 +27,6 @@ NEEDED: dict[str, list[str]] = {
     "sim-to-real": ["--effect", "flood=1"],
     "bench": ["--effect", "flood=1"],
     "import": ["nowhere.mf4"],
-    "coverage": ["--campaigns", "0"],
-    "reproduce": ["--seed", "-1"],
     "blind": ["--trials", "0"],
     "run": ["nowhere"],
     "gap": ["nowhere"],

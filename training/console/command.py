@@ -45,8 +45,6 @@ COMMANDS: dict[str, Entry] = {
     "bench": Entry(IDENTIFICATION, "write a campaign of a virtual bench whose truth is known"),
     "import": Entry(IDENTIFICATION, "turn measurement files into a campaign"),
     "run": Entry(IDENTIFICATION, "all stages of the identification: plant.json and report.html"),
-    "coverage": Entry(IDENTIFICATION, "how often the confidence region holds the truth"),
-    "reproduce": Entry(IDENTIFICATION, "the report's tables beside ours"),
     "gap": Entry(IDENTIFICATION, "which effect explains what the model misses"),
     "blind": Entry(IDENTIFICATION, "how often the diagnosis is right on hidden causes"),
 }

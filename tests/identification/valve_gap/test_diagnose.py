@@ -124,17 +124,11 @@ def test_without_its_effect_the_gap_is_unknown(diagnosed, tmp_path):
     assert not found.conclusion.ambiguity_set
 
 
-@pytest.mark.parametrize(
-    ("options", "rule"),
-    [
-        (["--without", "gremlins"], "no cause is named gremlins"),
-        (["--images", "x"], "--images belongs to --tables"),
-    ],
-)
-def test_wrong_options_are_refused(diagnosed, tmp_path, monkeypatch, options, rule, capsys):
+def test_an_unknown_cause_is_refused(diagnosed, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert main(["gap", str(diagnosed / "campaign"), "--out", "out", *options]) == 2
-    assert rule in capsys.readouterr().err
+    options = ["--out", "out", "--without", "gremlins"]
+    assert main(["gap", str(diagnosed / "campaign"), *options]) == 2
+    assert "no cause is named gremlins" in capsys.readouterr().err
     assert not (tmp_path / "out" / "gap.json").exists()
 
 

@@ -1,0 +1,159 @@
+"""How often the confidence intervals hold the truth: twin campaigns, calibrated one by one.
+
+    python -m docs.studies.coverage.study
+
+writes coverage.json, coverage.png and the table of README.md. The truth of each virtual campaign is
+Table 12; its noise is its own. Finished campaigns are kept in coverage.jsonl and not repeated.
+"""
+
+import sys
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import cache
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from scipy.stats import binomtest, chi2
+from threadpoolctl import threadpool_limits
+
+from docs.studies.common import PAGE, fill, study_options, study_parser, table, write_result
+from epv_env.common.command_line import fail_clearly
+from epv_env.common.files import Journal
+from epv_env.common.results_folder import progress
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.valves import available_cores
+from identification.bench.programmes import REPORT_SUITE
+from identification.bench.session import TrueSignals, measured_campaign, run_programme
+from identification.calibration.problem import calibration_problem
+from identification.calibration.search_methods import nelder_mead, weighted_least_squares
+from identification.confidence.covariance import estimate_covariance
+from identification.confidence.report_interval import report_interval
+
+FOLDER = Path(__file__).parent
+CAMPAIGNS, QUICK = 200, 2
+"""Campaigns: a coverage of 0.95 is then known to about ±0.03."""
+PROBABILITY = 0.95
+"""Of the intervals and regions [-]."""
+
+
+def calibrated_campaigns(
+    journal: Path, *, campaigns: int, seed: int = 0, workers: int | None = None
+) -> list[dict[str, Any]]:
+    """Where the truth lies relative to the estimates of each campaign; see `calibrated`.
+
+    Campaign i has the same noise whatever the number of campaigns or workers.
+    """
+    subject = {"study": "coverage", "truth": dict(Parameters.calibrated()), "seed": seed}
+    results = Journal(journal, subject)
+    # One seed per campaign, not seed + index: neighbouring studies must not share campaigns.
+    seeds = [int(np.random.SeedSequence([seed, i]).generate_state(1)[0]) for i in range(campaigns)]
+    missing = [i for i in range(campaigns) if str(i) not in results]
+    with ProcessPoolExecutor(
+        workers or available_cores(), get_context("spawn"), threadpool_limits, (1,)
+    ) as pool:
+        found = zip(missing, pool.map(calibrated, [seeds[i] for i in missing]), strict=True)
+        for index, result in progress(found, what="coverage: campaigns", total=len(missing)):
+            results.add(str(index), result)
+    return [results[str(i)] for i in range(campaigns)]
+
+
+def calibrated(noise_seed: int) -> dict[str, Any]:
+    """The calibration of one campaign, JSON-ready.
+
+    `distance`: squared Mahalanobis distance of the truth from the least-squares estimate. `independent`:
+    the same with the covariance for independent residuals and exact inputs. `disagreement`: the same
+    between the two methods' estimates. The others: whether intervals hold the truth.
+    """
+    problem = calibration_problem(measured_campaign(_truths(), Parameters.calibrated(), seed=noise_seed))
+    start = problem.vector.scaled(problem.vector.reference)
+    true = problem.vector.scaled(Parameters.calibrated())
+    squares, total = problem.least_squares(), problem.total_error()
+    fit, simplex = weighted_least_squares(squares, start), nelder_mead(total, start)
+    estimate = estimate_covariance(problem, squares, fit.z, seed=noise_seed)
+    report = report_interval(problem, simplex.z, simplex.error)
+    half_widths = np.sqrt(chi2.ppf(PROBABILITY, 1) * np.diag(estimate.total))
+    return {
+        "symbols": list(problem.vector.symbols),
+        "distance": _squared_distance(fit.z - true, estimate.total),
+        "independent": _squared_distance(fit.z - true, estimate.independent),
+        "disagreement": _squared_distance(fit.z - simplex.z, estimate.total),
+        "inside": (np.abs(fit.z - true) <= half_widths).tolist(),
+        "report_inside": (np.abs(simplex.z - true) <= report.half_widths).tolist(),
+        "report_joint": report.holds_jointly(simplex.z - true),
+    }
+
+
+def coverage(campaigns: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, float]]:
+    """Share of campaigns by kind of interval [-], with the ends of its exact 95 % interval."""
+    symbols = campaigns[0]["symbols"]
+    limit = chi2.ppf(PROBABILITY, len(symbols))
+    cases = {
+        "joint region": [c["distance"] <= limit for c in campaigns],
+        "joint region if residuals were independent and inputs exact": [
+            c["independent"] <= limit for c in campaigns
+        ],
+        "joint region by eq. 23": [c["report_joint"] for c in campaigns],
+        "Nelder-Mead estimate inside the joint region": [c["disagreement"] <= limit for c in campaigns],
+    }
+    for i, symbol in enumerate(symbols):
+        cases[f"interval of {symbol}"] = [c["inside"][i] for c in campaigns]
+        cases[f"eq. 23's interval of {symbol}"] = [c["report_inside"][i] for c in campaigns]
+    shares = {}
+    for name, held in cases.items():
+        ends = binomtest(sum(held), len(held)).proportion_ci()
+        shares[name] = {"share": sum(held) / len(held), "low": float(ends.low), "high": float(ends.high)}
+    return shares
+
+
+def distance_quantiles(campaigns: Sequence[Mapping[str, Any]]) -> Figure:
+    """Squared distances of the truth against the quantiles of the chi-square law they should follow."""
+    figure = Figure(figsize=(5.5, 4.5), layout="constrained")
+    axes = figure.subplots()
+    count, degrees = len(campaigns), len(campaigns[0]["symbols"])
+    expected = chi2.ppf((np.arange(count) + 0.5) / count, degrees)
+    for name, label in (
+        ("distance", "region of the plant file"),
+        ("independent", "independent residuals"),
+    ):
+        axes.plot(expected, np.sort([c[name] for c in campaigns]), ".", label=label)
+    axes.plot(expected, expected, color="black", linewidth=0.8)
+    axes.set_xlabel(f"quantiles of chi-square with {degrees} degrees of freedom")
+    axes.set_ylabel("squared distance of the truth")
+    axes.legend()
+    axes.grid(alpha=0.3)
+    return figure
+
+
+@cache
+def _truths() -> list[TrueSignals]:
+    """The noise-free recordings of the report's tests, the same for all campaigns."""
+    return [run_programme(Parameters.calibrated(), programme) for programme in REPORT_SUITE]
+
+
+def _squared_distance(deviation: NDArray, covariance: NDArray) -> float:
+    """Squared Mahalanobis distance of a deviation (k,) in a covariance (k, k)."""
+    return float(deviation @ np.linalg.solve(covariance, deviation))
+
+
+def main() -> int:
+    """Command line; returns the exit status."""
+    parser = study_parser(__doc__ or "", FOLDER)
+    parser.add_argument("--campaigns", type=int, help=f"default: {CAMPAIGNS}; {QUICK} with --quick")
+    parser.add_argument("--seed", type=int, default=0, help="of the campaigns' noise")
+    options = study_options(parser)
+    count = options.campaigns or (QUICK if options.quick else CAMPAIGNS)
+    found = calibrated_campaigns(options.out / "coverage.jsonl", campaigns=count, seed=options.seed)
+    shares = coverage(found)
+    write_result(options.out / "coverage.json", shares)
+    distance_quantiles(found).savefig(options.out / "coverage.png", dpi=100)
+    rows = [[name, *(f"{100 * value:.1f}" for value in s.values())] for name, s in shares.items()]
+    fill(options.out / PAGE, {"coverage": table(["", "Share [%]", "low", "high"], rows)})
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(fail_clearly(main))

@@ -1,0 +1,147 @@
+"""Compute the report's tables again, and check its printed figures against each other.
+
+    python -m docs.studies.reproduction.study
+
+writes reproduce.json, two pictures and the tables of README.md. The report is SCL-001/2003. Its
+recordings were never published: Tables 2 to 4 and 10 to 15 come from a virtual bench whose truth is
+Table 12.
+"""
+
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from docs.studies.common import PAGE, fill, study_options, study_parser, table, write_result
+from docs.studies.reproduction.errata import ERRATUM, figure_checks
+from epv_env.common.command_line import fail_clearly
+from epv_env.plant.parameters import Parameters, confidence_intervals
+from identification.bench.programmes import REPORT_SUITE
+from identification.bench.session import run_bench
+from identification.calibration.multi_start import METHODS
+from identification.calibration.settings import CalibrationSettings
+from identification.confidence import confidence_figures
+from identification.pipeline.identification import Identification
+from identification.pipeline.settings import IdentificationSettings
+from identification.quality.assessment import assess_recording
+from identification.quality.section import as_json as quality_json
+from identification.replay.error_tables import errors_as_json
+from identification.replay.response_figures import response_figure
+from identification.replay.responses import responses
+from identification.sensitivity.printed_agreement import sensitivity_tables
+from identification.sensitivity.sensitivity_study import run_one_at_a_time
+
+FOLDER = Path(__file__).parent
+QUICK = IdentificationSettings(calibration=CalibrationSettings(starts=1))
+
+
+def reproduce(identification: Identification) -> dict[str, Any]:
+    """Every table, JSON-ready: parameters in SI units, errors in percent.
+
+    identification: of a virtual bench's campaign whose truth is Table 12.
+    """
+    campaign = identification.campaign
+    quality = assess_recording(campaign.with_role("quality")[0], campaign.pressure)
+    return {
+        **sensitivity_tables(run_one_at_a_time()),
+        "virtual_bench": {"tables2to4": quality_json(quality), **_bench(identification)},
+        "slips": [asdict(check) for check in figure_checks()],
+    }
+
+
+def _bench(identification: Identification) -> dict[str, Any]:
+    """Tables 10 to 15 of the virtual bench."""
+    calibration, confidence = identification.calibration, identification.confidence
+    vector, validation = identification.problem.vector, identification.problem.validation
+    held_out = responses(validation, calibration.parameters("Nelder-Mead"))
+    return {
+        "table10": {s: vector.reference[s] for s in vector.symbols},
+        "table11": errors_as_json(calibration.before),
+        "table12": {m: {s: calibration.parameters(m)[s] for s in vector.symbols} for m in METHODS},
+        "table13": errors_as_json(calibration.after["Nelder-Mead"]),
+        "table14": {
+            "eq23": {s: list(ends) for s, ends in confidence.report_intervals().items()},
+            "covering": {s: list(ends) for s, ends in confidence.intervals().items()},
+        },
+        "table15": errors_as_json(held_out),
+    }
+
+
+def page_parts(results: Mapping[str, Any]) -> dict[str, str]:
+    """The tables of README.md."""
+    return {
+        "agreement": _agreement(results["comparison"]),
+        "estimates": _estimates(results["virtual_bench"]),
+        "errata": _errata(results["slips"]),
+    }
+
+
+def _agreement(comparison: Mapping[str, Any]) -> str:
+    rows = []
+    for title, key in (("fixed step of 0.5 ms", "fixed_step"), ("exact stops", "exact")):
+        found = comparison[key]
+        rows.append(
+            [
+                f"{title}, {found['U_on_V']:g} V",
+                f"{found['reproduced']} of {found['figures']}",
+                f"all but {', '.join(found['classes_differ'])}" if found["classes_differ"] else "all",
+                f"{found['worst_factor']:.3g}",
+            ]
+        )
+    return table(["", "Reproduced", "Classes as printed", "Farthest figure, factor"], rows)
+
+
+def _estimates(bench: Mapping[str, Any]) -> str:
+    """Table 12 found again, and widths of its intervals beside Table 14's."""
+    truth, printed = Parameters.calibrated(), confidence_intervals()
+    rows = []
+    for symbol, start in bench["table10"].items():
+        intervals = (
+            printed[symbol],
+            bench["table14"]["eq23"][symbol],
+            bench["table14"]["covering"][symbol],
+        )
+        found = (bench["table12"][method][symbol] for method in METHODS)
+        rows.append(
+            [
+                symbol,
+                *(f"{value:.5g}" for value in (start, truth[symbol], *found)),
+                *(f"{100 * np.diff(interval)[0] / truth[symbol]:.2g}" for interval in intervals),
+            ]
+        )
+    widths = ["Table 14 [%]", "eq. 23 [%]", "covering 95 % [%]"]
+    return table(["", "Start", "Truth", *METHODS, *widths], rows)
+
+
+def _errata(checks: Sequence[Mapping[str, str]]) -> str:
+    rows = [[c["where"], c["printed"], c["recomputed"]] for c in checks if c["status"] == ERRATUM]
+    return table(["Where", "Printed", "Recomputed"], rows)
+
+
+def main() -> int:
+    """Command line; returns the exit status."""
+    parser = study_parser(__doc__ or "", FOLDER)
+    parser.add_argument("--seed", type=int, default=0, help="of the virtual bench's noise")
+    options = study_options(parser)
+    campaign = run_bench(REPORT_SUITE, Parameters.calibrated(), seed=options.seed)
+    settings = QUICK if options.quick else IdentificationSettings()
+    identification = Identification(
+        campaign, options.out / "reproduce.jsonl", seed=options.seed, settings=settings
+    )
+    results = reproduce(identification)
+    write_result(options.out / "reproduce.json", results)
+    fill(options.out / PAGE, page_parts(results))
+    pictures = {
+        "calibration.png": response_figure(identification.calibration.after[METHODS[0]][0]),
+        "region.png": confidence_figures.region(identification.confidence),
+    }
+    for name, picture in pictures.items():
+        picture.savefig(options.out / name, dpi=100, bbox_inches="tight")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(fail_clearly(main))

@@ -1,1 +1,0 @@
-"""Studies about the methods themselves; the library imports none of them."""

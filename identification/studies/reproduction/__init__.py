@@ -1,1 +1,0 @@
-"""The report's tables computed again, and the errata among its printed figures."""

@@ -1,0 +1,132 @@
+"""The blind check's recordings, and the gaps of models against the noise-free truth."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from identification.bench import session as bench
+from identification.blind.bench import blind_suite, run_programme, true_recordings
+from identification.blind.explainable import explainable_gap, held_out_gap, recalibrated_parameters
+from identification.blind.truth import NOMINAL, ONE_CAUSE, Trial, draw_trial, top_sizes
+
+SUITE = blind_suite()
+SHORT = next(programme for programme in SUITE if programme.name == "test1")
+
+
+@cache
+def recordings(effect=""):
+    return true_recordings(trial(effect), 0)
+
+
+def trial(effect="") -> Trial:
+    return draw_trial(7, 0, ONE_CAUSE if effect else NOMINAL, [effect] if effect else [])
+
+
+def run(effect, deviation):
+    rng = np.random.default_rng(0)
+    return run_programme(trial(effect).parameters, SHORT, form_deviation=deviation, rng=rng).channels
+
+
+def test_the_suite_is_nine_recordings_of_a_valve_at_work_of_which_two_are_held_out():
+    assert len([programme for programme in SUITE if programme.U_on]) == 9
+    held_out = [programme.name for programme in SUITE if programme.role == "validation"]
+    assert held_out == ["validation", "steps"]
+
+
+def test_without_an_effect_the_bench_is_the_nominal_plant():
+    unit = trial().unit
+    nominal = bench.run_programme(unit, SHORT).channels
+    found = run_programme(unit, SHORT, form_deviation=0.0, rng=np.random.default_rng(0)).channels
+    for name, least in (("p1", 50.0), ("p2", 50.0), ("p3", 50.0), ("I", 5e-5)):
+        np.testing.assert_allclose(found[name], nominal[name], atol=least)
+
+
+@pytest.mark.parametrize(
+    ("effect", "channel", "least"),
+    [("supply_restriction", "p2", 1e3), ("magnetic_saturation", "I", 1e-3)],
+)
+def test_other_forms_are_the_plant_without_the_effect_and_another_with_it(effect, channel, least):
+    """The deviations of the recordings: within the solver's tolerance without, well above noise with."""
+    top = trial().unit.replace(**top_sizes(effect))
+    for valve, same in ((trial().unit, True), (top, False)):
+        fitted, other = (
+            run_programme(
+                valve, SHORT, form_deviation=0.0, rng=np.random.default_rng(0), other_forms=forms
+            ).channels[channel]
+            for forms in ((), (effect,))
+        )
+        apart = np.max(np.abs(other - fitted))
+        assert apart < 0.05 * least if same else apart > least
+
+
+@pytest.mark.parametrize(
+    ("effect", "channel", "least"),
+    [
+        ("pressure_sensor_bias", "p2", 20.0),
+        ("current_sensor_gain", "I", 1e-5),
+        ("command_delay", "I", 1e-3),
+    ],
+)
+def test_effects_outside_the_equations_deviate_too(effect, channel, least):
+    if effect == "pressure_sensor_bias":
+        channel = "p2" if "b_p2" in trial(effect).sizes else "p3"
+    apart = run(effect, 0.15)[channel] - run(effect, 0.0)[channel]
+    assert np.max(np.abs(apart)) > least
+
+
+def test_a_winding_that_heats_begins_each_recording_at_another_temperature():
+    p = trial("coil_heating")
+    energised = [true for true in recordings("coil_heating") if true.programme.U_on]
+    start = [true.channels["I"][0] * p.unit["R"] / true.programme.U_on for true in energised]
+    assert len(set(start)) == len(energised)
+    assert max(start) < 1.0
+
+
+def test_the_true_parameters_leave_no_gap():
+    assert held_out_gap(recordings(), trial().parameters) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_unit_of_the_nominal_design_leaves_nothing_to_explain():
+    fitted = recalibrated_parameters(recordings(), with_scatter=True)
+    assert held_out_gap(recordings(), fitted) == pytest.approx(1.0, abs=2e-3)
+    four = held_out_gap(recordings(), recalibrated_parameters(recordings(), with_scatter=False))
+    assert four > held_out_gap(recordings(), fitted)
+
+
+def test_an_effect_leaves_something():
+    assert explainable_gap(trial("flow_force"), recordings("flow_force"))["explainable"] > 1.05
+
+
+def test_more_of_the_winding_s_warmth_is_found_per_recording():
+    """The model with the true heating closes a gap that it leaves where the start is held cold."""
+    true = recordings("coil_heating")
+    p = trial("coil_heating").parameters
+    assert held_out_gap(true, p) < 1.5 < held_out_gap(true, p.replace(h_coil=0.0))
+
+
+def test_half_the_noise_is_twice_the_gap():
+    """The gap is in noise deviations: a constant error of a current counts by its size."""
+    true = recordings()
+    off = [
+        [replace(r, channels={**r.channels, "I": r.channels["I"] + shift}) for r in true]
+        for shift in (1e-3, 2e-3)
+    ]
+    one, two = (held_out_gap(each, trial().parameters) ** 2 - 1 for each in off)
+    assert two / one == pytest.approx(4.0, rel=0.05)
+
+
+def test_a_parameter_that_is_off_is_beyond_what_units_scatter():
+    """4 % more preload: neither the four nor any unit of the nominal design follows that."""
+    unit = trial().unit
+    off = replace(trial(), sizes={"xPV0": 1.04 * unit["xPV0"]})
+    true = true_recordings(off, 0)
+    assert explainable_gap(replace(off, kind=ONE_CAUSE), true)["explainable"] > 1.5
+
+
+def test_a_biased_start_of_the_circuit_is_read_with_its_bias():
+    biased = replace(trial(), sizes={"b_p2": 1e4})
+    true = true_recordings(biased, 0)
+    assert held_out_gap(true, biased.parameters) == pytest.approx(1.0, abs=2e-3)
+    assert held_out_gap(true, biased.unit) > 1.5

@@ -1,0 +1,85 @@
+"""Calibration of answers made by hand and by chance."""
+
+import numpy as np
+import pytest
+
+from identification.blind.report import (
+    FIRST,
+    INCLUSION,
+    answers_by_trial,
+    calibration_error,
+    expected_calibration_error,
+    reliability,
+)
+from identification.blind.score import Answer, score_trial
+from tests.identification.blind.hand_made import CLAMP, EDDY, NOTHING, answer, label
+
+
+def groups(probabilities, truths):
+    """One answer per trial."""
+    return [[Answer(probability=p, right=bool(r))] for p, r in zip(probabilities, truths, strict=True)]
+
+
+def error(probabilities, truths):
+    return expected_calibration_error(np.array(probabilities), np.array(truths, dtype=bool))
+
+
+def test_a_calibrated_judge_has_hardly_an_error():
+    """Statements of probability p that come true with probability p; chance leaves about 0.01."""
+    rng = np.random.default_rng(0)
+    p = rng.uniform(size=20_000)
+    assert error(p, rng.uniform(size=p.size) < p) < 0.02
+
+
+def test_answers_as_often_right_as_they_say_have_no_error():
+    """Of ten at 0.7 seven are right, of five at 0.2 one."""
+    assert error([0.7] * 10 + [0.2] * 5, [1] * 7 + [0] * 3 + [1] + [0] * 4) == pytest.approx(0.0)
+
+
+def test_an_overconfident_judge_has_the_error_that_hands_compute():
+    """Of 39 answers at 0.995, 33 are right; of 16 at 0.91, 13: both lie in the topmost bin.
+
+    A judge who is too sure in one bin and not sure enough in another errs in both.
+    """
+    sure = error([0.995] * 39 + [0.91] * 16, [1] * 33 + [0] * 6 + [1] * 13 + [0] * 3)
+    assert sure == pytest.approx((53.365 - 46) / 55)
+    mixed = error([0.95] * 10 + [0.55] * 10, [1] * 8 + [0] * 2 + [1] * 9 + [0])
+    assert mixed == pytest.approx((1.5 + 3.5) / 20)
+
+
+def test_the_interval_holds_the_error_and_draws_whole_trials():
+    """Ten copies of each trial's one answer say no more than one."""
+    rng = np.random.default_rng(1)
+    p = rng.uniform(0.5, 1.0, 60)
+    one = calibration_error(groups(p, rng.uniform(size=60) < p - 0.3))
+    rng = np.random.default_rng(1)
+    p = rng.uniform(0.5, 1.0, 60)
+    ten = calibration_error([group * 10 for group in groups(p, rng.uniform(size=60) < p - 0.3)])
+    assert one is not None
+    assert one["low"] < one["value"] < one["high"]
+    assert ten == pytest.approx(one)
+    assert calibration_error([]) is None
+
+
+def test_a_reliability_bin_has_its_mean_and_its_share():
+    (bin_,) = reliability(groups([0.82, 0.88, 0.86], [1, 1, 0]))
+    assert bin_["probability"] == pytest.approx(0.8533, abs=1e-4)
+    assert (bin_["right"]["hits"], bin_["right"]["of"]) == (2, 3)
+    assert [b["right"]["of"] for b in reliability(groups([0.0, 0.1, 0.99, 1.0], [0] * 4))] == [1, 1, 2]
+
+
+def test_a_named_cause_is_wrong_where_none_is_right_and_faint_inclusions_are_left_out():
+    """Named right, named where nothing is, named for a struck effect, and not named."""
+    said = [
+        (label(), answer("known", EDDY, CLAMP)),
+        (NOTHING, answer("known", EDDY)),
+        (label("left_out", ["flow_force"]), answer("ambiguous", CLAMP)),
+        (label(), answer("unknown", EDDY)),
+        (NOTHING, answer("no_gap", (["eddy_current"], 0.005))),
+        (label(), None),
+    ]
+    found = answers_by_trial([score_trial(*pair) for pair in said])
+    first = [(a.probability, a.right) for (a,) in found[FIRST]]
+    assert first == [(0.9, True), (0.9, False), (0.08, False)]
+    included = [[(a.probability, a.right) for a in group] for group in found[INCLUSION]]
+    assert included == [[(0.9, True), (0.08, False)], [(0.9, False)], [(0.08, False)], [(0.9, True)]]

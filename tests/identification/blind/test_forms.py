@@ -1,0 +1,167 @@
+"""The bench's forms: the plant's own without deviation or effect, others with them."""
+
+import numpy as np
+import pytest
+
+from epv_env.plant.coefficients import coefficients
+from epv_env.plant.effects.magnet import saturated_force
+from epv_env.plant.effects.registry import EFFECTS as RECORDS
+from epv_env.plant.effects.registry import effect, effect_constants
+from epv_env.plant.equations import Inputs, State
+from epv_env.plant.parameters import Parameters
+from identification.bench.hybrid_automaton import COMPILED_RIGHT_HAND_SIDES
+from identification.blind.bench import right_hand_side
+from identification.blind.forms import (
+    INSTANT_DROP,
+    LANGEVIN,
+    OTHER_FORMS,
+    langevin,
+    langevin_force,
+    langevin_slope,
+    level_of_force,
+)
+from identification.blind.truth import EFFECTS, top_sizes
+
+PLANT = COMPILED_RIGHT_HAND_SIDES[True]
+DROP, CURRENT = (State._fields.index(name) for name in ("supply_drop", "I"))
+LEVELS = (1e-3, 0.02, 0.03, 0.2, 1.0, 3.0)
+BESIDE_THE_STATE = {"pressure_sensor_bias", "current_sensor_gain", "command_delay"}
+"""Effects that act before or behind the equations of state (tests of the bench)."""
+
+
+def largest(record):
+    """The greatest drawn sizes of an effect by symbol."""
+    return {size.symbol: size.drawn[1] for sizes in record.drawn for size in sizes}
+
+
+def states(warm=0.0):
+    """States in the strokes, moving, with every state of an effect but the winding's away from rest."""
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        yield State(
+            p2=rng.uniform(4e5, 8e5), p3=rng.uniform(2e5, 11e5), xPV=rng.uniform(1e-5, 2e-3),
+            vPV=rng.normal(0, 0.2), xMV=rng.choice([1e-5, 4.9e-4]), vMV=rng.normal(0, 0.3),
+            I=rng.uniform(0.05, 0.5), p1=rng.uniform(9e5, 12e5), air_in_PV=0.0, air_in_MV=0.0,
+            air_vented=0.0, coil_energy=0.0, coil_heat=warm, heat_3=-0.05, heat_2=0.02,
+            far_pressure=-3e4, supply_drop=3e4, lag_2=4e3, lag_3=-6e3,
+        )  # fmt: skip
+
+
+def rates(function, p, q, U=24.0):
+    """Rates and forces at a state."""
+    c, e = coefficients(p), effect_constants(p)
+    return function(np.array(q, float), np.array(Inputs(U, 0.0, 0.0, 0.0), float), c, e, 1.0, 1.0)
+
+
+def all_rates(function, p, warm=0.0):
+    """Rates and forces with the coil on and off, (states, rows)."""
+    return np.array([rates(function, p, q, U) for q in states(warm) for U in (0.0, 18.9)])
+
+
+def test_without_deviation_the_forms_are_the_plant_s():
+    sizes = {symbol: size for record in RECORDS for symbol, size in largest(record).items()}
+    p = Parameters.calibrated().replace(**sizes)
+    np.testing.assert_allclose(
+        all_rates(right_hand_side(0.0), p, 20.0), all_rates(PLANT, p, 20.0), rtol=1e-12
+    )
+
+
+def test_without_effects_there_is_nothing_to_deviate():
+    p = Parameters.calibrated()
+    np.testing.assert_array_equal(
+        all_rates(right_hand_side(0.15), p), all_rates(right_hand_side(0.0), p)
+    )
+
+
+@pytest.mark.parametrize("name", [name for name in EFFECTS if name not in BESIDE_THE_STATE])
+def test_each_effect_deviates_and_by_a_part_of_itself(name):
+    """The deviation moves the rates less than the effect does, where the effect moves them."""
+    p = Parameters.calibrated().replace(**largest(effect(name)))
+    warm = 20.0 if name == "coil_heating" else 0.0
+    off = all_rates(right_hand_side(0.0), Parameters.calibrated())
+    fitted, other = (all_rates(right_hand_side(d), p, warm) for d in (0.0, 0.1))
+    scale = np.max(np.abs(fitted), axis=0) + 1e-30
+    deviates = np.max(np.abs(other - fitted) / scale)
+    assert deviates > 1e-5
+    if name != "armature_bounce":  # which acts in the landings, not in the rates
+        assert deviates < 0.5 * np.max(np.abs(fitted - off) / scale)
+
+
+def top(name):
+    return Parameters.calibrated().replace(**top_sizes(name))
+
+
+def state(**changed):
+    """A valve that fills its circuit, energised, its armature on the way."""
+    usual = State(
+        p2=6e5, p3=4e5, xPV=1e-3, vPV=0.1, xMV=2e-4, vMV=0.2, I=0.3, p1=11e5,
+        air_in_PV=0.0, air_in_MV=0.0, air_vented=0.0, coil_energy=0.0,
+    )  # fmt: skip
+    return usual._replace(**changed)
+
+
+@pytest.mark.parametrize("name", OTHER_FORMS)
+def test_the_other_form_is_the_plant_without_the_effect_and_another_with_it(name):
+    other = right_hand_side(0.0, [name])
+    p = Parameters.calibrated()
+    np.testing.assert_allclose(rates(other, p, state()), rates(PLANT, p, state()), rtol=1e-12)
+    found, fitted = (rates(function, top(name), state()) for function in (other, PLANT))
+    assert np.max(np.abs(found - fitted) / np.maximum(np.abs(fitted), 1e-9)) > 0.01
+
+
+def test_an_instant_drop_is_the_plant_s_once_that_has_settled():
+    """The plant's own drop, run to rest at this flow, gives the rates of the instant one."""
+    p = top(INSTANT_DROP)
+    instant = rates(right_hand_side(0.0, [INSTANT_DROP]), p, state())
+    low, high = 0.0, state().p1 / 3
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        falls = rates(PLANT, p, state(supply_drop=middle))[DROP] < 0
+        low, high = (low, middle) if falls else (middle, high)
+    assert low > 1e4
+    settled = rates(PLANT, p, state(supply_drop=low))
+    settled[DROP] = 0.0
+    np.testing.assert_allclose(instant, settled, rtol=1e-9)
+
+
+def test_a_flow_back_has_no_instant_drop():
+    function = right_hand_side(0.3, [INSTANT_DROP])
+    back = state(p1=5e5, p2=6e5, p3=6e5)
+    np.testing.assert_allclose(
+        rates(function, top(INSTANT_DROP), back),
+        rates(right_hand_side(0.3), Parameters.calibrated(), back),
+        rtol=1e-12,
+    )
+
+
+@pytest.mark.parametrize("u", LEVELS)
+def test_slope_and_force_are_derivatives_of_flux_and_coenergy(u):
+    """With k = N I sMV and u = k/Rm: flux L(3u), force d(Rm G(u))/d(-Rm), G the flux's integral."""
+    h = 1e-4 * u
+    levels = np.linspace(0.0, u + h, 20001)[1:]
+    flux = np.array([langevin(3 * level) for level in (u - h, u + h)])
+    assert langevin_slope(u) == pytest.approx((flux[1] - flux[0]) / (2 * h), rel=1e-4)
+    curve = np.concatenate([[0.0], 1 / np.tanh(3 * levels) - 1 / (3 * levels)])
+    at = np.concatenate([[0.0], levels])
+    coenergy = np.interp(
+        u, at, np.concatenate([[0.0], np.cumsum(np.diff(at) * (curve[1:] + curve[:-1]) / 2)])
+    )
+    assert langevin_force(u) == pytest.approx((u * langevin(3 * u) - coenergy) / u**2, rel=1e-3)
+    assert saturated_force(level_of_force(u)) == pytest.approx(langevin_force(u), rel=1e-9)
+
+
+def test_the_armature_s_force_and_the_current_s_rate_are_those_of_the_langevin_curve():
+    p, q = top(LANGEVIN), state(vMV=0.0)
+    gap = 1.0 / (p["mu0"] * np.pi / 4 * p["dMB"] ** 2)
+    Rm = p["RML"] + (p["xMVmax"] - q.xMV) * gap
+    u = p["sMV"] * p["N"] * q.I / Rm
+    linear = rates(PLANT, Parameters.calibrated(), q)
+    found = rates(right_hand_side(0.0, [LANGEVIN]), p, q)
+    pull = (langevin_force(u) - 0.5) * (p["N"] * q.I / Rm) ** 2 * gap
+    assert found[-1] - linear[-1] == pytest.approx(pull, rel=1e-9)
+    assert found[CURRENT] / linear[CURRENT] == pytest.approx(1 / langevin_slope(u), rel=1e-9)
+
+
+def test_an_effect_without_another_form_is_refused():
+    with pytest.raises(ValueError, match="flow_force has no other form"):
+        right_hand_side(0.0, ["flow_force"])

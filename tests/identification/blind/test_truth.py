@@ -1,0 +1,171 @@
+"""The drawn truths: reproducible, every effect as often, within its physical range."""
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from epv_env.plant.effects.registry import CATALOGUE
+from epv_env.plant.effects.registry import EFFECTS as RECORDS
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.region import CALIBRATED_SYMBOLS
+from identification.blind import truth
+from identification.blind.sealing import truth_label
+from identification.blind.truth import (
+    CALIBRATED_SPREAD,
+    EFFECTS,
+    EXCLUDED_EFFECT,
+    NOMINAL,
+    ONE_CAUSE,
+    TOP_SHARE,
+    TWO_EFFECTS,
+    UNIT_SCATTER,
+    UNIT_SCATTER_LIMIT,
+    draw_trial,
+    draw_unit,
+    trial_plan,
+)
+from identification.valve_gap.causes import PARAMETER_COMPONENTS
+
+
+def causes_of(kind, trials=300):
+    return Counter(cause for k, causes in trial_plan(0, trials) if k == kind for cause in causes)
+
+
+def test_the_same_seed_draws_the_same_truth_and_another_another():
+    assert trial_plan(3, 100) == trial_plan(3, 100) != trial_plan(4, 100)
+    first, again, other = (draw_trial(seed, 5, ONE_CAUSE, ["flow_force"]) for seed in (3, 3, 4))
+    assert first == again
+    assert first.sizes != other.sizes
+
+
+def test_more_trials_leave_the_first_as_they_are():
+    assert trial_plan(3, 300)[:70] == trial_plan(3, 70)
+
+
+def test_kinds_come_in_the_shares_that_are_asked_for():
+    assert Counter(kind for kind, _ in trial_plan(0, 300)) == {
+        NOMINAL: 60,
+        ONE_CAUSE: 150,
+        TWO_EFFECTS: 36,
+        EXCLUDED_EFFECT: 54,
+    }
+
+
+def test_every_effect_is_excluded_equally_often():
+    assert causes_of(EXCLUDED_EFFECT) == dict.fromkeys(EFFECTS, 2)
+
+
+def test_every_effect_comes_up_alone_and_thrice_as_often_as_a_parameter():
+    found = causes_of(ONE_CAUSE, trials=198)  # 99 trials with one cause: the deck once through
+    assert {effect: found[effect] for effect in EFFECTS} == dict.fromkeys(EFFECTS, 3)
+    assert {s: found[f"parameter:{s}"] for s in PARAMETER_COMPONENTS} == dict.fromkeys(
+        PARAMETER_COMPONENTS, 1
+    )
+
+
+def test_pairs_are_two_effects():
+    assert all(len(set(causes)) == 2 for kind, causes in trial_plan(1, 400) if kind == TWO_EFFECTS)
+
+
+def test_every_effect_has_its_own_sizes():
+    assert {effect.name for effect in RECORDS if effect.drawn} == set(CATALOGUE)
+    for effect in RECORDS:
+        drawn = {size.symbol for sizes in effect.drawn for size in sizes}
+        assert drawn <= set(CATALOGUE[effect.name])
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_sizes_are_those_of_the_effect_and_in_its_domain(effect):
+    for number in range(20):
+        trial = draw_trial(0, number, ONE_CAUSE, [effect])
+        assert set(trial.sizes) <= set(CATALOGUE[effect])
+        assert {
+            s: trial.parameters[s] for s in trial.sizes
+        } == trial.sizes  # in the domain, or it raises
+        assert trial.form_deviation > 0
+
+
+def drawn(effect, forms="usual", trials=200):
+    return [draw_trial(0, number, ONE_CAUSE, [effect], forms) for number in range(trials)]
+
+
+@pytest.mark.parametrize("effect", ["supply_restriction", "magnetic_saturation"])
+def test_some_trials_have_the_other_form_and_their_label_says_so(effect):
+    having = [trial.other_forms for trial in drawn(effect)]
+    assert set(having) == {(), (effect,)}
+    assert 0.4 < np.mean([bool(forms) for forms in having]) < 0.6
+    label = truth_label(
+        next(trial for trial in drawn(effect) if trial.other_forms),
+        {"recalibrated": 2.0, "explainable": 2.0}, {}, seed=0,
+    )  # fmt: skip
+    assert label["other_forms"] == [effect]
+
+
+@pytest.mark.parametrize(
+    ("effect", "sizes"),
+    [
+        ("armature_bounce", {"eMV": 0.75}),
+        ("supply_restriction", {"z_supply": 5e4}),
+        ("magnetic_saturation", {"sMV": 8e3}),
+        ("flow_force", None),
+    ],
+)
+def test_some_trials_are_at_the_top_of_what_is_drawn(effect, sizes):
+    share = np.mean([trial.sizes == sizes for trial in drawn(effect)])
+    assert share == pytest.approx(TOP_SHARE, abs=0.08) if sizes else share == 0
+
+
+def test_other_forms_and_tops_leave_the_other_draws_as_they_are(monkeypatch):
+    usual = drawn("armature_bounce")
+    monkeypatch.setattr(truth, "OTHER_FORM_SHARE", 0.0)
+    monkeypatch.setattr(truth, "TOP_SHARE", 0.0)
+    for one, other in zip(usual, drawn("armature_bounce"), strict=True):
+        assert (one.unit, one.form_deviation) == (other.unit, other.form_deviation)
+
+
+def test_strong_forms_deviate_by_a_fifth_to_a_half():
+    deviations = [trial.form_deviation for trial in drawn("flow_force", "strong")]
+    assert 0.20 <= min(deviations) < 0.22
+    assert 0.48 < max(deviations) <= 0.50
+
+
+def test_a_parameter_that_is_off_is_off_by_more_than_scatter():
+    for number in range(20):
+        trial = draw_trial(0, number, ONE_CAUSE, ["parameter:d1"])
+        off = trial.parameters["d1"] / Parameters.calibrated()["d1"] - 1
+        assert 2 * UNIT_SCATTER_LIMIT * UNIT_SCATTER < abs(off) <= 0.05
+        assert trial.form_deviation == 0
+
+
+def test_units_scatter_within_what_is_said():
+    centre = Parameters.calibrated()
+    units = [draw_unit(np.random.default_rng(seed)) for seed in range(200)]
+    for symbols, most in (
+        (CALIBRATED_SYMBOLS, CALIBRATED_SPREAD),
+        (PARAMETER_COMPONENTS, UNIT_SCATTER_LIMIT * UNIT_SCATTER),
+    ):
+        off = np.array([[unit[s] / centre[s] - 1 for s in symbols] for unit in units])
+        assert np.max(np.abs(off)) <= most * (1 + 1e-12)
+        assert np.max(np.abs(np.mean(off, axis=0))) < 0.25 * most
+    assert all(unit[s] == centre[s] for s in ("F_PV", "T_env", "kappa") for unit in units)
+
+
+def test_only_an_effect_outside_the_catalogue_is_excluded():
+    assert draw_trial(0, 1, EXCLUDED_EFFECT, ["seat_leak"]).excluded == ("seat_leak",)
+    assert draw_trial(0, 1, ONE_CAUSE, ["seat_leak"]).excluded == ()
+
+
+def test_half_of_a_pair_is_the_same_valve_with_that_effect():
+    trial = draw_trial(0, 1, TWO_EFFECTS, ["seat_leak", "coil_heating"])
+    half = trial.with_only("seat_leak")
+    assert half.sizes == {"A_PV": trial.sizes["A_PV"]}
+    assert half.unit is trial.unit
+    heating = trial.with_only("coil_heating")
+    assert half.winding_temperature_rise == 0.0
+    restricted = draw_trial(0, 1, TWO_EFFECTS, ["supply_restriction", "seat_leak"])
+    restricted = replace(restricted, other_forms=("supply_restriction",))
+    assert restricted.with_only("supply_restriction").other_forms == ("supply_restriction",)
+    assert restricted.with_only("seat_leak").other_forms == ()
+    assert heating.winding_temperature_rise == trial.winding_temperature_rise

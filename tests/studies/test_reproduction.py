@@ -1,0 +1,95 @@
+"""The report's tables computed again, and its figures checked against each other."""
+
+import json
+
+import pytest
+
+from docs.studies.reproduction.errata import (
+    DOUBT,
+    ERRATUM,
+    HOLDS,
+    figure_checks,
+    interval_position,
+    measurement_points,
+    numeric_check,
+    recomputed_partial,
+    recomputed_total,
+    signal_to_noise,
+)
+from docs.studies.reproduction.study import FOLDER, main, page_parts
+from identification.recordings.recording import CHANNELS
+from identification.report_2003.printed_values import printed_errors
+
+STATUS = {check.where: check.status for check in figure_checks()}
+PUBLISHED = json.loads((FOLDER / "reproduce.json").read_text(encoding="utf-8"))
+
+
+@pytest.mark.slow
+def test_the_short_form_gives_the_published_tables(tmp_path, monkeypatch):
+    """All that does not depend on the number of searches is equal; the estimates agree."""
+    monkeypatch.setattr("sys.argv", ["study", "--quick", "--out", str(tmp_path)])
+    assert main() == 0
+    found = json.loads((tmp_path / "reproduce.json").read_text(encoding="utf-8"))
+    for name in ("table8", "table9", "comparison"):
+        assert found[name].keys() == PUBLISHED[name].keys()
+    for symbol, row in PUBLISHED["table8"].items():
+        assert found["table8"][symbol] == pytest.approx(row, rel=1e-6)
+    assert found["slips"] == PUBLISHED["slips"]
+    for method, values in PUBLISHED["virtual_bench"]["table12"].items():
+        assert found["virtual_bench"]["table12"][method] == pytest.approx(values, rel=1e-4)
+    assert {path.name for path in tmp_path.glob("*.png")} == {"calibration.png", "region.png"}
+
+
+def test_the_page_shows_the_published_results():
+    page = (FOLDER / "README.md").read_text(encoding="utf-8")
+    assert all(part in page for part in page_parts(PUBLISHED).values())
+
+
+def test_total_error_of_table_13_is_not_what_eq_21_gives():
+    assert recomputed_total(13) == pytest.approx(6.8297, abs=1e-4)
+    assert STATUS["Table 13, total error [%]"] == ERRATUM
+    assert STATUS["Table 11, total error [%]"] == HOLDS
+    partials = [status for where, status in STATUS.items() if "partial error" in where]
+    assert partials == [HOLDS] * 9
+
+
+def test_a_changed_figure_would_be_an_erratum():
+    """The checks can fail: a tenth of a percent more in one output breaks the sum of squares."""
+    errors = dict(printed_errors(11)["Test1"])
+    errors["I"] *= 1.001
+    found = numeric_check("", errors["partial"], recomputed_partial(errors), 1.5e-4)
+    assert found.status == ERRATUM
+
+
+def test_only_p2_s_signal_to_noise_ratio_follows_from_its_standard_deviation():
+    fits = [name for name in CHANNELS if STATUS[f"Table 3, SNR of {name} [dB]"] == HOLDS]
+    assert fits == ["p2"]
+    assert signal_to_noise("p2", 0.0098) == pytest.approx(64.26, abs=0.01)
+
+
+def test_seven_of_ten_pairs_are_correlated():
+    (found,) = [check for check in figure_checks() if "non-correlated" in check.where]
+    assert found.recomputed.startswith("7 of 10 pairs beyond ±0.0196")
+
+
+def test_eq_23_has_negative_degrees_of_freedom():
+    assert measurement_points() == 3 * (3 * 1301 + 2101)
+    assert STATUS["Eq. 23, degrees of freedom of F(k, v - k, p)"] == ERRATUM
+
+
+def test_estimates_lie_at_the_upper_ends_of_their_intervals():
+    positions = [interval_position(symbol) for symbol in ("alphaMV", "alphaPV", "RML", "R")]
+    assert positions == pytest.approx([0.935, 0.881, 0.993, 0.999], abs=1e-3)
+    assert [status for where, status in STATUS.items() if "95 % interval" in where] == [DOUBT] * 4
+
+
+def test_what_holds_and_what_is_an_erratum_besides():
+    for where, status in (
+        ("Tables 8 and 9, classes", HOLDS),
+        ("Section 4, samples of the quality record", HOLDS),
+        ("Section 5.1.3, candidate parameters", HOLDS),
+        ("Tables 6 and 7, values within their expected domains", HOLDS),
+        ("Table 5, permeability of vacuum [V s/(A m)]", ERRATUM),
+        ("Table 9, a1, total error [%]", ERRATUM),
+    ):
+        assert STATUS[where] == status, where
