@@ -19,9 +19,9 @@ pytestmark = pytest.mark.training
 import griffe  # noqa: E402
 from markdown.extensions.toc import slugify_unicode  # noqa: E402
 
-from docs.scripts.command_lines import parser_of, subparsers  # noqa: E402
+from docs.scripts.command_lines import parser_of  # noqa: E402
 from docs.scripts.effects_table import effects_table  # noqa: E402
-from docs.scripts.public_names import undocumented  # noqa: E402
+from docs.scripts.hooks import undocumented  # noqa: E402
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("epv_env", "identification", "controllers", "training")
@@ -130,14 +130,17 @@ def test_options_shown_are_those_of_the_commands(tmp_path, monkeypatch):
     """The commands' own parsers accept what the pages show."""
     monkeypatch.chdir(tmp_path)
     for page, words in shown():
-        if words[:2] == ["python", "-m"] and words[2] in ("identification", "docs.examples.tank"):
-            parser, rest = parser_of(words[2]), words[3:]
-        elif words[0] == "python" and words[1].startswith("training/"):
-            parser, rest = parser_of(words[1]), words[2:]
+        if words[0] != "python" or not words[1:]:
+            continue
+        if words[1] == "-m" and words[2] == "identification":
+            command, rest = " ".join(words[1:4]), words[4:]
+        elif words[1] == "-m" and words[2] in ("docs.examples.tank", "docs.studies.coverage.study"):
+            command, rest = " ".join(words[1:3]), words[3:]
+        elif words[1].startswith("training/"):
+            command, rest = words[1], words[2:]
         else:
             continue
-        if own := subparsers(parser):
-            parser, rest = own[rest[0]], rest[1:]
+        parser = parser_of(command)
         try:
             parser.parse_args(rest)
         except SystemExit:
@@ -216,5 +219,5 @@ def test_the_film_in_its_shortest_form(tmp_path):
 
 
 def test_the_table_of_effects_is_that_of_the_records():
-    """Written by `python docs/scripts/effects_table.py`."""
+    """Written by `python -m docs.scripts.effects_table`."""
     assert effects_table() in text("docs/explanation/effects.md")

@@ -4,15 +4,13 @@ import argparse
 import os
 import runpy
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from unittest.mock import patch
 
+from epv_env.common.commands import commands
+
 ROOT = Path(__file__).parents[2]
 """The repository's root."""
-MODULES = ("identification", "docs.examples.tank")
-"""Packages that run as `python -m NAME`."""
 WIDTH = "88"
 """Characters in a line of usage."""
 
@@ -21,80 +19,66 @@ class _Captured(Exception):
     """Carries a parser out of the command that made it."""
 
 
-@contextmanager
-def _parsers_stop() -> Iterator[None]:
-    """Within, a parser raises `_Captured` with itself instead of reading options."""
-
-    def stop(parser: argparse.ArgumentParser, *_: object) -> None:
-        raise _Captured(parser)
-
-    with patch.object(argparse.ArgumentParser, "parse_known_args", stop):
-        yield
-
-
-def scripts() -> list[str]:
-    """The scripts of `training/` that run from the command line, as paths from the root."""
-    files = sorted((ROOT / "training").glob("*.py"))
-    return [f"training/{file.name}" for file in files if "__main__" in file.read_text(encoding="utf-8")]
+def shown_commands() -> list[str]:
+    """Every command of the page, as a user types it after `python`."""
+    library = [f"-m identification {name}" for name in commands(["identification.commands"])]
+    scripts = [
+        f"training/{file.name}"
+        for file in sorted((ROOT / "training").glob("*.py"))
+        if "__main__" in file.read_text(encoding="utf-8")
+    ]
+    return [*library, *scripts, "-m docs.examples.tank"]
 
 
 def parser_of(command: str) -> argparse.ArgumentParser:
-    """The parser of `training/NAME.py` or of `python -m NAME`.
+    """The parser of a command of `shown_commands`, or of another one that `python` runs.
 
     The command is started, and stopped at the moment it reads its options.
     Raises RuntimeError if the command reads none.
     """
-    start = runpy.run_path if command.endswith(".py") else runpy.run_module
-    target = str(ROOT / command) if command.endswith(".py") else command
-    with patch.object(sys, "argv", [command]), _parsers_stop():
+    first, *rest = command.split()
+    module = first == "-m"
+    name, *arguments = rest if module else (first, *rest)
+
+    def stop(parser: argparse.ArgumentParser, *_: object) -> None:
+        raise _Captured(parser)
+
+    with (
+        patch.object(sys, "argv", [name, *arguments]),
+        patch.object(argparse.ArgumentParser, "parse_known_args", stop),
+    ):
         try:
-            start(target, run_name="__main__")
+            if module:
+                runpy.run_module(name, run_name="__main__")
+            else:
+                runpy.run_path(str(ROOT / name), run_name="__main__")
         except _Captured as captured:
             return captured.args[0]
-    raise RuntimeError(f"{command} reads no options: take it off the reference page's list")
-
-
-def subparsers(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
-    """Parsers of a command's own commands by name; empty where there are none."""
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            return dict(action.choices)
-    return {}
+    raise RuntimeError(f"python {command} reads no options: take it off the reference page's list")
 
 
 def page() -> str:
     """All command lines as Markdown."""
-    parts = []
-    for command in (*MODULES, *scripts()):
-        shown = f"python {command}" if command.endswith(".py") else f"python -m {command}"
-        parser = parser_of(command)
-        own = subparsers(parser)
-        parts.append(f"## `{shown}`\n\n{parser.description}")
-        parts += [_section(f"{shown} {name}", sub, "###") for name, sub in own.items()]
-        if not own:
-            parts.append(_options(shown, parser))
-    return "\n\n".join(parts) + "\n"
+    return "\n\n".join(map(_section, shown_commands())) + "\n"
 
 
-def _section(shown: str, parser: argparse.ArgumentParser, level: str) -> str:
-    return f"{level} `{shown}`\n\n{parser.description}\n\n{_options(shown, parser)}"
-
-
-def _options(shown: str, parser: argparse.ArgumentParser) -> str:
-    """Usage and a table of options."""
-    parser.prog = shown
+def _section(command: str) -> str:
+    """Heading, meaning, usage and a table of the options."""
+    parser = parser_of(command)
+    parser.prog = f"python {command}"
     with patch.dict(os.environ, {"COLUMNS": WIDTH, "NO_COLOR": "1"}):
         usage = parser.format_usage()
     rows = [_row(action) for action in parser._actions if action.dest != "help"]
     table = "\n".join(("| Option | Default | Meaning |", "|---|---|---|", *rows))
-    return f"```text\n{usage.strip()}\n```\n\n{table}"
+    return f"## `{parser.prog}`\n\n{parser.description}\n\n```text\n{usage.strip()}\n```\n\n{table}"
 
 
 def _row(action: argparse.Action) -> str:
     """One option: its names, its default and what it means."""
     names = ", ".join(f"`{name}`" for name in action.option_strings or [action.dest.upper()])
-    cells = (names, _default(action), _meaning(action))
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+    choices = f"one of {', '.join(map(str, action.choices))}" if action.choices else ""
+    meaning = "; ".join(filter(None, (action.help, choices))).replace("%%", "%")
+    return "| " + " | ".join(c.replace("|", "\\|") for c in (names, _default(action), meaning)) + " |"
 
 
 def _default(action: argparse.Action) -> str:
@@ -103,14 +87,4 @@ def _default(action: argparse.Action) -> str:
     if action.default is None or action.default is False or action.default == []:
         return "–"
     several = isinstance(action.default, list | tuple)
-    text = ", ".join(map(str, action.default)) if several else str(action.default)
-    return f"`{text}`"
-
-
-def _meaning(action: argparse.Action) -> str:
-    choices = f"one of {', '.join(map(str, action.choices))}" if action.choices else ""
-    return "; ".join(filter(None, (action.help, choices)))
-
-
-if __name__ == "__main__":
-    print(page())
+    return f"`{', '.join(map(str, action.default)) if several else action.default}`"

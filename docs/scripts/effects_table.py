@@ -1,6 +1,6 @@
 """The table of effects in docs/explanation/effects.md, from the effects' records.
 
-    python docs/scripts/effects_table.py
+    python -m docs.scripts.effects_table
 
 writes the part between the page's markers.
 """

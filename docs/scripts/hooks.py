@@ -1,16 +1,35 @@
-"""What mkdocs runs while it builds the site: generated pages join those that are written by hand."""
+"""What mkdocs runs while it builds the site: generated pages join those that are written by hand.
+
+The API reference has one page for each folder of modules. Public names without a docstring are warned
+of, and a warning fails a strict build.
+"""
 
 import logging
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import griffe
 from mkdocs.structure.files import File, Files
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from docs.scripts import api_pages, command_lines, public_names
+from docs.scripts import command_lines
 
+ROOT = Path(__file__).parents[2]
+"""The repository's root."""
+PACKAGES = ("epv_env", "controllers", "identification", "training")
+"""Top-level packages, in the order in which the reference lists them."""
+FOLDER = "reference/api"
+"""Where the pages stand in the site."""
+FOLDER_OPTIONS = """    options:
+      members: []
+      show_root_heading: false
+      show_root_toc_entry: false"""
+"""Show a folder's docstring only; its modules follow."""
+OWN = (*PACKAGES, "typing", "abc", "object")
+"""First words of base classes that do not document the methods of this project's classes."""
 COMMAND_LINES = "<!-- generated: command lines -->"
 """The line of a page that the list of command lines replaces."""
 LOG = logging.getLogger("mkdocs.hooks.public_names")
@@ -21,18 +40,18 @@ API = "API"
 
 def on_config(config: Any) -> Any:
     """Put the API pages into the navigation; warn of public names without a docstring."""
-    for name in public_names.undocumented_names():
+    for name in undocumented_names():
         LOG.warning("%s has no docstring: give it one", name)
     for entry in config.nav:
         for part in entry.get("Reference", []):
             if API in part:
-                part[API] = api_pages.navigation()
+                part[API] = api_navigation()
     return config
 
 
 def on_files(files: Files, config: Any) -> Files:
     """Add the API pages."""
-    for path, text in api_pages.pages().items():
+    for path, text in api_pages().items():
         files.append(File.generated(config, path, content=text))
     return files
 
@@ -42,3 +61,77 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
     if COMMAND_LINES not in markdown:
         return markdown
     return markdown.replace(COMMAND_LINES, command_lines.page())
+
+
+def _modules(package: Path) -> list[Path]:
+    """Python files of one folder that hold code, alphabetically, without `__init__.py`."""
+    return sorted(file for file in package.glob("*.py") if not file.name.startswith("__"))
+
+
+def _folders(package: str) -> list[Path]:
+    """The package's folder and all folders of modules below it."""
+    top = ROOT / package
+    found = sorted({file.parent for file in top.rglob("*.py") if "__pycache__" not in file.parts})
+    return [folder for folder in found if _modules(folder)]
+
+
+def _dotted(path: Path) -> str:
+    """The name under which a folder or file is imported."""
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts)
+
+
+def api_pages() -> dict[str, str]:
+    """Markdown by path in the site, one page for each folder of modules."""
+    return {
+        f"{FOLDER}/{_dotted(folder)}.md": _page(folder)
+        for package in PACKAGES
+        for folder in _folders(package)
+    }
+
+
+def _page(folder: Path) -> str:
+    """A heading, the folder's docstring, and a line for each module, which mkdocstrings replaces."""
+    name = _dotted(folder)
+    sections = [f"::: {_dotted(module)}" for module in _modules(folder)]
+    return "\n\n".join((f"# `{name}`", f"::: {name}\n{FOLDER_OPTIONS}", *sections)) + "\n"
+
+
+def api_navigation() -> list[dict[str, object]]:
+    """The pages as entries of the site's navigation, grouped by package."""
+    return [
+        {package: [{_dotted(folder): f"{FOLDER}/{_dotted(folder)}.md"} for folder in _folders(package)]}
+        for package in PACKAGES
+    ]
+
+
+def undocumented_names() -> list[str]:
+    """Public modules, classes, functions and methods of the packages without a docstring."""
+    loaded = [griffe.load(package, search_paths=[ROOT]) for package in PACKAGES]
+    return [path for module in loaded for path in undocumented(module)]
+
+
+def undocumented(owner: griffe.Object | griffe.Alias) -> Iterator[str]:
+    """Paths of the names below a module or class.
+
+    A method is documented elsewhere if its class overrides one of another project's classes. A class
+    may also set its `__doc__`.
+    """
+    for name, member in owner.members.items():
+        if name.startswith("_") or member.is_alias:
+            continue
+        if _needs_docstring(member) and not member.has_docstring and "__doc__" not in member.members:
+            yield member.path
+        if member.is_module or member.is_class:
+            yield from undocumented(member)
+
+
+def _needs_docstring(member: griffe.Object | griffe.Alias) -> bool:
+    if member.is_function and isinstance(member.parent, griffe.Class):
+        return not _overrides_another_project(member.parent)
+    return member.is_module or member.is_class or member.is_function
+
+
+def _overrides_another_project(owner: griffe.Class) -> bool:
+    """Whether a class has a base outside this project."""
+    names = (base if isinstance(base, str) else base.canonical_path for base in owner.bases)
+    return any(name.split(".")[0] not in OWN for name in names)
