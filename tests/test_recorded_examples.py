@@ -13,8 +13,8 @@ from docs.examples.pendulum.plant import pendulum
 from docs.examples.recorded_disturbances import RIPPLE_PERIODS, RIPPLE_SIZE, disturbed
 from docs.examples.thermal_lab.plant import thermal_lab
 from docs.examples.toy_car.plant import toy_car
-from identification.gap.model.ode_plant import OdePlant
-from identification.gap.model.prepared_plant import prepared
+from identification.gap.ode_plant import OdePlant
+from identification.gap.prepared_plant import prepared
 
 ROOT = Path(__file__).parents[1]
 RECORDED = ROOT.parent / "shared" / "recorded"

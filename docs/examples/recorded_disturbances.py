@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.signal import lfilter
 
-from identification.gap.model.ode_plant import OdePlant
-from identification.gap.model.prepared_plant import prepared
+from identification.gap.ode_plant import OdePlant
+from identification.gap.prepared_plant import prepared
 
 NOISE_FACTORS = {"sigma=0.3": 0.3, "sigma=3": 3.0}
 """Factors by which the noise is stated too small or too large [1]."""

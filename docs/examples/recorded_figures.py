@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from identification.gap.diagnosis import Diagnosis
-from identification.gap.fit.prediction import predict
 from identification.gap.gap_json import drawn_term
+from identification.gap.prediction import predict
 from identification.gap.report_figures import missing_term_figure
 
 RECALIBRATED, WITH_CAUSES, MEASURED = "tab:orange", "tab:blue", "black"

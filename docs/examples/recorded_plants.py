@@ -13,12 +13,10 @@ from docs.examples.recorded_disturbances import DISTURBANCES, disturbed
 from docs.examples.recorded_figures import write_figures
 from epv_env.common.command_line import writable_folder
 from identification.gap.diagnosis import Diagnosis, diagnose
-from identification.gap.fit.prediction import predict
 from identification.gap.gap_json import write_results
-from identification.gap.model.cause import Cause
-from identification.gap.model.free_parameter import FreeParameter
-from identification.gap.model.ode_plant import OdePlant
-from identification.gap.model.recorded_run import Run
+from identification.gap.ode_plant import OdePlant
+from identification.gap.plant import Cause, FreeParameter, Run
+from identification.gap.prediction import predict
 from identification.gap.report_page import sections
 from identification.gap.sentences import verdict_sentence
 from identification.report.page import write_page

@@ -15,8 +15,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.fit.prediction import Prediction
-from identification.gap.model.grey_box import GreyBox
+from identification.gap.plant import GreyBox
+from identification.gap.prediction import Prediction
 from identification.gap.reduce.settings import ReductionSettings
 
 

@@ -5,12 +5,8 @@ from dataclasses import replace
 from itertools import combinations
 
 from identification.gap.evidence import EvaluatedHypothesis, evaluate
-from identification.gap.fit.fit_cache import FitCache
-from identification.gap.fit.fitting_problem import FittingProblem
-from identification.gap.fit.gauss_newton import fit
-from identification.gap.fit.hypothesis import Estimate, Hypothesis
-from identification.gap.fit.linearisation import linearise
-from identification.gap.fit.variable_projection import LinearisedRun
+from identification.gap.fitting_problem import Estimate, FitCache, FittingProblem, Hypothesis
+from identification.gap.gauss_newton import fit, linearise
 from identification.gap.posterior import Posterior, misfit_beyond_noise, posterior
 from identification.gap.rank.settings import RankingSettings
 from identification.gap.recalibration import refit, with_own_nuisances
@@ -26,6 +22,7 @@ from identification.gap.screening import (
     simulated_starts,
     with_cause,
 )
+from identification.gap.variable_projection import LinearisedRun
 
 
 class HypothesisPool:
@@ -235,7 +232,7 @@ def _fit_promising_pairs(
     settings, problem = pool.settings, pool.problem
     wanted: list[frozenset[str]] | None = None
     if not _is_small(pool):
-        labels = promising_pairs(base_runs, signatures, problem.settings.largest_deviation)
+        labels = promising_pairs(base_runs, signatures)
         wanted = [own for own in labels if own not in pool][: settings.screened_pairs]
     together = [
         _both(problem, base, first, second)

@@ -5,11 +5,8 @@ from dataclasses import dataclass, replace
 from identification.block_bootstrap import Interval
 from identification.gap.cause_search import HypothesisPool, search_causes
 from identification.gap.evidence import EvaluatedHypothesis, evaluate_linearised
-from identification.gap.fit.fit_cache import FitCache
-from identification.gap.fit.fitting_problem import FittingProblem
-from identification.gap.fit.hypothesis import Estimate, Hypothesis
-from identification.gap.fit.linearisation import linearise
-from identification.gap.fit.settings import FitSettings
+from identification.gap.fitting_problem import Estimate, FitCache, FittingProblem, Hypothesis
+from identification.gap.gauss_newton import linearise
 from identification.gap.held_out import (
     NOMINAL,
     RECALIBRATED,
@@ -17,10 +14,10 @@ from identification.gap.held_out import (
     measure_discrepancy_reduction,
 )
 from identification.gap.localisation import Localisation, locate
-from identification.gap.model.checks import check
-from identification.gap.model.grey_box import GreyBox
-from identification.gap.model.prepared_plant import prepared
+from identification.gap.plant import GreyBox
+from identification.gap.plant_checks import check
 from identification.gap.posterior import Posterior
+from identification.gap.prepared_plant import prepared
 from identification.gap.rank.settings import RankingSettings
 from identification.gap.recalibration import (
     recalibrate,
@@ -120,9 +117,9 @@ def diagnose(
         PlantError: something is wrong with the plant or its recordings; each finding is one line.
     """
     settings, cache = settings or DiagnosisSettings(), cache or FitCache(plant)
-    warnings = check(plant, settings.preparation)
-    plant = prepared(plant, settings.preparation)
-    ranking = rank_hypotheses(plant, cache, settings.ranking, settings.fit, settings.reduction)
+    warnings = check(plant)
+    plant = prepared(plant)
+    ranking = rank_hypotheses(plant, cache, settings.ranking, settings.reduction)
     cache.announce("where")
     localisation = _locate(ranking, ranking.recalibrated, seed, settings)
     cache.announce("how far it shrinks")
@@ -213,7 +210,6 @@ def rank_hypotheses(
     plant: GreyBox,
     cache: FitCache | None = None,
     settings: RankingSettings | None = None,
-    fit_settings: FitSettings | None = None,
     floor: ReductionSettings | None = None,
 ) -> Ranking:
     """Refit the promising hypotheses and weigh them; a fit that does not converge is weighed as it is.
@@ -222,23 +218,21 @@ def rank_hypotheses(
         plant: the model, its recordings and its catalogue of causes.
         cache: runs the fits; None keeps nothing.
         settings: judgement of the ranking; None: the defaults.
-        fit_settings: judgement of the fits; None: the defaults.
         floor: how noise is seen in residuals; None: the defaults.
     """
     settings, cache, plant = settings or RankingSettings(), cache or FitCache(plant), prepared(plant)
-    fit_settings = fit_settings or FitSettings()
-    if len(plant.causes) <= settings.multi_start_causes:
-        fit_settings = fit_settings.thorough
-    problem, base = recalibrate(plant, cache, fit_settings)
+    thorough = len(plant.causes) <= settings.multi_start_causes
+    problem, base = recalibrate(plant, cache, thorough=thorough)
     corrected = with_seen_noise(problem, base, settings, floor or ReductionSettings())
     if corrected is not plant:
-        problem, base = recalibrate(corrected, cache, fit_settings, "with the noise seen: ")
+        prefix = "with the noise seen: "
+        problem, base = recalibrate(corrected, cache, thorough=thorough, prefix=prefix)
     ranking = _searched(problem, base, cache, settings)
     weighted = with_disturbance(corrected, ranking.discrepancies, settings)
     if weighted is corrected:
         return ranking
     cache = cache.named("with the disturbance: ")
-    return _searched(*recalibrate(weighted, cache, fit_settings), cache, settings)
+    return _searched(*recalibrate(weighted, cache, thorough=thorough), cache, settings)
 
 
 def _searched(
@@ -255,9 +249,7 @@ def _searched(
     runs = linearise(problem, [base], problem.all_runs)[0]
     base_runs = [runs[r] for r in problem.fitted_runs]
     signatures = simulate_signatures(problem, base, problem.plant.causes)
-    separability = assess_separability(
-        base_runs, signatures, problem.settings.largest_deviation, settings
-    )
+    separability = assess_separability(base_runs, signatures, settings)
     evaluated = evaluate_linearised(problem, base, runs, settings)
     step = "recalibration: own nuisances"
     recalibrated = with_own_nuisances(problem, [evaluated], step, cache, settings)[0]

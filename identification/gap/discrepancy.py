@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from identification.gap.model.grey_box import GreyBox
+from identification.gap.plant import GreyBox
 from identification.gap.rank.settings import RankingSettings
 from identification.gap.reduce.settings import ReductionSettings
 

@@ -9,17 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.fit.fitting_problem import FittingProblem
-from identification.gap.fit.hypothesis import Estimate, cause_places
-from identification.gap.fit.linearisation import linearise
-from identification.gap.fit.prediction import with_settled_runs
-from identification.gap.fit.variable_projection import (
+from identification.gap.fitting_problem import Estimate, FittingProblem, cause_places
+from identification.gap.gauss_newton import linearise
+from identification.gap.prediction import with_settled_runs
+from identification.gap.rank.settings import RankingSettings
+from identification.gap.variable_projection import (
     LinearisedRun,
     NormalEquations,
     normal_equations,
     without_run_nuisances,
 )
-from identification.gap.rank.settings import RankingSettings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,14 +105,13 @@ def evaluate_linearised(
     settings: RankingSettings,
 ) -> EvaluatedHypothesis:
     """An estimate on all runs, linearised."""
-    bound = problem.settings.largest_deviation
-    tolerances = normal_equations(runs, bound).tolerances
-    freed = [without_run_nuisances(run, tolerances, bound) for run in runs]
+    tolerances = normal_equations(runs).tolerances
+    freed = [without_run_nuisances(run, tolerances) for run in runs]
     residuals = [
         residual.reshape(run.measured.shape)
         for (residual, _), run in zip(freed, problem.plant.runs, strict=True)
     ]
-    fitted = normal_equations([runs[r] for r in problem.fitted_runs], bound)
+    fitted = normal_equations([runs[r] for r in problem.fitted_runs])
     scales = [parameter.scale for parameter in problem.parameters(estimate)]
     deviations = _squared_deviations(runs, [step for _, step in freed], tolerances)
     return EvaluatedHypothesis(

@@ -17,15 +17,20 @@ from scipy.linalg import solve_triangular
 from scipy.special import log_softmax
 
 from identification.gap.design.settings import DesignSettings
-from identification.gap.fit.fitting_problem import FittingProblem
-from identification.gap.fit.hypothesis import Estimate, cause_places, nominal_vector
-from identification.gap.fit.linearisation import linearise, nuisance_slopes
-from identification.gap.fit.variable_projection import (
+from identification.gap.fitting_problem import (
+    FAILED_RESIDUAL,
+    Estimate,
+    FittingProblem,
+    cause_places,
+    nominal_vector,
+)
+from identification.gap.gauss_newton import linearise, nuisance_slopes
+from identification.gap.plant import GreyBox
+from identification.gap.variable_projection import (
     LinearisedRun,
     normal_equations,
     tolerances_as_slopes,
 )
-from identification.gap.model.grey_box import GreyBox
 from identification.gap.verdict import Ranking
 
 
@@ -104,7 +109,7 @@ def expected_information(
     gains = []
     for r, run in enumerate(plan.runs):
         own = [runs[r] for runs in predictions]
-        if any(np.any(line.residual == planned.settings.failed_residual) for line in own):
+        if any(np.any(line.residual == FAILED_RESIDUAL) for line in own):
             means, covariances = np.zeros((len(own), 1)), np.ones((len(own), 1, 1))
         else:
             channels, period = run.measured.shape[0], float(run.time[1])
@@ -120,9 +125,9 @@ def _planned_problem(
 ) -> tuple[FittingProblem, list[Estimate]]:
     """The plan with nuisance slopes at the first rival, and the rivals in the plan's runs."""
     planned = [_planned(estimate, plan) for estimate in estimates]
-    rough = FittingProblem(plan, settings=problem.settings)
+    rough = FittingProblem(plan, thorough=problem.thorough)
     slopes = nuisance_slopes(rough, planned[:1], [np.zeros(len(plan.tolerances))])[0]
-    return FittingProblem(plan, slopes, problem.settings), planned
+    return FittingProblem(plan, slopes, thorough=problem.thorough), planned
 
 
 def _planned(estimate: Estimate, plan: GreyBox) -> Estimate:
@@ -187,9 +192,7 @@ def parameter_posteriors(
     posteriors = []
     linearised = linearise(problem, estimates, problem.fitted_runs)
     for estimate, runs in zip(estimates, linearised, strict=True):
-        equations = normal_equations(
-            [tolerances_as_slopes(run) for run in runs], problem.settings.largest_deviation
-        )
+        equations = normal_equations([tolerances_as_slopes(run) for run in runs])
         parameters = problem.parameters(estimate)
         widths = np.array([(p.high - p.low) / p.scale for p in parameters])
         prior = np.concatenate([12.0 / widths**2, np.ones(runs[0].tolerance_slopes.shape[1])])

@@ -11,14 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.fit.fitting_problem import FittingProblem
-from identification.gap.fit.hypothesis import Estimate
-from identification.gap.fit.linearisation import linearise
-from identification.gap.fit.variable_projection import LinearisedRun
+from identification.gap.fitting_problem import Estimate, FittingProblem
+from identification.gap.gauss_newton import linearise
 from identification.gap.locate.settings import LocalisationSettings
-from identification.gap.model.grey_box import GreyBox, noise_weighted
-from identification.gap.model.state_equation import StateEquation, StateTrace
+from identification.gap.plant import GreyBox, StateEquation, StateTrace, noise_weighted
 from identification.gap.sensor_faults import physical_forms, reading_faults
+from identification.gap.variable_projection import LinearisedRun
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,8 +17,7 @@ from identification.block_bootstrap import (
 )
 from identification.gap.discrepancy import LAGS, noise_ratios, squared_differences
 from identification.gap.locate.settings import LocalisationSettings
-from identification.gap.model.grey_box import GreyBox
-from identification.gap.model.recorded_run import Run
+from identification.gap.plant import GreyBox, Run
 from identification.gap.reduce.settings import ReductionSettings
 
 FLOOR = 1.0

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from identification.gap.fit.fitting_problem import FittingProblem
-from identification.gap.fit.hypothesis import Estimate
+from identification.gap.fitting_problem import Estimate, FittingProblem
 from identification.gap.forcing import (
     LocalisationDesign,
     QuadraticForm,
@@ -24,9 +23,9 @@ from identification.gap.forcing import (
 )
 from identification.gap.gaps import RegimeGap, regime_gaps, regimes_of
 from identification.gap.locate.settings import LocalisationSettings
-from identification.gap.model.state_equation import StateEquation
-from identification.gap.model.time_scale import time_scale
+from identification.gap.plant import StateEquation
 from identification.gap.reduce.settings import ReductionSettings
+from identification.gap.time_scale import time_scale
 
 FREE, SLOW = "free", "slow"
 """Processes in time: independent windows, or neighbours alike. Other processes bear a state's name."""

@@ -20,7 +20,7 @@ from scipy.special import gammaln, softmax
 
 from identification.gap.discrepancy import ChannelDiscrepancy, channel_discrepancies
 from identification.gap.evidence import EvaluatedHypothesis
-from identification.gap.fit.fitting_problem import FittingProblem
+from identification.gap.fitting_problem import FittingProblem
 from identification.gap.rank.settings import RankingSettings
 
 

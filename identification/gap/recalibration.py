@@ -12,15 +12,11 @@ import numpy as np
 
 from identification.gap.discrepancy import LAGS, ChannelDiscrepancy, noise_ratios, squared_differences
 from identification.gap.evidence import EvaluatedHypothesis, evaluate
-from identification.gap.fit.fit_cache import FitCache
-from identification.gap.fit.fitting_problem import FittingProblem
-from identification.gap.fit.gauss_newton import fit
-from identification.gap.fit.hypothesis import Estimate, Hypothesis
-from identification.gap.fit.linearisation import nuisance_slopes
-from identification.gap.fit.prediction import predict
-from identification.gap.fit.settings import FitSettings
-from identification.gap.model.grey_box import GreyBox
-from identification.gap.model.prepared_plant import PreparedPlant, prepared
+from identification.gap.fitting_problem import Estimate, FitCache, FittingProblem, Hypothesis
+from identification.gap.gauss_newton import fit, nuisance_slopes
+from identification.gap.plant import GreyBox
+from identification.gap.prediction import predict
+from identification.gap.prepared_plant import PreparedPlant, prepared
 from identification.gap.rank.settings import RankingSettings
 from identification.gap.reduce.settings import ReductionSettings
 from identification.gap.screening import Start
@@ -29,7 +25,8 @@ from identification.gap.screening import Start
 def recalibrate(
     plant: GreyBox,
     cache: FitCache | None = None,
-    settings: FitSettings | None = None,
+    *,
+    thorough: bool = False,
     prefix: str = "",
 ) -> tuple[FittingProblem, Estimate]:
     """The nominal model with its calibrated parameters refitted, and the problem with its nuisances.
@@ -37,15 +34,15 @@ def recalibrate(
     Args:
         plant: the model and its recordings.
         cache: runs the fits; None keeps nothing.
-        settings: judgement of the fits; None: the defaults.
+        thorough: whether fits go on until little is left to gain.
         prefix: of the names of both fits in the journal.
     """
     cache = cache or FitCache(plant)
-    rough = FittingProblem(plant, settings=settings)
+    rough = FittingProblem(plant, thorough=thorough)
     start = rough.start(Hypothesis(causes=()), {})
     calibrated = cache(f"{prefix}calibration", lambda: fit(rough, [start]))[0]
     slopes = nuisance_slopes(rough, [calibrated], [np.zeros(len(plant.tolerances))])[0]
-    problem = FittingProblem(plant, slopes, settings)
+    problem = FittingProblem(plant, slopes, thorough=thorough)
     base = cache(f"{prefix}recalibration", lambda: fit(problem, [restarted(calibrated)]))[0]
     return problem, base
 

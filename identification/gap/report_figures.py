@@ -16,8 +16,7 @@ from identification.gap.gap_json import parameter_intervals
 from identification.gap.gaps import FLOOR, Gap, RegimeGap
 from identification.gap.held_out import DiscrepancyReduction
 from identification.gap.localisation import ForcingEstimate, MissingTerm
-from identification.gap.model.free_parameter import FreeParameter
-from identification.gap.model.grey_box import GreyBox
+from identification.gap.plant import FreeParameter, GreyBox
 from identification.gap.quantities import (
     probability_text,
     quantity_with_interval,

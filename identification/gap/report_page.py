@@ -10,7 +10,7 @@ from identification.gap.evidence import EvaluatedHypothesis
 from identification.gap.gap_json import discrepancy, drawn_term, inclusion, parameter_covariance
 from identification.gap.gaps import FLOOR, Gap, regimes_of
 from identification.gap.localisation import Localisation
-from identification.gap.model.free_parameter import FreeParameter
+from identification.gap.plant import FreeParameter
 from identification.gap.quantities import (
     gap_text,
     gap_with_interval,

@@ -7,12 +7,15 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.fit.changed_run import ChangedRuns
-from identification.gap.fit.fitting_problem import FittingProblem
-from identification.gap.fit.hypothesis import Estimate, Hypothesis
-from identification.gap.fit.variable_projection import LinearisedRun, NormalEquations, normal_equations
-from identification.gap.model.cause import Cause
+from identification.gap.fitting_problem import Estimate, FittingProblem, Hypothesis
+from identification.gap.plant import Cause
 from identification.gap.rank.settings import RankingSettings
+from identification.gap.variable_projection import (
+    ChangedRuns,
+    LinearisedRun,
+    NormalEquations,
+    normal_equations,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,7 +164,7 @@ def screen_causes(
     if not signatures:
         return []
     changes = [signature.changes for signature in signatures]
-    changed = ChangedRuns(base_runs, changes, problem.settings.largest_deviation)
+    changed = ChangedRuns(base_runs, changes)
     tried = [
         _adapted(problem, base, signature.estimate, changed.explained(i))
         for i, signature in enumerate(signatures)
@@ -189,7 +192,7 @@ def promising_causes(
     if not signatures:
         return []
     changes = [signature.changes for signature in signatures]
-    changed = ChangedRuns(base_runs, changes, problem.settings.largest_deviation)
+    changed = ChangedRuns(base_runs, changes)
     least: dict[str, float] = {}
     for i, signature in enumerate(signatures):
         label = signature.cause.label
@@ -220,7 +223,7 @@ def simulated_starts(
         return []
     residuals = problem.residuals([base, *estimates], problem.fitted_runs)
     changes = [[block[:, 0] - block[:, 1 + k] for block in residuals] for k in range(len(estimates))]
-    changed = ChangedRuns(base_runs, changes, problem.settings.largest_deviation)
+    changed = ChangedRuns(base_runs, changes)
     return [
         _adapted(problem, base, estimate, changed.explained(k)) for k, estimate in enumerate(estimates)
     ]
@@ -278,7 +281,6 @@ def _bounded_last_step(equations: NormalEquations, low: float, high: float) -> t
 def promising_pairs(
     base_runs: Sequence[LinearisedRun],
     signatures: Sequence[CauseSignature],
-    largest_deviation: float,
 ) -> list[frozenset[str]]:
     """Pairs of labels by falling decrease of chi-square, both changes taken as linear in their sizes.
 
@@ -287,7 +289,6 @@ def promising_pairs(
     Args:
         base_runs: the base estimate linearised in the fitted runs.
         signatures: from `simulate_signatures` beside the same base; the first of each cause counts.
-        largest_deviation: bound of nuisance parameters [standard deviations].
     """
     first: dict[str, CauseSignature] = {}
     for signature in signatures:
@@ -298,7 +299,7 @@ def promising_pairs(
         replace(run, slopes=np.column_stack([run.slopes, *(s.changes[r] for s in first.values())]))
         for r, run in enumerate(base_runs)
     ]
-    equations = normal_equations(runs, largest_deviation)
+    equations = normal_equations(runs)
     k = base_runs[0].slopes.shape[1]
     hessian, gradient = equations.hessian, equations.gradient
     own = hessian[:k, :k] + 1e-9 * np.eye(k)
@@ -319,7 +320,6 @@ def promising_pairs(
 def assess_separability(
     base_runs: Sequence[LinearisedRun],
     signatures: Sequence[CauseSignature],
-    largest_deviation: float,
     settings: RankingSettings,
 ) -> Separability:
     """Separability of the causes at their first trial values.
@@ -327,7 +327,6 @@ def assess_separability(
     Args:
         base_runs: the base estimate linearised in the fitted runs.
         signatures: from `simulate_signatures` beside the same base.
-        largest_deviation: bound of nuisance parameters [standard deviations].
         settings: thresholds that the result keeps.
     """
     first: dict[str, CauseSignature] = {}
@@ -337,7 +336,7 @@ def assess_separability(
         replace(run, slopes=np.column_stack([run.slopes, *(s.changes[r] for s in first.values())]))
         for r, run in enumerate(base_runs)
     ]
-    hessian = normal_equations(runs, largest_deviation).hessian
+    hessian = normal_equations(runs).hessian
     k = base_runs[0].slopes.shape[1]
     cross = hessian[:k, k:]
     gram = hessian[k:, k:] - cross.T @ np.linalg.solve(hessian[:k, :k] + 1e-9 * np.eye(k), cross)

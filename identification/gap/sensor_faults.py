@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from identification.gap.locate.settings import LocalisationSettings
-from identification.gap.model.grey_box import GreyBox, noise_weighted
-from identification.gap.model.state_equation import StateEquation
+from identification.gap.plant import GreyBox, StateEquation, noise_weighted
 
 TIMING = "timing"
 """Name of the place where all channels are late together."""

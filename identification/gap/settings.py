@@ -3,9 +3,7 @@
 from dataclasses import dataclass, field
 
 from identification.gap.design.settings import DesignSettings
-from identification.gap.fit.settings import FitSettings
 from identification.gap.locate.settings import LocalisationSettings
-from identification.gap.model.settings import PreparationSettings
 from identification.gap.rank.settings import RankingSettings
 from identification.gap.reduce.settings import ReductionSettings
 
@@ -52,8 +50,6 @@ class ReportSettings:
 class DiagnosisSettings:
     """Judgement of every stage of a diagnosis."""
 
-    preparation: PreparationSettings = field(default_factory=PreparationSettings)
-    fit: FitSettings = field(default_factory=FitSettings)
     ranking: RankingSettings = field(default_factory=RankingSettings)
     localisation: LocalisationSettings = field(default_factory=LocalisationSettings)
     reduction: ReductionSettings = field(default_factory=ReductionSettings)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from identification.gap.discrepancy import ChannelDiscrepancy
 from identification.gap.evidence import EvaluatedHypothesis
-from identification.gap.fit.fitting_problem import FittingProblem
+from identification.gap.fitting_problem import FittingProblem
 from identification.gap.localisation import Localisation
 from identification.gap.posterior import variance_inflation
 from identification.gap.rank.settings import RankingSettings

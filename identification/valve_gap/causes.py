@@ -6,10 +6,17 @@ from epv_env.plant.effects.record import Size
 from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.parameters import Parameters, table
 from epv_env.plant.region import CALIBRATED_SYMBOLS
-from identification.gap.model.cause import Cause
-from identification.gap.model.free_parameter import FreeParameter, NuisanceParameter
+from identification.gap.plant import Cause, FreeParameter, NuisanceParameter
 from identification.replay.parameter_vector import ParameterVector
-from identification.valve_gap.settings import VALVE, ValveSettings
+
+PARAMETER_RANGE = 0.1
+"""Share by which a parameter that is not calibrated may be off [-]: Tables 8 and 9 vary them so far."""
+
+PARAMETER_TRIALS = (1.03, 0.97)
+"""Factors on such a parameter's value from which its fit begins [-]."""
+
+PARAMETER_PRIOR = 0.5
+"""Prior probability that a parameter is off, relative to that of an effect [-]."""
 
 PARAMETER_COMPONENTS = {
     "cMV": "armature", "dMB": "solenoid", "mMV": "armature", "N": "solenoid", "xMV0": "armature",
@@ -24,7 +31,6 @@ PARAMETER_COMPONENTS = {
 def catalogue(
     nominal: Parameters,
     without: Sequence[str] = (),
-    settings: ValveSettings = VALVE,
     free: Collection[str] = CALIBRATED_SYMBOLS,
 ) -> tuple[Cause, ...]:
     """All causes but those named; without those parameters that calibration fits anyway.
@@ -32,7 +38,7 @@ def catalogue(
     nominal: parameters of the model. free: symbols that calibration fits. Raises ValueError for a name
     that no cause has.
     """
-    every = effects() + [c for c in parameters(nominal, settings) if c.parameters[0].symbol not in free]
+    every = effects() + [c for c in parameters(nominal) if c.parameters[0].symbol not in free]
     unknown = set(without) - {cause.name for cause in every}
     if unknown:
         known = ", ".join(dict.fromkeys(cause.name for cause in every))
@@ -56,15 +62,15 @@ def effects() -> list[Cause]:
     ]
 
 
-def parameters(nominal: Parameters, settings: ValveSettings = VALVE) -> list[Cause]:
+def parameters(nominal: Parameters) -> list[Cause]:
     """Causes `parameter:<symbol>`: a parameter outside the four off its nominal value."""
     return [
         Cause(
             name=f"parameter:{symbol}",
             words=f"another {symbol} ({table()[symbol].meaning})",
             component=component,
-            parameters=(parameter_size(symbol, nominal, settings),),
-            prior=settings.parameter_prior,
+            parameters=(parameter_size(symbol, nominal),),
+            prior=PARAMETER_PRIOR,
             exact_form=True,
         )
         for symbol, component in PARAMETER_COMPONENTS.items()
@@ -90,16 +96,16 @@ def _run_parameter(size: Size) -> NuisanceParameter:
     return NuisanceParameter(symbol=size.symbol, sd=size.scatter or 0.0, step=size.difference or 0.0)
 
 
-def parameter_size(symbol: str, nominal: Parameters, settings: ValveSettings = VALVE) -> FreeParameter:
+def parameter_size(symbol: str, nominal: Parameters) -> FreeParameter:
     """A parameter that is not off by itself; its scale is its nominal value."""
     value, (low, high) = nominal[symbol], nominal.domain(symbol)
     return FreeParameter(
         symbol=symbol,
         unit=table()[symbol].unit,
-        low=max(low, value * (1 - settings.parameter_range)),
-        high=min(high, value * (1 + settings.parameter_range)),
+        low=max(low, value * (1 - PARAMETER_RANGE)),
+        high=min(high, value * (1 + PARAMETER_RANGE)),
         nominal=value,
-        trials=tuple(value * factor for factor in settings.parameter_trials),
+        trials=tuple(value * factor for factor in PARAMETER_TRIALS),
         scale=value,
     )
 

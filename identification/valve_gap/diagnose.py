@@ -15,7 +15,7 @@ from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from epv_env.plant.region import Region
 from identification.bench.programmes import at_voltage, save_programmes
 from identification.gap.diagnosis import Diagnosis, diagnose, hypothesis_label
-from identification.gap.fit.fit_cache import FitCache
+from identification.gap.fitting_problem import FitCache
 from identification.gap.gap_json import fitted_values, parameter_covariance, write_results
 from identification.gap.report_page import sections
 from identification.recordings.campaign_files import read_campaign
@@ -27,6 +27,9 @@ from identification.valve_gap.programmes import FILE_NAME as PROGRAMME
 from identification.valve_gap.valve import Valve
 
 REPORT, PLANT, JOURNAL = "report.html", "plant.json", "fits.jsonl"
+
+REGION_PROBABILITY = 0.95
+"""Probability that the plant file's region holds the parameters [-]."""
 
 STEP_COUNT = 18
 """Steps of a diagnosis with pairs. Without pairs there are two less; more effects than two, or a
@@ -112,7 +115,7 @@ def refitted_plant(found: Diagnosis, valve: Valve, name: str) -> Plant:
             centre=parameters,
             symbols=symbols,
             covariance=parameter_covariance(found, best),
-            chi_square=float(chi2.ppf(valve.settings.region_probability, len(symbols))),
+            chi_square=float(chi2.ppf(REGION_PROBABILITY, len(symbols))),
         ),
         name=f"{name} with {hypothesis_label(best)}" if named else f"{name}, recalibrated",
         provenance={

@@ -1,16 +1,16 @@
-"""The valve's state equations f1 to f7 (report eqs 5 to 12), and forcings on them."""
+"""The valve's state equations f1 to f7 (report eqs 5 to 12), forcings on them, and its regimes."""
 
 from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.common.units import GRAM, MILLIGRAM
+from epv_env.common.units import BAR, GRAM, MILLIGRAM, MILLIMETRE
 from epv_env.plant.channels import readings
 from epv_env.plant.equations import Inputs
 from epv_env.plant.simulate import Trajectory, energised, simulate
 from epv_env.plant.valves import Valves
-from identification.gap.model.state_equation import StateEquation
+from identification.gap.plant import StateEquation, StateTrace
 from identification.recordings.recording import OUTPUTS
 from identification.replay.model_inputs import ModelInputs
 
@@ -56,6 +56,19 @@ FORCINGS = {
 """Input of the simulator by which each equation is forced, and its sign: drawn air lacks in p2."""
 
 
+SETTLED_CURRENT = 0.02
+"""Distance from the end value, relative to the greatest current, where a transient is over [-]."""
+
+FLOWING_RATE = 1e6
+"""Rate of p3 from which the control chamber fills or vents [Pa/s]."""
+
+UNSEATED_STROKE = 1e-3
+"""Share of its stroke beyond which a mover is off its seat [-]."""
+
+MOVING_SPEED = 2e-3
+"""Least speed of a piston that opens or shuts [m/s]."""
+
+
 def modelled(drive: ModelInputs, p: Mapping[str, float]) -> Trajectory:
     """The model on a recording's inputs; p: every parameter by symbol [SI]."""
     initial = energised(p, p1=drive.p1_start, p2=drive.p2_start, U=drive.U_start)
@@ -98,3 +111,62 @@ def _simulated(
         field[:] = value
     read = readings(valves.record(Inputs(**inputs), drive.period), p)
     return np.stack([read[output] for output in OUTPUTS])
+
+
+def regimes(
+    answer: Trajectory,
+    p: Mapping[str, float],
+    energised: NDArray,
+) -> dict[str, NDArray]:
+    """Boolean (samples,) by regime.
+
+    Args:
+        answer: the model's trajectory.
+        p: parameters by symbol [SI].
+        energised: whether the coil is on, boolean (samples,).
+    """
+    q = answer.state
+    current, greatest = np.abs(q.I), np.max(np.abs(q.I))
+    settled = answer.U / p["R"]
+    stroke_MV, open_PV = np.asarray(q.xMV) / p["xMVmax"], q.xPV > UNSEATED_STROKE * p["xPVmax"]
+    rate = np.gradient(q.p3, answer.time)
+    moving = {
+        "coil_rise": energised & (settled - current > SETTLED_CURRENT * greatest),
+        "armature_flight": _widened((stroke_MV > UNSEATED_STROKE) & (stroke_MV < 1 - UNSEATED_STROKE)),
+        "coil_decay": ~energised & (current > SETTLED_CURRENT * greatest),
+        "filling": rate > FLOWING_RATE,
+        "venting": rate < -FLOWING_RATE,
+        "pv_opening": open_PV & (q.vPV > MOVING_SPEED),
+        "pv_open": open_PV & (np.abs(q.vPV) <= MOVING_SPEED),
+        "pv_shutting": open_PV & (q.vPV < -MOVING_SPEED),
+    }
+    return {**moving, "shut": ~np.any(list(moving.values()), axis=0)}
+
+
+def traces(answer: Trajectory) -> dict[str, StateTrace]:
+    """States and the pressure differences that drive flows and forces."""
+    q = answer.state
+    found = {
+        "p1 - p2": ("bar", BAR, q.p1 - q.p2),
+        "p1 - p3": ("bar", BAR, q.p1 - q.p3),
+        "p2": ("bar", BAR, q.p2),
+        "p3": ("bar", BAR, q.p3),
+        "xPV": ("mm", MILLIMETRE, q.xPV),
+        "vPV": ("m/s", 1.0, q.vPV),
+        "xMV": ("mm", MILLIMETRE, q.xMV),
+        "vMV": ("m/s", 1.0, q.vMV),
+        "I": ("A", 1.0, q.I),
+        "U": ("V", 1.0, answer.U),
+    }
+    return {
+        name: StateTrace(unit=unit, scale=scale, values=np.asarray(values))
+        for name, (unit, scale, values) in found.items()
+    }
+
+
+def _widened(mask: NDArray) -> NDArray:
+    """The mask and one sample on either side: a flight may lie between two samples."""
+    wide = mask.copy()
+    wide[1:] |= mask[:-1]
+    wide[:-1] |= mask[1:]
+    return wide

@@ -21,7 +21,6 @@ from identification.recordings.recording import CHANNELS, Recording
 from identification.replay.batch_simulation import Replay
 from identification.replay.model_inputs import ModelInputs
 from identification.report_2003.cases import Case
-from identification.valve_gap.settings import VALVE
 from identification.valve_gap.valve import Valve, as_run
 
 CASES = (
@@ -60,6 +59,12 @@ CANDIDATES = tuple(
     for p1, p2, U_on in CONDITIONS
 )
 """Every case under every condition."""
+
+SEPARATING_SHARE = 0.5
+"""An experiment separates rivals if it leaves at most this share of the doubt about the best [-]."""
+
+CERTAIN = 0.95
+"""Probability of the best rival above which no further experiment is needed [-]."""
 
 FILE_NAME = "next.json"
 RUN = f"bench --programme {FILE_NAME}"
@@ -128,18 +133,18 @@ def next_experiment(
     rivals = select_rivals(ranking, settings)
     if verdict == UNKNOWN or (verdict is None and ranking.unknown > sum(ranking.probabilities)):
         return _none_can_be_chosen(rivals, NOTHING_EXPLAINS)
-    if verdict == PARTIAL and rivals.probability[0] > valve.settings.certain:
+    if verdict == PARTIAL and rivals.probability[0] > CERTAIN:
         return _none_can_be_chosen(rivals, REST_WITHOUT_NAME.format(rivals.titles[0]))
     plan = planned(valve, programmes)
     found = expected_information(ranking.problem, plan, rivals, settings)
     options = [Option(programme=p, information=i) for p, i in zip(programmes, found, strict=True)]
     options.sort(key=lambda option: option.information.sort_key)
     best = options[0]
-    doubt = valve.settings.separating_share * (1.0 - rivals.probability[0])
+    doubt = SEPARATING_SHARE * (1.0 - rivals.probability[0])
     splits = 1.0 - best.information.expected_best <= doubt
     return NextExperiment(
         programme=best.programme,
-        text=sentence(best, rivals, splits, valve.settings.certain),
+        text=sentence(best, rivals, splits),
         rivals=rivals.names,
         before=rivals.probability,
         after=best.information.expected_probability,
@@ -165,16 +170,13 @@ def planned(valve: Valve, programmes: Sequence[Programme]) -> Valve:
     return plan
 
 
-def sentence(option: Option, rivals: Rivals, splits: bool, certain: float = VALVE.certain) -> str:
-    """What to record, and the expected odds.
-
-    certain: probability of the best rival above which no further experiment is needed.
-    """
+def sentence(option: Option, rivals: Rivals, splits: bool) -> str:
+    """What to record, and the expected odds."""
     names = _listed(rivals.titles)
     before = ":".join(f"{100 * p:.0f}" for p in rivals.probability)
     after = odds_text(option.information.expected_best)
     record = described(option.programme)
-    if rivals.probability[0] > certain:
+    if rivals.probability[0] > CERTAIN:
         return (
             f"None is needed ({rivals.titles[0]}: {odds_text(rivals.probability[0])}); {record} would "
             f"tell {names} apart best ({RUN})"

@@ -10,19 +10,58 @@ from epv_env.plant.free_parameters import FREE_PARAMETERS
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from identification.calibration.problem import calibration_problem
-from identification.gap.model.free_parameter import NuisanceParameter
-from identification.gap.model.recorded_run import Channel, Run
-from identification.gap.model.state_equation import StateEquation, StateTrace
-from identification.recordings.noise import coarse_step_warnings, rounding_error
+from identification.gap.plant import Channel, NuisanceParameter, Run, StateEquation, StateTrace
+from identification.recordings.noise import coarse_step_warnings, reliable_step, rounding_error
 from identification.recordings.recording import OUTPUTS, UNITS, Campaign, Recording
 from identification.replay.batch_simulation import Replay
 from identification.replay.model_inputs import model_inputs
 from identification.replay.weighted_residuals import measured_outputs
 from identification.valve_gap import causes
-from identification.valve_gap.equations import EQUATIONS, forced_changes, modelled
-from identification.valve_gap.noise import noise_of
-from identification.valve_gap.regimes import regimes, traces
-from identification.valve_gap.settings import VALVE, ValveSettings
+from identification.valve_gap.equations import EQUATIONS, forced_changes, modelled, regimes, traces
+
+
+def noise_of(recordings: Sequence[Recording], channel: str) -> float:
+    """Standard deviation of a channel's readings about a smooth course [SI].
+
+    Half the variance of first differences (Rice 1984), which a slope does not enter; the median over
+    blocks, which a few lively ones do not move, made the mean of a chi-square variable. A slow ripple
+    hardly enters: what neighbours share is no noise. Readings in coarse steps hardly differ between
+    neighbours, so their rounding error is the least.
+    """
+    estimates = [_block_variances(recording, channel) for recording in recordings]
+    variances = np.concatenate([part for part, _ in estimates])
+    length = min(length for _, length in estimates)
+    freedom = 2.0 * length / 3.0  # differences of white noise are correlated by -1/2
+    found = float(np.sqrt(np.median(variances) / (1.0 - 2.0 / (9.0 * freedom)) ** 3))
+    step = reliable_step(np.concatenate([recording.channel(channel) for recording in recordings]))
+    return max(found, rounding_error(step))
+
+
+def _block_variances(recording: Recording, channel: str) -> tuple[NDArray, int]:
+    """Variance of the noise in each quiet block, and the block's length [samples]."""
+    changes = np.diff(recording.channel(channel))
+    length = min(max(4, round(NOISE_BLOCK / recording.period)), len(changes))
+    transient = round(SWITCHING_TRANSIENT / recording.period)
+    lively = np.zeros(len(changes), dtype=bool)
+    for switching in np.flatnonzero(np.diff(recording.energised)):
+        lively[switching : switching + transient] = True
+    count = len(changes) // length
+    blocks = changes[: count * length].reshape(count, length)
+    quiet = ~np.any(lively[: count * length].reshape(count, length), axis=1)
+    return 0.5 * np.var(blocks[quiet if np.any(quiet) else slice(None)], axis=1), length
+
+
+TIME_SCALE = 5e-3
+"""How long the fastest transients last [s]: the armature's flight, the decay of the current."""
+
+NOISE_BLOCK = 0.02
+"""Length of the stretches of which each has its own estimate of the noise [s]: 40 samples."""
+
+SWITCHING_TRANSIENT = 0.02
+"""Time after a switching that the noise estimate leaves out [s]: the coil and p3 move."""
+
+PARAMETER_SCATTER = 3e-3
+"""Relative standard deviation, between units, of the parameters that are not calibrated [-]."""
 
 P2_START = NuisanceParameter(symbol="p2_start", sd=500.0, step=1e3)
 """Circuit pressure at the start of a recording, less the mean of the hold [Pa]."""
@@ -40,7 +79,6 @@ class Valve:
         campaign: Campaign,
         plant: Plant | None = None,
         without: Sequence[str] = (),
-        settings: ValveSettings = VALVE,
         noise: Mapping[str, float] | None = None,
     ):
         """Prepare a campaign for the diagnosis.
@@ -49,7 +87,6 @@ class Valve:
             campaign: its calibration and validation recordings.
             plant: the nominal parameters, and those that calibration fits; None: Table 10's four.
             without: names of causes to leave out.
-            settings: judgements about the valve.
             noise: standard deviation of the readings by channel [Pa, A], where it is known better than
                 from the recordings; the others are estimated from them.
 
@@ -57,8 +94,7 @@ class Valve:
             ValueError: the catalogue does not have a cause of `without`, or `noise` has another channel
                 or a value that is not positive.
         """
-        self.settings = settings
-        self.time_scale = settings.time_scale
+        self.time_scale = TIME_SCALE
         given = _checked_noise(noise or {})
         start, free = (plant.parameters, plant.free) if plant else (None, FREE_PARAMETERS)
         problem = calibration_problem(campaign, start=start, free=free)
@@ -70,15 +106,15 @@ class Valve:
                 name=name,
                 unit=UNITS[name][0],
                 scale=UNITS[name][1],
-                noise=given.get(name) or noise_of(self.recordings, name, settings),
+                noise=given.get(name) or noise_of(self.recordings, name),
             )
             for name in OUTPUTS
         )
         self.runs = tuple(as_run(recording) for recording in self.recordings)
         self.parameters = tuple(causes.calibrated(problem.vector))
-        self.causes = causes.catalogue(self.base, without, settings, free)
+        self.causes = causes.catalogue(self.base, without, free)
         self.tolerances = tuple(
-            _tolerance(symbol, self.base, settings.parameter_scatter)
+            _tolerance(symbol, self.base, PARAMETER_SCATTER)
             for symbol in causes.PARAMETER_COMPONENTS
             if symbol not in free
         )
@@ -113,7 +149,7 @@ class Valve:
         """`GreyBox.regimes`: boolean (samples,) by regime; values: (n,) or (n, runs) by symbol [SI]."""
         p = self._one(values, run)
         energised = self.recordings[run].energised
-        return regimes(modelled(self.replay.drives[run], p), p, energised, self.settings)
+        return regimes(modelled(self.replay.drives[run], p), p, energised)
 
     def forced(
         self, values: Mapping[str, NDArray], equation: StateEquation, run: int, edges: NDArray

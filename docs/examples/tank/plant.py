@@ -1,4 +1,4 @@
-"""The tank behind the protocol that the diagnosis knows (identification/gap/model/grey_box.py)."""
+"""The tank behind the protocol that the diagnosis knows (identification/gap/plant.py)."""
 
 from collections.abc import Mapping, Sequence
 
@@ -7,10 +7,15 @@ from numpy.typing import NDArray
 
 from docs.examples.tank.recordings import NOISE
 from docs.examples.tank.simulator import NOMINAL, levels, readings
-from identification.gap.model.cause import Cause
-from identification.gap.model.free_parameter import FreeParameter, NuisanceParameter
-from identification.gap.model.recorded_run import Channel, Run
-from identification.gap.model.state_equation import StateEquation, StateTrace
+from identification.gap.plant import (
+    Cause,
+    Channel,
+    FreeParameter,
+    NuisanceParameter,
+    Run,
+    StateEquation,
+    StateTrace,
+)
 
 
 class Tank:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from docs.examples.tank.simulator import levels, readings
 from epv_env.common.files import write_text
-from identification.gap.model.recorded_run import Run
+from identification.gap.plant import Run
 
 HEADER = "time_s,inflow_m3_per_s,level_m"
 

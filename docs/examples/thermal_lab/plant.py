@@ -11,9 +11,8 @@ import numba
 import numpy as np
 
 from docs.examples.recorded_plants import cause, found, run_of
-from identification.gap.model.free_parameter import FreeParameter, NuisanceParameter
-from identification.gap.model.ode_plant import OdePlant
-from identification.gap.model.recorded_run import Channel, Run
+from identification.gap.ode_plant import OdePlant
+from identification.gap.plant import Channel, FreeParameter, NuisanceParameter, Run
 
 FILE = "energy_balance_mimo_data.txt"
 SOURCE = (

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from docs.examples.recorded_plants import cause, found, run_of
-from identification.gap.model.free_parameter import FreeParameter
-from identification.gap.model.ode_plant import OdePlant
-from identification.gap.model.recorded_run import Channel, Run
+from identification.gap.ode_plant import OdePlant
+from identification.gap.plant import Channel, FreeParameter, Run
 
 SOURCE = (
     "github.com/Lorenzo-Lyons/DART (MIT): the CSV files of "

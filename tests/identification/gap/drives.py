@@ -6,9 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from identification.gap.model.cause import Cause
-from identification.gap.model.free_parameter import FreeParameter, NuisanceParameter
-from identification.gap.model.recorded_run import Channel, Run
+from identification.gap.plant import Cause, Channel, FreeParameter, NuisanceParameter, Run
 
 NOISE, SAMPLES, PERIOD = 0.01, 300, 0.01
 OFF = 3.0

@@ -2,10 +2,8 @@
 
 import numpy as np
 
-from identification.gap.model.cause import Cause
-from identification.gap.model.free_parameter import FreeParameter, NuisanceParameter
-from identification.gap.model.ode_plant import OdePlant
-from identification.gap.model.recorded_run import Channel, Run
+from identification.gap.ode_plant import OdePlant
+from identification.gap.plant import Cause, Channel, FreeParameter, NuisanceParameter, Run
 
 
 def quiet_run(period: float, samples: int, **inputs) -> Run:

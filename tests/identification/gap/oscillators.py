@@ -5,9 +5,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.model.free_parameter import FreeParameter, NuisanceParameter
-from identification.gap.model.recorded_run import Channel, Run
-from identification.gap.model.state_equation import StateEquation, StateTrace
+from identification.gap.plant import (
+    Channel,
+    FreeParameter,
+    NuisanceParameter,
+    Run,
+    StateEquation,
+    StateTrace,
+)
 
 NOISE = 2e-3
 """Of the angle's readings [rad]."""

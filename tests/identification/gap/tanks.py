@@ -8,8 +8,7 @@ import numpy as np
 from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import virtual_recordings
 from identification.gap.diagnosis import Diagnosis, diagnose
-from identification.gap.model.cause import Cause
-from identification.gap.model.free_parameter import FreeParameter
+from identification.gap.plant import Cause, FreeParameter
 
 
 def leaking() -> Tank:

@@ -15,14 +15,11 @@ from numpy.typing import NDArray
 from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import virtual_recordings
 from docs.examples.tank.simulator import START, levels, readings
+from identification.gap.black_box_plant import BlackBoxPlant, FmuSimulator, Regimes, fmu_simulator
 from identification.gap.diagnosis import Diagnosis, diagnose
 from identification.gap.gap_json import as_json
-from identification.gap.model.black_box_plant import BlackBoxPlant, Regimes
-from identification.gap.model.checks import check
-from identification.gap.model.fmu_simulator import FmuSimulator, fmu_simulator
-from identification.gap.model.free_parameter import NuisanceParameter
-from identification.gap.model.plant_error import PlantError
-from identification.gap.model.recorded_run import Run
+from identification.gap.plant import NuisanceParameter, PlantError, Run
+from identification.gap.plant_checks import check
 from identification.gap.report_page import sections
 from tests.identification.gap.tank_fmu import build_tank_fmu, can_build
 

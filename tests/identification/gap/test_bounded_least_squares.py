@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from identification.gap.fit.bounded_least_squares import bounded_minimiser
+from identification.gap.variable_projection import bounded_minimiser
 
 
 def problem(seed: int, n: int = 12) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -10,12 +10,15 @@ from scipy.optimize import lsq_linear
 from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import virtual_recordings
 from identification.gap.evidence import evaluate
-from identification.gap.fit.fitting_problem import FittingProblem
-from identification.gap.fit.hypothesis import Estimate
-from identification.gap.fit.linearisation import linearise
-from identification.gap.fit.variable_projection import normal_equations, without_run_nuisances
+from identification.gap.fitting_problem import Estimate, FittingProblem
+from identification.gap.gauss_newton import CONVERGED_DECREASE, linearise
 from identification.gap.rank.settings import RankingSettings
 from identification.gap.recalibration import recalibrate
+from identification.gap.variable_projection import (
+    LARGEST_DEVIATION,
+    normal_equations,
+    without_run_nuisances,
+)
 
 SD = 5e-4
 """Of the gauge's zero in a run [m]."""
@@ -33,9 +36,9 @@ def with_zero(deviations: float) -> tuple[FittingProblem, Estimate]:
 def judged(problem: FittingProblem, estimate: Estimate) -> float:
     """Sum of squares of readings and nuisances on the fitted runs, as the judgement sees them."""
     runs = linearise(problem, [estimate], problem.fitted_runs)[0]
-    bound, total = problem.settings.largest_deviation, 0.0
+    total = 0.0
     for run in runs:
-        residual, step = without_run_nuisances(run, np.zeros(0), bound)
+        residual, step = without_run_nuisances(run, np.zeros(0))
         total += residual @ residual + np.sum(((run.run_values + step) / run.run_sd) ** 2)
     return float(total)
 
@@ -52,7 +55,7 @@ def test_the_fit_is_that_of_the_whole_bounded_problem(deviations):
     """Nothing is gained by another step when all bounds are kept together."""
     problem, estimate = with_zero(deviations)
     runs = linearise(problem, [estimate], problem.fitted_runs)[0]
-    count, bound = 1 + 2 * len(runs), problem.settings.largest_deviation
+    count = 1 + 2 * len(runs)
     rows, right = [], []
     for r, run in enumerate(runs):
         own = np.zeros((len(run.residual) + 2, count))
@@ -61,11 +64,11 @@ def test_the_fit_is_that_of_the_whole_bounded_problem(deviations):
         own[len(run.residual) :, 1 + 2 * r : 3 + 2 * r] = np.eye(2)
         rows.append(own)
         right.append(np.concatenate([run.residual, np.zeros(2)]))
-    ends = np.array([np.inf, *[bound] * (count - 1)])
+    ends = np.array([np.inf, *[LARGEST_DEVIATION] * (count - 1)])
     solution = lsq_linear(np.vstack(rows), np.concatenate(right), (-ends, ends), method="bvls")
-    found = normal_equations(runs, bound)
-    assert np.any(np.abs(solution.x[1:]) > 0.999 * bound)
-    assert found.chi_square == pytest.approx(2 * solution.cost, abs=problem.settings.converged_decrease)
+    found = normal_equations(runs)
+    assert np.any(np.abs(solution.x[1:]) > 0.999 * LARGEST_DEVIATION)
+    assert found.chi_square == pytest.approx(2 * solution.cost, abs=CONVERGED_DECREASE)
     assert solution.x[0] == pytest.approx(0.0, abs=1e-3)
 
 

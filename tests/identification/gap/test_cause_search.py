@@ -8,9 +8,8 @@ import pytest
 from identification.gap.cause_search import HypothesisPool, _leave_causes_out
 from identification.gap.diagnosis import rank_hypotheses
 from identification.gap.evidence import evaluate
-from identification.gap.fit.fit_cache import FitCache
-from identification.gap.fit.gauss_newton import fit
-from identification.gap.fit.hypothesis import Hypothesis
+from identification.gap.fitting_problem import FitCache, Hypothesis
+from identification.gap.gauss_newton import fit
 from identification.gap.rank.settings import RankingSettings
 from identification.gap.recalibration import recalibrate
 from identification.gap.verdict import Ranking

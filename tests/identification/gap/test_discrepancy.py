@@ -12,7 +12,7 @@ from identification.gap.discrepancy import (
     channel_discrepancies,
     white_variance,
 )
-from identification.gap.model.recorded_run import Channel, Run
+from identification.gap.plant import Channel, Run
 from identification.gap.rank.settings import RankingSettings
 from tests.identification.gap.drives import Drive
 

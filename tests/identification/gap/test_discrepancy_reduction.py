@@ -8,14 +8,13 @@ import pytest
 
 from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import NOISE, virtual_recordings
-from identification.gap.fit.fitting_problem import FittingProblem
-from identification.gap.fit.gauss_newton import fit
-from identification.gap.fit.hypothesis import Estimate, Hypothesis
-from identification.gap.fit.prediction import percentage_errors, predict
+from identification.gap.fitting_problem import Estimate, FittingProblem, Hypothesis
+from identification.gap.gauss_newton import fit
 from identification.gap.held_out import (
     DiscrepancyReduction,
     measure_discrepancy_reduction,
 )
+from identification.gap.prediction import percentage_errors, predict
 from identification.gap.recalibration import recalibrate
 from identification.gap.report_figures import gap_figure, share_figure
 

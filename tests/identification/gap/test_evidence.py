@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from identification.gap.evidence import EvaluatedHypothesis, _covariance
-from identification.gap.fit.variable_projection import LinearisedRun, normal_equations
 from identification.gap.rank.settings import RankingSettings
+from identification.gap.variable_projection import LinearisedRun, normal_equations
 from tests.identification.gap.tanks import diagnosed
 
 ALONG = np.array([1.0, 1.0])
@@ -22,7 +22,7 @@ def test_what_no_reading_tells_is_wide_but_known_to_be():
         residual=np.zeros(3), slopes=np.eye(3)[:, :2], run_slopes=none, run_values=np.zeros(0),
         run_sd=np.zeros(0), tolerance_slopes=none,
     )  # fmt: skip
-    equations = replace(normal_equations([run], 3.0), hessian=hessian)
+    equations = replace(normal_equations([run]), hessian=hessian)
     found = _covariance(equations, RankingSettings().smallest_eigenvalue)
     assert np.all(np.diag(found) > 1.0)
     assert ALONG @ found @ ALONG == pytest.approx(1e-8, rel=1e-3)

@@ -24,12 +24,10 @@ from identification.gap.experiment_design import (
     parameter_posteriors,
     select_rivals,
 )
-from identification.gap.fit.fitting_problem import FittingProblem
-from identification.gap.fit.linearisation import linearise, nuisance_slopes
-from identification.gap.fit.variable_projection import LinearisedRun, normal_equations
-from identification.gap.model.cause import Cause
-from identification.gap.model.free_parameter import FreeParameter, NuisanceParameter
-from identification.gap.model.recorded_run import Channel, Run
+from identification.gap.fitting_problem import FittingProblem
+from identification.gap.gauss_newton import linearise, nuisance_slopes
+from identification.gap.plant import Cause, Channel, FreeParameter, NuisanceParameter, Run
+from identification.gap.variable_projection import LinearisedRun, normal_equations
 from identification.gap.verdict import Ranking
 
 NOISE, SAMPLES, PERIOD = 0.02, 40, 1e-3
@@ -177,7 +175,7 @@ def log_evidence(runs: Sequence[LinearisedRun]) -> float:
         )
         for run in runs
     ]
-    found = normal_equations(together, largest_deviation=3.0)
+    found = normal_equations(together)
     k = runs[0].slopes.shape[1]
     hessian = found.hessian + np.diag([0.0] * k + [1.0] * (len(found.hessian) - k))
     gain = found.gradient @ np.linalg.solve(hessian, found.gradient)

@@ -9,7 +9,7 @@ from identification.gap.evidence import evaluate
 from identification.gap.forcing import most_windows, resolving_edges
 from identification.gap.localisation import Localisation, MissingTerm, locate
 from identification.gap.locate.settings import LocalisationSettings
-from identification.gap.model.state_equation import StateTrace
+from identification.gap.plant import StateTrace
 from identification.gap.rank.settings import RankingSettings
 from identification.gap.recalibration import recalibrate
 from tests.identification.gap.oscillators import swung

@@ -8,14 +8,12 @@ import pytest
 from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import virtual_recordings
 from identification.gap.evidence import evaluate
-from identification.gap.fit.fitting_problem import FittingProblem
-from identification.gap.fit.hypothesis import Estimate
+from identification.gap.fitting_problem import Estimate, FittingProblem
 from identification.gap.forcing import quadratic_forms, window_edges
 from identification.gap.gaps import RegimeGap, regime_gaps
 from identification.gap.localisation import Localisation, fit_processes, locate
 from identification.gap.locate.settings import LocalisationSettings
-from identification.gap.model.grey_box import noise_weighted
-from identification.gap.model.state_equation import StateTrace
+from identification.gap.plant import StateTrace, noise_weighted
 from identification.gap.rank.settings import RankingSettings
 from identification.gap.recalibration import recalibrate
 from identification.gap.reduce.settings import ReductionSettings

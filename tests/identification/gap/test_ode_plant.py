@@ -7,9 +7,7 @@ from docs.examples.tank.recordings import PERIOD
 from docs.examples.tank.simulator import AREA, START, levels
 from identification.gap.diagnosis import diagnose
 from identification.gap.gaps import WHOLE
-from identification.gap.model.cause import Cause
-from identification.gap.model.grey_box import GreyBox
-from identification.gap.model.recorded_run import Run
+from identification.gap.plant import Cause, GreyBox, Run
 from tests.identification.gap.ode_plants import block, decay, decay_rate, free, quiet_run
 
 MODES = ("numpy", "python", "compiled")

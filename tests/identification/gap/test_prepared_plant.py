@@ -9,12 +9,9 @@ from numpy.typing import NDArray
 
 from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import virtual_recordings
-from identification.gap.fit.fitting_problem import FittingProblem
-from identification.gap.model.free_parameter import FreeParameter
-from identification.gap.model.grey_box import noise_weighted
-from identification.gap.model.plant_error import PlantError
-from identification.gap.model.prepared_plant import PreparedPlant, prepared
-from identification.gap.model.recorded_run import Channel, Run
+from identification.gap.fitting_problem import FittingProblem
+from identification.gap.plant import Channel, FreeParameter, PlantError, Run, noise_weighted
+from identification.gap.prepared_plant import PreparedPlant, prepared
 from tests.identification.gap.tanks import without_gap
 
 SIGMA = 0.02

@@ -8,13 +8,9 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from identification.gap.fit.changed_run import ChangedRuns
-from identification.gap.fit.gauss_newton import fit
-from identification.gap.fit.hypothesis import Estimate, Hypothesis
-from identification.gap.fit.linearisation import linearise
-from identification.gap.fit.variable_projection import LinearisedRun
-from identification.gap.model.cause import Cause
-from identification.gap.model.free_parameter import FreeParameter
+from identification.gap.fitting_problem import Estimate, Hypothesis
+from identification.gap.gauss_newton import fit, linearise
+from identification.gap.plant import Cause, FreeParameter
 from identification.gap.recalibration import recalibrate, refit
 from identification.gap.screening import (
     CauseSignature,
@@ -25,9 +21,8 @@ from identification.gap.screening import (
     simulate_signatures,
     with_cause,
 )
+from identification.gap.variable_projection import ChangedRuns, LinearisedRun
 from tests.identification.gap.drives import Drive
-
-FARTHEST = 3.0
 
 
 def screened(every_start: bool = False) -> list[Start]:
@@ -43,7 +38,7 @@ def test_a_threshold_begins_at_its_trial_where_a_linear_step_leads_to_off():
     runs = linearise(problem, [base], problem.fitted_runs)[0]
     (limit,) = [cause for cause in problem.plant.causes if cause.name == "limit"]
     signatures = simulate_signatures(problem, base, [limit])
-    changed = ChangedRuns(runs, [signatures[0].changes], problem.settings.largest_deviation)
+    changed = ChangedRuns(runs, [signatures[0].changes])
     predicted = _predicted(changed.with_slope(0), signatures[0])[1]
     assert predicted["limit"] > 1.0  # beyond the largest command: no effect, and no slope either
     (stuck,) = fit(problem, [with_cause(problem, base, limit, predicted)])
@@ -129,7 +124,7 @@ def test_pairs_come_in_the_order_of_what_they_leave_together(seed):
         frozenset(pair): squares_left(runs, [own[label] for label in pair])
         for pair in combinations(own, 2)
     }
-    found = promising_pairs(runs, signatures, FARTHEST)
+    found = promising_pairs(runs, signatures)
     assert found == [pair for pair in sorted(left, key=lambda pair: left[pair]) if pair in found]
     assert found[0] == min(left, key=lambda pair: left[pair]) == frozenset("ab")
 
@@ -138,10 +133,10 @@ def test_the_best_pair_may_have_no_promising_member():
     runs, signatures = runs_and_signatures(0)
     alone = {s.cause.label: squares_left(runs, [s.changes]) for s in signatures}
     assert min(alone["a"], alone["b"]) > alone["c"]
-    assert promising_pairs(runs, signatures, FARTHEST)[0] == frozenset("ab")
+    assert promising_pairs(runs, signatures)[0] == frozenset("ab")
 
 
 def test_variants_of_one_cause_make_no_pair():
     runs, signatures = runs_and_signatures(0)
     variants = [replace(s, cause=replace(s.cause, name="a", variant=s.cause.name)) for s in signatures]
-    assert promising_pairs(runs, variants, FARTHEST) == []
+    assert promising_pairs(runs, variants) == []

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from identification.gap.model.recorded_run import Channel, Run
-from identification.gap.model.time_scale import time_scale
-from identification.valve_gap.settings import VALVE
+from identification.gap.plant import Channel, Run
+from identification.gap.time_scale import time_scale
+from identification.valve_gap.valve import TIME_SCALE
 
 
 def recorded(*series: np.ndarray, period: float, noise: float, trusted: np.ndarray | None = None) -> Any:
@@ -111,7 +111,7 @@ def test_a_plant_s_own_time_scale_counts():
     plant = recorded(COURSES["lag"].values, period=0.01, noise=1e-3)
     plant.time_scale = 0.25
     assert time_scale(plant) == 0.25
-    assert VALVE.time_scale == 5e-3
+    assert TIME_SCALE == 5e-3
     plant.time_scale = 0.0
     with pytest.raises(ValueError, match="positive time in s"):
         time_scale(plant)

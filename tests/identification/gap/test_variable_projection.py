@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from identification.gap.fit.settings import FitSettings
-from identification.gap.fit.variable_projection import (
+from identification.gap.variable_projection import (
+    LARGEST_DEVIATION,
     LinearisedRun,
     normal_equations,
     without_run_nuisances,
 )
 
-FARTHEST = FitSettings().largest_deviation
 RNG = np.random.default_rng(2)
 SD = np.array([0.3, 2.0])
 
@@ -48,7 +47,7 @@ def one_problem(given):
 
 def test_the_reduced_equations_have_the_whole_problem_s_solution():
     given = runs()
-    found = normal_equations(given, FARTHEST)
+    found = normal_equations(given)
     matrix, right = one_problem(given)
     solution, squares, *_ = np.linalg.lstsq(matrix, right, rcond=None)
     step = np.linalg.solve(found.hessian, found.gradient)
@@ -60,12 +59,12 @@ def test_the_reduced_equations_have_the_whole_problem_s_solution():
 def test_residuals_without_nuisances_are_what_the_whole_problem_leaves():
     given = runs()
     at_rest = [replace(run, slopes=np.zeros((40, 2))) for run in given]
-    found = normal_equations(at_rest, FARTHEST)
+    found = normal_equations(at_rest)
     matrix, right = one_problem(given)
     solution = np.linalg.lstsq(matrix[:, 2:], right, rcond=None)[0]
     np.testing.assert_allclose(found.tolerances, solution[:3], rtol=1e-9)
     for r, run in enumerate(given):
-        residual, step = without_run_nuisances(run, found.tolerances, FARTHEST)
+        residual, step = without_run_nuisances(run, found.tolerances)
         np.testing.assert_allclose(step, solution[3 + 2 * r : 5 + 2 * r], rtol=1e-9)
         expected = run.residual - run.tolerance_slopes @ solution[:3] - run.run_slopes @ step
         np.testing.assert_allclose(residual, expected, rtol=1e-9)
@@ -73,21 +72,21 @@ def test_residuals_without_nuisances_are_what_the_whole_problem_leaves():
 
 def test_a_bounded_step_is_that_of_the_whole_bounded_problem():
     given = [replace(run, residual=200.0 * run.residual) for run in runs()]
-    found = normal_equations(given, FARTHEST)
+    found = normal_equations(given)
     matrix, right = one_problem(given)
     ends = np.full(matrix.shape[1], np.inf)
-    ends[:2], ends[2:5] = (0.05, 0.5), FARTHEST
-    ends[5:] = FARTHEST * np.tile(SD, len(given))
+    ends[:2], ends[2:5] = (0.05, 0.5), LARGEST_DEVIATION
+    ends[5:] = LARGEST_DEVIATION * np.tile(SD, len(given))
     present = np.concatenate([np.zeros(5), *(run.run_values for run in given)])
     expected = lsq_linear(matrix, right, (-ends - present, ends - present), method="bvls")
     step, gain = found.step(-ends[:2], ends[:2], damping=0.0)
     np.testing.assert_allclose(step, expected.x[:2], atol=1e-8)
-    assert np.any(np.abs(expected.x[2:5]) >= FARTHEST)
+    assert np.any(np.abs(expected.x[2:5]) >= LARGEST_DEVIATION)
     assert found.chi_square - gain == pytest.approx(2 * expected.cost, rel=1e-9)
     assert found.chi_square > found.least
 
 
 def test_a_number_of_a_run_stays_within_its_bounds():
     run = replace(runs(1)[0], run_values=np.zeros(2), run_sd=np.array([1e-3, 2.0]))
-    _, step = without_run_nuisances(run, np.zeros(3), FARTHEST)
-    assert abs(step[0]) <= FARTHEST * 1e-3
+    _, step = without_run_nuisances(run, np.zeros(3))
+    assert abs(step[0]) <= LARGEST_DEVIATION * 1e-3

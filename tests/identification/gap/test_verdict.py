@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from identification.gap.evidence import EvaluatedHypothesis
-from identification.gap.fit.hypothesis import Hypothesis
+from identification.gap.fitting_problem import Hypothesis
 from identification.gap.localisation import ForcingEstimate, Localisation
-from identification.gap.model.cause import Cause
-from identification.gap.model.state_equation import StateEquation
+from identification.gap.plant import Cause, StateEquation
 from identification.gap.verdict import (
     AMBIGUOUS,
     KNOWN,

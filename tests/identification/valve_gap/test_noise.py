@@ -8,7 +8,7 @@ import pytest
 from epv_env.plant.channels import SENSORS
 from identification.bench.session import add_ripple
 from identification.recordings.recording import Campaign, Recording
-from identification.valve_gap.noise import noise_of
+from identification.valve_gap.valve import noise_of
 
 
 def recording(noise: float, seed: int, steps: float = 0.0) -> Recording:

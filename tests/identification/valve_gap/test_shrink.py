@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identification.calibration.problem import calibration_problem
-from identification.gap.fit.prediction import percentage_errors
+from identification.gap.prediction import percentage_errors
 from identification.replay.responses import total_response_error
 from identification.validation.validate import validate
 from identification.valve_gap.valve import Valve

@@ -14,16 +14,32 @@ from numpy.typing import NDArray
 from scipy.signal import correlate
 from scipy.stats import norm
 
-from identification.gap.model.grey_box import GreyBox
-from identification.gap.model.settings import TimeScaleSettings
+from identification.gap.plant import GreyBox
+
+WIDENING = 1.25
+"""Ratio of successive widths over which readings are averaged before their changes are taken [1]: fine
+enough that the choice of a width hardly moves the result."""
+
+CLEAR_SIGNAL = 100.0
+"""Variance of changes relative to that of noise alone [1] from which a width needs no further averaging:
+enough even where the noise is three times as large as the plant says."""
+
+LEAST_SIGNAL = 3.0
+"""The same below which a channel shows no motion at all [1]: what noise reaches by chance."""
+
+FEWEST_WIDTHS = 8
+"""Fewest averaging widths that the shortest run must hold [1]: fewer show no course."""
+
+STILL_SHARE = 0.01
+"""Time scale of a plant whose readings show no motion, relative to its shortest run [1]: some hundred
+stretches tell chance from rule."""
 
 
-def time_scale(plant: GreyBox, settings: TimeScaleSettings | None = None) -> float:
+def time_scale(plant: GreyBox) -> float:
     """Shortest time in which the plant's motion changes its course [s], at least one sampling period.
 
     Args:
         plant: its attribute `time_scale` [s] counts where it has one; else its readings do.
-        settings: judgement of the readings; None: the defaults.
 
     Raises:
         ValueError: the plant's own time scale is not positive.
@@ -35,15 +51,14 @@ def time_scale(plant: GreyBox, settings: TimeScaleSettings | None = None) -> flo
                 f"the plant's time_scale is {given}: give a positive time in s, or leave it out"
             )
         return float(given)
-    settings = settings or TimeScaleSettings()
     period = min(float(run.time[1] - run.time[0]) for run in plant.runs)
-    scales = [_channel_scale(plant, c, settings) for c in range(len(plant.channels))]
+    scales = [_channel_scale(plant, c) for c in range(len(plant.channels))]
     seen = [scale for scale in scales if scale is not None]
-    still = settings.still_share * min(float(run.time[-1] - run.time[0]) for run in plant.runs)
+    still = STILL_SHARE * min(float(run.time[-1] - run.time[0]) for run in plant.runs)
     return max(period, min(seen, default=still))
 
 
-def _channel_scale(plant: GreyBox, channel: int, settings: TimeScaleSettings) -> float | None:
+def _channel_scale(plant: GreyBox, channel: int) -> float | None:
     """Time scale of one channel [s]; None where it shows no motion.
 
     A channel that is read at every tenth sample only is taken at its own period.
@@ -51,14 +66,14 @@ def _channel_scale(plant: GreyBox, channel: int, settings: TimeScaleSettings) ->
     series, spacings, period = [], [], 0.0
     for run in plant.runs:
         counted = np.flatnonzero(run.trusted[channel] & np.isfinite(run.measured[channel]))
-        if len(counted) > settings.fewest_widths:
+        if len(counted) > FEWEST_WIDTHS:
             series.append(run.measured[channel, counted])
             spacings.append(np.diff(counted))
             period = max(period, float(run.time[1] - run.time[0]))
     if not series:
         return None
     noise = min(plant.channels[channel].known_noise, _apparent_noise(series))
-    lag = _correlation_lag(series, noise, settings)
+    lag = _correlation_lag(series, noise)
     return None if lag is None else lag * period * float(np.median(np.concatenate(spacings)))
 
 
@@ -73,15 +88,13 @@ def _apparent_noise(series: Sequence[NDArray]) -> float:
     return median / float(norm.ppf(0.75)) / float(np.sqrt(weights @ weights))
 
 
-def _correlation_lag(
-    series: Sequence[NDArray], noise: float, settings: TimeScaleSettings
-) -> float | None:
+def _correlation_lag(series: Sequence[NDArray], noise: float) -> float | None:
     """Lag at which the autocorrelation of the changes falls below 1/e [readings].
 
     None where the changes do not stand out of the noise. series: per run (readings,) [SI]. noise:
     standard deviation [SI].
     """
-    width = _averaging_width(series, noise, settings)
+    width = _averaging_width(series, noise)
     if width is None:
         return None
     changes = [_changes(y, width) for y in series]
@@ -102,19 +115,19 @@ def _correlation_lag(
     return float(after - 1 + fraction)
 
 
-def _averaging_width(series: Sequence[NDArray], noise: float, settings: TimeScaleSettings) -> int | None:
+def _averaging_width(series: Sequence[NDArray], noise: float) -> int | None:
     """Narrowest width [readings] at which changes stand clearly out of the noise, or about as clearly
     as at any width; None where they never do."""
-    widest = min(len(y) for y in series) // settings.fewest_widths
+    widest = min(len(y) for y in series) // FEWEST_WIDTHS
     widths = [1]
     while widths[-1] < widest:
-        widths.append(max(widths[-1] + 1, round(settings.widening * widths[-1])))
+        widths.append(max(widths[-1] + 1, round(WIDENING * widths[-1])))
     squares = [np.mean(np.concatenate([_changes(y, w) for y in series]) ** 2) for w in widths]
     # Readings that stand still without noise have neither.
     expected = np.maximum(2 * noise**2 / np.array(widths), np.finfo(float).tiny)
     clearness = np.array(squares) / expected
-    enough = min(settings.clear_signal, 0.5 * float(np.max(clearness)))
-    if np.max(clearness) < settings.least_signal:
+    enough = min(CLEAR_SIGNAL, 0.5 * float(np.max(clearness)))
+    if np.max(clearness) < LEAST_SIGNAL:
         return None
     return widths[int(np.argmax(clearness >= enough))]
 

@@ -10,8 +10,70 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
 
-from identification.gap.fit.bounded_least_squares import bounded_minimiser
+PIVOTS = 10
+"""Most exchanges of the numbers at their bounds; few problems need more than five, and another method
+solves those."""
+
+ROUNDING = 1e-10
+"""Relative excess of a bound, and slope at a bound, that is rounding."""
+
+
+def bounded_minimiser(matrix: NDArray, moment: NDArray, low: NDArray, high: NDArray) -> NDArray:
+    """Minimiser (n,) of 0.5 x' matrix x - moment x between low and high (bounded least squares).
+
+    By block pivoting (Portugal, Judice and Vicente 1994), which needs a definite matrix and may run in a
+    circle; else by the slower method of Stark and Parker (1995).
+    """
+    if not len(moment):
+        return np.zeros(0)
+    scale = 1.0 / np.sqrt(np.diag(matrix))
+    scaled, target = matrix * np.outer(scale, scale), moment * scale
+    try:
+        found = _pivoted(scaled, target, low / scale, high / scale)
+    except np.linalg.LinAlgError:  # columns that are equal but for rounding
+        found = None
+    if found is None:
+        found = _by_factors(scaled, target, low / scale, high / scale)
+    return np.clip(found * scale, low, high)
+
+
+def _pivoted(matrix: NDArray, moment: NDArray, low: NDArray, high: NDArray) -> NDArray | None:
+    """The minimiser (n,): numbers beyond a bound go there, those that push inwards leave it.
+
+    None where this does not end.
+    """
+    fixed = high <= low
+    below, above = fixed.copy(), np.zeros(len(moment), dtype=bool)
+    for _ in range(PIVOTS):
+        free = ~(below | above)
+        x = np.where(below, low, np.where(above, high, 0.0))
+        if np.any(free):
+            own = matrix[np.ix_(free, free)]
+            x[free] = np.linalg.solve(own, moment[free] - matrix[free] @ x)
+        slope = matrix @ x - moment
+        tolerance = ROUNDING * (1.0 + np.abs(x))
+        leaves = ~fixed & ((below & (slope < -ROUNDING)) | (above & (slope > ROUNDING)))
+        too_low, too_high = free & (x < low - tolerance), free & (x > high + tolerance)
+        if not np.any(leaves | too_low | too_high):
+            return x
+        below, above = (below & ~leaves) | too_low, (above & ~leaves) | too_high
+    return None
+
+
+def _by_factors(matrix: NDArray, moment: NDArray, low: NDArray, high: NDArray) -> NDArray:
+    """The minimiser (n,) by bounded-variable least squares in a factor of the matrix."""
+    eigenvalues, vectors = np.linalg.eigh(matrix)
+    root = np.sqrt(np.maximum(eigenvalues, 1e-14))[:, None] * vectors.T
+    target = np.linalg.solve(root.T, moment)
+    widest = np.maximum(high - low, np.finfo(float).tiny)
+    return lsq_linear(root, target, (low, low + widest), method="bvls").x
+
+
+LARGEST_DEVIATION = 3.0
+"""Bound of a nuisance parameter [standard deviations from its centre]: a larger deviation is not a
+nuisance and stays in the residual."""
 
 ACTIVE_SET_ITERATIONS = 12
 """Most changes of the set of nuisances at their bounds. In the second half none leaves the set again, so
@@ -99,8 +161,6 @@ class NormalEquations:
     """Sum of squares at no step, with bounded nuisances [1]."""
     tolerances: NDArray
     """The tolerances that minimise `chi_square`, (m,) [standard deviations]."""
-    largest_deviation: float
-    """Bound of the tolerances [standard deviations]."""
 
     def step(self, low: NDArray, high: NDArray, damping: float) -> tuple[NDArray, float]:
         """Best bounded step and the decrease of chi-square that it promises.
@@ -114,35 +174,33 @@ class NormalEquations:
             The step (k,) [1], with nuisances within their bounds, and the predicted decrease [1].
         """
         m = len(self.tolerances)
-        bound = np.full(m, self.largest_deviation)
+        bound = np.full(m, LARGEST_DEVIATION)
         ends = np.concatenate([low, -bound]), np.concatenate([high, bound])
         best, squares = _bounded_solution(self.runs, self.steps, ends, damping)
         return best[: self.steps], self.chi_square - squares
 
 
-def normal_equations(runs: Sequence[LinearisedRun], largest_deviation: float) -> NormalEquations:
+def normal_equations(runs: Sequence[LinearisedRun]) -> NormalEquations:
     """Normal equations of several runs together.
 
     Args:
         runs: the same hypothesis linearised in each of them.
-        largest_deviation: bound of the nuisance parameters [standard deviations].
     """
-    products = [run_products(run, largest_deviation) for run in runs]
-    return equations_of(products, runs[0].slopes.shape[1], largest_deviation)
+    products = [run_products(run) for run in runs]
+    return equations_of(products, runs[0].slopes.shape[1])
 
 
-def equations_of(products: Sequence[RunProducts], k: int, largest_deviation: float) -> NormalEquations:
+def equations_of(products: Sequence[RunProducts], k: int) -> NormalEquations:
     """Normal equations from the products of several runs.
 
     Args:
         products: of each run, the same k slopes in all.
         k: number of parameters.
-        largest_deviation: bound of the nuisance parameters [standard deviations].
     """
     m = products[0].gram.shape[0] - len(products[0].bound) - 1 - k
     gram = _together(products, k, [np.full(len(run.bound), np.nan) for run in products])
     free = _eliminated(gram, np.arange(1 + k, 1 + k + m), np.arange(1 + k))
-    none, bound = np.zeros(k), np.full(m, largest_deviation)
+    none, bound = np.zeros(k), np.full(m, LARGEST_DEVIATION)
     ends = np.concatenate([none, -bound]), np.concatenate([none, bound])
     best, chi_square = _bounded_solution(products, k, ends, 0.0)
     return NormalEquations(
@@ -153,7 +211,6 @@ def equations_of(products: Sequence[RunProducts], k: int, largest_deviation: flo
         least=float(free[0, 0]),
         chi_square=chi_square,
         tolerances=best[k:],
-        largest_deviation=largest_deviation,
     )
 
 
@@ -195,9 +252,7 @@ def _together(runs: Sequence[RunProducts], k: int, held: Sequence[NDArray]) -> N
     return gram
 
 
-def without_run_nuisances(
-    run: LinearisedRun, tolerances: NDArray, largest_deviation: float
-) -> tuple[NDArray, NDArray]:
+def without_run_nuisances(run: LinearisedRun, tolerances: NDArray) -> tuple[NDArray, NDArray]:
     """Residual of a run less what its nuisance parameters explain, and the step to their best values.
 
     A deviation beyond the bound is no nuisance: it stays in the residual.
@@ -205,7 +260,6 @@ def without_run_nuisances(
     Args:
         run: the linearised run.
         tolerances: given tolerances, (m,) [standard deviations].
-        largest_deviation: bound of the run's nuisance parameters [standard deviations].
 
     Returns:
         Residual (values,) [noise deviations] and step of the nuisance parameters (l,) [SI].
@@ -215,7 +269,7 @@ def without_run_nuisances(
         return residual, np.zeros(0)
     gram = run.run_slopes.T @ run.run_slopes
     moment = run.run_slopes.T @ residual + gram @ run.run_values
-    bound = largest_deviation * run.run_sd
+    bound = LARGEST_DEVIATION * run.run_sd
     value = bounded_minimiser(gram + np.diag(1.0 / run.run_sd**2), moment, -bound, bound)
     step = value - run.run_values
     return residual - run.run_slopes @ step, step
@@ -253,13 +307,10 @@ def _eliminated(gram: NDArray, columns: NDArray, kept: NDArray) -> NDArray:
     return gram[np.ix_(kept, kept)] - cross.T @ np.linalg.solve(own, cross)
 
 
-def run_products(run: LinearisedRun, largest_deviation: float) -> RunProducts:
-    """Products of a run's columns.
-
-    largest_deviation: bound of the run's nuisance parameters [standard deviations].
-    """
+def run_products(run: LinearisedRun) -> RunProducts:
+    """Products of a run's columns."""
     columns = columns_of(run)
-    return with_priors(columns.T @ columns, run, largest_deviation)
+    return with_priors(columns.T @ columns, run)
 
 
 def columns_of(run: LinearisedRun) -> NDArray:
@@ -267,13 +318,12 @@ def columns_of(run: LinearisedRun) -> NDArray:
     return np.column_stack([run.residual, run.slopes, run.tolerance_slopes, run.run_slopes])
 
 
-def with_priors(gram: NDArray, run: LinearisedRun, largest_deviation: float) -> RunProducts:
+def with_priors(gram: NDArray, run: LinearisedRun) -> RunProducts:
     """Products with the priors of the run nuisances.
 
     Args:
         gram: of the columns, those of the run nuisances last, (1 + k + m + l, 1 + k + m + l) [1].
         run: whose nuisances these are.
-        largest_deviation: bound of the run's nuisance parameters [standard deviations].
     """
     own = len(run.run_sd)
     if own:
@@ -281,4 +331,65 @@ def with_priors(gram: NDArray, run: LinearisedRun, largest_deviation: float) -> 
         # Unknowns become the nuisances' distances from their centres, not steps from present values.
         gram = _shifted(gram, nuisances, -run.run_values)
         gram[nuisances, nuisances] += 1.0 / run.run_sd**2
-    return RunProducts(gram=gram, bound=largest_deviation * run.run_sd)
+    return RunProducts(gram=gram, bound=LARGEST_DEVIATION * run.run_sd)
+
+
+class ChangedRun:
+    """Products of a linearised run's columns with n changes of its outputs."""
+
+    def __init__(self, run: LinearisedRun, changes: Sequence[NDArray]):
+        """Multiply each change by the columns once.
+
+        Args:
+            run: the linearised run.
+            changes: n changes of the outputs, (values,) each [noise deviations].
+        """
+        self.run = run
+        columns, table = columns_of(run), np.array(changes)
+        self._gram = columns.T @ columns
+        self._cross = table @ columns
+        self._squares = np.einsum("ij,ij->i", table, table)
+
+    def explained(self, change: int) -> RunProducts:
+        """The products after one change has been added to the model's outputs."""
+        gram, cross = self._gram.copy(), self._cross[change]
+        gram[0] -= cross
+        gram[:, 0] -= cross
+        gram[0, 0] += self._squares[change]
+        return with_priors(gram, self.run)
+
+    def with_slope(self, change: int) -> RunProducts:
+        """The products with one change as a further slope, after the others."""
+        place = 1 + self.run.slopes.shape[1]
+        row = np.insert(self._cross[change], place, self._squares[change])
+        gram = np.insert(np.insert(self._gram, place, 0.0, axis=0), place, 0.0, axis=1)
+        gram[place], gram[:, place] = row, row
+        return with_priors(gram, self.run)
+
+
+class ChangedRuns:
+    """Several linearised runs of one estimate, and n changes of the outputs in all of them."""
+
+    def __init__(
+        self,
+        runs: Sequence[LinearisedRun],
+        changes: Sequence[Sequence[NDArray]],
+    ):
+        """Multiply each change by the columns of its run once.
+
+        Args:
+            runs: the same estimate linearised in each of them.
+            changes: n changes, each per run (values,) [noise deviations].
+        """
+        self._slopes = runs[0].slopes.shape[1]
+        self._runs = [ChangedRun(run, [change[r] for change in changes]) for r, run in enumerate(runs)]
+
+    def explained(self, change: int) -> NormalEquations:
+        """Normal equations after one change has been added to the model's outputs."""
+        products = [run.explained(change) for run in self._runs]
+        return equations_of(products, self._slopes)
+
+    def with_slope(self, change: int) -> NormalEquations:
+        """Normal equations with one change as a further slope, after the others."""
+        products = [run.with_slope(change) for run in self._runs]
+        return equations_of(products, self._slopes + 1)

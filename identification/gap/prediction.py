@@ -6,16 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.fit.fitting_problem import FittingProblem
-from identification.gap.fit.hypothesis import Estimate
-from identification.gap.fit.linearisation import linearised_run
-from identification.gap.fit.variable_projection import (
-    LinearisedRun,
-    normal_equations,
-    without_run_nuisances,
-)
-from identification.gap.model.grey_box import GreyBox, noise_weighted
+from identification.gap.fitting_problem import Estimate, FittingProblem
+from identification.gap.gauss_newton import linearised_run
+from identification.gap.plant import GreyBox, noise_weighted
+from identification.gap.variable_projection import LinearisedRun, normal_equations, without_run_nuisances
 from identification.report_2003.output_error import partial_error, relative_error, total_error
+
+SETTLING_STEPS = 3
+"""Gauss-Newton steps for a cause's run parameters when a run is predicted; the outputs are nearly linear
+in them, so that three suffice."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,14 +33,14 @@ class Prediction:
 
 def predict(problem: FittingProblem, estimate: Estimate) -> Prediction:
     """Simulate all runs; a held-out run determines its own nuisance parameters and nothing else."""
-    settings, estimate = problem.settings, with_settled_runs(problem, estimate)
+    estimate = with_settled_runs(problem, estimate)
     outputs, runs = _in_run_parameters(problem, estimate)
     tolerances = _tolerances(problem, runs)
     shapes = [run.measured.shape for run in problem.plant.runs]
     return Prediction(
         outputs=outputs,
         residuals=[
-            without_run_nuisances(run, tolerances, settings.largest_deviation)[0].reshape(shape)
+            without_run_nuisances(run, tolerances)[0].reshape(shape)
             for run, shape in zip(runs, shapes, strict=True)
         ],
         residuals_nominal_offsets=[
@@ -56,13 +55,11 @@ def with_settled_runs(problem: FittingProblem, estimate: Estimate) -> Estimate:
 
     The outputs need not be linear in them: a winding that begins 30 K warmer, for one.
     """
-    settings, count = problem.settings, len(estimate.hypothesis.run_parameters)
-    for _ in range(settings.prediction_iterations if count else 0):
+    count = len(estimate.hypothesis.run_parameters)
+    for _ in range(SETTLING_STEPS if count else 0):
         runs = _in_run_parameters(problem, estimate)[1]
         tolerances = _tolerances(problem, runs)
-        steps = [
-            without_run_nuisances(run, tolerances, settings.largest_deviation)[1][:count] for run in runs
-        ]
+        steps = [without_run_nuisances(run, tolerances)[1][:count] for run in runs]
         estimate = replace(estimate, run_values=estimate.run_values + np.array(steps))
     return estimate
 
@@ -70,7 +67,7 @@ def with_settled_runs(problem: FittingProblem, estimate: Estimate) -> Estimate:
 def _tolerances(problem: FittingProblem, runs: Sequence[LinearisedRun]) -> NDArray:
     """Tolerances (m,) [standard deviations] as the fitted runs determine them."""
     fitted = [runs[r] for r in problem.fitted_runs]
-    return normal_equations(fitted, problem.settings.largest_deviation).tolerances
+    return normal_equations(fitted).tolerances
 
 
 def _in_run_parameters(

@@ -1,1 +1,0 @@
-"""Joint fits of parameters and causes to recordings."""

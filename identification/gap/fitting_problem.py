@@ -1,0 +1,263 @@
+"""Hypotheses, their estimates, and the least-squares problem that a plant's recordings pose."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epv_env.common.files import Journal
+from identification.gap.plant import Cause, FreeParameter, GreyBox, NuisanceParameter, noise_weighted
+
+FAILED_RESIDUAL = 1e3
+"""Residual of a reading whose candidate cannot be simulated [noise deviations]: far above every residual
+of a usable candidate, so that the fit moves away."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hypothesis:
+    """Causes that are taken to act together; without causes: the recalibrated nominal model."""
+
+    causes: tuple[Cause, ...]
+
+    @property
+    def parameters(self) -> tuple[FreeParameter, ...]:
+        """Parameters of all causes, which are fitted beside the calibrated parameters."""
+        return tuple(parameter for cause in self.causes for parameter in cause.parameters)
+
+    @property
+    def run_parameters(self) -> tuple[NuisanceParameter, ...]:
+        """Nuisance parameters of all causes that take a separate value in every run."""
+        return tuple(nuisance for cause in self.causes for nuisance in cause.run_parameters)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Labels of the causes."""
+        return tuple(cause.label for cause in self.causes)
+
+    @property
+    def titles(self) -> tuple[str, ...]:
+        """The causes for people."""
+        return tuple(cause.title for cause in self.causes)
+
+
+@dataclass(frozen=True, kw_only=True)
+class NuisanceSlopes:
+    """Derivatives of the outputs by run offsets and tolerances, which enter the fits linearly."""
+
+    deviations: NDArray
+    """Tolerances of the simulations at which they hold, (m,) [standard deviations from the centres]."""
+    offset_slopes: list[NDArray]
+    """Per run: derivatives by the run offsets, (values, offsets) [noise deviations/SI]."""
+    tolerance_slopes: list[NDArray]
+    """Per run: derivatives by the tolerances, (values, m) [noise deviations/standard deviation]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """Parameter values of a hypothesis: the start, an intermediate result or the result of a fit."""
+
+    hypothesis: Hypothesis
+    vector: NDArray
+    """Calibrated parameters, then parameters of the causes, each divided by its scale, (k,) [1]."""
+    run_values: NDArray
+    """Run parameters of the causes less their centres, (runs, l) [SI]."""
+    slopes: NuisanceSlopes | None = None
+    """Nuisance slopes taken at this estimate; None: those of the fitting problem."""
+    chi_square: float = np.inf
+    """Weighted sum of squares on the fitted runs, infinite before a fit [1]."""
+    converged: bool = False
+    given_up: bool = False
+    """True where a rival hypothesis fits so much better that the fit was stopped."""
+
+    @property
+    def cause_start(self) -> int:
+        """Index of the vector at which the parameters of the causes begin."""
+        return len(self.vector) - len(self.hypothesis.parameters)
+
+    @property
+    def cause_vector(self) -> NDArray:
+        """Scaled parameters of the causes, (parameters of causes,) [1]."""
+        return self.vector[self.cause_start :]
+
+
+def cause_places(estimate: Estimate) -> list[tuple[Cause, slice, slice]]:
+    """Each cause with the places of its parameters in the vector and of its run parameters."""
+    places = []
+    first, first_run = estimate.cause_start, 0
+    for cause in estimate.hypothesis.causes:
+        end, end_run = first + len(cause.parameters), first_run + len(cause.run_parameters)
+        places.append((cause, slice(first, end), slice(first_run, end_run)))
+        first, first_run = end, end_run
+    return places
+
+
+def nominal_vector(cause: Cause) -> NDArray:
+    """Scaled parameters of a cause that does not act, (parameters,) [1]."""
+    return np.array([parameter.nominal / parameter.scale for parameter in cause.parameters])
+
+
+class FitCache:
+    """Runs the steps of a diagnosis; a step that the journal holds is not run again."""
+
+    def __init__(
+        self,
+        plant: GreyBox,
+        journal: Journal | None = None,
+        announce: Callable[[str], None] = lambda step: None,
+        prefix: str = "",
+    ):
+        """Begin with the fits of a journal.
+
+        Args:
+            plant: the plant to whose causes the journal refers.
+            journal: finished fits; None keeps nothing.
+            announce: called with the name of every step before it begins.
+            prefix: of the names of all steps.
+        """
+        self.plant = plant
+        self.journal = journal
+        self.announce = announce
+        self.prefix = prefix
+
+    def named(self, prefix: str) -> "FitCache":
+        """The same cache for a second search: all names of steps begin with the prefix."""
+        return FitCache(self.plant, self.journal, self.announce, prefix)
+
+    def __call__(self, step: str, fit: Callable[[], list[Estimate]]) -> list[Estimate]:
+        """The estimates that `fit` returns, or returned in an earlier run under this step's name."""
+        step = self.prefix + step
+        self.announce(step)
+        if self.journal is not None and step in self.journal:
+            return [self._estimate(entry) for entry in self.journal[step]]
+        estimates = fit()
+        if self.journal is not None:
+            self.journal.add(step, [_entry(estimate) for estimate in estimates])
+        return estimates
+
+    def _estimate(self, entry: dict[str, Any]) -> Estimate:
+        causes = {cause.label: cause for cause in self.plant.causes}
+        runs = len(self.plant.runs)
+        return Estimate(
+            hypothesis=Hypothesis(causes=tuple(causes[label] for label in entry["causes"])),
+            vector=np.array(entry["vector"]),
+            run_values=np.array(entry["local"]).reshape(runs, -1),
+            chi_square=entry["chi_square"],
+            converged=entry["converged"],
+        )
+
+
+def _entry(estimate: Estimate) -> dict[str, Any]:
+    """An estimate as the journal keeps it; nuisance slopes are computed again."""
+    return {
+        "causes": list(estimate.hypothesis.labels),
+        "vector": estimate.vector.tolist(),
+        "local": estimate.run_values.tolist(),
+        "chi_square": estimate.chi_square,
+        "converged": estimate.converged,
+    }
+
+
+class FittingProblem:
+    """Weighted readings of a plant, with the nuisance slopes that hold for all estimates."""
+
+    def __init__(
+        self,
+        plant: GreyBox,
+        slopes: NuisanceSlopes | None = None,
+        *,
+        thorough: bool = False,
+    ):
+        """Weigh the readings of a plant.
+
+        Args:
+            plant: the model and its recordings.
+            slopes: nuisance slopes of estimates that have none; None: nuisances have no effect.
+            thorough: whether fits go on until little is left to gain, as a small catalogue allows.
+        """
+        self.plant = plant
+        self.thorough = thorough
+        self.fitted_runs = [r for r, run in enumerate(plant.runs) if not run.held_out]
+        self.all_runs = list(range(len(plant.runs)))
+        self.readings = sum(np.count_nonzero(plant.runs[r].trusted) for r in self.fitted_runs)
+        self.measured = [
+            noise_weighted(plant, r, run.measured).reshape(-1) for r, run in enumerate(plant.runs)
+        ]
+        """Per run: readings (channels x samples,) [noise deviations]."""
+        none = [np.zeros((len(values), 0)) for values in self.measured]
+        self.slopes = slopes or NuisanceSlopes(
+            deviations=np.zeros(0), offset_slopes=none, tolerance_slopes=none
+        )
+
+    def start(self, hypothesis: Hypothesis, values: Mapping[str, float]) -> Estimate:
+        """An estimate with values [SI] by symbol; a symbol that is left out has its nominal value."""
+        parameters = (*self.plant.parameters, *hypothesis.parameters)
+        vector = np.array([values.get(p.symbol, p.nominal) / p.scale for p in parameters])
+        run_values = np.zeros((len(self.plant.runs), len(hypothesis.run_parameters)))
+        return Estimate(hypothesis=hypothesis, vector=vector, run_values=run_values)
+
+    def parameters(self, estimate: Estimate) -> tuple[FreeParameter, ...]:
+        """Parameters of the estimate's vector: the calibrated ones, then those of its causes."""
+        return (*self.plant.parameters, *estimate.hypothesis.parameters)
+
+    def values(self, estimate: Estimate) -> dict[str, float]:
+        """Calibrated parameters and parameters of causes by symbol [SI]."""
+        pairs = zip(self.parameters(estimate), estimate.vector, strict=True)
+        return {p.symbol: float(scaled * p.scale) for p, scaled in pairs}
+
+    def candidate(self, estimate: Estimate) -> dict[str, NDArray]:
+        """Values by symbol, (1,) or (1, runs) [SI], as `GreyBox` takes one candidate."""
+        values = {symbol: np.array([value]) for symbol, value in self.values(estimate).items()}
+        run_values = {
+            nuisance.symbol: estimate.run_values[None, :, j]
+            for j, nuisance in enumerate(estimate.hypothesis.run_parameters)
+        }
+        return {**values, **run_values}
+
+    def candidates(self, estimates: Sequence[Estimate]) -> dict[str, NDArray]:
+        """Values by symbol of n estimates side by side, (n,) or (n, runs) [SI], for `GreyBox`."""
+        n = len(estimates)
+        columns: dict[str, NDArray] = {}
+        for i, estimate in enumerate(estimates):
+            for p, scaled in zip(self.parameters(estimate), estimate.vector, strict=True):
+                nominal = np.full(n, p.nominal, dtype=float)
+                columns.setdefault(p.symbol, nominal)[i] = scaled * p.scale
+            run_parameters = estimate.hypothesis.run_parameters
+            for nuisance, own in zip(run_parameters, estimate.run_values.T, strict=True):
+                centre = np.full((n, len(self.plant.runs)), nuisance.centre)
+                columns.setdefault(nuisance.symbol, centre)[i] = own
+            # A cause may set the same parameter: the unit's scatter is added to its value.
+            deviations = self.slopes_of(estimate).deviations
+            tolerances = self.plant.tolerances[: len(deviations)]
+            for tolerance, deviation in zip(tolerances, deviations, strict=True):
+                centre = np.full(n, tolerance.centre, dtype=float)
+                columns.setdefault(tolerance.symbol, centre)[i] += deviation * tolerance.sd
+        return columns
+
+    def ends(self, estimate: Estimate) -> tuple[NDArray, NDArray]:
+        """Steps of the scaled vector to both ends of the ranges, (k,) each [1]; never across zero."""
+        parameters, vector = self.parameters(estimate), estimate.vector
+        low = np.array([min(p.low / p.scale, p.high / p.scale) for p in parameters])
+        high = np.array([max(p.low / p.scale, p.high / p.scale) for p in parameters])
+        return np.minimum(low - vector, 0.0), np.maximum(high - vector, 0.0)
+
+    def slopes_of(self, estimate: Estimate) -> NuisanceSlopes:
+        """Nuisance slopes that hold for an estimate."""
+        return estimate.slopes or self.slopes
+
+    def outputs(self, estimates: Sequence[Estimate], runs: Sequence[int]) -> list[NDArray]:
+        """Weighted outputs of n estimates, per run (values, n) [noise deviations]."""
+        outputs = self.plant.outputs(self.candidates(estimates), runs)
+        return [
+            noise_weighted(self.plant, r, output).reshape(-1, len(estimates))
+            for r, output in zip(runs, outputs, strict=True)
+        ]
+
+    def residuals(self, estimates: Sequence[Estimate], runs: Sequence[int]) -> list[NDArray]:
+        """Weighted measured - model of n estimates, per run (values, n) [noise deviations]."""
+        return [self.residual(r, y) for r, y in zip(runs, self.outputs(estimates, runs), strict=True)]
+
+    def residual(self, run: int, outputs: NDArray) -> NDArray:
+        """Measured less weighted outputs (values, n) of a run [noise deviations]."""
+        return np.nan_to_num(self.measured[run][:, None] - outputs, nan=FAILED_RESIDUAL)

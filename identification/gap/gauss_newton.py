@@ -1,0 +1,279 @@
+"""Damped Gauss-Newton fits (Levenberg 1944, Marquardt 1963): many hypotheses side by side.
+
+Estimates are linearised by finite differences, all candidates in one simulation.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.gap.fitting_problem import Estimate, FittingProblem, NuisanceSlopes
+from identification.gap.plant import noise_weighted
+from identification.gap.variable_projection import (
+    LinearisedRun,
+    NormalEquations,
+    normal_equations,
+    without_run_nuisances,
+)
+
+DIFFERENCE_STEP = 1e-3
+"""Relative change of a scaled parameter for a finite difference [1]: large against rounding of the
+simulation, small against the curvature of the outputs."""
+
+SMALLEST_DIFFERENCED = 0.1
+"""Scaled parameter [1] below which the difference step no longer shrinks with the parameter: a cause
+that does not act yet has the value 0."""
+
+ITERATIONS, THOROUGH_ITERATIONS = 12, 40
+"""Most Gauss-Newton iterations, for computing time. A fit that needs more is weighed as it is and
+reported as not converged. Plants with a small catalogue have thorough fits, which cost little."""
+
+INITIAL_DAMPING = 1e-3
+"""Levenberg-Marquardt damping of the first step, relative to the diagonal [1]: nearly none, as starts
+are expected to be close."""
+
+DAMPING_DECREASE, DAMPING_INCREASE = 0.2, 10.0
+"""Factors on the damping after a step that did and one that did not decrease chi-square [1] (Marquardt
+1963)."""
+
+LEAST_DAMPING, MOST_DAMPING = 1e-9, 1e6
+"""Bounds of the damping, relative to the diagonal [1]. The lower one is practically none; a fit ends at
+a tenth of the upper one, where a step is too short to gain anything."""
+
+CONVERGED_DECREASE = 0.3
+"""Predicted decrease of chi-square [1] below which a fit has converged: less changes no odds."""
+
+CONVERGED_EXCESS_SHARE, THOROUGH_EXCESS_SHARE = 3e-3, 1e-4
+"""Predicted decrease below which a fit, or a thorough one, has converged, as a share of the excess,
+chi-square beyond one per reading [1]: a cause that leaves a large residual need not be fitted to the
+last digit. A thorough fit follows a flat valley to its end."""
+
+PROMISED_DECREASES = 3.0
+"""Multiple of the predicted decrease [1] that a fit may still gain, before it is given up: steps of a
+nonlinear model gain more than they predict at first."""
+
+HOPELESS_EXCESS_RATIO = 3.0
+"""A fit is given up if its excess stays above this multiple of its best rival's excess [1], for
+computing time."""
+
+HOPELESS_EXCESS_PER_READING = 0.05
+"""Excess per reading that the rule above adds [1]: noise is not known to the percent."""
+
+
+def linearise(
+    problem: FittingProblem, estimates: Sequence[Estimate], runs: Sequence[int]
+) -> list[list[LinearisedRun]]:
+    """Residuals and derivatives of each estimate in each of the runs."""
+    changed = [_changed(problem, estimate) for estimate in estimates]
+    ends = np.cumsum([0, *(len(each) for each in changed)])
+    outputs = problem.outputs([candidate for each in changed for candidate in each], runs)
+    return [
+        [
+            _linearised(problem, estimate, r, block[:, first:last])
+            for r, block in zip(runs, outputs, strict=True)
+        ]
+        for estimate, first, last in zip(estimates, ends[:-1], ends[1:], strict=True)
+    ]
+
+
+def _changed(problem: FittingProblem, estimate: Estimate) -> list[Estimate]:
+    """The estimate, then a copy for each parameter and run parameter, changed by its step."""
+    candidates = [estimate]
+    for i, step in enumerate(_steps(problem, estimate)):
+        vector = estimate.vector.copy()
+        vector[i] += step
+        candidates.append(replace(estimate, vector=vector))
+    for j, nuisance in enumerate(estimate.hypothesis.run_parameters):
+        run_values = estimate.run_values.copy()
+        run_values[:, j] += nuisance.step
+        candidates.append(replace(estimate, run_values=run_values))
+    return candidates
+
+
+def _steps(problem: FittingProblem, estimate: Estimate) -> NDArray:
+    """Finite differences of the scaled vector (k,) [1], away from the nearer end of each range."""
+    middle = np.array([0.5 * (p.low + p.high) / p.scale for p in problem.parameters(estimate)])
+    relative = np.where(estimate.vector > middle, -DIFFERENCE_STEP, DIFFERENCE_STEP)
+    return relative * np.maximum(np.abs(estimate.vector), SMALLEST_DIFFERENCED)
+
+
+def _linearised(
+    problem: FittingProblem, estimate: Estimate, run: int, outputs: NDArray
+) -> LinearisedRun:
+    """One run from the weighted outputs (values, 1 + k + l) of the changed estimates."""
+    k = len(estimate.vector)
+    changes = np.nan_to_num(outputs[:, 1:] - outputs[:, :1])
+    return linearised_run(
+        problem,
+        estimate,
+        run,
+        outputs[:, 0],
+        slopes=changes[:, :k] / _steps(problem, estimate),
+        run_slopes=changes[:, k:] / [n.step for n in estimate.hypothesis.run_parameters],
+        run_values=estimate.run_values[run],
+    )
+
+
+def linearised_run(
+    problem: FittingProblem,
+    estimate: Estimate,
+    run: int,
+    outputs: NDArray,
+    *,
+    slopes: NDArray,
+    run_slopes: NDArray,
+    run_values: NDArray,
+) -> LinearisedRun:
+    """One run from outputs and derivatives, with the nuisance slopes of the estimate.
+
+    Args:
+        problem: the readings.
+        estimate: where the run is linearised.
+        run: index of the run.
+        outputs: weighted outputs, (values,) [noise deviations].
+        slopes: their derivatives by the scaled vector, (values, k).
+        run_slopes: their derivatives by the run parameters, (values, l).
+        run_values: the run parameters less their centres, (l,) [SI].
+    """
+    nuisances = problem.slopes_of(estimate)
+    offset_slopes, tolerance_slopes = nuisances.offset_slopes[run], nuisances.tolerance_slopes[run]
+    offsets = offset_slopes.shape[1]
+    run_parameters = estimate.hypothesis.run_parameters
+    known = (*run_parameters, *problem.plant.run_offsets[:offsets])
+    # The slopes describe tolerances from their centres: their part in the simulation is undone.
+    undone = tolerance_slopes @ nuisances.deviations
+    return LinearisedRun(
+        residual=problem.residual(run, outputs[:, None])[:, 0] + undone,
+        slopes=slopes,
+        run_slopes=np.column_stack([run_slopes, offset_slopes]),
+        run_values=np.concatenate([run_values, np.zeros(offsets)]),
+        run_sd=np.array([nuisance.sd for nuisance in known]),
+        tolerance_slopes=tolerance_slopes,
+    )
+
+
+def nuisance_slopes(
+    problem: FittingProblem, estimates: Sequence[Estimate], deviations: Sequence[NDArray]
+) -> list[NuisanceSlopes]:
+    """Derivatives by run offsets and tolerances at each estimate, over all runs.
+
+    Args:
+        problem: the plant.
+        estimates: where the derivatives are taken.
+        deviations: tolerances of each estimate, (m,) [standard deviations from the centres].
+    """
+    plant = problem.plant
+    nuisances = (*plant.run_offsets, *plant.tolerances)
+    n, offsets = 1 + len(nuisances), len(plant.run_offsets)
+    all_slopes = [
+        NuisanceSlopes(deviations=d, offset_slopes=[], tolerance_slopes=[]) for d in deviations
+    ]
+    placed = [replace(e, slopes=slopes) for e, slopes in zip(estimates, all_slopes, strict=True)]
+    values = problem.candidates([estimate for estimate in placed for _ in range(n)])
+    for j, nuisance in enumerate(nuisances, start=1):
+        centre = np.full(n * len(estimates), nuisance.centre, dtype=float)
+        values.setdefault(nuisance.symbol, centre)[j::n] += nuisance.step
+    steps = np.array([nuisance.step for nuisance in nuisances])
+    sd = np.array([nuisance.sd for nuisance in plant.tolerances])
+    for r, output in enumerate(plant.outputs(values, problem.all_runs)):
+        outputs = noise_weighted(plant, r, output).reshape(-1, len(estimates), n)
+        slopes = np.nan_to_num(outputs[..., 1:] - outputs[..., :1]) / steps
+        for each, own in zip(all_slopes, slopes.transpose(1, 0, 2), strict=True):
+            each.offset_slopes.append(own[:, :offsets])
+            each.tolerance_slopes.append(own[:, offsets:] * sd)
+    return all_slopes
+
+
+def fit(
+    problem: FittingProblem, starts: Sequence[Estimate], rival_chi_square: float = np.inf
+) -> list[Estimate]:
+    """Fit every start to the fitted runs, until each fit has converged or is given up.
+
+    Args:
+        problem: readings and settings.
+        starts: where the fits begin.
+        rival_chi_square: least chi-square of earlier fits against which these compete [1].
+    """
+    if not starts:
+        return []
+    searches = [_Search(problem, start) for start in starts]
+    active = searches
+    for _ in range((THOROUGH_ITERATIONS if problem.thorough else ITERATIONS) + 1):
+        linearised = linearise(problem, [search.trial for search in active], problem.fitted_runs)
+        for search, runs in zip(active, linearised, strict=True):
+            search.advance(runs, rival_chi_square)
+        rival_chi_square = min(rival_chi_square, *(search.best.chi_square for search in searches))
+        active = [s for s in active if not (s.best.converged or s.best.given_up)]
+        if not active:
+            break
+    return [search.best for search in searches]
+
+
+class _Search:
+    """The fit of one hypothesis."""
+
+    def __init__(self, problem: FittingProblem, start: Estimate):
+        self.problem = problem
+        self.best = start
+        self.trial = start
+        self.damping = INITIAL_DAMPING
+        self.equations: NormalEquations | None = None
+
+    def advance(self, runs: Sequence[LinearisedRun], rival_chi_square: float) -> None:
+        """Accept or reject the trial by its linearised runs, decide whether to go on, and step."""
+        equations = normal_equations(runs)
+        if self.equations is None or equations.chi_square < self.best.chi_square:
+            self._accept(runs, equations)
+            current = equations
+        else:
+            self._tighten()
+            current = self.equations
+        self.trial, decrease = self._step(current)
+        self._decide(decrease, rival_chi_square)
+
+    def _accept(self, runs: Sequence[LinearisedRun], equations: NormalEquations) -> None:
+        self.damping = max(DAMPING_DECREASE * self.damping, LEAST_DAMPING)
+        self.equations = equations
+        self.best = replace(
+            self.trial,
+            chi_square=equations.chi_square,
+            run_values=self._stepped_run_values(runs, equations),
+        )
+
+    def _tighten(self) -> None:
+        raised = DAMPING_INCREASE * self.damping + 1e-6  # leaves zero as well
+        self.damping = min(raised, MOST_DAMPING)
+
+    def _stepped_run_values(self, runs: Sequence[LinearisedRun], equations: NormalEquations) -> NDArray:
+        """Run parameters of the causes after one Gauss-Newton step; run offsets stay linear."""
+        run_values = self.trial.run_values.copy()
+        count = run_values.shape[1]
+        if count:
+            for r, run in zip(self.problem.fitted_runs, runs, strict=True):
+                step = without_run_nuisances(run, equations.tolerances)[1]
+                run_values[r] += step[:count]
+        return run_values
+
+    def _step(self, equations: NormalEquations) -> tuple[Estimate, float]:
+        """The next trial, within the ranges, and the decrease of chi-square that it promises."""
+        ends = self.problem.ends(self.best)
+        step, decrease = equations.step(*ends, self.damping)
+        return replace(self.best, vector=self.best.vector + step), decrease
+
+    def _decide(self, decrease: float, rival_chi_square: float) -> None:
+        """Mark the fit as converged or given up."""
+        readings = self.problem.readings
+        share = THOROUGH_EXCESS_SHARE if self.problem.thorough else CONVERGED_EXCESS_SHARE
+        excess = self.best.chi_square - readings
+        enough = max(CONVERGED_DECREASE, share * excess)
+        hopeless = (
+            HOPELESS_EXCESS_RATIO * max(rival_chi_square - readings, 0.0)
+            + HOPELESS_EXCESS_PER_READING * readings
+        )
+        self.best = replace(
+            self.best,
+            converged=bool(decrease < enough or self.damping >= 0.1 * MOST_DAMPING),
+            given_up=bool(excess - PROMISED_DECREASES * decrease > hopeless),
+        )

@@ -1,1 +1,0 @@
-"""The grey-box protocol: how the diagnosis knows a plant."""

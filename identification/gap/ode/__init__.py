@@ -1,1 +1,0 @@
-"""Simulation of a plant from its plain ordinary differential equations."""

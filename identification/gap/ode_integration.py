@@ -1,0 +1,491 @@
+"""Integration of plain differential equations for many candidates, with stops at thresholds.
+
+Steps are those of the classical Runge-Kutta method. A step counts only where no stage of it lies
+beyond a threshold, so that its order is kept. Otherwise it is shortened until the threshold is near
+enough to be passed in one tiny step. A state that both sides of a threshold push back slides along it,
+to first order, and exactly where it sticks.
+
+Inputs are held over each sampling period, and delayed where the plant reacts late: the mean of a delayed
+input over a sub-step is taken from the input's integral. Without a delay it is the sample itself, and it
+is a smooth function of the delay, as a fit needs it. Before the run the first sample holds.
+"""
+
+import contextlib
+import keyword
+from collections import namedtuple
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numba
+import numpy as np
+from numba.core.errors import NumbaError
+from numpy.typing import NDArray
+
+STEP_ERROR = 0.05
+"""Largest change of a reading by halving the sub-steps [noise deviations]: far below what the readings
+can show."""
+
+MOST_STEPS = 256
+"""Most sub-steps in a sampling period that are tried; a model that needs more is stiff, and an explicit
+method is the wrong one for it."""
+
+APPROACH_FACTOR = 8.0
+"""By what a sub-step is divided when it would pass a threshold; computing time only."""
+
+SHORTEST_STEP = 1e-8
+"""Sub-step at which a threshold is passed, relative to the ordinary sub-step [1]: a threshold is located
+to this accuracy, well above rounding."""
+
+MOST_EVENT_STEPS = 600
+"""Most steps within one sub-step near thresholds; ten crossings in one sub-step fit in."""
+
+
+TIME = "t"
+"""Field of the inputs that holds the time since the start of the run [s]."""
+
+
+def record(kind: str, names: Sequence[str]) -> Any:
+    """A class of records with these fields. Raises ValueError for names that Python cannot have."""
+    for name in names:
+        if not name.isidentifier() or keyword.iskeyword(name) or name.startswith("_"):
+            raise ValueError(
+                f"{kind} '{name}': the name is used as in `p.{name}`, so it must be a Python name: "
+                "rename it with letters, digits and _"
+            )
+    double = sorted({name for name in names if list(names).count(name) > 1})
+    if double:
+        raise ValueError(f"{kind} '{double[0]}' is given twice: give every {kind} a name of its own")
+    return namedtuple(kind.replace(" ", "_"), names)
+
+
+class Records:
+    """The records of one plant: states, inputs with the time, and parameters."""
+
+    def __init__(self, states: Sequence[str], inputs: Sequence[str], symbols: Sequence[str]):
+        self.states, self.inputs, self.symbols = tuple(states), tuple(inputs), tuple(symbols)
+        self.x = record("state", self.states)
+        self.u = record("input", (TIME, *self.inputs))
+        self.p = record("parameter", self.symbols)
+
+    def flat(self, function: Callable, count: int) -> Callable:
+        """A function (x, t, u, p, out) of arrays that writes `count` results into `out`.
+
+        The arrays' first axes are states, inputs, symbols and results; a second axis of candidates may
+        follow. The text is generated, as numba needs every field written out.
+        """
+        x = ", ".join(f"x[{i}]" for i in range(len(self.states)))
+        u = ", ".join(["t", *(f"u[{i}]" for i in range(len(self.inputs)))])
+        p = ", ".join(f"p[{i}]" for i in range(len(self.symbols)))
+        lines = [
+            "def flat(x, t, u, p, out):",
+            f"    r = function(State({x}), Input({u}), Parameter({p}))",
+            *(f"    out[{i}] = r[{i}]" for i in range(count)),
+            "    return out",
+        ]
+        names = {"function": function, "State": self.x, "Input": self.u, "Parameter": self.p}
+        exec("\n".join(lines), names)
+        return names["flat"]
+
+
+def compiled(function: Callable) -> Callable:
+    """The function compiled by numba; divisions by zero give inf, as in numpy."""
+    return function if hasattr(function, "py_func") else numba.njit(error_model="numpy")(function)
+
+
+def totals(samples: NDArray) -> NDArray:
+    """Integrals of held samples (samples, inputs) [sampling periods], (samples + 1, inputs)."""
+    return np.concatenate([np.zeros((1, *samples.shape[1:])), np.cumsum(samples, axis=0)])
+
+
+def delayed_mean(total: NDArray, since: float, length: float) -> float:
+    """Mean of a held input over a stretch; numba compiles this function.
+
+    total: integral of the input, (samples + 1,). since, length: of the stretch [sampling periods].
+    """
+    ends = (since, since + length)
+    values = [0.0, 0.0]
+    for i in range(2):
+        k = min(max(int(np.floor(ends[i])), 0), len(total) - 2)
+        values[i] = total[k] + (ends[i] - k) * (total[k + 1] - total[k])
+    return (values[1] - values[0]) / length
+
+
+def delayed_means(total: NDArray, since: NDArray, length: float) -> NDArray:
+    """The same for n inputs at once, (n,); total: (samples + 1, n). since: (n,)."""
+    lanes = np.arange(total.shape[1])
+    values = []
+    for end in (since, since + length):
+        k = np.clip(np.floor(end).astype(int), 0, len(total) - 2)
+        values.append(total[k, lanes] + (end - k) * (total[k + 1, lanes] - total[k, lanes]))
+    return (values[1] - values[0]) / length
+
+
+def advancing(rate: Callable, thresholds: Callable, count: int, wrap: Callable) -> Callable:
+    """A function (x, t, h, u, p, push, work) that advances one candidate's states x (states,) by h [s].
+
+    push: forcing of the rates, (states,). work: scratch of `workspace`, (rows, states).
+
+    Args:
+        rate: derivatives of the states, as `Records.flat` makes it.
+        thresholds: functions whose change of sign marks a threshold, likewise.
+        count: number of thresholds.
+        wrap: compiles a function, or leaves it as it is.
+    """
+
+    @wrap
+    def slope(x, t, u, p, push, out):
+        rate(x, t, u, p, out)
+        for i in range(len(x)):
+            out[i] += push[i]
+
+    @wrap
+    def passed(x, t, u, p, before, level):
+        """Index of a threshold that lies between x and where `before` was taken; -1 for none."""
+        if count > 0:
+            thresholds(x, t, u, p, level)
+            for i in range(count):
+                if before[i] * level[i] < 0.0:
+                    return i
+        return -1
+
+    @wrap
+    def try_step(x, t, h, u, p, push, before, level, work):
+        """A step into work[5]; returns whether no stage has passed a threshold."""
+        slope(x, t, u, p, push, work[0])
+        for stage in range(1, 4):
+            part = h if stage == 3 else 0.5 * h
+            for i in range(len(x)):
+                work[4, i] = x[i] + part * work[stage - 1, i]
+            if passed(work[4], t + part, u, p, before, level) >= 0:
+                return False
+            slope(work[4], t + part, u, p, push, work[stage])
+        for i in range(len(x)):
+            inner = work[0, i] + 2.0 * work[1, i] + 2.0 * work[2, i] + work[3, i]
+            work[5, i] = x[i] + h / 6.0 * inner
+        return passed(work[5], t + h, u, p, before, level) < 0
+
+    @wrap
+    def pass_threshold(x, t, tiny, left, u, p, push, before, level, work):
+        """Pass a threshold by a tiny step, or stay on it where both sides push back (Filippov)."""
+        slope(x, t, u, p, push, work[0])
+        work[4] = x + tiny * work[0]
+        i = passed(work[4], t, u, p, before, level)
+        if i >= 0:
+            old, new = before[i], level[i]
+            slope(work[4], t, u, p, push, work[1])
+            work[5] = work[4] + tiny * work[1]
+            thresholds(work[5], t, u, p, level)
+            if new * level[i] < 0.0:
+                share = (new - old) / ((new - old) - (level[i] - new))
+                x += left * (work[0] + share * (work[1] - work[0]))
+                return True
+        x[:] = work[4]
+        return False
+
+    @wrap
+    def advance_past_thresholds(x, t, h, u, p, push, work):
+        tiny, left, size = SHORTEST_STEP * h, h, h
+        before, level = np.empty(count), np.empty(count)
+        thresholds(x, t, u, p, before)
+        if np.any(before == 0.0):
+            # On a threshold the sign is open: the rate decides to which side the state leaves it.
+            slope(x, t, u, p, push, work[0])
+            x += tiny * work[0]
+            thresholds(x, t, u, p, before)
+        for _ in range(MOST_EVENT_STEPS):
+            size = min(size, left)
+            if try_step(x, t, size, u, p, push, before, level, work):
+                x[:] = work[5]
+                t, left = t + size, left - size
+            elif size > tiny:
+                size = max(size / APPROACH_FACTOR, tiny)
+                continue
+            elif pass_threshold(x, t, tiny, left, u, p, push, before, level, work):
+                return
+            else:
+                t, left = t + tiny, left - tiny
+                size = left
+            if left <= tiny:
+                return
+            thresholds(x, t, u, p, before)
+
+    @wrap
+    def advance(x, t, h, u, p, push, work):
+        if count > 0:
+            advance_past_thresholds(x, t, h, u, p, push, work)
+        else:
+            try_step(x, t, h, u, p, push, push, push, work)
+            x[:] = work[5]
+
+    return advance
+
+
+def workspace(states: int) -> NDArray:
+    """Scratch of a step: four slopes, a stage and the end, (6, states)."""
+    return np.empty((6, states))
+
+
+def together_step(
+    rate: Callable, x: NDArray, t: float, h: float, u: NDArray, p: NDArray, push: NDArray
+) -> tuple[NDArray, list[NDArray]]:
+    """A step of many candidates: the states after h [s], (states, n), and its three stages likewise.
+
+    The arguments are those of `advancing`, with an axis of candidates.
+    """
+
+    def slope(y: NDArray, time: float) -> NDArray:
+        return rate(y, time, u, p, np.empty_like(y)) + push
+
+    k1 = slope(x, t)
+    x2 = x + 0.5 * h * k1
+    k2 = slope(x2, t + 0.5 * h)
+    x3 = x + 0.5 * h * k2
+    k3 = slope(x3, t + 0.5 * h)
+    x4 = x + h * k3
+    return x + (h / 6.0) * (k1 + 2.0 * (k2 + k3) + slope(x4, t + h)), [x2, x3, x4]
+
+
+Simulation = Callable[[Sequence["Job"]], list[tuple[NDArray, NDArray]]]
+"""Gives of each job readings (channels, samples, n) and states (states, samples, n) [SI]; NaN from where
+a candidate fails."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """One run to be simulated for n candidates."""
+
+    start: NDArray
+    """States at the first sample, (states, n) [SI]."""
+    inputs: NDArray
+    """Samples of the inputs, held until the next one, (samples, inputs) [SI]."""
+    delays: NDArray
+    """By how much each input acts late, (inputs, n) [s]."""
+    parameters: NDArray
+    """Values of all symbols, (symbols, n) [SI]."""
+    period: float
+    """Sampling period [s]."""
+    steps: int
+    """Sub-steps in a sampling period."""
+    acting: NDArray
+    """First sample with the forcing, and the first one without it again, (2, n)."""
+    push: NDArray
+    """Forcing of the states' rates while it acts, (states, n) [SI/s]."""
+
+
+def alone(advance: Callable, read: Callable, channels: int, wrap: Callable) -> Simulation:
+    """A simulation in which each candidate has a loop of its own.
+
+    Args:
+        advance: of `advancing`.
+        read: readings from states, as `Records.flat` makes it.
+        channels: number of readings.
+        wrap: compiles a function, or leaves it as it is.
+    """
+    mean = wrap(delayed_mean)
+
+    @wrap
+    def finite(x):
+        total = 0.0
+        for value in x:
+            total += value
+        return np.isfinite(total)
+
+    @wrap
+    def loop(x, inputs, total, delays, p, period, substeps, acting, push, work, states, readings):
+        u, none = np.empty(inputs.shape[1]), np.zeros_like(push)
+        for k in range(len(inputs)):
+            if not finite(x):
+                break
+            pushed = push if acting[0] <= k < acting[1] else none
+            for s in range(substeps):
+                begin = k + s / substeps
+                for i in range(len(u)):
+                    if delays[i] == 0.0:
+                        u[i] = inputs[k, i]
+                    else:
+                        u[i] = mean(total[:, i], begin - delays[i] / period, 1.0 / substeps)
+                if s == 0:
+                    states[:, k] = x
+                    read(x, k * period, u, p, readings[:, k])
+                advance(x, begin * period, period / substeps, u, p, pushed, work)
+
+    def simulate(job: Job) -> tuple[NDArray, NDArray]:
+        n, work = job.start.shape[1], workspace(len(job.start))
+        states = np.full((n, len(job.start), len(job.inputs)), np.nan)
+        readings = np.full((n, channels, len(job.inputs)), np.nan)
+        total = totals(job.inputs)
+        starts, delays, parameters, acting, pushes = (
+            np.ascontiguousarray(own.T)
+            for own in (job.start, job.delays, job.parameters, job.acting, job.push)
+        )
+        for c in range(n):
+            given = starts[c], job.inputs, total, delays[c], parameters[c], job.period, job.steps
+            # Functions such as math.exp refuse what numpy calls inf: the candidate ends there.
+            with contextlib.suppress(ArithmeticError):
+                loop(*given, acting[c], pushes[c], work, states[c], readings[c])
+        return np.moveaxis(readings, 0, -1), np.moveaxis(states, 0, -1)
+
+    return lambda jobs: [simulate(job) for job in jobs]
+
+
+def together(
+    rate: Callable, read: Callable, thresholds: Callable, counts: tuple[int, int], advance: Callable
+) -> Simulation:
+    """A simulation of all candidates at once; one that is near a threshold advances by itself.
+
+    Args:
+        rate: of the states, as `Records.flat` makes it.
+        read: readings, as `Records.flat` makes them.
+        thresholds: as `Records.flat` makes them.
+        counts: numbers of readings and of thresholds.
+        advance: of `advancing`, not compiled.
+    """
+    channels, count = counts
+
+    def stepped(x: NDArray, t: float, h: float, u: NDArray, p: NDArray, push: NDArray) -> NDArray:
+        end, stages = together_step(rate, x, t, h, u, p, push)
+        if count:
+            before, *after = (
+                thresholds(y, t, u, p, np.empty((count, x.shape[1]))) for y in (x, *stages, end)
+            )
+            near = np.any(before == 0.0, axis=0) | np.any(before * np.array(after) < 0.0, axis=(0, 1))
+            for c in np.flatnonzero(near):
+                own = x[:, c].copy()
+                advance(own, t, h, u[:, c], p[:, c], push[:, c], workspace(len(own)))
+                end[:, c] = own
+        return end
+
+    def simulate(jobs: Sequence[Job]) -> list[tuple[NDArray, NDArray]]:
+        bundle = _Bundle(jobs)
+        x, p, size = bundle.start, bundle.parameters, bundle.period / bundle.steps
+        states, readings = (np.empty((bundle.samples, rows, x.shape[1])) for rows in (len(x), channels))
+        for k in range(bundle.samples):
+            push = bundle.push * ((bundle.acting[0] <= k) & (k < bundle.acting[1]))
+            for s in range(bundle.steps):
+                begin = k + s / bundle.steps
+                u = bundle.inputs(k, begin)
+                if s == 0:
+                    states[k] = x
+                    read(x, k * bundle.period, u, p, readings[k])
+                x = stepped(x, begin * bundle.period, size, u, p, push)
+        readings[~np.isfinite(readings)] = np.nan
+        return bundle.taken_apart(readings, states)
+
+    def simulate_all(jobs: Sequence[Job]) -> list[tuple[NDArray, NDArray]]:
+        alike: dict[tuple[float, int], list[int]] = {}
+        for i, job in enumerate(jobs):
+            alike.setdefault((job.period, job.steps), []).append(i)
+        done = {}
+        for members in alike.values():
+            done |= dict(zip(members, simulate([jobs[i] for i in members]), strict=True))
+        return [done[i] for i in range(len(jobs))]
+
+    return simulate_all
+
+
+class _Bundle:
+    """Runs with the same sampling period as one simulation; the shorter ones are continued."""
+
+    def __init__(self, jobs: Sequence[Job]):
+        self.jobs, self.period, self.steps = jobs, jobs[0].period, jobs[0].steps
+        self.start, self.parameters, self.delays, self.acting, self.push = (
+            np.concatenate([getattr(job, name) for job in jobs], axis=1)
+            for name in ("start", "parameters", "delays", "acting", "push")
+        )
+        self.samples = max(len(job.inputs) for job in jobs)
+        self.signals = np.stack(
+            [np.pad(j.inputs, ((0, self.samples - len(j.inputs)), (0, 0)), mode="edge") for j in jobs],
+            axis=-1,
+        )
+        self.totals = totals(self.signals)
+        self.run = np.repeat(np.arange(len(jobs)), [job.start.shape[1] for job in jobs])
+        self.delayed = np.flatnonzero(np.any(self.delays, axis=1))
+
+    def inputs(self, k: int, begin: float) -> NDArray:
+        """Inputs of a sub-step that begins in the period k, at `begin` periods, (inputs, n)."""
+        held = self.signals[k][:, self.run]
+        for i in self.delayed:
+            since = begin - self.delays[i] / self.period
+            own = self.totals[:, i, self.run]
+            held[i] = np.where(self.delays[i], delayed_means(own, since, 1.0 / self.steps), held[i])
+        return held
+
+    def taken_apart(self, readings: NDArray, states: NDArray) -> list[tuple[NDArray, NDArray]]:
+        """Readings and states of each run, from (samples, channels or states, all candidates)."""
+        parts = []
+        for i, job in enumerate(self.jobs):
+            own = (y[: len(job.inputs)][..., self.run == i] for y in (readings, states))
+            read, passed = (np.swapaxes(y, 0, 1) for y in own)
+            parts.append((read, passed))
+        return parts
+
+
+MODES = ("numpy", "python", "compiled")
+
+
+def simulator(records: Records, functions: Sequence[tuple[Callable, int]], mode: str) -> Simulation:
+    """The simulation of a plant.
+
+    Args:
+        records: the plant's names.
+        functions: rate, readings and thresholds of records, each with its number of results.
+        mode: one of MODES.
+
+    Raises:
+        ValueError: for another mode, and at the first simulation for functions that numba refuses.
+    """
+    if mode not in MODES:
+        raise ValueError(f"mode '{mode}' is none of {', '.join(MODES)}: choose one of them")
+    own = compiled if mode == "compiled" else _as_it_is
+    rate, read, thresholds = (own(records.flat(own(f), results)) for f, results in functions)
+    channels, count = functions[1][1], functions[2][1]
+    advance = advancing(rate, thresholds, count, own)
+    if mode == "numpy":
+        return together(rate, read, thresholds, (channels, count), advance)
+    simulation = alone(advance, read, channels, own)
+    return _explained(simulation) if mode == "compiled" else simulation
+
+
+def _explained(simulation: Simulation) -> Simulation:
+    """The simulation, whose refusal by numba becomes one sentence."""
+
+    def simulate(jobs: Sequence[Job]):
+        try:
+            return simulation(jobs)
+        except NumbaError as error:
+            lines = [line for line in str(error).splitlines() if "File" not in line and line.strip()]
+            reason = next((line for line in lines if "Failed in" not in line), lines[0])
+            raise ValueError(
+                f"rate, readings or thresholds cannot be compiled by numba ({reason}): let them use "
+                "numbers, numpy and functions under numba.njit only, or choose mode='numpy'"
+            ) from error
+
+    return simulate
+
+
+def _as_it_is(function: Callable) -> Callable:
+    return function
+
+
+def settled_steps(read: Callable[[int], Sequence[NDArray]]) -> int:
+    """Sub-steps whose halving changes no reading noticeably, or the most that are tried.
+
+    read: readings with so many sub-steps, per run (channels, samples, n) [noise deviations].
+    """
+    steps, coarse = 1, read(1)
+    while 2 * steps <= MOST_STEPS:
+        fine = read(2 * steps)
+        if _largest_change(coarse, fine) <= STEP_ERROR:
+            return steps
+        steps, coarse = 2 * steps, fine
+    return steps
+
+
+def _largest_change(coarse: Sequence[NDArray], fine: Sequence[NDArray]) -> float:
+    """Largest difference of readings [noise deviations]; infinity where only the fine one is finite."""
+    changes = [
+        np.where(np.isfinite(b), np.nan_to_num(np.abs(b - a), nan=np.inf), 0.0)
+        for a, b in zip(coarse, fine, strict=True)
+    ]
+    return float(max(np.max(change) for change in changes))

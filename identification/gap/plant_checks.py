@@ -1,0 +1,393 @@
+"""What is wrong with the description of a plant, before a diagnosis begins: one sentence per fault."""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import combinations
+from math import isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.gap.plant import (
+    Cause,
+    Channel,
+    FreeParameter,
+    GreyBox,
+    NuisanceParameter,
+    PlantError,
+    Run,
+)
+
+MEMBERS = (
+    "channels", "runs", "parameters", "causes", "tolerances", "run_offsets", "outputs", "equations",
+    "states", "regimes", "forced",
+)  # fmt: skip
+"""Members of `GreyBox`."""
+
+UNEVEN_PERIOD = 0.01
+"""Largest deviation of a sampling instant from a uniform course [sampling periods]: rounding of a
+logger's clock."""
+
+TRIAL_STEP = 0.05
+"""Change of a calibrated parameter that must show in the outputs, as a share of its range [1]: far
+beyond rounding, and small enough that the model can be simulated."""
+
+LEAST_EFFECT = 1e-9
+"""Change of the outputs that is no effect, relative to their magnitude [1]: rounding."""
+
+SIDE_BY_SIDE_ERROR = 1e-3
+"""Largest difference between a candidate alone and the same one beside another, relative to the outputs'
+magnitude [1]: a solver whose steps candidates share differs by less, mixed-up candidates by more."""
+
+ALIKE = 0.999
+"""Correlation of the changes by two calibrated parameters from which they act alike [1]: recordings then
+determine one number for both."""
+
+
+def check(plant: GreyBox) -> list[str]:
+    """Look for mistakes in the description of a plant, in its recordings and in its simulator.
+
+    The nominal model is simulated on every run, alone and beside another candidate. Every parameter and
+    cause is tried once, on as few runs as show its effect.
+
+    Returns:
+        Warnings, a sentence each: parameters and causes without effect, parameters that act alike.
+
+    Raises:
+        PlantError: every finding is one line that names the member, the rule and the remedy.
+    """
+    _refuse(
+        f"{name}: the plant has no such member: add it as identification/gap/plant.py describes"
+        for name in MEMBERS
+        if not hasattr(plant, name)
+    )
+    _refuse([*_recording_faults(plant), *_number_faults(plant), *_symbol_faults(plant)])
+    alone = _simulated(plant, [{}])
+    _refuse(_nominal_faults(plant, alone))
+    beside = _simulated(plant, [{}, next(iter(_trials(plant).values()))])
+    _refuse(_mixing_faults(plant, alone, beside))
+    _refuse(_shape_faults(plant))
+    return _effect_warnings(plant)
+
+
+def _refuse(faults: Iterable[str]) -> None:
+    """Raise an error with all faults, if there are any."""
+    lines = list(faults)
+    if lines:
+        raise PlantError("\n".join(lines))
+
+
+def _repeated(names: Iterable[str]) -> list[str]:
+    return [name for name, count in Counter(names).items() if count > 1]
+
+
+def _positive(number: float) -> bool:
+    return isfinite(number) and number > 0
+
+
+def _recording_faults(plant: GreyBox) -> Iterator[str]:
+    if not plant.channels:
+        yield "channels: there is none, but a gap is seen in measured outputs: give one or more"
+    for name in _repeated(channel.name for channel in plant.channels):
+        yield f"channels: two are named {name}, but results are listed by name: rename one"
+    for channel in plant.channels:
+        yield from _channel_faults(channel)
+    if not plant.runs:
+        yield "runs: there is none: give two or more, one of them with held_out=True"
+    for held_out, word, use in ((True, "held-out", "a gap is judged"), (False, "fitted", "a fit rests")):
+        own = [run for run in plant.runs if run.held_out == held_out]
+        if plant.runs and not own:
+            yield f"runs: no run is {word}, but {use} on such runs: set held_out={held_out} in one"
+        elif own and not any(np.any(run.trusted) for run in own):
+            yield f"runs: no reading of a {word} run is trusted: set `trusted` where readings count"
+    for run in plant.runs:
+        yield from _run_faults(plant, run)
+
+
+def _channel_faults(channel: Channel) -> Iterator[str]:
+    member = f"channels, {channel.name}"
+    if channel.noise is not None and not _positive(channel.noise):
+        yield f"{member}: noise {channel.noise:g} is not positive: leave it out where it is not known"
+    if not (isfinite(channel.resolution) and channel.resolution >= 0):
+        yield f"{member}: resolution {channel.resolution:g} is no step: give a positive one, or 0"
+    if not _positive(channel.scale):
+        yield f"{member}: scale {channel.scale:g} is not positive: give the size of the unit in SI"
+
+
+def _run_faults(plant: GreyBox, run: Run) -> Iterator[str]:
+    member, samples = f"run {run.name}", len(run.time)
+    if np.ndim(run.time) != 1 or samples < 3:
+        shape = np.shape(run.time)
+        yield f"{member}: time has the shape {shape}: record three samples or more, or leave the run out"
+        return
+    yield from _time_faults(member, run.time)
+    expected = len(plant.channels), samples
+    shapes = {"measured": np.shape(run.measured), "trusted": np.shape(run.trusted)}
+    for name, shape in shapes.items():
+        if shape != expected:
+            yield f"{member}: {name} has the shape {shape}, not (channels, samples) = {expected}"
+    if np.asarray(run.trusted).dtype != bool:
+        yield f"{member}: trusted is no boolean array: convert it with astype(bool)"
+    elif set(shapes.values()) == {expected}:
+        for c, i in np.argwhere(run.trusted & ~np.isfinite(run.measured))[:1]:
+            yield (
+                f"{member}: channel {plant.channels[c].name} is not finite at sample {i}, but trusted "
+                "there: set trusted to False where a reading is missing"
+            )
+    for name, signal in run.inputs.items():
+        if np.shape(signal) != (samples,):
+            yield f"{member}: input {name} has the shape {np.shape(signal)}, not ({samples},)"
+        elif not np.all(np.isfinite(signal)):
+            first = int(np.argmin(np.isfinite(signal)))
+            yield f"{member}: input {name} is not finite at sample {first}: fill the gap or cut the run"
+
+
+def _time_faults(member: str, time: NDArray) -> Iterator[str]:
+    rising = np.diff(time) > 0
+    if not np.all(rising):
+        first = int(np.argmin(rising))
+        yield f"{member}: time does not rise from sample {first} to {first + 1}: sort or cut the run"
+        return
+    period = (time[-1] - time[0]) / (len(time) - 1)
+    late = np.abs(time - np.linspace(time[0], time[-1], len(time))) > UNEVEN_PERIOD * period
+    if np.any(late):
+        yield (
+            f"{member}: time is not uniform: sample {int(np.argmax(late))} is off the period of "
+            f"{period:.6g} s: resample the run, or let samples that a channel lacks be untrusted"
+        )
+
+
+def _number_faults(plant: GreyBox) -> Iterator[str]:
+    """Numbers of parameters, causes, nuisances and equations that no search can use."""
+    if not plant.parameters and not plant.causes:
+        yield "parameters, causes: both are empty, so nothing can be fitted: give one parameter or cause"
+    for p in plant.parameters:
+        yield from _range_faults(f"parameters, {p.symbol}", p, [("nominal", p.nominal)])
+    for cause in plant.causes:
+        member = f"causes, {cause.label}"
+        if not cause.parameters:
+            yield f"{member}: it has no parameters, so nothing can be fitted: give it a size"
+        if not _positive(cause.prior):
+            yield f"{member}: prior {cause.prior:g} is not positive: give 1, or leave the cause out"
+        for p in cause.parameters:
+            place = f"{member}, {p.symbol}"
+            yield from _range_faults(place, p, [("trial", t) for t in p.trials])
+            if not p.trials:
+                yield f"{place}: it has no trials, but the search begins there: give one value or more"
+            if p.nominal in p.trials:
+                yield f"{place}: trial {p.nominal:g} is the nominal value, where no cause acts"
+        yield from _nuisance_faults(member, cause.run_parameters)
+    yield from _nuisance_faults("tolerances", plant.tolerances)
+    yield from _nuisance_faults("run_offsets", plant.run_offsets)
+    for equation in plant.equations:
+        if not (isfinite(equation.step) and equation.step >= 0):
+            yield (
+                f"equations, {equation.name}: step {equation.step:g} is negative: give a positive "
+                "forcing, or 0 for an equation that lacks nothing"
+            )
+
+
+def _range_faults(place: str, p: FreeParameter, starts: Sequence[tuple[str, float]]) -> Iterator[str]:
+    """starts: what lies in the range, such as a trial, and its value [SI]."""
+    if not (isfinite(p.low) and isfinite(p.high) and p.low < p.high):
+        yield f"{place}: low {p.low:g} and high {p.high:g} are no range: give low below high"
+    if not _positive(p.scale):
+        yield f"{place}: scale {p.scale:g} is not positive: leave it out, or give a usual size"
+    for name, value in starts:
+        if not p.low <= value <= p.high:
+            yield (
+                f"{place}: {name} {value:g} lies outside {p.low:g} to {p.high:g}, but the search begins "
+                "there: widen the range or correct the value"
+            )
+
+
+def _nuisance_faults(member: str, nuisances: Sequence[NuisanceParameter]) -> Iterator[str]:
+    for nuisance in nuisances:
+        for name, value in (("sd", nuisance.sd), ("step", nuisance.step)):
+            if not _positive(value):
+                yield (
+                    f"{member}, {nuisance.symbol}: {name} {value:g} is not positive: give a positive "
+                    "one, or leave it out"
+                )
+
+
+def _symbol_faults(plant: GreyBox) -> Iterator[str]:
+    """Symbols with two meanings; a cause may shift a tolerance, variants of a cause share symbols."""
+    calibrated = [p.symbol for p in plant.parameters]
+    offsets = [n.symbol for n in plant.run_offsets]
+    tolerances = [n.symbol for n in plant.tolerances]
+    labels = [cause.label for cause in plant.causes]
+    members = {
+        "parameters": calibrated, "tolerances": tolerances, "run_offsets": offsets, "causes": labels
+    }  # fmt: skip
+    members |= {f"causes, {cause.label}": _symbols(cause) for cause in plant.causes}
+    for member, symbols in members.items():
+        for symbol in _repeated(symbols):
+            yield f"{member}: two are named {symbol}: rename one"
+    for one, other in combinations(("parameters", "tolerances", "run_offsets"), 2):
+        for symbol in sorted({*members[one]} & {*members[other]}):
+            yield f"{other}, {symbol}: it is one of `{one}` as well: strike one of them"
+    for cause in plant.causes:
+        for symbol in sorted({*_symbols(cause)} & {*calibrated, *offsets}):
+            yield (
+                f"causes, {cause.label}: {symbol} is a calibrated parameter or a run offset as well: "
+                "give the cause a symbol of its own"
+            )
+    for one, other in combinations(plant.causes, 2):
+        for symbol in sorted({*_symbols(one)} & {*_symbols(other)} if one.name != other.name else ()):
+            yield (
+                f"causes, {one.label} and {other.label}: both have {symbol}: give each its own symbol, "
+                "or make them variants of one name"
+            )
+
+
+def _symbols(cause: Cause) -> list[str]:
+    return [parameter.symbol for parameter in (*cause.parameters, *cause.run_parameters)]
+
+
+def _trials(plant: GreyBox) -> dict[str, dict[str, float]]:
+    """Values [SI] by symbol of a candidate off nominal, by the parameter or cause that it tries."""
+    found = {}
+    for p in plant.parameters:
+        step = TRIAL_STEP * (p.high - p.low)
+        value = p.nominal + (step if p.nominal + step <= p.high else -step)
+        found[f"parameters, {p.symbol}"] = {p.symbol: value}
+    for cause in plant.causes:
+        found[f"causes, {cause.label}"] = {p.symbol: p.trials[0] for p in cause.parameters}
+    return found
+
+
+def _side_by_side(
+    plant: GreyBox, changes: Sequence[Mapping[str, float]], *, all_symbols: bool = False
+) -> dict[str, NDArray]:
+    """Values (n,) [SI] by symbol of n candidates.
+
+    changes: what of each of them is not nominal [SI]. all_symbols: whether causes that do not act are
+    given with their nominal values, or left out.
+    """
+    sizes = [p for cause in plant.causes for p in cause.parameters]
+    nominal = {p.symbol: p.nominal for p in (*sizes, *plant.parameters)}
+    # A plant without calibrated parameters still has to see how many candidates there are.
+    used = nominal if all_symbols else [p.symbol for p in plant.parameters or sizes]
+    symbols = dict.fromkeys([*used, *(symbol for own in changes for symbol in own)])
+    return {s: np.array([own.get(s, nominal[s]) for own in changes], dtype=float) for s in symbols}
+
+
+def _simulated(plant: GreyBox, changes: Sequence[Mapping[str, float]]) -> list[NDArray]:
+    """Outputs of all runs for candidates that differ from the nominal one, of the right shapes."""
+    n = len(changes)
+    try:
+        values = _side_by_side(plant, changes, all_symbols=n > 1)
+        outputs = plant.outputs(values, list(range(len(plant.runs))))
+    except Exception as error:
+        raise PlantError(
+            f"outputs: {n} candidates side by side end in {type(error).__name__}: {error}: every value "
+            f"is an array ({n},), and a symbol that is left out has its nominal value"
+        ) from error
+    found = [np.shape(output) for output in outputs]
+    expected = [(len(plant.channels), len(run.time), n) for run in plant.runs]
+    if found != expected:
+        raise PlantError(
+            f"outputs: the arrays have the shapes {found}, not (channels, samples, n) of each run, "
+            f"{expected}: return one array per run with those axes"
+        )
+    return outputs
+
+
+def _nominal_faults(plant: GreyBox, outputs: Sequence[NDArray]) -> Iterator[str]:
+    for run, output in zip(plant.runs, outputs, strict=True):
+        for c, i in np.argwhere(run.trusted & ~np.isfinite(output[..., 0]))[:1]:
+            yield (
+                f"outputs: run {run.name}, channel {plant.channels[c].name} is not finite at sample {i} "
+                "at the nominal values: correct the model or the values, or leave the run out"
+            )
+
+
+def _mixing_faults(plant: GreyBox, alone: Sequence[NDArray], beside: Sequence[NDArray]) -> Iterator[str]:
+    for run, one, two in zip(plant.runs, alone, beside, strict=True):
+        error = np.abs(two[..., 0] - one[..., 0]) / _magnitudes(one)[:, None]
+        if np.any(run.trusted & ~(error <= SIDE_BY_SIDE_ERROR)):
+            yield (
+                f"outputs: run {run.name} of the nominal candidate changes when another candidate is "
+                "simulated beside it, or a cause is given its nominal value: keep candidates apart "
+                "along the last axis, and let no cause act at its nominal value"
+            )
+
+
+def _shape_faults(plant: GreyBox) -> Iterator[str]:
+    """Shapes of states, regimes and forced outputs of the shortest run."""
+    run = min(range(len(plant.runs)), key=lambda r: len(plant.runs[r].time))
+    values, name, samples = _side_by_side(plant, [{}]), plant.runs[run].name, len(plant.runs[run].time)
+    for state, trace in plant.states(values, run).items():
+        if np.shape(trace.values) != (samples,):
+            shape = np.shape(trace.values)
+            yield f"states: {state} of run {name} has the shape {shape}, not (samples,) = {(samples,)}"
+    for regime, mask in plant.regimes(values, run).items():
+        if np.shape(mask) != (samples,) or np.asarray(mask).dtype != bool:
+            yield f"regimes: {regime} of run {name} is not boolean (samples,) = {(samples,)}"
+    edges = np.array([0, (samples - 1) // 2, samples - 1])
+    expected = len(plant.channels), samples, len(edges) - 1
+    for equation in plant.equations:
+        if not equation.step:
+            continue
+        shape = np.shape(plant.forced(values, equation, run, edges))
+        if shape != expected:
+            yield (
+                f"forced: equation {equation.name} has the shape {shape}, not (channels, samples, "
+                f"windows) = {expected}: return the change of the outputs for each window"
+            )
+
+
+def _magnitudes(outputs: NDArray) -> NDArray:
+    """Largest magnitude of each channel of outputs (channels, samples, ...), (channels,); never 0."""
+    largest = np.max(np.abs(np.nan_to_num(outputs)).reshape(len(outputs), -1), axis=1)
+    return np.where(largest > 0, largest, 1.0)
+
+
+def _effect_warnings(plant: GreyBox) -> list[str]:
+    """Sentences on parameters and causes without effect, and on calibrated parameters that act alike.
+
+    Runs are simulated, the shortest first, until nothing is in doubt.
+    """
+    trials = _trials(plant)
+    members, calibrated = list(trials), np.arange(len(trials)) < len(plant.parameters)
+    seen = np.zeros(len(trials), dtype=bool)
+    gram = np.zeros((len(trials), len(trials)))
+    doubtful, alike = np.arange(len(trials)), gram > 0
+    for run in sorted(range(len(plant.runs)), key=lambda r: len(plant.runs[r].time)):
+        changes = _changes(plant, [trials[members[i]] for i in doubtful], run)
+        seen[doubtful] |= np.max(np.abs(changes), axis=0, initial=0.0) > LEAST_EFFECT
+        gram[np.ix_(doubtful, doubtful)] += changes.T @ changes
+        alike = _alike(gram, calibrated)
+        doubtful = np.flatnonzero(~seen | np.any(alike, axis=1))
+        if not len(doubtful):
+            return []
+    return [
+        f"{members[i]} has no effect on any trusted reading: check that `outputs` uses it, or leave "
+        "it out"
+        for i in np.flatnonzero(~seen)
+    ] + [
+        f"{members[i]} and {members[j]} act alike on all runs, so that only one number can be told for "
+        "both: fix one of them, or make it a tolerance"
+        for i, j in np.argwhere(np.triu(alike))
+    ]
+
+
+def _changes(plant: GreyBox, tried: Sequence[Mapping[str, float]], run: int) -> NDArray:
+    """Change of the trusted readings of a run by each trial, (values, trials) [channel magnitudes]."""
+    outputs = np.asarray(plant.outputs(_side_by_side(plant, [{}, *tried]), [run])[0])
+    shares = outputs / _magnitudes(outputs[..., :1])[:, None, None]
+    # A candidate that cannot be simulated shows that the model uses its value.
+    changes = np.nan_to_num(shares[..., 1:] - shares[..., :1], nan=1.0)
+    return changes[plant.runs[run].trusted]
+
+
+def _alike(gram: NDArray, calibrated: NDArray) -> NDArray:
+    """Pairs of calibrated parameters whose changes correlate, boolean (trials, trials).
+
+    gram: products of the changes, (trials, trials). calibrated: boolean (trials,).
+    """
+    size = np.sqrt(np.diag(gram))
+    counts = calibrated & (size > 0)
+    correlation = np.abs(gram) / np.maximum(np.outer(size, size), np.finfo(float).tiny)
+    return np.outer(counts, counts) & ~np.eye(len(gram), dtype=bool) & (correlation > ALIKE)
