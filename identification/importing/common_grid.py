@@ -18,9 +18,8 @@ from scipy.signal import firwin, kaiserord, oaconvolve
 
 from identification.importing.channels import MappedChannel
 from identification.importing.source_file import ImportingError
-from identification.recordings.columns import sampling_period
+from identification.recordings.columns import LEAST_RATE, sampling_period
 from identification.recordings.recording import CampaignError
-from identification.recordings.rules import RULES
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,9 +105,9 @@ def _check_times(place: str, channel: MappedChannel, settings: ImportSettings) -
             f"{place}: no samples from {first:.6g} to {last:.6g} s, where the usual step is {usual:.3g} "
             "s: cut the recording there, since a gap is not filled"
         )
-    if channel.name != "sigma_S" and usual * RULES.least_rate > 1.0 + 1e-3:
+    if channel.name != "sigma_S" and usual * LEAST_RATE > 1.0 + 1e-3:
         raise ImportingError(
-            f"{place}: sampled at {1 / usual:.4g} Hz: record at {RULES.least_rate:g} Hz or faster, or "
+            f"{place}: sampled at {1 / usual:.4g} Hz: record at {LEAST_RATE:g} Hz or faster, or "
             "give the right unit of time in a mapping file"
         )
 
@@ -130,7 +129,7 @@ def _period(
     if rate is not None:
         return 1.0 / rate
     periods = [
-        own[channel.name] or 1.0 / max(round(usual_rate(channel.time)), RULES.least_rate)
+        own[channel.name] or 1.0 / max(round(usual_rate(channel.time)), LEAST_RATE)
         for channel in channels
         if channel.name != "sigma_S"
     ]

@@ -24,8 +24,8 @@ from identification.importing.mapping_file import MappingFile, RecordingEntry, m
 from identification.importing.source_file import ImportingError, SourceChannel, SourceFile
 from identification.importing.text_files import read_text
 from identification.recordings.campaign_files import check_campaign, write_campaign
+from identification.recordings.plausibility import switches
 from identification.recordings.recording import Campaign, Recording
-from identification.recordings.recording_checks import switches
 from identification.recordings.rules import RULES, RecordingRules
 
 USUAL_TEMPERATURE, USUAL_PRESSURE = 293.0, 1.0 * BAR
@@ -167,7 +167,7 @@ def _imported(
 
 def _proposed_role(path: Path, U: NDArray) -> str:
     """By the voltage, (samples,) [V], and the file's name."""
-    if not switches(U, RULES):
+    if not switches(U):
         return "quality"
     return "validation" if "valid" in path.stem.lower() else "calibration"
 

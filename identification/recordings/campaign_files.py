@@ -2,16 +2,16 @@
 
 import hashlib
 import os
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.common.files import JSONFileError, decoded, read_bytes, write_json, write_text
+from epv_env.common.files import JSONFileError, read_bytes, read_json, write_json, write_text
 from epv_env.common.units import BAR
 from epv_env.plant.channels import CHANNEL, MEASURED_CHANNELS, MeasuredChannel
 from epv_env.plant.parameters import ParameterError, checked_value
@@ -20,7 +20,12 @@ from identification.recordings.noise import column_steps
 from identification.recordings.recording import CHANNELS, ROLES, Campaign, CampaignError, Recording
 from identification.recordings.recording_checks import check_recording
 from identification.recordings.rules import RULES, RecordingRules
-from identification.recordings.unit_diagnosis import check_reference
+
+FORMAT = "epv-campaign/1"
+"""Version of campaign.json, in its field `format`."""
+
+FILE_NAME = "campaign.json"
+"""Name of the file in the campaign's folder."""
 
 DECIMALS = {
     TIME_COLUMN: 9,
@@ -30,25 +35,50 @@ DECIMALS = {
 """Decimals written: a hundredth of an ADC step or less, and any rate's times as uniform."""
 
 
+class _Environment(msgspec.Struct):
+    temperature_K: float
+    pressure_bar: float
+
+
+class _Entry(msgspec.Struct):
+    file: str
+    role: str
+
+
+class _Manifest(msgspec.Struct):
+    """What a campaign.json holds; other fields are ignored."""
+
+    format: str
+    name: str
+    environment: _Environment
+    recordings: list[_Entry]
+
+
 def read_campaign(folder: str | PathLike[str], rules: RecordingRules = RULES) -> Campaign:
     """The campaign in a folder, every rule of docs/reference/files.md checked. Raises CampaignError."""
     folder = Path(folder)
-    manifest = read_manifest(folder)
-    files = {path: _read_file(path) for path in manifest.roles}
+    remedy = "give the folder of a campaign, or write the file as docs/reference/files.md shows"
+    try:
+        manifest = read_json(folder / FILE_NAME, _Manifest, version=FORMAT, remedy=remedy)
+    except JSONFileError as error:
+        raise CampaignError(str(error)) from None
+    temperature, pressure = _ambient(folder, manifest)
+    roles = _roles(folder, manifest)
+    files = {path: _read_file(path) for path in roles}
     steps = column_steps([columns for _, columns in files.values()], rules)
-    campaign = Campaign(
+    recordings = []
+    for path, role in roles.items():
+        sha256, columns = files[path]
+        period = check_recording(str(path), columns, role, pressure / BAR, steps, rules)
+        recordings.append(_recording(path.stem, sha256, columns, role, period))
+    return Campaign(
         name=manifest.name,
-        temperature=manifest.temperature,
-        pressure=manifest.pressure,
-        recordings=tuple(
-            _recording(path, *files[path], role, manifest.pressure, steps, rules)
-            for path, role in manifest.roles.items()
-        ),
+        temperature=temperature,
+        pressure=pressure,
+        recordings=tuple(recordings),
         folder=folder,
         rules=rules,
     )
-    check_reference(str(folder), campaign.recordings, campaign.pressure, rules)
-    return campaign
 
 
 def check_vacant(folder: Path) -> None:
@@ -71,10 +101,9 @@ def write_campaign(
     provenance: where the recordings come from; campaign.json holds it, and readers ignore it.
     """
     folder = Path(folder)
-    written = check_campaign(campaign, folder)
-    for recording, columns in written:
+    for recording, columns in check_campaign(campaign, folder):
         write_text(folder / f"{recording.name}.csv", _csv(columns))
-    content = manifest_content(campaign)
+    content = msgspec.to_builtins(_manifest(campaign))
     write_json(folder / FILE_NAME, {**content, "provenance": provenance} if provenance else content)
 
 
@@ -84,20 +113,83 @@ def check_campaign(campaign: Campaign, folder: Path) -> list[tuple[Recording, di
     Nothing is written. Raises CampaignError if the folder holds a campaign already or a rule is broken.
     """
     check_vacant(folder)
-    rules = campaign.rules
-    content = manifest_content(campaign)
-    check_manifest(folder, content)
+    manifest = _manifest(campaign)
+    _ambient(folder, manifest)
+    _roles(folder, manifest)
     written = [(recording, _columns(recording)) for recording in campaign.recordings]
     for recording, columns in written:
         _check_writable(folder / f"{recording.name}.csv", recording, columns)
-    steps = column_steps([columns for _, columns in written], rules)
+    steps = column_steps([columns for _, columns in written], campaign.rules)
     for recording, columns in written:
-        path, ambient = str(folder / f"{recording.name}.csv"), campaign.pressure / BAR
-        check_recording(
-            path, columns, role=recording.role, ambient_bar=ambient, steps=steps, rules=rules
-        )
-    check_reference(str(folder), campaign.recordings, campaign.pressure, rules)
+        path = str(folder / f"{recording.name}.csv")
+        check_recording(path, columns, recording.role, campaign.pressure / BAR, steps, campaign.rules)
     return written
+
+
+def _manifest(campaign: Campaign) -> _Manifest:
+    return _Manifest(
+        format=FORMAT,
+        name=campaign.name,
+        environment=_Environment(float(campaign.temperature), float(campaign.pressure / BAR)),
+        recordings=[
+            _Entry(f"{recording.name}.csv", recording.role) for recording in campaign.recordings
+        ],
+    )
+
+
+def _ambient(folder: Path, manifest: _Manifest) -> tuple[float, float]:
+    """Temperature [K] and pressure [Pa], inside the domains of the plant's parameters."""
+    values = []
+    for name, symbol, unit in (("temperature_K", "T_env", 1.0), ("pressure_bar", "p_env", BAR)):
+        value = getattr(manifest.environment, name)
+        try:
+            values.append(checked_value(symbol, round(value * unit, 6)))  # 1.1 * 1e5 is above 110000
+        except ParameterError as error:
+            place = f"{folder / FILE_NAME}, environment"
+            raise CampaignError(f"{place}: {name} is {value!r}: {error}") from None
+    return values[0], values[1]
+
+
+def _roles(folder: Path, manifest: _Manifest) -> dict[Path, str]:
+    """Each recording's role by the path of its file, which lies in the campaign's folder."""
+    if not manifest.recordings:
+        raise CampaignError(
+            f"{folder / FILE_NAME}: recordings is empty: name at least one file and its role"
+        )
+    roles: dict[Path, str] = {}
+    for number, entry in enumerate(manifest.recordings, start=1):
+        place = f"{folder / FILE_NAME}, recording {number}"
+        path = _inside(place, folder, entry.file)
+        if entry.role not in ROLES:
+            raise CampaignError(
+                f"{place}: unknown role {entry.role!r}: choose one of {', '.join(ROLES)}"
+            )
+        _check_new(place, path, roles)
+        roles[path] = entry.role
+    return roles
+
+
+def _inside(place: str, folder: Path, name: str) -> Path:
+    """The path of a file that lies in the folder, however it is written or linked."""
+    try:
+        path = folder / name
+        if path.resolve().is_relative_to(folder.resolve()):
+            return path
+    except (OSError, ValueError, RuntimeError):  # a path the system cannot hold, a loop of links
+        pass
+    raise CampaignError(
+        f"{place}: file {name!r} leaves the campaign's folder: copy it there and give its name"
+    )
+
+
+def _check_new(place: str, path: Path, earlier: Iterable[Path]) -> None:
+    """Files, and the names of recordings that come from them, occur once."""
+    for other in earlier:
+        if path.resolve() == other.resolve() or path.stem == other.stem:
+            raise CampaignError(
+                f"{place}: {path.name} is named twice, after {other.name}: name each file once, and "
+                "rename files that differ in folder or suffix only"
+            )
 
 
 def _read_file(path: Path) -> tuple[str, dict[str, NDArray]]:
@@ -112,26 +204,15 @@ def _read_file(path: Path) -> tuple[str, dict[str, NDArray]]:
 
 
 def _recording(
-    path: Path,
-    sha256: str,
-    columns: Mapping[str, NDArray],
-    role: str,
-    ambient: float,
-    steps: Mapping[str, float],
-    rules: RecordingRules,
+    name: str, sha256: str, columns: Mapping[str, NDArray], role: str, period: float
 ) -> Recording:
-    """Check and convert a file's columns; steps: coarse ones by column [bar]."""
-    period = check_recording(
-        str(path), columns, role=role, ambient_bar=ambient / BAR, steps=steps, rules=rules
-    )
-    signals = {channel.name: _signal(channel, columns) for channel in MEASURED_CHANNELS}
     return Recording(
-        name=path.stem,
+        name=name,
         role=role,
         period=period,
         sigma_S=columns.get(CONSUMPTION_COLUMN, np.zeros_like(columns["U_V"])),
         sha256=sha256,
-        **signals,
+        **{channel.name: _signal(channel, columns) for channel in MEASURED_CHANNELS},
     )
 
 
@@ -168,126 +249,3 @@ def _check_writable(path: Path, recording: Recording, columns: Mapping[str, NDAr
                 f"{path}: {name} has shape {values.shape} or a value that is not finite: give "
                 f"{len(recording)} finite samples"
             )
-
-
-FORMAT = "epv-campaign/1"
-"""Version of the file, in its field `format`."""
-
-FILE_NAME = "campaign.json"
-"""Name of the file in the campaign's folder."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Manifest:
-    """Content of a campaign.json, checked."""
-
-    name: str
-    """Of the campaign."""
-    temperature: float
-    """T_env [K]."""
-    pressure: float
-    """p_env [Pa absolute]."""
-    roles: dict[Path, str]
-    """Each recording's role by the path of its file, which lies in the campaign's folder."""
-
-
-def read_manifest(folder: Path) -> Manifest:
-    """The campaign.json of a folder. Raises CampaignError."""
-    path = folder / FILE_NAME
-    remedy = "give the folder of a campaign, or write the file anew"
-    try:
-        content = decoded(path, remedy=remedy, allow_nan=True)  # `checked_value` names the field
-    except JSONFileError as error:
-        raise CampaignError(str(error)) from None
-    return check_manifest(folder, content)
-
-
-def manifest_content(campaign: Campaign) -> dict[str, Any]:
-    """What a campaign's campaign.json holds, for json.dumps."""
-    return {
-        "format": FORMAT,
-        "name": campaign.name,
-        "environment": {
-            "temperature_K": float(campaign.temperature),
-            "pressure_bar": float(campaign.pressure / BAR),
-        },
-        "recordings": [
-            {"file": f"{recording.name}.csv", "role": recording.role}
-            for recording in campaign.recordings
-        ],
-    }
-
-
-def check_manifest(folder: Path, content: Any) -> Manifest:
-    """The meaning of a campaign.json's content. Raises CampaignError; fields not listed are ignored."""
-    file = str(folder / FILE_NAME)
-    version = content.get("format") if isinstance(content, dict) else None
-    if version != FORMAT:
-        raise CampaignError(
-            f"{file} has format {version!r}, this version reads {FORMAT!r}: write it anew"
-        )
-    environment = _field(file, content, "environment", dict)
-    return Manifest(
-        name=_field(file, content, "name", str),
-        temperature=_ambient(f"{file}, environment", environment, "temperature_K", "T_env", 1.0),
-        pressure=_ambient(f"{file}, environment", environment, "pressure_bar", "p_env", BAR),
-        roles=_roles(file, folder, _field(file, content, "recordings", list)),
-    )
-
-
-def _roles(file: str, folder: Path, entries: Sequence[Any]) -> dict[Path, str]:
-    if not entries:
-        raise CampaignError(f"{file}: recordings is empty: name at least one file and its role")
-    roles: dict[Path, str] = {}
-    for number, entry in enumerate(entries, start=1):
-        place = f"{file}, recording {number}"
-        path = _inside(place, folder, _field(place, entry, "file", str))
-        role = _field(place, entry, "role", str)
-        if role not in ROLES:
-            raise CampaignError(f"{place}: unknown role {role!r}: choose one of {', '.join(ROLES)}")
-        _check_new(place, path, roles)
-        roles[path] = role
-    return roles
-
-
-def _inside(place: str, folder: Path, name: str) -> Path:
-    """The path of a file that lies in the folder, however it is written or linked."""
-    try:
-        path = folder / name
-        if path.resolve().is_relative_to(folder.resolve()):
-            return path
-    except (OSError, ValueError, RuntimeError):  # a path the system cannot hold, a loop of links
-        pass
-    raise CampaignError(
-        f"{place}: file {name!r} leaves the campaign's folder: copy it there and give its name"
-    )
-
-
-def _check_new(place: str, path: Path, earlier: Iterable[Path]) -> None:
-    """Files, and the names of recordings that come from them, occur once."""
-    for other in earlier:
-        if path.resolve() == other.resolve() or path.stem == other.stem:
-            raise CampaignError(
-                f"{place}: {path.name} is named twice, after {other.name}: name each file once, and "
-                "rename files that differ in folder or suffix only"
-            )
-
-
-def _field(place: str, content: Any, name: str, *kinds: type) -> Any:
-    """A field of a JSON object, if it is there and of one of the kinds."""
-    value = content.get(name) if isinstance(content, dict) else None
-    if type(value) not in kinds:
-        expected = {str: "text", dict: "an object", list: "a list", float: "a number"}[kinds[-1]]
-        raise CampaignError(
-            f"{place}: {name} is missing or not {expected}: give it as in docs/reference/files.md"
-        )
-    return value
-
-
-def _ambient(place: str, environment: Any, name: str, symbol: str, unit: float) -> float:
-    """A value [SI] given in a unit, inside the domain of the plant's parameter of that symbol."""
-    value = _field(place, environment, name, int, float)
-    try:
-        return checked_value(symbol, round(value * unit, 6))  # 1.1 * 1e5 is a little above 110000
-    except (ParameterError, OverflowError) as error:
-        raise CampaignError(f"{place}: {name} is {value!r}: {error}") from None

@@ -1,17 +1,16 @@
 """The columns of a recording's CSV file: the number in every cell, and the sampling of the times."""
 
-import csv
 import io
-import math
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from epv_env.plant.channels import CHANNEL, P1
 from identification.recordings.recording import CHANNELS, CampaignError
-from identification.recordings.rules import RULES, RecordingRules
 
 TIME_COLUMN, CONSUMPTION_COLUMN = "time_s", "sigmaS_kg_per_s"
 """Columns that are no channel: time [s] and consumed air [kg/s]."""
@@ -31,6 +30,15 @@ SUPPLY_COLUMNS = (P1.columns[:1], P1.columns[1:])
 KNOWN_COLUMNS = (TIME_COLUMN, *CHANNEL_OF, CONSUMPTION_COLUMN)
 """Columns that are read; others are ignored."""
 
+LEAST_RATE = 500.0
+"""Least sampling rate [1/s]: a slower bench misses the armature's movement."""
+
+HARMLESS_JITTER = 1e-3
+"""Part of a period by which a sample may be off; the steepest signal then moves by less than noise."""
+
+MOST_DIGITS = 9
+"""Most decimals of a second with which files print times."""
+
 
 def line_number(sample: int) -> int:
     """Number of a sample's line in its file; the header is line 1."""
@@ -43,34 +51,37 @@ def read_columns(file: str, content: bytes) -> dict[str, NDArray]:
     file: what messages call it. The unit of each column is in its name. Columns that are not
     KNOWN_COLUMNS are ignored. Raises CampaignError.
     """
-    text = _decoded(file, content)
-    names = _column_names(file, text)
-    wanted = [index for index, name in enumerate(names) if name in KNOWN_COLUMNS]
-    values = _parsed_at_once(text, len(names), wanted)
-    if values is None:
-        values = _parsed_by_line(file, text, names, wanted)
-    return {names[index]: values[:, place].copy() for place, index in enumerate(wanted)}
+    cells = _cells(file, content)
+    names = [name.strip() for name in cells.iloc[0].fillna("")] if len(cells) else []
+    _check_names(f"{file}, line 1", names)
+    return {
+        name: _numbers(file, name, cells.iloc[1:, place].to_numpy())
+        for place, name in enumerate(names)
+        if name in KNOWN_COLUMNS
+    }
 
 
-def _decoded(file: str, content: bytes) -> str:
+def _cells(file: str, content: bytes) -> pd.DataFrame:
+    """Every cell as text, the header in the first row; NaN where a line ends early."""
     try:
-        text = content.decode("utf-8-sig")
+        text = content.decode("utf-8-sig").rstrip()
+        return pd.read_csv(
+            io.StringIO(text), header=None, dtype=object, keep_default_na=False, skip_blank_lines=False
+        )
     except UnicodeDecodeError as error:
         place = content.count(b"\n", 0, error.start) + 1
         raise CampaignError(
             f"{file}, line {place}: a byte is not UTF-8: save the file as CSV in UTF-8"
         ) from None
-    return text.replace("\r\n", "\n").rstrip("\n")
-
-
-def _column_names(file: str, text: str) -> list[str]:
-    try:
-        header = next(csv.reader(io.StringIO(text), strict=True), [])
-    except csv.Error as error:
-        raise CampaignError(f"{file}, line 1: not CSV ({error}): write the header anew") from None
-    names = [name.strip() for name in header]
-    _check_names(f"{file}, line 1", names)
-    return names
+    except pd.errors.EmptyDataError:
+        return pd.DataFrame()
+    except pd.errors.ParserError as error:
+        found = re.search(r"(?:line|row) (\d+)", str(error))
+        place = f", line {found[1]}" if found else ""
+        reason = str(error).strip().removeprefix("Error tokenizing data. C error: ")
+        raise CampaignError(
+            f"{file}{place}: not CSV ({reason}): give every column one cell, with '.' as decimal sign"
+        ) from None
 
 
 def _check_names(place: str, names: Sequence[str]) -> None:
@@ -91,57 +102,28 @@ def _check_names(place: str, names: Sequence[str]) -> None:
         )
 
 
-def _parsed_at_once(text: str, width: int, wanted: Sequence[int]) -> NDArray | None:
-    """All numbers, (samples, wanted), or None where only a closer look can tell."""
-    rows = text.split("\n")[1:]
-    if '"' in text or not rows or any(row.count(",") != width - 1 for row in rows):
-        return None
-    try:
-        values = np.loadtxt(rows, delimiter=",", comments=None, usecols=wanted, ndmin=2)
-    except ValueError:
-        return None
-    return values if np.all(np.isfinite(values)) else None
-
-
-def _parsed_by_line(file: str, text: str, names: Sequence[str], wanted: Sequence[int]) -> NDArray:
-    """The same, slowly; the first line that breaks a rule is named."""
-    reader = csv.reader(io.StringIO(text), strict=True)
-    values: list[list[float]] = []
-    try:
-        next(reader, None)
-        for row in reader:
-            values.append(_row(f"{file}, line {reader.line_num}", row, names, wanted))
-    except csv.Error as error:
+def _numbers(file: str, name: str, cells: NDArray) -> NDArray:
+    """The numbers of a column's cells, (samples,); the first cell without one is named."""
+    values = np.array([_number(str(cell)) for cell in cells], dtype=float)
+    wrong = np.flatnonzero(~np.isfinite(values))
+    if wrong.size:
+        cell = cells[wrong[0]]
+        shown = repr(cell[:40]) if isinstance(cell, str) and cell.strip() else "empty"
         raise CampaignError(
-            f"{file}, line {reader.line_num}: not CSV ({error}): write this line anew"
-        ) from None
-    return np.reshape(np.array(values, dtype=float), (-1, len(wanted)))
-
-
-def _row(place: str, row: Sequence[str], names: Sequence[str], wanted: Sequence[int]) -> list[float]:
-    if len(row) != len(names):
-        raise CampaignError(
-            f"{place}: {len(row)} cells stand under {len(names)} column names: "
-            "give every column one cell, with '.' as decimal sign"
+            f"{file}, line {line_number(wrong[0])}: {name} is {shown}, not a finite number: give one "
+            "with '.' as decimal sign, or cut the recording before this line"
         )
-    return [_number(f"{place}: {names[index]}", row[index]) for index in wanted]
+    return values
 
 
-def _number(place: str, cell: str) -> float:
+def _number(cell: str) -> float:
     try:
-        value = math.nan if "_" in cell else float(cell)  # Python's own 1_000 is no CSV number
+        return np.nan if "_" in cell else float(cell)  # Python's own 1_000 is no CSV number
     except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        shown = repr(cell[:40]) if cell.strip() else "empty"
-        raise CampaignError(
-            f"{place} is {shown}, not a finite number: give one with '.' as decimal sign, or cut the "
-            "recording before this line"
-        )
-    return value
+        return np.nan
 
 
-def sampling_period(file: str, time: NDArray, rules: RecordingRules = RULES) -> float:
+def sampling_period(file: str, time: NDArray) -> float:
     """Time between samples [s] of a `time_s` column, (samples,).
 
     Of all periods that explain the printed times the one with the roundest rate in Hz; their middle
@@ -150,24 +132,23 @@ def sampling_period(file: str, time: NDArray, rules: RecordingRules = RULES) -> 
     if len(time) < 2:
         raise CampaignError(
             f"{file}, line {line_number(len(time))}: the file ends after {len(time)} samples, too few "
-            "to tell "
-            "the sampling rate: record for longer"
+            "to tell the sampling rate: record for longer"
         )
     _check_order(file, time)
     _check_gaps(file, time)
-    least, greatest = _explaining_periods(time, rules)
+    least, greatest = _explaining_periods(time)
     if least > greatest:
         _refuse_jitter(file, time)
     period = _roundest(least, greatest)
     return period
 
 
-def check_rate(file: str, period: float, rules: RecordingRules = RULES) -> None:
+def check_rate(file: str, period: float) -> None:
     """Samples follow each other fast enough; period [s]. Raises CampaignError."""
-    if period * rules.least_rate > 1 + 1e-9:
+    if period * LEAST_RATE > 1 + 1e-9:
         raise CampaignError(
             f"{file}, line {line_number(1)}: sampled at {1 / period:g} Hz: record at "
-            f"{rules.least_rate:g} Hz or faster"
+            f"{LEAST_RATE:g} Hz or faster"
         )
 
 
@@ -211,15 +192,13 @@ def _refuse_jitter(file: str, time: NDArray) -> None:
     )
 
 
-def _explaining_periods(time: NDArray, rules: RecordingRules) -> tuple[float, float]:
+def _explaining_periods(time: NDArray) -> tuple[float, float]:
     """Ends of the range of periods with which every time is right up to its rounding [s].
 
     Time k, rounded by at most h, allows (t_k - h) / k to (t_k + h) / k; the first end lies above the
     second where nothing explains all.
     """
-    rounding = 0.5 * _last_digit(time, rules.most_digits) + rules.harmless_jitter * float(
-        np.median(np.diff(time))
-    )
+    rounding = 0.5 * _last_digit(time) + HARMLESS_JITTER * float(np.median(np.diff(time)))
     count = np.arange(1, len(time))
     return (
         float(np.max((time[1:] - rounding) / count)),
@@ -227,12 +206,12 @@ def _explaining_periods(time: NDArray, rules: RecordingRules) -> tuple[float, fl
     )
 
 
-def _last_digit(time: NDArray, most_digits: int) -> float:
+def _last_digit(time: NDArray) -> float:
     """Value of the last decimal in which times are printed [s]."""
-    for digits in range(most_digits):
+    for digits in range(MOST_DIGITS):
         if np.max(np.abs(time - np.round(time, digits))) < 1e-12:
             return 10.0**-digits
-    return 10.0**-most_digits
+    return 10.0**-MOST_DIGITS
 
 
 def _roundest(least: float, greatest: float) -> float:

@@ -21,15 +21,27 @@ from identification.recordings.recording import (
 )
 from identification.recordings.rules import RULES, RecordingRules
 
+DISTINCT_SHARE = 0.2
+"""Distinct readings per sample above which the readings are taken for continuous (no grid)."""
+LEAST_CODES = 10
+"""Distinct readings that show a step; the least distance of a few may be several steps."""
+GRID_ERROR = 0.1
+"""Distance from a grid, in its steps, within which a reading lies on it; digits are few."""
+COARSE_STEP = 2.0
+"""Step over Table 3's noise above which a live channel may read the same throughout: a sensor
+that is somewhat quieter than Table 3's then rarely leaves a code."""
+NOISE_BLOCK = 0.05
+"""Time over which a drift passes for straight when the noise is read [s]."""
 
-def reading_step(readings: NDArray, rules: RecordingRules = RULES) -> float:
+
+def reading_step(readings: NDArray) -> float:
     """Step of the readings [their unit]: the least step between distinct readings, (samples,).
 
     The few digits of a file make equal steps unequal, so the step is the slope of the line through
     the distinct readings over their codes. 0.0: fewer than two distinct readings, or no grid.
     """
     distinct = np.unique(readings)
-    if len(distinct) < 2 or len(distinct) > rules.distinct_share * len(readings):
+    if len(distinct) < 2 or len(distinct) > DISTINCT_SHARE * len(readings):
         return 0.0
     steps = np.diff(distinct)
     steps = steps[steps > 1e-3 * np.median(steps)]  # the same reading but for rounding in sums
@@ -37,11 +49,11 @@ def reading_step(readings: NDArray, rules: RecordingRules = RULES) -> float:
     return float(np.polyfit(np.rint((distinct - distinct[0]) / least), distinct, 1)[0])
 
 
-def reliable_step(readings: NDArray, rules: RecordingRules = RULES) -> float:
+def reliable_step(readings: NDArray) -> float:
     """`reading_step` of readings (samples,) [unit]; 0.0 where too few are distinct to trust it."""
-    if len(np.unique(readings)) < rules.least_codes:
+    if len(np.unique(readings)) < LEAST_CODES:
         return 0.0
-    return reading_step(readings, rules)
+    return reading_step(readings)
 
 
 def coarse_steps(
@@ -54,10 +66,10 @@ def coarse_steps(
     pressures: all readings of a campaign by name, each (samples,). sizes: the sensors' noise by name,
     in the same unit.
     """
-    own = {name: reliable_step(readings, rules) for name, readings in pressures.items()}
+    own = {name: reliable_step(readings) for name, readings in pressures.items()}
     coarsest = max(own.values(), default=0.0)
-    steps = {name: step or _shared(pressures[name], coarsest, rules) for name, step in own.items()}
-    return {name: step for name, step in steps.items() if step > rules.coarse_step * sizes[name]}
+    steps = {name: step or _shared(pressures[name], coarsest) for name, step in own.items()}
+    return {name: step for name, step in steps.items() if step > COARSE_STEP * sizes[name]}
 
 
 def column_steps(
@@ -102,11 +114,11 @@ def coarse_step_warnings(steps: Mapping[str, float]) -> list[str]:
     ]
 
 
-def _shared(readings: NDArray, coarsest: float, rules: RecordingRules) -> float:
+def _shared(readings: NDArray, coarsest: float) -> float:
     """The others' step, if the few distinct readings (samples,) lie on its grid; otherwise 0.0."""
     codes = np.unique(readings) / coarsest if coarsest else np.array([])
     off_grid = np.abs(codes - codes[:1] - np.rint(codes - codes[:1]))
-    return coarsest if codes.size and np.max(off_grid) < rules.grid_error else 0.0
+    return coarsest if codes.size and np.max(off_grid) < GRID_ERROR else 0.0
 
 
 def pooled_noise(campaign: Campaign) -> dict[str, float]:
@@ -148,7 +160,7 @@ def _pooled(
     finest = {name: rules.sensors[name].resolution * UNITS[name][1] for name in CHANNELS}
     least = {**finest, **coarse}
     return {
-        name: max(_deviation(name, stretches, rules.noise_block), rounding_error(least[name]))
+        name: max(_deviation(name, stretches, NOISE_BLOCK), rounding_error(least[name]))
         for name in CHANNELS
     }
 

@@ -1,0 +1,376 @@
+"""Units, references, signs and times of a recording: physics says what is wrong, a table names it.
+
+With the coil on and at rest, the open inlet makes p3 equal to p1, and the current is U/R. With the coil
+off, p3 vents through choked flow towards absolute zero at a known rate and ends at ambient pressure; p1
+and p2 do not. A recording that contradicts this is refused. The first misreading of the tables that
+removes every contradiction is named; nothing is converted silently.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise, permutations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.recordings.columns import CHANNEL_OF, line_number
+from identification.recordings.recording import CampaignError
+from identification.recordings.rules import RULES, RecordingRules
+
+Signals = Mapping[str, NDArray]
+"""Readings by channel, each (samples,) [A, V or bar]."""
+
+PRESSURE_FACTORS: Mapping[str, float] = {
+    "Pa": 1e-5,
+    "mbar": 1e-3,
+    "psi": 0.0689475729,
+    "kPa": 1e-2,
+    "MPa": 10.0,
+    "bar, 100 times too small": 100.0,
+    "bar, 1000 times too small": 1000.0,
+    "bar, 10 times too large": 0.1,
+}
+"""Right value [bar] over reading, by what a column may hold instead; each absolute and gauge."""
+
+VOLTAGE_FACTORS: Mapping[str, float] = {"mV": 1e-3, "kV": 1e3, "a voltage with its sign flipped": -1.0}
+CURRENT_FACTORS: Mapping[str, float] = {
+    "mA": 1e-3,
+    "µA": 1e-6,
+    "kA": 1e3,
+    "a current with its sign flipped": -1.0,
+    "mA with the sign flipped": -1e-3,
+    "A, 10 times too small": 10.0,
+    "A, 10 times too large": 0.1,
+}
+"""The same for voltages [V] and currents [A]."""
+
+TIME_FACTORS: Mapping[str, float] = {"ms": 1e3, "µs": 1e6, "ks": 1e-3}
+"""Printed time over right time, by its unit."""
+
+SWITCHING_NOISE = 10.0
+"""Range of a voltage that switches, over the changes of nine samples in ten; noise has 3."""
+LEAST_VOLTAGE = 1.0 / 6.0
+"""Greatest voltage of a coil that is on at all, over the least operating voltage; noise has 0.012 V."""
+MOST_REST_VOLTAGE = 0.1
+"""Voltage of a coil that is off, over its voltage when it is on; flyback is shorter than half."""
+MOST_REST_CURRENT = 0.03
+"""Current of a coil that is off, over the sensor's range: three times the accuracy."""
+DECAY_TIME = 0.03
+"""Time after which no current flows in a coil that was switched off [s]; six time constants."""
+CHOKED_RATIO = 2.2
+"""Pressure over ambient above which outflow is choked (from 1.9 on), with room for noise."""
+LEAST_DISCHARGE, LEAST_FALL = 20, 0.25
+"""Samples (40 ms at 500 Hz) and relative fall of a discharge that shows where the pressure falls to."""
+GAUGE_LIKENESS = 0.3
+"""Part of the ambient pressure within which the end of a discharge meets that of a gauge reading."""
+CORRECTED = 0.5
+"""Tolerance of signals that a misreading explains: an offset is no wrong unit."""
+NEARLY_VENTED = 1.5
+"""Pressure over ambient below which a circuit counts as vented: an open supply must fill it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Misreading:
+    """What columns may hold: right value = factor × reading of the source + offset."""
+
+    text: str
+    """What looks wrong, with the remedy."""
+    channels: Sequence[str] = ()
+    """To which factor and offset apply."""
+    factor: float = 1.0
+    offset: float = 0.0
+    source: Mapping[str, str] = field(default_factory=dict)
+    """Channel whose column holds a channel; those left out hold their own."""
+
+    def corrected(self, signals: Signals) -> dict[str, NDArray]:
+        """The signals as they would be without the mistake."""
+        right = {name: signals[self.source.get(name, name)] for name in signals}
+        return right | {name: self.factor * right[name] + self.offset for name in self.channels}
+
+
+def check_units(
+    file: str,
+    columns: Mapping[str, NDArray],
+    period: float,
+    ambient_bar: float,
+    rules: RecordingRules = RULES,
+) -> None:
+    """Raise CampaignError if physics contradicts the columns; the message names the likeliest mistake.
+
+    Args:
+        file: what messages call the recording.
+        columns: by the file's column names, each (samples,) in the unit of the name.
+        period: between samples [s].
+        ambient_bar: p_env [bar absolute].
+    """
+    electrical = {"U": columns["U_V"], "I": columns["I_A"]}
+    names = {"U": "U_V", "I": "I_A"}
+    swapped = _exchanges(names)
+    voltages = [*swapped, *_scales(names, ("U",), VOLTAGE_FACTORS, "V")]
+    _refuse(file, names, electrical, lambda s, _: _voltage(s["U"], rules), voltages, rules)
+    currents = [*swapped, *_scales(names, ("I",), CURRENT_FACTORS, "A")]
+    _refuse(file, names, electrical, lambda s, _: _electrical(s, period, rules), currents, rules)
+
+    on = energised_samples(columns["U_V"], rules)
+    for supply in (column for column, name in CHANNEL_OF.items() if name == "p1" and column in columns):
+        names = {"p1": supply, "p2": "p2_bar", "p3": "p3_bar"}
+        _refuse(
+            file,
+            names,
+            {name: columns[column] for name, column in names.items()},
+            lambda s, tolerance: _pressures(s, on, ambient_bar, tolerance, rules),
+            _pressure_misreadings(names, ambient_bar),
+            rules,
+        )
+    _check_venting(file, columns["p3_bar"], on, period, ambient_bar, rules)
+
+
+def switches(U: NDArray) -> bool:
+    """Whether a coil, at voltages (samples,) in any unit, is on and off: around half the greatest.
+
+    Noise does not switch: its samples differ from each other by nearly as much as from the mean.
+    """
+    size, noise = np.abs(U), np.quantile(np.abs(np.diff(U)), 0.9)
+    return bool(np.min(size) < 0.5 * np.max(size) and np.ptp(U) > SWITCHING_NOISE * noise)
+
+
+def energised_samples(U: NDArray, rules: RecordingRules = RULES) -> NDArray:
+    """Whether the coil is on, boolean like `U` (samples,) [V]: above half the greatest voltage."""
+    greatest = float(np.max(U))
+    return (0.5 * greatest < U) & (greatest > LEAST_VOLTAGE * rules.operating_voltages[0])
+
+
+def _refuse(
+    file: str,
+    names: Mapping[str, str],
+    signals: Signals,
+    contradictions: Callable[[Signals, float], Iterator[str]],
+    misreadings: Sequence[Misreading],
+    rules: RecordingRules,
+) -> None:
+    """Raise CampaignError with the first contradiction, and the misreading that explains all.
+
+    contradictions: of signals, with the tolerance as a share of the sensors' accuracy.
+    """
+    found = next(contradictions(signals, 1.0), None)
+    if found is None:
+        return
+    beyond = {n for n, values in signals.items() if np.max(np.abs(values)) > rules.sensors[n].high}
+    explaining = (
+        m
+        for m in misreadings
+        if (abs(m.factor) >= 1 or beyond & set(m.channels))  # small units make large readings
+        and next(contradictions(m.corrected(signals), CORRECTED), None) is None
+    )
+    columns = ", ".join(names.values())
+    likely = next((m.text for m in explaining), f"check unit, sign and sensor of {columns}")
+    last = line_number(len(next(iter(signals.values()))) - 1)
+    sign = ";" if ": " in likely else ":"
+    raise CampaignError(f"{file}, lines {line_number(0)} to {last}: {found}{sign} {likely}")
+
+
+def _exchanges(names: Mapping[str, str]) -> list[Misreading]:
+    """Columns that changed places, two before three."""
+    found = []
+    for order in permutations(names):
+        source = {name: other for name, other in zip(names, order, strict=True) if name != other}
+        if source:
+            held = ", ".join(f"{names[other]} holds {name}" for name, other in source.items())
+            columns = " and ".join(names[name] for name in source)
+            text = f"{columns} look swapped ({held}): rename the columns"
+            found.append(Misreading(text=text, source=source))
+    return sorted(found, key=lambda misreading: len(misreading.source))
+
+
+def _scales(
+    names: Mapping[str, str],
+    channels: Sequence[str],
+    factors: Mapping[str, float],
+    unit: str,
+    offset: float = 0.0,
+) -> list[Misreading]:
+    """Wrong units and signs of some channels; offset: what to add after scaling [unit]."""
+    columns = " and ".join(names[name] for name in channels)
+    looks = f"{columns} {'looks' if len(channels) == 1 else 'look'} like"
+    found = []
+    for text, factor in factors.items():
+        scaled = f"divide by {1 / factor:g}" if abs(factor) < 1 else f"multiply by {factor:g}"
+        steps = [scaled] if factor != 1.0 else []
+        steps += ["add the environment's pressure"] if offset > 0 else []
+        steps += ["subtract the environment's pressure once"] if offset < 0 else []
+        gauge = ", gauge" if offset > 0 and factor != 1.0 else ""
+        text = f"{looks} {text}{gauge}: give {unit} ({', then '.join(steps)})"
+        found.append(Misreading(text=text, channels=channels, factor=factor, offset=offset))
+    return found
+
+
+def _pressure_misreadings(names: Mapping[str, str], ambient: float) -> list[Misreading]:
+    """Wrong units, references and columns, the usual ones first; ambient [bar]."""
+    device = [tuple(names)]  # one that measures all of them
+    single = [(name,) for name in names]
+    added = {"absolute pressure to which the ambient was added": 1.0}
+    tables = (
+        ([*single, *device], PRESSURE_FACTORS, 0.0),
+        ([*device, *single], {"gauge pressure": 1.0}, ambient),
+        ([*device, *single], added, -ambient),
+        ([*device, *single], PRESSURE_FACTORS, ambient),
+    )
+    found = _exchanges(names)
+    for groups, factors, offset in tables:
+        for channels in groups:
+            found += _scales(names, channels, factors, "bar absolute", offset)
+    return found
+
+
+def _starting_state(energised: NDArray) -> slice:
+    """Samples before the coil, boolean (samples,), first switches."""
+    changes = np.flatnonzero(np.diff(energised))
+    return slice(0, int(changes[0]) + 1 if changes.size else len(energised))
+
+
+def _voltage(U: NDArray, rules: RecordingRules) -> Iterator[str]:
+    """What a coil's voltage (samples,) [V] cannot be."""
+    on = energised_samples(U, rules)
+    low, high = rules.operating_voltages
+    level = float(np.median(U[_starting_state(on)]))
+    if on[0]:
+        if not low <= level <= high:
+            yield f"the energised coil has {level:.4g} V, and {low:g} to {high:g} V are usual"
+        off = float(np.median(U[~on])) if np.any(~on) else 0.0
+        if abs(off) > MOST_REST_VOLTAGE * float(np.max(U)):
+            yield f"the voltage is {off:.4g} V while the coil is off"
+    elif abs(level) > rules.sensors["U"].accuracy * rules.sensors["U"].high:
+        yield f"the voltage is {level:.4g} V, neither off nor on"
+    if switches(U) and not np.any(on):
+        yield f"U switches at {np.max(np.abs(U)):.4g} V, and {low:g} to {high:g} V are usual"
+
+
+def _electrical(signals: Signals, period: float, rules: RecordingRules) -> Iterator[str]:
+    """What voltage and current cannot be: U/R while the coil holds, and none when it is off."""
+    U, current = signals["U"], signals["I"]
+    yield from _voltage(U, rules)
+    on = energised_samples(U, rules)
+    start = _starting_state(on)
+    settled = start if not on[0] else np.flatnonzero(_time_off(on, period) > DECAY_TIME)
+    if on[0]:
+        least, greatest = rules.coil_resistances
+        volts, ampere = float(np.median(U[start])), float(np.median(current[start]))
+        resistance = volts / ampere if ampere else np.inf
+        if not least <= resistance <= greatest:
+            yield (
+                f"{volts:.4g} V and a holding current of {ampere:.4g} A make {resistance:.4g} ohm, and "
+                f"coils have {least:g} to {greatest:g} ohm"
+            )
+    rest = float(np.median(current[settled])) if len(current[settled]) else 0.0
+    if abs(rest) > MOST_REST_CURRENT * rules.sensors["I"].high:
+        yield f"a current of {rest:.4g} A flows while the coil is off"
+
+
+def _time_off(energised: NDArray, period: float) -> NDArray:
+    """Time since the coil was last on [s], (samples,)."""
+    index = np.arange(len(energised))
+    return (index - np.maximum.accumulate(np.where(energised, index, -1))) * period
+
+
+def _pressures(
+    signals: Signals, on: NDArray, ambient: float, tolerance: float, rules: RecordingRules
+) -> Iterator[str]:
+    """What p1, p2 and p3 cannot be.
+
+    on: whether the coil is, boolean (samples,). ambient: p_env [bar absolute]. tolerance: a share of the
+    sensors' accuracy.
+    """
+    margin = tolerance * rules.pressure_margin
+    least, most = {}, {}
+    for name, values in signals.items():  # a hundredth of the samples may have a fault of another kind
+        least[name], most[name] = (float(q) for q in np.quantile(values, (0.01, 0.99)))
+        highest = rules.sensors[name].high
+        if least[name] < ambient - margin:
+            yield f"{name} falls to {least[name]:.4g} bar, below the ambient {ambient:g} bar"
+        if most[name] > highest + margin:
+            yield f"{name} rises to {most[name]:.4g} bar, beyond the sensor's {highest:g} bar"
+    start = _starting_state(on)
+    p1, p2, p3 = (float(np.mean(signals[name][start])) for name in ("p1", "p2", "p3"))
+    if not on[0]:
+        if abs(p3 - ambient) > margin:
+            yield f"at rest, p3 is {p3:.4g} bar, and the exhaust is open to the ambient {ambient:g} bar"
+        if p1 > p2 + 2 * margin:
+            yield f"at rest, p1 is {p1:.4g} and p2 {p2:.4g} bar, although the open valve joins them"
+        return
+    if abs(p1 - p3) > 2 * margin:
+        yield f"with the coil on, p1 is {p1:.4g} and p3 {p3:.4g} bar, although the open inlet joins them"
+    if p2 > p1 + 2 * margin:
+        yield f"the circuit's p2 of {p2:.4g} bar lies above its supply p1 of {p1:.4g} bar"
+    if np.all(on):
+        return
+    if p1 < CHOKED_RATIO * ambient:
+        yield f"a supply p1 of {p1:.4g} bar absolute is next to empty"
+    fall = max(1.0 - least["p3"] / p3, 0.0)
+    for name, level in (("p1", p1), ("p2", p2)):
+        if 1.0 - least[name] / level > fall + 0.05:
+            yield f"with the coil off, {name} falls to {least[name]:.4g} bar and p3 to {least['p3']:.4g}"
+    rise = most["p2"] - p2
+    if fall > 0.35 and p2 < NEARLY_VENTED * ambient and rise < 2 * margin:
+        yield f"p2 rises by only {rise:.2g} bar from {p2:.4g}, although the valve opens"
+    discharges = _discharges(signals["p3"], on, ambient)
+    if discharges:
+        # Whole discharges and their late parts must agree: a slow sensor bends the beginning.
+        late = [slice((2 * part.start + part.stop) // 3, part.stop) for part in discharges]
+        ends = [_median_end(signals["p3"], parts) for parts in (discharges, late)]
+        if all(abs(end + ambient) < GAUGE_LIKENESS * ambient for end in ends):
+            yield f"p3 vents towards {ends[0]:.2f} bar, and choked flow leads towards 0 bar absolute"
+
+
+def _discharges(p3: NDArray, on: NDArray, ambient: float) -> list[slice]:
+    """Samples, from each switching-off, in which p3 (samples,) [bar] falls far through choked flow."""
+    found = []
+    for first, last in pairwise([0, *(np.flatnonzero(np.diff(on)) + 1), len(p3)]):
+        falling = (p3[first:last] < 0.9 * p3[first]) & (p3[first:last] > CHOKED_RATIO * ambient)
+        if on[first] or not np.any(falling):
+            continue
+        inside = first + np.flatnonzero(falling)
+        part = slice(int(inside[0]), int(inside[-1]) + 1)
+        long = part.stop - part.start >= LEAST_DISCHARGE
+        if long and p3[part.stop - 1] < (1 - LEAST_FALL) * p3[part.start]:
+            found.append(part)
+    return found
+
+
+def _median_end(p3: NDArray, parts: Sequence[slice]) -> float:
+    """Pressure [bar] towards which p3 falls, by least squares on the integral of its exponential.
+
+    p(t) = e + (p(0) - e) exp(-k t) gives p(t) - p(0) = k e t - k (integral of p), linear in k e and k,
+    and the integral averages noise. Time counts in samples: wrong times hide no wrong reference.
+    """
+    ends = []
+    for pressure in (p3[part] for part in parts):
+        integral = np.concatenate([[0.0], np.cumsum(0.5 * (pressure[1:] + pressure[:-1]))])
+        basis = np.stack([np.ones(len(pressure)), np.arange(len(pressure)), -integral], axis=1)
+        _, product, rate = np.linalg.lstsq(basis, pressure, rcond=None)[0]
+        ends.append(product / rate)
+    return float(np.median(ends))
+
+
+def _check_venting(
+    file: str, p3: NDArray, on: NDArray, period: float, ambient: float, rules: RecordingRules
+) -> None:
+    """The control chamber vents at a rate that its exhaust and volume allow, or the times are wrong."""
+    discharges = _discharges(p3, on, ambient)
+    if not on[0] or not discharges:
+        return
+    slopes = [np.polyfit(np.arange(len(p3[d])), np.log(p3[d]), 1)[0] for d in discharges]
+    rate, (least, greatest) = float(np.median(slopes)) / -period, rules.venting_rates
+    if least <= rate <= greatest:
+        return
+    factor = rules.usual_venting / rate
+    units = [text for text, size in TIME_FACTORS.items() if 0.3 * size < factor < 3 * size]
+    size = f"{factor:.2g} times too long" if factor > 1 else f"{1 / factor:.2g} times too short"
+    likely = (
+        f"time_s looks like {units[0]}: give s"
+        if units
+        else f"time_s looks {size}: give the true sampling rate in s, or another valve's --plant"
+    )
+    raise CampaignError(
+        f"{file}, line {line_number(discharges[0].start)}: p3 vents at {rate:.3g} 1/s, and this valve "
+        f"at {least:g} to {greatest:g}; {likely}"
+    )
