@@ -18,8 +18,9 @@ from epv_env.common.results_folder import CONFIG, check_options, write_options
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from identification.bench.programmes import REPORT_SUITE, load_programmes, save_programmes
 from identification.importing.mapping_file import read_mapping
-from identification.recordings.campaign_files import FILE_NAME, read_manifest
+from identification.recordings.campaign_files import FILE_NAME, read_campaign, write_campaign
 from identification.recordings.columns import REQUIRED_COLUMNS, read_columns
+from tests.identification.recordings.good_campaign import campaign_of, switching
 from training.studies.benchmark.result_file import (
     Entry,
     Results,
@@ -63,12 +64,7 @@ def _copied(folder: Path) -> None:
 
 
 def _manifest(folder: Path) -> None:
-    content = {
-        "format": "epv-campaign/1", "name": "fuzz",
-        "environment": {"temperature_K": 293.0, "pressure_bar": 1.0},
-        "recordings": [{"file": "test1.csv", "role": "calibration"}],
-    }  # fmt: skip
-    (folder / FILE_NAME).write_text(json.dumps(content))
+    write_campaign(campaign_of(switching()), folder)
 
 
 def _mapping(folder: Path) -> None:
@@ -110,7 +106,7 @@ FORMATS = (
         write=lambda folder: save_programmes(REPORT_SUITE, folder / "next.json"),
         read=lambda folder: load_programmes(folder / "next.json"),
     ),
-    Format(name="manifest", file=FILE_NAME, write=_manifest, read=read_manifest),
+    Format(name="manifest", file=FILE_NAME, write=_manifest, read=read_campaign),
     Format(
         name="mapping", file="mapping.json", write=_mapping,
         read=lambda folder: read_mapping(folder / "mapping.json"),
