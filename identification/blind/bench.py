@@ -1,22 +1,16 @@
 """The blind check's bench: a trial's true recordings, with forms and solver that no fit uses."""
 
-import hashlib
 from collections.abc import Collection
 from dataclasses import replace
-from pathlib import Path
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.channels import readings
 from epv_env.plant.coefficients import coefficients
-from epv_env.plant.effects.coil import coil_current
-from epv_env.plant.effects.registry import Effects, effect_constants
-from epv_env.plant.equations import State, derivative
-from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at, store_state
+from epv_env.plant.effects.registry import effect_constants
+from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.primitives import FLAGS, replacing, source_digest
 from identification.bench.hybrid_automaton import RightHandSide, Schedule, piecewise_schedule
 from identification.bench.programmes import DIAGNOSIS_SUITE, Programme
 from identification.bench.reference_simulation import simulate_reference
@@ -26,18 +20,7 @@ from identification.bench.session import (
     initial_state,
     measured_campaign,
 )
-from identification.blind import forms
-from identification.blind.forms import (
-    INSTANT_DROP,
-    IRON_TIME_CONSTANT,
-    LANGEVIN,
-    OTHER_FORMS,
-    deviating_sizes,
-    film_rate,
-    instant_drop,
-    langevin_current_rate,
-    langevin_size,
-)
+from identification.blind.forms import currents_at_terminals, right_hand_side
 from identification.blind.truth import Trial
 from identification.recordings.recording import Campaign
 from identification.report_2003.cases import SAMPLING_RATE
@@ -65,84 +48,6 @@ WARMING_RANGE = (0.8, 1.2)
 NO_OFFSETS: dict[str, float] = {}
 """Offsets of the bench's own sensors. They are zeroed before the session, as a bias is an effect."""
 
-_with_supply_drop = replacing(State, "supply_drop")
-_with_saturation = replacing(Effects, "saturation")
-_with_rates = replacing(State, "vMV", "coil_heat", "I", "supply_drop")
-
-
-def _digest() -> str:
-    """Of every source that the kernels inline: Numba's cache sees changes of this file only."""
-    own = Path(forms.__file__ or "").read_bytes()
-    return hashlib.sha256(source_digest().encode() + own).hexdigest()
-
-
-def _compile(digest: str):
-    """Rates and terminal currents as compiled functions; a changed digest compiles them anew."""
-
-    @numba.njit(cache=True, **FLAGS)
-    def rates_and_forces(y, u, c, e, free_PV, free_MV, d, instant, langevin):
-        out = np.empty(y.size + 2)
-        if digest == "":
-            return out
-        q, inputs = state_at(y.reshape(-1, 1), 0, 0), inputs_at(u.reshape(-1, 1), 0, 0)
-        valve, fitted = coefficients_at(c, 0, 0), effects_at(e, 0, 0)
-        if instant:
-            q = _with_supply_drop(q, instant_drop(q, inputs, valve, fitted, d))
-        deviating = deviating_sizes(q, inputs, valve, fitted, d)
-        size = langevin_size(q, valve, deviating) if langevin else deviating.saturation
-        sizes = _with_saturation(deviating, size)
-        rates, force_PV, force_MV = derivative(q, inputs, valve, sizes, free_PV, free_MV, True)
-        slowed = rates.vMV - d * film_rate(q, valve) * q.vMV * free_MV
-        cooled = rates.coil_heat - d * q.coil_heat / IRON_TIME_CONSTANT
-        current = rates.I
-        if langevin:
-            current = langevin_current_rate(q, valve, deviating, size, current)
-        dropping = 0.0 if instant else rates.supply_drop
-        store_state(out.reshape(-1, 1), 0, 0, _with_rates(rates, slowed, cooled, current, dropping))
-        out[-2], out[-1] = force_PV, force_MV
-        return out
-
-    @numba.njit(cache=True, **FLAGS)
-    def currents(states, u, c, e, d):
-        out = np.empty(states.shape[1])
-        if digest == "":
-            return out
-        valve, fitted = coefficients_at(c, 0, 0), effects_at(e, 0, 0)
-        for k in range(out.size):
-            q, inputs = state_at(states, 0, k), inputs_at(u, 0, k)
-            sizes = deviating_sizes(q, inputs, valve, fitted, d)
-            out[k] = coil_current(inputs.U, q.I, valve.R, q.coil_heat, sizes)
-        return out
-
-    return rates_and_forces, currents
-
-
-_rates_and_forces, _terminal_currents = _compile(_digest())
-
-
-def right_hand_side(form_deviation: float, forms: Collection[str] = ()) -> RightHandSide:
-    """The plant with effects of the bench's forms, for `simulate_reference`.
-
-    Args:
-        form_deviation: share by which the forms deviate [-].
-        forms: effects that have their other form.
-
-    Raises:
-        ValueError: an effect has no other form.
-    """
-    strange = sorted(set(forms) - set(OTHER_FORMS))
-    if strange:
-        raise ValueError(
-            f"{strange[0]} has no other form: choose among {', '.join(OTHER_FORMS)}, or add the form to "
-            "forms.py"
-        )
-    instant, langevin = INSTANT_DROP in forms, LANGEVIN in forms
-
-    def rates_and_forces(y, u, c, e, free_PV, free_MV):
-        return _rates_and_forces(y, u, c, e, free_PV, free_MV, form_deviation, instant, langevin)
-
-    return rates_and_forces
-
 
 def terminal_currents(state: State, schedule: Schedule, time: NDArray, form_deviation: float) -> NDArray:
     """Currents at the coil's terminals [A], (samples,), where eddy currents deviate as well.
@@ -156,7 +61,7 @@ def terminal_currents(state: State, schedule: Schedule, time: NDArray, form_devi
     segment = np.searchsorted(schedule.borders[1:-1], time, side="left")
     inputs = np.ascontiguousarray([field[segment] for field in schedule.inputs])
     c, e = coefficients(schedule.parameters), effect_constants(schedule.parameters)
-    return _terminal_currents(np.ascontiguousarray(state), inputs, c, e, form_deviation)
+    return currents_at_terminals(np.ascontiguousarray(state), inputs, c, e, form_deviation)
 
 
 def blind_suite() -> tuple[Programme, ...]:
@@ -216,7 +121,6 @@ def run_programme(
 
     Raises:
         RuntimeError: no solver follows the valve.
-        ValueError: an effect has no other form.
     """
     U = programme.case.voltage(programme.U_on, SAMPLING_RATE)
     time = np.arange(len(U)) / SAMPLING_RATE

@@ -50,21 +50,26 @@ the anhysteretic curve of Jiles and Atherton 1986; the force is that of its coen
 """
 
 import math
+from collections.abc import Collection
 
 import numba
+import numpy as np
 
 from epv_env.common.units import BAR
-from epv_env.plant.effects.coil import OFF_VOLTAGE, heated
+from epv_env.plant.effects.coil import OFF_VOLTAGE, coil_current, heated
 from epv_env.plant.effects.magnet import saturated_force, saturation_level
 from epv_env.plant.effects.registry import Effects
 from epv_env.plant.equations import (
     State,
+    derivative,
     flow_exhaust,
     flow_inlet,
     flow_PV,
     reluctance_inverse,
 )
-from epv_env.plant.primitives import FLAGS, inlined, replacing
+from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at, store_state
+from epv_env.plant.primitives import FLAGS, inlined, replacing, source_digest
+from identification.bench.hybrid_automaton import RightHandSide
 
 FILM_THICKNESS = 20e-6
 """Thickness of the air film that an armature squeezes out as it lands [m]."""
@@ -102,6 +107,8 @@ _with_piston = replacing(
 )
 _with_supply = replacing(State, "p1")
 _with_drop = replacing(State, "supply_drop")
+_with_saturation = replacing(Effects, "saturation")
+_with_rates = replacing(State, "vMV", "coil_heat", "I", "supply_drop")
 
 
 @inlined
@@ -281,3 +288,63 @@ def langevin_current_rate(q, c, e, size, rate):
     level = saturation_level(current, inverse_Rm, e)
     fitted = 1.0 + (size / e.saturation * level if e.saturation > 0.0 else 0.0)
     return (rate + motion) / (fitted * fitted * langevin_slope(level)) - motion
+
+
+def _compile(digest: str):
+    """Rates and terminal currents as compiled functions. Numba's cache sees changes of this file; the
+    digest tells it of changes in the plant's equations, which are inlined."""
+
+    @numba.njit(cache=True, **FLAGS)
+    def rates_and_forces(y, u, c, e, free_PV, free_MV, d, instant, langevin):
+        out = np.empty(y.size + 2)
+        if digest == "":
+            return out
+        q, inputs = state_at(y.reshape(-1, 1), 0, 0), inputs_at(u.reshape(-1, 1), 0, 0)
+        valve, fitted = coefficients_at(c, 0, 0), effects_at(e, 0, 0)
+        if instant:
+            q = _with_drop(q, instant_drop(q, inputs, valve, fitted, d))
+        deviating = deviating_sizes(q, inputs, valve, fitted, d)
+        size = langevin_size(q, valve, deviating) if langevin else deviating.saturation
+        sizes = _with_saturation(deviating, size)
+        rates, force_PV, force_MV = derivative(q, inputs, valve, sizes, free_PV, free_MV, True)
+        slowed = rates.vMV - d * film_rate(q, valve) * q.vMV * free_MV
+        cooled = rates.coil_heat - d * q.coil_heat / IRON_TIME_CONSTANT
+        current = rates.I
+        if langevin:
+            current = langevin_current_rate(q, valve, deviating, size, current)
+        dropping = 0.0 if instant else rates.supply_drop
+        store_state(out.reshape(-1, 1), 0, 0, _with_rates(rates, slowed, cooled, current, dropping))
+        out[-2], out[-1] = force_PV, force_MV
+        return out
+
+    @numba.njit(cache=True, **FLAGS)
+    def currents(states, u, c, e, d):
+        out = np.empty(states.shape[1])
+        if digest == "":
+            return out
+        valve, fitted = coefficients_at(c, 0, 0), effects_at(e, 0, 0)
+        for k in range(out.size):
+            q, inputs = state_at(states, 0, k), inputs_at(u, 0, k)
+            sizes = deviating_sizes(q, inputs, valve, fitted, d)
+            out[k] = coil_current(inputs.U, q.I, valve.R, q.coil_heat, sizes)
+        return out
+
+    return rates_and_forces, currents
+
+
+_rates_and_forces, currents_at_terminals = _compile(source_digest())
+
+
+def right_hand_side(form_deviation: float, forms: Collection[str] = ()) -> RightHandSide:
+    """The plant with effects of the bench's forms, for `simulate_reference`.
+
+    Args:
+        form_deviation: share by which the forms deviate [-].
+        forms: effects that have their other form.
+    """
+    instant, langevin = INSTANT_DROP in forms, LANGEVIN in forms
+
+    def rates_and_forces(y, u, c, e, free_PV, free_MV):
+        return _rates_and_forces(y, u, c, e, free_PV, free_MV, form_deviation, instant, langevin)
+
+    return rates_and_forces

@@ -8,15 +8,14 @@ from docs.studies.reproduction.errata import (
     DOUBT,
     ERRATUM,
     HOLDS,
-    figure_checks,
     interval_position,
     measurement_points,
     numeric_check,
     recomputed_partial,
     recomputed_total,
-    signal_to_noise,
 )
-from docs.studies.reproduction.study import FOLDER, main, page_parts
+from docs.studies.reproduction.noise_errata import signal_to_noise
+from docs.studies.reproduction.study import FOLDER, figure_checks, main, page_parts
 from identification.recordings.recording import CHANNELS
 from identification.report_2003.printed_values import printed_errors
 

@@ -1,4 +1,4 @@
-"""Checks of the report's printed figures against each other: errata, doubts and what holds."""
+"""A printed figure checked against the report's others; checks of parameters and error tables."""
 
 import math
 from collections.abc import Mapping
@@ -7,19 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from epv_env.plant.channels import SENSORS
 from epv_env.plant.parameters import Parameters, confidence_intervals, table
-from identification.quality.section import (
-    REPORT_CHANNELS,
-    SAMPLES,
-    STATISTICS,
-    TREND_OFFSETS,
-)
-from identification.recordings.recording import OUTPUTS, UNITS
+from identification.recordings.recording import OUTPUTS
 from identification.report_2003.cases import CALIBRATION_CASES, SAMPLING_RATE
 from identification.report_2003.output_error import partial_error, total_error
 from identification.report_2003.printed_values import (
-    correlation_matrix,
     printed_errors,
     printed_sensitivities,
     printed_total,
@@ -37,8 +29,6 @@ ERROR_ROUNDING = 1.5e-4
 """Tolerance of a root of squares of errors that are printed to 1e-4 [%]."""
 IMPROVEMENT_ROUNDING = 0.01
 """Tolerance of a relative fall of the total error [%], printed to two digits here."""
-STANDARD_ERRORS = 3.0
-"""Deviation of a statistic from its expected value that is still no doubt [standard errors]."""
 CONFIDENCE = 0.95
 """Confidence of the band of a correlation, and probability of the F quantile of eq. 23 [-]."""
 CENTRAL_POSITIONS = (0.25, 0.75)
@@ -65,11 +55,6 @@ class FigureCheck:
     """What rule the recomputation uses, and what follows."""
 
 
-def figure_checks() -> list[FigureCheck]:
-    """All checks in the order of the report's sections, those that hold included."""
-    return [*noise_checks(), *parameter_checks(), *error_table_checks()]
-
-
 def numeric_check(
     where: str, printed: float, recomputed: float, tolerance: float, *, digits: int = 4, remark: str = ""
 ) -> FigureCheck:
@@ -90,198 +75,6 @@ def numeric_check(
         status=HOLDS if abs(printed - recomputed) <= tolerance else ERRATUM,
         remark=remark,
     )
-
-
-# Sections 3 and 4: noise statistics, Tables 1 to 4
-
-
-PRINTED_HALF_DIGIT = 5e-5
-"""Half the last digit of Table 3's standard deviations and ranges, which have four decimals [A, V or
-bar]."""
-
-PRINTED_DURATION, PRINTED_RATE, HIGHEST_CARD_RATE = 5.0, 2000.0, 2100.0
-"""Duration [s] and rate [Hz] of the quality record, and highest rate of the acquisition
-card [Hz] (sections 3 and 4)."""
-
-CLAIMED_SIGNAL_TO_NOISE = 62.0
-"""'over 62 dB in all cases' (section 4.1) [dB]."""
-
-
-def noise_checks() -> list[FigureCheck]:
-    """All checks of sections 3 and 4."""
-    return [
-        _samples(),
-        *(_signal_to_noise(name) for name in REPORT_CHANNELS),
-        _claimed_signal_to_noise(),
-        *(_outlier_factor(name) for name in REPORT_CHANNELS),
-        *(_interquartile_range(name) for name in REPORT_CHANNELS),
-        *(_median(name) for name in REPORT_CHANNELS),
-        _kurtosis(),
-        _skewness(),
-        _sensor_range(),
-        _symmetry(),
-        _correlations(),
-    ]
-
-
-def signal_to_noise(name: str, deviation: float) -> float:
-    """Signal-to-noise ratio by eq. 17 with Table 1's greatest value [dB].
-
-    name: channel. deviation: standard deviation of its noise [A, V or bar].
-    """
-    return float(20 * np.log10(SENSORS[name].high / deviation))
-
-
-def _samples() -> FigureCheck:
-    count = PRINTED_DURATION * PRINTED_RATE
-    fits = count == SAMPLES and PRINTED_RATE <= HIGHEST_CARD_RATE
-    return FigureCheck(
-        where="Section 4, samples of the quality record",
-        printed=f"{SAMPLES}",
-        recomputed=f"{count:g}",
-        status=HOLDS if fits else ERRATUM,
-        remark="5 s at 2000 Hz, which the card allows (1 to 2100 Hz)",
-    )
-
-
-def _signal_to_noise(name: str) -> FigureCheck:
-    """Printed SNR against what any standard deviation that rounds to the printed one can give."""
-    deviation, printed = STATISTICS[name].standard_deviation, STATISTICS[name].signal_to_noise
-    low, high = (
-        signal_to_noise(name, deviation + change) for change in (PRINTED_HALF_DIGIT, -PRINTED_HALF_DIGIT)
-    )
-    unit, greatest = UNITS[name][0], deviation * 10 ** (printed / 20)
-    return FigureCheck(
-        where=f"Table 3, SNR of {name} [dB]",
-        printed=f"{printed:.3f}",
-        recomputed=f"{low:.3f} to {high:.3f}",
-        status=HOLDS if low <= printed <= high else ERRATUM,
-        remark=f"eq. 17 with Table 1's greatest value, {SENSORS[name].high:g} {unit}; the printed SNR "
-        f"would take {greatest:.3g} {unit}",
-    )
-
-
-def _claimed_signal_to_noise() -> FigureCheck:
-    found = {
-        name: signal_to_noise(name, STATISTICS[name].standard_deviation) for name in REPORT_CHANNELS
-    }
-    least = min(found, key=lambda name: found[name])
-    return FigureCheck(
-        where="Section 4.1, SNR 'over 62 dB in all cases' [dB]",
-        printed=f"over {CLAIMED_SIGNAL_TO_NOISE:g}",
-        recomputed=f"{found[least]:.2f} ({least})",
-        status=HOLDS if found[least] > CLAIMED_SIGNAL_TO_NOISE else ERRATUM,
-        remark="eq. 17 with the printed standard deviations",
-    )
-
-
-def _outlier_factor(name: str) -> FigureCheck:
-    """The farthest sample lies between half the range and the range from the mean."""
-    row = STATISTICS[name]
-    farthest = row.outlier_factor * row.standard_deviation
-    slack = row.outlier_factor * PRINTED_HALF_DIGIT + PRINTED_HALF_DIGIT
-    return FigureCheck(
-        where=f"Table 3, outlier factor of {name}",
-        printed=f"{row.outlier_factor:.4f}",
-        recomputed=f"{row.range / 2 / row.standard_deviation:.2f} to "
-        f"{row.range / row.standard_deviation:.2f}",
-        status=HOLDS if row.range / 2 - slack <= farthest <= row.range + slack else ERRATUM,
-        remark="eq. 18: half the range or more, over the standard deviation",
-    )
-
-
-def _interquartile_range(name: str) -> FigureCheck:
-    """For normal noise 1.349 standard deviations, within one step of the converter."""
-    row = STATISTICS[name]
-    normal = float(2 * stats.norm.ppf(0.75)) * row.standard_deviation
-    within = abs(normal - row.interquartile_range) <= SENSORS[name].resolution
-    return FigureCheck(
-        where=f"Table 3, interquartile range of {name} [{UNITS[name][0]}]",
-        printed=f"{row.interquartile_range:.4f}",
-        recomputed=f"{normal:.4f}",
-        status=HOLDS if within else DOUBT,
-        remark=f"normal noise, within one step of the converter ({SENSORS[name].resolution:.4f})",
-    )
-
-
-def _median(name: str) -> FigureCheck:
-    """Of detrended, symmetric, rounded noise: within half a step and some standard errors of zero."""
-    row = STATISTICS[name]
-    error = np.sqrt(np.pi / 2 / SAMPLES) * row.standard_deviation
-    half = SENSORS[name].resolution / 2 + STANDARD_ERRORS * float(error)
-    return FigureCheck(
-        where=f"Table 3, median of {name} [{UNITS[name][0]}]",
-        printed=f"{row.median:.4f}",
-        recomputed=f"within ±{half:.4f}",
-        status=HOLDS if abs(row.median) <= half + PRINTED_HALF_DIGIT else DOUBT,
-        remark=f"half a step of the converter at mean zero and skewness {row.skewness:g}; the printed "
-        f"median is {abs(row.median) / row.standard_deviation:.2f} standard deviations off",
-    )
-
-
-def _kurtosis() -> FigureCheck:
-    excess = {name: STATISTICS[name].kurtosis - 3 for name in REPORT_CHANNELS}
-    return _beyond_normal("kurtosis", excess, np.sqrt(24 / SAMPLES))
-
-
-def _skewness() -> FigureCheck:
-    excess = {name: STATISTICS[name].skewness for name in REPORT_CHANNELS}
-    return _beyond_normal("skewness", excess, np.sqrt(6 / SAMPLES))
-
-
-def _beyond_normal(quantity: str, excess: dict[str, float], standard_error: float) -> FigureCheck:
-    """Excess over normal noise's value by channel [-], against its standard error for normal noise."""
-    limit = STANDARD_ERRORS
-    far = {
-        n: value / standard_error for n, value in excess.items() if abs(value) > limit * standard_error
-    }
-    return FigureCheck(
-        where=f"Table 3, {quantity} 'close to' that of normal noise",
-        printed="all channels",
-        recomputed=", ".join(f"{name} {value:+.1f}" for name, value in far.items()) or "none",
-        status=DOUBT if far else HOLDS,
-        remark=f"deviations of more than {limit:g} standard errors, in standard errors "
-        f"({standard_error:.3f} each)",
-    )
-
-
-def _sensor_range() -> FigureCheck:
-    outside = [name for name in REPORT_CHANNELS if TREND_OFFSETS[name] < SENSORS[name].low]
-    return FigureCheck(
-        where="Table 2 against Table 1, pressures at rest [bar]",
-        printed=", ".join(f"{name} {TREND_OFFSETS[name]:.4f}" for name in outside) or "inside",
-        recomputed=f"at least {SENSORS['p2'].low:g}",
-        status=DOUBT if outside else HOLDS,
-        remark="the record at ambient pressure lies at and below the lower end of the sensors' range",
-    )
-
-
-def _symmetry() -> FigureCheck:
-    matrix = np.array(correlation_matrix())
-    symmetric = bool(np.all(matrix == matrix.T)) and bool(np.all(np.diag(matrix) == 1))
-    return FigureCheck(
-        where="Table 4, symmetry and unit diagonal",
-        printed="symmetric",
-        recomputed="symmetric" if symmetric else "not symmetric",
-        status=HOLDS if symmetric else ERRATUM,
-    )
-
-
-def _correlations() -> FigureCheck:
-    matrix = np.array(correlation_matrix())
-    band = float(stats.norm.ppf(0.5 + CONFIDENCE / 2) / np.sqrt(SAMPLES))
-    pairs = [(i, j) for i in range(len(REPORT_CHANNELS)) for j in range(i) if abs(matrix[i, j]) > band]
-    return FigureCheck(
-        where="Table 4, 'shows non-correlated data'",
-        printed="no pair correlated",
-        recomputed=f"{len(pairs)} of 10 pairs beyond ±{band:.4f}: "
-        + ", ".join(f"{REPORT_CHANNELS[j]}-{REPORT_CHANNELS[i]} {matrix[i, j]:+.4f}" for i, j in pairs),
-        status=ERRATUM if len(pairs) > 1 else HOLDS,
-        remark=f"95 % band of independent white signals of {SAMPLES} samples; 1 in 20 may lie outside",
-    )
-
-
-# Sections 5.1 and 6: parameters, eq. 23 and counts in the text
 
 
 PRINTED_PERMEABILITY = 4 * math.pi * 1e7
@@ -397,9 +190,6 @@ def _signals() -> FigureCheck:
         status=ERRATUM if len(set(PRINTED_SIGNALS)) < len(PRINTED_SIGNALS) else HOLDS,
         remark="p2 stands twice and p1 is missing; Table 1 lists all five",
     )
-
-
-# Tables 8, 9, 11, 13 and 15
 
 
 ACCEPTED_TOTAL_ERROR = 10.0

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from docs.studies.common import PAGE, fill, study_options, study_parser, table, write_result
-from docs.studies.reproduction.errata import ERRATUM, figure_checks
+from docs.studies.reproduction.errata import ERRATUM, FigureCheck, error_table_checks, parameter_checks
+from docs.studies.reproduction.noise_errata import noise_checks
 from epv_env.common.command_line import fail_clearly
 from epv_env.plant.parameters import Parameters, confidence_intervals
 from identification.bench.programmes import REPORT_SUITE
@@ -50,6 +51,11 @@ def reproduce(identification: Identification) -> dict[str, Any]:
         "virtual_bench": {"tables2to4": quality_json(quality), **_bench(identification)},
         "slips": [asdict(check) for check in figure_checks()],
     }
+
+
+def figure_checks() -> list[FigureCheck]:
+    """All checks in the order of the report's sections, those that hold included."""
+    return [*noise_checks(), *parameter_checks(), *error_table_checks()]
 
 
 def _bench(identification: Identification) -> dict[str, Any]:

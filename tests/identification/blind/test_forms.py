@@ -10,7 +10,6 @@ from epv_env.plant.effects.registry import effect, effect_constants
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.parameters import Parameters
 from identification.bench.hybrid_automaton import COMPILED_RIGHT_HAND_SIDES
-from identification.blind.bench import right_hand_side
 from identification.blind.forms import (
     INSTANT_DROP,
     LANGEVIN,
@@ -19,6 +18,7 @@ from identification.blind.forms import (
     langevin_force,
     langevin_slope,
     level_of_force,
+    right_hand_side,
 )
 from identification.blind.truth import EFFECTS, top_sizes
 
@@ -160,8 +160,3 @@ def test_the_armature_s_force_and_the_current_s_rate_are_those_of_the_langevin_c
     pull = (langevin_force(u) - 0.5) * (p["N"] * q.I / Rm) ** 2 * gap
     assert found[-1] - linear[-1] == pytest.approx(pull, rel=1e-9)
     assert found[CURRENT] / linear[CURRENT] == pytest.approx(1 / langevin_slope(u), rel=1e-9)
-
-
-def test_an_effect_without_another_form_is_refused():
-    with pytest.raises(ValueError, match="flow_force has no other form"):
-        right_hand_side(0.0, ["flow_force"])
