@@ -52,7 +52,7 @@ test-oldest: $(OLDEST)/.installed ## run the plant and environment tests on the 
 	NUMBA_CACHE_DIR=$(CURDIR)/$(OLDEST)/numba-cache \
 		$(OLDEST)/bin/python -m pytest $(SIDE_BY_SIDE) tests/common tests/plant tests/env -m "not training and not slow"
 
-bench: $(VENV)/.installed ## measure speed and memory (a quarter of an hour); ARGS="--against HEAD~1" pairs with a commit
+bench: $(VENV)/.installed ## measure speed and memory beside peers (ten minutes)
 	$(PY) -m tests.benchmarks $(ARGS)
 
 tune: $(VENV)/.installed ## search the classic controllers' settings anew (minutes)

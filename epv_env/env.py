@@ -93,13 +93,13 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
         return {key: value[0] for key, value in shown.items()}
 
     def step(self, action: Any) -> tuple[NDArray, SupportsFloat, bool, bool, dict[str, Any]]:
-        batch = self.task.step(*self.action.decode(np.asarray(action)[None]))
-        info = {key: value[0, ...] for key, value in step_info(batch).items()}
-        result = batch.single()
-        self._consumption = result.consumption
+        result = self.task.step(*self.action.decode(np.asarray(action)[None]))
+        info = {key: value[0, ...] for key, value in step_info(result).items()}
+        self._consumption = float(result.consumption[0])
         if self.render_mode == "human":
             self.render()
-        return result.observation, result.reward, result.failed, False, info | self._truth()
+        reward, failed = float(result.reward[0]), bool(result.failed[0])
+        return result.observation[0], reward, failed, False, info | self._truth()
 
     def snapshot(self) -> Snapshot:
         """The true state at this instant, for pictures and logs (a controller must not see it)."""

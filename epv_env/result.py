@@ -7,62 +7,43 @@ from numpy.typing import NDArray
 
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import table
-from epv_env.plant.primitives import Value
 from epv_env.reward import RewardTerms
 
 N_TERM = len(RewardTerms._fields)
 """Rows of the reward's terms, which begin a table of figures."""
 DEVIATION, SWITCHINGS, VENTED, CONSUMPTION, SUCCEEDED, REWARD, FAILED = range(N_TERM, N_TERM + 7)
-"""The other rows, named as the properties of StepResult [SI, bar]; truth values are 0 and 1."""
+"""The other rows [SI, bar]; truth values are 0 and 1."""
 N_FIGURE = FAILED + 1
 """Rows of a table of figures."""
 
 
 class StepResult(NamedTuple):
-    """One control period of every episode, or of a single one.
-
-    The properties are arrays (n,), or Python numbers for a single episode.
-    """
+    """One control period of every episode; the properties are arrays (n,)."""
 
     observation: NDArray
-    """(n, entries) float32 [-], or (entries,)."""
-    figures: Value
-    """(N_FIGURE, n) in the order of this module's rows, or a list of N_FIGURE numbers."""
+    """(n, entries) float32 [-]."""
+    figures: NDArray
+    """(N_FIGURE, n) in the order of this module's rows."""
 
     @property
-    def reward(self) -> Value:
-        """Sum of the terms [-]."""
+    def reward(self) -> NDArray:
+        """Sum of the terms, (n,) [-]."""
         return self.figures[REWARD]
 
     @property
-    def failed(self) -> Value:
-        """The circuit is empty, or the plant left what can be integrated: what ends an episode."""
+    def failed(self) -> NDArray:
+        """Whether the circuit is empty, or the plant left what can be integrated: it ends an episode."""
         return self.figures[FAILED] != 0
 
     @property
-    def switchings(self) -> Value:
-        """Switchings of the coil within the period."""
-        found = self.figures[SWITCHINGS]
-        return int(found) if isinstance(found, float) else found.astype(np.int64)
+    def switchings(self) -> NDArray:
+        """Switchings of the coil within the period, (n,)."""
+        return self.figures[SWITCHINGS].astype(np.int64)
 
     @property
-    def vented_kg(self) -> Value:
-        """Air blown off within the period [kg]."""
-        return self.figures[VENTED]
-
-    @property
-    def consumption(self) -> Value:
-        """Mean consumption of the period [kg/s]."""
+    def consumption(self) -> NDArray:
+        """Mean consumption of the period, (n,) [kg/s]."""
         return self.figures[CONSUMPTION]
-
-    @property
-    def succeeded(self) -> Value:
-        """Settled and never outside the band since."""
-        return self.figures[SUCCEEDED] != 0
-
-    def single(self) -> "StepResult":
-        """The result of a batch of one as that of a single episode."""
-        return StepResult(self.observation[0], self.figures[:, 0].tolist())
 
 
 KEYS = (
@@ -103,7 +84,7 @@ def step_info(result: StepResult) -> dict[str, Any]:
     """
     info: dict[str, Any] = dict(zip(KEYS, result.figures[:_SHOWN], strict=True))
     info["switchings"] = result.switchings
-    info["vented_g"] = 1e3 * result.vented_kg
+    info["vented_g"] = 1e3 * result.figures[VENTED]
     info["consumption_g_per_s"] = 1e3 * result.consumption
-    info["is_success"] = result.succeeded
+    info["is_success"] = result.figures[SUCCEEDED] != 0
     return info

@@ -55,16 +55,6 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         check_count("num_envs", num_envs)
         if threads is not None:
             check_count("threads", threads)
-        if isinstance(max_episode_steps, (list, tuple)):
-            if len(max_episode_steps) != num_envs:
-                raise OptionError(
-                    f"max_episode_steps lists {len(max_episode_steps)} numbers for {num_envs} "
-                    "environments: give one each, or one for all"
-                )
-            for steps in max_episode_steps:
-                check_count("max_episode_steps", steps)
-        elif max_episode_steps is not None:
-            check_count("max_episode_steps", max_episode_steps)
         if render_mode is not None:
             raise OptionError("the vector environment does not render: use gymnasium.make instead")
         self.autoreset_mode = AutoresetMode(autoreset_mode)
@@ -73,9 +63,7 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         self.plant = load_plant(plant)
         self.settings = make_settings(self.plant, control_period=period, **options)
         self.num_envs = num_envs
-        self.max_episode_steps: Any = max_episode_steps
-        if isinstance(max_episode_steps, (list, tuple)):
-            self.max_episode_steps = np.array(max_episode_steps)
+        self.max_episode_steps: Any = _checked_limit(max_episode_steps, num_envs)
         self.render_mode = None
         self.action = self.action_form(period)
         self.single_action_space = self.action.space()
@@ -203,6 +191,23 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         if not mask.any():
             raise OptionError("reset_mask selects no environment: set at least one True")
         return mask
+
+
+def _checked_limit(limit: Any, n: int) -> Any:
+    """The greatest number of steps: None, a number for all, or an array (n,). Raises OptionError."""
+    if limit is None:
+        return None
+    each = limit if isinstance(limit, (list, tuple)) else [limit]
+    for steps in each:
+        check_count("max_episode_steps", steps)
+    if each is not limit:
+        return limit
+    if len(limit) != n:
+        raise OptionError(
+            f"max_episode_steps lists {len(limit)} numbers for {n} environments: give one each, or one "
+            "for all"
+        )
+    return np.array(limit)
 
 
 class EPValveVectorEnv(_ValveVectorEnv):

@@ -38,7 +38,7 @@ SHORT_FORMS: dict[str, str] = {
     "python training/tradeoff.py": "tests/training/test_commands.py",
     "python training/train_ppo.py": "tests/training/test_commands.py",
     "python training/tune.py": "tests/training/test_commands.py",
-    "epv": "tests/fuzzing/test_command_lines.py",
+    "epv": "tests/test_fuzzing.py",
     "python -m mkdocs": "tests/test_docs.py",
     "tensorboard": "tests/training/test_tracking.py",
     "cc": "tests/training/test_export.py",

@@ -20,18 +20,17 @@ PART = "effects"
 
 
 def effects_table() -> str:
-    """One row for each effect: name, component, sizes with unit and range, form, source."""
+    """One row for each effect: name, component, sizes with unit and range, form."""
     rows = [
         [
             f"`{effect.name}`",
             effect.component.replace("_", " "),
             ", ".join(_size(size) for size in effect.sizes),
             effect.form,
-            effect.source,
         ]
         for effect in EFFECTS
     ]
-    return markdown_table(["Effect", "Component", "Size, range, unit", "Form", "Source"], rows)
+    return markdown_table(["Effect", "Component", "Size, range, unit", "Form"], rows)
 
 
 def _size(size: Size) -> str:

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from filelock import FileLock, Timeout
-from tqdm import tqdm
 
 from epv_env.common.files import checked, decoded, write_json
 
@@ -113,5 +112,7 @@ Item = TypeVar("Item")
 
 def progress(items: Iterable[Item], *, what: str, total: int | None = None) -> Iterator[Item]:
     """Yield the items and show a bar; where no terminal reads it, a line every ten seconds."""
+    from tqdm import tqdm
+
     interval = 0.2 if sys.stderr.isatty() else 10.0
     yield from tqdm(items, desc=what, total=total, file=sys.stderr, mininterval=interval)

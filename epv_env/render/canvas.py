@@ -17,66 +17,38 @@ from numpy.typing import NDArray
 
 from epv_env.common.extras import how_to_install
 
-Colour = tuple[int, int, int]
-"""Red, green and blue, 0 to 255."""
+Colour = tuple[int, int, int]  # red, green and blue, 0 to 255
 
-PAGE: Colour = (238, 241, 245)
-"""Background of the window."""
-CARD: Colour = (255, 255, 255)
-"""Background of a panel."""
-EDGE: Colour = (214, 220, 228)
-"""Border of a panel."""
-GRID: Colour = (232, 236, 241)
-"""Grid lines."""
-INK: Colour = (29, 39, 54)
-"""Text."""
-MUTED: Colour = (104, 116, 134)
-"""Secondary text."""
+PAGE: Colour = (238, 241, 245)  # background of the window
+CARD: Colour = (255, 255, 255)  # background of a panel
+EDGE: Colour = (214, 220, 228)  # border of a panel
+GRID: Colour = (232, 236, 241)  # grid lines
+INK: Colour = (29, 39, 54)  # text
+MUTED: Colour = (104, 116, 134)  # secondary text
 
-BODY: Colour = (203, 209, 218)
-"""Valve body."""
-HATCH: Colour = (190, 197, 208)
-"""Hatching of the valve body."""
-OUTLINE: Colour = (62, 72, 88)
-"""Outlines of parts."""
-STEEL: Colour = (232, 235, 240)
-"""Moving steel parts."""
-STEEL_SHADE: Colour = (196, 203, 213)
-"""Shaded side of moving steel parts."""
-IRON: Colour = (136, 146, 160)
-"""Iron of the magnet."""
-RUBBER: Colour = (38, 42, 50)
-"""Seals."""
-COIL_COLD: Colour = (173, 128, 98)
-"""Winding without current."""
-COIL_HOT: Colour = (255, 176, 32)
-"""Winding with full current."""
-WIRE_COLD: Colour = (206, 166, 138)
-"""Wires without current."""
-WIRE_HOT: Colour = (255, 230, 150)
-"""Wires with full current."""
+BODY: Colour = (203, 209, 218)  # valve body
+HATCH: Colour = (190, 197, 208)  # hatching of the valve body
+OUTLINE: Colour = (62, 72, 88)  # outlines of parts
+STEEL: Colour = (232, 235, 240)  # moving steel parts
+STEEL_SHADE: Colour = (196, 203, 213)  # shaded side of moving steel parts
+IRON: Colour = (136, 146, 160)  # iron of the magnet
+RUBBER: Colour = (38, 42, 50)  # seals
+COIL_COLD: Colour = (173, 128, 98)  # winding without current
+COIL_HOT: Colour = (255, 176, 32)  # winding with full current
+WIRE_COLD: Colour = (206, 166, 138)  # wires without current
+WIRE_HOT: Colour = (255, 230, 150)  # wires with full current
 
-P1: Colour = (84, 96, 118)
-"""Curve of p1."""
-P2: Colour = (20, 108, 214)
-"""Curve of p2."""
-P3: Colour = (176, 58, 156)
-"""Curve of p3."""
-TARGET: Colour = (24, 138, 84)
-"""Line of the target."""
-BAND: Colour = (214, 240, 224)
-"""Band around the target."""
-COIL: Colour = (222, 140, 0)
-"""Curve of the coil's command."""
-CONSUMPTION: Colour = (0, 134, 139)
-"""Curve of the consumption."""
-GOOD: Colour = (24, 138, 84)
-"""A kept limit."""
-BAD: Colour = (205, 52, 52)
-"""A violated limit."""
+P1: Colour = (84, 96, 118)  # curve of p1
+P2: Colour = (20, 108, 214)  # curve of p2
+P3: Colour = (176, 58, 156)  # curve of p3
+TARGET: Colour = (24, 138, 84)  # line of the target
+BAND: Colour = (214, 240, 224)  # band around the target
+COIL: Colour = (222, 140, 0)  # curve of the coil's command
+CONSUMPTION: Colour = (0, 134, 139)  # curve of the consumption
+GOOD: Colour = (24, 138, 84)  # A kept limit
+BAD: Colour = (205, 52, 52)  # A violated limit
 
-SCALE_TOP_BAR = 14.0
-"""Pressure at the dark end of the scale [bar absolute]; the light end is vacuum."""
+SCALE_TOP_BAR = 14.0  # pressure at the dark end of the scale [bar absolute]; the light end is vacuum
 
 _ANCHORS: tuple[Colour, ...] = (
     (255, 255, 225),
@@ -129,15 +101,11 @@ def halved(drawing: NDArray[np.uint8]) -> NDArray[np.uint8]:
 if TYPE_CHECKING:
     import pygame
 
-Point = tuple[float, float]
-"""Place from the left and from above [px]."""
-Box = tuple[float, float, float, float]
-"""Left, top, right, bottom [px]."""
+Point = tuple[float, float]  # place from the left and from above [px]
+Box = tuple[float, float, float, float]  # left, top, right, bottom [px]
 
-FACTOR = 2
-"""Drawing pixels per frame pixel, in each direction: what `halved` takes back."""
-TEXT_CACHE = 1024
-"""Rendered texts kept; numbers that change would otherwise fill the memory."""
+FACTOR = 2  # drawing pixels per frame pixel, in each direction: what `halved` takes back
+TEXT_CACHE = 1024  # rendered texts kept; numbers that change would otherwise fill the memory
 
 
 def load_pygame() -> ModuleType:

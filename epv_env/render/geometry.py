@@ -35,60 +35,37 @@ class Snapshot:
     """Air consumed from the circuit during that step [g/s]."""
 
 
-BLOCK: Box = (96, 162, 590, 622)
-"""The valve's body."""
+BLOCK: Box = (96, 162, 590, 622)  # the valve's body
 
 # Magnet valve, upper left: from above the exhaust bore, the core, the armature, the inlet nozzle.
-MV = 190.0
-"""Axis of the magnet valve."""
-TUBE = 27.0
-"""Half width of the tube in which the armature moves."""
-ARMATURE = 22.0
-"""Half width of the armature."""
-NOSE = 11.0
-"""Half width of the armature's nose, which shuts the exhaust."""
-NOSE_LENGTH = 26.0
-"""Length of the nose."""
-ARMATURE_LENGTH = 94.0
-"""Length of the armature, its nose included."""
-BORE = 5.5
-"""Half width of the exhaust bore and of the riser to the inlet."""
-CORE_TIP = 236.0
-"""Height of the exhaust seat."""
-INLET_TIP = 354.0
-"""Height of the inlet seat."""
-MV_CHAMBER: Box = (130, 320, 250, 386)
-"""Chamber around the inlet nozzle."""
+MV = 190.0  # axis of the magnet valve
+TUBE = 27.0  # half width of the tube in which the armature moves
+ARMATURE = 22.0  # half width of the armature
+NOSE = 11.0  # half width of the armature's nose, which shuts the exhaust
+NOSE_LENGTH = 26.0  # length of the nose
+ARMATURE_LENGTH = 94.0  # length of the armature, its nose included
+BORE = 5.5  # half width of the exhaust bore and of the riser to the inlet
+CORE_TIP = 236.0  # height of the exhaust seat
+INLET_TIP = 354.0  # height of the inlet seat
+MV_CHAMBER: Box = (130, 320, 250, 386)  # chamber around the inlet nozzle
 COIL_TOP, COIL_BOTTOM = 182.0, 308.0
-STROKE_MV = INLET_TIP - CORE_TIP - ARMATURE_LENGTH
-"""Drawn stroke of the armature."""
+STROKE_MV = INLET_TIP - CORE_TIP - ARMATURE_LENGTH  # drawn stroke of the armature
 
 # Protection valve, right: from above the control chamber, the piston, the seat, the output chamber.
-PV = 438.0
-"""Axis of the protection valve."""
-PISTON = 90.0
-"""Half width of the piston."""
-PISTON_LENGTH = 60.0
-"""Height of the piston."""
-BOSS_LENGTH = 18.0
-"""Boss on the piston's back, which meets the stop."""
-CEILING = 184.0
-"""Top of the control chamber."""
-SEAT = 396.0
-"""Height of the seat."""
+PV = 438.0  # axis of the protection valve
+PISTON = 90.0  # half width of the piston
+PISTON_LENGTH = 60.0  # height of the piston
+BOSS_LENGTH = 18.0  # boss on the piston's back, which meets the stop
+CEILING = 184.0  # top of the control chamber
+SEAT = 396.0  # height of the seat
 SEAT_INNER, LIP, SEAT_OUTER = 50.0, 56.0, 64.0
 """Half widths of the seat's bore, of its lip and of its foot."""
-FLOOR = 470.0
-"""Bottom of the ring chamber around the seat."""
-STROKE_PV = 48.0
-"""Drawn stroke of the piston."""
+FLOOR = 470.0  # bottom of the ring chamber around the seat
+STROKE_PV = 48.0  # drawn stroke of the piston
 
-INPUT: Box = (96, 424, 314, 600)
-"""Input chamber."""
-NECK: Box = (313, 424, PV - PISTON, FLOOR)
-"""Passage from the input chamber to the ring around the seat."""
-OUTPUT: Box = (PV - 74, 508, 590, 602)
-"""Output chamber."""
+INPUT: Box = (96, 424, 314, 600)  # input chamber
+NECK: Box = (313, 424, PV - PISTON, FLOOR)  # passage from the input chamber to the ring around the seat
+OUTPUT: Box = (PV - 74, 508, 590, 602)  # output chamber
 DUCT: tuple[Box, ...] = ((249, 360, 306, 374), (292, 196, 306, 374), (292, 196, 349, 210))
 """From the magnet valve's chamber to the control chamber."""
 

@@ -34,14 +34,10 @@ from epv_env.render.canvas import (
 )
 from epv_env.render.geometry import Snapshot
 
-AMBIENT_BAR = 1.0
-"""Ambient pressure [bar absolute]."""
-CHOKED = 0.47
-"""Pressure drop over upstream pressure from which the flow no longer grows [-]."""
-WIDEST_G_PER_S = 5.0
-"""Consumption from which its arrow no longer grows [g/s]."""
-LEAST = 0.04
-"""Strength of flow below which no arrow is drawn [-]."""
+AMBIENT_BAR = 1.0  # ambient pressure [bar absolute]
+CHOKED = 0.47  # pressure drop over upstream pressure from which the flow no longer grows [-]
+WIDEST_G_PER_S = 5.0  # consumption from which its arrow no longer grows [g/s]
+LEAST = 0.04  # strength of flow below which no arrow is drawn [-]
 
 
 class Flows(NamedTuple):
@@ -170,8 +166,7 @@ def _arrow(
         canvas.arrow(points if signed > 0 else points[::-1], colour, width, INK)
 
 
-FULL_GLOW_A = 0.45
-"""Coil current at which the coil is drawn brightest [A]."""
+FULL_GLOW_A = 0.45  # coil current at which the coil is drawn brightest [A]
 
 Profile = Sequence[tuple[float, float]]
 """Half widths and heights along the outline of a part that turns around an axis [px]."""
@@ -266,8 +261,7 @@ def _spring(
         canvas.stroke(front, STEEL, width - 1.0)
 
 
-SCALE_BAR = (150.0, 660.0, 536.0, 672.0)
-"""Box of the colour scale [px]."""
+SCALE_BAR = (150.0, 660.0, 536.0, 672.0)  # box of the colour scale [px]
 
 
 def draw_section_background(canvas: Canvas) -> None:

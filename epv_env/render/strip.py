@@ -28,13 +28,10 @@ from epv_env.render.canvas import (
 )
 from epv_env.render.geometry import Snapshot
 
-SPACING = 19.0
-"""Least distance between two labels at the ends of lines [px]."""
-MOST_TICKS = 7
-"""Largest number of numbered grid lines."""
+SPACING = 19.0  # least distance between two labels at the ends of lines [px]
+MOST_TICKS = 7  # largest number of numbered grid lines
 
-Array = NDArray[np.float64]
-"""An array of floats."""
+Array = NDArray[np.float64]  # an array of floats
 
 
 class Label(NamedTuple):
@@ -123,14 +120,10 @@ def _next_of(multiples: tuple[int, ...], value: float) -> float:
     return next(float(m * decade) for m in multiples if m * decade >= value * (1 - 1e-9))
 
 
-LEFT, RIGHT = 730.0, 1150.0
-"""Ends of the time axis [px]."""
-PRESSURES: Box = (LEFT, 112, RIGHT, 428)
-"""Panel of the pressures [px]."""
-COMMAND: Box = (LEFT, 474, RIGHT, 512)
-"""Panel of the coil's command [px]."""
-CONSUMED: Box = (LEFT, 558, RIGHT, 650)
-"""Panel of the consumption [px]."""
+LEFT, RIGHT = 730.0, 1150.0  # ends of the time axis [px]
+PRESSURES: Box = (LEFT, 112, RIGHT, 428)  # panel of the pressures [px]
+COMMAND: Box = (LEFT, 474, RIGHT, 512)  # panel of the coil's command [px]
+CONSUMED: Box = (LEFT, 558, RIGHT, 650)  # panel of the consumption [px]
 
 
 class Samples(NamedTuple):

@@ -13,12 +13,9 @@ from epv_env.render.strip import Strip
 if TYPE_CHECKING:
     import pygame
 
-WIDTH, HEIGHT = 1280, 720
-"""Size of the frame [px]."""
-SECTION_CARD = (20, 68, 664, 704)
-"""Card behind the section of the valve [px]."""
-STRIP_CARD = (680, 68, 1260, 704)
-"""Card behind the chart [px]."""
+WIDTH, HEIGHT = 1280, 720  # size of the frame [px]
+SECTION_CARD = (20, 68, 664, 704)  # card behind the section of the valve [px]
+STRIP_CARD = (680, 68, 1260, 704)  # card behind the chart [px]
 MOVING_BOXES: tuple[Box, ...] = (
     (16, 16, 700, 52),
     (896, 16, 1264, 52),
@@ -26,8 +23,7 @@ MOVING_BOXES: tuple[Box, ...] = (
     (690, 102, 1258, 676),
 )
 """The parts of the frame that change [px]."""
-MOVING = 0.01
-"""Stroke fraction from which the piston counts as off its seat [-]."""
+MOVING = 0.01  # stroke fraction from which the piston counts as off its seat [-]
 
 
 def phase(snapshot: Snapshot) -> tuple[str, str]:

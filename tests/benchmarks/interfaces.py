@@ -1,28 +1,31 @@
-"""The interfaces at which control periods are counted, from the kernel to the learning, each a workload.
-
-    python -P tests/benchmarks/interfaces.py
-
-reads names of INTERFACES line by line and answers each with the rate of one run, as JSON. So another
-process can measure two commits by turns (tests/benchmarks/paired.py): this file uses nothing of the
-project that earlier commits lack.
-"""
+"""The workloads of `make bench`: each interface, from the kernel to the learning, counts its periods."""
 
 import json
+import subprocess
 import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
+from pathlib import Path
 
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
 import epv_env  # noqa: F401 - registers the ids
+from epv_env.plant.equations import Inputs
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.simulate import energised
+from epv_env.plant.valves import Valves
 
 IDENTIFIER = "EPValve-v0"
+PERIOD = 5e-3
+"""Time between decisions [s]."""
 SWITCHING = 0.15
 """Probability that a valve is switched at a decision."""
+P1, P2, U_ON = 12.0e5, 7.0e5, 24.0
+"""Supply and circuit pressure at the start [Pa], voltage of the energised coil [V]."""
 
 Run = Callable[[], int]
 """Runs a workload once and returns the control periods that it simulated."""
@@ -32,190 +35,167 @@ Run = Callable[[], int]
 class Interface:
     """One place at which control periods are counted."""
 
-    name: str
-    """Name in tables."""
     begin: Callable[[float], Run]
     """Makes the workload; its argument is a share of the usual length [1]."""
     kernel: str | None = None
-    """Name of the interface with the kernel's rate for as many valves and threads."""
-    one_thread: bool = False
-    """Whether it runs in one thread: its CPU time is counted, which other processes hardly disturb."""
+    """Name of the interface with the kernel's rate for as many valves."""
 
 
-def actions(n: int, periods: int) -> NDArray:
-    """Coils that are switched at random, (periods, n)."""
+def actions(n: int, share: float) -> NDArray:
+    """Coils that are switched at random, (periods, n); fewer periods for more valves."""
+    periods = max(round(share * 150_000 / (n + 500)), 1)
     switched = np.random.default_rng(0).random((periods, n)) < SWITCHING
     return (1 - np.cumsum(switched, axis=0) % 2).astype(np.int64)
 
 
-def _kernel(n: int, threads: int, share: float) -> Run:
+def _kernel(n: int, share: float) -> Run:
     """Many periods in one call of the kernel."""
-    from tests.benchmarks import workloads
-
-    periods = max(round(share * 150_000 / (n + 500)), 1)
-    valves = workloads.energised_valves(n, threads)
-    inputs = workloads.random_switching(n, periods)
+    p = Parameters.calibrated()
+    valves = Valves(n, threads=1)
+    valves.set_parameters(np.arange(n), p)
+    for field, value in zip(valves.state, energised(p, p1=P1, p2=P2, U=U_ON), strict=True):
+        field[:] = value
+    on = actions(n, share)
+    zeros = np.zeros(on.shape)
+    flow = np.random.default_rng(1).uniform(0, 4e-3, (1, n)) + zeros
+    inputs = Inputs(U_ON * on, flow, *[zeros] * 5)
 
     def run() -> int:
-        valves.record(inputs, workloads.PERIOD)
-        return n * periods
+        valves.record(inputs, PERIOD)
+        return on.size
 
     return run
 
 
-def _vector(n: int, threads: int, share: float) -> Run:
+def _vector(n: int, share: float) -> Run:
     """The vector environment, one call a period."""
-    env = gymnasium.make_vec(IDENTIFIER, num_envs=n, threads=threads)
+    env = gymnasium.make_vec(IDENTIFIER, num_envs=n, threads=1)
     env.reset(seed=0)
-    commands = actions(n, max(round(share * 150_000 / (n + 500)), 1))
-
-    def run() -> int:
-        for command in commands:
-            env.step(command)
-        return commands.size
-
-    return run
+    return partial(_stepped, env, actions(n, share))
 
 
-def _single(share: float, **options: bool) -> Run:
+def _single(share: float) -> Run:
     """One environment, its reset included."""
-    env = gymnasium.make(IDENTIFIER, **options)  # type: ignore[arg-type]
-    commands = actions(1, max(round(share * 1900), 1))[:, 0].tolist()
+    env = gymnasium.make(IDENTIFIER)
+    commands = actions(1, share)[:, 0].tolist()
 
     def run() -> int:
         env.reset(seed=0)
-        for command in commands:
-            env.step(command)
-        return len(commands)
+        return _stepped(env, commands)
 
     return run
 
 
-def _adapted(n: int, share: float) -> Run:
-    """stable-baselines3's vector environment, actions given."""
-    from epv_env.sb3 import make_sb3_env
-
-    env = make_sb3_env(IDENTIFIER, n)
-    env.reset()
-    commands = actions(n, max(round(share * 150_000 / (n + 500)), 1))
-
-    def run() -> int:
-        for command in commands:
-            env.step(command)
-        return commands.size
-
-    return run
-
-
-@cache
-def _model():
-    """PPO with the default hyperparameters on drawn plants, as `make train` has it."""
-    import torch
-
-    from epv_env.plant.plantfile import load_plant
-    from epv_env.reward import RewardWeights
-    from training.learners.hyperparameters import Hyperparameters
-    from training.learners.ppo import make_model
-    from training.learners.training_env import make_training_env
-
-    torch.set_num_threads(1)
-    h = Hyperparameters()
-    env = make_training_env(
-        h, plant=load_plant(None), scenario="mixed", parameters="confidence", seed=0,
-        weights=RewardWeights(),
-    )  # fmt: skip
-    return make_model(h, env, seed=0, device="cpu")
-
-
-def _collecting(share: float) -> Run:
-    """One rollout of PPO: environment, policy and buffer."""
-    model = _model()
-    _, callback = model._setup_learn(1, callback=None)
-    steps = max(round(share * model.n_steps), 1)
-    env = model.env
-    assert env is not None
-
-    def run() -> int:
-        model.collect_rollouts(env, callback, model.rollout_buffer, n_rollout_steps=steps)
-        return steps * model.n_envs
-
-    return run
+def _stepped(env: gymnasium.Env | gymnasium.vector.VectorEnv, commands) -> int:
+    """The control periods of an environment that is stepped through commands."""
+    for command in commands:
+        env.step(command)
+    return np.size(commands)
 
 
 def _learning(share: float) -> Run:
-    """One rollout and the update that follows it."""
-    model = _model()
-    periods = model.n_steps * model.n_envs
+    """Rollouts and updates of stable-baselines3's own PPO with 256 valves."""
+    import torch
+    from stable_baselines3 import PPO
+
+    from epv_env.sb3 import make_sb3_env
+
+    torch.set_num_threads(1)
+    env = make_sb3_env(IDENTIFIER, 256)
+    model = PPO("MlpPolicy", env, n_steps=max(round(128 * share), 2), batch_size=512, device="cpu")
 
     def run() -> int:
-        model.learn(periods, reset_num_timesteps=False)
-        return periods
+        before = model.num_timesteps
+        model.learn(model.n_steps * 256, reset_num_timesteps=False)
+        return model.num_timesteps - before
 
     return run
 
 
-def _batches() -> list[Interface]:
-    found = []
-    for n in (256, 1024):
-        for threads in (1, 2):
-            what = f"{n} valves, {threads} thread{'s' * (threads > 1)}"
-            kernel = f"kernel, {what}"
-            found += [
-                Interface(name=kernel, begin=partial(_kernel, n, threads), one_thread=threads == 1),
-                Interface(
-                    name=f"vector environment, {what}",
-                    begin=partial(_vector, n, threads),
-                    kernel=kernel,
-                    one_thread=threads == 1,
-                ),
-            ]
-    return found
-
-
-_ONE_VALVE = "kernel, 1 valve, 1 thread"
-
 INTERFACES = {
-    interface.name: interface
-    for interface in (
-        *_batches(),
-        Interface(name=_ONE_VALVE, begin=partial(_kernel, 1, 1), one_thread=True),
-        Interface(name="single environment", begin=_single, kernel=_ONE_VALVE, one_thread=True),
-        Interface(
-            name="single environment, disable_env_checker=True",
-            begin=partial(_single, disable_env_checker=True),
-            kernel=_ONE_VALVE,
-            one_thread=True,
-        ),
-        Interface(name="stable-baselines3 VecEnv, 256 valves", begin=partial(_adapted, 256)),
-        Interface(name="PPO as in make train, collecting", begin=_collecting),
-        Interface(name="PPO as in make train, learning included", begin=_learning),
-    )
+    "kernel, 1 valve": Interface(begin=partial(_kernel, 1)),
+    "kernel, 256 valves": Interface(begin=partial(_kernel, 256)),
+    "kernel, 1024 valves": Interface(begin=partial(_kernel, 1024)),
+    "single environment": Interface(begin=_single, kernel="kernel, 1 valve"),
+    "vector environment, 256 valves": Interface(
+        begin=partial(_vector, 256), kernel="kernel, 256 valves"
+    ),
+    "vector environment, 1024 valves": Interface(
+        begin=partial(_vector, 1024), kernel="kernel, 1024 valves"
+    ),
+    "stable-baselines3's PPO, 256 valves, learning included": Interface(begin=_learning),
 }
-"""All interfaces by name; threads are those of the plant, PyTorch has one."""
+"""All interfaces by name; plant and PyTorch have one thread."""
 
 
 def rate(name: str, run: Run) -> float:
-    """Control periods per second in one run of an interface: of CPU time if it has one thread."""
-    clock = time.process_time if INTERFACES[name].one_thread else time.perf_counter
-    start = clock()
+    """Control periods per CPU second in one run of an interface."""
+    start = time.process_time()
     periods = run()
-    return periods / (clock() - start)
+    return periods / (time.process_time() - start)
 
 
-def main() -> None:
-    """Answer names on the standard input with rates, or with what this commit lacks."""
-    runs: dict[str, Run] = {}
-    for line in sys.stdin:
-        name, share = json.loads(line)
-        try:
-            if name not in runs:
-                runs[name] = INTERFACES[name].begin(share)
-                runs[name]()  # compiles and warms up
-            answer = {"rate": rate(name, runs[name])}
-        except (ImportError, AttributeError, TypeError) as error:
-            answer = {"lacks": str(error)}
-        print(json.dumps(answer), flush=True)
+def one_valve(duration: float) -> dict[str, Callable[[], tuple[float, float]]]:
+    """Simulators of one valve, by name: each gives seconds per CPU second and p2's error [Pa]."""
+    from identification.bench.hybrid_automaton import piecewise_schedule
+    from identification.bench.reference_simulation import simulate_reference
+    from tests.reference.schedule import plant_states
+
+    p = Parameters.calibrated()
+    times = np.arange(round(duration / PERIOD) + 1) * PERIOD
+    on = np.cumsum(np.random.default_rng(0).random(len(times) - 1) < SWITCHING) % 2 == 0
+    schedule = piecewise_schedule(
+        p, energised(p, p1=P1, p2=P2, U=U_ON), times, U=U_ON * on, sigma_S=np.full(len(on), 2e-3)
+    )
+    end = [schedule.duration]
+    true = simulate_reference(schedule, end, rtol=1e-11).state.p2[0]
+
+    def timed(simulated: Callable[[], float]) -> tuple[float, float]:
+        start = time.process_time()
+        p2 = simulated()
+        return duration / (time.process_time() - start), abs(p2 - true)
+
+    return {
+        "this plant, a batch of one": lambda: timed(lambda: plant_states(schedule, end).p2[0]),
+        "SciPy LSODA with events, compiled right-hand side, 1e-6": lambda: timed(
+            lambda: simulate_reference(schedule, end, rtol=1e-6).state.p2[0]
+        ),
+    }
 
 
-if __name__ == "__main__":
-    main()
+STARTUP = {
+    "import epv_env": "import epv_env",
+    "import, one valve, first 5 ms simulated": (
+        "from epv_env.plant.valves import Valves; Valves(1).advance(5e-3)"
+    ),
+}
+"""What is timed in a new interpreter, without the interpreter's own start."""
+
+
+def startup_seconds(repetitions: int) -> dict[str, list[float]]:
+    """Times of STARTUP [s]; one process before them fills the caches and is not counted."""
+    found = {}
+    for name, code in STARTUP.items():
+        timed = f"import time; start = time.perf_counter(); {code}; print(time.perf_counter() - start)"
+        command = [sys.executable, "-c", timed]
+        printed = [subprocess.check_output(command, text=True) for _ in range(repetitions + 1)]
+        found[name] = [float(text) for text in printed[1:]]
+    return found
+
+
+LAUNCHER = """
+import json, resource, subprocess, sys, time
+start = time.perf_counter()
+subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=True)
+seconds = time.perf_counter() - start
+print(json.dumps([seconds, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024]))
+"""
+"""Starts a command. A process inherits the peak memory of its parent, so the parent is small."""
+
+
+def used_by(arguments: tuple[str, ...], folder: Path) -> tuple[float, float]:
+    """Wall time [s] and peak memory [MiB] of `python -m identification ARGUMENTS` run in a folder."""
+    command = [sys.executable, "-m", "identification", *arguments]
+    printed = subprocess.check_output([sys.executable, "-c", LAUNCHER, *command], cwd=folder, text=True)
+    seconds, peak = json.loads(printed)
+    return seconds, peak

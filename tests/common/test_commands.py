@@ -1,5 +1,8 @@
 """A command is a module: it is found, listed, parsed and run alone; wrong input is one sentence."""
 
+import os
+import signal
+import subprocess
 import sys
 
 import pytest
@@ -79,3 +82,28 @@ def test_a_missing_package_is_named_with_its_extra(package, tmp_path, capsys):
     )
     assert main([package], program="epv", arguments=["needs"]) == 2
     assert "epv needs: this needs the package torch" in capsys.readouterr().err
+
+
+HOLD = (
+    "import sys, time; from pathlib import Path; from epv_env.common.results_folder import only_writer\n"
+)
+HOLD += "with only_writer(Path(sys.argv[1])): print('held', flush=True); time.sleep(60)"
+
+
+def test_a_second_process_is_refused_until_the_first_is_dead(tmp_path):
+    folder = tmp_path / "out"
+    with subprocess.Popen([sys.executable, "-c", HOLD, str(folder)], stdout=subprocess.PIPE) as first:
+        assert first.stdout is not None
+        first.stdout.readline()
+        with pytest.raises(ValueError, match="another process writes into"), only_writer(folder):
+            pass
+        os.kill(first.pid, signal.SIGKILL)
+        first.wait()
+    with only_writer(folder):
+        pass
+
+
+def test_nothing_stays_of_a_start_that_failed(tmp_path):
+    with pytest.raises(OSError, match="no"), only_writer(tmp_path / "a" / "b"):
+        raise OSError("no")
+    assert not list(tmp_path.iterdir())

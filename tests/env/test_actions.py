@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from epv_env.actions import PWM, OnOff
+from epv_env.actions import PWM
 from tests.env.rollouts import native, run
 
 QUIET = {"scenario": "none", "supply": 9.0, "target_bar": 7.0, "p2_bar": 7.0}
@@ -25,12 +25,6 @@ def state(env):
     return np.array(env.task.valves.state)
 
 
-def test_on_is_the_whole_period():
-    on_time, fraction = OnOff(5e-3).decode(np.array([0, 1]))
-    np.testing.assert_array_equal(on_time, [0.0, 5e-3])
-    np.testing.assert_array_equal(fraction, [0.0, 1.0])
-
-
 def test_duty_is_realised_in_half_milliseconds():
     asked = np.random.default_rng(0).uniform(-1, 1, (1000, 1)).astype(np.float32)
     on_time, duty = PWM(20e-3).decode(asked)
@@ -45,12 +39,6 @@ def test_duty_s_ends_are_exactly_off_and_on():
     on_time, duty = PWM(20e-3).decode(np.array([[-1], [1], [-7], [7]]))
     np.testing.assert_array_equal(on_time, [0, 20e-3, 0, 20e-3])
     np.testing.assert_array_equal(duty, [0, 1, 0, 1])
-
-
-@pytest.mark.parametrize("period", [0.5e-3, 0.7e-3, 5e-3, 20e-3, 33.3e-3])
-def test_any_pwm_period_can_be_all_on(period):
-    on_time, _ = PWM(period).decode(np.array([[1.0], [-1.0]]))
-    np.testing.assert_array_equal(on_time, [period, 0.0])
 
 
 @pytest.mark.parametrize("on", [0, 1])
@@ -76,16 +64,6 @@ def test_half_duty_equals_on_and_off_at_twice_the_rate():
         np.testing.assert_array_equal(state(pwm), state(on_off))
 
 
-def test_equal_mean_voltage_opens_the_valve_alike():
-    """Far above the valve's bandwidth, only the mean voltage acts: the current settles at U duty / R."""
-    env = native("EPValvePWM-v0", 1, **QUIET, control_period=1e-3)
-    for duty in (0.0, 0.5, 1.0):
-        env.reset(seed=0)
-        for _ in range(400):
-            env.step(duties(duty)[0])
-        assert env.task.valves.state.I[0] == pytest.approx(duty * 24.0 / 42.15999, abs=0.06)
-
-
 def test_switchings_of_on_off_are_changes_of_the_action():
     """An episode begins with the coil on."""
     commands = np.array([1, 1, 0, 0, 1, 0])[:, None]
@@ -95,10 +73,3 @@ def test_switchings_of_on_off_are_changes_of_the_action():
 def test_a_pulse_in_every_period_switches_twice_and_staying_not_at_all():
     commands = duties(1, 0.5, 0.5, 0.5, 0, 0, 1, 1, 0.5, 0)
     assert switchings("EPValvePWM-v0", commands) == [0, 1, 2, 2, 0, 0, 1, 0, 1, 0]
-
-
-def test_a_new_episode_begins_with_the_coil_on():
-    env = native("EPValve-v0", 1)
-    for _ in range(2):
-        env.reset(seed=0)
-        assert env.step(np.array([0]))[-1]["switchings"][0] == 1

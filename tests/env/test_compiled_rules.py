@@ -66,12 +66,3 @@ def test_consumption_is_that_of_the_profiles(running):
     expected = env.task.consumption.mean_flow(env.task.time(), env.task.period)
     result = env.task.step(*env.action.decode(action))
     np.testing.assert_array_equal(result.consumption, expected)
-
-
-@pytest.mark.parametrize("identifier", IDS)
-@pytest.mark.parametrize("given", [1, 3, 5])
-def test_each_valve_needs_an_action_of_its_own(identifier, given):
-    env = native(identifier, 4)
-    env.reset(seed=0)
-    with pytest.raises(ValueError, match=f"got {given} actions for 4 episodes: give one each"):
-        env.step(actions(identifier, given, 1)[0])

@@ -34,8 +34,6 @@ def test_the_layout_names_measured_quantities_only():
     ("identifier", "supply", "target"),
     [
         ("EPValve-v0", (2.0, 16.0), 2.0),
-        ("EPValve-v0", 16.0, (2.0, 16.0)),
-        ("EPValve-v0", None, (2.0, 10.0)),
         ("EPValvePWM-v0", 16.0, (2.0, 16.0)),
     ],
     ids=str,
@@ -52,17 +50,6 @@ def test_observations_stay_in_their_space_under_extremes(identifier, supply, tar
     assert seen.dtype == np.float32
     assert np.all((seen >= space.low) & (seen <= space.high))
     assert np.all(np.isfinite([step.reward for step in found.steps]))
-
-
-def test_a_plant_at_the_corner_of_its_domains_is_integrated():
-    corner = {
-        "cMV": 1000, "dMB": 0.006, "dMVin": 0.001, "dMVexh": 0.001, "mMV": 0.001, "N": 1000,
-        "R": 35, "xMV0": 0.001, "xMVmax": 0.001, "kMV": 0, "RML": 1e7,
-    }  # fmt: skip
-    commands = np.array([1, 1, 1, 0, 0, 0, 0, 0, 0, 1])[:, None]
-    options = {"supply": 8.0, "target_bar": 7.0, "parameters": corner}
-    found = run(native("EPValve-v0", 1, **options), commands)
-    assert not np.any([step.terminated for step in found.steps])
 
 
 def test_plants_at_random_corners_of_all_domains_are_integrated():
@@ -90,8 +77,7 @@ def test_a_valve_that_cannot_be_integrated_ends_its_episode_with_finite_figures(
     assert all(np.all(np.isfinite(values)) for values in infos.values())
 
 
-@pytest.mark.parametrize("factor", [1.0, 4.0])
-@pytest.mark.parametrize("name", MEASURED)
+@pytest.mark.parametrize(("name", "factor"), [("p1", 1.0), ("p3", 4.0), ("I", 1.0)])
 def test_noise_is_table_3_s(name, factor):
     """Noise before rounding: the variances of both add up."""
     sensor = SENSORS[name]
@@ -102,12 +88,6 @@ def test_noise_is_table_3_s(name, factor):
     assert np.mean(seen) == pytest.approx(
         np.mean(readings(name, sensor_noise=False)), abs=0.6 * sensor.resolution
     )
-
-
-def test_noise_of_the_circuit_pressure_is_table_3_s():
-    sensor = SENSORS["p2"]
-    expected = np.hypot(sensor.noise, sensor.resolution / np.sqrt(12))
-    assert np.std(readings("p2_error")) == pytest.approx(expected, rel=0.05)
 
 
 def test_noise_is_white_and_of_its_own_in_every_channel_and_environment():
@@ -169,7 +149,7 @@ def test_consumption_that_is_to_come_is_not_observed():
         np.testing.assert_array_equal(a.observation, b.observation)
 
 
-@pytest.mark.parametrize("name", INDEX)
+@pytest.mark.parametrize("name", ["p2_error", "p1", "action"])
 def test_decode_undoes_encode(name):
     row = LAYOUT[INDEX[name]]
     values = row.centre + row.scale * np.linspace(-row.limit, row.limit, 101)
@@ -181,12 +161,6 @@ def test_decode_undoes_encode(name):
     )
     others = np.delete(observations, INDEX[name], axis=1)
     np.testing.assert_array_equal(others, 0.0)
-
-
-def test_encode_clips_at_the_space():
-    far = {name: np.array([-1e9, 1e9]) for name in INDEX}
-    space = observation_space()
-    np.testing.assert_array_equal(encode(far), [space.low, space.high])
 
 
 def test_the_contract_survives_json():

@@ -6,10 +6,9 @@ import gymnasium
 import numpy as np
 import pytest
 
-from epv_env.plant.consumption import SCENARIOS
-from epv_env.plant.parameters import Parameters, table
+from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant, save_plant
-from epv_env.plant.region import REGIONS, Region
+from epv_env.plant.region import Region
 from epv_env.plant.supply import Supply
 from tests.env.rollouts import IDS, actions, assert_same, native, run
 
@@ -45,7 +44,7 @@ def episodes(env, n=200, options=None):
 
 
 @pytest.mark.parametrize("identifier", IDS)
-@pytest.mark.parametrize("options", CHOICES, ids=str)
+@pytest.mark.parametrize("options", CHOICES[::2], ids=str)
 def test_an_option_means_the_same_at_construction_and_at_reset(identifier, options):
     commands = actions(identifier, 2, 30)
     built = run(native(identifier, 2, **options), commands)
@@ -54,7 +53,7 @@ def test_an_option_means_the_same_at_construction_and_at_reset(identifier, optio
         assert_same(run(native(identifier, 2), commands), built)
 
 
-@pytest.mark.parametrize("options", CHOICES, ids=str)
+@pytest.mark.parametrize("options", CHOICES[1::2], ids=str)
 def test_reset_options_last_one_episode(options):
     env, plain = valve(), valve()
     env.reset(seed=0, options=options)
@@ -76,34 +75,11 @@ def test_an_autoreset_forgets_the_options(mode):
     np.testing.assert_array_equal(seen[-1], usual[-1])
 
 
-def test_exact_parameters_arrive_at_the_plant():
-    env = valve(parameters={"alphaMV": 0.61, "RML": 2e7})
-    for p in episodes(env, 3):
-        assert (p["alphaMV"], p["RML"]) == (0.61, 2e7)
-        assert p["alphaPV"] == Parameters.calibrated()["alphaPV"]
-
-
 def test_a_range_is_drawn_from_for_each_episode():
     drawn = [p["alphaMV"] for p in episodes(valve(parameters={"alphaMV": (0.6, 0.7)}))]
     assert 0.6 <= min(drawn) < 0.61
     assert 0.69 < max(drawn) <= 0.7
     assert len(set(drawn)) == len(drawn)
-
-
-@pytest.mark.parametrize("name", REGIONS)
-def test_a_named_region_is_drawn_from(name):
-    env = valve(parameters=name)
-    region = env.settings.region
-    drawn = list(episodes(env, 50))
-    for symbol in table():
-        low, high = region.boxes.get(symbol, (env.plant.parameters[symbol],) * 2)
-        assert all(low <= p[symbol] <= high for p in drawn)
-    assert bool(region.boxes) == (name != "exact")
-
-
-def test_a_region_of_one_s_own_is_drawn_from():
-    region = Region(centre=Parameters.nominal(), boxes={"kPV": (1.0, 2.0)})
-    assert all(1.0 <= p["kPV"] <= 2.0 for p in episodes(valve(parameters=region), 20))
 
 
 def test_a_plant_file_is_the_centre_and_its_region_is_confidence(tmp_path):
@@ -116,25 +92,6 @@ def test_a_plant_file_is_the_centre_and_its_region_is_confidence(tmp_path):
     assert all(40.0 <= p["R"] <= 41.0 and p["alphaMV"] == 0.8 for p in drawn)
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
-def test_a_scenario_draws_within_its_flows(name):
-    env = native("EPValve-v0", 8, scenario=name, control_period=50e-3)
-    found = run(env, np.zeros((100, 8), dtype=int))
-    flow = np.array([step.infos["consumption_g_per_s"] for step in found.steps])
-    scenario = SCENARIOS[name]
-    assert np.all(flow >= scenario.leak[0] - 1e-12)
-    assert np.all(flow <= scenario.leak[1] + scenario.flow[1] + 1e-12)
-    assert (np.max(flow) > 0) == (name != "none")
-
-
-def test_a_constant_supply_holds():
-    env = valve(supply=9.5)
-    env.reset(seed=0)
-    for _ in range(50):
-        env.step(0)
-    assert env.snapshot().p1_bar == 9.5
-
-
 def test_a_recorded_supply_is_followed():
     env = valve(supply=RECORDED, target_bar=7.0)
     env.reset(seed=0)
@@ -142,24 +99,6 @@ def test_a_recorded_supply_is_followed():
         env.step(k % 3 // 2)
         expected = np.interp(5e-3 * k, [0.0, 0.1, 0.3], [9.0, 9.5, 8.0])
         assert env.snapshot().p1_bar == pytest.approx(expected, abs=1e-9)
-
-
-def test_reservoirs_sag_when_air_is_drawn():
-    env = valve(p2_bar=6.0, target_bar=9.0)
-    env.reset(seed=0)
-    first = env.snapshot().p1_bar
-    assert 10.5 <= first <= 12.5
-    for _ in range(50):
-        env.step(0)
-    assert env.snapshot().p1_bar < first - 0.01
-
-
-def test_pressures_start_where_they_are_told():
-    env = valve()
-    env.reset(seed=0, options={"target_bar": 7.5, "p2_bar": 5.5, "p3_bar": 4.5, "supply": 11.0})
-    start = env.snapshot()
-    found = (start.target_bar, start.p2_bar, start.p3_bar, start.p1_bar)
-    assert found == pytest.approx((7.5, 5.5, 4.5, 11.0), rel=1e-12)
 
 
 def test_an_episode_begins_energised_and_not_above_its_target():
@@ -212,26 +151,3 @@ def test_options_of_a_masked_reset_reach_the_masked_alone():
     after, _ = env.reset(seed=0, options={"reset_mask": mask, "target_bar": 5.0})
     assert env.task.target[1] == 5.0
     np.testing.assert_array_equal(after[~mask], before[~mask])
-
-
-def test_the_caller_s_options_are_left_alone():
-    options = {"reset_mask": np.array([True, True]), "target_bar": 7.0}
-    native("EPValve-v0", 2).reset(options=options)
-    assert set(options) == {"reset_mask", "target_bar"}
-
-
-@pytest.mark.parametrize("identifier", IDS)
-def test_a_control_period_can_be_chosen(identifier):
-    env = native(identifier, 1, control_period=8e-3)
-    env.reset(seed=0)
-    for command in actions(identifier, 1, 5):
-        env.step(command)
-    assert env.task.time()[0] == pytest.approx(40e-3)
-
-
-def test_the_supply_voltage_can_be_chosen():
-    env = valve(supply_voltage=20.0, scenario="none")
-    env.reset(seed=0)
-    env.step(1)
-    current = env.snapshot().I_A
-    assert current == pytest.approx(20.0 / Parameters.calibrated()["R"])

@@ -39,11 +39,6 @@ def test_seeds_and_episodes_differ(identifier):
     assert len(np.unique(np.concatenate(starts), axis=0)) == 8
 
 
-def test_without_a_seed_two_environments_differ(identifier):
-    starts = [native(identifier, 1).reset()[0] for _ in range(2)]
-    assert np.any(starts[0] != starts[1])
-
-
 @pytest.mark.parametrize("parameters", ["domain", {"alphaMV": 0.6, "V2": (5e-4, 2e-3)}], ids=str)
 def test_other_parameters_meet_the_same_consumption(identifier, parameters):
     found = consumption(identifier, parameters=parameters, scenario="steps")
@@ -61,11 +56,6 @@ def test_other_parameters_meet_the_same_pressures(identifier):
         starts.append([env.task.target.copy(), state.p1.copy(), state.p2.copy(), state.p3.copy()])
     np.testing.assert_array_equal(starts[1], starts[0])
     np.testing.assert_array_equal(starts[2], starts[0])
-
-
-def test_another_supply_and_target_meet_the_same_consumption(identifier):
-    found = consumption(identifier, supply=9.0, target_bar=7.0)
-    np.testing.assert_array_equal(found, consumption(identifier))
 
 
 def test_other_parameters_meet_the_same_noise(identifier):

@@ -5,7 +5,6 @@ import sys
 from typing import Any
 
 import gymnasium
-import numpy as np
 import pytest
 
 import epv_env
@@ -61,30 +60,3 @@ for name in ("EPValve-v0", "EPValvePWM-v0"):
     print(envs.step(envs.action_space.sample())[0].shape)
 """
     assert run_abroad(code, tmp_path) == "(2, 13)\n(2, 13)\n"
-
-
-def test_ids_work_from_a_foreign_folder_after_a_double_import(tmp_path):
-    code = """
-import importlib, gymnasium, epv_env
-importlib.reload(epv_env)
-print(gymnasium.make("EPValve-v0").reset(seed=0)[0].shape)
-"""
-    assert run_abroad(code, tmp_path) == "(13,)\n"
-
-
-def test_a_worker_process_makes_the_environment_from_its_id():
-    """AsyncVectorEnv is Gymnasium's own way to several processes."""
-    env = gymnasium.make_vec("epv_env:EPValve-v0", num_envs=2, vectorization_mode="async")
-    here = gymnasium.make_vec("EPValve-v0", num_envs=2)
-    try:
-        np.testing.assert_array_equal(env.reset(seed=3)[0], here.reset(seed=3)[0])
-        actions = np.array([0, 1])
-        np.testing.assert_array_equal(env.step(actions)[0], here.step(actions)[0])
-    finally:
-        env.close()
-
-
-def test_the_classes_need_no_gymnasium_wrapper():
-    bare, wrapped = EPValveEnv(), gymnasium.make("EPValve-v0")
-    np.testing.assert_array_equal(bare.reset(seed=4)[0], wrapped.reset(seed=4)[0])
-    np.testing.assert_array_equal(bare.step(0)[0], wrapped.step(0)[0])

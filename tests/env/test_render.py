@@ -11,8 +11,7 @@ import pytest
 from gymnasium.wrappers import RecordVideo
 from numpy.typing import NDArray
 
-from epv_env.render import Renderer, Snapshot, canvas, geometry, section, strip, window
-from epv_env.render.strip import SPACING, Label, round_up, run_ends, spread, time_step
+from epv_env.render import Renderer, Snapshot, canvas, geometry, strip, window
 
 SHUT = Snapshot(
     time_s=1.0,
@@ -57,20 +56,6 @@ def test_a_frame_is_an_rgb_image() -> None:
     assert image.std() > 20.0
 
 
-def test_the_same_history_gives_the_same_frame() -> None:
-    assert np.array_equal(frame(SHUT), frame(SHUT))
-
-
-def test_frames_do_not_share_memory() -> None:
-    pytest.importorskip("pygame")
-    renderer = Renderer("rgb_array", fps=60)
-    first = renderer.draw(SHUT)
-    assert first is not None
-    kept = first.copy()
-    renderer.draw(replace(OPEN, time_s=1.1))
-    assert np.array_equal(first, kept)
-
-
 def test_nothing_of_the_last_frame_is_left() -> None:
     """A frame depends on its snapshot only, once the history is forgotten."""
     pytest.importorskip("pygame")
@@ -80,13 +65,6 @@ def test_nothing_of_the_last_frame_is_left() -> None:
     image = renderer.draw(SHUT)
     assert image is not None
     assert np.array_equal(image, frame(SHUT))
-
-
-@pytest.mark.parametrize("moved", [{"xPV_fraction": 0.2}, {"xMV_fraction": 0.5}])
-def test_the_section_changes_when_a_part_moves(moved: dict[str, float]) -> None:
-    left, top, right, bottom = (int(edge) for edge in geometry.BLOCK)
-    still, other = frame(SHUT), frame(replace(SHUT, **moved))
-    assert np.any(still[top:bottom, left:right] != other[top:bottom, left:right])
 
 
 def test_the_piston_lifts_by_its_stroke() -> None:
@@ -105,17 +83,6 @@ def test_a_chamber_has_the_colour_of_its_pressure() -> None:
         image = frame(snapshot)
         place = int(geometry.CEILING) + 8, int(geometry.PV - geometry.PISTON) + 12
         assert tuple(image[place]) == canvas.pressure_colour(snapshot.p3_bar)
-
-
-def test_the_band_is_as_high_as_twice_the_tolerance() -> None:
-    column = int(strip.RIGHT) - 40
-    heights = []
-    for tolerance_bar in (0.5, 1.0):
-        image = frame(SHUT, tolerance_bar=tolerance_bar)
-        heights.append(pixels_of(image, canvas.BAND, (column, 0, column + 1, window.HEIGHT)))
-    pixels_per_bar = (strip.PRESSURES[3] - strip.PRESSURES[1]) / canvas.SCALE_TOP_BAR
-    # A grid line may lie in the band.
-    assert heights == pytest.approx([pixels_per_bar, 2.0 * pixels_per_bar], abs=4.0)
 
 
 def test_the_badge_tells_whether_p2_is_within_the_tolerance() -> None:
@@ -138,31 +105,6 @@ def test_reset_clears_the_strip_chart() -> None:
     assert counts[2] > counts[1] > 0
 
 
-def test_the_chart_begins_anew_when_time_goes_back() -> None:
-    assert np.array_equal(frame(replace(SHUT, time_s=5.0), replace(OPEN, time_s=0.0)),
-                          frame(replace(OPEN, time_s=0.0)))  # fmt: skip
-
-
-def test_the_chart_forgets_what_has_left_its_window() -> None:
-    chart = strip.Strip(tolerance_bar=0.5, window_s=3.0)
-    for k in range(10_000):
-        chart.append(replace(SHUT, time_s=0.01 * k))
-    assert 300 <= len(chart._history) <= 302
-
-
-def test_extreme_values_are_drawn() -> None:
-    frame(
-        replace(SHUT, p1_bar=0.0, p2_bar=0.0, p3_bar=0.0, xPV_fraction=-0.1, xMV_fraction=1.2),
-        replace(SHUT, p1_bar=25.0, p2_bar=20.0, p3_bar=30.0, time_s=1e4, sigma_S_g_per_s=1e3),
-    )
-
-
-def test_flow_arrows_follow_the_pressure_drop() -> None:
-    assert section.strength(1.0, 12.0, 1.0) == 1.0
-    assert section.strength(1.0, 8.0, 9.0) == -section.strength(1.0, 9.0, 8.0) < 0.0
-    assert section.strength(0.0, 12.0, 1.0) == section.strength(1.0, 9.0, 9.0) == 0.0
-
-
 def test_phases_are_told_apart() -> None:
     names = {
         window.phase(replace(SHUT, coil_on=coil_on, xPV_fraction=xPV, xMV_fraction=xMV))[0]
@@ -172,24 +114,6 @@ def test_phases_are_told_apart() -> None:
         )
     }  # fmt: skip
     assert names == {"Holding", "Closing", "Pulling in", "Venting", "Filling", "Releasing"}
-
-
-def test_labels_keep_their_distance_and_stay_inside() -> None:
-    labels = [Label(y, "", canvas.INK) for y in (100.0, 101.0, 199.0, 200.0)]
-    heights = [label.y for label in spread(labels, 100.0, 200.0)]
-    assert np.all(np.diff(heights) >= SPACING)
-    assert heights[0] >= 100.0
-    assert heights[-1] <= 200.0
-
-
-def test_axes_end_at_round_numbers() -> None:
-    assert [round_up(value) for value in (0.0, 1.1, 4.0, 5.0, 61.0)] == [1.0, 2.0, 4.0, 6.0, 100.0]
-    assert [time_step(window_s) for window_s in (0.5, 3.0, 60.0)] == pytest.approx([0.1, 0.5, 10.0])
-
-
-def test_run_ends_keep_the_staircase() -> None:
-    assert run_ends(np.array([1.0, 1.0, 1.0, 2.0, 2.0])).tolist() == [0, 2, 3, 4]
-    assert run_ends(np.array([1.0])).tolist() == [0]
 
 
 def test_human_mode_shows_a_window() -> None:
@@ -202,17 +126,6 @@ def test_human_mode_shows_a_window() -> None:
     assert not pygame.display.get_init()
 
 
-def test_human_mode_keeps_the_frame_rate() -> None:
-    pygame = pytest.importorskip("pygame")
-    renderer = Renderer("human", fps=20)
-    renderer.draw(SHUT)
-    start = pygame.time.get_ticks()
-    for k in range(4):
-        renderer.draw(replace(SHUT, time_s=2.0 + k))
-    assert pygame.time.get_ticks() - start >= 150
-    renderer.close()
-
-
 def test_drawing_goes_on_without_a_window_that_the_user_shut() -> None:
     pygame = pytest.importorskip("pygame")
     renderer = Renderer("human", fps=1000)
@@ -223,21 +136,6 @@ def test_drawing_goes_on_without_a_window_that_the_user_shut() -> None:
     assert renderer.draw(SHUT) is None
     assert not pygame.display.get_init()
     renderer.close()
-
-
-@pytest.mark.parametrize("mode", ["rgb_array", "human"])
-def test_close_may_be_called_twice_and_before_drawing(mode: str) -> None:
-    pytest.importorskip("pygame")
-    renderer = Renderer(mode, fps=1000)  # pyright: ignore[reportArgumentType]
-    renderer.close()
-    renderer.draw(SHUT)
-    renderer.close()
-    renderer.close()
-
-
-def test_an_unknown_mode_is_refused() -> None:
-    with pytest.raises(ValueError, match="use 'rgb_array' or 'human'"):
-        Renderer("ansi", fps=60)  # pyright: ignore[reportArgumentType]
 
 
 def test_an_episode_is_filmed(tmp_path: Path) -> None:

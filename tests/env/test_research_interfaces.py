@@ -7,9 +7,7 @@ import pytest
 import epv_env  # noqa: F401 - registers the ids
 from epv_env.env import EPValveEnv
 from epv_env.observation import decode
-from epv_env.plant.consumption import Scenario
 from epv_env.result import PARAMETER_NAMES, STATE_NAMES
-from epv_env.reward import RewardWeights
 from epv_env.signals import MovingTarget, RecordedConsumption
 from epv_env.vector_env import EPValveVectorEnv
 
@@ -47,44 +45,6 @@ def test_effects_of_one_episode_replace_the_constructors():
     assert column(env, "G_eddy")[0] == 0.004
 
 
-def test_effects_leave_the_other_draws_as_they_are():
-    plain, other = (
-        single(parameters="confidence"),
-        single(parameters="confidence", effects={"eddy_current": (0.001, 0.004)}),
-    )
-    for env in (plain, other):
-        env.reset(seed=3)
-    for symbol in ("R", "RML", "alphaMV", "alphaPV"):
-        assert column(plain, symbol) == column(other, symbol)
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"effects": {"flood": 1.0}}, "unknown effect 'flood'"),
-        ({"effects": 3}, "give a mapping"),
-        ({"effects": {"piston_friction": 8.0}}, "is sized by"),
-        ({"effects": {"eddy_current": {"R": 45.0}}}, "is sized by G_eddy"),
-        ({"effects": {"eddy_current": -1.0}}, "G_eddy"),
-        ({"effects": {"eddy_current": "much"}}, "G_eddy"),
-        ({"target_bar": lambda t: 20.0}, "keep it between 1 and 16"),
-        ({"target_bar": lambda t: float("nan")}, "keep it between 1 and 16"),
-        ({"weights": {"band": 1.0, "flood": 2.0}}, "unknown reward weight 'flood'"),
-        ({"weights": {"band": -1.0}}, "must be finite and at least 0"),
-        ({"weights": 3.0}, "give a RewardWeights"),
-        ({"band_bar": float("nan")}, "must be finite"),
-        ({"band_bar": 0.0}, "must lie above 0 and at most at 16 bar"),
-        ({"band_bar": 1e9}, "must lie above 0 and at most at 16 bar"),
-        ({"sensor_noise": 1e9}, "must lie in 0 to 1000"),
-        ({"sensor_noise": "1"}, "give a number"),
-        ({"control_period": "0.005"}, "give a number"),
-    ],
-)
-def test_what_makes_no_sense_is_refused(options, words):
-    with pytest.raises(ValueError, match=words):
-        single(**options)
-
-
 @pytest.mark.parametrize("name", ["threads", "max_episode_steps", "num_envs"])
 @pytest.mark.parametrize("value", [0, -1, 1.5, "2", True])
 def test_counts_are_whole_numbers_of_at_least_one(name, value):
@@ -104,13 +64,6 @@ def test_each_sub_environment_may_have_a_length_of_its_own():
     assert ends.sum(axis=0).tolist() == [15, 10, 6]
     with pytest.raises(ValueError, match="lists 2 numbers for 3 environments"):
         gymnasium.make_vec("EPValve-v0", num_envs=3, max_episode_steps=[2, 3])
-
-
-def test_negative_flows_are_refused():
-    with pytest.raises(ValueError, match="consumers draw air"):
-        Scenario(meaning="blowing", flow=(-1.0, 2.0))
-    with pytest.raises(ValueError, match="at 1 s: give flows of at least 0"):
-        RecordedConsumption.from_samples([0.0, 1.0], [1.0, -0.1])
 
 
 @pytest.mark.parametrize(
@@ -145,11 +98,6 @@ def test_a_recorded_consumption_is_drawn_as_it_was_measured():
         part = flow[2000 * k : 2000 * (k + 1) + 1]
         mean = (part[1:] + part[:-1]).mean() / 2
         assert env.step(1)[-1]["consumption_g_per_s"] == pytest.approx(mean, rel=1e-6)
-
-
-def test_weights_may_be_a_mapping():
-    env = single(weights={"switching": 0.1}, band_bar=0.3)
-    assert env.settings.weights == RewardWeights(switching=0.1, band_bar=0.3)
 
 
 def test_vector_and_single_follow_signals_alike():

@@ -68,17 +68,6 @@ def test_a_truncated_episode_tells_its_end():
     assert env.step(on)[3] == [{}, {}]
 
 
-def test_a_terminated_episode_is_not_truncated():
-    env = batch("EPValve-v0", 1, **{**ENDING, "p2_bar": 1.501})
-    env.reset()
-    done, infos = [False], [{}]
-    while not done[0]:
-        _, _, done, infos = env.step(np.array([0]))
-    assert infos[0]["TimeLimit.truncated"] is False
-    assert not infos[0]["is_success"]
-    assert infos[0]["reward_failure"] < 0
-
-
 def test_seeds_are_forwarded():
     env = batch("EPValve-v0", 3)
     assert list(env.seed(7)) == [7, 8, 9]
@@ -89,28 +78,12 @@ def test_seeds_are_forwarded():
     np.testing.assert_array_equal(env.reset(), expected)
 
 
-def test_options_are_forwarded():
-    env = batch("EPValve-v0", 2)
-    env.set_options({"target_bar": 7.0, "scenario": "none"})
-    env.reset()
-    np.testing.assert_array_equal(env.env.task.target, 7.0)
-    env.reset()
-    assert np.all(env.env.task.target != 7.0)
-
-
 def test_options_of_their_own_are_forwarded():
     env = batch("EPValve-v0", 2)
     env.set_options([{"target_bar": 7.0}, {"target_bar": (8.0, 8.1)}])
     env.reset()
     assert env.env.task.target[0] == 7.0
     assert 8.0 <= env.env.task.target[1] <= 8.1
-
-
-def test_options_of_some_leave_the_others_alone():
-    env = batch("EPValve-v0", 2)
-    env.set_options([{"target_bar": 7.0}, {}])
-    env.reset()
-    assert env.env.task.target[0] == 7.0
 
 
 def test_attributes_and_methods_are_reached():
@@ -126,34 +99,10 @@ def test_attributes_and_methods_are_reached():
     assert env.env_is_wrapped(gymnasium.wrappers.TimeLimit) == [False] * 3
 
 
-def test_an_attribute_of_a_part_is_refused():
-    env = batch("EPValve-v0", 3)
-    with pytest.raises(ValueError, match="shared by all sub-environments: leave indices out"):
-        env.set_attr("max_episode_steps", 5, indices=[0])
-
-
 @pytest.mark.parametrize("mode", ["NextStep", "Disabled"])
 def test_another_autoreset_mode_is_refused(mode):
     with pytest.raises(ValueError, match=r'needs autoreset in the same step: .*"SameStep"'):
         SB3VectorEnv(native("EPValve-v0", 2, autoreset_mode=mode))
-
-
-def test_figures_of_every_step_stay_at_hand():
-    env = batch("EPValve-v0", 3)
-    env.reset()
-    env.step(np.zeros(3, dtype=int))
-    np.testing.assert_array_equal(env.last_infos["switchings"], [1, 1, 1])
-
-
-def test_vec_monitor_counts_episodes():
-    env = vec_env.VecMonitor(batch("EPValve-v0", 3, max_episode_steps=10))
-    env.reset()
-    total, infos = np.zeros(3), []
-    for command in actions("EPValve-v0", 3, 10):
-        _, reward, _, infos = env.step(command)
-        total += reward
-    assert [info["episode"]["l"] for info in infos] == [10] * 3
-    np.testing.assert_allclose([info["episode"]["r"] for info in infos], total, atol=1e-4)
 
 
 @pytest.mark.parametrize("identifier", IDS)

@@ -1,9 +1,7 @@
 """The vector environment is n single environments, to the bit, whatever n, threads and autoreset."""
 
-import gymnasium
 import numpy as np
 import pytest
-from gymnasium.utils.env_match import check_environments_match
 from gymnasium.vector import AutoresetMode
 
 from tests.env.rollouts import (
@@ -53,13 +51,6 @@ def test_autoreset_is_that_of_sync_vector_env(identifier, mode):
     assert any(step.terminated.any() and not step.terminated.all() for step in found.steps)
 
 
-def test_reset_options_mean_the_same_as_in_sync_vector_env(identifier):
-    options = {"parameters": {"R": (38.0, 45.0)}, "supply": 9.5, "scenario": "leak"}
-    commands = actions(identifier, 3, 20)
-    found = run(native(identifier, 3), commands, options=options)
-    assert_same(found, run(side_by_side(identifier, 3), commands, options=options))
-
-
 def test_a_long_episode_crosses_every_block_of_noise_alike(identifier):
     commands = actions(identifier, 1, 300)
     found = run(native(identifier, 1, max_episode_steps=None), commands)
@@ -87,11 +78,6 @@ def test_a_companion_with_the_cone_effect_changes_nothing(identifier):
     assert_same(part(found, slice(0, 1)), part(plain, slice(0, 1)))
 
 
-def test_gymnasium_finds_two_single_environments_equal(identifier):
-    pair = [gymnasium.make(identifier, max_episode_steps=30) for _ in range(2)]
-    check_environments_match(*pair, num_steps=70, seed=3)
-
-
 def test_the_comparison_can_fail(identifier):
     """Another seed, another action or another parameter is noticed."""
     commands = actions(identifier, 3, 20)
@@ -106,14 +92,6 @@ def test_the_comparison_can_fail(identifier):
     for other in others:
         with pytest.raises(AssertionError):
             assert_same(other, reference)
-
-
-def test_an_unequal_info_is_noticed(identifier):
-    commands = actions(identifier, 2, 2)
-    found, expected = (run(native(identifier, 2), commands) for _ in range(2))
-    found.steps[1].infos["vented_g"][0] += 1e-12
-    with pytest.raises(AssertionError, match="vented_g"):
-        assert_same(found, expected)
 
 
 def test_what_step_returns_belongs_to_the_caller(identifier):

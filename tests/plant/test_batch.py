@@ -54,7 +54,7 @@ def case(request):
     return valves, u, alone
 
 
-@pytest.mark.parametrize("size", [5, 16, 17, 100])
+@pytest.mark.parametrize("size", [5, 17])
 def test_trajectory_is_the_same_alone_and_in_any_batch(case, size):
     valves, u, alone = case
     np.testing.assert_array_equal(run(valves, u, np.arange(size)), alone[:, :, :size])
@@ -70,11 +70,6 @@ def test_trajectory_is_the_same_with_any_number_of_threads(case):
     valves, u, _ = case
     many = np.tile(np.arange(N), 4)
     np.testing.assert_array_equal(run(valves, u, many, threads=2), run(valves, u, many, threads=1))
-
-
-def test_trajectories_of_different_parameters_differ(case):
-    _, _, alone = case
-    assert len(np.unique(State(*alone).coil_energy[-1])) == N
 
 
 def test_a_valve_that_fails_leaves_its_companions_alone(case):
@@ -101,32 +96,6 @@ def test_advance_and_record_are_the_same():
         valves.advance(PERIOD)
     recorded = run((p, start), u, np.arange(N))
     np.testing.assert_array_equal(np.array(valves.state), recorded[:, -1])
-
-
-def test_splitting_a_period_changes_nothing_that_matters():
-    (p, start), u = fleet(), inputs(40)
-    whole = State(*run((p, start), u, np.arange(N)))
-    valves = Valves(N)
-    valves.set_parameters(np.arange(N), p)
-    for field, value in zip(valves.state, start, strict=True):
-        field[:] = value
-    split = valves.record(Inputs(*(np.repeat(field, 3, axis=0) for field in u)), PERIOD / 3)
-    inelastic = p["eMV"] == 0
-    difference = np.abs(split.p2[2::3] - whole.p2)[:, inelastic]
-    assert np.max(difference) < 50.0  # Pa
-
-
-def test_each_valve_may_have_a_duration_of_its_own():
-    p, start = fleet()
-    valves = Valves(N)
-    valves.set_parameters(np.arange(N), p)
-    for field, value in zip(valves.state, start, strict=True):
-        field[:] = value
-    before = np.array(valves.state)
-    valves.inputs.U[:] = 0.0
-    valves.advance(np.where(np.arange(N) % 2 == 0, 0.01, 0.0))
-    np.testing.assert_array_equal(np.array(valves.state)[:, 1::2], before[:, 1::2])
-    assert np.all(valves.state.air_vented[::2] > 0)
 
 
 def test_extremes_are_those_of_the_trajectory():

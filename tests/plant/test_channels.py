@@ -1,24 +1,26 @@
-"""One record describes a measured channel; what is missing in a record is said in one sentence."""
+"""Measured channels: one record each, sensors of Tables 1 and 3, and what effects make of readings."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
+from itertools import pairwise
 
+import numpy as np
 import pytest
 
 from epv_env.plant.channels import (
     CURRENT,
     MEASURED,
-    MEASURED_CHANNELS,
     P2,
     SENSOR_SYMBOLS,
     SENSORS,
     VOLTAGE,
     ChannelError,
+    readings,
 )
-from epv_env.plant.parameters import table
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.simulate import Trajectory, energised, simulate
+from epv_env.plant.valves import Valves
 from identification.recordings.columns import CHANNEL_OF, REQUIRED_COLUMNS, TIME_COLUMN
-from identification.recordings.recording import CHANNELS, OUTPUTS, UNITS, Recording
-
-each = pytest.mark.parametrize("channel", MEASURED_CHANNELS, ids=lambda channel: channel.name)
+from identification.recordings.recording import CHANNELS, OUTPUTS
 
 
 def test_the_order_of_channels_is_that_of_files_and_of_drawn_noise():
@@ -29,31 +31,6 @@ def test_the_order_of_channels_is_that_of_files_and_of_drawn_noise():
     assert list(SENSORS) == ["p1", "p2", "p3", "I", "U"]
     assert REQUIRED_COLUMNS == (TIME_COLUMN, "I_A", "U_V", "p2_bar", "p3_bar")
     assert list(CHANNEL_OF) == ["I_A", "U_V", "p1_bar", "p1a_bar", "p1b_bar", "p2_bar", "p3_bar"]
-
-
-@each
-def test_a_recording_has_a_field_for_the_channel(channel):
-    names = [field.name for field in fields(Recording)]
-    assert channel.name in names, f"Recording lacks a field for {channel.name}: add it"
-
-
-@each
-def test_the_sensor_s_parameters_have_rows(channel):
-    for symbol in channel.symbols:
-        assert symbol in table(), f"parameter {symbol} of channel {channel.name} has no row: add it"
-
-
-@each
-def test_columns_name_channel_and_unit(channel):
-    for column in channel.columns:
-        assert column.startswith(channel.name)
-        assert column.endswith(f"_{channel.unit}")
-    assert UNITS[channel.name] == (channel.unit, channel.scale)
-
-
-@each
-def test_a_file_keeps_a_hundredth_of_a_step(channel):
-    assert 10.0**-channel.decimals <= channel.sensor.resolution / 100
 
 
 @pytest.mark.parametrize(
@@ -69,3 +46,117 @@ def test_a_file_keeps_a_hundredth_of_a_step(channel):
 def test_an_incomplete_record_is_refused_in_one_sentence(channel, changes, message):
     with pytest.raises(ChannelError, match=message):
         replace(channel, **changes)
+
+
+TABLE_3 = {"p1": 0.0068, "p2": 0.0098, "p3": 0.0075, "I": 0.0008, "U": 0.0122}
+
+each = pytest.mark.parametrize("name", SENSORS)
+
+
+def inside(sensor, n=10_001):
+    """True values over the sensor's range."""
+    return np.linspace(sensor.low, sensor.high, n)
+
+
+@each
+def test_twelve_bits_resolve_the_range(name):
+    sensor = SENSORS[name]
+    readings = np.unique(sensor.measure(inside(sensor, 400_001), np.zeros(400_001)))
+    np.testing.assert_allclose(np.diff(readings), (sensor.high - sensor.low) / 4096, rtol=1e-6)
+    assert len(readings) in (4096, 4097)
+
+
+@each
+def test_a_reading_without_noise_is_the_nearest_step(name):
+    sensor = SENSORS[name]
+    error = sensor.measure(inside(sensor), np.zeros(10_001)) - inside(sensor)
+    assert np.max(np.abs(error)) <= sensor.resolution / 2 * (1 + 1e-9)
+    assert abs(np.mean(error)) < 0.01 * sensor.resolution
+
+
+@each
+def test_readings_saturate_at_the_range_and_its_accuracy(name):
+    sensor = SENSORS[name]
+    far = sensor.measure(np.array([-1e6, 1e6]), np.zeros(2))
+    margin = sensor.accuracy * sensor.high
+    np.testing.assert_array_equal(far, [sensor.low - margin, sensor.high + margin])
+
+
+@each
+def test_noise_has_the_standard_deviation_of_table_3(name):
+    """Rounding adds its own twelfth of a step squared, as long as the noise spans a step."""
+    sensor = SENSORS[name]
+    assert sensor.noise == TABLE_3[name]
+    rng = np.random.default_rng(0)
+    middle = 0.3 * sensor.low + 0.7 * sensor.high
+    found = sensor.measure(
+        middle + sensor.resolution * rng.random(100_000), rng.standard_normal(100_000)
+    )
+    expected = np.sqrt(sensor.noise**2 + sensor.resolution**2 / 6)  # of the dither and of rounding
+    assert np.std(found) == pytest.approx(expected, rel=0.01)
+
+
+CALIBRATED = Parameters.calibrated()
+TRUE = {"p1": "p1", "p2": "p2", "p3": "p3", "I": "I_coil"}
+
+
+def opening(p: Parameters) -> Trajectory:
+    U = np.full(3000, 24.0)
+    U[200:1200] = 0.0
+    return simulate(p, initial=energised(p, p1=12e5, p2=6.8e5, U=24.0), U=U, period=1e-4)
+
+
+def test_sensors_without_effects_read_the_state():
+    run = opening(CALIBRATED)
+    values = readings(run.state, CALIBRATED)
+    assert set(values) == set(MEASURED)
+    for name, field in TRUE.items():
+        np.testing.assert_array_equal(values[name], getattr(run.state, field), err_msg=name)
+
+
+@pytest.mark.parametrize(
+    ("symbol", "size", "name"), [("b_p2", 2e4, "p2"), ("b_p3", -3e4, "p3"), ("g_I", 0.05, "I")]
+)
+def test_a_bias_adds_and_a_gain_multiplies_one_reading_exactly(symbol, size, name):
+    p = CALIBRATED.replace(**{symbol: size})
+    run, nominal = opening(p), opening(CALIBRATED)
+    values = readings(run.state, p)
+    for other, field in TRUE.items():
+        true = getattr(nominal.state, field)
+        np.testing.assert_array_equal(getattr(run.state, field), true)
+        wrong = true * (1.0 + size) if symbol == "g_I" else true + size
+        np.testing.assert_array_equal(values[other], wrong if other == name else true, err_msg=other)
+
+
+def test_every_valve_of_a_batch_has_sensors_of_its_own():
+    valves = Valves(2)
+    sizes = {"b_p2": [0.0, 2e4], "b_p3": [-3e4, 0.0], "g_I": [0.05, 0.0]}
+    valves.set_parameters(np.arange(2), {**CALIBRATED, **{s: np.array(v) for s, v in sizes.items()}})
+    for field, value in zip(valves.state, energised(CALIBRATED, p1=12e5, p2=6e5, U=24.0), strict=True):
+        field[:] = value
+    current = np.array([1.05, 1.0]) * 24.0 / CALIBRATED["R"]
+    expected = {"p1": [12e5] * 2, "p2": [6e5, 6.2e5], "p3": [11.7e5, 12e5], "I": current}
+    for name, found in valves.readings().items():
+        np.testing.assert_allclose(found, expected[name], rtol=1e-12, err_msg=name)
+
+
+@pytest.mark.parametrize(("symbol", "name"), [("tau_p2", "p2"), ("tau_p3", "p3")])
+def test_a_lagging_sensor_is_a_first_order_filter_that_the_valve_does_not_feel(symbol, name):
+    """Against the filter's exact response to the pressure, taken linear between samples."""
+    tau, period = 0.01, 1e-4
+    p = CALIBRATED.replace(**{symbol: tau})
+    run, nominal = opening(p), opening(CALIBRATED)
+    true = getattr(run.state, name)
+    np.testing.assert_allclose(true, getattr(nominal.state, name), rtol=1e-5)
+    assert _filtered(true, tau, period) == pytest.approx(readings(run.state, p)[name], abs=100.0)
+    assert np.max(np.abs(_filtered(true, 1.05 * tau, period) - readings(run.state, p)[name])) > 500.0
+
+
+def _filtered(values: np.ndarray, tau: float, period: float) -> np.ndarray:
+    left = np.exp(-period / tau)
+    out = np.empty_like(values)
+    out[0] = values[0]
+    for k, (before, after) in enumerate(pairwise(values)):
+        slope = (after - before) / period
+        out[k + 1] = after - tau * slope + (out[k] - before + tau * slope) * left
+    return out

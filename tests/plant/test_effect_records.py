@@ -50,12 +50,6 @@ def test_every_size_is_a_parameter_that_is_off_at_zero(record):
             assert all(row.domain[0] <= value <= row.domain[1] for value in sizes)
 
 
-def test_symbols_and_names_occur_once():
-    symbols = [symbol for record in EFFECTS for symbol in record.symbols]
-    assert len({record.name for record in EFFECTS}) == len(EFFECTS)
-    assert len(set(symbols)) == len(symbols)
-
-
 def test_the_equations_use_every_effect():
     assert unread_constants(CONSTANTS) == []
     assert [symbol for record in EFFECTS for symbol in unused_symbols(record)] == []

@@ -142,12 +142,6 @@ def test_a_saturating_magnet_with_remanence_conserves_energy():
     assert linkage_rate == pytest.approx(U - p["R"] * current, rel=1e-6)
 
 
-def test_the_driver_s_drop_lowers_the_current():
-    p = CALIBRATED.replace(U_drop=1.5)
-    run = two_openings(p)
-    assert run.state.I[-1] == pytest.approx((24.0 - 1.5) / p["R"], rel=1e-4)
-
-
 def released_inductance(p: Parameters) -> float:
     """Inductance of the coil with the armature at its spring [H]."""
     return p["N"] ** 2 / (p["RML"] + p["xMVmax"] / (p["mu0"] * np.pi / 4 * p["dMB"] ** 2))
@@ -199,16 +193,6 @@ def test_the_energy_of_the_coil_goes_into_heat_of_winding_and_iron_and_the_field
     assert run.state.coil_energy[-1] == pytest.approx(simpson(heat, x=run.time) + stored, rel=1e-6)
 
 
-def test_a_warm_winding_starts_with_less_current_and_cools():
-    p = CALIBRATED.replace(theta_coil=60.0)
-    rest = energised(p, p1=12e5, p2=6e5, U=24.0)
-    np.testing.assert_allclose(rest.I, 24.0 / (p["R"] * (1 + 0.00393 * 60.0)), rtol=1e-12)
-    run = simulate(p, initial=rest, U=np.full(21, 24.0), period=0.05)
-    np.testing.assert_allclose(run.state.coil_heat, 60.0 * np.exp(-run.time / 60.0), rtol=1e-6)
-    resistance = p["R"] * (1 + 0.00393 * run.state.coil_heat)
-    np.testing.assert_allclose(run.state.I, 24.0 / resistance, rtol=1e-5)
-
-
 def test_a_winding_warms_with_its_power_up_to_where_it_cools_as_fast():
     """At first h U^2/R; in the end theta (1 + COPPER theta) = COOLING_TIME h U^2/R."""
     p = CALIBRATED.replace(h_coil=0.1)
@@ -248,16 +232,6 @@ def test_gas_of_a_closed_chamber_follows_the_isentrope_or_relaxes():
     assert p_rate / 3e5 == pytest.approx(heat_rate / 1.25)
 
 
-def test_a_control_chamber_that_fills_too_fast_for_its_wall_warms_adiabatically():
-    """Air enters at T: kappa R T dm = V dp, so T_3/T = p/(p0 + (p - p0)/kappa)."""
-    p = {**CALIBRATED, "tau_3": 1e9}
-    start = energised(p, p1=12e5, p2=6e5, U=24.0)._replace(p3=1e5)
-    run = simulate(p, initial=start, U=np.full(60, 24.0), period=1e-3)
-    p3 = run.state.p3
-    np.testing.assert_allclose(1 + run.state.heat_3, p3 / (1e5 + (p3 - 1e5) / KAPPA), rtol=1e-6)
-    assert p3[-1] > 8e5
-
-
 def test_a_circuit_that_leaks_too_fast_for_its_wall_cools_along_the_isentrope():
     p = {**CALIBRATED, "tau_2": 1e9, "A_circuit": 1e-6}
     start = energised(p, p1=9e5, p2=8e5, U=24.0)
@@ -265,18 +239,6 @@ def test_a_circuit_that_leaks_too_fast_for_its_wall_cools_along_the_isentrope():
     expected = (run.state.p2 / 8e5) ** ((KAPPA - 1) / KAPPA)
     np.testing.assert_allclose(1 + run.state.heat_2, expected, rtol=1e-6)
     assert run.state.p2[-1] < 4e5
-
-
-@pytest.mark.parametrize(("symbol", "pressure"), [("tau_2", "p2"), ("tau_3", "p3")])
-def test_a_chamber_with_a_quick_wall_is_isothermal(symbol, pressure):
-    """The departure from the nominal valve vanishes in proportion to the time constant."""
-    nominal, quick, quicker = (
-        getattr(two_openings(CALIBRATED.replace(**{symbol: tau})).state, pressure)
-        for tau in (0.0, 8e-4, 2e-4)
-    )
-    far, near = (float(np.max(np.abs(run - nominal))) for run in (quick, quicker))
-    assert 0 < near < far / 3
-    assert near < {"p2": 1e3, "p3": 2e4}[pressure]
 
 
 def test_behind_a_shut_pipe_the_circuit_is_small_and_the_rest_supplies_the_consumer():
@@ -288,17 +250,6 @@ def test_behind_a_shut_pipe_the_circuit_is_small_and_the_rest_supplies_the_consu
     np.testing.assert_allclose(run.state.p2, near, rtol=1e-6)
     far = 8e5 - RT / (0.6 * p["V2"]) * 1e-3 * run.time
     np.testing.assert_allclose(run.state.p2 + run.state.far_pressure, far, rtol=1e-6)
-
-
-def test_pressures_on_both_ends_of_a_pipe_meet():
-    p = CALIBRATED.replace(s_pipe=0.6, A_pipe=5e-6)
-    start = energised(p, p1=12e5, p2=8e5, U=24.0)._replace(far_pressure=-6e5)
-    run = simulate(p, initial=start, U=np.full(400, 24.0), period=5e-3)
-    flux = float(mass_flux.py_func(8e5, 2e5, 1 / np.sqrt(RT)))
-    rate = np.diff(run.state.p2 + run.state.far_pressure)[0] / 5e-3
-    assert rate == pytest.approx(RT / (0.6 * p["V2"]) * 5e-6 * flux, rel=0.03)
-    assert run.state.far_pressure[-1] == pytest.approx(0.0, abs=1.0)
-    assert run.state.p2[-1] == pytest.approx(0.4 * 8e5 + 0.6 * 2e5, rel=1e-6)
 
 
 def test_the_supply_loses_pressure_with_the_square_of_the_flow():
@@ -315,19 +266,6 @@ def test_the_supply_loses_pressure_with_the_square_of_the_flow():
     # Meanwhile the control chamber gives a little back through the open inlet.
     np.testing.assert_allclose(run.state.supply_drop, rising, rtol=0, atol=0.02 * steady)
     np.testing.assert_allclose(run.state.p1, 12e5)
-
-
-@pytest.mark.parametrize("area", [2e-9, 1e-8, 4e-8])
-@pytest.mark.parametrize("p1", [4e5, 12e5])
-def test_a_leaking_exhaust_starts_where_it_rests(area, p1):
-    p = CALIBRATED.replace(A_exh=area)
-    start = energised(p, p1=p1, p2=3e5, U=24.0)
-    run = simulate(p, initial=start, U=np.full(50, 24.0), period=2e-3)
-    np.testing.assert_allclose(run.state.p3, start.p3, rtol=0, atol=100.0)
-    assert start.p3 < p1
-    elsewhere = start._replace(p3=start.p3 - 0.01 * p1)
-    run = simulate(p, initial=elsewhere, U=np.full(50, 24.0), period=2e-3)
-    np.testing.assert_allclose(run.state.p3[-1], start.p3, rtol=0, atol=100.0)
 
 
 def test_a_leak_of_the_circuit_is_exponential_while_it_chokes():
@@ -350,17 +288,6 @@ def test_orifices_choke_where_the_effect_says():
         ellipse = np.sqrt(1 - ((ratio - b) / (1 - b)) ** 2)
         assert flux(1e6, 1e6 * ratio, 1.0, share) / choked == pytest.approx(ellipse, abs=0.03)
     assert flux(1e6, 5.2e5, 1.0) == pytest.approx(choked)  # without the effect it chokes at 0.528
-
-
-def test_friction_holds_a_piston_that_would_open():
-    """Opening force 20 N: 15 N of friction let it move, 25 N do not."""
-    back, seat = np.pi / 4 * CALIBRATED["d1"] ** 2, np.pi / 4 * CALIBRATED["d2"] ** 2
-    p3 = 12e5 - (20.0 + (12e5 - 6e5) * seat + CALIBRATED["cPV"] * CALIBRATED["xPV0"]) / back
-    for size, opens in ((15.0, True), (25.0, False)):
-        p = CALIBRATED.replace(F_PV=size, V3=2e-5)
-        start = energised(p, p1=12e5, p2=6e5, U=24.0)._replace(p3=p3)
-        run = simulate(p, initial=start, U=np.full(4, 24.0), period=2.5e-4)
-        assert (np.max(run.state.xPV) > 0) == opens
 
 
 def test_break_away_takes_the_excess_on_top():
@@ -388,7 +315,7 @@ def test_the_swept_volume_raises_the_pressure_of_a_sealed_chamber():
     assert np.max(run.state.xPV) > 1e-3
 
 
-@pytest.mark.parametrize("u", [0.0, 1e-6, 0.01, 0.3, 1.0, 3.0])
+@pytest.mark.parametrize("u", [1e-6, 0.3, 3.0])
 def test_the_saturated_force_is_the_coenergy_s(u):
     exact = (np.log1p(u) - u / (1 + u)) / u**2 if u > 1e-3 else 0.5 - 2 / 3 * u
     assert saturated_force.py_func(u) == pytest.approx(exact, abs=1e-5)

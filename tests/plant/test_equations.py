@@ -64,15 +64,6 @@ def test_compiled_derivative_agrees_with_equations_typed_independently(p):
     assert np.max(np.abs(found - expected) / scale) < 2 * MAX_RELATIVE_ERROR
 
 
-def test_held_movers_have_no_rates():
-    state, inputs = random_states(1)
-    q, u = np.array(state)[:, 0], np.array(inputs)[:, 0]
-    held = COMPILED_RIGHT_HAND_SIDES[False](
-        q, u, coefficients(CALIBRATED), effect_constants(CALIBRATED), 0.0, 0.0
-    )
-    np.testing.assert_array_equal(held[2:6], 0.0)
-
-
 def test_no_effects_make_the_extended_kernel_the_nominal_one():
     state, inputs = random_states(100, seed=1)
     c, e = coefficients(CALIBRATED), effect_constants(CALIBRATED)

@@ -1,12 +1,17 @@
 """The batched integrator against SciPy with every event at a border of its own."""
 
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
-from epv_env.plant.integrate import DEFAULT_STEP
+from epv_env.plant.coefficients import coefficients
+from epv_env.plant.effects.registry import effect_constants
+from epv_env.plant.equations import Inputs
 from epv_env.plant.parameters import Parameters
+from identification.bench.hybrid_automaton import COMPILED_RIGHT_HAND_SIDES, POSITIONS
 from identification.bench.reference_simulation import ReferenceRun, simulate_reference
 from tests.reference.closed_loop import random_schedules
 from tests.reference.schedule import (
@@ -25,7 +30,6 @@ EVENT_TIME = 0.1e-3  # s
 
 CALIBRATED = Parameters.calibrated()
 REPORT = report_tests(CALIBRATED)
-REBOUNDING = report_tests(CALIBRATED.replace(eMV=0.8, ePV=0.3))["test1"]
 
 
 @cache
@@ -82,29 +86,12 @@ def test_events_happen_when_scipy_finds_them(name):
             assert (x[0] - kink) * (x[1] - kink) < 0, event
 
 
-def test_each_opening_has_its_twelve_events():
-    assert [len(reference(name).events) for name in REPORT] == [24, 24, 24, 12, 36]
-
-
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_agrees_with_scipy_in_random_closed_loops(seed):
     for schedule in random_schedules(4, seed):
         run = simulate_reference(schedule, sample_times(schedule, 1e-3))
         assert np.ptp(run.state.p2) > 0.2e5
         assert_agrees(schedule, run, within=0.06)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(100, 110))
-def test_agrees_with_scipy_in_many_random_closed_loops(seed):
-    for schedule in random_schedules(10, seed):
-        assert_agrees(schedule, simulate_reference(schedule, sample_times(schedule, 1e-3)), 0.06)
-
-
-def test_rebounds_end_and_agree_with_scipy():
-    run = simulate_reference(REBOUNDING, sample_times(REBOUNDING, 0.5e-3))
-    assert sum(event.name == "armature lands high" for event in run.events) > 10
-    assert_agrees(REBOUNDING, run, within=0.5)
 
 
 def test_a_bounce_within_one_step_is_not_missed():
@@ -154,16 +141,23 @@ def test_error_falls_with_the_fourth_power_of_the_step(field):
     assert np.polyfit(np.log(steps), np.log(error), 1)[0] >= 3.5
 
 
-def test_laminar_seam_costs_less_than_a_tenth_of_a_millibar_at_the_default_step():
-    found = errors(REPORT["test1"], [DEFAULT_STEP, DEFAULT_STEP / 2])
-    assert found["p2"][0] < 0.1 * MILLIBAR
-    assert found["p2"][1] < 0.01 * MILLIBAR
+def test_an_integrator_without_stop_events_is_wrong():
+    """SciPy's LSODA sees the movers held at their stops, but is not told when they meet them."""
+    schedule = REPORT["test4"]
+    p, u, y = schedule.parameters, np.zeros(len(Inputs._fields)), np.array(schedule.initial, dtype=float)
+    c, e = coefficients(p), effect_constants(p)
+    limits = dict(zip(POSITIONS, (p["xPVmax"], p["xMVmax"]), strict=True))
 
+    def rates(_, y):
+        inside = np.array(y)
+        for x, limit in limits.items():
+            inside[x] = min(max(y[x], 0.0), limit)
+        return COMPILED_RIGHT_HAND_SIDES[False](inside, u, c, e, 1.0, 1.0)[:-2]
 
-def test_error_keeps_falling_to_below_a_microbar():
-    error = errors(REPORT["test4"], [10e-6], period=5e-3)
-    assert error["p2"][0] < 1e-3 * MILLIBAR
-    assert error["p3"][0] < 1e-3 * MILLIBAR
+    for k, ends in enumerate(pairwise(schedule.borders)):
+        u[:] = [field[k] for field in schedule.inputs]
+        y = solve_ivp(rates, ends, y, method="LSODA", rtol=1e-6, atol=1e-9).y[:, -1]
+    assert abs(y[0] - reference("test4").state.p2[-1]) > 100 * MILLIBAR
 
 
 @pytest.mark.parametrize("change", ["step 8 times as large", "alphaMV 1 % larger"])

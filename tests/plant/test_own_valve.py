@@ -52,12 +52,6 @@ def test_its_own_domains_bound_its_values_and_regions():
             assert low <= ends[0] <= drawn[symbol] <= ends[1] <= high
 
 
-def test_a_circuit_of_20_litres_and_a_coil_of_600_turns_are_no_fault(tmp_path):
-    path = changed(tmp_path, parameters={"V2": 0.02}, domains={"V2": [0.01, 0.03]})
-    plant = load_plant(path)
-    assert (plant.parameters["V2"], plant.parameters["N"]) == (0.02, 600)
-
-
 def test_the_force_balance_holds_at_its_edge():
     p = Parameters.calibrated()
     area = np.pi / 4 * (p["d1"] ** 2 - p["d2"] ** 2)
@@ -122,10 +116,3 @@ def test_what_could_be_no_valve_is_refused_in_a_sentence(tmp_path, fields, messa
         load_plant(changed(tmp_path, **fields))
     assert "\n" not in str(refusal.value)
     assert str(tmp_path / "plant.json") in str(refusal.value)
-
-
-def test_free_must_name_something(tmp_path):
-    content = {**CONTENT, "free": {}}
-    (tmp_path / "plant.json").write_text(json.dumps(content))
-    with pytest.raises(PlantFileError, match="free names no parameter: leave it out, or name"):
-        load_plant(tmp_path / "plant.json")

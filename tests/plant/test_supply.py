@@ -39,10 +39,6 @@ def test_air_is_conserved_between_reservoirs_and_circuit():
     assert (state.p2 - 5e5) * P["V2"] / RT == pytest.approx(state.air_in_PV, abs=1e-12)
 
 
-def test_a_supply_without_volume_limit_holds_still():
-    assert opened(Supply.constant(9.0).volume, refill=5e-3).p1 == 9e5
-
-
 def test_an_imposed_slope_is_followed_exactly():
     assert opened(np.inf, slope=-1e5).p1 == pytest.approx(9e5 - 0.3e5, rel=1e-13)
 
@@ -70,29 +66,11 @@ def test_a_compressor_cycles_between_its_thresholds():
     assert np.sum(np.diff(np.sign(np.diff(seen))) != 0) > 3
 
 
-def test_a_constant_supply_never_starts_a_compressor():
-    supply = Supply.constant(8.0)
-    assert not supply.compressor_runs(np.array([1e-3, 8e5]), np.array([False, False]), 0.0).any()
-
-
 def test_first_pressures_are_drawn_from_the_range():
     rng = np.random.default_rng(0)
     drawn = [Supply.reservoirs((9.0, 10.0)).draw(rng) / BAR for _ in range(500)]
     assert (min(drawn), max(drawn)) == pytest.approx((9.0, 10.0), abs=0.01)
     assert Supply.constant(8.0).draw(rng) == 8 * BAR
-
-
-def test_a_range_is_drawn_for_every_episode_and_then_held():
-    supply = Supply.constant(8.0, 9.0)
-    rng = np.random.default_rng(0)
-    drawn = [supply.draw(rng) / BAR for _ in range(500)]
-    assert (min(drawn), max(drawn)) == pytest.approx((8.0, 9.0), abs=0.01)
-    assert supply.volume == np.inf
-
-
-def test_a_recording_that_starts_before_the_episode_is_entered_at_time_zero():
-    supply = Supply.recorded(np.array([-1.0, 1.0]), np.array([8.0, 10.0]))
-    assert supply.draw(np.random.default_rng(0)) == pytest.approx(9 * BAR)
 
 
 def test_slopes_of_a_recording_lead_along_it():
@@ -102,31 +80,6 @@ def test_slopes_of_a_recording_lead_along_it():
     p1 = supply.draw(np.random.default_rng(0)) + np.cumsum(0.02 * supply.slope(starts, 0.02))
     expected = np.interp(starts + 0.02, time, pressure) * BAR
     np.testing.assert_allclose(p1, expected, rtol=1e-13)
-
-
-def test_only_a_recording_imposes_a_slope():
-    time = np.arange(3.0)
-    np.testing.assert_array_equal(Supply.reservoirs().slope(time, 0.1), np.zeros(3))
-
-
-@pytest.mark.parametrize("ends", [(0.0, 1e6), (-1e5, 1e6), (9e5, 8e5), (np.nan, 1e6)])
-def test_an_impossible_pressure_range_is_refused(ends):
-    with pytest.raises(ValueError, match="is empty or not positive: give 0 < low <= high"):
-        Supply(pressure=ends)
-
-
-def test_a_compressor_that_stops_before_it_starts_is_refused():
-    with pytest.raises(ValueError, match=r"cut-in .* above its cut-out .*: give cut_in <= cut_out"):
-        Supply(pressure=(9e5, 9e5), cut_in=11e5, cut_out=10e5)
-
-
-@pytest.mark.parametrize(
-    ("time", "pressure"),
-    [([0.0, 0.0], [9.0, 9.0]), ([1.0, 0.0], [9.0, 9.0]), ([0.0, 1.0], [9.0]), (0.0, 9.0)],
-)
-def test_a_recording_without_increasing_times_is_refused(time, pressure):
-    with pytest.raises(ValueError, match="needs increasing times and one pressure for each"):
-        Supply.recorded(time, pressure)
 
 
 @pytest.mark.parametrize(

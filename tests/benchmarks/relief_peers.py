@@ -1,13 +1,23 @@
-"""The relief valve by SciPy's `solve_ivp` with events, from impact to impact."""
+"""The relief valve by other integrators: SciPy's `solve_ivp`, from impact to impact, and Boost odeint.
+
+relief_odeint.cpp is compiled where a compiler and Boost's headers are installed.
+"""
+
+import shutil
+import subprocess
+import time
+from pathlib import Path
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from tests.benchmarks.relief_valve.model import (
+from tests.benchmarks.relief_valve import (
+    BETA,
     CONVERGED,
     DELTA,
+    KAPPA,
     N_IMPACTS,
     RESTITUTION,
     START,
@@ -85,11 +95,54 @@ def _run(q: float, trajectory: _Trajectory, method: str, tolerance: float) -> No
             state = trajectory.strike(t, state)
 
 
-def run_scipy(task: Task, method: str, tolerance: float) -> Result:
-    """Do a task by one of `solve_ivp`'s methods; tolerance: relative and absolute."""
-    found = Result.empty(task)
+def run_scipy(task: Task, method: str, tolerance: float) -> tuple[Result, float]:
+    """Do a task by one of `solve_ivp`'s methods; tolerance: relative and absolute.
+
+    Returns what it finds and the CPU time [s].
+    """
+    found, begun = Result.empty(task), time.process_time()
     for k, q in enumerate(task.flows):
         trajectory = _Trajectory(task, found.impacts[k], found.maxima[k])
         _run(q, trajectory, method, tolerance)
         found.passed[k] = trajectory.passed
-    return found
+    return found, time.process_time() - begun
+
+
+COMPILER_FLAGS = ("-std=c++17", "-O3", "-march=native")
+SOURCE = Path(__file__).with_name("relief_odeint.cpp")
+
+
+class NoOdeintError(RuntimeError):
+    """The program cannot be compiled here; the message says why."""
+
+
+def build(folder: Path) -> Path:
+    """Compile the program into a folder. Raises NoOdeintError where compiler or Boost is missing."""
+    compiler = shutil.which("g++")
+    if compiler is None:
+        raise NoOdeintError("g++ is not installed")
+    program = folder / "relief_valve_odeint"
+    made = subprocess.run(
+        [compiler, *COMPILER_FLAGS, str(SOURCE), "-o", str(program)], capture_output=True, text=True
+    )
+    if made.returncode and "boost/numeric/odeint.hpp" in made.stderr:
+        raise NoOdeintError("Boost's headers are not installed (libboost-dev, or CPLUS_INCLUDE_PATH)")
+    if made.returncode:
+        raise RuntimeError(f"g++ does not compile {SOURCE.name}: {made.stderr[:2000]}")
+    return program
+
+
+def run_odeint(program: Path, task: Task, tolerance: float) -> tuple[Result, float]:
+    """Do a task; tolerance: relative and absolute. Returns what it finds and its CPU time [s]."""
+    given = (
+        tolerance, task.transient, task.recorded, N_IMPACTS,
+        KAPPA, BETA, DELTA, RESTITUTION, *START, CONVERGED, *task.flows,
+    )  # fmt: skip
+    arguments = [repr(float(value)) for value in given]
+    printed = subprocess.run([program, *arguments], capture_output=True, text=True, check=True).stdout
+    first, *lines = printed.splitlines()
+    rows = np.array([[float(word) for word in line.split()] for line in lines])
+    found = Result(
+        passed=rows[:, 0], impacts=rows[:, 1 : 1 + N_IMPACTS], maxima=rows[:, 1 + N_IMPACTS :]
+    )
+    return found, float(first)

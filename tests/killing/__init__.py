@@ -1,1 +1,0 @@
-"""Long commands killed at random moments: `python -m tests.killing`."""
