@@ -1,22 +1,18 @@
 """Speed and memory of kernel, environments and identification beside their peers, in one run.
 
-python -m tests.benchmarks [--quick] [--json PATH]
+python -m tests.benchmarks [--quick]
 
 Median, least..greatest of the repetitions. Single-threaded times are CPU times, which other processes
 on the machine hardly touch. Machines are noisy all the same: trust the ratios.
 """
 
 import argparse
-import json
-import os
 import platform
 import tempfile
 from pathlib import Path
 from statistics import median
 
 import numba
-import numpy as np
-import scipy
 
 from epv_env.plant.valves import available_cores
 from tests.benchmarks.interfaces import INTERFACES, one_valve, rate, startup_seconds, used_by
@@ -35,38 +31,23 @@ HIGHEST_LASTING_FLOW = 8.5
 PROCESSES = {
     "bench: the report's campaign": ("bench", "--out", "bench"),
     "run: the report's campaign": ("run", "bench", "--out", "run"),
-    "gap: the report's campaign": ("gap", "bench", "--out", "gap"),
 }
 """Commands of the identification that are measured in processes of their own."""
 
 
-class Table:
-    """Rows under headings, printed as they are measured."""
-
-    def __init__(self) -> None:
-        self.rows: dict[str, list[dict[str, object]]] = {}
-
-    def section(self, title: str) -> None:
-        """Begin a new part."""
-        self.rows[title] = []
-        print(f"\n{title}", flush=True)
-
-    def add(
-        self, name: str, unit: str, values: list[float], *, ratio: float | None = None, note: str = ""
-    ) -> None:
-        """Record and print one row; ratio: to the row that the section compares with."""
-        row = {"name": name, "unit": unit, "values": values, "ratio": ratio, "note": note}
-        list(self.rows.values())[-1].append(row)
-        spread = f"{min(values):.4g}..{max(values):.4g}" if len(values) > 1 else ""
-        times = "" if ratio is None else f"x {ratio:.4g}"
-        print(
-            f"  {name:<58} {median(values):>11.5g} {unit:<10} {spread:<22} {times:<11} {note}".rstrip()
-        )
+def row(
+    name: str, unit: str, values: list[float], *, ratio: float | None = None, note: str = ""
+) -> None:
+    """Print the median of a quantity and its spread; ratio: to the row that the part compares with."""
+    spread = f"{min(values):.4g}..{max(values):.4g}" if len(values) > 1 else ""
+    times = "" if ratio is None else f"x {ratio:.4g}"
+    found = f"{median(values):>11.5g} {unit:<10} {spread:<22} {times:<11} {note}"
+    print(f"  {name:<58} {found}".rstrip(), flush=True)
 
 
-def environments(table: Table, repetitions: int, share: float) -> None:
+def environments(repetitions: int, share: float) -> None:
     """Every interface, one repetition after the other, so that a busy machine disturbs all alike."""
-    table.section("control periods per second; ratio: to the kernel with as many valves")
+    print("\ncontrol periods per second; ratio: to the kernel with as many valves")
     runs = {name: interface.begin(share) for name, interface in INTERFACES.items()}
     for run in runs.values():
         run()
@@ -76,26 +57,26 @@ def environments(table: Table, repetitions: int, share: float) -> None:
             found[name].append(rate(name, run))
     for name, rates in found.items():
         kernel = INTERFACES[name].kernel
-        table.add(name, "1/s", rates, ratio=median(rates) / median(found[kernel]) if kernel else None)
+        row(name, "1/s", rates, ratio=median(rates) / median(found[kernel]) if kernel else None)
 
 
-def beside_scipy(table: Table, repetitions: int, duration: float) -> None:
+def beside_scipy(repetitions: int, duration: float) -> None:
     """One valve under random switching by this plant and by LSODA with located events."""
-    table.section("one valve, simulated seconds per CPU second; ratio: to the first row")
+    print("\none valve, simulated seconds per CPU second; ratio: to the first row")
     first = None
     for name, run in one_valve(duration).items():
         found = [run() for _ in range(repetitions)]
         first = first or median(speed for speed, _ in found)
         speeds = [speed for speed, _ in found]
         note = f"p2 wrong by {found[0][1]:.2g} Pa"
-        table.add(name, "s per s", speeds, ratio=median(speeds) / first, note=note)
+        row(name, "s per s", speeds, ratio=median(speeds) / first, note=note)
 
 
-def relief_valve(table: Table, repetitions: int, task: Task) -> None:
+def relief_valve(repetitions: int, task: Task) -> None:
     """The public task with few flows; SciPy does its beginning only."""
-    table.section(
-        f"relief valve, {task.flows.size} flows, {task.transient} + {task.recorded} maxima: maxima per "
-        "CPU second, one thread;\nratio: to odeint with an error at least as large"
+    print(
+        f"\nrelief valve, {task.flows.size} flows, {task.transient} + {task.recorded} maxima: maxima "
+        "per CPU second, one thread;\nratio: to odeint with an error at least as large"
     )
     true = run_scipy(BEGINNING, "DOP853", 1e-13)[0]
     with tempfile.TemporaryDirectory() as folder:
@@ -113,63 +94,38 @@ def relief_valve(table: Table, repetitions: int, task: Task) -> None:
                 other = [run_odeint(program, task, tolerance) for _ in range(repetitions)]
                 peer = [found.passed.sum() / seconds for found, seconds in other]
                 ratio = median(speeds) / median(peer)
-            table.add(
-                f"this scheme, step {step:g}", "1/s", speeds, ratio=ratio, note=f"error {error:.1e}"
-            )
+            row(f"this scheme, step {step:g}", "1/s", speeds, ratio=ratio, note=f"error {error:.1e}")
             if program is not None:
                 worst = run_odeint(program, BEGINNING, tolerance)[0].error(true)
-                table.add(f"odeint, tolerance {tolerance:g}", "1/s", peer, note=f"error {worst:.1e}")
+                row(f"odeint, tolerance {tolerance:g}", "1/s", peer, note=f"error {worst:.1e}")
     found, seconds = run_scipy(BEGINNING, "DOP853", 1e-10)
     note = f"error {found.error(true):.1e}"
-    table.add("SciPy DOP853, tolerance 1e-10", "1/s", [found.passed.sum() / seconds], note=note)
+    row("SciPy DOP853, tolerance 1e-10", "1/s", [found.passed.sum() / seconds], note=note)
 
 
-def processes(table: Table, repetitions: int) -> None:
+def processes(repetitions: int) -> None:
     """Time and memory of fresh processes: start-up, and commands of the identification."""
-    table.section("fresh processes, caches warm")
+    print("\nfresh processes, caches warm")
     for name, seconds in startup_seconds(repetitions).items():
-        table.add(name, "s", seconds)
+        row(name, "s", seconds)
     with tempfile.TemporaryDirectory() as folder:
         for name, arguments in PROCESSES.items():
             seconds, peak = used_by(arguments, Path(folder))
-            table.add(name, "s", [seconds], note=f"at most {peak:.0f} MiB")
-
-
-def machine() -> dict[str, object]:
-    """Processor, load and versions."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        lines = []
-    names = [line.split(":")[1].strip() for line in lines if line.startswith("model name")]
-    return {
-        "processor": names[0] if names else platform.machine(),
-        "cores": available_cores(),
-        "load": f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown",
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "scipy": scipy.__version__,
-        "numba": numba.__version__,
-    }
+            row(name, "s", [seconds], note=f"at most {peak:.0f} MiB")
 
 
 def main() -> None:
     """Measure and print everything."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="few repetitions, short runs")
-    parser.add_argument("--json", type=Path, metavar="PATH", help="also write the figures there")
     options = parser.parse_args()
-    print(", ".join(f"{key} {value}" for key, value in machine().items()))
+    print(f"{platform.processor()}, {available_cores()} cores, numba {numba.__version__}")
     repetitions, share = (3, 0.1) if options.quick else (9, 1.0)
     task = Task(flows=flows(32, HIGHEST_LASTING_FLOW), transient=32 if options.quick else 1024)
-    table = Table()
-    environments(table, repetitions, share)
-    beside_scipy(table, repetitions, duration=2.0 * share)
-    relief_valve(table, repetitions, task)
-    processes(table, repetitions)
-    if options.json:
-        found = {"machine": machine(), "quick": options.quick, "results": table.rows}
-        options.json.write_text(json.dumps(found, indent=1))
+    environments(repetitions, share)
+    beside_scipy(repetitions, duration=2.0 * share)
+    relief_valve(repetitions, task)
+    processes(repetitions)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,9 @@
 """The native batch as a stable-baselines3 VecEnv: infos, seeds, attributes, training."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -114,3 +118,36 @@ def test_ppo_learns_from_two_rollouts(identifier):
     assert len(model.ep_success_buffer) > 0
     action, _ = model.predict(env.reset(), deterministic=True)
     assert env.get_attr("action_space")[0].contains(action)
+
+
+PROCESSES = """
+import numpy as np
+from stable_baselines3.common.vec_env import SubprocVecEnv
+from tests.env.rollouts import actions, native, run
+
+def make():
+    import gymnasium
+    return gymnasium.make("epv_env:EPValve-v0")
+
+if __name__ == "__main__":
+    run(native("EPValve-v0", 256, threads=2), actions("EPValve-v0", 256, 3))  # threads run from here on
+    for method in ("fork", "spawn"):
+        worker, here = SubprocVecEnv([make], start_method=method), native("EPValve-v0", 1)
+        worker.seed(3)
+        same = np.array_equal(worker.reset(), here.reset(seed=3)[0])
+        for command in actions("EPValve-v0", 1, 5):
+            same &= np.array_equal(worker.step(command)[0], here.step(command)[0])
+        worker.close()
+        print(method, bool(same))
+"""
+
+
+def test_worker_processes_agree_with_a_parent_that_has_threads(tmp_path):
+    script = tmp_path / "processes.py"
+    script.write_text(PROCESSES)
+    root = str(Path(__file__).parents[2])
+    done = subprocess.run(
+        [sys.executable, script], env={**os.environ, "PYTHONPATH": root},
+        capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+    assert done.stdout.split("\n")[:2] == ["fork True", "spawn True"], done.stderr

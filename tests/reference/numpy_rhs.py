@@ -4,7 +4,7 @@ Independent of epv_env.plant.equations, flow, effects and coefficients: raw symb
 eq. 13, no polynomial, no folded products. It checks those, and is the peer in the speed comparison.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,19 +79,3 @@ def _piston_force(q: State, p: Mapping[str, float]):
         - p["cPV"] * (q.xPV + p["xPV0"])
         - p["kPV"] * q.vPV
     )
-
-
-def numpy_right_hand_side(p: Mapping[str, float], reservoir_volume: float = np.inf) -> Callable:
-    """`numpy_rates` in the form that reference.hybrid integrates; its two tables are ignored."""
-
-    def rates_and_forces(y, u, _coefficients, _effects, free_PV, free_MV):
-        rates, force_PV, force_MV = numpy_rates(State(*y), Inputs(*u), p, reservoir_volume)
-        held = rates._replace(
-            xPV=rates.xPV * free_PV,
-            vPV=rates.vPV * free_PV,
-            xMV=rates.xMV * free_MV,
-            vMV=rates.vMV * free_MV,
-        )
-        return np.array([*held, force_PV, force_MV])
-
-    return rates_and_forces
