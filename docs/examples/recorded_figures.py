@@ -19,10 +19,9 @@ RECALIBRATED, WITH_CAUSES, MEASURED = "tab:orange", "tab:blue", "black"
 def write_figures(diagnosis: Diagnosis, folder: Path, name: str) -> list[Path]:
     """Write recorded-NAME.png, and recorded-NAME-left.png where a state explains what is left."""
     figures = {f"recorded-{name}.png": prediction_figure(diagnosis)}
-    term = drawn_term(diagnosis, diagnosis.remaining)
+    term = drawn_term(diagnosis.remaining)
     if term is not None:
-        level = diagnosis.settings.reduction.interval_level
-        figures[f"recorded-{name}-left.png"] = missing_term_figure(term, level)
+        figures[f"recorded-{name}-left.png"] = missing_term_figure(term)
     folder.mkdir(parents=True, exist_ok=True)
     for file, figure in figures.items():
         figure.savefig(folder / file, dpi=100, bbox_inches="tight")

@@ -10,14 +10,36 @@ with grouped folds would solve each of them anew and choose one penalty for all 
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.gap.plant import GreyBox
 from identification.gap.prediction import Prediction
-from identification.gap.reduce.settings import ReductionSettings
+
+HISTORY_UNIT = 0.1
+"""Unit of the lags below [time scales], or the sampling period if that is longer: a transient has about
+ten."""
+
+HISTORY_LAGS = (1, 2, 4, 10, 20, 40, 100, 400)
+"""Lags at which the black box sees inputs and outputs [history units]: 0.1 to 4 time scales for
+transients, to 40 for what they leave."""
+
+FEWEST_LEARNING_SAMPLES = 2000
+"""Samples of all learning runs together that a stride of the history unit must leave; fewer have a
+shorter stride: one sample tells little through its noise."""
+
+RANDOM_FEATURES = 300
+"""Number of random Fourier features; computing time."""
+
+SHORTEST_WAVE, LONGEST_WAVE = 0.2, 3.0
+"""Lengths of a random feature, in typical distances of two samples [1]."""
+
+FEATURE_LIMIT = 10.0
+"""Bound of a standardised feature [standard deviations], for samples unlike all others."""
+
+PENALTIES = np.logspace(-3.0, 5.0, 9)
+"""Ridge penalties [1]: from none to no prediction, one per decade."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,17 +57,11 @@ Learner = Callable[[Sequence[LearningRun], Sequence[NDArray], int], list[NDArray
 samples) [noise deviations]."""
 
 
-def ridge_learner(settings: ReductionSettings) -> Learner:
-    """The standard black box."""
-    return partial(ridge_on_random_features, settings=settings)
-
-
 def predict_residuals(
     plant: GreyBox,
     model: Prediction,
     learner: Learner,
     seed: int,
-    settings: ReductionSettings,
     scale: float,
 ) -> list[NDArray]:
     """A model's residuals of the held-out runs as the black box predicts them.
@@ -55,21 +71,20 @@ def predict_residuals(
         model: outputs and residuals of the model.
         learner: the black box.
         seed: of its random features.
-        settings: of the features.
         scale: the plant's time scale [s].
 
     Returns:
         Per run (channels, samples) [noise deviations]; zero in the fitted runs, which are not judged.
     """
-    features = [history_features(plant, r, y, scale, settings) for r, y in enumerate(model.outputs)]
+    features = [history_features(plant, r, y, scale) for r, y in enumerate(model.outputs)]
     fitted = [r for r, run in enumerate(plant.runs) if not run.held_out]
     samples = sum(len(features[r]) for r in fitted)
-    longest = max(1, samples // settings.fewest_learning_samples)
+    longest = max(1, samples // FEWEST_LEARNING_SAMPLES)
     learning = [
         _thinned(
             features[r],
             model.residuals[r],
-            min(longest, history_stride(plant, r, scale, settings)),
+            min(longest, history_stride(plant, r, scale)),
         )
         for r in fitted
     ]
@@ -90,7 +105,6 @@ def ridge_on_random_features(
     learning: Sequence[LearningRun],
     features: Sequence[NDArray],
     seed: int,
-    settings: ReductionSettings,
 ) -> list[NDArray]:
     """Ridge regression with the penalty that predicts left-out runs best.
 
@@ -98,15 +112,14 @@ def ridge_on_random_features(
         learning: runs to learn from.
         features: of the runs to predict, (samples, features) each [SI].
         seed: of the random features.
-        settings: of features and penalties.
 
     Returns:
         Per run (channels, samples) [noise deviations]; zero where leaving runs out shows nothing that
         carries over.
     """
-    waves = random_fourier_features(np.concatenate([run.features for run in learning]), seed, settings)
+    waves = random_fourier_features(np.concatenate([run.features for run in learning]), seed)
     folds = [(waves(run.features), run.target.T) for run in _folds(learning)]
-    penalties = np.logspace(*settings.penalty_decades, settings.penalties)
+    penalties = PENALTIES
     linear = learning[0].features.shape[1]
     grams = np.array([z.T @ z for z, _ in folds])
     moments = np.array([z.T @ y for z, y in folds])
@@ -152,9 +165,7 @@ def _solutions(gram: NDArray, moment: NDArray, linear: int, penalties: NDArray) 
     return weights
 
 
-def history_features(
-    plant: GreyBox, run: int, outputs: NDArray, scale: float, settings: ReductionSettings
-) -> NDArray:
+def history_features(plant: GreyBox, run: int, outputs: NDArray, scale: float) -> NDArray:
     """Inputs and model outputs at every instant, and their changes over each lag.
 
     Args:
@@ -162,27 +173,24 @@ def history_features(
         run: index of the run.
         outputs: model outputs, (channels, samples) [SI].
         scale: the plant's time scale [s].
-        settings: the lags.
 
     Returns:
         (samples, signals x (1 + lags)) [SI], signals being inputs and channels.
     """
     series = np.vstack([*plant.runs[run].inputs.values(), np.nan_to_num(outputs)])
-    stride = history_stride(plant, run, scale, settings)
-    past = [np.roll(series, lag * stride, axis=1) for lag in settings.history_lags]
-    for lag, rolled in zip(settings.history_lags, past, strict=True):
+    stride = history_stride(plant, run, scale)
+    past = [np.roll(series, lag * stride, axis=1) for lag in HISTORY_LAGS]
+    for lag, rolled in zip(HISTORY_LAGS, past, strict=True):
         rolled[:, : lag * stride] = series[:, :1]
     return np.vstack([series, *(series - rolled for rolled in past)]).T
 
 
-def history_stride(plant: GreyBox, run: int, scale: float, settings: ReductionSettings) -> int:
+def history_stride(plant: GreyBox, run: int, scale: float) -> int:
     """Number of samples in the history unit, at least one; scale: the plant's time scale [s]."""
-    return max(1, round(settings.history_unit * scale / plant.runs[run].time[1]))
+    return max(1, round(HISTORY_UNIT * scale / plant.runs[run].time[1]))
 
 
-def random_fourier_features(
-    features: NDArray, seed: int, settings: ReductionSettings
-) -> Callable[[NDArray], NDArray]:
+def random_fourier_features(features: NDArray, seed: int) -> Callable[[NDArray], NDArray]:
     """Map to standardised features and random waves of these (Rahimi and Recht 2007).
 
     The lengths of the waves are log-uniform, since the residual's scale is not known. (A sampler of one
@@ -191,7 +199,6 @@ def random_fourier_features(
     Args:
         features: samples from which location and scale are taken, (samples, features).
         seed: of the waves.
-        settings: number and lengths of the waves.
 
     Returns:
         A function from (samples, features) to (samples, features + waves) [1].
@@ -199,8 +206,8 @@ def random_fourier_features(
     mean, sd = np.mean(features, axis=0), np.std(features, axis=0)
     scale = np.where(sd > 0, 1.0 / np.where(sd > 0, sd, 1.0), 0.0)
     rng = np.random.default_rng(seed)
-    count, waves, limit = features.shape[1], settings.random_features, settings.feature_limit
-    low, high = np.log((settings.shortest_wave, settings.longest_wave))
+    count, waves, limit = features.shape[1], RANDOM_FEATURES, FEATURE_LIMIT
+    low, high = np.log((SHORTEST_WAVE, LONGEST_WAVE))
     lengths = np.exp(rng.uniform(low, high, waves)) * np.sqrt(2 * count)
     frequencies = rng.standard_normal((count, waves)) / lengths
     phases = rng.uniform(0, 2 * np.pi, waves)

@@ -1,9 +1,9 @@
 """The whole diagnosis of a grey-box plant: which cause, where, and how far the gap is reduced."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from identification.block_bootstrap import Interval
-from identification.gap.cause_search import HypothesisPool, search_causes
+from identification.gap.cause_search import HypothesisPool, is_small, search_causes
 from identification.gap.evidence import EvaluatedHypothesis, evaluate_linearised
 from identification.gap.fitting_problem import Estimate, FitCache, FittingProblem, Hypothesis
 from identification.gap.gauss_newton import linearise
@@ -16,18 +16,14 @@ from identification.gap.held_out import (
 from identification.gap.localisation import Localisation, locate
 from identification.gap.plant import GreyBox
 from identification.gap.plant_checks import check
-from identification.gap.posterior import Posterior
 from identification.gap.prepared_plant import prepared
-from identification.gap.rank.settings import RankingSettings
 from identification.gap.recalibration import (
     recalibrate,
     with_disturbance,
     with_own_nuisances,
     with_seen_noise,
 )
-from identification.gap.reduce.settings import ReductionSettings
-from identification.gap.screening import Separability, assess_separability, simulate_signatures
-from identification.gap.settings import DiagnosisSettings
+from identification.gap.screening import assess_separability, simulate_signatures
 from identification.gap.verdict import (
     AMBIGUOUS,
     KNOWN,
@@ -38,6 +34,13 @@ from identification.gap.verdict import (
     Ranking,
     conclude,
 )
+
+JUDGED_RUNNERS_UP = 3
+"""Single causes beyond the ambiguity set whose discrepancy reduction is measured too; computing time and
+length of the tables."""
+
+MENTIONED_PROBABILITY = 0.01
+"""Probability from which reports mention a cause."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +60,6 @@ class Diagnosis:
     """Causes whose discrepancy reduction was measured, the most probable first."""
     warnings: list[str]
     """Doubts about the plant's description and fits that did not converge, in sentences."""
-    settings: DiagnosisSettings
 
     @property
     def best(self) -> RankedCause | None:
@@ -98,85 +100,101 @@ def hypothesis_title(hypothesis: EvaluatedHypothesis) -> str:
     return " + ".join(hypothesis.titles)
 
 
-def diagnose(
-    plant: GreyBox,
-    *,
-    settings: DiagnosisSettings | None = None,
-    seed: int = 0,
-    cache: FitCache | None = None,
-) -> Diagnosis:
+def diagnose(plant: GreyBox, *, seed: int = 0, cache: FitCache | None = None) -> Diagnosis:
     """Diagnose the plant's recordings.
 
     Args:
         plant: the model, its recordings and its catalogue of causes.
-        settings: judgement of every stage; None: the defaults.
         seed: of the bootstrap, the black box and the permutations.
         cache: runs the fits and may keep them; None keeps nothing.
 
     Raises:
         PlantError: something is wrong with the plant or its recordings; each finding is one line.
     """
-    settings, cache = settings or DiagnosisSettings(), cache or FitCache(plant)
+    cache = cache or FitCache(plant)
     warnings = check(plant)
-    plant = prepared(plant)
-    ranking = rank_hypotheses(plant, cache, settings.ranking, settings.reduction)
+    ranking = rank_hypotheses(prepared(plant), cache)
     cache.announce("where")
-    localisation = _locate(ranking, ranking.recalibrated, seed, settings)
+    localisation = _locate(ranking, ranking.recalibrated, seed)
     cache.announce("how far it shrinks")
-    diagnosis = _judge(ranking, localisation, seed, settings)
-    return replace(diagnosis, warnings=[*warnings, *diagnosis.warnings])
-
-
-def _locate(
-    ranking: Ranking, hypothesis: EvaluatedHypothesis, seed: int, settings: DiagnosisSettings
-) -> Localisation:
-    """Where the gap lies that a hypothesis leaves."""
-    return locate(
-        ranking.problem,
-        hypothesis.estimate,
-        hypothesis.residuals,
-        seed,
-        settings.localisation,
-        settings.reduction,
-    )
-
-
-def _judge(
-    ranking: Ranking, localisation: Localisation, seed: int, settings: DiagnosisSettings
-) -> Diagnosis:
-    """The verdict on the probabilities, and how far the causes that count reduce the gap."""
-    problem, recalibrated = ranking.problem, ranking.recalibrated
     conclusion = conclude(ranking, localisation)
-    judged = _judged_causes(conclusion, settings.report.judged_runners_up)
-    nominal = problem.start(Hypothesis(causes=()), {})
-    estimates = {NOMINAL: nominal, RECALIBRATED: recalibrated.estimate}
+    judged = _judged_causes(conclusion)
+    nominal = ranking.problem.start(Hypothesis(causes=()), {})
+    estimates = {NOMINAL: nominal, RECALIBRATED: ranking.recalibrated.estimate}
     estimates |= {hypothesis_label(c.hypothesis): c.hypothesis.estimate for c in judged}
-    reduction = measure_discrepancy_reduction(problem, estimates, seed=seed, settings=settings.reduction)
+    reduction = measure_discrepancy_reduction(ranking.problem, estimates, seed=seed)
     left = conclusion.verdict in (PARTIAL, UNKNOWN) or (
         conclusion.verdict in (KNOWN, AMBIGUOUS) and reduction.unexplained.still_predictable
     )
-    remaining = _locate(ranking, judged[0].hypothesis, seed, settings) if left and judged else None
     return Diagnosis(
         ranking=ranking,
         conclusion=conclusion,
         localisation=localisation,
-        remaining=remaining,
+        remaining=_locate(ranking, judged[0].hypothesis, seed) if left and judged else None,
         reduction=reduction,
         nominal=nominal,
         judged=judged,
-        warnings=[
-            *_disturbances(ranking),
-            *_warnings(recalibrated, judged, settings.report.mentioned_probability),
-        ],
-        settings=settings,
+        warnings=[*warnings, *_disturbances(ranking), *_unconverged(ranking.recalibrated, judged)],
     )
 
 
-def _judged_causes(conclusion: Conclusion, runners_up: int) -> list[RankedCause]:
+def rank_hypotheses(plant: GreyBox, cache: FitCache | None = None) -> Ranking:
+    """Refit the promising hypotheses and weigh them; a fit that does not converge is weighed as it is.
+
+    Args:
+        plant: the model, its recordings and its catalogue of causes.
+        cache: runs the fits; None keeps nothing.
+    """
+    cache, plant = cache or FitCache(plant), prepared(plant)
+    thorough = is_small(plant)
+    problem, base = recalibrate(plant, cache, thorough=thorough)
+    corrected = with_seen_noise(problem, base)
+    if corrected is not plant:
+        problem, base = recalibrate(corrected, cache, thorough=thorough, prefix="with the noise seen: ")
+    ranking = _searched(problem, base, cache)
+    weighted = with_disturbance(corrected, ranking.discrepancies)
+    if weighted is corrected:
+        return ranking
+    cache = cache.named("with the disturbance: ")
+    return _searched(*recalibrate(weighted, cache, thorough=thorough), cache)
+
+
+def _searched(problem: FittingProblem, base: Estimate, cache: FitCache) -> Ranking:
+    """The search for causes beside the recalibrated model `base`; the most probable hypotheses first."""
+    runs = linearise(problem, [base], problem.all_runs)[0]
+    base_runs = [runs[r] for r in problem.fitted_runs]
+    signatures = simulate_signatures(problem, base, problem.plant.causes)
+    separability = assess_separability(base_runs, signatures)
+    evaluated = evaluate_linearised(problem, base, runs)
+    recalibrated = with_own_nuisances(problem, [evaluated], "recalibration: own nuisances", cache)[0]
+    pool = HypothesisPool(problem, recalibrated, cache)
+    search_causes(pool, base, base_runs, signatures, separability)
+    hypotheses, found = pool.posterior()
+    keys = list(zip(found.probabilities, found.scores, strict=True))
+    order = sorted(range(len(keys)), key=keys.__getitem__, reverse=True)
+    return Ranking(
+        problem=problem,
+        recalibrated=recalibrated,
+        hypotheses=[hypotheses[i] for i in order],
+        probabilities=[found.probabilities[i] for i in order],
+        no_cause=found.no_cause,
+        unknown=found.unknown,
+        shares_left=[found.shares_left[i] for i in order],
+        discrepancies=found.discrepancies,
+        separability=separability,
+    )
+
+
+def _locate(ranking: Ranking, hypothesis: EvaluatedHypothesis, seed: int) -> Localisation:
+    """Where the gap lies that a hypothesis leaves."""
+    return locate(ranking.problem, hypothesis.estimate, hypothesis.residuals, seed)
+
+
+def _judged_causes(conclusion: Conclusion) -> list[RankedCause]:
     """The ambiguity set, or the most probable cause, and the next single causes."""
     first = max(len(conclusion.ambiguity_set), 1)
     singles = [cause for cause in conclusion.causes[first:] if len(cause.effects) == 1]
-    return [*conclusion.causes[:first], *singles[:runners_up]]
+    return [*conclusion.causes[:first], *singles[:JUDGED_RUNNERS_UP]]
 
 
 def _disturbances(ranking: Ranking) -> list[str]:
@@ -191,9 +209,7 @@ def _disturbances(ranking: Ranking) -> list[str]:
     ]
 
 
-def _warnings(
-    recalibrated: EvaluatedHypothesis, judged: list[RankedCause], mentioned_probability: float
-) -> list[str]:
+def _unconverged(recalibrated: EvaluatedHypothesis, judged: list[RankedCause]) -> list[str]:
     """Fits that did not converge, of causes with a noticeable probability."""
     warnings = []
     if not recalibrated.converged:
@@ -202,83 +218,5 @@ def _warnings(
         f"the fit of {hypothesis_title(cause.hypothesis)} did not converge: its size and its "
         "probability are in doubt"
         for cause in judged
-        if not cause.hypothesis.converged and cause.probability > mentioned_probability
+        if not cause.hypothesis.converged and cause.probability > MENTIONED_PROBABILITY
     ]
-
-
-def rank_hypotheses(
-    plant: GreyBox,
-    cache: FitCache | None = None,
-    settings: RankingSettings | None = None,
-    floor: ReductionSettings | None = None,
-) -> Ranking:
-    """Refit the promising hypotheses and weigh them; a fit that does not converge is weighed as it is.
-
-    Args:
-        plant: the model, its recordings and its catalogue of causes.
-        cache: runs the fits; None keeps nothing.
-        settings: judgement of the ranking; None: the defaults.
-        floor: how noise is seen in residuals; None: the defaults.
-    """
-    settings, cache, plant = settings or RankingSettings(), cache or FitCache(plant), prepared(plant)
-    thorough = len(plant.causes) <= settings.multi_start_causes
-    problem, base = recalibrate(plant, cache, thorough=thorough)
-    corrected = with_seen_noise(problem, base, settings, floor or ReductionSettings())
-    if corrected is not plant:
-        prefix = "with the noise seen: "
-        problem, base = recalibrate(corrected, cache, thorough=thorough, prefix=prefix)
-    ranking = _searched(problem, base, cache, settings)
-    weighted = with_disturbance(corrected, ranking.discrepancies, settings)
-    if weighted is corrected:
-        return ranking
-    cache = cache.named("with the disturbance: ")
-    return _searched(*recalibrate(weighted, cache, thorough=thorough), cache, settings)
-
-
-def _searched(
-    problem: FittingProblem, base: Estimate, cache: FitCache, settings: RankingSettings
-) -> Ranking:
-    """The search for causes beside a recalibrated model, and what it found.
-
-    Args:
-        problem: readings and settings of the fits.
-        base: the recalibrated model.
-        cache: runs the fits.
-        settings: judgement.
-    """
-    runs = linearise(problem, [base], problem.all_runs)[0]
-    base_runs = [runs[r] for r in problem.fitted_runs]
-    signatures = simulate_signatures(problem, base, problem.plant.causes)
-    separability = assess_separability(base_runs, signatures, settings)
-    evaluated = evaluate_linearised(problem, base, runs, settings)
-    step = "recalibration: own nuisances"
-    recalibrated = with_own_nuisances(problem, [evaluated], step, cache, settings)[0]
-    pool = HypothesisPool(problem, recalibrated, cache, settings)
-    search_causes(pool, base, base_runs, signatures, separability)
-    hypotheses, found = pool.posterior()
-    return _ranking(problem, recalibrated, hypotheses, found, separability, settings)
-
-
-def _ranking(
-    problem: FittingProblem,
-    recalibrated: EvaluatedHypothesis,
-    hypotheses: list[EvaluatedHypothesis],
-    found: Posterior,
-    separability: Separability,
-    settings: RankingSettings,
-) -> Ranking:
-    """Hypotheses by falling probability; equal ones by their scores."""
-    keys = zip(found.probabilities, found.scores, strict=True)
-    order = [i for i, _ in sorted(enumerate(keys), key=lambda item: item[1], reverse=True)]
-    return Ranking(
-        problem=problem,
-        recalibrated=recalibrated,
-        hypotheses=[hypotheses[i] for i in order],
-        probabilities=[found.probabilities[i] for i in order],
-        no_cause=found.no_cause,
-        unknown=found.unknown,
-        shares_left=[found.shares_left[i] for i in order],
-        discrepancies=found.discrepancies,
-        separability=separability,
-        settings=settings,
-    )

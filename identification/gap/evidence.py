@@ -12,13 +12,18 @@ from numpy.typing import NDArray
 from identification.gap.fitting_problem import Estimate, FittingProblem, cause_places
 from identification.gap.gauss_newton import linearise
 from identification.gap.prediction import with_settled_runs
-from identification.gap.rank.settings import RankingSettings
 from identification.gap.variable_projection import (
     LinearisedRun,
     NormalEquations,
     normal_equations,
     without_run_nuisances,
 )
+
+BOUND_MARGIN = 1e-4
+"""Share of a range [1] within which a parameter counts as lying at the bound: rounding."""
+
+SMALLEST_EIGENVALUE = 1e-12
+"""Eigenvalue of a correlation matrix below which it is rounding [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,9 +86,7 @@ class EvaluatedHypothesis:
         return slice(place.start - first, place.stop - first)
 
 
-def evaluate(
-    problem: FittingProblem, estimates: Sequence[Estimate], settings: RankingSettings
-) -> list[EvaluatedHypothesis]:
+def evaluate(problem: FittingProblem, estimates: Sequence[Estimate]) -> list[EvaluatedHypothesis]:
     """Each estimate on all runs.
 
     The vector has seen the fitted runs only; nuisance parameters, which have priors, adapt to every run.
@@ -93,7 +96,7 @@ def evaluate(
     estimates = [with_settled_runs(problem, estimate) for estimate in estimates]
     linearised = linearise(problem, estimates, problem.all_runs)
     return [
-        evaluate_linearised(problem, estimate, runs, settings)
+        evaluate_linearised(problem, estimate, runs)
         for estimate, runs in zip(estimates, linearised, strict=True)
     ]
 
@@ -102,7 +105,6 @@ def evaluate_linearised(
     problem: FittingProblem,
     estimate: Estimate,
     runs: Sequence[LinearisedRun],
-    settings: RankingSettings,
 ) -> EvaluatedHypothesis:
     """An estimate on all runs, linearised."""
     tolerances = normal_equations(runs).tolerances
@@ -120,8 +122,8 @@ def evaluate_linearised(
         squares=np.sum([np.sum(residual**2, axis=1) for residual in residuals], axis=0),
         nuisance_penalty=0.5 * deviations,
         tolerances=fitted.tolerances,
-        covariance=_covariance(fitted, settings.smallest_eigenvalue) * np.outer(scales, scales),
-        at_bound=_at_bound(estimate, settings.bound_margin),
+        covariance=_covariance(fitted) * np.outer(scales, scales),
+        at_bound=_at_bound(estimate),
     )
 
 
@@ -135,18 +137,18 @@ def _squared_deviations(
     )
 
 
-def _covariance(equations: NormalEquations, smallest_eigenvalue: float) -> NDArray:
+def _covariance(equations: NormalEquations) -> NDArray:
     """Covariance of the scaled vector (k, k) [1]; wide, but finite, where the recordings say nothing."""
     size = np.sqrt(np.diag(equations.hessian) + 1e-9)  # a parameter may have no effect at all
     values, vectors = np.linalg.eigh(equations.hessian / np.outer(size, size))
-    return (vectors / np.maximum(values, smallest_eigenvalue)) @ vectors.T / np.outer(size, size)
+    return (vectors / np.maximum(values, SMALLEST_EIGENVALUE)) @ vectors.T / np.outer(size, size)
 
 
-def _at_bound(estimate: Estimate, margin_share: float) -> bool:
+def _at_bound(estimate: Estimate) -> bool:
     """Whether a cause's parameter lies at an end of its range and is not merely nominal there."""
     for p, scaled in zip(estimate.hypothesis.parameters, estimate.cause_vector, strict=True):
         low, high = sorted((p.low, p.high))
-        value, margin = scaled * p.scale, margin_share * (high - low)
+        value, margin = scaled * p.scale, BOUND_MARGIN * (high - low)
         if min(value - low, high - value) < margin and abs(value - p.nominal) > margin:
             return True
     return False

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.special import log_softmax
 
-from identification.gap.design.settings import DesignSettings
 from identification.gap.fitting_problem import (
     FAILED_RESIDUAL,
     Estimate,
@@ -26,12 +25,26 @@ from identification.gap.fitting_problem import (
 )
 from identification.gap.gauss_newton import linearise, nuisance_slopes
 from identification.gap.plant import GreyBox
-from identification.gap.variable_projection import (
-    LinearisedRun,
-    normal_equations,
-    tolerances_as_slopes,
-)
+from identification.gap.variable_projection import LinearisedRun, normal_equations, tolerances_as_slopes
 from identification.gap.verdict import Ranking
+
+MOST_RIVALS = 4
+"""Most hypotheses between which an experiment is to decide; computing time."""
+
+PROBABILITY_HELD_BY_RIVALS = 0.99
+"""Share of the probability of all named hypotheses that the rivals hold [1]; at least two rivals."""
+
+LEAST_VARIANCE = 1e-10
+"""Variance of a direction of outcomes, relative to the widest one [1], below which the direction is left
+out as rounding."""
+
+OUTCOMES = 1000
+"""Simulated outcomes of each rival over which an experiment is averaged: expected probabilities are then
+known to 0.02 or better."""
+
+FORM_ERROR, SEGMENT_DURATION = 0.1, 5e-3
+"""Relative standard deviation by which a cause's effect may differ from our form in one segment [1]:
+textbook forms are accurate to some percent. Duration of a segment [s]: about one transient."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,7 +104,6 @@ def expected_information(
     problem: FittingProblem,
     plan: GreyBox,
     rivals: Rivals,
-    settings: DesignSettings | None = None,
 ) -> list[InformationGain]:
     """Expected information of each run of a plan; none where a rival cannot simulate the run.
 
@@ -99,9 +111,7 @@ def expected_information(
         problem: of the campaign, whose fitted runs give the rivals' posteriors.
         plan: the campaign's plant with the experiments as its runs; their readings are not used.
         rivals: hypotheses between which the experiment is to decide.
-        settings: judgement of the design; None: the defaults.
     """
-    settings = settings or DesignSettings()
     posteriors = parameter_posteriors(problem, rivals.estimates)
     planned, estimates = _planned_problem(problem, plan, rivals.estimates)
     predictions = linearise(planned, estimates, planned.all_runs)
@@ -113,10 +123,8 @@ def expected_information(
             means, covariances = np.zeros((len(own), 1)), np.ones((len(own), 1, 1))
         else:
             channels, period = run.measured.shape[0], float(run.time[1])
-            means, covariances = outcome_distributions(
-                own, posteriors, effects[r], channels, period, settings
-            )
-        gains.append(information_gain(means, covariances, rivals.probability, settings.outcomes))
+            means, covariances = outcome_distributions(own, posteriors, effects[r], channels, period)
+        gains.append(information_gain(means, covariances, rivals.probability, OUTCOMES))
     return gains
 
 
@@ -162,9 +170,8 @@ def _simulated_effects(
     ]
 
 
-def select_rivals(ranking: Ranking, settings: DesignSettings | None = None) -> Rivals:
+def select_rivals(ranking: Ranking) -> Rivals:
     """The most probable hypotheses of a diagnosis, the recalibrated model among them."""
-    settings = settings or DesignSettings()
     named = [
         (hypothesis.estimate, probability)
         for hypothesis, probability in zip(ranking.hypotheses, ranking.probabilities, strict=True)
@@ -173,8 +180,8 @@ def select_rivals(ranking: Ranking, settings: DesignSettings | None = None) -> R
     named.sort(key=lambda pair: -pair[1])
     total = max(sum(p for _, p in named), np.finfo(float).tiny)
     share = np.cumsum([p for _, p in named]) / total
-    enough = np.searchsorted(share, settings.probability_held_by_rivals) + 1
-    count = int(np.clip(enough, 2, min(settings.most_rivals, len(named))))
+    enough = np.searchsorted(share, PROBABILITY_HELD_BY_RIVALS) + 1
+    count = int(np.clip(enough, 2, min(MOST_RIVALS, len(named))))
     chosen = np.array([p for _, p in named[:count]])
     chosen = chosen / np.sum(chosen) if np.any(chosen) else np.full(count, 1.0 / count)
     return Rivals(
@@ -210,7 +217,6 @@ def outcome_distributions(
     effects: NDArray,
     channels: int,
     period: float,
-    settings: DesignSettings,
 ) -> tuple[NDArray, NDArray]:
     """Each rival's Gaussian of the outcome of one run.
 
@@ -223,7 +229,6 @@ def outcome_distributions(
         effects: effects of all rivals' causes of uncertain form, (values, causes) [noise deviations].
         channels: number of channels.
         period: of sampling [s].
-        settings: directions that count, size and segments of errors of form.
 
     Returns:
         Means (rivals, d) and covariances (rivals, d, d) [1].
@@ -242,9 +247,9 @@ def outcome_distributions(
     columns = np.column_stack([means, *spreads])
     gram = columns.T @ columns
     if effects.shape[1]:
-        errors = settings.form_error / np.sqrt(n) * effects
-        gram -= explained_by_form_errors(columns, errors, channels, period, settings.segment_duration)
-    coordinates = _coordinates(gram, settings.least_variance)
+        errors = FORM_ERROR / np.sqrt(n) * effects
+        gram -= explained_by_form_errors(columns, errors, channels, period, SEGMENT_DURATION)
+    coordinates = _coordinates(gram, LEAST_VARIANCE)
     ends = np.cumsum([n, *(spread.shape[1] for spread in spreads)])
     own = np.split(coordinates, ends[:-1], axis=1)
     covariances = [np.eye(len(coordinates)) + spread @ spread.T for spread in own[1:]]

@@ -13,10 +13,34 @@ from numpy.typing import NDArray
 
 from identification.gap.fitting_problem import Estimate, FittingProblem
 from identification.gap.gauss_newton import linearise
-from identification.gap.locate.settings import LocalisationSettings
 from identification.gap.plant import GreyBox, StateEquation, StateTrace, noise_weighted
 from identification.gap.sensor_faults import physical_forms, reading_faults
 from identification.gap.variable_projection import LinearisedRun
+
+WINDOWS, MOST_WINDOWS = 80, 400
+"""Windows of a run in which a forcing is constant, where they follow its motion, and the most of them
+elsewhere; where those are too few, only the first part of the run counts. Computing time."""
+
+LONGEST_WINDOW, RESOLVED_WINDOW = 1.5, 0.5
+"""Length of a window, half of the motion lying in shorter ones, up to which windows follow the motion,
+and where more are needed [time scales]: a third and a tenth of a period."""
+
+WINDOWS_TOGETHER, MOST_VALUES = 1200, 8_000_000
+"""Most windows of all runs, and most changes of a run's readings by its windows (64 MB), where they are
+more than usual: time and memory for matrices of this size."""
+
+UNIFORM_SHARE = 0.3
+"""Share of the windows spread uniformly in time [1]; the others follow the states' motion."""
+
+SAMPLES = 8000
+"""Most samples of the runs that are examined together, for time and memory; one run at least."""
+
+LATE_READINGS = 0.1
+"""Share of a run before its first reading that counts [1], beyond which the run is examined only where
+there is no other."""
+
+REGULARISATION = 1e-9
+"""Precision added to parameters that no reading determines [1], against a singular matrix."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,7 +177,6 @@ def quadratic_forms(
     estimate: Estimate,
     runs: Sequence[int],
     scale: float,
-    settings: LocalisationSettings,
 ) -> tuple[LocalisationDesign, list[QuadraticForm]]:
     """Quadratic form of every equation that can lack something, and of every fault of the readings.
 
@@ -162,15 +185,14 @@ def quadratic_forms(
         estimate: the model whose residual is to be explained.
         runs: indices of the runs.
         scale: the plant's time scale [s].
-        settings: windows and forms of faults.
     """
     plant, values = problem.plant, problem.candidate(estimate)
     traces = [plant.states(values, r) for r in runs]
     times = [plant.runs[r].time for r in runs]
-    most = most_windows(len(runs), len(plant.channels) * max(len(t) for t in times), settings)
+    most = most_windows(len(runs), len(plant.channels) * max(len(t) for t in times))
     first = [int(np.argmax(np.any(plant.runs[r].trusted, axis=0))) for r in runs]
     edges = [
-        resolving_edges(t, own, scale, most, begin, settings)
+        resolving_edges(t, own, scale, most, begin)
         for t, own, begin in zip(times, traces, first, strict=True)
     ]
     windows = [
@@ -180,7 +202,7 @@ def quadratic_forms(
     ]
     linearised = linearise(problem, [estimate], runs)[0]
     counted = [_counted(plant, r, ends) for r, ends in zip(runs, edges, strict=True)]
-    elimination = NuisanceElimination(linearised, counted, settings.regularisation)
+    elimination = NuisanceElimination(linearised, counted, REGULARISATION)
     forms = []
     for equation in plant.equations:
         if equation.step:
@@ -194,7 +216,7 @@ def quadratic_forms(
         chi_square=elimination.chi_square,
         readings=int(sum(np.sum(own) for own in counted)),
     )
-    return design, [*forms, *_fault_forms(problem, values, runs, elimination, settings)]
+    return design, [*forms, *_fault_forms(problem, values, runs, elimination)]
 
 
 def _counted(plant: GreyBox, run: int, edges: NDArray) -> NDArray:
@@ -226,11 +248,10 @@ def _fault_forms(
     values: Mapping[str, NDArray],
     runs: Sequence[int],
     elimination: NuisanceElimination,
-    settings: LocalisationSettings,
 ) -> list[QuadraticForm]:
     """Quadratic forms of the faults of the readings, in their physically possible forms."""
     forms = []
-    for fault in reading_faults(problem.plant, values, runs, settings):
+    for fault in reading_faults(problem.plant, values, runs):
         moment, precision = elimination.moment_and_precision(fault.changes, shared=True)
         kept = physical_forms(moment, precision, fault.either_sign)
         if np.any(kept):
@@ -244,9 +265,7 @@ def _fault_forms(
     return forms
 
 
-def most_misfitting_runs(
-    problem: FittingProblem, residuals: Sequence[NDArray], settings: LocalisationSettings
-) -> list[int]:
+def most_misfitting_runs(problem: FittingProblem, residuals: Sequence[NDArray]) -> list[int]:
     """Indices of the runs with the largest mean square residual, up to a number of samples together.
 
     A run whose readings count late only is taken where there is no other: what the model lacked before
@@ -254,11 +273,11 @@ def most_misfitting_runs(
 
     residuals: per run (channels, samples) [noise deviations].
     """
-    runs, samples = problem.plant.runs, settings.samples
+    runs, samples = problem.plant.runs, SAMPLES
     lengths = np.array([len(run.time) for run in runs])
     misfit = np.array([np.sum(residual**2) for residual in residuals]) / lengths
     begins = np.array([np.argmax(np.any(run.trusted, axis=0)) for run in runs]) / lengths
-    late = begins > settings.late_readings
+    late = begins > LATE_READINGS
     if not np.all(late):
         misfit = np.where(late, -1.0, misfit)
     first, *others = [run for run in np.argsort(-misfit, kind="stable").tolist() if misfit[run] >= 0]
@@ -276,7 +295,6 @@ def resolving_edges(
     scale: float,
     most: int,
     first: int,
-    settings: LocalisationSettings,
 ) -> NDArray:
     """Edges of windows that follow the motion: more than usual, and of a part of the run, if need be.
 
@@ -286,41 +304,38 @@ def resolving_edges(
         scale: the plant's time scale [s].
         most: most windows.
         first: sample at which such a part begins, with the first reading that counts.
-        settings: usual number and length of windows.
 
     Returns:
         First sample of each window, and the end of the last one, (windows + 1,).
     """
-    edges = window_edges(time, traces, settings.windows, settings)
+    edges = window_edges(time, traces, WINDOWS)
     typical = _typical_length(edges, traces) * (time[1] - time[0]) / scale
-    if typical <= settings.longest_window:
+    if typical <= LONGEST_WINDOW:
         return edges
-    needed = int(np.ceil(settings.windows * typical / settings.resolved_window))
+    needed = int(np.ceil(WINDOWS * typical / RESOLVED_WINDOW))
     if needed > most:
-        part = slice(first, first + max(settings.windows, int(len(time) * most / needed)))
+        part = slice(first, first + max(WINDOWS, int(len(time) * most / needed)))
         traces = {name: replace(trace, values=trace.values[part]) for name, trace in traces.items()}
-        return first + window_edges(time[part], traces, most, settings)
-    return window_edges(time, traces, needed, settings)
+        return first + window_edges(time[part], traces, most)
+    return window_edges(time, traces, needed)
 
 
-def most_windows(runs: int, values: int, settings: LocalisationSettings) -> int:
+def most_windows(runs: int, values: int) -> int:
     """Most windows of one of several runs.
 
     runs: number of runs. values: number of readings of the longest one, over all channels.
     """
-    most = min(settings.most_windows, settings.windows_together // runs, settings.most_values // values)
-    return max(settings.windows, most)
+    most = min(MOST_WINDOWS, WINDOWS_TOGETHER // runs, MOST_VALUES // values)
+    return max(WINDOWS, most)
 
 
-def window_edges(
-    time: NDArray, traces: Mapping[str, StateTrace], windows: int, settings: LocalisationSettings
-) -> NDArray:
+def window_edges(time: NDArray, traces: Mapping[str, StateTrace], windows: int) -> NDArray:
     """First sample of each window and the end of the last one, dense where states move, (windows + 1,).
 
     time: (samples,) [s]. traces: states of the run by name. windows: most windows. No window is empty.
     """
     uniform = np.full(len(time) - 1, 1.0 / (len(time) - 1))
-    share = settings.uniform_share
+    share = UNIFORM_SHARE
     density = share * uniform + (1 - share) * np.mean([*_motion(traces), uniform], axis=0)
     progress = np.concatenate([[0.0], np.cumsum(density)]) / np.sum(density)
     ends = np.searchsorted(progress, np.linspace(0.0, 1.0, windows + 1)[1:-1])

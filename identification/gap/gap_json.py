@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from epv_env.common.files import write_json
-from identification.block_bootstrap import Interval
+from identification.block_bootstrap import LEVEL, Interval
 from identification.gap.diagnosis import Diagnosis, hypothesis_label
 from identification.gap.evidence import EvaluatedHypothesis
 from identification.gap.gaps import FLOOR
@@ -24,6 +24,20 @@ from identification.gap.posterior import variance_inflation
 from identification.gap.verdict import RankedCause
 
 GAP, TERM = "gap.json", "missing_term.json"
+
+LISTED_CAUSES = 10
+"""Most causes in gap.json; the others are the least probable."""
+
+LISTED_INCLUSION = 0.001
+"""Probability that an effect is part of the gap from which gap.json lists it (contract)."""
+
+DRAWN_TERM_SHARE = 0.2
+"""Share of the missing term that a state must explain [1] for the term to be drawn over it."""
+
+SYSTEMATIC_FORM_ERROR = 0.07
+"""Relative standard deviation of a cause's parameter by errors of its form that the recordings cannot
+show [1]: an error that is the same everywhere looks like another value of the parameter."""
+
 
 TERM_FORMAT = "epv-term/1"
 """Format of the file that holds a missing term."""
@@ -53,26 +67,40 @@ def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = 
         next_experiment: a sentence, empty where none was sought.
         term: name of the file beside gap.json that holds the missing term; None where none was written.
     """
-    conclusion = diagnosis.conclusion
-    causes = conclusion.causes[: diagnosis.settings.report.listed_causes]
-    separability = diagnosis.ranking.separability
+    conclusion, ranking = diagnosis.conclusion, diagnosis.ranking
+    separability, left = ranking.separability, remainder(diagnosis)
+    unexplained = diagnosis.reduction.unexplained
+    with_cause = diagnosis.best.hypothesis if diagnosis.best else ranking.recalibrated
     return {
         "format": "epv-gap/2",
         "verdict": conclusion.verdict,
         "where": _where(diagnosis),
-        "causes": [_cause(diagnosis, cause) for cause in causes],
+        "causes": [_cause(diagnosis, cause) for cause in conclusion.causes[:LISTED_CAUSES]],
         "ambiguity_set": [list(cause.effects) for cause in conclusion.ambiguity_set],
         "gap": _gap(diagnosis),
-        "unexplained": _unexplained(diagnosis),
-        "inclusion": inclusion(diagnosis),
-        "remainder": _remainder(diagnosis, term),
-        "discrepancy": discrepancy(diagnosis),
-        "parameters": _parameters(diagnosis),
-        "next_experiment": next_experiment,
-        "probability": {
-            "no_cause": diagnosis.ranking.no_cause,
-            "unknown": diagnosis.ranking.unknown,
+        "unexplained": {
+            "fraction": unexplained.fraction,
+            "still_predictable": unexplained.still_predictable,
+            "p_value": unexplained.p_value,
+            "location": remaining_location(diagnosis),
         },
+        "inclusion": inclusion(diagnosis),
+        "remainder": {
+            "fraction": left.share.value,
+            "low": left.share.low,
+            "high": left.share.high,
+            "component": left.component,
+            "equation": left.equation,
+            "term": term,
+        },
+        "discrepancy": discrepancy(diagnosis),
+        "parameters": {
+            "nominal": ranking.problem.values(diagnosis.nominal),
+            "recalibrated": fitted_values(diagnosis, ranking.recalibrated),
+            "with_cause": fitted_values(diagnosis, with_cause),
+        },
+        "next_experiment": next_experiment,
+        "probability": {"no_cause": ranking.no_cause, "unknown": ranking.unknown},
         "twins": {
             label: list(twins)
             for cause in diagnosis.judged
@@ -86,9 +114,8 @@ def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = 
 
 def inclusion(diagnosis: Diagnosis) -> dict[str, float]:
     """Probability that each effect is part of the gap, of effects with a noticeable one."""
-    least = diagnosis.settings.report.listed_inclusion
     found = diagnosis.ranking.inclusion.items()
-    return {name: min(float(probability), 1.0) for name, probability in found if probability >= least}
+    return {name: min(float(share), 1.0) for name, share in found if share >= LISTED_INCLUSION}
 
 
 def discrepancy(diagnosis: Diagnosis) -> dict[str, dict[str, float]]:
@@ -131,28 +158,6 @@ def remaining_location(diagnosis: Diagnosis) -> str | None:
     return f"{equation.component}: {equation.name}"
 
 
-def _unexplained(diagnosis: Diagnosis) -> dict[str, Any]:
-    unexplained = diagnosis.reduction.unexplained
-    return {
-        "fraction": unexplained.fraction,
-        "still_predictable": unexplained.still_predictable,
-        "p_value": unexplained.p_value,
-        "location": remaining_location(diagnosis),
-    }
-
-
-def _remainder(diagnosis: Diagnosis, term: str | None) -> dict[str, Any]:
-    found = remainder(diagnosis)
-    return {
-        "fraction": found.share.value,
-        "low": found.share.low,
-        "high": found.share.high,
-        "component": dict(found.component),
-        "equation": dict(found.equation),
-        "term": term,
-    }
-
-
 def _where(diagnosis: Diagnosis) -> dict[str, Any]:
     localisation = diagnosis.localisation
     return {
@@ -188,7 +193,8 @@ def _cause(diagnosis: Diagnosis, cause: RankedCause) -> dict[str, Any]:
 
 
 def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
-    gaps, best = diagnosis.reduction.gaps, _best_label(diagnosis)
+    gaps = diagnosis.reduction.gaps
+    best = hypothesis_label(diagnosis.best.hypothesis) if diagnosis.best else RECALIBRATED
     labels = {"nominal": NOMINAL, "recalibrated": RECALIBRATED, "with_cause": best}
     overall = {name: gaps[label].overall for name, label in labels.items()}
     overall["black_box_floor"] = diagnosis.reduction.black_box.overall
@@ -204,20 +210,6 @@ def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
             name: (gaps[label].percent or {}).get("overall") for name, label in labels.items()
         },
     }
-
-
-def _parameters(diagnosis: Diagnosis) -> dict[str, Any]:
-    recalibrated, best = diagnosis.ranking.recalibrated, diagnosis.best
-    return {
-        "nominal": diagnosis.ranking.problem.values(diagnosis.nominal),
-        "recalibrated": fitted_values(diagnosis, recalibrated),
-        "with_cause": fitted_values(diagnosis, best.hypothesis if best else recalibrated),
-    }
-
-
-def _best_label(diagnosis: Diagnosis) -> str:
-    """Label of the model that the verdict leaves in force."""
-    return hypothesis_label(diagnosis.best.hypothesis) if diagnosis.best else RECALIBRATED
 
 
 def write_results(
@@ -247,20 +239,22 @@ def write_results(
 
 def remainder(diagnosis: Diagnosis) -> Remainder:
     """What the verdict's first cause leaves; the whole gap where the verdict names none."""
-    location = diagnosis.remaining if diagnosis.named else _unnamed(diagnosis)
+    unnamed = diagnosis.localisation if _explainable(diagnosis) else None
+    location = diagnosis.remaining if diagnosis.named else unnamed
+    components = location.component_probabilities if location else {}
     return Remainder(
         share=_share_left(diagnosis),
-        component=_component_probabilities(location),
+        component=dict(sorted(components.items(), key=lambda pair: -pair[1])),
         equation=dict(location.equation_probabilities) if location else {},
         location=location,
-        term=drawn_term(diagnosis, location),
+        term=drawn_term(location),
     )
 
 
-def drawn_term(diagnosis: Diagnosis, location: Localisation | None) -> MissingTerm | None:
+def drawn_term(location: Localisation | None) -> MissingTerm | None:
     """The missing term, where one state explains enough of it to be drawn."""
     term = location.missing_term if location else None
-    return term if term and term.explained >= diagnosis.settings.report.drawn_term_share else None
+    return term if term and term.explained >= DRAWN_TERM_SHARE else None
 
 
 def term_table(term: MissingTerm) -> dict[str, Any]:
@@ -282,11 +276,6 @@ def term_table(term: MissingTerm) -> dict[str, Any]:
     }
 
 
-def _unnamed(diagnosis: Diagnosis) -> Localisation | None:
-    """Where the gap lies of which nothing is named; None where there is no gap."""
-    return diagnosis.localisation if _explainable(diagnosis) else None
-
-
 def _explainable(diagnosis: Diagnosis) -> bool:
     """Whether recalibration leaves more than noise."""
     return diagnosis.reduction.gaps[RECALIBRATED].overall.low > FLOOR
@@ -302,16 +291,6 @@ def _share_left(diagnosis: Diagnosis) -> Interval:
     return Interval(value=left, low=min(1.0 - closed.high, left), high=max(1.0 - closed.low, left))
 
 
-def _component_probabilities(location: Localisation | None) -> dict[str, float]:
-    """Of the equations and readings of each component together, the highest first."""
-    total: dict[str, float] = {}
-    for forcing in location.forcings if location else ():
-        component, name = forcing.equation.component, forcing.equation.name
-        share = location.equation_probabilities[name] if location else 0.0
-        total[component] = total.get(component, 0.0) + share
-    return dict(sorted(total.items(), key=lambda pair: -pair[1]))
-
-
 def fitted_values(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis) -> dict[str, float]:
     """Calibrated parameters, parameters of causes and the unit's tolerances by symbol [SI].
 
@@ -319,8 +298,7 @@ def fitted_values(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis) -> dict
     """
     problem = diagnosis.ranking.problem
     values = problem.values(hypothesis.estimate)
-    pairs = zip(problem.plant.tolerances, hypothesis.tolerances, strict=True)
-    for tolerance, deviation in pairs:
+    for tolerance, deviation in zip(problem.plant.tolerances, hypothesis.tolerances, strict=True):
         own = values.get(tolerance.symbol, tolerance.centre)
         values[tolerance.symbol] = float(own + deviation * tolerance.sd)
     return values
@@ -333,7 +311,7 @@ def parameter_intervals(
 
     No interval leaves the parameter's physical range.
     """
-    quantile = norm.ppf(0.5 + diagnosis.settings.reduction.interval_level / 2)
+    quantile = norm.ppf(0.5 + LEVEL / 2)
     estimate = hypothesis.estimate
     covariance = parameter_covariance(diagnosis, hypothesis)
     deviations = np.sqrt(np.diag(covariance))[estimate.cause_start :]
@@ -353,7 +331,6 @@ def parameter_covariance(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis) 
     Noise and discrepancy of the readings, as large and as correlated as they are, and errors of form
     that no recording shows.
     """
-    systematic_form_error = diagnosis.settings.report.systematic_form_error
     inflation = variance_inflation(hypothesis, diagnosis.ranking.discrepancies)
     estimate = hypothesis.estimate
     deviations = np.zeros(len(estimate.vector))
@@ -361,5 +338,5 @@ def parameter_covariance(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis) 
     pairs = zip(estimate.hypothesis.parameters, exact, strict=True)
     for i, (p, known) in enumerate(pairs, start=estimate.cause_start):
         acting = estimate.vector[i] * p.scale - p.nominal
-        deviations[i] = 0.0 if known else systematic_form_error * acting
+        deviations[i] = 0.0 if known else SYSTEMATIC_FORM_ERROR * acting
     return inflation * hypothesis.covariance + np.diag(deviations**2)

@@ -16,15 +16,24 @@ from identification.block_bootstrap import (
     interval,
 )
 from identification.gap.discrepancy import LAGS, noise_ratios, squared_differences
-from identification.gap.locate.settings import LocalisationSettings
 from identification.gap.plant import GreyBox, Run
-from identification.gap.reduce.settings import ReductionSettings
 
 FLOOR = 1.0
 """Gap that noise alone leaves [noise deviations]; a definition."""
 
+SHARE_STEPS = 1000
+"""Steps between 0 and 1 in which the interval of a share is searched."""
+
 WHOLE = "the_whole_recording"
 """The one regime of a plant that tells none apart."""
+
+REGIME_BLOCK, REGIME_BLOCK_SHARE = 4.0, 0.05
+"""Longest part of a regime that the bootstrap draws as one [time scales], longer than residuals
+correlate; relative to the shortest run [1] where that is less."""
+
+FEWEST_PARTS = 5
+"""Fewest parts of a regime. With fewer on held-out runs all runs count; with fewer on all runs the gap
+has no interval."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +57,6 @@ class GapDraws:
         plant: GreyBox,
         residuals: Mapping[str, Sequence[NDArray]],
         seed: int,
-        settings: ReductionSettings,
         scale: float,
     ):
         """Sum squares over blocks of the held-out runs.
@@ -57,11 +65,9 @@ class GapDraws:
             plant: the plant with its recordings.
             residuals: by model, per run (channels, samples) [noise deviations].
             seed: of the bootstrap.
-            settings: of the bootstrap and the noise floor.
             scale: the plant's time scale [s].
         """
         self.plant = plant
-        self.settings = settings
         self._scale = scale
         held_out = [run for run in plant.runs if run.held_out]
         blocks = [len(block_starts(len(run.time), block_samples(run, scale))) for run in held_out]
@@ -73,7 +79,7 @@ class GapDraws:
         squares = {label: self._sums([np.square(y) for y in own]) for label, own in residuals.items()}
         best = min(squares, key=lambda label: np.sum(squares[label][0]))
         variograms = np.array([self._variogram(residuals[best], lag) for lag in LAGS])
-        self.noise = noise_ratios(variograms, squares[best] / self._readings, settings)
+        self.noise = noise_ratios(variograms, squares[best] / self._readings)
         """Noise deviation relative to the channel's, (1 + draws, channels) [1]."""
         self._squares = {label: own / self.noise**2 for label, own in squares.items()}
 
@@ -111,7 +117,7 @@ class GapDraws:
         )
 
     def _share_closed(self, base: str, label: str) -> Interval:
-        grid = np.linspace(0.0, 1.0, self.settings.share_steps + 1)
+        grid = np.linspace(0.0, 1.0, SHARE_STEPS + 1)
         whole, closed = self.overall(base) - FLOOR, self.overall(base) - self.overall(label)
         value = float(np.clip(closed[0] / whole[0], 0, 1)) if whole[0] > 0 else 0.0
         below = np.mean(closed[1:, None] < grid * whole[1:, None], axis=0)
@@ -125,7 +131,7 @@ class GapDraws:
 
         residuals: per run (channels, samples) [noise deviations].
         """
-        differences = squared_differences(self.plant, residuals, lag, self.settings)
+        differences = squared_differences(self.plant, residuals, lag)
         changes, count = [self._sums(own) for own in differences]
         return 0.5 * changes / np.maximum(count, np.finfo(float).tiny)
 
@@ -173,8 +179,6 @@ def regime_gaps(
     masks: Sequence[Mapping[str, NDArray]],
     residuals: Sequence[NDArray],
     seed: int,
-    settings: LocalisationSettings,
-    bootstrap: ReductionSettings,
     scale: float,
 ) -> list[RegimeGap]:
     """The gap of every channel in every regime that occurs.
@@ -186,21 +190,19 @@ def regime_gaps(
         masks: per run, samples of each regime, boolean (samples,) by name.
         residuals: per run (channels, samples) [noise deviations], 0 at untrusted readings.
         seed: of the bootstrap.
-        settings: length and least number of the parts of a regime.
-        bootstrap: number of draws, and level of the intervals.
         scale: the plant's time scale [s].
     """
     shortest = min(float(run.time[-1]) for run in plant.runs)
-    block = min(settings.regime_block * scale, settings.regime_block_share * shortest)
+    block = min(REGIME_BLOCK * scale, REGIME_BLOCK_SHARE * shortest)
     gaps = []
     for regime in masks[0]:
         own = [mask[regime] for mask in masks]
-        squares, counts, held_out = _sums(plant, own, residuals, block, settings.fewest_parts)
+        squares, counts, held_out = _sums(plant, own, residuals, block, FEWEST_PARTS)
         parts = squares.shape[1]
-        weights = block_weights([parts], seed) if parts >= settings.fewest_parts else None
+        weights = block_weights([parts], seed) if parts >= FEWEST_PARTS else None
         for channel, square, count in zip(plant.channels, squares, counts, strict=True):
             if np.any(count):
-                gap, low, high = _gap_and_interval(square, count, weights, bootstrap)
+                gap, low, high = _gap_and_interval(square, count, weights)
                 gaps.append(
                     RegimeGap(
                         channel=channel.name,
@@ -256,7 +258,7 @@ def _part_sums(
 
 
 def _gap_and_interval(
-    squares: NDArray, counts: NDArray, weights: NDArray | None, bootstrap: ReductionSettings
+    squares: NDArray, counts: NDArray, weights: NDArray | None
 ) -> tuple[float, float, float]:
     """Root mean square and its interval from sums over parts (parts,); weights: None for too few."""
     if weights is None:

@@ -12,16 +12,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.block_bootstrap import Interval, block_starts
-from identification.gap.black_box import Learner, predict_residuals, ridge_learner
+from identification.gap.black_box import Learner, predict_residuals, ridge_on_random_features
 from identification.gap.fitting_problem import Estimate, FittingProblem
 from identification.gap.gaps import FLOOR, Gap, GapDraws, block_samples
 from identification.gap.plant import GreyBox
 from identification.gap.prediction import Prediction, percentage_errors, predict
-from identification.gap.reduce.settings import ReductionSettings
 from identification.gap.time_scale import time_scale
 
 NOMINAL, RECALIBRATED = "nominal", "recalibrated"
 """Labels of the two models without a cause."""
+
+PERMUTATIONS, SIGNIFICANCE = 1999, 0.01
+"""Random orders of blocks behind a p-value, which is then at least 0.0005, and the p-value below which a
+prediction is not chance."""
+
+LEAST_GAP_CLOSED, LEAST_SHARE_CLOSED = 0.02, 0.05
+"""Gap that a prediction must close to matter [noise deviations], and share of the explainable gap [1];
+the larger of both holds."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,24 +66,21 @@ class DiscrepancyReduction:
 def measure_discrepancy_reduction(
     problem: FittingProblem,
     estimates: Mapping[str, Estimate],
-    learner: Learner | None = None,
+    learner: Learner = ridge_on_random_features,
     seed: int = 0,
-    settings: ReductionSettings | None = None,
 ) -> DiscrepancyReduction:
     """Judge fitted models on the held-out runs.
 
     Args:
         problem: the plant with its readings.
         estimates: 'nominal', 'recalibrated' and the causes by label, the best cause first.
-        learner: the black box; None: ridge regression on random features.
+        learner: the black box.
         seed: of the bootstrap, the random features and the permutations.
-        settings: judgement of the reduction; None: the defaults.
 
     Raises:
         ValueError: where no run is held out.
     """
-    settings, plant = settings or ReductionSettings(), problem.plant
-    learner = learner or ridge_learner(settings)
+    plant = problem.plant
     if not any(run.held_out for run in plant.runs):
         raise ValueError("no run is held out: how far a gap shrinks is judged on runs never fitted to")
     predictions = {label: predict(problem, estimate) for label, estimate in estimates.items()}
@@ -84,14 +88,12 @@ def measure_discrepancy_reduction(
     best = (*causes, RECALIBRATED)[0]
     scale = time_scale(plant)
     boxes = {
-        label: predict_residuals(plant, predictions[label], learner, seed, settings, scale)
+        label: predict_residuals(plant, predictions[label], learner, seed, scale)
         for label in {RECALIBRATED, best}
     }
     boxes = {label: _helpful(predictions[label].residuals, box, plant) for label, box in boxes.items()}
-    draws = GapDraws(plant, _all_residuals(predictions, boxes), seed, settings, scale)
-    significance = p_value(
-        plant, predictions[best].residuals, boxes[best], seed, scale, settings.permutations
-    )
+    draws = GapDraws(plant, _all_residuals(predictions, boxes), seed, scale)
+    significance = p_value(plant, predictions[best].residuals, boxes[best], seed, scale)
     ratios = zip(plant.channels, draws.noise[0], strict=True)
     return DiscrepancyReduction(
         gaps={
@@ -156,17 +158,16 @@ def _unexplained(draws: GapDraws, best: str, significance: float) -> Unexplained
 
     significance: p-value of the black box's prediction.
     """
-    settings = draws.settings
     recalibrated = draws.gap(RECALIBRATED).overall
     left, boxed = draws.overall(best)[0], draws.overall(_boxed(best))[0]
     explainable = max(recalibrated.value - FLOOR, 0.0)
     above, predicted = left**2 - FLOOR**2, left**2 - boxed**2
-    matters = max(settings.least_gap_closed, settings.least_share_closed * explainable)
+    matters = max(LEAST_GAP_CLOSED, LEAST_SHARE_CLOSED * explainable)
     return Unexplained(
         fraction=_share(left - FLOOR, explainable) if recalibrated.low > FLOOR else 0.0,
         predictable=_share(predicted, above),
         p_value=significance,
-        still_predictable=bool(significance < settings.significance and left - boxed > matters),
+        still_predictable=bool(significance < SIGNIFICANCE and left - boxed > matters),
     )
 
 
@@ -181,7 +182,6 @@ def p_value(
     predicted: Sequence[NDArray],
     seed: int,
     scale: float,
-    permutations: int,
 ) -> float:
     """Probability that blocks of the residual in random order agree as well with the prediction.
 
@@ -194,13 +194,12 @@ def p_value(
         predicted: per run (channels, samples) [noise deviations].
         seed: of the permutations.
         scale: the plant's time scale [s].
-        permutations: number of random orders.
 
     Returns:
         1 where nothing is predicted.
     """
     rng = np.random.default_rng(seed)
-    agreement = np.zeros(permutations + 1)
+    agreement = np.zeros(PERMUTATIONS + 1)
     for run, residual, prediction in zip(plant.runs, residuals, predicted, strict=True):
         if not run.held_out:
             continue
@@ -208,7 +207,7 @@ def p_value(
         products = blocks[0] @ blocks[1].T
         order = np.arange(len(products))
         agreement[0] += np.trace(products)
-        agreement[1:] += [products[order, rng.permutation(order)].sum() for _ in range(permutations)]
+        agreement[1:] += [products[order, rng.permutation(order)].sum() for _ in range(PERMUTATIONS)]
     if not any(np.any(prediction) for prediction in predicted):
         return 1.0
     return float(np.mean(agreement >= agreement[0]))

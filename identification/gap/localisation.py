@@ -22,13 +22,37 @@ from identification.gap.forcing import (
     quadratic_forms,
 )
 from identification.gap.gaps import RegimeGap, regime_gaps, regimes_of
-from identification.gap.locate.settings import LocalisationSettings
 from identification.gap.plant import StateEquation
-from identification.gap.reduce.settings import ReductionSettings
 from identification.gap.time_scale import time_scale
 
 FREE, SLOW = "free", "slow"
 """Processes in time: independent windows, or neighbours alike. Other processes bear a state's name."""
+
+AMPLITUDES = np.logspace(-3.0, 9.0, 37)
+"""Variances of a forcing over which the evidence is averaged, relative to what the readings tell of it
+on average [1]: from no effect to far beyond any gap, three per decade."""
+
+STATE_LENGTH, TIME_MEMORY = 0.2, 0.02
+"""Correlation length of a function of a state, relative to the state's range: the smooth terms of
+physics bend once or twice. Correlation time of a slow forcing, relative to the longest run [1]."""
+
+ROUGH_VARIANCE = 1e-3
+"""Variance by which single windows may depart from a smooth forcing, relative to the whole [1]."""
+
+IDENTIFIABLE_SHARE = 1e-7
+"""Precision of a direction of forcings, relative to the most precise one [1], below which the direction
+is left out: rounding is no information."""
+
+RIVAL_SHARE = 0.5
+"""Share of what the best equation explains [1], below which functions of states are not tried."""
+
+PRIOR_NOTHING, PRIOR_READING = 0.9, 0.3
+"""Probability before any data that nothing is missing: only clear evidence names an equation. That of a
+fault of the readings relative to an equation: sensors are checked more often than physics."""
+
+EVIDENCE_DOUBT = 0.5
+"""Log evidences are divided by this number times the root of the largest one [1], since the assumed
+forms of a forcing are not exact."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,6 +112,15 @@ class Localisation:
         """The forcing of the equation or fault with the highest probability."""
         return max(self.forcings, key=lambda f: self.equation_probabilities[f.equation.name])
 
+    @property
+    def component_probabilities(self) -> dict[str, float]:
+        """Of the equations and readings of each component together."""
+        total: dict[str, float] = {}
+        for forcing in self.forcings:
+            component, name = forcing.equation.component, forcing.equation.name
+            total[component] = total.get(component, 0.0) + self.equation_probabilities[name]
+        return total
+
 
 @dataclass(frozen=True, kw_only=True)
 class ProcessFit:
@@ -116,10 +149,10 @@ class ProcessFit:
 class IdentifiableSubspace:
     """The d directions of an equation's forcings that the readings determine."""
 
-    def __init__(self, form: QuadraticForm, least_share: float):
-        """Keep the directions with at least this share of the highest precision [1]."""
+    def __init__(self, form: QuadraticForm):
+        """Keep the directions that are precise enough."""
         precision, axes = np.linalg.eigh(form.precision)
-        kept = precision > least_share * max(precision[-1], np.finfo(float).tiny)
+        kept = precision > IDENTIFIABLE_SHARE * max(precision[-1], np.finfo(float).tiny)
         self.form = form
         self.root = axes[:, kept] * np.sqrt(precision[kept])
         """Square root of the precision, precision = root root', (windows, d)."""
@@ -132,8 +165,6 @@ def locate(
     estimate: Estimate,
     residuals: Sequence[NDArray],
     seed: int,
-    settings: LocalisationSettings | None = None,
-    bootstrap: ReductionSettings | None = None,
 ) -> Localisation:
     """Locate what a model, recalibrated or with causes, leaves unexplained.
 
@@ -143,25 +174,22 @@ def locate(
         residuals: its residuals, per run (channels, samples) [noise deviations], nuisance parameters
             accounted for.
         seed: of the bootstrap of the regimes' gaps.
-        settings: judgement of the localisation; None: the defaults.
-        bootstrap: settings of the intervals; None: the defaults.
     """
-    settings, bootstrap = settings or LocalisationSettings(), bootstrap or ReductionSettings()
     plant, values = problem.plant, problem.candidate(estimate)
     masks = [regimes_of(plant, values, r) for r in problem.all_runs]
-    runs = most_misfitting_runs(problem, residuals, settings)
+    runs = most_misfitting_runs(problem, residuals)
     scale = time_scale(plant)
-    design, forms = quadratic_forms(problem, estimate, runs, scale, settings)
-    fits = fit_processes(forms, design, settings)
+    design, forms = quadratic_forms(problem, estimate, runs, scale)
+    fits = fit_processes(forms, design)
     evidence = np.array([average_log_evidence(own) for own in fits])
-    priors = [1.0 if form.windows else settings.prior_reading for form in forms]
-    weights = _probabilities(evidence, priors, settings)
+    priors = [1.0 if form.windows else PRIOR_READING for form in forms]
+    weights = _probabilities(evidence, priors)
     order = np.argsort(-evidence, kind="stable")
     likeliest = fits[int(np.argmax(weights[:-1]))]
     missing = weights[-1] < np.max(weights[:-1])
     return Localisation(
         channel_gaps=_channel_gaps(problem, residuals),
-        regime_gaps=regime_gaps(plant, masks, residuals, seed, settings, bootstrap, scale),
+        regime_gaps=regime_gaps(plant, masks, residuals, seed, scale),
         equation_probabilities={equation.name: 0.0 for equation in plant.equations}
         | {form.equation.name: float(w) for form, w in zip(forms, weights[:-1], strict=True)},
         nothing_missing=float(weights[-1]),
@@ -170,18 +198,15 @@ def locate(
     )
 
 
-def _probabilities(
-    evidence: NDArray, priors: Sequence[float], settings: LocalisationSettings
-) -> NDArray:
+def _probabilities(evidence: NDArray, priors: Sequence[float]) -> NDArray:
     """Probability of each place (places,) and, last, that nothing is missing.
 
     evidence: log evidence of each place, (places,). priors: relative probability before any data.
     """
     largest = max(float(np.max(evidence)), 0.0)
-    doubt = max(1.0, settings.evidence_doubt * np.sqrt(largest))
-    nothing = settings.prior_nothing
-    prior = (1 - nothing) * np.array(priors) / np.sum(priors)
-    score = np.append(evidence / doubt + np.log(prior), np.log(nothing))
+    doubt = max(1.0, EVIDENCE_DOUBT * np.sqrt(largest))
+    prior = (1 - PRIOR_NOTHING) * np.array(priors) / np.sum(priors)
+    score = np.append(evidence / doubt + np.log(prior), np.log(PRIOR_NOTHING))
     weights = np.exp(score - np.max(score))
     return weights / np.sum(weights)
 
@@ -238,22 +263,20 @@ def _missing_term(
     )
 
 
-def fit_processes(
-    forms: Sequence[QuadraticForm], design: LocalisationDesign, settings: LocalisationSettings
-) -> list[list[ProcessFit]]:
+def fit_processes(forms: Sequence[QuadraticForm], design: LocalisationDesign) -> list[list[ProcessFit]]:
     """Every process for each equation, by falling evidence.
 
     Functions of states are tried only for equations that explain about as much as the best one.
     """
-    subspaces = [IdentifiableSubspace(form, settings.identifiable_share) for form in forms]
+    subspaces = [IdentifiableSubspace(form) for form in forms]
     fits = [
-        [_fit(own, design, kind, settings) for kind in ((FREE, SLOW) if own.form.windows else (FREE,))]
+        [_fit(own, design, kind) for kind in ((FREE, SLOW) if own.form.windows else (FREE,))]
         for own in subspaces
     ]
-    enough = settings.rival_share * max(own_fits[0].explained for own_fits in fits)
+    enough = RIVAL_SHARE * max(own_fits[0].explained for own_fits in fits)
     for subspace, own_fits in zip(subspaces, fits, strict=True):
         if subspace.form.windows and own_fits[0].explained >= enough:
-            own_fits += [_fit(subspace, design, state, settings) for state in design.units]
+            own_fits += [_fit(subspace, design, state) for state in design.units]
         own_fits.sort(key=lambda fit: -fit.log_evidence)
     return fits
 
@@ -263,24 +286,24 @@ def average_log_evidence(fits: Sequence[ProcessFit]) -> float:
     return float(logsumexp([fit.log_evidence for fit in fits]) - np.log(len(fits)))
 
 
-def _covariance(form: QuadraticForm, kind: str, settings: LocalisationSettings) -> tuple[NDArray, float]:
+def _covariance(form: QuadraticForm, kind: str) -> tuple[NDArray, float]:
     """Prior covariance of the smooth part (windows, windows), and variance of each window's own part."""
     count, windows = len(form.moment), form.windows
     if kind == FREE:
         return np.zeros((count, count)), 1.0
     if kind == SLOW:
-        return _slow_covariance(windows, settings.time_memory), settings.rough_variance
+        return _slow_covariance(windows), ROUGH_VARIANCE
     x = np.array([window.states[kind] for window in windows])
-    length = settings.state_length * max(float(np.ptp(x)), np.finfo(float).tiny)
+    length = STATE_LENGTH * max(float(np.ptp(x)), np.finfo(float).tiny)
     distance = (x[:, None] - x) / length
-    return np.exp(-0.5 * distance**2), settings.rough_variance
+    return np.exp(-0.5 * distance**2), ROUGH_VARIANCE
 
 
-def _slow_covariance(windows: Sequence[Window], time_memory: float) -> NDArray:
+def _slow_covariance(windows: Sequence[Window]) -> NDArray:
     """Exponential covariance in time within each run, (windows, windows) [1]."""
     run = np.array([window.run for window in windows])
     time = np.array([0.5 * (window.begin + window.end) for window in windows])
-    memory = time_memory * max(window.end for window in windows)
+    memory = TIME_MEMORY * max(window.end for window in windows)
     return np.where(run[:, None] == run, np.exp(-np.abs(time[:, None] - time) / memory), 0.0)
 
 
@@ -288,18 +311,16 @@ def _fit(
     subspace: IdentifiableSubspace,
     design: LocalisationDesign,
     kind: str,
-    settings: LocalisationSettings,
 ) -> ProcessFit:
     """Evidence averaged over the amplitudes, and the forcing at the most likely amplitude."""
-    smooth, own = _covariance(subspace.form, kind, settings)
+    smooth, own = _covariance(subspace.form, kind)
     smooth_root = smooth @ subspace.root
     root = smooth_root + own * subspace.root
     strength, axes = np.linalg.eigh(subspace.root.T @ root)
     strength = np.maximum(strength, 0.0)
     moment = axes.T @ subspace.moment
     # Where no reading tells of this forcing every strength is 0, and any amplitude will do.
-    grid = np.logspace(*settings.amplitude_decades, settings.amplitudes)
-    amplitudes = grid / (np.mean(strength) if np.any(strength) else 1.0)
+    amplitudes = AMPLITUDES / (np.mean(strength) if np.any(strength) else 1.0)
     weights = amplitudes[:, None] / (1.0 + amplitudes[:, None] * strength)
     explained = (weights * strength) @ moment**2
     noise = np.maximum(1.0, (design.chi_square - explained) / design.readings)

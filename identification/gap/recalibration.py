@@ -17,9 +17,11 @@ from identification.gap.gauss_newton import fit, nuisance_slopes
 from identification.gap.plant import GreyBox
 from identification.gap.prediction import predict
 from identification.gap.prepared_plant import PreparedPlant, prepared
-from identification.gap.rank.settings import RankingSettings
-from identification.gap.reduce.settings import ReductionSettings
 from identification.gap.screening import Start
+
+WRONG_NOISE_RATIO = 1.25
+"""Ratio of the noise that the residuals show to the stated noise, or its inverse, above which the stated
+noise is corrected [1]: less changes no judgement."""
 
 
 def recalibrate(
@@ -34,7 +36,7 @@ def recalibrate(
     Args:
         plant: the model and its recordings.
         cache: runs the fits; None keeps nothing.
-        thorough: whether fits go on until little is left to gain.
+        thorough: whether fits go on until little is left to gain, as a small catalogue allows.
         prefix: of the names of both fits in the journal.
     """
     cache = cache or FitCache(plant)
@@ -63,17 +65,8 @@ def with_own_nuisances(
     evaluated: Sequence[EvaluatedHypothesis],
     name: str,
     cache: FitCache,
-    settings: RankingSettings,
 ) -> list[EvaluatedHypothesis]:
-    """Hypotheses fitted further, with nuisance slopes taken at each estimate.
-
-    Args:
-        problem: readings and settings of the fits.
-        evaluated: the hypotheses.
-        name: of this step in the journal.
-        cache: runs the fits.
-        settings: of the evaluation.
-    """
+    """Hypotheses fitted further, with nuisance slopes taken at each estimate; name: in the journal."""
     if not evaluated:
         return []
     estimates = [each.estimate for each in evaluated]
@@ -84,19 +77,13 @@ def with_own_nuisances(
     fitted = cache(name, partial(fit, problem, starts))
     # A journal keeps no slopes.
     refined = [replace(e, slopes=own) for e, own in zip(fitted, slopes, strict=True)]
-    return evaluate(problem, refined, settings)
+    return evaluate(problem, refined)
 
 
-def with_seen_noise(
-    problem: FittingProblem, base: Estimate, settings: RankingSettings, floor: ReductionSettings
-) -> PreparedPlant:
+def with_seen_noise(problem: FittingProblem, base: Estimate) -> PreparedPlant:
     """The plant with the noise that the residuals show; the same object where that is near the stated.
 
-    Args:
-        problem: readings weighted by the stated noise.
-        base: the recalibrated model.
-        settings: which ratio is near.
-        floor: how noise is seen in residuals.
+    problem: readings weighted by the stated noise. base: the recalibrated model.
     """
     plant = prepared(problem.plant)
     residuals = predict(problem, base).residuals
@@ -104,34 +91,27 @@ def with_seen_noise(
     counts = np.sum([np.sum(run.trusted, axis=1) for run in plant.runs], axis=0)
     variograms = []
     for lag in LAGS:
-        changes, kept = squared_differences(plant, residuals, lag, floor)
+        changes, kept = squared_differences(plant, residuals, lag)
         total = np.sum([np.sum(change, axis=1) for change in changes], axis=0)
         number = np.sum([np.sum(keep, axis=1) for keep in kept], axis=0)
         variograms.append(0.5 * total / np.maximum(number, 1))
-    ratios = noise_ratios(np.array(variograms)[:, None], (squares / np.maximum(counts, 1))[None], floor)[
-        0
-    ]
-    limit = settings.wrong_noise_ratio
-    wrong = (ratios > limit) | (ratios < 1.0 / limit)
+    mean_squares = squares / np.maximum(counts, 1)
+    ratios = noise_ratios(np.array(variograms)[:, None], mean_squares[None])[0]
+    wrong = (ratios > WRONG_NOISE_RATIO) | (ratios < 1.0 / WRONG_NOISE_RATIO)
     if not np.any(wrong):
         return plant
     return plant.with_noise(np.where(wrong, ratios, 1.0).tolist())
 
 
-def with_disturbance(
-    plant: PreparedPlant, discrepancies: Sequence[ChannelDiscrepancy], settings: RankingSettings
-) -> PreparedPlant:
+def with_disturbance(plant: PreparedPlant, discrepancies: Sequence[ChannelDiscrepancy]) -> PreparedPlant:
     """The plant whose disturbed channels weigh as much as they tell; the same object where none is.
 
     Readings under a slow disturbance do not err independently: n of them tell as much as n/inflation.
     Weighted as white noise, such a channel would pull the parameters after its disturbance.
 
-    Args:
-        plant: with the noise that the readings show.
-        discrepancies: of each channel, under the best hypothesis.
-        settings: which ratio of noises matters.
+    plant: with the noise that the readings show. discrepancies: under the best hypothesis.
     """
     ratios = [np.sqrt(d.floor * d.inflation) if d.inflation > 1.0 else 1.0 for d in discrepancies]
-    if max(ratios) <= settings.wrong_noise_ratio:
+    if max(ratios) <= WRONG_NOISE_RATIO:
         return plant
     return plant.with_noise([max(float(ratio), 1.0) for ratio in ratios])

@@ -10,20 +10,15 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from identification.block_bootstrap import Interval
+from identification.block_bootstrap import LEVEL, Interval
 from identification.gap.diagnosis import Diagnosis, hypothesis_title
-from identification.gap.gap_json import parameter_intervals
-from identification.gap.gaps import FLOOR, Gap, RegimeGap
+from identification.gap.gaps import FLOOR, RegimeGap
 from identification.gap.held_out import DiscrepancyReduction
 from identification.gap.localisation import ForcingEstimate, MissingTerm
-from identification.gap.plant import FreeParameter, GreyBox
+from identification.gap.plant import GreyBox
 from identification.gap.quantities import (
     probability_text,
-    quantity_with_interval,
-    readable_unit,
-    three_digits,
 )
-from identification.gap.sentences import mentioned_causes
 
 NAMED, OTHER, NO_NAME = "tab:blue", "0.7", "tab:orange"
 """Colours: causes that the verdict names, other causes, hypotheses without a named cause."""
@@ -31,6 +26,12 @@ NAMED, OTHER, NO_NAME = "tab:blue", "0.7", "tab:orange"
 NO_CAUSE, UNKNOWN_CAUSE, NOTHING = "no cause needed", "not in the catalogue", "nothing missing"
 
 OTHERS = "all other sets of causes"
+
+HEAT_MAP_RANGE = 10.0
+"""Upper end of the heat map's colours, unless a gap is larger [noise deviations]."""
+
+QUANTILE = float(norm.ppf(0.5 + LEVEL / 2))
+"""Half the width of a band [standard deviations]."""
 
 BAND = "lightskyblue"
 """Colour of an interval."""
@@ -67,88 +68,6 @@ def location_figure(diagnosis: Diagnosis) -> Figure:
     return figure
 
 
-def size_figure(diagnosis: Diagnosis) -> Figure:
-    """Fitted sizes with intervals in their physical range; of improbable causes only if all are."""
-    causes = mentioned_causes(diagnosis) or diagnosis.judged
-    rows = [
-        (hypothesis_title(cause.hypothesis), parameter, interval)
-        for cause in causes
-        for parameter, interval in zip(
-            cause.hypothesis.estimate.hypothesis.parameters,
-            parameter_intervals(diagnosis, cause.hypothesis),
-            strict=True,
-        )
-    ]
-    figure = Figure(
-        figsize=(9.5, 0.7 + 0.62 * row_height(name for name, _, _ in rows) * len(rows)),
-        layout="constrained",
-    )
-    axes = figure.subplots()
-    for row, (_, parameter, interval) in enumerate(rows):
-        _draw_in_range(axes, row, parameter, interval)
-    names = [f"{wrapped(name)}\n{p.symbol}" for name, p, _ in rows]
-    axes.set_yticks(range(len(rows)), names, fontsize=8)
-    axes.set_ylim(len(rows) - 0.4, -0.6)
-    axes.set_xlim(-0.03, 1.03)
-    axes.set_xticks([])
-    axes.set_xlabel("from one end of the physical range to the other (| nominal model)")
-    for side in ("top", "right", "left", "bottom"):
-        axes.spines[side].set_visible(False)
-    return figure
-
-
-def parameter_change_figure(diagnosis: Diagnosis) -> Figure:
-    """How far the calibrated parameters moved from their nominal values [%]."""
-    problem = diagnosis.ranking.problem
-    estimates = {"recalibrated": diagnosis.ranking.recalibrated.estimate}
-    if diagnosis.best:
-        best = diagnosis.best.hypothesis
-        estimates[f"with {hypothesis_title(best)}"] = best.estimate
-    parameters = problem.plant.parameters
-    symbols = [p.symbol for p in parameters]
-    begin = problem.values(diagnosis.nominal)
-    figure = Figure(figsize=(7.5, 1.1 + 0.35 * len(symbols)), layout="constrained")
-    axes = figure.subplots()
-    for shift, (name, estimate) in zip((-0.15, 0.15), estimates.items(), strict=False):
-        values = problem.values(estimate)
-        change = [100 * (values[p.symbol] - begin[p.symbol]) / _reference(p) for p in parameters]
-        axes.plot(change, shift + np.arange(len(symbols)), "o", label=name)
-    axes.axvline(0.0, color="black", linewidth=0.8)
-    axes.set_yticks(range(len(symbols)), symbols)
-    axes.set_ylim(len(symbols) - 0.5, -0.5)
-    axes.set_xlabel("change from the nominal value [% of it, or of the usual size where it is 0]")
-    axes.grid(alpha=0.3)
-    figure.legend(loc="outside upper center", ncols=2, fontsize="small")
-    return figure
-
-
-def _reference(parameter: FreeParameter) -> float:
-    """What a change is a share of [SI]: the nominal value, or the usual size where that is 0."""
-    return abs(parameter.nominal) or abs(parameter.scale)
-
-
-def _draw_in_range(
-    axes: Axes, row: int, parameter: FreeParameter, interval: tuple[float, float, float]
-) -> None:
-    """One parameter and its interval [SI] on a line that stands for its range."""
-    low, high = sorted((parameter.low, parameter.high))
-    value, least, most = (np.array(interval) - low) / (high - low)
-    axes.hlines(row, 0.0, 1.0, color="0.85", linewidth=7)
-    axes.hlines(row, least, most, color=NAMED, linewidth=7, alpha=0.5)
-    axes.plot((parameter.nominal - low) / (high - low), row, "|", color="black", markersize=14)
-    axes.plot(value, row, "o", color=NAMED)
-    unit, scale = readable_unit(parameter.unit, max(abs(low), abs(high)))
-    ends = {
-        "left": f"{three_digits(low / scale)} {unit}",
-        "right": f"{three_digits(high / scale)} {unit}",
-    }
-    for side, text in ends.items():
-        axes.text(side == "right", row + 0.38, text, ha=side, va="center", fontsize=7, color="0.4")
-    middle = float(np.clip(value, 0.2, 0.8))
-    text = quantity_with_interval(*interval, parameter.unit)
-    axes.text(middle, row - 0.34, text, ha="center", va="center", fontsize=8)
-
-
 def _bars(axes: Axes, probabilities: Mapping[str, float], colours: Sequence[str]) -> None:
     """Probabilities as horizontal bars, with their figures."""
     rows = range(len(probabilities))
@@ -174,7 +93,9 @@ def gap_figure(reduction: DiscrepancyReduction, words: Callable[[str], str] = st
     figure = Figure(figsize=(10, 1.4 + 0.32 * row_height(models) * len(models)), layout="constrained")
     axes = figure.subplots(1, len(panels), sharey=True)
     for own, panel in zip(axes, panels, strict=True):
-        _interval_bars(own, [_of_panel(gap, panel) for gap in models.values()])
+        _interval_bars(
+            own, [gap.overall if panel == "overall" else gap.channels[panel] for gap in models.values()]
+        )
         own.axvline(FLOOR, color="tab:red", linewidth=1.0)
         own.set_title(panel)
         own.set_xscale("log")
@@ -185,30 +106,6 @@ def gap_figure(reduction: DiscrepancyReduction, words: Callable[[str], str] = st
     axes[0].set_yticks(range(len(models)), [wrapped(name) for name in models])
     axes[0].invert_yaxis()
     return figure
-
-
-def share_figure(reduction: DiscrepancyReduction, words: Callable[[str], str] = str) -> Figure:
-    """Share of the explainable gap that each cause closes, with 90 % intervals.
-
-    words: what people read instead of a cause's name.
-    """
-    names = [words(name) for name in reduction.shares_closed]
-    figure = Figure(figsize=(7, 1.2 + 0.32 * row_height(names) * len(names)), layout="constrained")
-    axes = figure.subplots()
-    _interval_bars(axes, [_percent(share) for share in reduction.shares_closed.values()])
-    axes.set_yticks(range(len(names)), [wrapped(name) for name in names])
-    axes.invert_yaxis()
-    axes.set_xlim(0, 100)
-    axes.set_xlabel("share of the explainable gap that is closed [%]")
-    return figure
-
-
-def _of_panel(gap: Gap, panel: str) -> Interval:
-    return gap.overall if panel == "overall" else gap.channels[panel]
-
-
-def _percent(share: Interval) -> Interval:
-    return Interval(value=100 * share.value, low=100 * share.low, high=100 * share.high)
 
 
 def _interval_bars(axes: Axes, intervals: list[Interval]) -> None:
@@ -222,11 +119,8 @@ def _interval_bars(axes: Axes, intervals: list[Interval]) -> None:
     axes.grid(axis="x", alpha=0.3)
 
 
-def heat_map(gaps: Sequence[RegimeGap], largest: float) -> Figure:
-    """Gap of every channel in every regime, with its interval.
-
-    largest: upper end of the colours, unless a gap is larger [noise deviations].
-    """
+def heat_map(gaps: Sequence[RegimeGap]) -> Figure:
+    """Gap of every channel in every regime, with its interval."""
     channels = list(dict.fromkeys(gap.channel for gap in gaps))
     regimes = list(dict.fromkeys(gap.regime for gap in gaps))
     figure = Figure(figsize=(1.1 * len(regimes) + 1.6, 0.75 * len(channels) + 1.3), layout="constrained")
@@ -234,7 +128,7 @@ def heat_map(gaps: Sequence[RegimeGap], largest: float) -> Figure:
     table = np.full((len(channels), len(regimes)), np.nan)
     for gap in gaps:
         table[channels.index(gap.channel), regimes.index(gap.regime)] = gap.gap
-    colours = LogNorm(FLOOR, max(largest, float(np.nanmax(table))), clip=True)
+    colours = LogNorm(FLOOR, max(HEAT_MAP_RANGE, float(np.nanmax(table))), clip=True)
     image = axes.imshow(table, norm=colours, cmap="YlOrRd", aspect="auto")
     for gap in gaps:
         axes.text(
@@ -259,9 +153,7 @@ def _two_digits(gap: float) -> str:
     return f"{gap:.1f}" if gap < 9.95 else f"{gap:.0f}"
 
 
-def residual_figure(
-    plant: GreyBox, run: int, residual: NDArray, masks: Mapping[str, NDArray], level: float
-) -> Figure:
+def residual_figure(plant: GreyBox, run: int, residual: NDArray, masks: Mapping[str, NDArray]) -> Figure:
     """Residual of a run over time, with the regimes in strips above.
 
     Args:
@@ -269,9 +161,7 @@ def residual_figure(
         run: index of the run.
         residual: (channels, samples) [noise deviations].
         masks: samples of each regime, boolean (samples,) by name.
-        level: probability of the band in which noise lies.
     """
-    band = float(norm.ppf(0.5 + level / 2))
     time = plant.runs[run].time
     figure = Figure(figsize=(9.5, 1.6 * len(residual) + 0.2 * len(masks) + 1), layout="constrained")
     rows = figure.subplots(
@@ -284,7 +174,7 @@ def residual_figure(
     rows[0].set_yticks(range(len(masks)), [name.replace("_", " ") for name in masks], fontsize=7)
     rows[0].invert_yaxis()
     for axes, channel, values in zip(rows[1:], plant.channels, residual, strict=True):
-        axes.axhspan(-band, band, color="0.85")
+        axes.axhspan(-QUANTILE, QUANTILE, color="0.85")
         axes.plot(time, values, color="black", linewidth=0.6)
         axes.set_ylabel(f"{channel.name}\n[noise deviations]", fontsize=8)
         axes.grid(alpha=0.3)
@@ -294,17 +184,14 @@ def residual_figure(
     return figure
 
 
-def missing_term_figure(term: MissingTerm, level: float) -> Figure:
-    """The missing term over the state that explains it best, and what single windows need.
-
-    level: probability of the band around the term.
-    """
-    margin = float(norm.ppf(0.5 + level / 2)) * term.sd
+def missing_term_figure(term: MissingTerm) -> Figure:
+    """The missing term over the state that explains it best, and what single windows need."""
+    margin = QUANTILE * term.sd
     figure = Figure(figsize=(6, 4), layout="constrained")
     axes = figure.subplots()
     axes.plot(term.x, term.scatter, ".", color="0.6", markersize=4, label="single windows")
     axes.fill_between(term.x, term.y - margin, term.y + margin, color=BAND, linewidth=0.0)
-    axes.plot(term.x, term.y, color="tab:blue", label=f"as a function of the state, {level:.0%}")
+    axes.plot(term.x, term.y, color="tab:blue", label=f"as a function of the state, {LEVEL:.0%}")
     axes.axhline(0.0, color="black", linewidth=0.6)
     axes.set_xlabel(f"{term.state} [{term.state_unit}]")
     missing = term.equation
@@ -315,19 +202,15 @@ def missing_term_figure(term: MissingTerm, level: float) -> Figure:
     return figure
 
 
-def forcing_figure(plant: GreyBox, forcing: ForcingEstimate, level: float) -> Figure:
-    """The forcing of a state equation over time, run by run.
-
-    level: probability of the band around the forcing.
-    """
-    quantile = float(norm.ppf(0.5 + level / 2))
+def forcing_figure(plant: GreyBox, forcing: ForcingEstimate) -> Figure:
+    """The forcing of a state equation over time, run by run."""
     runs = list(dict.fromkeys(window.run for window in forcing.windows))
     figure = Figure(figsize=(9.5, 1.5 * len(runs) + 0.8), layout="constrained")
     rows = figure.subplots(len(runs), 1, squeeze=False)[:, 0]
     for axes, run in zip(rows, runs, strict=True):
         mine = [j for j, window in enumerate(forcing.windows) if window.run == run]
         edges = [forcing.windows[j].begin for j in mine] + [forcing.windows[mine[-1]].end]
-        value, sd = forcing.forcing[mine], quantile * forcing.sd[mine]
+        value, sd = forcing.forcing[mine], QUANTILE * forcing.sd[mine]
         low, high = np.append(value - sd, value[-1] - sd[-1]), np.append(value + sd, value[-1] + sd[-1])
         axes.fill_between(edges, low, high, step="post", color=BAND, linewidth=0.0)
         axes.stairs(value, edges, baseline=None, color="tab:blue")

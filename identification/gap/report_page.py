@@ -3,14 +3,14 @@
 from functools import partial
 
 import numpy as np
-from scipy.stats import norm
 
-from identification.gap.diagnosis import Diagnosis, hypothesis_title
+from identification.block_bootstrap import LEVEL
+from identification.gap.diagnosis import MENTIONED_PROBABILITY, Diagnosis, hypothesis_title
 from identification.gap.evidence import EvaluatedHypothesis
 from identification.gap.gap_json import discrepancy, drawn_term, inclusion, parameter_covariance
 from identification.gap.gaps import FLOOR, Gap, regimes_of
 from identification.gap.localisation import Localisation
-from identification.gap.plant import FreeParameter
+from identification.gap.plant import GreyBox
 from identification.gap.quantities import (
     gap_text,
     gap_with_interval,
@@ -19,18 +19,17 @@ from identification.gap.quantities import (
     quantity_with_interval,
 )
 from identification.gap.report_figures import (
+    QUANTILE,
     forcing_figure,
     gap_figure,
     heat_map,
     location_figure,
     missing_term_figure,
-    parameter_change_figure,
     ranking_figure,
     residual_figure,
-    share_figure,
-    size_figure,
 )
 from identification.gap.sentences import (
+    at_an_end,
     disturbance_sentence,
     hidden_causes_sentence,
     in_words,
@@ -43,8 +42,11 @@ from identification.gap.sentences import (
     sizes_with_intervals,
     verdict_sentence,
 )
-from identification.gap.verdict import AMBIGUOUS, KNOWN, NO_GAP
+from identification.gap.verdict import AMBIGUITY_SHARE, AMBIGUOUS, KNOWN, SURE_INCLUSION
 from identification.report.page import ANSWERS, Block, Picture, Section, Table, Text, Verdict
+
+LEVEL_TEXT = f"{100 * LEVEL:g} %"
+"""Probability within the intervals."""
 
 
 def sections(diagnosis: Diagnosis, next_experiment: str = "") -> list[Section]:
@@ -71,7 +73,7 @@ def _verdict(diagnosis: Diagnosis, next_experiment: str) -> Section:
         "The gap is the root mean square of (model - measured)/noise on recordings that were never "
         "fitted to: 1 is noise alone. The nominal model has the parameters as given. The recalibrated "
         "model has its calibrated parameters refitted. With a cause, both are refitted together. "
-        f"Intervals hold {level_text(diagnosis)}."
+        f"Intervals hold {LEVEL_TEXT}."
     )
     return Section(
         title="Verdict",
@@ -83,10 +85,9 @@ def _verdict(diagnosis: Diagnosis, next_experiment: str) -> Section:
 
 def _localisation(diagnosis: Diagnosis) -> Section:
     localisation = diagnosis.localisation
-    largest = diagnosis.settings.report.heat_map_range
     blocks: list[Block] = [
         Picture(
-            figure=heat_map(localisation.regime_gaps, largest),
+            figure=heat_map(localisation.regime_gaps),
             caption="Gap after recalibration, by channel and regime; regimes may overlap.",
         ),
         residual(diagnosis, diagnosis.ranking.recalibrated, "Residual after recalibration"),
@@ -99,7 +100,7 @@ def _localisation(diagnosis: Diagnosis) -> Section:
     ]
     verdicts = [Verdict(status="note", text=location_sentence(diagnosis))]
     if localisation.missing_term:
-        blocks += missing_term(diagnosis, localisation, "The recalibrated model")
+        blocks += missing_term(diagnosis.ranking.problem.plant, localisation, "The recalibrated model")
     return Section(title="Where the gap lies", verdicts=verdicts, blocks=blocks)
 
 
@@ -108,7 +109,7 @@ def _ranking(diagnosis: Diagnosis) -> Section:
     verdicts = [Verdict(status="note", text=hidden_causes_sentence(diagnosis))]
     if ambiguity_set:
         names = ", ".join(hypothesis_title(cause.hypothesis) for cause in ambiguity_set)
-        share = percent(diagnosis.ranking.settings.ambiguity_share)
+        share = f"{100 * AMBIGUITY_SHARE:g} %"
         text = f"The fewest causes that hold {share} of the probability of all causes: {names}."
         status = "good" if len(ambiguity_set) == 1 else "doubt"
         verdicts.insert(0, Verdict(status=status, text=text))
@@ -119,14 +120,7 @@ def _ranking(diagnosis: Diagnosis) -> Section:
         )
     ]
     if diagnosis.judged:
-        blocks += [
-            inclusion_table(diagnosis),
-            ranking_table(diagnosis),
-            Picture(
-                figure=size_figure(diagnosis),
-                caption=f"Fitted sizes with {level_text(diagnosis)} intervals in their physical range.",
-            ),
-        ]
+        blocks += [inclusion_table(diagnosis), ranking_table(diagnosis)]
     return Section(title="Which cause it is", verdicts=verdicts, blocks=blocks)
 
 
@@ -136,27 +130,13 @@ def _reduction(diagnosis: Diagnosis) -> Section:
         Picture(
             figure=gap_figure(reduction, words),
             caption="Gap of every model on held-out recordings with "
-            f"{level_text(diagnosis)} intervals; red: noise alone.",
-        )
+            f"{LEVEL_TEXT} intervals; red: noise alone.",
+        ),
+        gap_table(diagnosis),
     ]
-    if reduction.shares_closed and diagnosis.conclusion.verdict != NO_GAP:
-        blocks.append(
-            Picture(
-                figure=share_figure(reduction, words),
-                caption="Share that each cause closes of the gap between recalibration and noise.",
-            )
-        )
-    blocks.append(gap_table(diagnosis))
     if diagnosis.best and diagnosis.conclusion.verdict in (KNOWN, AMBIGUOUS):
         best = diagnosis.best.hypothesis
         blocks.append(residual(diagnosis, best, f"Residual with {hypothesis_title(best)}"))
-    blocks += [
-        Picture(
-            figure=parameter_change_figure(diagnosis),
-            caption="Changes of the calibrated parameters: they absorb part of what the model lacks.",
-        ),
-        parameter_table(diagnosis),
-    ]
     return Section(
         title="How far the gap shrinks",
         verdicts=[Verdict(status="note", text=reduction_sentence(diagnosis))],
@@ -168,8 +148,8 @@ def _remainder(diagnosis: Diagnosis) -> Section:
     """What no named cause explains: how much, where, of which shape, and what is only disturbance."""
     blocks: list[Block] = []
     if diagnosis.remaining and diagnosis.best:
-        name = hypothesis_title(diagnosis.best.hypothesis)
-        blocks += missing_term(diagnosis, diagnosis.remaining, f"The model with {name}")
+        name, plant = hypothesis_title(diagnosis.best.hypothesis), diagnosis.ranking.problem.plant
+        blocks += missing_term(plant, diagnosis.remaining, f"The model with {name}")
         blocks.append(residual(diagnosis, diagnosis.best.hypothesis, f"Residual with {name}"))
     text = remainder_sentence(diagnosis)
     if not diagnosis.remaining:
@@ -218,7 +198,6 @@ def ranking_table(diagnosis: Diagnosis) -> Table:
 def inclusion_table(diagnosis: Diagnosis) -> Table:
     """Probability that each effect is part of the gap, alone or beside others."""
     components = {cause.name: cause.component for cause in diagnosis.ranking.problem.plant.causes}
-    least = diagnosis.settings.report.mentioned_probability
     rows = [
         [
             in_words(diagnosis, name),
@@ -227,14 +206,14 @@ def inclusion_table(diagnosis: Diagnosis) -> Table:
             "yes" if name in diagnosis.conclusion.held else "-",
         ]
         for name, probability in inclusion(diagnosis).items()
-        if probability >= least
+        if probability >= MENTIONED_PROBABILITY
     ]
-    sure = diagnosis.ranking.settings.sure_inclusion
     return Table(
         columns=["Effect", "component", "part of the gap", "held"],
         rows=rows or [["none", "-", "-", "-"]],
         caption="Probability that an effect is part of the gap, alone or beside others, so that the "
-        f"figures need not add to 100 %. Held: {100 * sure:g} % or more, and the verdict names causes.",
+        f"figures need not add to 100 %. Held: {100 * SURE_INCLUSION:g} % or more, and the verdict "
+        "names causes.",
     )
 
 
@@ -290,40 +269,17 @@ def _percent(model: Gap, columns: list[str]) -> list[str]:
     return [f"{model.percent[column]:.2f}" if model.percent else "-" for column in columns]
 
 
-def parameter_table(diagnosis: Diagnosis) -> Table:
-    """Calibrated parameters of each model."""
-    problem = diagnosis.ranking.problem
-    estimates = {
-        "nominal": diagnosis.nominal,
-        "recalibrated": diagnosis.ranking.recalibrated.estimate,
-    }
-    if diagnosis.best:
-        best = diagnosis.best.hypothesis
-        estimates[f"with {hypothesis_title(best)}"] = best.estimate
-    values = [problem.values(estimate) for estimate in estimates.values()]
-    return Table(
-        columns=["Parameter", *estimates],
-        rows=[
-            [p.symbol, *(quantity(own[p.symbol], p.unit) for own in values)]
-            for p in problem.plant.parameters
-        ],
-        caption="Calibrated parameters.",
-    )
-
-
 def calibrated_values(diagnosis: Diagnosis, status: str) -> Table:
     """Calibrated parameters of the model to use, with intervals; status: of the verdict."""
     problem, kept = diagnosis.ranking.problem, diagnosis.kept
     fitted = problem.values(kept.estimate)
-    level = diagnosis.settings.reduction.interval_level
-    quantile = float(norm.ppf(0.5 + level / 2))
-    margins = quantile * np.sqrt(np.diag(parameter_covariance(diagnosis, kept)))
+    margins = QUANTILE * np.sqrt(np.diag(parameter_covariance(diagnosis, kept)))
     rows, statuses = [], []
     for parameter, margin in zip(problem.plant.parameters, margins, strict=False):
         value = fitted[parameter.symbol]
         low, high = sorted((parameter.low, parameter.high))
         ends = max(value - margin, low), min(value + margin, high)
-        own = "bad" if _at_an_end(diagnosis, parameter, value) else status
+        own = "bad" if at_an_end(parameter, value) else status
         why = ": at an end of its range" if own != status else ""
         rows.append(
             [
@@ -336,36 +292,28 @@ def calibrated_values(diagnosis: Diagnosis, status: str) -> Table:
         statuses.append(own)
     model = f"with {hypothesis_title(kept)}" if kept.labels else "recalibrated, without a cause"
     return Table(
-        columns=["Parameter", "nominal", f"fitted ({100 * level:g} % interval)", "trust it"],
+        columns=["Parameter", "nominal", f"fitted ({LEVEL_TEXT} interval)", "trust it"],
         rows=rows,
         statuses=statuses,
         caption=f"Calibrated parameters of the model to use: {model}.",
     )
 
 
-def _at_an_end(diagnosis: Diagnosis, parameter: FreeParameter, value: float) -> bool:
-    """Whether a fitted value [SI] lies at an end of its physical range."""
-    apart = min(abs(value - parameter.low), abs(value - parameter.high))
-    tolerance = diagnosis.settings.report.bound_tolerance
-    return apart <= tolerance * abs(parameter.high - parameter.low)
-
-
-def missing_term(diagnosis: Diagnosis, localisation: Localisation, model: str) -> list[Block]:
+def missing_term(plant: GreyBox, localisation: Localisation, model: str) -> list[Block]:
     """The missing term over time, and over a state where one explains it."""
-    if not localisation.likeliest.windows:
+    forcing = localisation.likeliest
+    if not forcing.windows:
         return []
-    forcing, level = localisation.likeliest, diagnosis.settings.reduction.interval_level
-    plant = diagnosis.ranking.problem.plant
     blocks: list[Block] = [
         Picture(
-            figure=forcing_figure(plant, forcing, level),
+            figure=forcing_figure(plant, forcing),
             caption=f"{model} lacks this term in {forcing.equation.title}: the forcing with which it "
             "meets the recordings.",
         )
     ]
-    term = drawn_term(diagnosis, localisation)
+    term = drawn_term(localisation)
     if term:
-        picture = missing_term_figure(term, level)
+        picture = missing_term_figure(term)
         caption = "The missing term over the state that explains it best."
         blocks.append(Picture(figure=picture, caption=caption))
     return blocks
@@ -378,19 +326,8 @@ def residual(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis, name: str) -
     held_out = [r for r, run in enumerate(problem.plant.runs) if run.held_out]
     run = max(held_out, key=lambda r: np.mean(recalibrated[r] ** 2))
     masks = regimes_of(problem.plant, problem.candidate(hypothesis.estimate), run)
-    level = diagnosis.settings.reduction.interval_level
     return Picture(
-        figure=residual_figure(problem.plant, run, hypothesis.residuals[run], masks, level),
+        figure=residual_figure(problem.plant, run, hypothesis.residuals[run], masks),
         caption=f"{name}, on the held-out recording that recalibration misses most. Grey: where "
-        f"{level_text(diagnosis)} of the noise lies.",
+        f"{LEVEL_TEXT} of the noise lies.",
     )
-
-
-def level_text(diagnosis: Diagnosis) -> str:
-    """Probability within the intervals."""
-    return percent(diagnosis.settings.reduction.interval_level)
-
-
-def percent(share: float) -> str:
-    """A share [1] in percent, ready to read."""
-    return f"{100 * share:g} %"

@@ -9,13 +9,20 @@ from numpy.typing import NDArray
 
 from identification.gap.fitting_problem import Estimate, FittingProblem, Hypothesis
 from identification.gap.plant import Cause
-from identification.gap.rank.settings import RankingSettings
 from identification.gap.variable_projection import (
     ChangedRuns,
     LinearisedRun,
     NormalEquations,
     normal_equations,
 )
+
+TWIN_CORRELATION = 0.98
+"""Correlation of signatures [1] above which the recordings hardly tell two causes apart; an announcement
+only, no verdict uses it."""
+
+DETECTABLE_SIGNATURE = 3.0
+"""Length of a signature [noise deviations] below which the recordings do not show a cause at its usual
+size; an announcement only, except that such a cause resembles no other."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,19 +82,18 @@ class Separability:
     """Length of each signature at the cause's first trial value, (n,) [noise deviations]."""
     correlation: NDArray
     """Correlations of the signatures, (n, n) [1]: near 1 or -1 for causes that look alike."""
-    settings: RankingSettings
     """Thresholds of detection and of likeness."""
 
     @property
     def absorbed(self) -> tuple[str, ...]:
         """Causes that recalibration hides."""
-        least = self.settings.detectable_signature
+        least = DETECTABLE_SIGNATURE
         pairs = zip(self.labels, self.signature_norms, strict=True)
         return tuple(label for label, norm in pairs if norm < least)
 
     def twins(self, label: str) -> tuple[str, ...]:
         """Causes that the campaign hardly tells from one cause, the most alike first."""
-        return self.alike(label, self.settings.twin_correlation)
+        return self.alike(label, TWIN_CORRELATION)
 
     def alike(self, label: str, least_correlation: float) -> tuple[str, ...]:
         """Detectable causes with a higher absolute correlation with one cause, the most alike first."""
@@ -100,7 +106,7 @@ class Separability:
             for i in order
             if row[i] > least_correlation
             and self.labels[i] != label
-            and self.signature_norms[i] >= self.settings.detectable_signature
+            and self.signature_norms[i] >= DETECTABLE_SIGNATURE
         )
 
 
@@ -320,14 +326,12 @@ def promising_pairs(
 def assess_separability(
     base_runs: Sequence[LinearisedRun],
     signatures: Sequence[CauseSignature],
-    settings: RankingSettings,
 ) -> Separability:
     """Separability of the causes at their first trial values.
 
     Args:
         base_runs: the base estimate linearised in the fitted runs.
         signatures: from `simulate_signatures` beside the same base.
-        settings: thresholds that the result keeps.
     """
     first: dict[str, CauseSignature] = {}
     for signature in signatures:
@@ -346,5 +350,4 @@ def assess_separability(
         labels=tuple(first),
         signature_norms=norms,
         correlation=gram / np.outer(divisors, divisors),
-        settings=settings,
     )

@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from identification.gap.locate.settings import LocalisationSettings
 from identification.gap.plant import GreyBox, StateEquation, noise_weighted
 
 TIMING = "timing"
 """Name of the place where all channels are late together."""
+
+LAGS, DELAYS = (1, 3, 10, 30), (1, 2, 4, 8, 16)
+"""Time constants of first-order lags, and delays [samples]: their sums come near any lag or delay."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,7 +36,6 @@ def reading_faults(
     plant: GreyBox,
     values: Mapping[str, NDArray],
     runs: Sequence[int],
-    settings: LocalisationSettings,
 ) -> list[ReadingFault]:
     """A fault of every sensor, and one of the clock.
 
@@ -42,19 +43,18 @@ def reading_faults(
         plant: the model and its recordings.
         values: one candidate's values by symbol, (1,) or (1, runs) [SI].
         runs: indices of the runs.
-        settings: lags and delays of the forms.
     """
     outputs = [np.nan_to_num(block[:, :, 0]) for block in plant.outputs(values, runs)]
     faults = [
         ReadingFault(
             place=_place(f"reading {channel.name}", "sensor"),
-            changes=[_sensor_forms(y, c, settings.lags) for y in outputs],
-            either_sign=np.arange(1 + len(settings.lags)) == 0,
+            changes=[_sensor_forms(y, c, LAGS) for y in outputs],
+            either_sign=np.arange(1 + len(LAGS)) == 0,
         )
         for c, channel in enumerate(plant.channels)
     ]
-    late = [np.stack([_delay_change(y, d) for d in settings.delays], axis=2) for y in outputs]
-    either_sign = np.zeros(len(settings.delays), dtype=bool)
+    late = [np.stack([_delay_change(y, d) for d in DELAYS], axis=2) for y in outputs]
+    either_sign = np.zeros(len(DELAYS), dtype=bool)
     clock = ReadingFault(place=_place(TIMING, "timing"), changes=late, either_sign=either_sign)
     return [replace(fault, changes=_weighted(plant, runs, fault.changes)) for fault in (*faults, clock)]
 

@@ -2,10 +2,16 @@
 
 from collections.abc import Sequence
 
-from identification.gap.diagnosis import Diagnosis, hypothesis_label, hypothesis_title
+from identification.gap.diagnosis import (
+    MENTIONED_PROBABILITY,
+    Diagnosis,
+    hypothesis_label,
+    hypothesis_title,
+)
 from identification.gap.gap_json import Remainder, discrepancy, parameter_intervals, remainder
 from identification.gap.gaps import FLOOR
-from identification.gap.held_out import NOMINAL, RECALIBRATED
+from identification.gap.held_out import LEAST_GAP_CLOSED, NOMINAL, RECALIBRATED
+from identification.gap.plant import FreeParameter
 from identification.gap.quantities import (
     gap_text,
     gap_with_interval,
@@ -17,6 +23,16 @@ from identification.gap.quantities import (
 )
 from identification.gap.verdict import AMBIGUOUS, KNOWN, NO_GAP, PARTIAL, RankedCause
 
+LIKELY_PROBABILITY = 0.5
+"""Probability above which the report states no gap without reservation."""
+
+MENTIONED_DISCREPANCY = 0.3
+"""Standard deviation of a disturbance [noise deviations] from which the verdict mentions it: less adds
+under 5 % to the readings' scatter."""
+
+BOUND_TOLERANCE = 1e-6
+"""Share of a range [1] within which a parameter is reported as lying at the end of its range."""
+
 
 def verdict_sentence(diagnosis: Diagnosis, next_experiment: str) -> tuple[str, str]:
     """Status for the page ('good', 'doubt' or 'bad'), and the verdict in a few sentences.
@@ -25,7 +41,7 @@ def verdict_sentence(diagnosis: Diagnosis, next_experiment: str) -> tuple[str, s
     """
     conclusion, no_warning = diagnosis.conclusion, not diagnosis.warnings
     if conclusion.verdict == NO_GAP:
-        likely = diagnosis.ranking.no_cause > diagnosis.settings.report.likely_probability
+        likely = diagnosis.ranking.no_cause > LIKELY_PROBABILITY
         return ("good" if likely and no_warning else "doubt"), _no_gap(diagnosis)
     if conclusion.verdict == KNOWN:
         complete = not diagnosis.reduction.unexplained.still_predictable
@@ -116,12 +132,12 @@ def _beside(rest: str, common: Sequence[str]) -> str:
 
 
 def _no_gap(diagnosis: Diagnosis) -> str:
-    gaps, settings = diagnosis.reduction.gaps, diagnosis.settings
+    gaps = diagnosis.reduction.gaps
     recalibrated = gaps[RECALIBRATED].overall
     disturbance = disturbance_sentence(diagnosis)
     if disturbance:
         text = "There is no gap beyond noise and disturbances after recalibration"
-    elif recalibrated.low <= FLOOR + settings.reduction.least_gap_closed:
+    elif recalibrated.low <= FLOOR + LEAST_GAP_CLOSED:
         text = "There is no gap beyond noise after recalibration"
     else:
         text = "Recalibration leaves a small gap of which no cause can be named"
@@ -130,7 +146,7 @@ def _no_gap(diagnosis: Diagnosis) -> str:
         f"deviations, and {gap_text(gaps[NOMINAL].overall.value)} before. {disturbance}Use the "
         "recalibrated parameters and add nothing."
     )
-    likely = diagnosis.ranking.no_cause > settings.report.likely_probability
+    likely = diagnosis.ranking.no_cause > LIKELY_PROBABILITY
     return text if likely else f"{text} {_possible_cause(diagnosis)}"
 
 
@@ -232,7 +248,7 @@ def remainder_sentence(diagnosis: Diagnosis) -> str:
 
 def disturbance_sentence(diagnosis: Diagnosis) -> str:
     """Disturbances that are seen beside the noise, with a blank at the end; empty where none is seen."""
-    least = diagnosis.settings.report.mentioned_discrepancy
+    least = MENTIONED_DISCREPANCY
     ranking, seen = diagnosis.ranking, discrepancy(diagnosis)
     channels = zip(ranking.problem.plant.channels, ranking.discrepancies, strict=True)
     texts = [
@@ -328,19 +344,24 @@ def parameters_at_bounds(diagnosis: Diagnosis) -> list[str]:
         hypothesis_title(cause.hypothesis): cause.hypothesis.estimate
         for cause in mentioned_causes(diagnosis)
     }
-    tolerance = diagnosis.settings.report.bound_tolerance
     return [
         f"{name}: {p.symbol} is at an end of its physical range ({quantity(value, p.unit)})"
         for name, estimate in estimates.items()
         for p in problem.parameters(estimate)
         for value in [problem.values(estimate)[p.symbol]]
-        if min(abs(value - p.low), abs(value - p.high)) <= tolerance * abs(p.high - p.low)
+        if at_an_end(p, value)
     ]
+
+
+def at_an_end(parameter: FreeParameter, value: float) -> bool:
+    """Whether a value [SI] lies at an end of its parameter's physical range."""
+    apart = min(abs(value - parameter.low), abs(value - parameter.high))
+    return apart <= BOUND_TOLERANCE * abs(parameter.high - parameter.low)
 
 
 def mentioned_causes(diagnosis: Diagnosis) -> Sequence[RankedCause]:
     """Judged causes with a noticeable probability."""
-    least = diagnosis.settings.report.mentioned_probability
+    least = MENTIONED_PROBABILITY
     return [cause for cause in diagnosis.judged if cause.probability >= least]
 
 

@@ -7,14 +7,22 @@ from identification.gap.discrepancy import ChannelDiscrepancy
 from identification.gap.evidence import EvaluatedHypothesis
 from identification.gap.fitting_problem import FittingProblem
 from identification.gap.localisation import Localisation
-from identification.gap.posterior import variance_inflation
-from identification.gap.rank.settings import RankingSettings
+from identification.gap.posterior import NO_CAUSE_DOUBT, variance_inflation
 from identification.gap.screening import Separability
 
 NO_GAP, KNOWN, AMBIGUOUS = "no_gap", "known", "ambiguous"
-
 PARTIAL, UNKNOWN = "partial", "unknown"
 """Verdicts as gap.json has them."""
+
+NOTICED_REMAINDER = 0.04
+"""Share of the misfit [1] beyond which a named cause leaves a part of the gap that is missing still: a
+fifth of the gap. Less is an error of the cause's form."""
+
+AMBIGUITY_SHARE = 0.9
+"""Share of the probability of all causes that the ambiguity set holds."""
+
+SURE_INCLUSION = 0.9
+"""Probability that an effect is part of the gap from which it is held (contract: gap.json)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +46,6 @@ class Ranking:
     """Noise and discrepancy of each channel under the best hypothesis."""
     separability: Separability
     """What the recordings could tell apart, whatever the residual."""
-    settings: RankingSettings
 
     @property
     def inclusion(self) -> Mapping[str, float]:
@@ -88,10 +95,9 @@ class Conclusion:
 def conclude(ranking: Ranking, localisation: Localisation) -> Conclusion:
     """The verdict on the probabilities, and the components that they point at."""
     causes = causes_by_name(ranking)
-    settings = ranking.settings
     verdict = _verdict(ranking)
     named = verdict in (KNOWN, PARTIAL)
-    ambiguity_set = smallest_set(causes, settings.ambiguity_share) if named else []
+    ambiguity_set = smallest_set(causes, AMBIGUITY_SHARE) if named else []
     if verdict == KNOWN and len(ambiguity_set) > 1:
         verdict = AMBIGUOUS
     return Conclusion(
@@ -105,8 +111,7 @@ def conclude(ranking: Ranking, localisation: Localisation) -> Conclusion:
 
 def _held(ranking: Ranking) -> tuple[str, ...]:
     """Effects whose inclusion is sure."""
-    sure = ranking.settings.sure_inclusion
-    return tuple(name for name, probability in ranking.inclusion.items() if probability >= sure)
+    return tuple(name for name, share in ranking.inclusion.items() if share >= SURE_INCLUSION)
 
 
 def causes_by_name(ranking: Ranking) -> list[RankedCause]:
@@ -153,32 +158,22 @@ def component_probabilities(ranking: Ranking, localisation: Localisation) -> dic
     for hypothesis, probability in zip(ranking.hypotheses, ranking.probabilities, strict=True):
         for component in {c.component for c in hypothesis.estimate.hypothesis.causes}:
             total[component] += probability
-    for component, share in _localised_shares(localisation).items():
-        total[component] = total.get(component, 0.0) + ranking.unknown * share
-    return dict(sorted(total.items(), key=lambda pair: -pair[1]))
-
-
-def _localised_shares(localisation: Localisation) -> Mapping[str, float]:
-    """Shares of the components by the fault localisation; they sum to 1."""
-    shares: dict[str, float] = {}
-    for forcing in localisation.forcings:
-        equation = forcing.equation
-        probability = localisation.equation_probabilities[equation.name]
-        shares[equation.component] = shares.get(equation.component, 0.0) + probability
+    shares = localisation.component_probabilities
     whole = sum(shares.values())
-    return {component: share / whole for component, share in shares.items()} if whole > 0 else {}
+    for component, share in shares.items() if whole > 0 else ():
+        total[component] = total.get(component, 0.0) + ranking.unknown * (share / whole)
+    return dict(sorted(total.items(), key=lambda pair: -pair[1]))
 
 
 def _verdict(ranking: Ranking) -> str:
     """NO_GAP, UNKNOWN, PARTIAL or KNOWN by the probabilities."""
-    settings = ranking.settings
-    if ranking.no_cause > settings.no_cause_doubt:
+    if ranking.no_cause > NO_CAUSE_DOUBT:
         return NO_GAP
     if ranking.unknown > sum(ranking.probabilities):
         return UNKNOWN
-    if ranking.shares_left[0] <= settings.noticed_remainder:
+    if ranking.shares_left[0] <= NOTICED_REMAINDER:
         return KNOWN
     if _held(ranking):
         return PARTIAL
     # Look-alikes share the probability; less than that names nothing while much is left.
-    return KNOWN if sum(ranking.probabilities) >= settings.sure_inclusion else UNKNOWN
+    return KNOWN if sum(ranking.probabilities) >= SURE_INCLUSION else UNKNOWN

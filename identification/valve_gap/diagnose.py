@@ -77,7 +77,6 @@ def _report(
         found.ranking,
         valve,
         at_voltage(CANDIDATES, valve.plant.voltage),
-        settings=found.settings.design,
         verdict=found.conclusion.verdict,
     )
     (out / PROGRAMME).unlink(missing_ok=True)

@@ -8,7 +8,6 @@ import numpy as np
 
 from epv_env.common.units import BAR
 from identification.bench.programmes import Programme
-from identification.gap.design.settings import DesignSettings
 from identification.gap.experiment_design import (
     InformationGain,
     Rivals,
@@ -116,7 +115,6 @@ def next_experiment(
     ranking: Ranking,
     valve: Valve,
     programmes: Sequence[Programme] = CANDIDATES,
-    settings: DesignSettings | None = None,
     verdict: str | None = None,
 ) -> NextExperiment:
     """The programme after which the least doubt between the most probable hypotheses is expected.
@@ -125,18 +123,17 @@ def next_experiment(
         ranking: the hypotheses and their probabilities.
         valve: the campaign that was diagnosed.
         programmes: candidates.
-        settings: judgement of the design; None: the defaults.
         verdict: of the diagnosis; None: unknown where that is more probable than all causes together.
             No programme can separate hypotheses that are not there: where the cause is unknown, or known
             but for a remainder without a name, the shape of the missing term comes first.
     """
-    rivals = select_rivals(ranking, settings)
+    rivals = select_rivals(ranking)
     if verdict == UNKNOWN or (verdict is None and ranking.unknown > sum(ranking.probabilities)):
         return _none_can_be_chosen(rivals, NOTHING_EXPLAINS)
     if verdict == PARTIAL and rivals.probability[0] > CERTAIN:
         return _none_can_be_chosen(rivals, REST_WITHOUT_NAME.format(rivals.titles[0]))
     plan = planned(valve, programmes)
-    found = expected_information(ranking.problem, plan, rivals, settings)
+    found = expected_information(ranking.problem, plan, rivals)
     options = [Option(programme=p, information=i) for p, i in zip(programmes, found, strict=True)]
     options.sort(key=lambda option: option.information.sort_key)
     best = options[0]

@@ -34,10 +34,10 @@ def main() -> int:
     write_results(diagnosis, chosen.out)
     title = f"Gap between model and recordings: {folder}"
     write_page(chosen.out / "report.html", title=title, sections=sections(diagnosis))
-    term, level = diagnosis.localisation.missing_term, diagnosis.settings.reduction.interval_level
+    term = diagnosis.localisation.missing_term
     if chosen.images and term:
         chosen.images.mkdir(parents=True, exist_ok=True)
-        missing_term_figure(term, level).savefig(chosen.images / "gap-tank.png", dpi=100)
+        missing_term_figure(term).savefig(chosen.images / "gap-tank.png", dpi=100)
     print(verdict_sentence(diagnosis, "")[1])
     return 0
 

@@ -12,7 +12,6 @@ from docs.examples.tank.recordings import virtual_recordings
 from identification.gap.evidence import evaluate
 from identification.gap.fitting_problem import Estimate, FittingProblem
 from identification.gap.gauss_newton import CONVERGED_DECREASE, linearise
-from identification.gap.rank.settings import RankingSettings
 from identification.gap.recalibration import recalibrate
 from identification.gap.variable_projection import (
     LARGEST_DEVIATION,
@@ -75,10 +74,10 @@ def test_the_fit_is_that_of_the_whole_bounded_problem(deviations):
 def test_what_a_bounded_nuisance_cannot_follow_stays_in_the_residual():
     """A gauge that is off by thirty deviations: three are its zero, the rest is a gap."""
     problem, estimate = with_zero(30.0)
-    residual = evaluate(problem, [estimate], RankingSettings())[0].residuals[0]
+    residual = evaluate(problem, [estimate])[0].residuals[0]
     assert np.mean(residual) > 1.0
     sound, at_rest = with_zero(0.0)
-    assert abs(np.mean(evaluate(sound, [at_rest], RankingSettings())[0].residuals[0])) < 0.3
+    assert abs(np.mean(evaluate(sound, [at_rest])[0].residuals[0])) < 0.3
 
 
 def test_nothing_jumps_where_a_nuisance_reaches_its_bound():

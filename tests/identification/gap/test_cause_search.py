@@ -1,23 +1,17 @@
 """The search: sets of up to four causes are found, thresholds among them, and no more than acted."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
+from identification.gap import cause_search
 from identification.gap.cause_search import HypothesisPool, _leave_causes_out
 from identification.gap.diagnosis import rank_hypotheses
 from identification.gap.evidence import evaluate
 from identification.gap.fitting_problem import FitCache, Hypothesis
 from identification.gap.gauss_newton import fit
-from identification.gap.rank.settings import RankingSettings
 from identification.gap.recalibration import recalibrate
 from identification.gap.verdict import Ranking
 from tests.identification.gap.drives import Drive
-
-SMALL = RankingSettings()
-LARGE = RankingSettings(multi_start_causes=0)
-"""Every catalogue counts as large."""
 
 THREE = {"dead_zone": 0.15, "lag": 0.03, "coupling": 0.1}
 THRESHOLDS = {"dead_zone": 0.15, "limit": 0.6, "coupling": 0.1, "drift": -0.05}
@@ -32,20 +26,21 @@ def sizes(found: Ranking) -> dict[str, float]:
 
 
 @pytest.mark.parametrize(
-    ("truth", "settings"),
+    ("truth", "largest_small"),
     [
-        ({"limit": 0.8}, SMALL),
-        ({"limit": 0.8}, LARGE),
-        ({"dead_zone": 0.3, "drag": -0.2}, SMALL),
-        (THREE, SMALL),
-        (THREE, LARGE),
-        (THRESHOLDS, SMALL),
-        (THRESHOLDS, LARGE),
-        (FAINT_AMONG_FOUR, SMALL),
+        ({"limit": 0.8}, 12),
+        ({"limit": 0.8}, 0),
+        ({"dead_zone": 0.3, "drag": -0.2}, 12),
+        (THREE, 12),
+        (THREE, 0),
+        (THRESHOLDS, 12),
+        (THRESHOLDS, 0),
+        (FAINT_AMONG_FOUR, 12),
     ],
 )
-def test_all_that_acts_is_found_and_nothing_else(truth, settings):
-    found = rank_hypotheses(Drive(truth), settings=settings)
+def test_all_that_acts_is_found_and_nothing_else(truth, largest_small, monkeypatch):
+    monkeypatch.setattr(cause_search, "MULTI_START_CAUSES", largest_small)
+    found = rank_hypotheses(Drive(truth))
     assert sizes(found) == pytest.approx(truth, rel=0.1)
     assert all((found.inclusion[name] > 0.9) == (name in truth) for name in found.inclusion)
 
@@ -57,7 +52,7 @@ def test_no_fit_of_the_true_causes_from_their_true_sizes_is_better(truth):
     problem = found.problem
     causes = tuple(cause for cause in problem.plant.causes if cause.name in truth)
     direct = fit(problem, [problem.start(Hypothesis(causes=causes), truth)])
-    by_hand = evaluate(problem, direct, found.settings)[0].residuals[2]
+    by_hand = evaluate(problem, direct)[0].residuals[2]
     assert np.std(found.hypotheses[0].residuals[2]) < 1.05 * np.std(by_hand)
 
 
@@ -65,8 +60,8 @@ def test_a_cause_that_has_become_superfluous_is_left_out():
     """A pool that lacks the true cause alone: it is refitted from where a larger set has it."""
     problem, base = recalibrate(Drive({"lag": 0.05}))
     causes = {cause.name: cause for cause in problem.plant.causes}
-    recalibrated = evaluate(problem, [base], SMALL)[0]
-    pool = HypothesisPool(problem, recalibrated, FitCache(problem.plant), SMALL)
+    recalibrated = evaluate(problem, [base])[0]
+    pool = HypothesisPool(problem, recalibrated, FitCache(problem.plant))
     both = Hypothesis(causes=(causes["lag"], causes["drag"]))
     pool.add(fit(problem, [problem.start(both, {"lag": 0.03, "drag": 0.1})]))
     assert pool.ranked()[0][0].labels == ("lag", "drag")
@@ -92,6 +87,7 @@ def test_a_catalogue_without_the_true_causes_names_none():
 
 
 @pytest.mark.parametrize("most", [1, 2])
-def test_no_set_is_larger_than_the_settings_allow(most):
-    found = rank_hypotheses(Drive(THREE), settings=replace(SMALL, most_causes=most))
+def test_no_set_is_larger_than_the_search_allows(most, monkeypatch):
+    monkeypatch.setattr(cause_search, "MOST_CAUSES", most)
+    found = rank_hypotheses(Drive(THREE))
     assert max(len(each.labels) for each in found.hypotheses) == most

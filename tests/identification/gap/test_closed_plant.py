@@ -7,10 +7,10 @@ import pytest
 
 from docs.examples.tank.plant import Tank
 from docs.examples.tank.recordings import virtual_recordings
+from identification.gap import sensor_faults
 from identification.gap.diagnosis import Diagnosis, diagnose
 from identification.gap.gap_json import as_json
 from identification.gap.gaps import WHOLE
-from identification.gap.locate.settings import LocalisationSettings
 from identification.gap.report_page import sections
 from identification.gap.sensor_faults import reading_faults
 from identification.report.page import Picture
@@ -65,8 +65,8 @@ def test_its_report_and_its_json_are_written():
     assert list(as_json(diagnosed())["where"]["equation"]) == ["reading h", "timing"]
 
 
-def test_recordings_shorter_than_the_longest_delay_are_examined():
+def test_recordings_shorter_than_the_longest_delay_are_examined(monkeypatch):
     tank = ClosedTank()
-    settings = LocalisationSettings(delays=(1, 300))
-    for fault in reading_faults(tank, {"c": np.array([0.02])}, [0], settings):
+    monkeypatch.setattr(sensor_faults, "DELAYS", (1, 300))
+    for fault in reading_faults(tank, {"c": np.array([0.02])}, [0]):
         assert np.all(np.isfinite(fault.changes[0]))

@@ -13,10 +13,8 @@ from identification.gap.discrepancy import (
     white_variance,
 )
 from identification.gap.plant import Channel, Run
-from identification.gap.rank.settings import RankingSettings
 from tests.identification.gap.drives import Drive
 
-SETTINGS = RankingSettings()
 PERIOD, SAMPLES, RUNS = 1e-3, 4000, 3
 
 
@@ -42,7 +40,7 @@ def seen(residuals: list[NDArray], trusted: NDArray | None = None) -> list[Chann
             for r, own in enumerate(residuals)
         ),
     )  # fmt: skip
-    return channel_discrepancies(plant, [np.where(counted, own, 0.0) for own in residuals], SETTINGS)
+    return channel_discrepancies(plant, [np.where(counted, own, 0.0) for own in residuals])
 
 
 def white(rng: np.random.Generator, samples: int = SAMPLES) -> NDArray:
@@ -144,7 +142,7 @@ def test_the_white_variance_of_an_exact_covariance(share):
     """A white part and a geometric one, whose sum is 1."""
     covariance = (1.0 - share) * 0.8 ** np.arange(10.0)
     covariance[0] += share
-    assert white_variance(covariance, 2.0) == pytest.approx(share, abs=1e-9)
+    assert white_variance(covariance) == pytest.approx(share, abs=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(3))

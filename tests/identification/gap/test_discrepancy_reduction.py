@@ -16,7 +16,7 @@ from identification.gap.held_out import (
 )
 from identification.gap.prediction import percentage_errors, predict
 from identification.gap.recalibration import recalibrate
-from identification.gap.report_figures import gap_figure, share_figure
+from identification.gap.report_figures import gap_figure
 
 
 def estimates(tank: Tank, causes: tuple[str, ...]) -> tuple[FittingProblem, dict[str, Estimate]]:
@@ -162,4 +162,3 @@ def test_figures_show_every_model():
     axes = gap_figure(found).axes
     assert [one.get_title() for one in axes] == ["overall", "h"]
     assert [t.get_text() for t in axes[0].get_yticklabels()] == [*found.gaps, "black box"]
-    assert len(share_figure(found).axes[0].patches) == len(found.shares_closed)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from identification.gap.evidence import EvaluatedHypothesis, _covariance
-from identification.gap.rank.settings import RankingSettings
 from identification.gap.variable_projection import LinearisedRun, normal_equations
 from tests.identification.gap.tanks import diagnosed
 
@@ -23,7 +22,7 @@ def test_what_no_reading_tells_is_wide_but_known_to_be():
         run_sd=np.zeros(0), tolerance_slopes=none,
     )  # fmt: skip
     equations = replace(normal_equations([run]), hessian=hessian)
-    found = _covariance(equations, RankingSettings().smallest_eigenvalue)
+    found = _covariance(equations)
     assert np.all(np.diag(found) > 1.0)
     assert ALONG @ found @ ALONG == pytest.approx(1e-8, rel=1e-3)
 

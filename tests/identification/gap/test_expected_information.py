@@ -11,9 +11,9 @@ from scipy.integrate import quad
 from scipy.special import expit, logsumexp
 from scipy.stats import norm
 
-from identification.gap.design.settings import DesignSettings
 from identification.gap.diagnosis import rank_hypotheses
 from identification.gap.experiment_design import (
+    FORM_ERROR,
     ParameterPosterior,
     Rivals,
     expected_information,
@@ -199,7 +199,7 @@ def test_predictions_are_those_of_the_whole_covariances():
     effects = 20 * rng.normal(size=(n, 2))
     number = np.concatenate([np.arange(samples) // 5, 100 + np.arange(samples) // 5])
     noise = np.eye(n)
-    for effect in effects.T * DesignSettings().form_error:
+    for effect in effects.T * FORM_ERROR:
         noise += np.outer(effect, effect) * (number[:, None] == number) / 3
     whole = []
     means = []
@@ -210,9 +210,7 @@ def test_predictions_are_those_of_the_whole_covariances():
         local = line.run_slopes * line.run_sd
         whole.append(np.linalg.cholesky(noise + columns @ columns.T + local @ local.T))
     expected = kullback_leibler_divergences(np.stack(means), np.stack(whole))
-    own_means, covariances = outcome_distributions(
-        runs, known, effects, channels, period, DesignSettings()
-    )
+    own_means, covariances = outcome_distributions(runs, known, effects, channels, period)
     found = kullback_leibler_divergences(own_means, np.linalg.cholesky(covariances))
     np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-8)
 

@@ -6,15 +6,18 @@ import numpy as np
 import pytest
 
 from identification.gap.evidence import evaluate
-from identification.gap.forcing import most_windows, resolving_edges
+from identification.gap.forcing import (
+    MOST_VALUES,
+    MOST_WINDOWS,
+    WINDOWS,
+    WINDOWS_TOGETHER,
+    most_windows,
+    resolving_edges,
+)
 from identification.gap.localisation import Localisation, MissingTerm, locate
-from identification.gap.locate.settings import LocalisationSettings
 from identification.gap.plant import StateTrace
-from identification.gap.rank.settings import RankingSettings
 from identification.gap.recalibration import recalibrate
 from tests.identification.gap.oscillators import swung
-
-SETTINGS = LocalisationSettings()
 
 PERIODS = 960
 """Of the drive in a recording: twelve in each of 80 windows."""
@@ -23,7 +26,7 @@ PERIODS = 960
 @cache
 def located(**truth: float) -> Localisation:
     problem, estimate = recalibrate(swung(truth, PERIODS, samples=10))
-    residuals = evaluate(problem, [estimate], RankingSettings())[0].residuals
+    residuals = evaluate(problem, [estimate])[0].residuals
     return locate(problem, estimate, residuals, seed=4)
 
 
@@ -67,32 +70,32 @@ def sine(periods: int) -> tuple[np.ndarray, dict[str, StateTrace]]:
 
 
 def test_a_motion_that_usual_windows_follow_has_usual_windows():
-    edges = resolving_edges(*sine(15), 0.19, 400, 0, SETTINGS)
-    assert len(edges) - 1 <= SETTINGS.windows
+    edges = resolving_edges(*sine(15), 0.19, 400, 0)
+    assert len(edges) - 1 <= WINDOWS
     assert edges[-1] == 20 * 15 - 1
 
 
 def test_a_faster_motion_has_more_windows_over_the_whole_run():
-    edges = resolving_edges(*sine(35), 0.19, 400, 0, SETTINGS)
+    edges = resolving_edges(*sine(35), 0.19, 400, 0)
     assert np.median(np.diff(edges)) <= 2
     assert edges[-1] == 20 * 35 - 1
 
 
 def test_of_a_run_that_is_too_long_the_first_part_counts():
-    edges = resolving_edges(*sine(1000), 0.19, 400, 0, SETTINGS)
+    edges = resolving_edges(*sine(1000), 0.19, 400, 0)
     assert len(edges) - 1 <= 400
     assert np.median(np.diff(edges)) <= 3
     assert 20 * 25 < edges[-1] < 20 * 60
 
 
 def test_the_part_of_a_long_run_begins_with_its_readings():
-    edges = resolving_edges(*sine(1000), 0.19, 400, 5000, SETTINGS)
+    edges = resolving_edges(*sine(1000), 0.19, 400, 5000)
     assert edges[0] == 5000
     assert 5000 + 20 * 25 < edges[-1] < 5000 + 20 * 60
 
 
 def test_windows_are_few_where_runs_are_many_or_long():
-    assert most_windows(1, 10_000, SETTINGS) == SETTINGS.most_windows
-    assert most_windows(6, 10_000, SETTINGS) == SETTINGS.windows_together / 6
-    assert most_windows(50, 10_000, SETTINGS) == SETTINGS.windows
-    assert most_windows(1, 40_000, SETTINGS) == SETTINGS.most_values / 40_000
+    assert most_windows(1, 10_000) == MOST_WINDOWS
+    assert most_windows(6, 10_000) == WINDOWS_TOGETHER / 6
+    assert most_windows(50, 10_000) == WINDOWS
+    assert most_windows(1, 40_000) == MOST_VALUES / 40_000

@@ -12,19 +12,14 @@ from identification.gap.fitting_problem import Estimate, FittingProblem
 from identification.gap.forcing import quadratic_forms, window_edges
 from identification.gap.gaps import RegimeGap, regime_gaps
 from identification.gap.localisation import Localisation, fit_processes, locate
-from identification.gap.locate.settings import LocalisationSettings
 from identification.gap.plant import StateTrace, noise_weighted
-from identification.gap.rank.settings import RankingSettings
 from identification.gap.recalibration import recalibrate
-from identification.gap.reduce.settings import ReductionSettings
 from identification.gap.report_figures import (
     forcing_figure,
     heat_map,
     missing_term_figure,
     residual_figure,
 )
-
-SETTINGS, BOOTSTRAP = LocalisationSettings(), ReductionSettings()
 
 LEAK = 2e-3
 """Of the tank [1/s]."""
@@ -33,7 +28,7 @@ LEAK = 2e-3
 @cache
 def recalibrated_tank(**truth: float) -> tuple[FittingProblem, Estimate, list]:
     problem, estimate = recalibrate(Tank(virtual_recordings(truth)))
-    return problem, estimate, evaluate(problem, [estimate], RankingSettings())[0].residuals
+    return problem, estimate, evaluate(problem, [estimate])[0].residuals
 
 
 @cache
@@ -88,27 +83,27 @@ def test_a_forcing_is_recovered_but_for_noise_and_what_calibration_absorbs():
     problem, estimate, _ = recalibrated_tank()
     plant, values = problem.plant, problem.candidate(estimate)
     equation = plant.equations[0]
-    edges = window_edges(plant.runs[0].time, plant.states(values, 0), 80, SETTINGS)
+    edges = window_edges(plant.runs[0].time, plant.states(values, 0), 80)
     truth = 20.0 * np.sin(np.linspace(0, 6, len(edges) - 1))
     change = plant.forced(values, equation, 0, edges) @ truth
     altered = FittingProblem(plant, problem.slopes)
     shift = noise_weighted(plant, 0, change).ravel()
     altered.measured = [problem.measured[0] + shift, *problem.measured[1:]]
-    design, forms = quadratic_forms(altered, estimate, [0], 100.0, SETTINGS)
-    fit = fit_processes(forms, design, SETTINGS)[0][0]
+    design, forms = quadratic_forms(altered, estimate, [0], 100.0)
+    fit = fit_processes(forms, design)[0][0]
     error = fit.forcing - truth
     assert error @ forms[0].precision @ error < len(truth)
     assert truth @ forms[0].precision @ truth > 20 * len(truth)
 
 
 def gaps_of(problem: FittingProblem, masks: list, residuals: list, seed: int) -> list[RegimeGap]:
-    return regime_gaps(problem.plant, masks, residuals, seed, SETTINGS, BOOTSTRAP, scale=0.005)
+    return regime_gaps(problem.plant, masks, residuals, seed, scale=0.005)
 
 
 def test_windows_are_dense_where_states_move():
     time = np.arange(1000) * 0.1
     moving = StateTrace(unit="m", scale=1.0, values=np.clip((time - 50.0) / 5.0, 0.0, 1.0))
-    edges = window_edges(time, {"x": moving}, 80, SETTINGS)
+    edges = window_edges(time, {"x": moving}, 80)
     assert edges[0] == 0
     assert edges[-1] == len(time) - 1
     assert np.all(np.diff(edges) > 0)
@@ -153,9 +148,9 @@ def test_every_picture_is_drawn():
     masks = plant.regimes(problem.candidate(estimate), 2)
     assert found.missing_term is not None
     for figure in (
-        heat_map(found.regime_gaps, 10.0),
-        residual_figure(plant, 2, residuals[2], masks, 0.9),
-        missing_term_figure(found.missing_term, 0.9),
-        forcing_figure(plant, found.forcings[0], 0.9),
+        heat_map(found.regime_gaps),
+        residual_figure(plant, 2, residuals[2], masks),
+        missing_term_figure(found.missing_term),
+        forcing_figure(plant, found.forcings[0]),
     ):
         figure.canvas.draw()

@@ -6,12 +6,16 @@ import numpy as np
 import pytest
 
 from identification.gap.diagnosis import rank_hypotheses
-from identification.gap.posterior import log_completeness, with_hidden_causes
-from identification.gap.rank.settings import RankingSettings
+from identification.gap.posterior import (
+    CHANCE_MISFIT,
+    COMPLETING_SHARE,
+    FORM_ERROR_SHARE,
+    HIDDEN_SHARE,
+    log_completeness,
+    with_hidden_causes,
+)
 from identification.gap.verdict import Ranking
 from tests.identification.gap.drives import Drive
-
-SETTINGS = RankingSettings()
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +27,7 @@ def doubts(found: Ranking, misfits: dict[frozenset[str], float], other: float = 
     """Log completeness of each set, by the labels of its causes; `other`: misfit of sets not given."""
     sets = [frozenset(each.labels) for each in found.hypotheses]
     values = np.array([misfits.get(own, other) for own in sets])
-    return dict(zip(sets, log_completeness(found.hypotheses, values, SETTINGS), strict=True))
+    return dict(zip(sets, log_completeness(found.hypotheses, values), strict=True))
 
 
 ONE, BOTH = frozenset({"coupling"}), frozenset({"coupling", "dead_zone"})
@@ -44,22 +48,22 @@ def test_what_chance_leaves_is_no_reason_for_doubt(two_causes):
 
 
 def test_the_doubt_is_one_half_at_the_even_share(two_causes):
-    chance = SETTINGS.chance_misfit
-    small = SETTINGS.completing_share * (1000.0 + chance) - chance
+    chance = CHANCE_MISFIT
+    small = COMPLETING_SHARE * (1000.0 + chance) - chance
     assert doubts(two_causes, {ONE: 1000.0, BOTH: small})[ONE] == pytest.approx(np.log(0.5))
 
 
 def test_a_cause_at_the_end_of_its_range_explains_nothing(two_causes):
     hypotheses = [replace(each, at_bound=True) for each in two_causes.hypotheses]
     misfits = np.linspace(1.0, 1000.0, len(hypotheses))
-    assert np.all(log_completeness(hypotheses, misfits, SETTINGS) == 0.0)
+    assert np.all(log_completeness(hypotheses, misfits) == 0.0)
 
 
 def test_a_small_second_cause_beside_a_large_one_is_named():
     """It closes less of the gap than an error of the first one's form may, and is there all the same."""
     found = rank_hypotheses(Drive({"coupling": 0.9, "dead_zone": 0.04}))
     alone = next(i for i, each in enumerate(found.hypotheses) if each.labels == ("coupling",))
-    assert found.shares_left[alone] < SETTINGS.form_error_share
+    assert found.shares_left[alone] < FORM_ERROR_SHARE
     assert found.inclusion["dead_zone"] > 0.9
 
 
@@ -72,14 +76,13 @@ def hidden(found: Ranking, misfit: float) -> dict[frozenset[str], float]:
         found.hypotheses,
         np.full(count, misfit),
         np.zeros(count),
-        SETTINGS,
     )
     return dict(zip(sets, spread, strict=True))
 
 
 def test_a_second_cause_may_hide_where_much_is_left(two_causes):
     found = hidden(two_causes, 1e6)
-    assert found[ONE] == pytest.approx(1.0 - SETTINGS.hidden_share, rel=1e-6)
+    assert found[ONE] == pytest.approx(1.0 - HIDDEN_SHARE, rel=1e-6)
     assert found[BOTH] > 0.0
     assert sum(p for own, p in found.items() if own >= ONE) == pytest.approx(1.0)
 

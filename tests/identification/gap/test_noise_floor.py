@@ -8,9 +8,6 @@ import pytest
 from scipy.signal import lfilter
 
 from identification.gap.gaps import GapDraws
-from identification.gap.reduce.settings import ReductionSettings
-
-SETTINGS = ReductionSettings(draws=300)
 
 SAMPLES = 2500
 """Of each of two recordings, as many as the valve's held-out ones have at 0.5 ms."""
@@ -36,7 +33,7 @@ def judged(residuals: list[np.ndarray], trusted: list[np.ndarray] | None = None)
     )
     plant: Any = SimpleNamespace(runs=runs, channels=(SimpleNamespace(name="y"),))
     counted = [y * mask for y, mask in zip(residuals, masks, strict=True)]
-    return GapDraws(plant, {"model": counted}, 1, SETTINGS, scale=5e-3)
+    return GapDraws(plant, {"model": counted}, 1, scale=5e-3)
 
 
 @pytest.mark.parametrize("factor", [0.3, 1.0, 3.0])

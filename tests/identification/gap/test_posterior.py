@@ -7,12 +7,15 @@ import pytest
 
 from identification.gap.diagnosis import rank_hypotheses
 from identification.gap.evidence import EvaluatedHypothesis
-from identification.gap.posterior import Posterior, credibility, misfit_beyond_noise, posterior
-from identification.gap.rank.settings import RankingSettings
+from identification.gap.posterior import (
+    EVEN_SHARE_LEFT,
+    Posterior,
+    credibility,
+    misfit_beyond_noise,
+    posterior,
+)
 from identification.gap.verdict import Ranking
 from tests.identification.gap.drives import Drive
-
-SETTINGS = RankingSettings()
 
 
 def ranked(truth: dict[str, float], seed: int = 0) -> Ranking:
@@ -22,7 +25,7 @@ def ranked(truth: dict[str, float], seed: int = 0) -> Ranking:
 def weighed(found: Ranking, change=lambda each: each) -> Posterior:
     """Probabilities of the same fits, each changed."""
     every = [change(each) for each in (found.recalibrated, *found.hypotheses)]
-    return posterior(found.problem, every[0], every[1:], SETTINGS)
+    return posterior(found.problem, every[0], every[1:])
 
 
 def in_units_of(factor: float, each: EvaluatedHypothesis) -> EvaluatedHypothesis:
@@ -77,15 +80,15 @@ def test_the_more_a_cause_explains_the_less_no_cause_is_believed(seed, size):
 
 def test_credibility_falls_with_what_is_left():
     left = np.linspace(0.0, 1.0, 50)
-    found = credibility(left, 45, SETTINGS)
+    found = credibility(left, 45)
     assert found[0] == 1.0
     assert np.all(np.diff(found) < 0.0)
-    assert credibility(np.array([SETTINGS.even_share_left]), 45, SETTINGS)[0] == pytest.approx(0.5)
+    assert credibility(np.array([EVEN_SHARE_LEFT]), 45)[0] == pytest.approx(0.5)
 
 
 def test_a_larger_catalogue_makes_the_nearest_cause_less_credible():
     half_left = np.array([0.3])
-    by_number = [credibility(half_left, causes, SETTINGS)[0] for causes in (3, 10, 45, 100)]
+    by_number = [credibility(half_left, causes)[0] for causes in (3, 10, 45, 100)]
     assert by_number == sorted(by_number, reverse=True)
     assert by_number[-1] < by_number[0]
 

@@ -14,6 +14,7 @@ from identification.block_bootstrap import Interval
 from identification.gap.diagnosis import Diagnosis, diagnose, hypothesis_label
 from identification.gap.gap_json import (
     GAP,
+    SYSTEMATIC_FORM_ERROR,
     TERM,
     as_json,
     parameter_covariance,
@@ -257,5 +258,5 @@ def test_an_interval_is_as_wide_as_what_remains_is_large_and_correlated():
     form = covariance - inflation * hypothesis.covariance
     size = hypothesis.estimate.hypothesis.parameters[0]
     acting = hypothesis.estimate.cause_vector[0] * size.scale
-    share = found.settings.report.systematic_form_error
+    share = SYSTEMATIC_FORM_ERROR
     np.testing.assert_allclose(np.diag(form), [0.0, (share * acting) ** 2], atol=1e-12)

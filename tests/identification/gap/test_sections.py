@@ -13,7 +13,7 @@ from matplotlib.patches import Rectangle
 from identification.gap import report_figures as ranking_figures
 from identification.gap.diagnosis import Diagnosis
 from identification.gap.gap_json import as_json
-from identification.gap.quantities import probability_text, quantity
+from identification.gap.quantities import probability_text
 from identification.gap.report_page import sections
 from identification.gap.sentences import (
     hidden_causes_sentence,
@@ -233,17 +233,6 @@ def test_places_sum_to_one_with_nothing_missing():
     assert all(0 <= width <= 1 for width in widths(right)), "a set may lie in several components"
 
 
-def test_sizes_lie_within_their_range():
-    found = diagnosed("known")
-    (axes,) = ranking_figures.size_figure(found).axes
-    estimate = found.judged[0].hypothesis.estimate
-    leak = estimate.hypothesis.parameters[0]
-    value = found.ranking.problem.values(estimate)[leak.symbol]
-    dots = [line for line in axes.lines if line.get_marker() == "o"]
-    assert len(dots) == 1, "faint causes are not drawn beside a probable one"
-    assert dots[0].get_xdata() == pytest.approx((value - leak.low) / (leak.high - leak.low))
-
-
 def test_tables_hold_the_figures_of_the_file():
     found = diagnosed("known")
     content, shrink = as_json(found), sections(found)[3]
@@ -254,11 +243,3 @@ def test_tables_hold_the_figures_of_the_file():
     columns = table(shrink, "Model").columns
     percent = content["gap"]["report_metric_percent"]["nominal"]
     assert gaps["nominal"][columns.index("overall [%]")] == f"{percent:.2f}"
-    parameters = {row[0]: row[1:] for row in table(shrink, "Parameter").rows}
-    fitted = [quantity(content["parameters"][m]["c"], "m/s") for m in content["parameters"]]
-    assert parameters["c"] == fitted
-
-
-def test_without_a_gap_no_share_of_it_is_drawn():
-    known, none = (len(pictures(sections(diagnosed(name))[3])) for name in ("known", "no_gap"))
-    assert none == known - 2

@@ -9,7 +9,7 @@ from epv_env.plant.parameters import Parameters
 from identification.bench.programmes import DIAGNOSIS_SUITE
 from identification.bench.session import add_ripple, measured_campaign, round_pressures, run_programme
 from identification.gap.diagnosis import rank_hypotheses
-from identification.gap.rank.settings import RankingSettings
+from identification.gap.posterior import NO_CAUSE_DOUBT
 from identification.gap.verdict import Ranking
 from identification.recordings.recording import Campaign
 from identification.valve_gap.valve import Valve
@@ -59,4 +59,4 @@ def test_a_true_effect_is_found_in_pressures_of_50_mbar():
 
 @pytest.mark.xfail(strict=True, reason="three recordings have too few blocks of ten correlations")
 def test_a_slow_ripple_on_three_recordings_is_no_gap():
-    assert ranked(rippled(short_campaign())).no_cause > RankingSettings().no_cause_doubt
+    assert ranked(rippled(short_campaign())).no_cause > NO_CAUSE_DOUBT

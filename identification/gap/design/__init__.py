@@ -1,1 +1,0 @@
-"""Experiment design: which recording would tell rival hypotheses apart."""

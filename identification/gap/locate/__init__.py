@@ -1,1 +1,0 @@
-"""Fault localisation: which channel, regime and state equation the gap lies in."""

@@ -1,1 +1,0 @@
-"""Hypothesis ranking: screening, refits, evidence, probabilities and the verdict."""
