@@ -11,7 +11,7 @@ SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile
 
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help venv train test test-oldest identify gap sim-to-real bench tune tradeoff results benchmark robustness export gif docs lint check format wheel clean
+.PHONY: help venv train test test-oldest identify gap sim-to-real bench tune results robustness export gif docs lint check format wheel clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z][a-z-]*\):.*## /\1	/p' Makefile | while IFS='	' read -r name text; do \
@@ -56,35 +56,16 @@ bench: $(VENV)/.installed ## measure speed and memory beside peers (ten minutes)
 	$(PY) -m tests.benchmarks $(ARGS)
 
 tune: $(VENV)/.installed ## search the classic controllers' settings anew (minutes)
-	$(PY) training/tune.py --out controllers/tuned.json $(ARGS)
-	$(PY) training/tune.py --out controllers/tuned.json --objective margin \
-		--only "hysteresis, adaptive" "cascade, adaptive" "pulse, adaptive" $(ARGS)
+	$(PY) -m training.epv tune --out controllers/tuned.json $(ARGS)
 
-# The policies of the comparison, trained once and kept. To train them anew, remove the folder first.
-# Two of them are links to those in the package: controllers/trained.
-POLICIES := docs/results/policies
-TRADEOFF := training/tradeoff.py --out $(POLICIES)/tradeoff
-# Where a switching costs nothing there is most to learn: long without a memory, then with one.
-tradeoff: $(VENV)/.installed ## optimise controllers at several prices of switching (what is there is kept)
-	$(PY) $(TRADEOFF) --prices 0.5 1 2 --recurrent $(POLICIES)/recurrent
-	$(PY) $(TRADEOFF) --prices 0 --timesteps 20000000
-	$(PY) $(TRADEOFF) --prices 0 --timesteps 12000000 --recurrent $(POLICIES)/recurrent
+results: $(VENV)/.installed ## compare six controllers, and write docs/studies/comparison (an hour of one core)
+	$(PY) -m docs.studies.comparison.study $(ARGS)
 
-results: tradeoff ## compare all controllers, and write docs/results/comparison.md's figures (trains what is missing)
-	$(PY) training/compare.py --recurrent $(POLICIES)/recurrent --end-to-end $(POLICIES)/end-to-end --policies $(POLICIES)/plain --tradeoff $(POLICIES)/tradeoff \
-		--out runs/comparison --images docs/images --pages docs/results/comparison.md README.md $(ARGS)
-
-benchmark: $(VENV)/.installed ## train seven algorithms of stable-baselines3 and sb3-contrib, and score them (half an hour of one free core)
-	$(PY) training/benchmark.py --algo ppo a2c trpo dqn qrdqn td3 sac --out runs/benchmark --images docs/images --pages docs/results/benchmark.md $(ARGS)
-	cp runs/benchmark/benchmark.json docs/results/
-
-robustness: $(VENV)/.installed ## sweep parameters, effects and conditions, and write docs/results/robustness.md's figures
-	$(PY) training/sweep.py --controllers "hysteresis, extrapolating" PWM pulse "pulse, adaptive" PPO=$(POLICIES)/plain/seed-0 \
-		"supervised:PPO, recurrent=$(POLICIES)/recurrent/seed-7" "supervised:PPO, end to end=$(POLICIES)/end-to-end/seed-0" \
-		--out runs/robustness --images docs/images --pages docs/results/robustness.md docs/results/speed.md $(ARGS)
+robustness: $(VENV)/.installed ## sweep parameters, effects and conditions, and write docs/studies/robustness
+	$(PY) -m docs.studies.robustness.study $(ARGS)
 
 export: $(VENV)/.installed ## turn the policy of `make train` into C and ONNX (needs a C compiler)
-	$(PY) training/export.py runs/ppo --out runs/ecu $(ARGS)
+	$(PY) -m training.epv export runs/ppo --out runs/ecu $(ARGS)
 
 identify: $(VENV)/.installed ## calibrate a plant on a virtual bench's recordings, with a report
 	rm -rf runs/bench
@@ -97,7 +78,7 @@ gap: $(VENV)/.installed ## say which effect a virtual bench has that the model l
 	$(PY) -m identification gap runs/gap-bench --out runs/gap $(ARGS)
 
 sim-to-real: $(VENV)/.installed ## train, deploy on a bench, diagnose, retrain, deploy again (5 minutes)
-	$(PY) training/sim_to_real.py --out runs/sim-to-real --images docs/images $(ARGS)
+	$(PY) -m docs.studies.sim_to_real.study $(ARGS)
 
 # make study-reproduction, study-coverage ...: the folders of docs/studies
 study-%: $(VENV)/.installed

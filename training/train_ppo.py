@@ -5,9 +5,6 @@
 writes policy, configuration, table and figures into runs/ppo and prints the table.
 """
 
-import training.console.missing_packages  # noqa: F401 - before what may be missing
-
-# isort: split
 import argparse
 import sys
 from dataclasses import asdict, replace

@@ -13,8 +13,8 @@ from controllers.pulse import Pulse
 from controllers.pulse_simulation import pulse_table
 from epv_env.common.units import BAR
 from epv_env.plant.parameters import Parameters
-from training.evaluation.hard_scenarios import HARD
 from training.evaluation.rollout import run_episodes
+from training.evaluation.scenarios import BEYOND, TUNING_REGION
 
 pytestmark = pytest.mark.training
 PLANT = Parameters.calibrated()
@@ -75,9 +75,12 @@ def test_pulses_tell_opening_pressure_and_gain(offset, gain):
 
 
 def test_a_refill_after_starvation_does_not_carry_p2_out_of_the_band(table):
-    scenario = HARD["starved"]
+    scenario = BEYOND["starved"]
     metrics, _ = run_episodes(
-        AdaptivePulse(table=table, **ADAPTIVE), seeds=SEEDS, duration=10.0, options=scenario.all_options
+        AdaptivePulse(table=table, **ADAPTIVE),
+        seeds=SEEDS,
+        duration=10.0,
+        options={"parameters": TUNING_REGION, **scenario.options},
     )
     assert np.all(metrics.stayed)
 

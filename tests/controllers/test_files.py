@@ -5,12 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from controllers.registry import SIMULATING_KINDS, TUNED_KINDS, kind_of, registration
+from controllers.registry import kind_of, registration
 from controllers.tuned import ControllersFileError, Tuning, build, load_tunings, save_tunings
 from epv_env.plant.plantfile import Plant
 
 pytest.importorskip("optuna")
-from training.tune import budget
 
 pytestmark = pytest.mark.training
 
@@ -19,16 +18,6 @@ def test_tunings_survive_a_round_trip(tmp_path):
     tunings = {"hysteresis": Tuning(values={"open_below": -0.1}, trials=3, mean_return=-1.5, episodes=4)}
     save_tunings(tunings, tmp_path / "t.json", {"seed": 0})
     assert load_tunings(tmp_path / "t.json") == tunings
-
-
-def test_every_controller_was_tuned_with_the_same_budget_or_a_stated_smaller_one():
-    tunings = load_tunings()
-    assert tuple(dict.fromkeys(map(kind_of, tunings))) == TUNED_KINDS
-    full = {(t.trials, t.episodes) for name, t in tunings.items() if name not in SIMULATING_KINDS}
-    assert full == {(100, 128)}
-    assert SIMULATING_KINDS == ("MPC", "MPC, adaptive")
-    for kind in SIMULATING_KINDS:
-        assert (tunings[kind].trials, tunings[kind].episodes) == budget(kind, 100, 128) == (16, 32)
 
 
 @pytest.mark.parametrize("name", [name for name in load_tunings() if name != kind_of(name)])

@@ -21,8 +21,8 @@ from controllers.supervised import (
 from controllers.supervisor import Supervisor
 from controllers.supervisor_settings import SETTINGS, SupervisorSettings
 from epv_env.plant.plantfile import Plant
-from training.evaluation.hard_scenarios import HARD
 from training.evaluation.rollout import run_episodes
+from training.evaluation.scenarios import BEYOND, TUNING_REGION
 
 ALL = asdict(SETTINGS)
 PACKAGED = TRAINED / "end-to-end" / "seed-0"
@@ -88,13 +88,13 @@ def test_the_packaged_policy_holds_the_band_under_its_supervisor():
 
 
 def test_it_survives_a_p3_that_freezes_as_often_as_the_controller_behind_the_check():
-    scenario = HARD["p3 frozen"]
+    scenario = BEYOND["p3 frozen"]
     control = load_supervised(PACKAGED)
     left = []
     for each in (control.main, control):
         metrics, _ = run_episodes(
             each, seeds=list(range(3_500_000, 3_500_064)), duration=6.0,
-            options={"scenario": "mixed", **scenario.all_options},
+            options={"scenario": "mixed", "parameters": TUNING_REGION, **scenario.options},
         )  # fmt: skip
         left.append(np.sum(~metrics.stayed))
     assert left[0] > 16

@@ -17,8 +17,8 @@ from controllers.tuned import build, load_tunings
 from controllers.valve_learner import ValveLearner
 from epv_env.observation import LAYOUT, decode, encode
 from epv_env.plant.plantfile import Plant
-from training.evaluation.hard_scenarios import HARD
 from training.evaluation.rollout import run_episodes
+from training.evaluation.scenarios import BEYOND, TUNING_REGION
 
 
 @dataclass(kw_only=True)
@@ -256,14 +256,14 @@ def test_a_pulse_that_was_ended_is_measured_before_the_next_one():
 
 @pytest.mark.parametrize("name", ["restart", "latency of 5 ms"])
 def test_the_supervised_policy_leaves_less_often(name):
-    scenario = HARD[name]
+    scenario = BEYOND[name]
     policy = load_policy(TRAINED / "end-to-end" / "seed-0")
     left = []
     for control in (policy, supervisor(policy)):
         faulty = scenario.fault.around(control, 5e-3) if scenario.fault else control
         metrics, _ = run_episodes(
             faulty, seeds=list(range(3_500_000, 3_500_256)), duration=6.0,
-            options={"plant": Plant.calibrated(), "scenario": "mixed", **scenario.all_options},
+            options={"scenario": "mixed", "parameters": TUNING_REGION, **scenario.options},
         )  # fmt: skip
         left.append(np.sum(~metrics.stayed))
     assert left[1] < 0.7 * left[0]

@@ -8,34 +8,30 @@ from pathlib import Path
 import numpy as np
 
 from controllers.hysteresis import Hysteresis
-from controllers.learned import GatedUnit
-from epv_env.common.command_line import fail_clearly
+from epv_env.common.commands import main_of
 from epv_env.observation import LAYOUT
-from tests.training.policies import Layers, fitted_layers, random_unit, write_policy
-from training.deploy.settings import SETTINGS
-from training.export import main
-
-EPISODES, PERIODS = SETTINGS.episodes, SETTINGS.periods
+from tests.training.policies import Layers, write_policy
+from training.deploy.agreement import STATES_EPISODES as EPISODES
+from training.deploy.agreement import STATES_PERIODS as PERIODS
 
 GOOD = Hysteresis(open_below=-0.1, shut_above=0.0, shut_lookahead=0.03, name="good")
 QUICK = ("--episodes", "4", "--duration", "1")
 
 
+def command(*words: object) -> int:
+    arguments = [str(word) for word in words]
+    return main_of("training.commands.export", program="export", arguments=arguments)
+
+
 def export(policy: Path, out: Path, *more: str) -> int:
-    return fail_clearly(lambda: main([str(policy), "--out", str(out), *QUICK, *more]))
+    return command(policy, "--out", out, *QUICK, *more)
 
 
-def export_of(layers: Layers, folder: Path, unit: GatedUnit | None = None) -> tuple[Path, Path]:
+def export_of(layers: Layers, folder: Path) -> tuple[Path, Path]:
     """Folders of a policy and of its export."""
-    policy = write_policy(layers, folder / "policy", unit)
+    policy = write_policy(layers, folder / "policy")
     assert export(policy, folder / "ecu") == 0
     return policy, folder / "ecu"
-
-
-def recurrent_export(folder: Path) -> tuple[Path, Path]:
-    """A policy with a memory that acts like a good controller, and its export."""
-    unit = random_unit(seed=3, cells=10)
-    return export_of(fitted_layers(GOOD, seed=3, unit=unit), folder, unit)
 
 
 def column(folder: Path, name: str) -> np.ndarray:

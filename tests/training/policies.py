@@ -12,8 +12,7 @@ from controllers.base import Controller
 from controllers.learned import GatedUnit
 from controllers.policy_contract import CONTRACT_FILE, FORMAT, WEIGHTS_FILE
 from epv_env.observation import LAYOUT, contract
-from training.deploy.double_precision import memory_along
-from training.deploy.visited_states import visit
+from training.deploy.agreement import visit
 
 Layers = list[tuple[NDArray, NDArray]]
 
@@ -49,19 +48,15 @@ def random_unit(*, seed: int, cells: int) -> GatedUnit:
     )
 
 
-def fitted_layers(controller: Controller, *, seed: int, unit: GatedUnit | None = None) -> Layers:
+def fitted_layers(controller: Controller, *, seed: int) -> Layers:
     """A net of 64 and 64 units that acts much like a controller.
 
-    The hidden layers are random, and so is the unit before them; the last is fitted by least squares to
-    what the controller decides on the states that it visits.
+    The hidden layers are random; the last is fitted by least squares to what the controller decides on
+    the states that it visits.
     """
     seen = visit(controller, first_seed=seed, episodes=32, periods=300)
-    signal, cells = seen.flat, 0
-    if unit is not None:
-        cells = unit.width
-        memory = memory_along(unit, seen.observations)[:, 1:].reshape(-1, cells)
-        signal = np.concatenate([signal, memory], axis=1)
-    hidden = random_layers(seed=seed, widths=(64,), outputs=64, cells=cells)
+    signal = seen.flat
+    hidden = random_layers(seed=seed, widths=(64,), outputs=64)
     for weight, bias in hidden:
         signal = np.tanh(signal @ weight.T + bias)
     columns = np.column_stack([signal, np.ones(len(signal))])

@@ -5,24 +5,20 @@ import shutil
 import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout
-from functools import partial
 from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from controllers.learned import TRAINED, load_policy
+from controllers.learned import load_policy
 from controllers.registry import SIMULATING_KINDS
 from controllers.supervised import load_settings
 from controllers.tuned import load_tunings
 from epv_env.common.command_line import fail_clearly
 
 pytest.importorskip("stable_baselines3")
-from training import tradeoff, train_ppo, tune
-from training.learners.policy_files import save_policy
-from training.learners.policy_folders import Training
-from training.learners.student import Student, policy_of
+from training import train_ppo
 
 pytestmark = pytest.mark.training
 
@@ -164,67 +160,3 @@ def test_wrong_input_gets_one_sentence_and_leaves_nothing(arguments, words, tmp_
     assert words in result.stderr
     assert "Traceback" not in result.stderr
     assert not out.exists()
-
-
-def test_tuning_in_its_shortest_form(tmp_path):
-    out = tmp_path / "tuned.json"
-    result = command(
-        "--trials", 2, "--episodes", 2, "--duration", 0.6, "--out", out, script="training/tune.py"
-    )
-    assert result.returncode == 0, result.stderr
-    assert json.loads(out.read_text())["search"]["trials"] == 2
-
-
-@pytest.mark.parametrize("script", [tune, tradeoff])
-def test_tuning_without_a_trial_is_refused(script, tmp_path):
-    result = command_here("--trials", 0, "--out", tmp_path / "out", script=script)
-    assert result.returncode == 2
-    assert "--trials must be positive" in result.stderr
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize("shape", [{"memory": 4, "width": 8}, None])
-def test_the_tradeoff_goes_on_from_no_other_kind_of_policy(shape, tmp_path):
-    """One of other layers, and one without a memory."""
-    wrong = policy_of(Student(**shape)) if shape else load_policy(TRAINED / "plain" / "seed-0")
-    save_recurrent(wrong, tmp_path / "memory")
-    out = tmp_path / "out"
-    result = command("--recurrent", tmp_path / "memory", "--out", out, script="training/tradeoff.py")
-    assert result.returncode == 2
-    assert "its folder `student`" in result.stderr
-    assert result.stderr.count("\n") == 1
-    assert not out.exists()
-
-
-def save_recurrent(student, folder):
-    """The first training seed's student, and its policy, as compare.py fills a folder."""
-    for kept in (folder / "seed-0", folder / "seed-0" / "student"):
-        save_policy(student, kept, control_period=5e-3, provenance={})
-
-
-def test_the_tradeoff_in_its_shortest_form_keeps_what_is_done(tmp_path, monkeypatch):
-    """In this process: the command has no short form, and its trainings are long."""
-    monkeypatch.setattr(tradeoff, "Training", partial(Training, unusual=train_ppo.QUICK_HYPERPARAMETERS))
-    student = policy_of(Student(memory=4, width=64))
-    save_recurrent(student, tmp_path / "memory")
-
-    def run(trials):
-        options = ("--recurrent", tmp_path / "memory", "--prices", 0.2, "--timesteps", 16384,
-                   "--trials", trials, "--workers", 1, "--out", tmp_path)  # fmt: skip
-        return command_here(*options, script=tradeoff)
-
-    first = run(trials=1)
-    assert first.returncode == 0, first.stderr
-    folder = tmp_path / "price-0.2"
-    variants = {next(iter(each.runs)) for each in tradeoff.finished_variants(tmp_path)}
-    assert variants == {
-        f"{name}, price 0.2" for name in ("PPO", "PPO, recurrent", "hysteresis, extrapolating")
-    }
-    written = ("policy.safetensors", "tuned.json", "recurrent/policy.safetensors")
-    before = [(folder / name).read_bytes() for name in written]
-    assert json.loads(before[1])["search"]["switching_price"] == 0.2
-    assert run(trials=1).returncode == 0
-    assert [(folder / name).read_bytes() for name in written] == before
-    other = run(trials=2)
-    assert other.returncode == 2
-    assert "choose another --out" in other.stderr

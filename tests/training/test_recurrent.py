@@ -1,6 +1,5 @@
 """A policy with a memory: the unit is torch's, its teacher sees the plant, a seed means one policy."""
 
-from copy import deepcopy
 from dataclasses import replace
 from typing import Any
 
@@ -23,7 +22,6 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from tests.training.policies import random_layers
-from training.deploy.double_precision import in_double, logits_along
 from training.evaluation.rollout import begin_episodes, make_env, run_episodes
 from training.learners.distillation import Distillation, distil
 from training.learners.hyperparameters import Hyperparameters
@@ -90,17 +88,6 @@ def test_the_policy_computes_what_torch_does(student, readings):
     policy.reset(readings.shape[1])
     logits = np.array([policy.logits(part) for part in readings])
     np.testing.assert_allclose(logits[..., 1] - logits[..., 0], expected, atol=1e-5)
-
-
-def test_in_double_precision_too(student, readings):
-    """Where the order of sums is of no account."""
-    along = readings.swapaxes(0, 1).copy()
-    with torch.no_grad():
-        expected = (
-            deepcopy(student).double()(torch.as_tensor(along).double(), nothing(6).double()).numpy()
-        )
-    logits = logits_along(in_double(policy_of(student)), along)
-    np.testing.assert_allclose(logits[..., 1] - logits[..., 0], expected, atol=1e-12)
 
 
 def test_a_valve_is_decided_alone_as_in_a_batch_to_the_bit(student, readings):

@@ -9,11 +9,25 @@ pytest.importorskip("pandas")
 
 from controllers.hysteresis import Hysteresis
 from epv_env.plant.consumption import SCENARIOS, Profiles, Scenario, draw_profile
+from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.plantfile import Plant
+from epv_env.reward import REFERENCE_PERIOD
 from epv_env.settings import make_settings
 from epv_env.signals import RecordedConsumption
 from training.evaluation.rollout import run_episodes
-from training.evaluation.scenarios import EVALUATION, NAMED, RANDOM
+from training.evaluation.scenarios import (
+    BEYOND,
+    EVALUATION,
+    LEVELS,
+    NAMED,
+    RANDOM,
+    REFILL_TIME,
+    TUNING_REGION,
+    VENTED_DROP_BAR,
+    effect_levels,
+    scenario_group,
+    worn_scenarios,
+)
 
 pytestmark = pytest.mark.training
 
@@ -40,10 +54,10 @@ def test_there_are_a_dozen_and_a_random_one():
     assert all(scenario.meaning for scenario in EVALUATION.values())
 
 
-@pytest.mark.parametrize("name", EVALUATION)
-def test_every_scenario_runs(name):
-    metrics, _ = run_episodes(CONTROLLER, seeds=[1, 2], duration=0.05, options=EVALUATION[name].options)
-    assert len(metrics) == 2
+def test_the_environment_accepts_every_scenario():
+    for name, scenario in {**EVALUATION, **BEYOND, **worn_scenarios()}.items():
+        options = {"control_period": REFERENCE_PERIOD, "parameters": TUNING_REGION, **scenario.options}
+        assert make_settings(Plant.calibrated(), **options).control_period > 0, name
 
 
 def test_one_emergency_is_one():
@@ -77,3 +91,72 @@ def test_a_scenario_of_ones_own_is_drawn_like_a_named_one():
     assert isinstance(own, Scenario)
     ours, named = (draw_profile(each, np.random.default_rng(3)) for each in (own, "steps"))
     np.testing.assert_array_equal(ours.applications, named.applications)
+
+
+class Shut(Hysteresis):
+    """Keeps the coil on, which shuts the valve."""
+
+    def act(self, observations):
+        return np.ones(len(observations), dtype=int)
+
+
+class Open(Hysteresis):
+    """Keeps the coil off, which opens the valve."""
+
+    def act(self, observations):
+        return np.zeros(len(observations), dtype=int)
+
+
+def test_an_open_valve_refills_within_the_settling_time():
+    options = {
+        "parameters": TUNING_REGION, "drop_bar": (4.4, 4.4), "scenario": "none",
+        "settling_time": REFILL_TIME,
+    }  # fmt: skip
+    metrics, _ = run_episodes(
+        Open(open_below=-0.1, shut_above=0.0), seeds=list(range(16)), duration=2.0, options=options
+    )
+    assert np.all(metrics.breakdown_bar < 0.5)
+
+
+@pytest.mark.parametrize(("drop", "avoidable"), [(VENTED_DROP_BAR[0], True), (0.3, False)])
+def test_a_vented_valve_can_be_shut_in_time_only_from_far_below(drop, avoidable):
+    options = {
+        "parameters": TUNING_REGION, "p3_bar": (1.0, 1.0), "drop_bar": (drop, drop), "scenario": "none",
+    }  # fmt: skip
+    _, trace = run_episodes(
+        Shut(open_below=-0.1, shut_above=0.0), seeds=list(range(16)), duration=1.5, options=options,
+        trace_of=0,
+    )  # fmt: skip
+    assert trace is not None
+    assert (trace.p2_bar.max() < trace.target_bar + 0.5) == avoidable
+
+
+def test_a_starved_circuit_reaches_its_band_once_refilled_and_not_before():
+    controller = Hysteresis(open_below=0.0, shut_above=0.0)
+    options = {"parameters": TUNING_REGION, **BEYOND["starved"].options}
+    for duration, reached in ((2.9, False), (4.5, True)):
+        _, trace = run_episodes(
+            controller, seeds=list(range(4)), duration=duration, options=options, trace_of=0
+        )
+        assert trace is not None
+        assert (trace.p2_bar.max() > trace.target_bar - 0.5) == reached
+
+
+def test_every_effect_is_there_at_growing_sizes():
+    found: dict[str, dict[str, dict[str, float]]] = {}
+    for name, level, sizes in effect_levels():
+        found.setdefault(name, {})[level] = sizes
+    assert {name.split(" ")[0] for name in found} == set(CATALOGUE)
+    assert len(worn_scenarios()) == len(found)
+    for levels in found.values():
+        assert tuple(levels) == LEVELS
+        for symbol in set(levels["top"]) - {"A_pipe"}:
+            sizes = [abs(levels[level][symbol]) for level in LEVELS]
+            assert 0 < sizes[0] < sizes[1] < sizes[2]
+
+
+def test_groups_and_single_scenarios_are_found_by_name():
+    assert scenario_group("beyond") == BEYOND
+    assert scenario_group("restart") == {"restart": BEYOND["restart"]}
+    with pytest.raises(ValueError, match="no scenario 'flood': give named, beyond, worn, or some of"):
+        scenario_group("flood")

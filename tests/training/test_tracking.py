@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 
-from training import benchmark, train_ppo
+from training import train_ppo
 from training.learners.tracking import PROJECT, tracked
 
 pytestmark = pytest.mark.training
@@ -91,21 +91,9 @@ def test_nothing_is_tracked_unless_it_is_asked_for(package, tmp_path):
     assert package.calls == []
 
 
-@pytest.mark.parametrize("command", [benchmark, train_ppo])
+@pytest.mark.parametrize("command", [train_ppo])
 def test_a_command_without_the_package_names_it_and_writes_nothing(command, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "wandb", None)
     with pytest.raises(ValueError, match=r"--track needs the package wandb.*pip install wandb"):
         command.main(["--quick", "--track", "--out", str(tmp_path / "out")])
     assert not (tmp_path / "out").exists()
-
-
-def test_each_training_of_a_benchmark_has_its_run(package, tmp_path):
-    assert benchmark.main(["--quick", "--track", "--out", str(tmp_path)]) == 0
-    begun = [call[1] for call in package.calls if call[0] == "init"]
-    assert [settings["name"] for settings in begun] == [
-        "EPValve-v0/a2c/seed-0", "EPValvePWM-v0/a2c/seed-0",
-    ]  # fmt: skip
-    assert all(settings["config"]["algorithm"] == "a2c" for settings in begun)
-    for settings in begun:
-        assert list((tmp_path / settings["name"] / "tensorboard").iterdir())
-        assert settings["dir"] == str(tmp_path / settings["name"])

@@ -1,14 +1,12 @@
 """Tuning some kinds keeps what the file holds of the others, and refuses to mix budgets."""
 
-import numpy as np
 import pytest
 
 from controllers.registration import Choice, Range
 from controllers.tuned import Tuning, load_tunings, save_tunings
-from epv_env.reward import reward_terms
+from epv_env.common.commands import main_of
+from training.commands.tune import _search, kept, widened
 from training.evaluation.scenarios import TUNING_REGION
-from training.learners.hyperparameters import FROM_STUDENT
-from training.tune import OBJECTIVES, _search, kept, main, widened
 
 pytestmark = pytest.mark.training
 SHORT = ("--trials", "1", "--episodes", "1", "--duration", "0.1")
@@ -19,46 +17,25 @@ SEARCH = {
 OTHER = Tuning(values={"open_below": -0.1, "shut_above": 0.1}, trials=1, mean_return=-9.0, episodes=1)
 
 
+def main(*arguments):
+    return main_of("training.commands.tune", program="tune", arguments=[*SHORT, *arguments])
+
+
 def test_one_kind_alone_is_searched_and_the_others_are_kept(tmp_path):
     path = tmp_path / "tuned.json"
     save_tunings({"hysteresis": OTHER}, path, SEARCH)
     kinds = ("--only", "hysteresis, extrapolating")
-    assert main([*SHORT, *kinds, "--out", str(path), "--seed", "0"]) == 0
+    assert main(*kinds, "--out", str(path)) == 0
     found = load_tunings(path)
     assert list(found) == ["hysteresis", "hysteresis, extrapolating"]
     assert found["hysteresis"] == OTHER
 
 
-def test_the_stricter_objective_gives_a_tuning_of_its_own_beside_the_kinds_first(tmp_path):
-    path = tmp_path / "tuned.json"
-    save_tunings({"hysteresis": OTHER}, path, SEARCH)
-    assert main([*SHORT, "--only", "hysteresis", "--objective", "margin", "--out", str(path)]) == 0
-    found = load_tunings(path)
-    assert found["hysteresis"] == OTHER
-    assert found["hysteresis, with margin"].objective == "margin"
-
-
-def test_the_stricter_objective_charges_a_deviation_within_the_band():
-    """At 0.4 bar below the target for one period only the narrower band is left."""
-    reward, margin = (
-        reward_terms(
-            OBJECTIVES[name], period=5e-3, error_bar=np.array([-0.4]), highest_error_bar=np.zeros(1),
-            lowest_error_bar=np.array([-0.4]), switchings=np.zeros(1), vented_kg=np.zeros(1),
-            failed=np.zeros(1),
-        )
-        for name in ("reward", "margin")
-    )  # fmt: skip
-    assert reward.band == 0
-    assert margin.band == -FROM_STUDENT.band_price
-    assert margin.breakdown == 2 * reward.breakdown
-    assert margin.tracking == reward.tracking
-
-
-def test_another_budget_is_refused_and_the_file_left_alone(tmp_path):
+def test_another_budget_is_refused_and_the_file_left_alone(tmp_path, capsys):
     path = tmp_path / "tuned.json"
     save_tunings({"hysteresis": OTHER}, path, {**SEARCH, "trials": 100})
-    with pytest.raises(ValueError, match="search all kinds anew"):
-        main([*SHORT, "--only", "hysteresis", "--out", str(path)])
+    assert main("--only", "hysteresis", "--out", str(path)) == 2
+    assert "search all kinds anew" in capsys.readouterr().err
     assert load_tunings(path) == {"hysteresis": OTHER}
 
 

@@ -3,7 +3,7 @@
 C1  p2 stays within target ±500 mbar after the settling time: constraint violation rate, worst
     excursion, and the excursion that 99.9 % of the episodes do not exceed.
 C2  p2 breaks down little when air is drawn, and recovers soon: breakdown and recovery of every
-    consumption event (training/evaluation/consumption_events.py), largest shortfall of the episode.
+    consumption event, largest shortfall of the episode.
 C3  the same figures on plants drawn from a region.
 Cost: switchings of the coil, air vented, coil energy.
 """
@@ -16,11 +16,100 @@ from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from epv_env.reward import BAND_BAR
-from training.evaluation.consumption_events import EVENTS, ConsumptionEvents, EventSettings
 from training.evaluation.statistics import mean_interval
 
 TAIL_SHARE = 0.999
 """Share of the episodes that do not exceed the tail excursion [1]."""
+
+
+SHORTFALL_BAR = BAND_BAR / 2
+"""Shortfall below the target from which a breakdown counts as not yet recovered [bar]."""
+EVENT_FLOW = 0.9
+"""Consumption above which a period belongs to an application [g/s]; the largest leak lies below."""
+ONSET = 0.5
+"""Time after an event's beginning within which a dip counts as its answer, for the recovery [s]."""
+AFTERMATH = 1.0
+"""Time after the end of its consumption for which a shortfall is still the event's [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EventFigures:
+    """Figures of every episode's events, arrays (n,); 0 for an episode without any."""
+
+    count: NDArray
+    """Number of events."""
+    mean_breakdown: NDArray
+    """Mean over the events of the largest shortfall [bar]."""
+    mean_recovery: NDArray
+    """Mean over the events of the recovery time [s]."""
+    longest_recovery: NDArray
+    """Longest recovery time [s]."""
+
+
+class ConsumptionEvents:
+    """Accumulates the events of n episodes, period by period, in constant memory.
+
+    An event begins with the period in which consumption rises above EVENT_FLOW. It ends where the next
+    one begins, or AFTERMATH after consumption has fallen below again, or with the episode. Its breakdown
+    is the largest shortfall in that time. Its recovery is the time from its beginning until p2 is back
+    above target - SHORTFALL_BAR after the first dip below, or to the event's end if that comes first;
+    0 if no dip begins within ONSET.
+    """
+
+    def __init__(self, n: int, period: float):
+        """n: number of episodes. period: control period [s]."""
+        self._period = period
+        self._open = np.zeros(n, dtype=bool)
+        self._consuming = np.zeros(n, dtype=bool)
+        self._age = np.zeros(n)
+        self._quiet = np.zeros(n)
+        self._depth = np.zeros(n)
+        self._recovery = np.zeros(n)
+        self._recovered = np.zeros(n, dtype=bool)
+        self._count = np.zeros(n)
+        self._depths = np.zeros(n)
+        self._recoveries = np.zeros(n)
+        self._longest = np.zeros(n)
+
+    def update(self, consumption: NDArray, shortfall: NDArray) -> None:
+        """Take in one period: mean consumption [g/s] and largest shortfall, 0 or more [bar], (n,)."""
+        consuming = consumption > EVENT_FLOW
+        begins = consuming & ~self._consuming
+        self._consuming = consuming
+        self._close(begins)
+        self._open |= begins
+        self._count += begins
+
+        self._age += self._period
+        self._quiet = np.where(consuming, 0.0, self._quiet + self._period)
+        self._depth = np.maximum(self._depth, shortfall)
+        answer = (self._recovery > 0) | (self._age <= ONSET)
+        low = (shortfall > SHORTFALL_BAR) & answer & ~self._recovered
+        self._recovered |= ~low & (self._recovery > 0)
+        self._recovery = np.where(low, self._age, self._recovery)
+        self._close(self._quiet >= AFTERMATH)
+
+    def _close(self, where: NDArray) -> None:
+        """End the events among `where` that are open, and forget what was gathered there."""
+        ended = where & self._open
+        self._depths += ended * self._depth
+        self._recoveries += ended * self._recovery
+        self._longest = np.where(ended, np.maximum(self._longest, self._recovery), self._longest)
+        self._open &= ~where
+        for figure in (self._age, self._depth, self._recovery):
+            figure[where] = 0.0
+        self._recovered[where] = False
+
+    def result(self) -> EventFigures:
+        """The figures so far; events under way end here."""
+        count = np.maximum(self._count, 1)
+        under_way = self._open
+        return EventFigures(
+            count=self._count.copy(),
+            mean_breakdown=(self._depths + under_way * self._depth) / count,
+            mean_recovery=(self._recoveries + under_way * self._recovery) / count,
+            longest_recovery=np.maximum(self._longest, under_way * self._recovery),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,15 +165,13 @@ class Meter:
     for the failure, and no later one does.
     """
 
-    def __init__(self, n: int, period: float, settling_time: float, events: EventSettings = EVENTS):
+    def __init__(self, n: int, period: float, settling_time: float):
         """
         Args:
             n: number of episodes.
             period: control period [s].
             settling_time: time from which pressures count [s].
-            events: what counts as a consumption event and as recovered from it.
         """
-        self._shortfall_bar = events.shortfall_bar
         self._period = period
         self._settling_time = settling_time
         self._steps = 0
@@ -99,7 +186,7 @@ class Meter:
         self._vented = np.zeros(n)
         self._return = np.zeros(n)
         self._failed = np.zeros(n, dtype=bool)
-        self._events = ConsumptionEvents(n, period, events)
+        self._events = ConsumptionEvents(n, period)
 
     def update(self, reward: NDArray, failed: NDArray, info: dict[str, NDArray]) -> None:
         """Take in one period of every episode.
@@ -123,7 +210,7 @@ class Meter:
         self._highest = np.maximum(self._highest, deviation)
         self._lowest = np.minimum(self._lowest, deviation)
         self._squares += deviation**2
-        self._low_time = np.where(deviation < -self._shortfall_bar, self._low_time + self._period, 0.0)
+        self._low_time = np.where(deviation < -SHORTFALL_BAR, self._low_time + self._period, 0.0)
         self._longest_low = np.maximum(self._longest_low, self._low_time)
         consumption = np.where(runs, info["consumption_g_per_s"], 0.0)
         self._events.update(consumption, np.maximum(-deviation, 0.0))

@@ -1,6 +1,8 @@
 """Running controllers on scenarios: the same seeds give every controller the same episodes."""
 
-from collections.abc import Callable, Sequence
+import gc
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +16,10 @@ from epv_env.common.units import BAR
 from epv_env.result import step_info
 from epv_env.vector_env import EPValvePWMVectorEnv, EPValveVectorEnv
 from training.evaluation.metrics import EpisodeMetrics, Meter
+from training.evaluation.seeds import TIMING_SEED
+
+WARM_UP_DECISIONS = 50
+"""Decisions whose time is not counted."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,6 +82,7 @@ def run_episodes(
     duration: float,
     options: dict[str, Any],
     each: dict[str, list[Any]] | None = None,
+    restart_s: float | None = None,
     trace_of: int | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> tuple[EpisodeMetrics, Trace | None]:
@@ -90,6 +97,8 @@ def run_episodes(
         duration: of each episode [s].
         options: of the environment.
         each: options of its reset, lists with one value for each episode.
+        restart_s: when the control unit restarts, so that the controller forgets everything, and the
+            plant goes on [s]; a privileged controller remembers. None: never.
         trace_of: index of an episode to record; None: none.
         progress: called with the share done [1].
     """
@@ -100,8 +109,11 @@ def run_episodes(
     period = env.settings.control_period
     steps = round(duration / period)
     meter = Meter(len(seeds), period, env.settings.settling_time)
+    restart = None if restart_s is None else round(restart_s / period)
     rows = []
     for step in range(steps):
+        if step == restart and not isinstance(controller, Privileged):
+            controller.reset(len(seeds))
         action = controller.act(observation)
         result = env.task.step(*env.action.decode(action))
         observation = result.observation
@@ -132,18 +144,32 @@ def run_episodes(
     return metrics, trace
 
 
-def run_batches(
-    controller: Controller,
-    *,
-    seeds: Sequence[int],
-    duration: float,
-    options: dict[str, Any],
-    size: int,
-) -> EpisodeMetrics:
-    """`run_episodes` of many seeds, `size` episodes at a time: together they would fill the memory."""
-    parts = []
-    for first in range(0, len(seeds), size):
-        batch = list(seeds[first : first + size])
-        metrics, _ = run_episodes(controller, seeds=batch, duration=duration, options=options)
-        parts.append(metrics)
-    return EpisodeMetrics.joined(parts)
+def decision_times(
+    controller: Controller, decisions: int, *, seed: int = TIMING_SEED, **options: Any
+) -> NDArray:
+    """Processor time of each decision of one valve's episode [s] (decisions,).
+
+    Times are those of this implementation on this machine, without garbage collection: a control unit
+    has no garbage. The first decisions compile and fill caches and are not counted.
+
+    Args:
+        controller: whose `act` is timed.
+        decisions: how many.
+        seed: of the episode.
+        options: of the environment.
+    """
+    env = make_env(controller, 1, threads=1, **options)
+    observation = begin_episodes(env, controller, [seed])
+    seconds = np.zeros(WARM_UP_DECISIONS + decisions)
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        for k in range(len(seconds)):
+            begin = time.process_time()
+            action = controller.act(observation)
+            seconds[k] = time.process_time() - begin
+            observation = env.task.step(*env.action.decode(action)).observation
+    finally:
+        if collects:
+            gc.enable()
+    return seconds[WARM_UP_DECISIONS:]

@@ -1,14 +1,24 @@
-"""Scenarios of the evaluation: consumption of the circuit, target, and supply.
+"""Scenarios of the evaluation: ordinary ones, ones beyond training, and worn valves.
 
 `run_episodes` takes a scenario's `options` as they are. Those of the environment
 (epv_env/plant/consumption.py) serve training and tuning; most of the scenarios here are not among them.
+
+BEYOND: each differs in one thing from an ordinary episode, which comes first. All are judged by C1, the
+band after the settling time. The valve cannot let air out of the circuit, so no episode begins above the
+target, and targets only rise. Where an episode begins far below the target, `settling_time` leaves the
+time of the refill. Nothing is drawn until it ends, so an overshoot remains and counts.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from epv_env.plant.consumption import MIXED, SCENARIOS, Scenario
+from epv_env.plant.effects.record import Size
+from epv_env.plant.effects.registry import EFFECTS
+from epv_env.plant.parameters import table
 from epv_env.plant.supply import Supply
+from epv_env.signals import MovingTarget
 
 TUNING_REGION = "sensitive_ten_percent"
 """Plants tuned on: those that PPO trains on."""
@@ -24,6 +34,10 @@ class EvaluationScenario:
     meaning: str
     options: dict[str, Any] = field(default_factory=dict)
     """Of the environment: consumption, target, supply, first pressure; defaults elsewhere."""
+    duration: float | None = None
+    """Of an episode [s]; None: as long as the comparison's others."""
+    restart_s: float | None = None
+    """When the control unit restarts, so that the controller forgets everything [s]; None: never."""
 
 
 def consumption(like: str | None = None, **ranges: Any) -> Scenario:
@@ -126,4 +140,161 @@ EVALUATION: dict[str, EvaluationScenario] = {
     ),
     **NAMED,
 }
-"""All scenarios of the comparison."""
+"""The ordinary scenarios: random ones, and the named situations."""
+
+REFILL_TIME = 1.5
+"""An open valve refills the circuit from 4.4 bar below the target within 1 s; with a margin [s]."""
+
+VENTED_DROP_BAR = (3.0, 4.0)
+"""First p2 below the target where the valve begins open. Closing it takes so long that p2 rises by 0.8
+to 2.7 bar (64 plants within ±10 %): nearer to the target no controller could avoid overshoot [bar]."""
+
+
+def _late_emergency(at: float) -> Any:
+    """Nothing is drawn until one emergency at this time [s]."""
+    return consumption("emergency", flow=(5.0, 5.5), hold=(1.5, 2.0), first=(at, at), pause=(60.0, 60.0))
+
+
+def _recovery(low: float, high: float, **options: Any) -> EvaluationScenario:
+    """An episode that begins this far below the target [bar]; options: further ones."""
+    return EvaluationScenario(
+        meaning=f"begins {low:g} to {high:g} bar below the target, an emergency after the refill",
+        options={
+            "drop_bar": (low, high), "settling_time": REFILL_TIME,
+            "scenario": _late_emergency(REFILL_TIME + 1.0), **options,
+        },
+    )  # fmt: skip
+
+
+def _rest(seconds: float) -> EvaluationScenario:
+    """An emergency after a rest [s]."""
+    return EvaluationScenario(
+        meaning=f"nothing is drawn for {seconds:g} s, then an emergency",
+        options={"scenario": _late_emergency(seconds)},
+        duration=seconds + 4.0,
+    )
+
+
+BEYOND: dict[str, EvaluationScenario] = {
+    "as in training": EvaluationScenario(meaning="nothing differs: plants within ±10 %"),
+    "2 to 4 bar below": _recovery(2.0, 4.0),
+    "4 to 4.4 bar below": _recovery(4.0, 4.4),
+    "vented": replace(
+        _recovery(*VENTED_DROP_BAR, p3_bar=(1.0, 1.0)),
+        meaning="the control chamber begins vented, so the valve is open, 3 to 4 bar below the target",
+    ),
+    "target steps": EvaluationScenario(
+        meaning="target 6.5 bar, raised by 0.25 bar at 2, 4, 6 and 8 s",
+        options={
+            "target_bar": MovingTarget.recorded(
+                [0, 2, 2.001, 4, 4.001, 6, 6.001, 8, 8.001],
+                [6.5, 6.5, 6.75, 6.75, 7.0, 7.0, 7.25, 7.25, 7.5],
+            ),
+            "drop_bar": (0.0, 0.3),
+        },
+    ),
+    **{f"rest of {seconds} s": _rest(seconds) for seconds in (8, 20, 40, 80)},
+    "60 s at rest": EvaluationScenario(
+        meaning="nothing is drawn at all: every needless opening remains as overshoot",
+        options={"scenario": "none"},
+        duration=60.0,
+    ),
+    "starved": EvaluationScenario(
+        meaning="supply 1 to 2 bar below the target, refilled within a second from 3 s on",
+        options={
+            "conditions": {"starved": 1.0, "starved_bar": (1.0, 2.0), "starved_s": 3.0},
+            "drop_bar": (1.0, 2.0), "settling_time": 3.0 + REFILL_TIME, "scenario": "none",
+        },
+    ),
+    "8 g/s": EvaluationScenario(
+        meaning="sudden applications of 8 g/s: training ends at 5.5 g/s",
+        options={"scenario": consumption("steps", flow=(8.0, 8.0))},
+    ),
+    "restart": EvaluationScenario(
+        meaning="the control unit restarts at 5 s", restart_s=5.0
+    ),
+    "p3 frozen": EvaluationScenario(
+        meaning="the reading of p3 stops changing at 2 s",
+        options={"conditions": {"frozen_p3": 1.0, "frozen_p3_s": 2.0}},
+    ),
+    "p2 biased": EvaluationScenario(
+        meaning="the reading of p2 is 0.256 bar too high (Table 1: 1.6 % of 16 bar)",
+        options={"effects": {"pressure_sensor_bias": {"b_p2": 25.6e3}}},
+    ),
+    "latency of 5 ms": EvaluationScenario(
+        meaning="the coil follows its command after 5 ms",
+        options={"effects": {"command_delay": 5e-3}},
+    ),
+    "period of 4 ms": EvaluationScenario(
+        meaning="a decision every 4 ms instead of 5", options={"control_period": 4e-3}
+    ),
+    "period of 6 ms": EvaluationScenario(
+        meaning="a decision every 6 ms instead of 5", options={"control_period": 6e-3}
+    ),
+}  # fmt: skip
+"""Scenarios beyond training by name; plants within ±10 % (TUNING_REGION)."""
+
+LEVELS = ("small", "typical", "top")
+"""Sizes at which an effect of the gap catalogue is tried."""
+
+
+def effect_levels() -> Iterator[tuple[str, str, dict[str, float]]]:
+    """(effect, level, sizes by symbol [SI]) of every effect, variant and sign, at LEVELS.
+
+    Small is the least and typical the (geometric) middle of what sealed trials draw; top is the end of
+    the physical range, which may lie far beyond what a sound valve has.
+    """
+    for effect in EFFECTS:
+        for sizes in effect.variants.values():
+            for sign in (1, -1) if sizes[0].either_sign else (1,):
+                name = _name(effect.name, sizes, sign, several=len(effect.variants) > 1)
+                for level in LEVELS:
+                    yield name, level, {size.symbol: _size(size, level, sign) for size in sizes}
+
+
+def _name(effect: str, sizes: tuple[Size, ...], sign: int, *, several: bool) -> str:
+    """The effect, with the symbol where variants differ in it, and the sign where it has two."""
+    symbol = f" {sizes[0].symbol}" if several else ""
+    ending = {1: " +", -1: " −"}[sign] if sizes[0].either_sign else ""
+    return f"{effect}{symbol}{ending}"
+
+
+def _size(size: Size, level: str, sign: int) -> float:
+    """A size, with its sign [SI]."""
+    low, high = size.drawn or size.swept or (0.0, 0.0)
+    if size.stronger_when_smaller:
+        return {"small": high, "typical": size.typical, "top": low}[level]
+    least, greatest = table()[size.symbol].domain or (0.0, 0.0)
+    if level == "top":
+        return greatest if sign > 0 else least
+    return sign * (low if level == "small" else size.typical)
+
+
+def worn_scenarios() -> dict[str, EvaluationScenario]:
+    """A scenario for each effect of the catalogue, variant and sign, at its typical size."""
+    owners = {symbol: effect.name for effect in EFFECTS for symbol in effect.symbols}
+    return {
+        f"worn: {name}": EvaluationScenario(
+            meaning="the valve or its sensors have this effect at its typical size",
+            options={"effects": {owners[next(iter(sizes))]: sizes}},
+        )
+        for name, level, sizes in effect_levels()
+        if level == "typical"
+    }
+
+
+def scenario_group(name: str) -> dict[str, EvaluationScenario]:
+    """The scenarios that a name on a command line stands for: one, or a group of them.
+
+    Groups: `named` (ordinary situations), `beyond` (beyond training), `worn` (one effect each).
+    Raises ValueError for an unknown name.
+    """
+    groups = {"named": NAMED, "beyond": BEYOND, "worn": worn_scenarios()}
+    if name in groups:
+        return groups[name]
+    known = {**EVALUATION, **BEYOND, **groups["worn"]}
+    if name not in known:
+        raise ValueError(
+            f"no scenario {name!r}: give {', '.join(groups)}, or some of {', '.join(known)}"
+        )
+    return {name: known[name]}

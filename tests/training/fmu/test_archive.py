@@ -12,19 +12,15 @@ from xml.etree import ElementTree as xml
 import numpy as np
 import pytest
 
-from epv_env.common.command_line import fail_clearly
+from epv_env.common.commands import main_of
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant, save_plant
 from tests.training.fmu.unit import OK, Instance, Unit
-from training.deploy.fmu.files import VERSIONS, fmu, fmu_sources
-from training.deploy.fmu.model_description import model_description
-from training.deploy.fmu.plant_model import plant_model
-from training.deploy.fmu.units import UnitError, base_units
-from training.export_fmu import main
+from training.deploy.compiled import STRICT
+from training.deploy.fmu.archive import UnitError, base_units, fmu, fmu_sources, model_description
+from training.deploy.fmu.models import plant_model
 
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler (cc) here")
-FILES = {f"epv_plant_fmi{version[0]}.fmu" for version in VERSIONS}
-STRICT = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +29,8 @@ def model():
 
 
 def run(*words: object) -> int:
-    return fail_clearly(lambda: main([str(word) for word in words]))
+    arguments = [str(word) for word in words]
+    return main_of("training.commands.export", program="export", arguments=arguments)
 
 
 def description(path: Path) -> xml.Element:
@@ -62,9 +59,13 @@ def test_an_unknown_unit_is_named():
 
 
 def test_every_number_with_a_dimension_has_its_unit(model):
-    root = xml.fromstring(model_description(model, "3.0", "t"))
+    root = xml.fromstring(model_description(model))
     known = {unit.attrib["name"] for unit in root.iter("Unit")}
-    units = {v.attrib["name"]: v.attrib.get("unit") for v in root.iter("Float64")}
+    units = {
+        v.attrib["name"]: real.attrib.get("unit")
+        for v in root.iter("ScalarVariable")
+        for real in v.iter("Real")
+    }
     assert units["p2"] == "Pa"
     assert units["I"] == "A"
     assert units["alphaMV"] is None
@@ -72,38 +73,36 @@ def test_every_number_with_a_dimension_has_its_unit(model):
 
 
 @needs_compiler
-def test_the_command_writes_both_versions_of_a_plant_file(tmp_path):
+def test_the_command_writes_a_plant_file(tmp_path):
     plant = Plant(parameters=Parameters.calibrated().replace(R=44.0), region=Plant.calibrated().region)
     save_plant(plant, tmp_path / "plant.json")
     assert run("plant", "--plant", tmp_path / "plant.json", "--out", tmp_path / "out") == 0
-    assert {path.name for path in (tmp_path / "out").iterdir()} == FILES
-    for path in (tmp_path / "out").iterdir():
-        instance = Instance(Unit(path.read_bytes(), tmp_path / path.stem)).start()
-        assert instance.step(0.1) == OK
-        assert instance.get("I") == pytest.approx([24 / 44])
+    (path,) = (tmp_path / "out").iterdir()
+    assert path.name == "epv_plant.fmu"
+    instance = Instance(Unit(path.read_bytes(), tmp_path / path.stem)).start()
+    assert instance.step(0.1) == OK
+    assert instance.get("I") == pytest.approx([24 / 44])
 
 
 def test_without_a_compiler_the_sources_are_there(tmp_path, capsys):
     assert run("plant", "--out", tmp_path, "--compiler", "no-such-compiler") == 0
     assert "no C compiler" in capsys.readouterr().out
-    for name in FILES:
-        with zipfile.ZipFile(tmp_path / name) as archive:
-            names = set(archive.namelist())
-        assert not any(each.startswith("binaries") for each in names)
-        assert {"modelDescription.xml", "sources/equations.h"} <= names
-        assert ("sources/buildDescription.xml" in names) == ("fmi3" in name)
+    with zipfile.ZipFile(tmp_path / "epv_plant.fmu") as archive:
+        names = set(archive.namelist())
+    assert not any(each.startswith("binaries") for each in names)
+    assert {"modelDescription.xml", "sources/equations.h"} <= names
 
 
 def test_the_same_plant_gives_the_same_sources(model):
     again = plant_model(Plant.calibrated())
-    assert fmu(model, "3.0", "") == fmu(again, "3.0", "")
+    assert fmu(model, "") == fmu(again, "")
 
 
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
         (("plant", "--plant", "missing.json"), "cannot read plant file missing.json"),
-        (("policy", "missing"), "give a folder that training/export.py wrote"),
+        (("missing",), "cannot read a policy from missing"),
     ],
 )
 def test_bad_input_is_one_sentence_and_nothing_is_written(tmp_path, capsys, words, sentence):
@@ -114,17 +113,15 @@ def test_bad_input_is_one_sentence_and_nothing_is_written(tmp_path, capsys, word
 
 
 @needs_compiler
-@pytest.mark.parametrize("version", VERSIONS)
-def test_the_sources_agree_with_the_standards_header(model, version, tmp_path):
+def test_the_sources_agree_with_the_standards_header(model, tmp_path):
     """FMPy brings the header; a function of another form than its declaration would not compile."""
     fmpy = importlib.util.find_spec("fmpy")
     if fmpy is None or fmpy.origin is None:
         pytest.skip("FMPy, which has the standard's headers, is not installed")
-    for name, text in fmu_sources(model, version).items():
+    for name, text in fmu_sources(model).items():
         (tmp_path / name).write_text(text)
     headers = Path(fmpy.origin).parent / "c-code"
-    main_file = f"fmi{version[0]}.c"
-    words = ["-I", str(headers), "-include", f"fmi{version[0]}Functions.h", "-c", main_file]
+    words = ["-I", str(headers), "-include", "fmi2Functions.h", "-c", "fmi2.c"]
     done = subprocess.run(
         ["cc", *STRICT, *words], cwd=tmp_path, capture_output=True, text=True, check=False
     )
@@ -132,24 +129,22 @@ def test_the_sources_agree_with_the_standards_header(model, version, tmp_path):
 
 
 @needs_compiler
-@pytest.mark.parametrize("version", VERSIONS)
-def test_a_prefix_keeps_linked_units_apart(model, version, tmp_path):
-    for name, text in fmu_sources(model, version).items():
+def test_a_prefix_keeps_linked_units_apart(model, tmp_path):
+    for name, text in fmu_sources(model).items():
         (tmp_path / name).write_text(text)
-    prefix = f"-DFMI{version[0]}_FUNCTION_PREFIX=valve_"
-    command = ["cc", *STRICT, prefix, "-c", f"fmi{version[0]}.c", "-o", "unit.o"]
+    prefix = "-DFMI2_FUNCTION_PREFIX=valve_"
+    command = ["cc", *STRICT, prefix, "-c", "fmi2.c", "-o", "unit.o"]
     subprocess.run(command, cwd=tmp_path, check=True)
     text = (tmp_path / "unit.o").read_bytes()
-    assert f"valve_fmi{version[0]}DoStep".encode() in text
+    assert b"valve_fmi2DoStep" in text
 
 
 @needs_compiler
-@pytest.mark.parametrize("version", VERSIONS)
-def test_fmpy_validates_and_simulates_it(model, version, tmp_path):
+def test_fmpy_validates_and_simulates_it(model, tmp_path):
     fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed")
     validation = pytest.importorskip("fmpy.validation")
     path = tmp_path / "plant.fmu"
-    path.write_bytes(fmu(model, version, "cc"))
+    path.write_bytes(fmu(model, "cc"))
     assert validation.validate_fmu(str(path)) == []
     signal = np.array(
         [(0.0, 0.0, 0.01), (0.1, 0.0, 0.01), (0.1, 24.0, 0.0), (0.2, 24.0, 0.0)],
@@ -167,7 +162,7 @@ def test_fmpy_validates_and_simulates_it(model, version, tmp_path):
 
 
 def test_the_archive_is_a_plain_zip(model):
-    with zipfile.ZipFile(io.BytesIO(fmu(model, "2.0", ""))) as archive:
+    with zipfile.ZipFile(io.BytesIO(fmu(model, ""))) as archive:
         assert archive.testzip() is None
         assert not any("\\" in name or name.startswith("/") for name in archive.namelist())
 
@@ -179,4 +174,4 @@ def test_the_description_survives_any_plant_name(tmp_path):
     save_plant(plant, tmp_path / "plant.json")
     assert json.loads((tmp_path / "plant.json").read_text())
     assert run("plant", "--plant", tmp_path / "plant.json", "--out", tmp_path, "--compiler", "") == 0
-    assert "plant" in description(tmp_path / "epv_plant_fmi2.fmu").attrib["description"]
+    assert "plant" in description(tmp_path / "epv_plant.fmu").attrib["description"]

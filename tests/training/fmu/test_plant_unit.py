@@ -10,9 +10,8 @@ from epv_env.plant.parameters import Parameters, table
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.valves import Valves
 from tests.training.fmu.unit import ERROR, OK, Instance, Unit
-from training.deploy.fmu.files import VERSIONS, fmu
-from training.deploy.fmu.plant_model import plant_model
-from training.deploy.fmu.settings import SETTINGS
+from training.deploy.fmu.archive import fmu
+from training.deploy.fmu.models import P1_START, P2_START, U_START, plant_model
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler (cc) here")
 
@@ -24,15 +23,8 @@ SYMBOLS = [symbol for symbol, row in table().items() if row.domain]
 
 
 @pytest.fixture(scope="module")
-def units(tmp_path_factory):
-    """The unit of each version of the standard."""
-    model = plant_model(Plant.calibrated())
-    return [Unit(fmu(model, each, "cc"), tmp_path_factory.mktemp("fmu")) for each in VERSIONS]
-
-
-@pytest.fixture(params=[2, 3])
-def unit(request, units):
-    return units[request.param - 2]
+def unit(tmp_path_factory):
+    return Unit(fmu(plant_model(Plant.calibrated()), "cc"), tmp_path_factory.mktemp("fmu"))
 
 
 def drawn_parameters(rng: np.random.Generator, effects: int) -> Parameters:
@@ -49,7 +41,7 @@ def drawn_parameters(rng: np.random.Generator, effects: int) -> Parameters:
 
 def started(unit: Unit, p: Parameters) -> Instance:
     """An instance with these parameters, its current at rest."""
-    return Instance(unit).start({s: p[s] for s in SYMBOLS} | {"I_start": SETTINGS.U / p["R"]})
+    return Instance(unit).start({s: p[s] for s in SYMBOLS} | {"I_start": U_START / p["R"]})
 
 
 def kernel_of(plants: list[Parameters]) -> Valves:
@@ -58,20 +50,20 @@ def kernel_of(plants: list[Parameters]) -> Valves:
     for k, p in enumerate(plants):
         valves.set_parameters(np.array([k]), p)
         state = {
-            "p1": SETTINGS.p1, "p2": SETTINGS.p2, "p3": SETTINGS.p1, "xMV": p["xMVmax"],
-            "I": SETTINGS.U / p["R"], "I_coil": SETTINGS.U / p["R"], "coil_heat": p["theta_coil"],
+            "p1": P1_START, "p2": P2_START, "p3": P1_START, "xMV": p["xMVmax"],
+            "I": U_START / p["R"], "I_coil": U_START / p["R"], "coil_heat": p["theta_coil"],
         }  # fmt: skip
         for name, value in state.items():
             getattr(valves.state, name)[k] = value
     return valves
 
 
-def test_ten_thousand_random_steps_are_the_kernels(units):
+def test_ten_thousand_random_steps_are_the_kernels(unit):
     """100 plants of other parameters, most with effects, 100 steps of random inputs."""
     rng = np.random.default_rng(5)
     plants = [drawn_parameters(rng, effects=k % 4) for k in range(VALVES)]
     valves = kernel_of(plants)
-    instances = [started(units[0], p) for p in plants]
+    instances = [started(unit, p) for p in plants]
     on, worst, wanted = np.ones(VALVES, dtype=bool), np.zeros(4), np.zeros((VALVES, 4))
     for _ in range(STEPS):
         on ^= rng.random(VALVES) < 0.3
@@ -91,9 +83,9 @@ def test_ten_thousand_random_steps_are_the_kernels(units):
     assert worst[3] < 1e-4
 
 
-def test_finer_steps_change_little(units):
+def test_finer_steps_change_little(unit):
     """The error of the default step, on the calibrated plant."""
-    fine, default = (Instance(units[0]).start({"longest_step": step}) for step in (20e-6, 250e-6))
+    fine, default = (Instance(unit).start({"longest_step": step}) for step in (20e-6, 250e-6))
     for k in range(100):
         for instance in (fine, default):
             assert instance.step(PERIOD, U=0.0 if k % 5 < 2 else 24.0, sigma_S=0.01) == OK
@@ -112,16 +104,6 @@ def test_all_states_come_out(unit):
         np.testing.assert_allclose(found, value[0], rtol=1e-3, atol=1e-9, err_msg=name)
 
 
-def test_both_versions_give_the_same_numbers(units):
-    p = drawn_parameters(np.random.default_rng(1), effects=3)
-    results = []
-    for unit in units:
-        instance = started(unit, p)
-        assert [instance.step(7e-3, U=24.0 * (k % 2)) for k in range(10)] == [OK] * 10
-        results.append(instance.get(*OUTPUTS))
-    assert results[0] == results[1]
-
-
 def test_the_length_of_steps_matters_little(unit):
     long, short = (started(unit, Parameters.calibrated()) for _ in range(2))
     for k in range(10):
@@ -133,13 +115,13 @@ def test_the_length_of_steps_matters_little(unit):
 
 
 @pytest.mark.parametrize("name", list(CATALOGUE))
-def test_each_effect_is_felt(units, name):
+def test_each_effect_is_felt(unit, name):
     """A parameter that reached nothing would go unnoticed among random ones."""
     sizes = next(effect.drawn[0] for effect in EFFECTS if effect.name == name)
     large = {size.symbol: size.drawn[1] for size in sizes if size.drawn}
     results = []
     for p in (Parameters.calibrated(), Parameters.calibrated().replace(**large)):
-        instance = started(units[0], p)
+        instance = started(unit, p)
         for k in range(30):
             assert instance.step(5e-3, U=0.0 if k < 24 else 24.0, sigma_S=0.01) == OK
         results.append(instance.get(*OUTPUTS))
@@ -250,4 +232,4 @@ def test_a_finite_reservoir_sags(unit):
         instance = Instance(unit).start({"V1": volume})
         assert instance.step(0.3, U=0.0, sigma_S=0.02) == OK
         results.append(instance.get("p1")[0])
-    assert results[0] == SETTINGS.p1 > results[1]
+    assert results[0] == P1_START > results[1]

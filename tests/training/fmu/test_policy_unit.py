@@ -1,6 +1,5 @@
 """The FMU of an exported policy decides as the policy, and closes the loop with the plant's FMU."""
 
-import json
 import shutil
 from pathlib import Path
 
@@ -12,12 +11,10 @@ pytest.importorskip("safetensors")
 
 from controllers.learned import TRAINED
 from epv_env.plant.plantfile import Plant
-from tests.training.exports import PERIODS, column, export, recurrent_export
+from tests.training.exports import PERIODS, column, export
 from tests.training.fmu.unit import OK, Instance, Unit
-from training.deploy.fmu.files import VERSIONS, fmu
-from training.deploy.fmu.plant_model import plant_model
-from training.deploy.fmu.policy_model import policy_model
-from training.deploy.quantisation import ExportError
+from training.deploy.fmu.archive import fmu
+from training.deploy.fmu.models import plant_model
 
 pytestmark = [
     pytest.mark.training,
@@ -32,12 +29,13 @@ HALF_A_BAR = 5e4
 def ecu(tmp_path_factory) -> Path:
     """The export of a policy that comes with the package."""
     folder = tmp_path_factory.mktemp("policy") / "ecu"
-    assert export(TRAINED / "plain" / "seed-0", folder) == 0
+    assert export(TRAINED / "plain" / "seed-0", folder, "--fmu") == 0
     return folder
 
 
-def units_of(folder: Path, where: Path) -> list[Unit]:
-    return [Unit(fmu(policy_model(folder), each, "cc"), where / each) for each in VERSIONS]
+@pytest.fixture
+def unit(ecu, tmp_path) -> Unit:
+    return Unit((ecu / "epv_policy.fmu").read_bytes(), tmp_path / "policy")
 
 
 def readings(folder: Path, episode: int) -> list[dict[str, float]]:
@@ -61,24 +59,16 @@ def decisions(unit: Unit, inputs: list[dict[str, float]]) -> list[float]:
     return found
 
 
-@pytest.mark.parametrize("version", [0, 1])
-def test_it_decides_as_the_policy_on_visited_states(ecu, tmp_path, version):
-    unit = units_of(ecu, tmp_path)[version]
+def test_it_decides_as_the_policy_on_visited_states(ecu, unit):
     actions = column(ecu, "policy_action")
     for episode in range(3):
         assert decisions(unit, readings(ecu, episode)) == list(actions[episode])
 
 
-def test_so_does_a_policy_with_a_memory(tmp_path):
-    _, folder = recurrent_export(tmp_path)
-    found = decisions(units_of(folder, tmp_path)[1], readings(folder, 0))
-    assert found == list(column(folder, "policy_action")[0])
-
-
-def test_the_loop_of_both_units_holds_the_pressure(ecu, tmp_path):
+def test_the_loop_of_both_units_holds_the_pressure(unit, tmp_path):
     """Communication steps of 1 ms under braking: p2 stays within 0.5 bar of its target."""
-    plant = Instance(Unit(fmu(plant_model(Plant.calibrated()), "3.0", "cc"), tmp_path / "plant")).start()
-    policy = Instance(units_of(ecu, tmp_path)[1]).start()
+    plant = Instance(Unit(fmu(plant_model(Plant.calibrated()), "cc"), tmp_path / "plant")).start()
+    policy = Instance(unit).start()
     pressures = []
     for k in range(1000):
         (U,) = policy.get("U")
@@ -90,41 +80,6 @@ def test_the_loop_of_both_units_holds_the_pressure(ecu, tmp_path):
     assert np.ptp(pressures) > 1e3
 
 
-def test_the_voltage_of_a_decision_is_a_parameter(ecu, tmp_path):
-    instance = Instance(units_of(ecu, tmp_path)[0]).start({"U_on": 12.0, "p2": 12e5})
+def test_the_voltage_of_a_decision_is_a_parameter(unit):
+    instance = Instance(unit).start({"U_on": 12.0, "p2": 12e5})
     assert instance.get("coil", "U") == [1.0, 12.0]
-
-
-@pytest.mark.parametrize(
-    ("content", "sentence"),
-    [
-        ("{", "is not JSON"),
-        ("[" * 100_000, "is not JSON"),
-        ('{"format": "other/1"}', "has format 'other/1'"),
-        ('{"format": "epv-deployment/1"}', "field 'observation' is missing"),
-        ('{"format": "epv-deployment/1", "observation": {"control_period_s": 0}}', "no control period"),
-        (
-            '{"format": "epv-deployment/1", "observation": {"control_period_s": NaN}}',
-            "NaN is no number",
-        ),
-    ],
-)
-def test_a_damaged_export_is_refused(ecu, tmp_path, content, sentence):
-    folder = tmp_path / "ecu"
-    shutil.copytree(ecu, folder)
-    (folder / "contract.json").write_text(content)
-    with pytest.raises(ExportError, match=sentence):
-        policy_model(folder)
-
-
-def test_code_that_does_not_compile_is_refused(ecu, tmp_path):
-    folder = tmp_path / "ecu"
-    shutil.copytree(ecu, folder)
-    (folder / "epv_float.c").write_text("int")
-    with pytest.raises(ExportError, match="does not compile"):
-        fmu(policy_model(folder), "2.0", "cc")
-
-
-def test_the_period_is_the_exports(ecu):
-    period = json.loads((ecu / "contract.json").read_text())["observation"]["control_period_s"]
-    assert policy_model(ecu).step == period / 5

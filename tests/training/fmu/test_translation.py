@@ -3,9 +3,8 @@
 import pytest
 
 from epv_env.plant.primitives import inlined
-from training.deploy.fmu.expressions import NUMBER
-from training.deploy.fmu.tracing import Symbol, TranslationError, written
-from training.deploy.fmu.translation import Translation
+from training.deploy.fmu.c_expressions import NUMBER, Symbol, TranslationError, written
+from training.deploy.fmu.c_functions import Translation
 
 LIMIT = 0.1
 

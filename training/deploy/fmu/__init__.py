@@ -1,1 +1,1 @@
-"""The plant and an exported policy as Functional Mock-up Units: C sources after FMI 2.0 and 3.0."""
+"""The plant and an exported policy as Functional Mock-up Units: C sources after FMI 2.0."""

@@ -1,6 +1,6 @@
 /* How long does a decision take, from the readings to the action? In the folder of the export:
  *
- *     cc -std=c99 -O2 bench.c epv_float.c epv_fixed.c -o bench && ./bench
+ *     cc -std=c99 -O2 bench.c epv_policy.c -o bench && ./bench
  *
  * Each state is decided REPEATS times. `slowest_state` is the longest over the states of each state's
  * shortest time: what the code needs. `slowest_call` is the longest of all: it holds what interrupts and
@@ -30,46 +30,30 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static void report(const char *name, double slowest_call)
-{
-    qsort(best, STATES, sizeof best[0], ascending);
-    printf("%s,%.3f,%.3f,%.3f\n", name, best[STATES / 2], best[STATES - 1], slowest_call);
-}
-
-/* Times STEP(&copy, READINGS) for all states, each from the memory that its episode has left. */
-#define TIME(NAME, MEMORY, STEP, READINGS)                                        \
-    do {                                                                          \
-        MEMORY memory, copy;                                                      \
-        double slowest = 0.0;                                                     \
-        int k, n;                                                                 \
-        for (k = 0; k < STATES; k++) {                                            \
-            const state *s = &STATE[k];                                           \
-            if (k == 0 || s->episode != STATE[k - 1].episode)                     \
-                memset(&memory, 0, sizeof memory);                                \
-            best[k] = 1e9;                                                        \
-            for (n = 0; n < REPEATS; n++) {                                       \
-                double begun, taken;                                              \
-                copy = memory;                                                    \
-                begun = now_us();                                                 \
-                sink = STEP(&copy, READINGS);                                     \
-                taken = now_us() - begun;                                         \
-                best[k] = taken < best[k] ? taken : best[k];                      \
-                slowest = taken > slowest ? taken : slowest;                      \
-            }                                                                     \
-            memory = copy;                                                        \
-        }                                                                         \
-        report(NAME, slowest);                                                    \
-    } while (0)
-
 int main(void)
 {
-    static epv_fixed_readings integers[STATES];
-    int i;
+    epv_policy_memory memory, copy;
+    double slowest = 0.0;
+    int k, n;
     read_states("states.csv");
-    for (i = 0; i < STATES; i++)
-        integers[i] = in_integers(&STATE[i].readings);
-    printf("variant,median_us,slowest_state_us,slowest_call_us\n");
-    TIME("float", epv_float_memory, epv_float_step, &s->readings);
-    TIME("fixed", epv_fixed_memory, epv_fixed_step, &integers[k]);
+    for (k = 0; k < STATES; k++) {
+        const state *s = &STATE[k];
+        if (k == 0 || s->episode != STATE[k - 1].episode)
+            memset(&memory, 0, sizeof memory);
+        best[k] = 1e9;
+        for (n = 0; n < REPEATS; n++) {
+            double begun, taken;
+            copy = memory; /* as its episode has left it */
+            begun = now_us();
+            sink = epv_policy_step(&copy, &s->readings);
+            taken = now_us() - begun;
+            best[k] = taken < best[k] ? taken : best[k];
+            slowest = taken > slowest ? taken : slowest;
+        }
+        memory = copy;
+    }
+    qsort(best, STATES, sizeof best[0], ascending);
+    printf("median_us,slowest_state_us,slowest_call_us\n");
+    printf("%.3f,%.3f,%.3f\n", best[STATES / 2], best[STATES - 1], slowest);
     return 0;
 }

@@ -1,20 +1,20 @@
 /* An exported policy: it decides at its start and every $period_us us, and holds the coil in between.
  *
- * epv_float.c is the file that training/export.py wrote and compared with the policy.
+ * epv_policy.c is the file that the export wrote and compared with the policy.
  */
 #ifndef MODEL_H
 #define MODEL_H
 
 #include <string.h>
 
-#include "epv_float.c"
+#include "epv_policy.c"
 #include "variables.h"
 
-#define PERIOD_S (1e-6 * EPV_FLOAT_PERIOD_US)
+#define PERIOD_S (1e-6 * EPV_POLICY_PERIOD_US)
 
 typedef struct {
     double value[VARIABLES];
-    epv_float_memory memory;
+    epv_policy_memory memory;
     double elapsed; /* since the start [s] */
     double decisions; /* so far */
 } model;
@@ -22,14 +22,14 @@ typedef struct {
 static void decide(model *m)
 {
     double *value = m->value;
-    epv_float_readings now;
+    epv_policy_readings now;
     now.p1 = (float)(value[V_p1] / 1e5);
     now.p2 = (float)(value[V_p2] / 1e5);
     now.p3 = (float)(value[V_p3] / 1e5);
     now.target = (float)(value[V_p2_target] / 1e5);
     now.current = (float)value[V_I];
     now.coil = (uint8_t)(value[V_coil] > 0.5);
-    value[V_coil] = epv_float_step(&m->memory, &now);
+    value[V_coil] = epv_policy_step(&m->memory, &now);
     value[V_U] = value[V_coil] * value[V_U_on];
     m->decisions += 1.0;
 }

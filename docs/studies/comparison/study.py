@@ -1,0 +1,94 @@
+"""Compare six controllers: random episodes on three plant sets, scenarios beyond training, worn valves.
+
+    python -m docs.studies.comparison.study
+
+writes comparison.csv, differences.csv, beyond.csv, comparison.png and the table of README.md. What is
+finished is kept in runs/comparison and not run again.
+"""
+
+import shutil
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from docs.studies.common import PAGE, ROOT, fill, study_options, study_parser, table
+from epv_env.common.command_line import fail_clearly
+from epv_env.common.commands import parse
+from training.commands import compare
+
+FOLDER = Path(__file__).parent
+CONTROLLERS = (
+    f"PPO={ROOT / 'controllers' / 'trained'}",
+    "pulse, adaptive, with rules",
+    "pulse, adaptive",
+    "hysteresis, extrapolating",
+    "PWM",
+    "pulse, informed",
+)
+"""The learned one, then what it is built on, classic ones, and one that knows each valve's
+parameters."""
+EPISODES, BEYOND_EPISODES, QUICK = 4096, 512, 4
+"""In each plant set, in each scenario beyond training, and under --quick."""
+PLANTS = "sensitive_ten_percent"
+"""Plant set of the page's table and picture, and of the scenarios beyond training."""
+COLUMNS = {
+    "C1_worst_excursion_bar": ("worst excursion [bar]", "{:.2f}"),
+    "rms_error_mbar": ("rms error [mbar]", "{:.0f}"),
+    "C2_event_breakdown_mbar": ("breakdown per event [mbar]", "{:.0f}"),
+    "switchings_per_s": ("switchings [1/s]", "{:.1f}"),
+    "mean_return": ("return", "{:.0f}"),
+    "decision_us": ("decision [µs]", "{:.0f}"),
+}
+"""Columns of the page's table: heading and format."""
+
+
+def run_compare(out: Path, *arguments: object, quick: bool) -> None:
+    """Run the command `epv compare` with the study's controllers."""
+    words = ["--controllers", *CONTROLLERS, "--out", out, *arguments, *(["--quick"] if quick else [])]
+    compare.run(parse(compare, "compare", [str(word) for word in words]))
+
+
+def page_table(rows: pd.DataFrame) -> str:
+    """The page's table. rows: of comparison.csv."""
+    lines = []
+    for row in rows.query("plants == @PLANTS").to_dict("records"):
+        share = f"{row['left_percent']:.2g} ({row['left_low']:.2g} to {row['left_high']:.2g})"
+        cells = [form.format(row[column]) for column, (_, form) in COLUMNS.items()]
+        lines.append([str(row["controller"]), share, *cells])
+    headings = ["controller", "leaves ±500 mbar [%]", *(heading for heading, _ in COLUMNS.values())]
+    return table(headings, lines)
+
+
+def beyond_table(rows: pd.DataFrame) -> pd.DataFrame:
+    """Share that leaves [%]: a row for each scenario, a column for each controller."""
+    return rows.pivot(index="scenario", columns="controller", values="left_percent").loc[
+        list(dict.fromkeys(rows["scenario"])), list(dict.fromkeys(rows["controller"]))
+    ]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the study; returns the exit status."""
+    options = study_options(study_parser(__doc__ or "", FOLDER), arguments)
+    work = (options.out if options.quick else ROOT / "runs") / "comparison"
+    beyond = work.with_name("comparison-beyond")
+    for out in (work, beyond):
+        out.mkdir(parents=True, exist_ok=True)
+    episodes = (QUICK, QUICK) if options.quick else (EPISODES, BEYOND_EPISODES)
+    run_compare(work, "--episodes", episodes[0], quick=options.quick)
+    scenarios = ("beyond",) if options.quick else ("beyond", "worn")
+    run_compare(
+        beyond, "--scenarios", *scenarios, "--plants", PLANTS, "--episodes", episodes[1],
+        quick=options.quick,
+    )  # fmt: skip
+    for name in ("comparison.csv", "differences.csv", "comparison.png"):
+        shutil.copy(work / name, options.out / name)
+    shares = beyond_table(pd.read_csv(beyond / "comparison.csv"))
+    shares.to_csv(options.out / "beyond.csv", float_format="%.3g")
+    fill(options.out / PAGE, {"controllers": page_table(pd.read_csv(work / "comparison.csv"))})
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(fail_clearly(main))

@@ -1,0 +1,156 @@
+"""A sweep's designs cover what they promise and stay inside it; it survives being killed."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+pytest.importorskip("joblib")
+from epv_env.common.commands import main_of
+from epv_env.plant.effects.registry import CATALOGUE
+from epv_env.plant.parameters import Parameters, sensitive_symbols, table
+from epv_env.plant.plantfile import Plant
+from epv_env.plant.region import CALIBRATED_SYMBOLS, Region
+from epv_env.settings import make_settings
+from training.studies.sweep_designs import (
+    ONE_AT_A_TIME,
+    chosen_points,
+    hypercube,
+    latin_hypercube,
+    parameters,
+    regions,
+)
+from training.studies.sweep_report import harmful_changes, share_figure
+
+pytestmark = pytest.mark.training
+
+PLANT = Plant.calibrated()
+ROOT = Path(__file__).parents[2]
+SHORT = (
+    "--designs", "conditions", "hypercube", "--factors", "sensor noise", "control period",
+    "--episodes", 3, "--joint-episodes", 8, "--duration", 0.55,
+    "--controllers", "hysteresis, extrapolating",
+)  # fmt: skip
+"""A sweep of a few seconds."""
+BATCHES = 4 + 4 + 1
+"""Levels of both factors, and the hypercube of SHORT."""
+
+
+def test_a_latin_hypercube_has_one_plant_in_every_slice_of_every_range():
+    plants = hypercube(PLANT, 64, seed=3).parameters or []
+    boxes = Region.named("sensitive_ten_percent", PLANT.parameters).boxes
+    assert set(boxes) == set(sensitive_symbols()) == set(plants[0])
+    for symbol, (low, high) in boxes.items():
+        place = (np.array([plant[symbol] for plant in plants]) - low) / (high - low) * 64
+        assert sorted(np.floor(place).astype(int)) == list(range(64))
+
+
+def test_an_ellipsoid_is_filled_and_not_left():
+    """Thin, as identification leaves it."""
+    p = Parameters.calibrated()
+    deviation = 0.01 * np.array([p[s] for s in CALIBRATED_SYMBOLS])
+    covariance = (np.full((4, 4), 0.95) + 0.05 * np.eye(4)) * np.outer(deviation, deviation)
+    region = Region(centre=p, symbols=CALIBRATED_SYMBOLS, covariance=covariance, chi_square=9.49)
+    points = np.array([list(plant.values()) for plant in latin_hypercube(region, 500, 1)])
+    offset = points - [p[s] for s in CALIBRATED_SYMBOLS]
+    distance = np.sum(offset @ np.linalg.inv(covariance) * offset, axis=1)
+    assert 0.9 * 9.49 < distance.max() <= 9.49 * (1 + 1e-9)
+    assert distance.min() < 0.1 * 9.49
+
+
+def test_every_point_is_one_that_the_environment_takes():
+    for make in ONE_AT_A_TIME.values():
+        for point in make(PLANT):
+            make_settings(PLANT, **{"control_period": 5e-3, **point.options})
+
+
+def test_the_parameters_are_those_of_tables_6_and_7_and_the_environment():
+    factors = {point.factor for point in parameters(PLANT)}
+    groups = {"partially known", "unknown", "environment"}
+    named = {s for s, row in table().items() if row.group in groups}
+    assert factors == named - set(CATALOGUE["local_gas_speed"])
+
+
+def test_only_named_factors_are_changed_and_regions_stay():
+    points = chosen_points(PLANT, ["regions", "parameters"], ["R"], 8, seed=0)
+    assert {point.factor for point in points} == {"region", "R"}
+    assert len(points) == len(list(regions(PLANT))) + 4
+
+
+def test_a_change_hurts_if_its_interval_lies_above_the_nominal_one():
+    common = {"design": "parameters", "controller": "c", "left_high": 1.0}
+    points = pd.DataFrame(
+        [
+            {**common, "design": "regions", "factor": "region", "level": "exact", "left": 0.0,
+             "left_low": 0.0, "left_high": 0.03},
+            {**common, "factor": "R", "level": "+10 %", "left": 0.2, "left_low": 0.1},
+            {**common, "factor": "R", "level": "-10 %", "left": 0.02, "left_low": 0.01},
+        ]
+    )  # fmt: skip
+    found = harmful_changes(points)
+    assert found.to_dict("records") == [
+        {"controller": "c", "changed": "parameters", "tried": 2, "hurt": 1,
+         "most [% leave]": "R +10 % (20)"}
+    ]  # fmt: skip
+    labels = [
+        label.get_text() for label in share_figure(points, ["parameters"]).axes[0].get_yticklabels()
+    ]
+    assert labels == ["R: +10 %", "R: -10 %"]
+
+
+def sweep(out, *arguments):
+    words = [str(word) for word in (*SHORT, *arguments, "--out", out)]
+    return main_of("training.commands.sweep", program="sweep", arguments=words)
+
+
+def finished(out):
+    """Names of the batches in a sweep's journal, as they finished; torn lines do not count."""
+    path = out / "finished.jsonl"
+    text = path.read_text() if path.exists() else ""
+    complete = text[: text.rfind("\n") + 1]
+    return [json.loads(line)["name"] for line in complete.splitlines()[1:]]
+
+
+def test_two_workers_and_a_killed_sweep_give_the_same_to_the_bit(tmp_path):
+    assert sweep(tmp_path / "alone", "--workers", 1) == 0
+    out = tmp_path / "killed"
+    words = [sys.executable, ROOT / "training/sweep.py", *SHORT, "--workers", 2, "--out", out]
+    process = subprocess.Popen(
+        [str(word) for word in words], cwd=ROOT, start_new_session=True,
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    while len(finished(out)) < 3 and process.poll() is None:
+        time.sleep(0.02)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    before = finished(out)
+    assert 3 <= len(before) < BATCHES  # it was killed in mid-sweep
+    assert sweep(out, "--workers", 2) == 0
+    after = finished(out)
+    assert after[: len(before)] == before  # nothing was lost
+    assert len(after) == len(set(after)) == BATCHES  # nor done twice
+    for name in ("results.json", "points.csv", "hypercube.csv"):
+        assert (out / name).read_bytes() == (tmp_path / "alone" / name).read_bytes()
+    assert (out / "robustness-conditions.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--controllers", "nobody"], "no controller 'nobody': give a folder that training wrote"),
+        (["--factors", "luck"], "no factor 'luck' in the designs"),
+        (["--scenario", "flood"], "unknown consumption scenario 'flood'"),
+    ],
+)
+def test_wrong_input_gets_one_sentence_and_leaves_nothing(arguments, words, tmp_path, capsys):
+    assert sweep(tmp_path / "out", *arguments) == 2
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,152 @@
+"""compare controllers on the same unseen episodes, and say how sure the differences are
+
+python training/compare.py --out runs/comparison
+python training/compare.py --controllers "pulse, adaptive" PPO=runs/ppo --out runs/mine
+python training/compare.py --scenarios beyond worn --plants sensitive_ten_percent --out runs/beyond
+
+A comparison that was stopped goes on where it stopped when it is started again.
+"""
+
+import argparse
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from controllers.tuned import load_tunings
+from epv_env.common.files import Journal, write_json, write_text
+from epv_env.plant.plantfile import Plant, load_plant
+from training.commands.options import add_episodes, add_folder, count
+from training.evaluation.named import HELP, named_controllers
+from training.evaluation.plots import episode_overlay, save_figure
+from training.evaluation.rollout import decision_times, run_episodes
+from training.evaluation.scenarios import RANDOM, EvaluationScenario, scenario_group
+from training.evaluation.seeds import EVALUATION_SEED, check_first_seed
+from training.studies.comparison import (
+    PLANTS,
+    Results,
+    as_text,
+    compare,
+    differences,
+    figure,
+    rows,
+)
+
+QUICK: dict[str, Any] = {"episodes": 8, "duration": 0.8, "decisions": 20}
+LISTED = 100
+"""Episodes that leave the band are named by their seeds up to this many."""
+OVERLAID = 6
+"""Most controllers in the picture of one episode."""
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    add_folder(parser, "runs/comparison")
+    parser.add_argument(
+        "--controllers", nargs="+", metavar="NAME", default=list(load_tunings()),
+        help=f"{HELP} (default: all tuned kinds)",
+    )  # fmt: skip
+    parser.add_argument("--against", metavar="LABEL", help="whom the others are set against (the first)")
+    parser.add_argument("--plants", nargs="+", choices=list(PLANTS), default=list(PLANTS))
+    parser.add_argument(
+        "--scenarios", nargs="+", metavar="NAME", default=[RANDOM],
+        help="scenarios, or the groups named, beyond (beyond training), worn (one effect each)",
+    )  # fmt: skip
+    parser.add_argument("--episodes", type=count, default=1024, help="in each scenario and plant set")
+    parser.add_argument("--decisions", type=count, default=1000, help="whose time is measured")
+    add_episodes(parser)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Run the episodes that --out lacks; write tables, differences and pictures.
+
+    Raises ValueError for an unknown controller or scenario.
+    """
+    check_first_seed(options.seed, options.episodes)
+    plant = load_plant(options.plant)
+    controllers, digests = named_controllers(options.controllers, plant)
+    against = options.against or next(iter(controllers))
+    if against not in controllers:
+        raise ValueError(f"--against {against!r} takes no part: give one of {', '.join(controllers)}")
+    scenarios = {k: v for name in options.scenarios for k, v in scenario_group(name).items()}
+    first_seed = EVALUATION_SEED + options.seed
+    results = compare(
+        controllers, plant=plant, scenarios=scenarios, episodes=options.episodes,
+        duration=options.duration, plant_sets=options.plants, first_seed=first_seed,
+        workers=options.workers, digests=digests,
+        journal=Journal(options.out / "finished.jsonl", subject(plant, scenarios, options.duration)),
+    )  # fmt: skip
+    times = {
+        label: 1e6 * decision_times(controller, options.decisions, plant=plant, scenario="steps")
+        for label, controller in controllers.items()
+    }
+    table: Any = rows(results).assign(decision_us=lambda row: row["controller"].map(_medians(times)))
+    paired = differences(results, against)
+    settings = {name: getattr(options, name) for name in ("episodes", "duration", "seed", "plants")}
+    write_results(options, table, paired, results, first_seed, {**settings, "controllers": digests})
+    draw(options, table, controllers, plant, first_seed)
+    for _, cell in table.groupby(["plants", "scenario"], sort=False):
+        print(f"{as_text(cell)}\n")
+    print(f"results in {options.out}")
+
+
+def subject(plant: Plant, scenarios: dict[str, EvaluationScenario], duration: float) -> dict[str, Any]:
+    """What the figures depend on beside the batches' names: another subject begins the journal anew."""
+    return {
+        "software": version("epv-valve"),
+        "plant": {"parameters": dict(plant.parameters), "region": repr(plant.region)},
+        "duration": duration,
+        "scenarios": {name: repr(scenario) for name, scenario in scenarios.items()},
+    }
+
+
+def _medians(times: dict[str, Any]) -> dict[str, float]:
+    return {label: float(np.median(each)) for label, each in times.items()}
+
+
+def write_results(
+    options: argparse.Namespace,
+    table: pd.DataFrame,
+    paired: pd.DataFrame,
+    results: Results,
+    first_seed: int,
+    settings: dict[str, Any],
+) -> None:
+    """Write comparison.csv, differences.csv and results.json (with the seeds of episodes that left)."""
+    write_text(options.out / "comparison.csv", table.to_csv(index=False))
+    if len(paired):
+        write_text(options.out / "differences.csv", paired.to_csv(index=False))
+    left = [
+        (first_seed + np.flatnonzero(~metrics.stayed)[:LISTED]).tolist() for metrics in results.values()
+    ]
+    write_json(
+        options.out / "results.json",
+        {
+            "settings": settings,
+            "rows": table.assign(left_seeds=left).to_dict("records"),
+            "differences": paired.to_dict("records"),
+        },
+    )
+
+
+def draw(
+    options: argparse.Namespace,
+    table: pd.DataFrame,
+    controllers: dict[str, Any],
+    plant: Plant,
+    first_seed: int,
+) -> None:
+    """Draw comparison.png, of the last plant set's first scenario, and episode.png, one episode."""
+    name = table["scenario"].iloc[0]
+    cell: Any = table[(table["plants"] == options.plants[-1]) & (table["scenario"] == name)]
+    save_figure(figure(cell), options.out / "comparison.png")
+    traces = {}
+    for label, controller in list(controllers.items())[:OVERLAID]:
+        _, trace = run_episodes(
+            controller, seeds=[first_seed], duration=options.duration,
+            options={"plant": plant, "scenario": "mixed"}, trace_of=0,
+        )  # fmt: skip
+        assert trace is not None  # since one was asked for
+        traces[label] = trace
+    episode_overlay(traces, options.out / "episode.png")

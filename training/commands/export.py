@@ -1,0 +1,173 @@
+"""turn a policy into C, ONNX and an FMU, or the plant into an FMU
+
+epv export runs/ppo --out runs/ecu            # C and ONNX
+epv export runs/ppo --out runs/ecu --fmu      # and epv_policy.fmu
+epv export plant --out runs/fmu               # epv_plant.fmu, of --plant FILE
+
+A policy is written only after its C code was compiled here and agreed with the policy on every one of
+10,000 states. docs/reference/exported-policy.md says what each file is, docs/reference/fmu.md the FMU.
+"""
+
+import argparse
+import hashlib
+import json
+import os
+import shutil
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from controllers.learned import LearnedPolicy, load_policy
+from controllers.policy_contract import WEIGHTS_FILE, read_contract
+from epv_env.common.command_line import writable_folder
+from epv_env.common.files import write_bytes
+from epv_env.plant.plantfile import load_plant
+from training.commands.options import count, seconds
+from training.deploy import agreement as verdict
+from training.deploy import compiled
+from training.deploy.c_code import Export, ExportError, checks, deployment_contract, sources
+from training.deploy.fmu.archive import fmu
+from training.deploy.fmu.models import plant_model, policy_model
+from training.deploy.onnx_model import onnx_model
+
+PLANT = "plant"
+"""What is exported in place of a policy's folder."""
+FILES = {
+    "policy.onnx", "epv_policy.h", "epv_policy.c", "contract.json", "states.csv", "states.h",
+    "parity.c", "bench.c", "report.json", "epv_policy.fmu",
+}  # fmt: skip
+"""What the export of a policy consists of."""
+BUILT = {"parity", "bench"}
+"""What its reader builds there, and another export may sweep away."""
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    parser.add_argument("what", help=f"a folder that training wrote, or `{PLANT}`")
+    parser.add_argument(
+        "--out", dest="folder", type=writable_folder, required=True, help="folder to write"
+    )
+    parser.add_argument("--fmu", action="store_true", help="an FMU of the policy, too")
+    parser.add_argument("--plant", type=Path, help=f"plant file of `{PLANT}` (default: the report's)")
+    parser.add_argument(
+        "--compiler", default=os.environ.get("CC", "cc"),
+        help="C compiler; '' for a plant's sources alone (default: cc)",
+    )  # fmt: skip
+    parser.add_argument("--episodes", type=count, default=256, help="under the compiled code")
+    parser.add_argument("--duration", type=seconds, default=10.0, help="length of one of them [s]")
+
+
+def run(options: argparse.Namespace) -> None:
+    """Write the files.
+
+    Raises ExportError for another kind of policy, or code that does not decide as the policy.
+    """
+    if options.what == PLANT:
+        model = plant_model(load_plant(options.plant))
+        path = options.folder / f"{model.identifier}.fmu"
+        write_bytes(path, fmu(model, options.compiler))
+        print(f"written to {path}")
+        if not compiled.compiler_words(options.compiler):
+            print("without a library: no C compiler; the importing tool has to compile the sources")
+        return
+    check_free(options.folder)
+    compiler = compiled.find_compiler(options.compiler)
+    export = prepared(Path(options.what))
+    files, report = verified(export, compiler, options.episodes, options.duration)
+    contract = deployment_contract(export)
+    files["contract.json"] = json.dumps(contract, indent=1) + "\n"
+    files["report.json"] = json.dumps(report, indent=1) + "\n"
+    content = {name: text.encode() for name, text in files.items()}
+    content["policy.onnx"] = onnx_model(export.policy, period=export.period).SerializeToString()
+    if options.fmu:
+        content["epv_policy.fmu"] = fmu(policy_model(export.period, files), options.compiler)
+    write_folder(options.folder, content)
+    print(f"{verdict.as_text(report, contract)}\nwritten to {options.folder}")
+
+
+def prepared(folder: Path) -> Export:
+    """The policy in a folder that training wrote. Raises ExportError for another kind of policy."""
+    policy: LearnedPolicy = load_policy(folder)
+    outputs = len(policy.layers[-1][1])
+    if policy.environment != "EPValve-v0" or outputs != 2 or policy.cells:
+        raise ExportError(
+            f"the policy in {folder} is no perceptron that decides between off and on: only "
+            "such ones can be exported"
+        )
+    if not all(np.all(np.isfinite(array)) for layer in policy.layers for array in layer):
+        raise ExportError(f"the policy in {folder} has weights that are not finite: train it anew")
+    content = read_contract(folder)
+    return Export(
+        policy=policy,
+        period=content.observation.control_period_s,
+        weights_sha256=hashlib.sha256((folder / WEIGHTS_FILE).read_bytes()).hexdigest(),
+        provenance=content.provenance,
+    )
+
+
+def verified(
+    export: Export, compiler: list[str], episodes: int, duration: float
+) -> tuple[dict[str, str], dict[str, Any]]:
+    """The C files by name and the report, once compiled code has passed. Raises ExportError.
+
+    Args:
+        export: the policy.
+        compiler: the words of its command.
+        episodes: under the compiled code.
+        duration: length of one of them [s].
+    """
+    policy = export.policy
+    states = verdict.visit(policy)
+    files = sources(export)
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        _write(folder, files)
+        code = compiled.library(compiler, folder)
+        agreement = verdict.agreement(policy, code, states)
+        tests = checks(states.actions.size, agreement["rounding_of_c"])
+        tests["states.csv"] = verdict.states_table(states, verdict.margins(policy, states))
+        _write(folder, tests)
+        compiled.run_parity(compiler, folder)
+        loop = verdict.closed_loop(policy, code, episodes=episodes, duration=duration)
+        report = {
+            "agreement": agreement,
+            "closed_loop": {"episodes": episodes, "duration_s": duration, "controllers": loop},
+            "microseconds": compiled.run_bench(compiler, folder),
+            "machine": compiled.machine(compiler),
+        }
+    return files | tests, report
+
+
+def _write(folder: Path, files: dict[str, str]) -> None:
+    for name, text in files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+
+
+def check_free(folder: Path) -> None:
+    """Raises ExportError if the folder holds anything but the files of an earlier export."""
+    there = {path.name for path in folder.iterdir()} if folder.exists() else set()
+    if foreign := sorted(there - FILES - BUILT):
+        raise ExportError(
+            f"{folder} holds {foreign[0]!r}, which no export writes: give --out a new or empty folder"
+        )
+
+
+def write_folder(folder: Path, files: dict[str, bytes]) -> None:
+    """Put a folder with these files in place of an earlier one; a failure leaves the earlier one."""
+    folder = folder.resolve()
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}.") as temporary:
+        new, old = Path(temporary, "new"), Path(temporary, "old")
+        new.mkdir()
+        for name, content in files.items():
+            (new / name).write_bytes(content)
+        if folder.exists():
+            os.rename(folder, old)
+        try:
+            os.rename(new, folder)
+        except BaseException:
+            if old.exists():
+                shutil.move(old, folder)
+            raise

@@ -1,0 +1,129 @@
+"""robustness of controllers: plants, effects, sensors and timing that deviate by a known amount
+
+python training/sweep.py --out runs/sweep
+python training/sweep.py --out runs/friction --designs effects --factors piston_friction
+
+A sweep that was stopped goes on where it stopped when it is started again.
+"""
+
+import argparse
+from importlib.metadata import version
+from typing import Any
+
+import pandas as pd
+
+from epv_env.common.files import Journal, write_json, write_text
+from epv_env.plant.consumption import check_scenario
+from epv_env.plant.plantfile import Plant, load_plant
+from training.commands.options import add_episodes, add_folder, count
+from training.evaluation.batches import Batch, in_batches, run_batches
+from training.evaluation.metrics import EpisodeMetrics
+from training.evaluation.named import HELP, named_controllers
+from training.evaluation.plots import save_figure
+from training.evaluation.seeds import SWEEP_SEED, check_first_seed
+from training.studies.sweep_designs import DESIGNS, Point, chosen_points
+from training.studies.sweep_report import (
+    harmful_changes,
+    point_table,
+    rank_table,
+    region_table,
+    share_figure,
+    strongest_parameters,
+)
+
+DEFAULT = ("hysteresis, extrapolating", "pulse, adaptive", "PWM")
+"""Controllers that are swept unless others are named: one of each kind."""
+
+QUICK: dict[str, Any] = {
+    "controllers": DEFAULT[:1], "episodes": 4, "joint_episodes": 16, "duration": 0.6,
+    "factors": ["R", "V2", "piston_friction", "sensor noise", "control period", "latency"],
+}  # fmt: skip
+
+FIGURES = {
+    "robustness-parameters": ("parameters",),
+    "robustness-effects": ("effects",),
+    "robustness-conditions": ("regions", "conditions"),
+}
+"""Designs of each picture."""
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    add_folder(parser, "runs/sweep")
+    parser.add_argument("--controllers", nargs="+", default=list(DEFAULT), metavar="NAME", help=HELP)
+    parser.add_argument("--designs", nargs="+", choices=DESIGNS, default=list(DESIGNS))
+    parser.add_argument(
+        "--factors", nargs="+", default=[], help="change only these, one at a time (default: all)"
+    )
+    parser.add_argument(
+        "--episodes", type=count, default=128, help="at each point that changes one thing"
+    )
+    parser.add_argument(
+        "--joint-episodes", type=count, default=4096, help="at each region, and in the hypercube"
+    )
+    parser.add_argument("--scenario", default="mixed", help="consumption, where it is not what changes")
+    add_episodes(parser)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Run the episodes that --out lacks; write tables and pictures.
+
+    Raises ValueError for an unknown controller, scenario or factor.
+    """
+    check_first_seed(options.seed, max(options.episodes, options.joint_episodes))
+    check_scenario(options.scenario)
+    plant = load_plant(options.plant)
+    controllers, digests = named_controllers(options.controllers, plant)
+    points = chosen_points(plant, options.designs, options.factors, options.joint_episodes, options.seed)
+    cells = [(point, label) for point in points for label in controllers]
+    batches = [_batches(point, label, digests[label], plant, options) for point, label in cells]
+    subject = {
+        "software": version("epv-valve"),
+        "plant": {"parameters": dict(plant.parameters), "region": repr(plant.region)},
+        "scenario": options.scenario,
+        "duration": options.duration,
+        "hypercube": [options.joint_episodes, options.seed],
+    }
+    found = run_batches(
+        [batch for each in batches for batch in each], controllers,
+        journal=Journal(options.out / "finished.jsonl", subject), workers=options.workers, what="sweep",
+    )  # fmt: skip
+    metrics = [EpisodeMetrics.joined([found[batch.name] for batch in each]) for each in batches]
+    table = point_table(cells, metrics, SWEEP_SEED + options.seed)
+    write_results(options, table, rank_table(cells, metrics), {**subject, "controllers": digests})
+    print(f"\nresults in {options.out}")
+
+
+def _batches(
+    point: Point, label: str, digest: str, plant: Plant, options: argparse.Namespace
+) -> list[Batch]:
+    """A point's episodes under one controller."""
+    joint = point.design in ("regions", "hypercube")
+    return in_batches(
+        options.joint_episodes if joint else options.episodes,
+        Batch(
+            name=f"{point.design}, {point.factor}, {point.level}, {label} {digest}",
+            controller=label,
+            first_seed=SWEEP_SEED + options.seed,
+            episodes=0,
+            duration=options.duration,
+            options={"plant": plant, "scenario": options.scenario, **point.options},
+            plants=point.parameters,
+        ),
+    )
+
+
+def write_results(
+    options: argparse.Namespace, points: pd.DataFrame, ranks: pd.DataFrame, settings: dict[str, Any]
+) -> None:
+    """Write points.csv, hypercube.csv, results.json and the pictures; print the tables."""
+    for name, table in {"points": points, "hypercube": ranks}.items():
+        if len(table):
+            write_text(options.out / f"{name}.csv", table.to_csv(index=False))
+    content = {"points": points.to_dict("records"), "hypercube": ranks.to_dict("records")}
+    write_json(options.out / "results.json", {"format": "epv-sweep/2", "settings": settings, **content})
+    for name, designs in FIGURES.items():
+        if set(designs) & set(points["design"]):
+            save_figure(share_figure(points, designs), options.out / f"{name}.png")
+    texts = (region_table(points), harmful_changes(points), strongest_parameters(ranks))
+    print("\n\n".join(text.to_string(index=False) for text in texts if len(text)))

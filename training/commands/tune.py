@@ -1,0 +1,166 @@
+"""search the classic controllers' settings: the same budget, scenarios and objective for each
+
+epv tune --trials 100 --out controllers/tuned.json
+epv tune --only "pulse, adaptive" --out controllers/tuned.json    # keeps the file's others
+
+The objective is the mean return on the training scenarios.
+"""
+
+import argparse
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import optuna
+from optuna.trial import Trial
+
+from controllers.registration import Choice, Range, SearchSpace
+from controllers.registry import TUNED_KINDS, registration
+from controllers.tuned import Tuning, load_search, load_tunings, save_tunings
+from epv_env.common.command_line import writable_file
+from epv_env.common.results_folder import progress
+from epv_env.plant.plantfile import Plant
+from training.commands.options import count, seconds, seed
+from training.evaluation.rollout import run_episodes
+from training.evaluation.scenarios import TUNING_REGION
+from training.evaluation.seeds import TUNING_SEED
+
+WIDENINGS = 2
+"""Most repetitions of a kind's search, each wider than the one before. Two quadruple a range, or reach
+its physical limit."""
+
+
+def suggest(space: SearchSpace, trial: Trial) -> dict[str, Any]:
+    """A trial's values of the quantities of a search space, by name."""
+    return {name: _suggested(name, quantity, trial) for name, quantity in space.items()}
+
+
+def _suggested(name: str, quantity: Range | Choice, trial: Trial) -> Any:
+    if isinstance(quantity, Choice):
+        return trial.suggest_categorical(name, list(quantity.values))
+    return trial.suggest_float(name, quantity.low, quantity.high, log=quantity.log)
+
+
+def tune(
+    kind: str, *, trials: int, episodes: int, duration: float, seed: int, options: dict[str, Any]
+) -> Tuning:
+    """Search one kind of controller; a search that ends at a bound is widened and run again.
+
+    Args:
+        kind: one of TUNED_KINDS.
+        trials: evaluations of a search.
+        episodes: episodes of an evaluation.
+        duration: length of an episode [s].
+        seed: of the search.
+        options: of the environment.
+    """
+    space = registration(kind).search_space
+    assert space is not None, f"{kind} has nothing to tune"
+    run = partial(
+        _mean_return, kind, seeds=list(range(TUNING_SEED, TUNING_SEED + episodes)),
+        duration=duration, options=options,
+    )  # fmt: skip
+    study, searched = _search(kind, space, run, trials, seed), space
+    for _ in range(WIDENINGS):
+        wider = widened(searched, study.best_params)
+        if wider == searched:
+            break
+        print(f"{kind}: the search ended at a bound; searching wider: {_named(searched, wider)}")
+        study, searched = _search(kind, wider, run, trials, seed, study.best_params), wider
+    if widened(searched, study.best_params) != searched:
+        print(f"{kind}: the search ended at a bound again after {WIDENINGS} wider ones; it is kept")
+    return Tuning(
+        values=study.best_params, trials=trials, mean_return=study.best_value, episodes=episodes,
+        widened=_named(space, searched),
+    )  # fmt: skip
+
+
+def widened(space: SearchSpace, values: Mapping[str, Any]) -> SearchSpace:
+    """The space to search next after `values` were found in `space`; itself if none is at a bound."""
+    return {
+        name: quantity if isinstance(quantity, Choice) else quantity.widened(values[name])
+        for name, quantity in space.items()
+    }
+
+
+def _named(before: SearchSpace, after: SearchSpace) -> dict[str, tuple[float, float]]:
+    """The ranges of `after` that differ from `before`, by name."""
+    return {
+        name: (quantity.low, quantity.high)
+        for name, quantity in after.items()
+        if isinstance(quantity, Range) and quantity != before[name]
+    }
+
+
+def _mean_return(kind: str, values: dict[str, Any], **scenarios: Any) -> float:
+    """Mean return of a kind with these quantities. Values that contradict each other cost a trial."""
+    try:
+        controller = registration(kind).built(values, Plant.calibrated())
+    except ValueError as contradiction:
+        raise optuna.TrialPruned(str(contradiction)) from None
+    metrics, _ = run_episodes(controller, **scenarios)
+    return float(metrics.episode_return.mean())
+
+
+def _search(
+    kind: str, space: SearchSpace, run: Callable[[dict[str, Any]], float], trials: int, seed: int,
+    first: Mapping[str, Any] | None = None,
+) -> optuna.Study:  # fmt: skip
+    """One search of a space. first: values to try first, so that the outcome is no worse than they."""
+    study = optuna.create_study(
+        direction="maximize", sampler=optuna.samplers.TPESampler(seed=seed, multivariate=True)
+    )
+    if first is not None:
+        study.enqueue_trial(dict(first))
+    for _ in progress(range(trials), what=f"{kind:27s}"):
+        study.optimize(lambda trial: run(suggest(space, trial)), n_trials=1)
+    return study
+
+
+def kept(path: Path, search: dict[str, Any]) -> dict[str, Tuning]:
+    """What a file holds already. Raises ValueError if that was searched otherwise: budgets are equal."""
+    if not path.exists():
+        return {}
+    if load_search(path) != search:
+        raise ValueError(
+            f"{path} was searched with {load_search(path)}, not {search}: search all kinds anew "
+            "(leave --only out), or choose another --out"
+        )
+    return load_tunings(path)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    parser.add_argument("--trials", type=count, default=100, help="evaluations for each controller")
+    parser.add_argument("--episodes", type=count, default=128, help="episodes of one evaluation")
+    parser.add_argument("--duration", type=seconds, default=6.0, help="length of an episode [s]")
+    parser.add_argument("--seed", type=seed, default=0, help="of the search")
+    parser.add_argument(
+        "--out", dest="file", type=writable_file, required=True, help="JSON file to write"
+    )
+    parser.add_argument(
+        "--only", choices=TUNED_KINDS, nargs="+", help="kinds to search; --out keeps others"
+    )
+
+
+def run(options: argparse.Namespace) -> None:
+    """Search, write the file and print what was found.
+
+    Raises ValueError if --only would mix tunings of different budgets in one file.
+    """
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    settings = {"trials": options.trials, "episodes": options.episodes, "duration": options.duration}
+    region = {"parameters": TUNING_REGION}
+    search = {"method": "Optuna TPE on the mean return", **settings, "seed": options.seed, **region}
+    if options.only:
+        kept(options.file, search)  # before the work, since it may refuse
+    found = {
+        kind: tune(kind, **settings, seed=options.seed, options=region)
+        for kind in options.only or TUNED_KINDS
+    }
+    tunings = {**(kept(options.file, search) if options.only else {}), **found}
+    ordered = {name: tunings[name] for name in sorted(tunings, key=TUNED_KINDS.index)}
+    save_tunings(ordered, options.file, search)
+    for kind, tuning in found.items():
+        print(f"{kind}: mean return {tuning.mean_return:.1f} with {tuning.values}")

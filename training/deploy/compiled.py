@@ -1,0 +1,138 @@
+"""The exported C code, compiled: called from Python, and run as a stranger runs it."""
+
+import csv
+import ctypes
+import platform
+import shlex
+import shutil
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epv_env.observation import decode
+from training.deploy.c_code import MEMORY, ExportError
+
+STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
+"""What the exported code is compiled with here."""
+
+READINGS = ("p1", "p2", "p3", "current", "target", "coil")
+"""Readings of a control unit at the end of a period, in the order of the C structure."""
+
+READINGS_TYPE = np.dtype([*((name, "f4") for name in READINGS[:-1]), (READINGS[-1], "u1")], align=True)
+"""The C structure, laid out as C lays it out."""
+
+
+def compiler_words(command: str) -> list[str]:
+    """The words of a compiler's command; none if there is no such program."""
+    words = shlex.split(command)
+    return words if words and shutil.which(words[0]) else []
+
+
+def find_compiler(command: str) -> list[str]:
+    """The words of a compiler's command. Raises ExportError if there is no such program."""
+    words = compiler_words(command)
+    if not words:
+        raise ExportError(
+            f"there is no C compiler {command!r} here, and no export goes out that was not compiled and "
+            "compared: install one (Debian: apt install gcc), or name yours with --compiler"
+        )
+    return words
+
+
+def build(compiler: list[str], folder: Path, *options: str, output: str) -> Path:
+    """Compile files of a folder strictly. Raises ExportError with the compiler's first complaint."""
+    done = subprocess.run(
+        [*compiler, *STRICT, *options, "-o", output],
+        cwd=folder, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    if done.returncode:
+        complaint = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr)
+        raise ExportError(f"{compiler[0]} does not compile the exported code: {complaint.strip()}")
+    return folder / output
+
+
+def library(compiler: list[str], folder: Path) -> ctypes.CDLL:
+    """The policy as a library, loaded."""
+    built = build(compiler, folder, "-shared", "-fPIC", "epv_policy.c", output="policy.so")
+    code = ctypes.CDLL(str(built))
+    code.epv_policy_step.argtypes = (ctypes.c_void_p, ctypes.c_void_p)
+    code.epv_policy_logits.argtypes = (ctypes.c_void_p, ctypes.c_void_p)
+    code.epv_policy_logits.restype = None
+    return code
+
+
+def readings_of(observations: NDArray) -> dict[str, NDArray]:
+    """The readings behind observations (..., entries), float32, in bar, A and 0 or 1, by READINGS."""
+    wide = observations.astype(np.float64)
+    target = decode(wide, "target")
+    values = {
+        "p1": decode(wide, "p1"),
+        "p2": decode(wide, "p2_error") + target,
+        "p3": decode(wide, "p3"),
+        "current": decode(wide, "I"),
+        "target": target,
+        "coil": np.rint(decode(wide, "action")),
+    }
+    return {name: values[name].astype(np.float32) for name in READINGS}
+
+
+@dataclass(kw_only=True)
+class CompiledPolicy:
+    """The whole chain that runs in the unit, readings to action, behind the controllers' protocol.
+
+    It makes readings of the observations, and observations of those again, with a memory of its own.
+    """
+
+    code: ctypes.CDLL
+    environment: str = "EPValve-v0"
+    name: str = "C"
+
+    def reset(self, n: int) -> None:
+        """n valves, nothing remembered."""
+        self._memory = np.zeros(n, dtype=MEMORY)
+
+    def act(self, observations: NDArray) -> NDArray:
+        """Actions (n,) for the readings behind observations (n, entries)."""
+        readings = np.zeros(len(observations), dtype=READINGS_TYPE)
+        for name, values in readings_of(observations).items():
+            readings[name] = values
+        memory, reading = self._memory.ctypes.data, readings.ctypes.data
+        memory_size, size = MEMORY.itemsize, READINGS_TYPE.itemsize
+        step, n = self.code.epv_policy_step, len(readings)
+        return np.array([step(memory + i * memory_size, reading + i * size) for i in range(n)])
+
+
+def logits_of(code: ctypes.CDLL, observations: NDArray) -> NDArray:
+    """Logits (n, 2) of the compiled code for observations (n, entries)."""
+    inputs = np.ascontiguousarray(observations, dtype=np.float32)
+    logits = np.empty((len(inputs), 2), dtype=np.float32)
+    for row, result in zip(inputs, logits, strict=True):
+        code.epv_policy_logits(row.ctypes.data, result.ctypes.data)
+    return logits
+
+
+def run_parity(compiler: list[str], folder: Path) -> str:
+    """Compile and run parity.c in the folder; what it printed. Raises ExportError if it fails."""
+    program = build(compiler, folder, "parity.c", "epv_policy.c", output="parity")
+    done = subprocess.run([program], cwd=folder, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise ExportError(f"the parity test failed: {' '.join((done.stdout + done.stderr).split())}")
+    return done.stdout
+
+
+def run_bench(compiler: list[str], folder: Path) -> dict[str, float]:
+    """Compile and run bench.c in the folder: microseconds for a decision."""
+    program = build(compiler, folder, "bench.c", "epv_policy.c", output="bench")
+    done = subprocess.run([program], cwd=folder, capture_output=True, text=True, check=True)
+    row = next(csv.DictReader(done.stdout.splitlines()))
+    return {name: float(value) for name, value in row.items()}
+
+
+def machine(compiler: list[str]) -> dict[str, str]:
+    """Processor, system and compiler of the measured times."""
+    done = subprocess.run([*compiler, "--version"], capture_output=True, text=True, check=False)
+    version = (done.stdout.splitlines() or ["unknown"])[0]
+    return {"processor": platform.machine(), "system": platform.system(), "compiler": version}

@@ -1,0 +1,118 @@
+"""Episodes in batches that run in several processes; what is finished stays finished.
+
+A batch is data: it names a controller, seeds and conditions, so it gives the same figures, to the bit,
+in whatever process and order it runs. Finished batches lie in a journal (epv_env/common/journal.py).
+"""
+
+import sys
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from joblib import Parallel, delayed
+from threadpoolctl import threadpool_limits
+from tqdm import tqdm
+
+from controllers.base import Controller
+from epv_env.common.files import Journal
+from training.evaluation.metrics import EpisodeMetrics
+from training.evaluation.rollout import run_episodes
+
+BATCH_EPISODES = 512
+"""Most episodes of a batch: larger ones are hardly faster, and a stopped run loses its unfinished
+ones."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Batch:
+    """Episodes of one controller under one set of conditions, run side by side."""
+
+    name: str
+    """Its own in the journal."""
+    controller: str
+    """Label of the controller."""
+    first_seed: int
+    episodes: int
+    duration: float
+    """Of an episode [s]."""
+    options: Mapping[str, Any] = field(default_factory=dict)
+    """Of the environment."""
+    plants: Sequence[dict[str, float]] | None = None
+    """Parameters of each episode's plant [SI]; None: as the options say."""
+    restart_s: float | None = None
+    """When the control unit restarts [s]; None: never."""
+
+
+def in_batches(episodes: int, whole: Batch) -> list[Batch]:
+    """Batches of at most BATCH_EPISODES that together have so many episodes, from `whole`'s first on."""
+    parts = []
+    for begin in range(0, episodes, BATCH_EPISODES):
+        count = min(BATCH_EPISODES, episodes - begin)
+        plants = None if whole.plants is None else whole.plants[begin : begin + count]
+        first = whole.first_seed + begin
+        name = f"{whole.name}, seeds {first} to {first + count - 1}"
+        parts.append(replace(whole, name=name, first_seed=first, episodes=count, plants=plants))
+    return parts
+
+
+def run_batches(
+    batches: Sequence[Batch],
+    controllers: Mapping[str, Controller],
+    *,
+    journal: Journal | None = None,
+    workers: int = 1,
+    what: str,
+) -> dict[str, EpisodeMetrics]:
+    """Figures of each batch by name, in the order of the batches; those in the journal are not run
+    again.
+
+    Args:
+        batches: with names of their own.
+        controllers: by label.
+        journal: batches that are finished; new ones are added.
+        workers: processes.
+        what: name of the progress bar.
+    """
+    found: dict[str, Any] = {}
+    missing = [each for each in batches if journal is None or each.name not in journal]
+    longest_first = sorted(missing, key=lambda batch: -batch.episodes * batch.duration)
+    # Processes, not threads: most of an episode is NumPy on short arrays, which holds Python's lock.
+    pool: Any = Parallel(n_jobs=workers, return_as="generator_unordered")
+    jobs = (delayed(_run)(batch, controllers[batch.controller]) for batch in longest_first)
+    with tqdm(
+        total=sum(batch.episodes for batch in missing), desc=what, unit="episode", file=sys.stderr,
+        mininterval=0.2 if sys.stderr.isatty() else 10.0,
+    ) as bar:  # fmt: skip
+        for name, figures in pool(jobs):
+            found[name] = figures
+            if journal is not None:
+                journal.add(name, figures)
+            bar.update(len(figures["stayed"]))
+    return {
+        batch.name: _metrics(found[batch.name] if batch.name in found else (journal or {})[batch.name])
+        for batch in batches
+    }
+
+
+def _run(batch: Batch, controller: Controller) -> tuple[str, dict[str, list[Any]]]:
+    """Name and figures of a batch, each figure a list of the episodes' values, ready for JSON."""
+    own: Any = deepcopy(controller)
+    settings = {"threads": 1, "control_period": batch.options.get("control_period")}
+    known = {name: v for name, v in settings.items() if v is not None and hasattr(own, name)}
+    seeds = list(range(batch.first_seed, batch.first_seed + batch.episodes))
+    with threadpool_limits(1):  # the figures must not depend on the threads of the linear algebra
+        metrics, _ = run_episodes(
+            replace(own, **known) if known else own,
+            seeds=seeds,
+            duration=batch.duration,
+            options={"threads": 1, **batch.options},
+            each=None if batch.plants is None else {"parameters": list(batch.plants)},
+            restart_s=batch.restart_s,
+        )
+    return batch.name, {name: np.asarray(v).tolist() for name, v in asdict(metrics).items()}
+
+
+def _metrics(figures: Mapping[str, list[Any]]) -> EpisodeMetrics:
+    return EpisodeMetrics(**{name: np.array(values) for name, values in figures.items()})

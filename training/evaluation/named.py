@@ -1,0 +1,109 @@
+"""Controllers by what a user calls them: registered kinds, folders of policies, classes of one's own."""
+
+import hashlib
+import importlib
+import inspect
+import json
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from controllers.base import Controller
+from controllers.learned import load_policy
+from controllers.policy_contract import CONTRACT_FILE, WEIGHTS_FILE
+from controllers.registry import REGISTRY
+from controllers.tuned import build, load_tunings
+from epv_env.plant.plantfile import Plant
+
+HELP = (
+    "kinds of controllers/tuned.json, folders of policies, LABEL=FOLDER, or MODULE:CLASS of your own, "
+    "in the working folder or installed"
+)
+"""Of the options that take controllers."""
+
+UNTUNED = tuple(entry.kind for entry in REGISTRY if entry.search_space is None)
+"""Kinds that have nothing to tune, because they see what no control unit measures."""
+
+
+def named_controllers(
+    sources: Sequence[str], plant: Plant
+) -> tuple[dict[str, Controller], dict[str, str]]:
+    """Controllers by label, and a digest of what each was made from.
+
+    Args:
+        sources: kinds of controllers/tuned.json or UNTUNED, folders that training wrote, LABEL=FOLDER,
+        or
+            MODULE:CLASS.
+        plant: that the classic ones are designed for.
+
+    Raises:
+        ValueError: there is no such controller, or two have the same label.
+    """
+    controllers: dict[str, Controller] = {}
+    digests: dict[str, str] = {}
+    for source in sources:
+        label, controller, content = _named(source, plant)
+        if label in controllers:
+            raise ValueError(f"two controllers are called {label!r}: give one as LABEL=FOLDER")
+        controllers[label] = controller
+        digests[label] = hashlib.sha256(content).hexdigest()[:16]
+    return controllers, digests
+
+
+def _named(source: str, plant: Plant) -> tuple[str, Controller, bytes]:
+    """Label, controller, and the bytes that define it."""
+    tunings = load_tunings()
+    if source in tunings:
+        values = tunings[source].values
+        return source, build(source, values, plant), json.dumps(values, sort_keys=True).encode()
+    if source in UNTUNED:
+        return source, build(source, {}, plant), source.encode()
+    if is_import(source):
+        return _imported(source)
+    label, _, folder = source.rpartition("=")
+    path = Path(folder)
+    if not folder or not path.is_dir():
+        raise ValueError(
+            f"no controller {source!r}: give a folder that training wrote, MODULE:CLASS, or one of "
+            f"{', '.join(tunings)}"
+        )
+    policy = load_policy(path)
+    content = (path / CONTRACT_FILE).read_bytes() + (path / WEIGHTS_FILE).read_bytes()
+    return label or policy.name, policy, content
+
+
+def is_import(source: str) -> bool:
+    """Whether a controller's name has the form MODULE:CLASS."""
+    module, colon, name = source.partition(":")
+    return bool(colon) and all(part.isidentifier() for part in module.split(".")) and name.isidentifier()
+
+
+def _imported(source: str) -> tuple[str, Controller, bytes]:
+    """The controller that MODULE:CLASS names, made without arguments, and its module's text.
+
+    Raises ValueError if the module or the class is missing, needs arguments, or is no controller.
+    """
+    module_name, _, class_name = source.partition(":")
+    if os.getcwd() not in sys.path:
+        sys.path.insert(0, os.getcwd())
+    try:
+        module = importlib.import_module(module_name)
+    except ModuleNotFoundError as error:
+        raise ValueError(
+            f"controller {source}: {error}: give MODULE:CLASS of a module in {os.getcwd()} or installed"
+        ) from None
+    found = getattr(module, class_name, None)
+    if not inspect.isclass(found):
+        raise ValueError(f"controller {source}: {module.__file__} has no class {class_name}")
+    try:
+        controller: Any = found()
+    except TypeError as error:
+        raise ValueError(f"controller {source}: {error}: give every argument a default value") from None
+    lacking = [name for name in ("name", "environment", "reset", "act") if not hasattr(controller, name)]
+    if lacking:
+        raise ValueError(
+            f"controller {source} lacks {', '.join(lacking)}: controllers/base.py has the protocol"
+        )
+    return controller.name, controller, inspect.getsource(module).encode()

@@ -1,1 +1,0 @@
-"""The benchmark of algorithms: result files, tables and figure."""

@@ -1,0 +1,219 @@
+"""Controllers on the same unseen episodes: figures, differences paired by episode, and a picture."""
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from controllers.base import Controller
+from epv_env.common.files import Journal
+from epv_env.plant.plantfile import Plant
+from epv_env.plant.region import Region
+from training.evaluation.batches import Batch, in_batches, run_batches
+from training.evaluation.metrics import EpisodeMetrics, summary, violation_interval
+from training.evaluation.plots import plt
+from training.evaluation.scenarios import EvaluationScenario
+from training.evaluation.seeds import EVALUATION_SEED
+from training.evaluation.statistics import mean_interval, paired_difference
+
+PLANTS = {
+    "calibrated": "the calibrated plant",
+    "confidence": "drawn from its confidence region (C3)",
+    "sensitive_ten_percent": "all 13 sensitive parameters each within ±10 % (C3)",
+}
+"""The plant sets on which controllers are compared."""
+
+Results = dict[tuple[str, str, str], EpisodeMetrics]
+"""Episodes by plant set, scenario and controller."""
+
+SCORES = {
+    "stayed": "share that leaves [%]",
+    "rms_bar": "rms error [mbar]",
+    "event_breakdown_bar": "breakdown per event [mbar]",
+    "switchings_per_s": "switchings [1/s]",
+    "episode_return": "return",
+}
+"""Fields of EpisodeMetrics that are compared in pairs."""
+
+FACTORS = {"stayed": -100.0, "rms_bar": 1e3, "event_breakdown_bar": 1e3}
+"""From a score to the unit of its heading; "stayed" becomes the share that leaves."""
+
+COLUMNS = {
+    "plants": "plants",
+    "scenario": "scenario",
+    "controller": "controller",
+    "left_percent": "leaves [%]",
+    "C1_worst_excursion_bar": "worst [bar]",
+    "rms_error_mbar": "rms [mbar]",
+    "C2_event_breakdown_mbar": "breakdown [mbar]",
+    "switchings_per_s": "switchings [1/s]",
+    "mean_return": "return",
+}
+"""Columns that are printed, and their headings."""
+
+
+def plant_region(plants: str, plant: Plant) -> Region:
+    """The region around a plant that a key of PLANTS, or a region's name, stands for."""
+    if plants == "calibrated":
+        return Region(centre=plant.parameters)
+    if plants == "confidence":
+        return plant.region
+    return Region.named(plants, plant.parameters)
+
+
+def compare(
+    controllers: Mapping[str, Controller],
+    *,
+    plant: Plant,
+    scenarios: Mapping[str, EvaluationScenario],
+    episodes: int,
+    duration: float,
+    plant_sets: Collection[str] = tuple(PLANTS),
+    first_seed: int = EVALUATION_SEED,
+    workers: int = 1,
+    journal: Journal | None = None,
+    digests: Mapping[str, str] = {},
+) -> Results:
+    """Run every controller in every scenario on every plant set, with common random numbers.
+
+    Args:
+        controllers: by label.
+        plant: the calibrated plant and its confidence region.
+        scenarios: by name.
+        episodes: number of episodes of each cell.
+        duration: length of an episode, where the scenario has none of its own [s].
+        plant_sets: keys of PLANTS.
+        first_seed: of the episodes of each cell.
+        workers: processes.
+        journal: finished batches; new ones are added.
+        digests: of the controllers by label: part of the batches' names in the journal.
+    """
+    cells: dict[tuple[str, str, str], list[Batch]] = {}
+    for plants in plant_sets:
+        for name, scenario in scenarios.items():
+            for label in controllers:
+                whole = Batch(
+                    name=f"{plants}, {name}, {label} {digests.get(label, '')}".rstrip(),
+                    controller=label,
+                    first_seed=first_seed,
+                    episodes=episodes,
+                    duration=scenario.duration or duration,
+                    options={
+                        "plant": plant,
+                        "parameters": plant_region(plants, plant),
+                        **scenario.options,
+                    },
+                    restart_s=scenario.restart_s,
+                )
+                cells[plants, name, label] = in_batches(episodes, whole)
+    found = run_batches(
+        [batch for batches in cells.values() for batch in batches], controllers,
+        journal=journal, workers=workers, what="comparison",
+    )  # fmt: skip
+    return {
+        cell: EpisodeMetrics.joined([found[batch.name] for batch in batches])
+        for cell, batches in cells.items()
+    }
+
+
+def rows(results: Results) -> pd.DataFrame:
+    """A row for each plant set, scenario and controller: `summary`, and some figures in % and mbar."""
+    table = []
+    for (plants, scenario, label), metrics in results.items():
+        figures = summary(metrics)
+        low, high = (100 * end for end in violation_interval(metrics.stayed))
+        table.append(
+            {
+                "plants": plants, "scenario": scenario, "controller": label,
+                "left_percent": 100 * (1 - figures["C1_stayed"]), "left_low": low, "left_high": high,
+                "rms_error_mbar": 1e3 * figures["rms_error_bar"],
+                "C2_event_breakdown_mbar": 1e3 * figures["C2_event_breakdown_bar"],
+                **figures,
+            }
+        )  # fmt: skip
+    return pd.DataFrame(table)
+
+
+def differences(results: Results, against: str) -> pd.DataFrame:
+    """A row for each cell and score: the controller minus the one called `against`, paired by episode.
+
+    Columns: plants, scenario, controller, score, difference, low, high (95 %, bootstrap), in the units
+    of SCORES."""
+    table = []
+    for (plants, scenario, label), metrics in results.items():
+        if label == against:
+            continue
+        theirs = results[plants, scenario, against]
+        for field, heading in SCORES.items():
+            factor = FACTORS.get(field, 1.0)
+            pair = (factor * np.asarray(getattr(each, field), float) for each in (metrics, theirs))
+            value, low, high = paired_difference(*pair)
+            table.append(
+                {
+                    "plants": plants, "scenario": scenario, "controller": label, "score": heading,
+                    "difference": value, "low": low, "high": high,
+                }
+            )  # fmt: skip
+    return pd.DataFrame(table)
+
+
+def as_text(table: pd.DataFrame) -> str:
+    """Rows as they are printed: plant set and scenario only where they differ."""
+    same = [name for name in ("plants", "scenario") if len(set(table[name])) == 1]
+    shown = table.loc[:, [name for name in COLUMNS if name not in same]].rename(columns=COLUMNS)
+    head = "; ".join(f"{name}: {table[name].iloc[0]}" for name in same)
+    text = shown.to_string(index=False, float_format=lambda value: f"{value:.3g}")
+    return f"{head}\n{text}" if head else text
+
+
+PANELS = {
+    "left_percent": "episodes that leave ±500 mbar [%]",
+    "C2_event_breakdown_mbar": "breakdown per event [mbar]",
+    "switchings_per_s": "switchings [1/s]",
+}
+"""What the picture shows, by column of `rows`."""
+
+
+def figure(table: pd.DataFrame) -> Figure:
+    """A line for each controller and a panel for each of PANELS. table: `rows` of one cell each.
+
+    Bars are exact 95 % intervals of the share that leaves.
+    """
+    names = list(table["controller"])
+    drawn, panels = plt.subplots(
+        1, len(PANELS), figsize=(9, 1.2 + 0.35 * len(names)), sharey=True, layout="constrained"
+    )
+    places = np.arange(len(names))
+    for axes, (column, label) in zip(panels, PANELS.items(), strict=True):
+        values = table[column].to_numpy(float)
+        axes.plot(values, places, "o", color="C0")
+        if column == "left_percent":
+            axes.hlines(places, table["left_low"], table["left_high"], color="C0")
+            axes.set_xscale("symlog", linthresh=0.1)
+            axes.set_xlim(-0.01, 110)
+            axes.set_xticks([0, 0.1, 1, 10, 100], ["0", "0.1", "1", "10", "100"])
+        else:
+            axes.set_xlim(0, 1.1 * max(values.max(), 1e-3))
+        axes.set_xlabel(label)
+        axes.grid(alpha=0.3, axis="x")
+    panels[0].set_yticks(places, names)
+    panels[0].set_ylim(len(names) - 0.5, -0.5)
+    return drawn
+
+
+def pooled(results: Results, label: str, members: Sequence[str]) -> Results:
+    """The same results with the episodes of several controllers, seeds of a training, under one
+    label."""
+    cells = dict.fromkeys((plants, scenario) for plants, scenario, _ in results)
+    return {
+        (*cell, label): EpisodeMetrics.joined([results[(*cell, member)] for member in members])
+        for cell in cells
+    }
+
+
+def mean_with_interval(values: Any) -> str:
+    """A mean and its 95 % interval as text."""
+    low, high = mean_interval(np.asarray(values, float))
+    return f"{np.mean(values):.3g} ({low:.3g} to {high:.3g})"

@@ -1,1 +1,0 @@
-"""The comparison: contenders, blocks of episodes, tables, acceptance criteria and figures."""

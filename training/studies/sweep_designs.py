@@ -1,0 +1,176 @@
+"""The conditions of a sweep: one thing changed at a time, regions, and a Latin hypercube."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from epv_env.plant.consumption import SCENARIOS
+from epv_env.plant.effects.registry import CATALOGUE
+from epv_env.plant.parameters import table
+from epv_env.plant.plantfile import Plant
+from epv_env.plant.region import Region
+from epv_env.settings import as_region
+from identification.sensitivity.one_at_a_time import changed_values
+from training.evaluation.scenarios import effect_levels
+
+JOINT = ("exact", "confidence", "ten_percent", "sensitive_ten_percent")
+"""Regions from which every episode draws a plant of its own."""
+
+SAMPLED = "sensitive_ten_percent"
+"""Region of the Latin hypercube."""
+
+MS = 1e-3
+
+
+SENSOR_NOISE = (0.0, 1.0, 2.0, 4.0)
+"""Factors on the sensors' noise [1]: from none to what a worn sensor has."""
+CONTROL_PERIODS_MS = (2, 5, 10, 20)
+"""Control periods [ms]; 5 is the environment's."""
+LATENCIES_MS = (1, 2, 5, 10)
+"""Delays of the command [ms], up to two control periods."""
+SUPPLY_VOLTAGES = (18.0, 21.0, 28.0, 32.0)
+"""Supply voltages of the coil [V], nominally 24 V: from a weak battery to a charging fault."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Point:
+    """Conditions under which every controller runs the same episodes."""
+
+    design: str
+    """One of DESIGNS."""
+    factor: str
+    """What is changed."""
+    level: str
+    """How far, in words."""
+    options: dict[str, Any] = field(default_factory=dict)
+    """Of the environment."""
+    parameters: list[dict[str, float]] | None = None
+    """A plant for each episode, where the options do not say which."""
+
+
+def regions(plant: Plant) -> Iterator[Point]:
+    """The plant itself, its confidence region, and +-10 % of four and of all sensitive parameters."""
+    for name in JOINT:
+        if name != "confidence" or plant.region.varies:
+            yield Point(design="regions", factor="region", level=name, options={"parameters": name})
+
+
+def parameters(plant: Plant) -> Iterator[Point]:
+    """Each parameter of Tables 6 and 7 and the environment's: +-10 %, and the ends of its domain."""
+    effects = {symbol for symbols in CATALOGUE.values() for symbol in symbols}
+    for symbol, row in table().items():
+        if row.domain is None or row.group == "unmodelled" or symbol in effects:
+            continue
+        low, high = plant.parameters.domain(symbol)
+        minus, plus = changed_values(symbol, plant.parameters[symbol])
+        levels = {"-10 %": max(minus, low), "+10 %": min(plus, high), "least": low, "greatest": high}
+        for level, value in levels.items():
+            yield _changed_plant("parameters", symbol, level, {symbol: value})
+
+
+def effects(plant: Plant) -> Iterator[Point]:
+    """Every effect of the gap catalogue, alone, at three sizes."""
+    for effect, level, sizes in effect_levels():
+        yield _changed_plant("effects", effect, level, sizes)
+
+
+def conditions(plant: Plant) -> Iterator[Point]:
+    """Consumption, sensor noise, control period, latency and supply voltage, one at a time."""
+    for name in SCENARIOS:
+        yield Point(design="conditions", factor="scenario", level=name, options={"scenario": name})
+    for factor in SENSOR_NOISE:
+        yield Point(
+            design="conditions", factor="sensor noise", level=f"{factor:g} x",
+            options={"sensor_noise": factor},
+        )  # fmt: skip
+    for ms in CONTROL_PERIODS_MS:
+        yield Point(
+            design="conditions", factor="control period", level=f"{ms} ms",
+            options={"control_period": ms * MS},
+        )  # fmt: skip
+    for ms in LATENCIES_MS:
+        yield _changed_plant("conditions", "latency", f"{ms} ms", {"t_delay": ms * MS})
+    for volts in SUPPLY_VOLTAGES:
+        yield Point(
+            design="conditions", factor="supply voltage", level=f"{volts:g} V",
+            options={"supply_voltage": volts},
+        )  # fmt: skip
+
+
+def hypercube(plant: Plant, points: int, seed: int) -> Point:
+    """A Latin hypercube over SAMPLED, one plant for each episode."""
+    plants = latin_hypercube(as_region(SAMPLED, plant), points, seed)
+    return Point(design="hypercube", factor=SAMPLED, level="Latin hypercube", parameters=plants)
+
+
+def latin_hypercube(region: Region, points: int, seed: int) -> list[dict[str, float]]:
+    """Plants of a region by symbol [SI]: each symbol's range is cut into slices of one plant each.
+
+    The coordinates of the region's ellipsoid are a cube that is drawn in to the ball along its rays.
+    """
+    symbols = (*region.boxes, *region.symbols)
+    coordinates = qmc.LatinHypercube(len(symbols), rng=seed).random(points)
+    boxes = len(region.boxes)
+    ends = np.array(list(region.boxes.values())).reshape(-1, 2)
+    boxed = ends[:, 0] + coordinates[:, :boxes] * np.ptp(ends, axis=1)
+    values = np.hstack([boxed, region.joint(_ball(2 * coordinates[:, boxes:] - 1))])
+    domains = [region.centre.domain(symbol) for symbol in symbols]
+    inside = np.clip(values, *np.array(domains).T)  # rounding may step over an end
+    return [dict(zip(symbols, row, strict=True)) for row in inside.tolist()]
+
+
+def _ball(cube: NDArray) -> NDArray:
+    """Points of the unit ball (points, k): those of the cube from -1 to 1, drawn in along their rays."""
+    length = np.linalg.norm(cube, axis=1, keepdims=True)
+    furthest = np.max(np.abs(cube), axis=1, keepdims=True, initial=0.0)
+    return cube * furthest / np.where(length > 0, length, 1.0)
+
+
+def _changed_plant(design: str, factor: str, level: str, values: dict[str, float]) -> Point:
+    """The plant with some values changed."""
+    return Point(design=design, factor=factor, level=level, options={"parameters": values})
+
+
+ONE_AT_A_TIME: dict[str, Callable[[Plant], Iterator[Point]]] = {
+    "parameters": parameters,
+    "effects": effects,
+    "conditions": conditions,
+}
+"""Designs that change one thing at a time, by name."""
+
+DESIGNS = ("regions", *ONE_AT_A_TIME, "hypercube")
+"""All designs."""
+
+
+def chosen_points(
+    plant: Plant, designs: Sequence[str], factors: Sequence[str], joint_episodes: int, seed: int
+) -> list[Point]:
+    """The points of some designs.
+
+    Args:
+        plant: that is changed.
+        designs: some of DESIGNS.
+        factors: only these, where a design changes one thing; none: all.
+        joint_episodes: plants of the Latin hypercube.
+        seed: of the hypercube.
+
+    Raises:
+        ValueError: none of the designs changes a factor.
+    """
+    single = [p for name, make in ONE_AT_A_TIME.items() if name in designs for p in make(plant)]
+    known = dict.fromkeys(point.factor for point in single)
+    unknown = [factor for factor in factors if factor not in known]
+    if unknown:
+        raise ValueError(
+            f"no factor {', '.join(map(repr, unknown))} in the designs {', '.join(designs)}: choose "
+            f"among {', '.join(known) or 'none'}"
+        )
+    points = list(regions(plant)) if "regions" in designs else []
+    points += [point for point in single if not factors or point.factor in factors]
+    if "hypercube" in designs:
+        points.append(hypercube(plant, joint_episodes, seed))
+    return points

@@ -1,0 +1,171 @@
+"""Tables and pictures of a sweep: shares that leave the band, and excursions, by what is changed."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from scipy.stats import spearmanr
+
+from training.evaluation.metrics import EpisodeMetrics, summary, violation_interval
+from training.evaluation.plots import COLOURS, plt
+from training.studies.sweep_designs import ONE_AT_A_TIME, Point
+
+NAMED_LEVELS = 3
+"""Changes that are named for each controller and design: more would not fit a table's cell."""
+
+NAMED_PARAMETERS = 4
+"""Parameters of the Latin hypercube that are named for each controller."""
+
+RANGE_ENDS = ("least", "greatest", "top")
+"""Levels at the ends of a range, beyond what a sound valve has; they are counted apart."""
+
+SHOWN_LEVELS = {"parameters": ("-10 %", "+10 %"), "effects": ("typical",)}
+"""Levels that a design's picture shows; of the other designs all."""
+
+HEADINGS = {
+    "level": "plants",
+    "controller": "controller",
+    "left_text": "leaves [%]",
+    "C1_worst_excursion_bar": "worst [bar]",
+    "rms_error_bar": "rms [bar]",
+    "switchings_per_s": "switchings [1/s]",
+}
+"""Columns of the table of regions."""
+
+Cell = tuple[Point, str]
+"""A point of a design under the controller of a label."""
+
+
+def point_table(
+    cells: Sequence[Cell], metrics: Sequence[EpisodeMetrics], first_seed: int
+) -> pd.DataFrame:
+    """A row for each point and controller.
+
+    Columns: design, factor, level, controller; `left`, the share of episodes that left ±500 mbar [1],
+    with its exact 95 % interval `left_low`, `left_high`; median excursion; the seed of the worst
+    episode; and `summary`."""
+    table = []
+    for (point, controller), each in zip(cells, metrics, strict=True):
+        low, high = violation_interval(each.stayed)
+        table.append(
+            {
+                "design": point.design, "factor": point.factor, "level": point.level,
+                "controller": controller, "left": 1 - float(np.mean(each.stayed)),
+                "left_low": low, "left_high": high,
+                "excursion_median_bar": float(np.median(each.excursion_bar)),
+                "worst_seed": first_seed + int(np.argmax(each.excursion_bar)), **summary(each),
+            }
+        )  # fmt: skip
+    return pd.DataFrame(table)
+
+
+def rank_table(cells: Sequence[Cell], metrics: Sequence[EpisodeMetrics]) -> pd.DataFrame:
+    """Spearman's rank correlation of each parameter with the excursion, over a Latin hypercube.
+
+    Columns: controller, symbol, rank_correlation, p_value (of no association).
+    """
+    table = []
+    for (point, controller), each in zip(cells, metrics, strict=True):
+        if point.parameters is None:
+            continue
+        plants = pd.DataFrame(point.parameters)
+        for symbol in plants:
+            found: Any = spearmanr(plants[symbol], each.excursion_bar)
+            table.append(
+                {
+                    "controller": controller, "symbol": symbol,
+                    "rank_correlation": float(found.statistic), "p_value": float(found.pvalue),
+                }
+            )  # fmt: skip
+    return pd.DataFrame(table)
+
+
+def share_text(row: Mapping[str, Any]) -> str:
+    """Share that leaves with its exact interval, in %; row: of `point_table`."""
+    low, value, high = (100 * row[name] for name in ("left_low", "left", "left_high"))
+    return f"{value:.3g} ({low:.2g} to {high:.2g})"
+
+
+def region_table(points: pd.DataFrame) -> pd.DataFrame:
+    """The regions and the Latin hypercube under each controller, with headings."""
+    some: Any = points[points["design"].isin(["regions", "hypercube"])]
+    shown = some.assign(left_text=[share_text(row) for row in some.to_dict("records")])
+    return shown.loc[:, list(HEADINGS)].rename(columns=HEADINGS)
+
+
+def harmful_changes(points: pd.DataFrame) -> pd.DataFrame:
+    """How many changes of one thing raise the share that leaves, and which ones most.
+
+    A change hurts if its exact interval lies above that of the plant as it is.
+    """
+    table = []
+    for controller, mine in points.groupby("controller", sort=False):
+        exact: Any = mine.loc[mine["level"] == "exact", "left_high"]
+        bound = float(exact.iloc[0]) if len(exact) else 0.0
+        for design in ONE_AT_A_TIME:
+            tried: Any = mine[mine["design"] == design]
+            for ends in (False, True):
+                some = tried[tried["level"].isin(RANGE_ENDS) == ends]
+                if len(some) == 0:
+                    continue
+                hurt = some[some["left_low"] > bound].sort_values("left", ascending=False, kind="stable")
+                named = [
+                    f"{row['factor']} {row['level']} ({100 * row['left']:.3g})"
+                    for row in hurt.head(NAMED_LEVELS).to_dict("records")
+                ]
+                table.append(
+                    {
+                        "controller": controller,
+                        "changed": f"{design}, ends of their ranges" if ends else design,
+                        "tried": len(some), "hurt": len(hurt), "most [% leave]": "; ".join(named) or "–",
+                    }
+                )  # fmt: skip
+    return pd.DataFrame(table)
+
+
+def strongest_parameters(ranks: pd.DataFrame) -> pd.DataFrame:
+    """The parameters that the excursion goes with most, for each controller."""
+    table = []
+    for controller, mine in ranks.groupby("controller", sort=False) if len(ranks) else ():
+        order = mine.sort_values("rank_correlation", key=abs, ascending=False)
+        named = [
+            f"{row['symbol']} {row['rank_correlation']:+.2f}"
+            for row in order.head(NAMED_PARAMETERS).to_dict("records")
+        ]
+        table.append({"controller": controller, "excursion goes with": ", ".join(named)})
+    return pd.DataFrame(table)
+
+
+def share_figure(points: pd.DataFrame, designs: Sequence[str]) -> Figure:
+    """Share that leaves by what is changed, a colour for each controller; exact 95 % intervals.
+
+    points: of `point_table`. designs: those shown, each at its SHOWN_LEVELS. Changes with which nobody
+    leaves are left out; the title says how many.
+    """
+    some: Any = points[points["design"].isin(designs)]
+    shown = [
+        row["level"] in SHOWN_LEVELS.get(row["design"], (row["level"],))
+        for row in some.to_dict("records")
+    ]
+    some = some[shown].assign(label=lambda rows: rows["factor"] + ": " + rows["level"])
+    worst: Any = some.groupby("label", sort=False)["left"].max()
+    labels = list(worst[worst > 0].index)
+    controllers = list(dict.fromkeys(some["controller"]))
+    figure, axes = plt.subplots(figsize=(8, 1.6 + 0.28 * len(labels)), layout="constrained")
+    apart = 0.6 / max(len(controllers), 1)
+    for k, (name, colour) in enumerate(zip(controllers, COLOURS, strict=False)):
+        mine = some[some["controller"] == name].set_index("label").reindex(labels)
+        places = np.arange(len(labels)) + (k - (len(controllers) - 1) / 2) * apart
+        axes.hlines(places, 100 * mine["left_low"], 100 * mine["left_high"], color=colour, alpha=0.5)
+        axes.plot(100 * mine["left"], places, "o", ms=4, color=colour, label=name)
+    axes.set_xscale("symlog", linthresh=1.0)
+    axes.set(xlabel="episodes that leave ±500 mbar [%], exact 95 % intervals", xlim=(-0.1, 115))
+    axes.set_xticks([0, 1, 3, 10, 30, 100], ["0", "1", "3", "10", "30", "100"])
+    axes.set_yticks(np.arange(len(labels)), labels, fontsize=8)
+    axes.set_ylim(len(labels) - 0.4, -0.6)
+    axes.set_title(f"{len(worst) - len(labels)} other changes: nobody leaves", fontsize=9)
+    axes.grid(alpha=0.3, axis="x")
+    figure.legend(fontsize=8, ncols=min(len(controllers), 4), loc="outside upper center")
+    return figure
