@@ -28,6 +28,7 @@ from identification.importing.mapping_file import read_mapping
 from identification.recordings.campaign_files import FILE_NAME, read_campaign, write_campaign
 from identification.recordings.columns import REQUIRED_COLUMNS, read_columns
 from tests.identification.recordings.good_campaign import campaign_of, switching
+from training.commands.options import count, seconds, seed
 
 pytestmark = pytest.mark.training
 PACKAGES = [name for name in ("identification.commands", "training.commands") if find_spec(name)]
@@ -36,6 +37,9 @@ WRONG_VALUES: tuple[Any, ...] = (
     None, True, -1, 1.5, 1e300, 10**30, float("nan"), float("inf"), "", "x", "\0", "é" * 300, [], {},
     [[]], [None] * 50, {"": {}}, "../../etc/passwd", 2**63,
 )  # fmt: skip
+
+NUMBERS = (int, float, count, seed, seconds)
+"""Types of the options that take a number."""
 
 NO_NUMBERS = ("-1", "nan", "1e999", "9" * 400, "", "x")
 """What no option that takes a number takes: negative, infinite, beyond sense, or no number."""
@@ -158,7 +162,7 @@ def number_options(parser: argparse.ArgumentParser) -> list[str]:
     return [
         action.option_strings[-1]
         for action in parser._actions
-        if action.option_strings and action.type in (int, float)
+        if action.option_strings and action.type in NUMBERS
     ]
 
 
