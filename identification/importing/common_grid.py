@@ -21,30 +21,21 @@ from identification.importing.source_file import ImportingError
 from identification.recordings.columns import LEAST_RATE, sampling_period
 from identification.recordings.recording import CampaignError
 
-
-@dataclass(frozen=True, kw_only=True)
-class ImportSettings:
-    """The defaults suit benches that sample at 500 Hz to 100 kHz."""
-
-    most_step: float = 1.75
-    """Longest step over the usual one. A missing sample makes 2; jitter of a third of a period, 1.67."""
-    resampling_margin: int = 4
-    """Least density of the fine grid over a channel's own rate: the spline is smooth on it."""
-    passband: float = 0.35
-    """End of the passband over the lower of both rates; the switching of the coil stays sharp."""
-    stopband: float = 0.5
-    """Begin of the stopband over the lower of both rates: from Nyquist's frequency on nothing folds."""
-    stop_attenuation: float = 70.0
-    """Attenuation of what would fold [dB]: below a step of 12 bits."""
-    same_time: float = 1e-3
-    """Part of a period by which times may differ and count as the same samples."""
-    greatest_rate: float = 20_000.0
-    """Greatest rate of a campaign [1/s]; a faster bench is brought down to it. Valve and sensors are
-    slower, and longer files only cost time."""
-
-
-IMPORT = ImportSettings()
-"""The default settings."""
+MOST_STEP = 1.75
+"""Longest step over the usual one. A missing sample makes 2; jitter of a third of a period, 1.67."""
+RESAMPLING_MARGIN = 4
+"""Least density of the fine grid over a channel's own rate: the spline is smooth on it."""
+PASSBAND = 0.35
+"""End of the passband over the lower of both rates; the switching of the coil stays sharp."""
+STOPBAND = 0.5
+"""Begin of the stopband over the lower of both rates: from Nyquist's frequency on nothing folds."""
+STOP_ATTENUATION = 70.0
+"""Attenuation of what would fold [dB]: below a step of 12 bits."""
+SAME_TIME = 1e-3
+"""Part of a period by which times may differ and count as the same samples."""
+GREATEST_RATE = 20_000.0
+"""Greatest rate of a campaign [1/s]; a faster bench is brought down to it. Valve and sensors are
+slower, and longer files only cost time."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,10 +51,7 @@ class GriddedSignals:
 
 
 def on_common_grid(
-    place: str,
-    channels: Sequence[MappedChannel],
-    rate: float | None = None,
-    settings: ImportSettings = IMPORT,
+    place: str, channels: Sequence[MappedChannel], rate: float | None = None
 ) -> GriddedSignals:
     """The channels on one uniform grid; samples that lie on it already are left as they are.
 
@@ -71,34 +59,33 @@ def on_common_grid(
         place: begins the messages.
         channels: of one recording.
         rate: wanted samples per second [1/s]; None: the slowest channel's.
-        settings: what a gap is, and how channels are resampled.
 
     Raises ImportingError for times with gaps, out of order or too slow.
     """
     for channel in channels:
-        _check_times(f"{place}, {channel.source.name}", channel, settings)
+        _check_times(f"{place}, {channel.source.name}", channel)
     own = {channel.name: _own_period(channel) for channel in channels}
-    period = _period(channels, own, rate, settings)
+    period = _period(channels, own, rate)
     grid = _grid(place, channels, own, period)
     signals, changed = {}, []
     for channel in channels:
-        first = _first_sample(channel, own[channel.name], grid, period, settings)
+        first = _first_sample(channel, own[channel.name], grid, period)
         if first is None:
-            signals[channel.name] = resampled(channel.time, channel.values, grid, settings)
+            signals[channel.name] = resampled(channel.time, channel.values, grid)
             changed.append(channel.name)
         else:
             signals[channel.name] = channel.values[first : first + len(grid)]
     return GriddedSignals(period=period, signals=signals, resampled=tuple(changed))
 
 
-def _check_times(place: str, channel: MappedChannel, settings: ImportSettings) -> None:
+def _check_times(place: str, channel: MappedChannel) -> None:
     steps = np.diff(channel.time)
     backward = np.flatnonzero(steps <= 0)
     if backward.size:
         at = channel.time[backward[0]]
         raise ImportingError(f"{place}: time does not increase after {at:.6g} s: sort the samples")
     usual = float(np.median(steps))
-    gap = np.flatnonzero(steps > settings.most_step * usual)
+    gap = np.flatnonzero(steps > MOST_STEP * usual)
     if gap.size:
         first, last = channel.time[gap[0]], channel.time[gap[0] + 1]
         raise ImportingError(
@@ -121,10 +108,7 @@ def _own_period(channel: MappedChannel) -> float | None:
 
 
 def _period(
-    channels: Sequence[MappedChannel],
-    own: Mapping[str, float | None],
-    rate: float | None,
-    settings: ImportSettings,
+    channels: Sequence[MappedChannel], own: Mapping[str, float | None], rate: float | None
 ) -> float:
     if rate is not None:
         return 1.0 / rate
@@ -133,7 +117,7 @@ def _period(
         for channel in channels
         if channel.name != "sigma_S"
     ]
-    return max(max(periods), 1.0 / settings.greatest_rate)
+    return max(max(periods), 1.0 / GREATEST_RATE)
 
 
 def _grid(
@@ -154,20 +138,14 @@ def _grid(
     return start + period * np.arange(count)
 
 
-def _first_sample(
-    channel: MappedChannel,
-    own: float | None,
-    grid: NDArray,
-    period: float,
-    settings: ImportSettings,
-) -> int | None:
+def _first_sample(channel: MappedChannel, own: float | None, grid: NDArray, period: float) -> int | None:
     """The sample with which the grid begins, if the channel's samples are the grid's; else None."""
-    if own is None or abs(own - period) * len(grid) > settings.same_time * period:
+    if own is None or abs(own - period) * len(grid) > SAME_TIME * period:
         return None
     first = round((grid[0] - channel.time[0]) / own)
     apart = channel.time[0] + first * own - grid[0]
     fits = first >= 0 and first + len(grid) <= len(channel.time)
-    return first if fits and abs(apart) <= settings.same_time * period else None
+    return first if fits and abs(apart) <= SAME_TIME * period else None
 
 
 def usual_rate(time: NDArray) -> float:
@@ -175,32 +153,29 @@ def usual_rate(time: NDArray) -> float:
     return (len(time) - 1) / float(time[-1] - time[0])
 
 
-def resampled(
-    time: NDArray, values: NDArray, grid: NDArray, settings: ImportSettings = IMPORT
-) -> NDArray:
+def resampled(time: NDArray, values: NDArray, grid: NDArray) -> NDArray:
     """Values on a uniform grid, (grid,), in the unit of `values`.
 
     Args:
         time: of the samples, increasing, (samples,) [s]; it covers the grid.
         values: (samples,), any unit.
         grid: wanted times, uniform, (grid,) [s].
-        settings: pass- and stopband, attenuation.
     """
     period = float(grid[-1] - grid[0]) / (len(grid) - 1)
     own = usual_rate(time)
-    dense = max(1, math.ceil(settings.resampling_margin * own * period))
-    taps = _low_pass(min(own, 1.0 / period), dense / period, settings)
+    dense = max(1, math.ceil(RESAMPLING_MARGIN * own * period))
+    taps = _low_pass(min(own, 1.0 / period), dense / period)
     half = len(taps) // 2
     fine = grid[0] + np.arange(-half, dense * (len(grid) - 1) + half + 1) * (period / dense)
     filtered = oaconvolve(_mirrored_spline(time, values, fine), taps, mode="valid")
     return np.asarray(filtered)[::dense]
 
 
-def _low_pass(rate: float, fine_rate: float, settings: ImportSettings) -> NDArray:
+def _low_pass(rate: float, fine_rate: float) -> NDArray:
     """Taps of a symmetric filter of unit gain, odd in number; rates [1/s]."""
-    width = (settings.stopband - settings.passband) * rate
-    count, beta = kaiserord(settings.stop_attenuation, width / (0.5 * fine_rate))
-    cut = 0.5 * (settings.passband + settings.stopband) * rate
+    width = (STOPBAND - PASSBAND) * rate
+    count, beta = kaiserord(STOP_ATTENUATION, width / (0.5 * fine_rate))
+    cut = 0.5 * (PASSBAND + STOPBAND) * rate
     window: Any = ("kaiser", beta)
     return np.asarray(firwin(count | 1, cut, window=window, fs=fine_rate))
 

@@ -13,13 +13,7 @@ from numpy.typing import NDArray
 from epv_env.common.units import BAR
 from identification.importing.binary_files import read_matlab, read_mdf, read_parquet, read_tdms
 from identification.importing.channels import MappedChannel, mapped_channels, supply_pair_mean
-from identification.importing.common_grid import (
-    IMPORT,
-    GriddedSignals,
-    ImportSettings,
-    on_common_grid,
-    usual_rate,
-)
+from identification.importing.common_grid import GriddedSignals, on_common_grid, usual_rate
 from identification.importing.mapping_file import MappingFile, RecordingEntry, meaning, read_mapping
 from identification.importing.source_file import ImportingError, SourceChannel, SourceFile
 from identification.importing.text_files import read_text
@@ -69,7 +63,6 @@ def read_files(
     rate: float | None = None,
     name: str | None = None,
     rules: RecordingRules = RULES,
-    settings: ImportSettings = IMPORT,
 ) -> ImportedCampaign:
     """The campaign that measurement files make, in memory.
 
@@ -81,7 +74,6 @@ def read_files(
         rate: samples per second of the recordings [1/s]; None: of each file's slowest channel.
         name: of the campaign; None: that of the first file's folder.
         rules: by which the recordings are checked (`rules_of` for another valve than the report's).
-        settings: of resampling.
 
     Raises:
         ImportingError: a file cannot be read, or a channel's meaning, unit or time is unclear.
@@ -93,7 +85,7 @@ def read_files(
     pressure = content.environment.pressure_bar if ambient_bar is None else ambient_bar
     temperature = content.environment.temperature_K if temperature_K is None else temperature_K
     given = None if pressure is None else round(pressure * BAR, 6)
-    imported = tuple(_imported(source, content, given, rate, settings) for source in sources)
+    imported = tuple(_imported(source, content, given, rate) for source in sources)
     campaign = Campaign(
         name=name or Path(files[0]).resolve().parent.name or "bench run",
         temperature=USUAL_TEMPERATURE if temperature is None else temperature,
@@ -144,11 +136,10 @@ def _imported(
     content: MappingFile,
     ambient: float | None,
     rate: float | None,
-    settings: ImportSettings,
 ) -> ImportedFile:
     """One file as a recording; ambient: p_env [Pa absolute], None if nobody gave it."""
     channels = mapped_channels(source, content, ambient)
-    gridded = on_common_grid(str(source.path), channels, rate, settings)
+    gridded = on_common_grid(str(source.path), channels, rate)
     signals = supply_pair_mean(gridded.signals)
     entry = content.recordings.get(source.path.name, RecordingEntry())
     recording = Recording(

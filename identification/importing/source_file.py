@@ -8,6 +8,7 @@ from pathlib import Path
 from types import ModuleType
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from epv_env.common.extras import how_to_install
@@ -64,10 +65,8 @@ def needed_package(name: str, purpose: str) -> ModuleType:
         ) from None
 
 
-STAMP = re.compile(
-    r"(\d{4})-?(\d\d)-?(\d\d)[T ](\d\d):?(\d\d)(?::?(\d\d(?:[.,]\d+)?))?\s*(?:Z|([+-])(\d\d):?(\d\d)?)?"
-)
-"""A date with a time of day, in extended or basic form, perhaps with a zone; a blank may stand for T."""
+STAMP = re.compile(r"\d{4}-?\d\d-?\d\d[T ]\d\d")
+"""Beginning of a date with a time of day (ISO 8601); a blank may stand for T."""
 
 
 def points_in_time(place: str, texts: Iterable[str | None]) -> NDArray:
@@ -75,7 +74,14 @@ def points_in_time(place: str, texts: Iterable[str | None]) -> NDArray:
 
     place: begins the message. Raises ImportingError for a text that is no point in time.
     """
-    return np.array([_point(place, text) if text else "NaT" for text in texts], "datetime64[ns]")
+    cells = [str(text or "").replace(",", ".") for text in texts]
+    try:
+        times = pd.to_datetime(cells, format="ISO8601", utc=True)
+    except ValueError as error:
+        raise ImportingError(
+            f"{place} has no point in time ({error}): write it as 2026-03-01T10:00:00.0005"
+        ) from None
+    return times.tz_localize(None).as_unit("ns").to_numpy()
 
 
 def seconds(values: NDArray) -> tuple[NDArray, np.datetime64 | None]:
@@ -108,21 +114,3 @@ def begin_offsets(place: str, begins: Sequence[np.datetime64 | None]) -> list[fl
     return [float((begin - min(known)) / np.timedelta64(1, "s")) for begin in known] or [0.0] * len(
         begins
     )
-
-
-def _point(place: str, text: str) -> np.datetime64:
-    found = STAMP.fullmatch(text)
-    if found is None:
-        raise ImportingError(
-            f"{place} has {text[:40]!r}, which is no point in time: write it as 2026-03-01T10:00:00.0005"
-        )
-    year, month, day, hour, minute, second, sign, zone_hour, zone_minute = found.groups()
-    second = (second or "00").replace(",", ".")
-    try:
-        local = np.datetime64(f"{year}-{month}-{day}T{hour}:{minute}:{second}", "ns")
-    except ValueError:
-        raise ImportingError(
-            f"{place} has {text[:40]!r}, a day or time that does not exist: mend it"
-        ) from None
-    minutes = 60 * int(zone_hour or 0) + int(zone_minute or 0)
-    return local - np.timedelta64(-minutes if sign == "-" else minutes, "m")

@@ -2,12 +2,15 @@
 
 import codecs
 import csv
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+import pandas as pd
 
 from identification.importing.source_file import (
     STAMP,
@@ -71,26 +74,16 @@ DIALECTS = tuple(
 
 def decoded(file: str, content: bytes) -> tuple[str, str]:
     """Text of a file and its encoding: by byte order mark, else UTF-8, else Windows-1252."""
-    for mark, encoding in MARKS:
-        if content.startswith(mark):
-            return _decode(file, content, encoding), encoding
+    encodings = [encoding for mark, encoding in MARKS if content.startswith(mark)]
     zeros = (content[1:2000:2].count(0), content[0:2000:2].count(0))
     if max(zeros) > min(len(content), 2000) // 4:
-        encoding = "utf-16-le" if zeros[0] > zeros[1] else "utf-16-be"
-        return _decode(file, content, encoding), encoding
-    try:
-        return content.decode("utf-8"), "utf-8"
-    except UnicodeDecodeError:
-        return _decode(file, content, "cp1252"), "cp1252"
-
-
-def _decode(file: str, content: bytes, encoding: str) -> str:
-    try:
-        return content.decode(encoding)
-    except UnicodeDecodeError:
-        raise ImportingError(
-            f"{file} is no text in UTF-8, UTF-16 or Windows-1252: save it as CSV in UTF-8"
-        ) from None
+        encodings += ["utf-16-le" if zeros[0] > zeros[1] else "utf-16-be"]
+    for encoding in (*encodings, "utf-8", "cp1252"):
+        try:
+            return content.decode(encoding), encoding
+        except UnicodeDecodeError:
+            continue
+    raise ImportingError(f"{file} is no text in UTF-8, UTF-16 or Windows-1252: save it as CSV in UTF-8")
 
 
 def found_dialect(file: str, lines: Sequence[str]) -> Dialect:
@@ -116,10 +109,6 @@ def _fit(dialect: Dialect, sample: Sequence[str]) -> int:
     return sum(bool(cell) for row in data for cell in row) if len(data) > 0.8 * len(rows) else 0
 
 
-Row = tuple[int, list[str]]
-"""Number of a line in its file, and its cells."""
-
-
 def read_text(path: Path) -> tuple[str, list[SourceChannel]]:
     """Every named column of numbers."""
     text, encoding = decoded(str(path), path.read_bytes())
@@ -129,14 +118,17 @@ def read_text(path: Path) -> tuple[str, list[SourceChannel]]:
         if line.strip() and not line.lstrip().startswith(COMMENTS)
     ]
     dialect = found_dialect(str(path), [line for _, line in lines])
-    rows = [(number, dialect.cells(line)) for number, line in lines]
-    names, units, data = _parts(str(path), rows, dialect)
+    names, units, first = _header(str(path), lines, dialect)
+    table: Any = pd.read_csv(
+        io.StringIO("\n".join(line for _, line in lines[first:])),
+        sep=r"\s+" if dialect.separator == " " else dialect.separator,
+        decimal=dialect.decimal,
+        names=list(range(len(names))),
+        skipinitialspace=True,
+    )
+    numbers = [number for number, _ in lines[first:]]
     channels = [
-        _times(str(path), data, column, name)
-        if _stamped(data, column)
-        else SourceChannel(
-            name=name, unit=units[column], values=_column(str(path), data, column, name, dialect)
-        )
+        _channel(str(path), numbers, table[column], name, units[column])
         for column, name in enumerate(names)
         if name
     ]
@@ -144,25 +136,26 @@ def read_text(path: Path) -> tuple[str, list[SourceChannel]]:
     return f"text (separator {shown}, decimal {dialect.decimal!r}, {encoding})", channels
 
 
-def _parts(
-    file: str, rows: Sequence[Row], dialect: Dialect
-) -> tuple[list[str], list[str], Sequence[Row]]:
-    """Names, units and lines of data; what stands above the names is a preamble."""
-    width = len(rows[-1][1])
-    first = next(
-        i for i, (_, cells) in enumerate(rows) if len(cells) == width and dialect.is_data(cells)
-    )
-    above = [cells for _, cells in rows[:first] if len(cells) == width]
+def _header(
+    file: str, lines: Sequence[tuple[int, str]], dialect: Dialect
+) -> tuple[list[str], list[str], int]:
+    """Names, units and place of the first line of data; what stands above the names is a preamble."""
+    width = len(dialect.cells(lines[-1][1]))
+    rows = (dialect.cells(line) for _, line in lines)
+    above = list(takewhile(lambda cells: len(cells) != width or not dialect.is_data(cells), rows))
+    first = len(above)
+    above = [cells for cells in above if len(cells) == width]
     if not above:
         raise ImportingError(
-            f"{file}, line {rows[first][0]}: no line of {width} names stands above the numbers: "
+            f"{file}, line {lines[first][0]}: no line of {width} names stands above the numbers: "
             "add a header"
         )
     with_units = len(above) > 1 and _are_units(above[-1])
     names = above[-2] if with_units else above[-1]
-    units = above[-1] if with_units else [""] * width
-    _check_names(file, names)
-    return names, units, rows[first:]
+    for name in names:
+        if name and names.count(name) > 1:
+            raise ImportingError(f"{file}: column {name!r} stands twice: rename one of them")
+    return names, above[-1] if with_units else [""] * width, first
 
 
 def _are_units(cells: Sequence[str]) -> bool:
@@ -171,34 +164,18 @@ def _are_units(cells: Sequence[str]) -> bool:
     return bool(filled) and sum(is_unit(cell.strip("[]()")) for cell in filled) * 2 >= len(filled)
 
 
-def _check_names(file: str, names: Sequence[str]) -> None:
-    for name in names:
-        if name and names.count(name) > 1:
-            raise ImportingError(f"{file}: column {name!r} stands twice: rename one of them")
-
-
-def _stamped(data: Sequence[Row], column: int) -> bool:
-    cells = data[0][1]
-    return column < len(cells) and STAMP.match(cells[column]) is not None
-
-
-def _times(file: str, data: Sequence[Row], column: int, name: str) -> SourceChannel:
-    """A column of points in time, as seconds."""
-    texts = (cells[column] if column < len(cells) else "" for _, cells in data)
-    values, begin = seconds(points_in_time(f"{file}, {name}", texts))
-    return SourceChannel(name=name, unit="s", values=values, begin=begin)
-
-
-def _column(file: str, data: Sequence[Row], column: int, name: str, dialect: Dialect) -> NDArray:
-    """The numbers of a column, (samples,); NaN for an empty cell."""
-    values = np.empty(len(data))
-    for place, (line, cells) in enumerate(data):
-        cell = cells[column] if column < len(cells) else ""
-        number = dialect.number(cell) if cell else np.nan
-        if number is None:
-            raise ImportingError(
-                f"{file}, line {line}: {name} is {cell[:40]!r}, not a number with decimal sign "
-                f"{dialect.decimal!r}: mend the cell, or cut the file there"
-            )
-        values[place] = number
-    return values
+def _channel(file: str, lines: Sequence[int], column: Any, name: str, unit: str) -> SourceChannel:
+    """A column of numbers, NaN for an empty cell, or of points in time, as seconds."""
+    texts = column.dropna()
+    if len(texts) and STAMP.match(str(texts.iloc[0])):
+        cells = column.astype(object).where(column.notna(), None)
+        values, begin = seconds(points_in_time(f"{file}, {name}", cells))
+        return SourceChannel(name=name, unit="s", values=values, begin=begin)
+    numbers: Any = pd.to_numeric(column, errors="coerce")
+    wrong = np.flatnonzero(numbers.isna() & column.notna())
+    if wrong.size:
+        raise ImportingError(
+            f"{file}, line {lines[wrong[0]]}: {name} is {str(column.iloc[wrong[0]])[:40]!r}, not a "
+            "number with the file's decimal sign: mend the cell, or cut the file there"
+        )
+    return SourceChannel(name=name, unit=unit, values=numbers.to_numpy(dtype=float))
