@@ -3,13 +3,13 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
-from typing import Any
 
-from epv_env.common.files import JSONFileError, decoded, write_json
+import msgspec
+
+from epv_env.common.files import JSONFileError, read_json, write_json
 from epv_env.common.units import BAR
 from epv_env.plant.channels import SENSORS, Sensor
 from epv_env.plant.plantfile import VOLTAGE
-from identification.bench.settings import BENCH
 from identification.recordings.recording import HOLD, ROLES
 from identification.report_2003.cases import (
     CALIBRATION_CASES,
@@ -84,14 +84,33 @@ def at_voltage(suite: Sequence[Programme], voltage: float) -> tuple[Programme, .
 
 
 FORMAT = "epv-programme/1"
-"""Version of the file, in its field `format`."""
+"""Version of a programme file, in its field `format`."""
 
-MILLISECONDS = 1e3
-"""In a second."""
+LONGEST_MS, SHORTEST_MS = 60e3, 1.0
+"""Longest recording; shortest time for which the coil is off, or on between two openings [ms]."""
 
 
 class ProgrammeError(ValueError):
     """A programme file cannot be read or run: the message names file, programme, rule and remedy."""
+
+
+class _Entry(msgspec.Struct):
+    """A programme as its file has it; the first opening starts at `first_ms`."""
+
+    name: str
+    role: str
+    supply_bar: float
+    circuit_bar: float
+    voltage_V: float
+    first_ms: float
+    openings_ms: list[float]
+    pause_ms: float
+    duration_ms: float
+
+
+class _File(msgspec.Struct):
+    format: str
+    programmes: list[_Entry]
 
 
 def save_programmes(
@@ -103,9 +122,9 @@ def save_programmes(
 
     Raises ProgrammeError, before anything is written, for what could not be read back.
     """
-    content = {"format": FORMAT, "programmes": [_content(programme) for programme in programmes]}
-    _decode(str(path), content, sensors)
-    write_json(path, content)
+    content = _File(FORMAT, [_entry(programme) for programme in programmes])
+    _programmes(path, content, sensors)
+    write_json(path, msgspec.to_builtins(content))
 
 
 def load_programmes(
@@ -115,41 +134,37 @@ def load_programmes(
 
     sensors: of the bench, by channel [bar absolute, A or V]. Raises ProgrammeError.
     """
-    remedy = "give the path of a JSON file, or write it anew"
+    remedy = "write it as docs/reference/files.md shows"
     try:
-        content = decoded(path, remedy=remedy, what="programme file", allow_nan=True)
+        content = read_json(path, _File, version=FORMAT, remedy=remedy)
     except JSONFileError as error:
-        raise ProgrammeError(str(error)) from None
-    return _decode(str(path), content, sensors)
+        raise ProgrammeError(f"programme file: {error}") from None
+    return _programmes(path, content, sensors)
 
 
-def _content(programme: Programme) -> dict[str, Any]:
+def _entry(programme: Programme) -> _Entry:
     case = programme.case
-    return {
-        "name": programme.name,
-        "role": programme.role,
-        "supply_bar": round(programme.p1 / BAR, 9),
-        "circuit_bar": round(programme.p2 / BAR, 9),
-        "voltage_V": programme.U_on,
-        "first_ms": round(MILLISECONDS * case.first, 6),
-        "openings_ms": [round(MILLISECONDS * opening, 6) for opening in case.openings],
-        "pause_ms": round(MILLISECONDS * case.pause, 6),
-        "duration_ms": round(MILLISECONDS * case.duration, 6),
-    }
+    return _Entry(
+        name=programme.name,
+        role=programme.role,
+        supply_bar=round(programme.p1 / BAR, 9),
+        circuit_bar=round(programme.p2 / BAR, 9),
+        voltage_V=programme.U_on,
+        first_ms=round(1e3 * case.first, 6),
+        openings_ms=[round(1e3 * opening, 6) for opening in case.openings],
+        pause_ms=round(1e3 * case.pause, 6),
+        duration_ms=round(1e3 * case.duration, 6),
+    )
 
 
-def _decode(path: str, content: Any, sensors: Mapping[str, Sensor]) -> tuple[Programme, ...]:
-    version = content.get("format") if isinstance(content, dict) else None
-    if version != FORMAT:
-        raise ProgrammeError(
-            f"programme file {path} has format {version!r}, this version reads {FORMAT!r}: write it anew"
-        )
-    entries = content.get("programmes")
-    if not isinstance(entries, list) or not entries:
-        raise ProgrammeError(f"programme file {path}: programmes is not a list of at least one: add one")
+def _programmes(
+    path: str | PathLike[str], content: _File, sensors: Mapping[str, Sensor]
+) -> tuple[Programme, ...]:
+    if not content.programmes:
+        raise ProgrammeError(f"{path}: programmes is empty: add one")
     programmes = tuple(
         _programme(f"{path}, programme {number}", entry, sensors)
-        for number, entry in enumerate(entries, start=1)
+        for number, entry in enumerate(content.programmes, start=1)
     )
     names = [programme.name for programme in programmes]
     twice = next((name for name in names if names.count(name) > 1), None)
@@ -158,80 +173,47 @@ def _decode(path: str, content: Any, sensors: Mapping[str, Sensor]) -> tuple[Pro
     return programmes
 
 
-def _programme(place: str, entry: Any, sensors: Mapping[str, Sensor]) -> Programme:
-    if not isinstance(entry, dict):
-        raise ProgrammeError(f"{place} is not an object: give its fields as in docs/reference/files.md")
-    role = _text(place, entry, "role")
-    if role not in ROLES:
-        raise ProgrammeError(f"{place}: unknown role {role!r}: choose one of {', '.join(ROLES)}")
-    supply = _number(place, entry, "supply_bar", sensors["p1"].low, sensors["p1"].high)
+def _programme(place: str, entry: _Entry, sensors: Mapping[str, Sensor]) -> Programme:
+    if not entry.name.replace("_", "").replace("-", "").isalnum():  # it becomes that of a file
+        raise ProgrammeError(
+            f"{place}: name {entry.name!r} does not name a file: use letters, digits, - and _ only"
+        )
+    if entry.role not in ROLES:
+        raise ProgrammeError(f"{place}: unknown role {entry.role!r}: choose one of {', '.join(ROLES)}")
+    switching = entry.role != "quality"
+    if switching and not entry.openings_ms:
+        raise ProgrammeError(f"{place}: openings_ms is empty: give at least one, or the role 'quality'")
+    ranges = {
+        "supply_bar": (entry.supply_bar, sensors["p1"].low, sensors["p1"].high),
+        "circuit_bar": (entry.circuit_bar, sensors["p2"].low, entry.supply_bar),
+        "voltage_V": (entry.voltage_V, 1.0 if switching else 0.0, sensors["U"].high),
+        "first_ms": (entry.first_ms, 1e3 * HOLD, LONGEST_MS),
+        "pause_ms": (entry.pause_ms, SHORTEST_MS, LONGEST_MS),
+        "duration_ms": (entry.duration_ms, 1e3 * HOLD, LONGEST_MS),
+        **{f"openings_ms[{i}]": (x, SHORTEST_MS, LONGEST_MS) for i, x in enumerate(entry.openings_ms)},
+    }
+    for name, (value, low, high) in ranges.items():
+        if not low <= value <= high:
+            raise ProgrammeError(
+                f"{place}: {name} = {value!r} is outside {low:g} to {high:g}: choose one inside"
+            )
+    end = entry.first_ms + sum(entry.openings_ms) + entry.pause_ms * (len(entry.openings_ms) - 1)
+    if entry.openings_ms and end > entry.duration_ms:
+        raise ProgrammeError(
+            f"{place}: the last opening ends at {end:g} ms, beyond duration_ms = "
+            f"{entry.duration_ms:g}: lengthen the recording or leave an opening out"
+        )
     return Programme(
-        name=_file_name(place, entry),
-        role=role,
-        case=_case(place, entry, switches=role != "quality"),
-        p1=round(supply * BAR, 6),
-        p2=round(_number(place, entry, "circuit_bar", sensors["p2"].low, supply) * BAR, 6),
-        U_on=_number(place, entry, "voltage_V", 1.0 if role != "quality" else 0.0, sensors["U"].high),
+        name=entry.name,
+        role=entry.role,
+        case=Case(
+            name=entry.name,
+            openings=tuple(length / 1e3 for length in entry.openings_ms),
+            duration=entry.duration_ms / 1e3,
+            first=entry.first_ms / 1e3,
+            pause=entry.pause_ms / 1e3,
+        ),
+        p1=round(entry.supply_bar * BAR, 6),
+        p2=round(entry.circuit_bar * BAR, 6),
+        U_on=float(entry.voltage_V),
     )
-
-
-def _case(place: str, entry: dict[str, Any], *, switches: bool) -> Case:
-    """When the coil is switched off; a recording that `switches` needs at least one opening."""
-    longest = MILLISECONDS * BENCH.longest_recording
-    shortest = MILLISECONDS * BENCH.shortest_opening
-    openings = entry.get("openings_ms")
-    if not isinstance(openings, list) or (switches and not openings):
-        raise ProgrammeError(
-            f"{place}: openings_ms is not a list of lengths: give at least one, or the role 'quality'"
-        )
-    lengths = [_checked(place, "openings_ms", value, shortest, longest) for value in openings]
-    first = _number(place, entry, "first_ms", MILLISECONDS * HOLD, longest)
-    pause = _number(place, entry, "pause_ms", shortest, longest)
-    duration = _number(place, entry, "duration_ms", MILLISECONDS * HOLD, longest)
-    end = first + sum(lengths) + pause * (len(lengths) - 1)
-    if lengths and end > duration:
-        raise ProgrammeError(
-            f"{place}: the last opening ends at {end:g} ms, beyond duration_ms = {duration:g}: "
-            "lengthen the recording or leave an opening out"
-        )
-    return Case(
-        name=str(entry["name"]),
-        openings=tuple(length / MILLISECONDS for length in lengths),
-        duration=duration / MILLISECONDS,
-        first=first / MILLISECONDS,
-        pause=pause / MILLISECONDS,
-    )
-
-
-def _file_name(place: str, entry: dict[str, Any]) -> str:
-    """The programme's name, which becomes that of its recording's file."""
-    name = _text(place, entry, "name")
-    if not name.replace("_", "").replace("-", "").isalnum():
-        raise ProgrammeError(
-            f"{place}: name {name!r} does not name a file: use letters, digits, - and _ only"
-        )
-    return name
-
-
-def _text(place: str, entry: dict[str, Any], field: str) -> str:
-    value = entry.get(field)
-    if not isinstance(value, str):
-        raise ProgrammeError(
-            f"{place}: {field} is missing or not text: give it as in docs/reference/files.md"
-        )
-    return value
-
-
-def _number(place: str, entry: dict[str, Any], field: str, low: float, high: float) -> float:
-    return _checked(place, field, entry.get(field), low, high)
-
-
-def _checked(place: str, field: str, value: Any, low: float, high: float) -> float:
-    """A number of a field inside its range; false for NaN, too."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ProgrammeError(f"{place}: {field} is missing or not a number ({value!r}): give one")
-    if not low <= value <= high:
-        raise ProgrammeError(
-            f"{place}: {field} = {value!r} is outside {low:g} to {high:g}: choose one inside"
-        )
-    return float(value)

@@ -16,7 +16,7 @@ from epv_env.plant.simulate import energised
 from identification.bench.hybrid_automaton import delayed_schedule, piecewise_schedule
 from identification.bench.programmes import Programme
 from identification.bench.reference_simulation import simulate_reference
-from identification.bench.settings import BENCH, BenchSettings
+from identification.recordings.columns import LEAST_RATE
 from identification.recordings.recording import (
     CHANNELS,
     PRESSURES,
@@ -27,6 +27,12 @@ from identification.recordings.recording import (
 )
 from identification.recordings.rules import RULES, RecordingRules
 from identification.report_2003.cases import SAMPLING_RATE
+
+RELATIVE_TOLERANCE = 1e-8
+"""Of the bench's solver: errors below 0.1 mbar, a thirtieth of an ADC step."""
+
+GREATEST_RATE = 20_000.0
+"""Greatest sampling rate [1/s]."""
 
 RESERVOIR_VOLUME = 0.08
 """The bench's two reservoirs of 40 litres (section 3) [m^3]; air drawn from them lowers p1."""
@@ -49,7 +55,6 @@ def run_programme(
     *,
     rate: float = SAMPLING_RATE,
     reservoir: float = RESERVOIR_VOLUME,
-    settings: BenchSettings = BENCH,
 ) -> TrueSignals:
     """The true signals of one recording.
 
@@ -62,7 +67,7 @@ def run_programme(
     # Switching takes effect at the sample at which the voltage is first read, or later.
     schedule = piecewise_schedule(parameters, start, time, U=U[:-1], reservoir_volume=reservoir)
     delayed = delayed_schedule(schedule, parameters["t_delay"])
-    state = simulate_reference(delayed, time, rtol=settings.relative_tolerance).state
+    state = simulate_reference(delayed, time, rtol=RELATIVE_TOLERANCE).state
     channels = {"U": U, **readings(state, parameters)}
     return TrueSignals(programme=programme, period=1.0 / rate, channels=channels)
 
@@ -137,7 +142,6 @@ def run_bench(
     seed: int,
     rate: float = SAMPLING_RATE,
     rules: RecordingRules = RULES,
-    settings: BenchSettings = BENCH,
 ) -> Campaign:
     """Run and measure every programme on a plant with the true parameters.
 
@@ -145,13 +149,13 @@ def run_bench(
     with the bench's sensors. Raises ValueError for a rate that the
     bench does not have.
     """
-    least, greatest = settings.least_rate, settings.greatest_rate
+    least, greatest = LEAST_RATE, GREATEST_RATE
     if not least <= rate <= greatest:
         raise ValueError(
             f"sampling rate {rate:g} 1/s is outside {least:g} to {greatest:g}: choose one inside"
         )
     truths = [
-        run_programme(truth, programme, rate=rate, settings=settings)
+        run_programme(truth, programme, rate=rate)
         for programme in progress(suite, what="bench: recordings", total=len(suite))
     ]
     return measured_campaign(truths, truth, seed=seed, rules=rules)

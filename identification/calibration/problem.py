@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from epv_env.plant.free_parameters import FREE_PARAMETERS, Freedom, check_free
 from epv_env.plant.parameters import Parameters
 from identification.quality.assessment import SensorOffset, assess_recording, sensor_offsets
-from identification.quality.settings import QUALITY, QualitySettings
 from identification.recordings.noise import campaign_steps, pooled_noise
 from identification.recordings.recording import Campaign, CampaignError, Recording
 from identification.replay.model_inputs import without_offsets
@@ -45,7 +44,6 @@ def calibration_problem(
     *,
     start: Parameters | None = None,
     free: Mapping[str, Freedom] = FREE_PARAMETERS,
-    quality: QualitySettings = QUALITY,
 ) -> CalibrationProblem:
     """The problem that a campaign poses, from `start` (None: Table 10) at the campaign's ambient.
 
@@ -63,7 +61,7 @@ def calibration_problem(
     )
     check_free(free, start)
     steps = campaign_steps(campaign.recordings, campaign.rules)
-    offsets = _offsets(campaign, quality, steps)
+    offsets = _offsets(campaign, steps)
     values = {name: offset.value for name, offset in offsets.items()}
     return CalibrationProblem(
         calibration=tuple(without_offsets(r, values) for r in campaign.with_role("calibration")),
@@ -75,13 +73,11 @@ def calibration_problem(
     )
 
 
-def _offsets(
-    campaign: Campaign, quality: QualitySettings, steps: Mapping[str, float]
-) -> dict[str, SensorOffset]:
+def _offsets(campaign: Campaign, steps: Mapping[str, float]) -> dict[str, SensorOffset]:
     """The sensors' offsets from the first quality recording that shows them."""
     for recording in campaign.with_role("quality"):
         sensors = campaign.rules.sensors
-        assessed = assess_recording(recording, campaign.pressure, quality, steps, sensors)
+        assessed = assess_recording(recording, campaign.pressure, steps, sensors)
         offsets = sensor_offsets(assessed)
         if offsets:
             return offsets

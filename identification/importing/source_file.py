@@ -79,7 +79,8 @@ def points_in_time(place: str, texts: Iterable[str | None]) -> NDArray:
         times = pd.to_datetime(cells, format="ISO8601", utc=True)
     except ValueError as error:
         raise ImportingError(
-            f"{place} has no point in time ({error}): write it as 2026-03-01T10:00:00.0005"
+            f"{place} has no point in time ({str(error).partition('. ')[0]}): write it as "
+            "2026-03-01T10:00:00.0005"
         ) from None
     return times.tz_localize(None).as_unit("ns").to_numpy()
 

@@ -43,9 +43,9 @@ class Identification:
     def problem(self) -> CalibrationProblem:
         """What is to be fitted to which recordings. Raises CampaignError."""
         if self.plant is None:
-            return calibration_problem(self.campaign, quality=self.settings.quality)
+            return calibration_problem(self.campaign)
         start, free = self.plant.parameters, self.plant.free
-        return calibration_problem(self.campaign, start=start, free=free, quality=self.settings.quality)
+        return calibration_problem(self.campaign, start=start, free=free)
 
     @cached_property
     def calibration(self) -> Calibration:

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 from identification.calibration.settings import CALIBRATION, CalibrationSettings
 from identification.confidence.settings import CONFIDENCE, ConfidenceSettings
-from identification.quality.settings import QUALITY, QualitySettings
 from identification.sensitivity.settings import SENSITIVITY, SensitivitySettings
 from identification.validation.settings import VALIDATION, ValidationSettings
 
@@ -13,7 +12,6 @@ from identification.validation.settings import VALIDATION, ValidationSettings
 class IdentificationSettings:
     """Judgements of every stage."""
 
-    quality: QualitySettings = QUALITY
     sensitivity: SensitivitySettings = SENSITIVITY
     calibration: CalibrationSettings = CALIBRATION
     confidence: ConfidenceSettings = CONFIDENCE

@@ -54,12 +54,10 @@ def quality(identification: Identification) -> Result:
             f"campaign {identification.campaign.name!r} has no recording with role 'quality': record "
             "about 5 s at rest, coil off and exhausted, and list it in campaign.json"
         )
-    settings, pressure = identification.settings.quality, identification.campaign.pressure
+    pressure = identification.campaign.pressure
     steps = campaign_steps(identification.campaign.recordings, identification.campaign.rules)
     sensors = identification.campaign.rules.sensors
-    assessments = [
-        assess_recording(recording, pressure, settings, steps, sensors) for recording in recordings
-    ]
+    assessments = [assess_recording(recording, pressure, steps, sensors) for recording in recordings]
     return Result(
         sections=[
             quality_section(assessment, report_2003=identification.report_2003)

@@ -9,9 +9,15 @@ from types import MappingProxyType
 from epv_env.plant.channels import SENSORS, Sensor
 from identification.quality.channel import ChannelAssessment, assess_channel
 from identification.quality.noise_tests import PairCorrelation, assess_correlation
-from identification.quality.settings import QUALITY, QualitySettings
 from identification.recordings.noise import rounding_error
 from identification.recordings.recording import CHANNELS, PRESSURES, UNITS, CampaignError, Recording
+
+LEAST_SAMPLES = 250
+"""Shortest record [samples]: half a second at 500 Hz. Fewer do not show the noise's distribution."""
+GREATEST_LAG = 0.1
+"""Greatest lag of the correlations [s]."""
+SAMPLES_PER_LAG = 20
+"""Samples that a record needs for each lag; with fewer, Ljung-Box alarms too often on white noise."""
 
 FINE: Mapping[str, float] = MappingProxyType({})
 """Steps of a campaign without coarse ones."""
@@ -41,8 +47,6 @@ class QualityAssessment:
     """By name, in the order of Table 1."""
     pairs: Mapping[tuple[str, str], PairCorrelation]
     """Of all channels that change."""
-    settings: QualitySettings = QUALITY
-    """What the recording was judged by."""
 
     @property
     def adjusted(self) -> dict[tuple[str, str], float]:
@@ -69,13 +73,12 @@ class QualityAssessment:
     @property
     def lags(self) -> int:
         """Greatest lag of the correlations [samples]."""
-        return greatest_lag(self.samples, self.period, self.settings)
+        return greatest_lag(self.samples, self.period)
 
 
 def assess_recording(
     recording: Recording,
     environment_pressure: float,
-    settings: QualitySettings = QUALITY,
     steps: Mapping[str, float] = FINE,
     sensors: Mapping[str, Sensor] = SENSORS,
 ) -> QualityAssessment:
@@ -83,27 +86,24 @@ def assess_recording(
 
     environment_pressure: p_env [Pa absolute]. steps: coarse steps of the campaign's readings by channel
     [SI], which a record at rest may not show. sensors: by channel [bar, A, V]. Raises CampaignError for
-    a record of fewer than `settings.least_samples`.
+    a record of fewer than `LEAST_SAMPLES`.
     """
-    if len(recording) < settings.least_samples:
+    if len(recording) < LEAST_SAMPLES:
         raise CampaignError(
             f"{recording.name}: {len(recording)} samples; the statistics of section 4 need "
-            f"{settings.least_samples} or more: record 5 s of steady state"
+            f"{LEAST_SAMPLES} or more: record 5 s of steady state"
         )
     channels = {
-        name: _channel(
-            recording, sensors[name], name, environment_pressure, settings, steps.get(name, 0.0)
-        )
+        name: _channel(recording, sensors[name], name, environment_pressure, steps.get(name, 0.0))
         for name in CHANNELS
     }
-    pairs = _pairs(channels, greatest_lag(len(recording), recording.period, settings))
+    pairs = _pairs(channels, greatest_lag(len(recording), recording.period))
     return QualityAssessment(
         name=recording.name,
         period=recording.period,
         samples=len(recording),
         channels=channels,
         pairs=pairs,
-        settings=settings,
     )
 
 
@@ -129,9 +129,9 @@ def _offset(channel: ChannelAssessment) -> SensorOffset:
     return SensorOffset(value=value * size, error=math.hypot(scatter, lasting) * size)
 
 
-def greatest_lag(samples: int, period: float, settings: QualitySettings = QUALITY) -> int:
+def greatest_lag(samples: int, period: float) -> int:
     """Greatest lag at which correlations are computed [samples]; period: between samples [s]."""
-    return max(1, min(round(settings.greatest_lag / period), samples // settings.samples_per_lag))
+    return max(1, min(round(GREATEST_LAG / period), samples // SAMPLES_PER_LAG))
 
 
 def _channel(
@@ -139,7 +139,6 @@ def _channel(
     sensor: Sensor,
     name: str,
     environment_pressure: float,
-    settings: QualitySettings,
     step: float,
 ) -> ChannelAssessment:
     size = UNITS[name][1]
@@ -148,10 +147,9 @@ def _channel(
         recording.channel(name) / size,
         period=recording.period,
         rest=environment_pressure / size if name in PRESSURES else 0.0,
-        lags=greatest_lag(len(recording), recording.period, settings),
+        lags=greatest_lag(len(recording), recording.period),
         step=step / size,
         sensor=sensor,
-        settings=settings,
     )
 
 

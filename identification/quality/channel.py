@@ -9,15 +9,22 @@ from scipy import stats
 
 from epv_env.plant.channels import SENSORS, Sensor
 from identification.quality.noise_tests import (
+    SIGNIFICANCE,
     UNTESTED,
     Normality,
     WhitenessTest,
     assess_normality,
     assess_whiteness,
 )
-from identification.quality.settings import QUALITY, QualitySettings
 from identification.recordings.noise import reading_step
 from identification.recordings.recording import UNITS
+
+DRIFT_LEVELS = (0.1, 1.0)
+"""Drift over the record, relative to Table 1's accuracy, from which it is in doubt, and bad."""
+LEAST_DITHER = 0.3
+"""Noise in converter steps below which rounding errors no longer average out."""
+OUTLIER_CONFIDENCE = 0.999
+"""Share of normal records whose greatest outlier stays below the limit."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,8 +171,6 @@ class ChannelAssessment:
     normality: Normality
     whiteness: WhitenessTest | None
     """None for a signal that never changes."""
-    settings: QualitySettings = QUALITY
-    """What the channel was judged by."""
     sensor: Sensor
     """Range, accuracy and noise that it should have; Table 1's and Table 3's on the report's bench."""
 
@@ -205,12 +210,12 @@ class ChannelAssessment:
     @property
     def at_rest(self) -> bool:
         """Whether the channel is steady, and within the accuracy of its rest value."""
-        return self.within_accuracy and abs(self.drift) < self.settings.drift_levels[0] * self.accuracy
+        return self.within_accuracy and abs(self.drift) < DRIFT_LEVELS[0] * self.accuracy
 
     @property
     def dithered(self) -> bool:
         """Whether noise moves the readings across steps enough for rounding errors to average out."""
-        return self.normality.standard_deviation >= self.settings.least_dither * self.quantum
+        return self.normality.standard_deviation >= LEAST_DITHER * self.quantum
 
     @property
     def outlier_limit(self) -> float:
@@ -219,7 +224,7 @@ class ChannelAssessment:
         return outlier_limit(
             len(self.readings),
             rounding=self.rounding,
-            confidence=self.settings.outlier_confidence,
+            confidence=OUTLIER_CONFIDENCE,
             hidden=max(1.0, self.normality.standard_deviation / sigma) if sigma else 1.0,
         )
 
@@ -233,7 +238,6 @@ def assess_channel(
     lags: int,
     step: float = 0.0,
     sensor: Sensor | None = None,
-    settings: QualitySettings = QUALITY,
 ) -> ChannelAssessment:
     """Statistics of one channel.
 
@@ -265,9 +269,8 @@ def assess_channel(
         quantum=step,
         rounding=rounding,
         longest_run=longest_run(readings),
-        run_limit=run_limit(readings, rounding=rounding, significance=settings.significance),
-        normality=assess_normality(readings, trend.at(time), step, settings) if moves else UNTESTED,
-        whiteness=assess_whiteness(residual, lags, settings) if moves else None,
-        settings=settings,
+        run_limit=run_limit(readings, rounding=rounding, significance=SIGNIFICANCE),
+        normality=assess_normality(readings, trend.at(time), step) if moves else UNTESTED,
+        whiteness=assess_whiteness(residual, lags) if moves else None,
         sensor=sensor,
     )

@@ -1,6 +1,7 @@
 """Figures 4 to 9 of the report for one assessed recording, each with all channels."""
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,7 +11,7 @@ from scipy import stats
 
 from identification.quality.assessment import QualityAssessment
 from identification.quality.channel import ChannelAssessment
-from identification.quality.noise_tests import WhitenessTest, probability_plot, white_noise_band
+from identification.quality.noise_tests import WhitenessTest, white_noise_band
 
 MARK = {"color": "tab:blue", "linewidth": 0.8}
 """Line of a computed curve."""
@@ -43,7 +44,8 @@ def probability_plots(quality: QualityAssessment) -> Figure:
     """Detrended signals on a normal probability scale (Figure 5)."""
     figure, panels = _grid(quality, "probability")
     for axes, channel, _ in panels:
-        quantiles, ordered, slope, offset = probability_plot(1e3 * channel.residual)
+        plot: Any = stats.probplot(1e3 * channel.residual)
+        (quantiles, ordered), (slope, offset, _) = plot
         axes.plot(ordered, quantiles, ".", markersize=2, color="tab:blue", rasterized=True)
         axes.plot(offset + slope * quantiles[[0, -1]], quantiles[[0, -1]], **REFERENCE)
         axes.set_yticks(stats.norm.ppf(TICKS), [f"{tick:g}" for tick in TICKS])

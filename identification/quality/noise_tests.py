@@ -16,7 +16,21 @@ from statsmodels.stats.diagnostic import acorr_ljungbox, normal_ad
 from statsmodels.stats.stattools import jarque_bera
 from statsmodels.tsa.stattools import acf, ccf
 
-from identification.quality.settings import QUALITY, QualitySettings
+SIGNIFICANCE = 1e-4
+"""Probability of a false alarm of one test; the 40 tests of a record stay below 1 % together."""
+FIRST_LAGS = 10
+"""Lags of the short Ljung-Box test, which finds dependence between neighbours [samples]."""
+SPECTRUM_SEGMENT = 256
+"""Samples per segment of Welch's method, at most an eighth of the record."""
+LEAST_EXPECTED = 5.0
+"""Counts that each bin of the chi-square test must be expected to hold; thinner bins are merged."""
+MOST_CELLS = 10_000
+"""Cells into which the readings of one channel are sorted for the chi-square test."""
+MOST_POSITIONS = 500
+"""Points along the trend, a quarter of sigma apart, over which a code's probability is averaged."""
+CELLS_PER_SIGMA = 3.0
+"""Codes finer than sigma over this number are merged, or the chi-square test loses its power."""
+
 
 ESTIMATED = 2
 """Parameters estimated from the counts: mean and standard deviation."""
@@ -54,17 +68,15 @@ UNTESTED = Normality(
 """Of a signal that never changes."""
 
 
-def assess_normality(
-    readings: NDArray, line: NDArray, step: float, settings: QualitySettings = QUALITY
-) -> Normality:
+def assess_normality(readings: NDArray, line: NDArray, step: float) -> Normality:
     """Test raw readings about a line for normality; readings, line: (samples,), [unit].
 
     step: the converter's step [unit], 0 for continuous readings. The raw readings are tested, since
     taking the line off would smear the codes; the probability of a code is its mean along the line.
     """
     sigma = float(np.std(readings - line, ddof=1))
-    edges, counts = _cells(readings, step, sigma, settings)
-    positions = _positions(line, sigma, settings)
+    edges, counts = _cells(readings, step, sigma)
+    positions = _positions(line, sigma)
     shift, deviation = _fit(edges, counts, positions, sigma)
     expected = len(readings) * _probabilities(edges, positions + shift, deviation)
     with np.errstate(
@@ -75,37 +87,25 @@ def assess_normality(
         standard_deviation=deviation,
         naive_anderson_darling=anderson_darling,
         naive_jarque_bera=float(jarque_bera(readings - line)[1]),
-        **_chi_square(*_merged(counts, expected, settings.least_expected)),
+        **_chi_square(*_merged(counts, expected, LEAST_EXPECTED)),
     )
 
 
-def probability_plot(residual: NDArray) -> tuple[NDArray, NDArray, float, float]:
-    """Normal quantiles and ordered values of a signal [unit], (samples,) each; their line.
-
-    The line is given by its slope and its offset [unit].
-    """
-    plot: Any = stats.probplot(residual)
-    (quantiles, ordered), (slope, offset, _) = plot
-    return quantiles, ordered, slope, offset
-
-
-def _positions(line: NDArray, sigma: float, settings: QualitySettings) -> NDArray:
+def _positions(line: NDArray, sigma: float) -> NDArray:
     """Midpoints of equal parts of the line; one point, unless the signal drifts."""
     drift = line[-1] - line[0]
-    parts = min(settings.most_positions, 1 + int(4 * abs(drift) / sigma))
+    parts = min(MOST_POSITIONS, 1 + int(4 * abs(drift) / sigma))
     return line[0] + drift * (np.arange(parts) + 0.5) / parts
 
 
-def _cells(
-    readings: NDArray, step: float, sigma: float, settings: QualitySettings
-) -> tuple[NDArray, NDArray]:
+def _cells(readings: NDArray, step: float, sigma: float) -> tuple[NDArray, NDArray]:
     """Inner edges (cells - 1,) and counts (cells,) of cells of whole codes."""
     least = float(np.min(readings))
     step = step or 1e-3 * sigma
     codes = np.rint((readings - least) / step).astype(int)
     # Readings that drift by thousands of deviations need no more cells than this to show it.
-    fewest = int(np.max(codes)) // settings.most_cells + 1
-    width = max(1, round(sigma / settings.cells_per_sigma / step), fewest)
+    fewest = int(np.max(codes)) // MOST_CELLS + 1
+    width = max(1, round(sigma / CELLS_PER_SIGMA / step), fewest)
     counts = np.bincount(codes // width)
     return least + (width * np.arange(1, len(counts)) - 0.5) * step, counts
 
@@ -225,14 +225,14 @@ def white_noise_band(samples: float) -> float:
     return float(stats.norm.isf(0.025) / np.sqrt(samples))
 
 
-def assess_whiteness(residual: NDArray, lags: int, settings: QualitySettings = QUALITY) -> WhitenessTest:
+def assess_whiteness(residual: NDArray, lags: int) -> WhitenessTest:
     """Of a detrended signal (samples,), in any unit, that changes; lags: the greatest [samples]."""
-    table = acorr_ljungbox(residual, lags=sorted({min(settings.first_lags, lags), lags}))
+    table = acorr_ljungbox(residual, lags=sorted({min(FIRST_LAGS, lags), lags}))
     frequency, power = signal.periodogram(residual, fs=2.0)
     return WhitenessTest(
         autocorrelation=np.asarray(acf(residual, nlags=lags, fft=True)),
         probability=float(min(1.0, 2 * np.min(table["lb_pvalue"]))),
-        spectrum=spectrum(residual, settings),
+        spectrum=spectrum(residual),
         peak_frequency=float(frequency[np.argmax(power)]),
     )
 
@@ -255,14 +255,14 @@ def assess_correlation(first: NDArray, second: NDArray, lags: int) -> PairCorrel
     )
 
 
-def spectrum(residual: NDArray, settings: QualitySettings = QUALITY) -> Spectrum:
+def spectrum(residual: NDArray) -> Spectrum:
     """Power density of a detrended signal (samples,) [unit], and the band of white noise.
 
     Welch's method with Hann windows that overlap by half.
 
     K such segments have 36 K^2/(19 K - 1) degrees of freedom (Percival and Walden 1993, chapter 6).
     """
-    length = min(settings.spectrum_segment, len(residual) // 8)
+    length = min(SPECTRUM_SEGMENT, len(residual) // 8)
     whole: Any = False  # the line is off already
     frequency, density = signal.welch(residual, fs=2.0, nperseg=length, detrend=whole)
     segments = (len(residual) - length) // (length - length // 2) + 1

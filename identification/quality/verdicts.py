@@ -4,19 +4,31 @@ A departure counts if it is statistically significant and large enough to matter
 the first alone would condemn every real bench.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
 from scipy import stats
 
 from identification.quality.assessment import QualityAssessment
-from identification.quality.channel import ChannelAssessment
-from identification.quality.noise_tests import PairCorrelation, WhitenessTest
-from identification.quality.settings import QualitySettings
+from identification.quality.channel import DRIFT_LEVELS, ChannelAssessment
+from identification.quality.noise_tests import SIGNIFICANCE, PairCorrelation, WhitenessTest
 from identification.recordings.recording import PRESSURES
 from identification.report.page import Verdict
+
+NOISE_LEVELS = (1.5, 4.0)
+"""Standard deviation relative to Table 3's: 3.5 dB and 12 dB of its signal-to-noise ratio."""
+QUIET_LEVELS = (5.0, 30.0)
+"""Table 3's standard deviation relative to the record's, from which the noise is too small for a
+sensor of this kind: a reading 100 times too small is as quiet."""
+OUTLIER_LEVELS = (1.0, 2.0)
+"""Outlier factor (eq. 18) relative to its limit."""
+COARSE_STEP = 1.1
+"""Converter step relative to Table 1's twelve bits from which the converter is too coarse."""
+EFFECT_LEVELS = (0.1, 0.3)
+"""Cohen's small and medium effects: of w for normality, of correlations otherwise."""
+INFLATION_LEVELS = (3.0, 10.0)
+"""Variance of a mean relative to that with independent samples."""
 
 SEVERITY = ("note", "good", "doubt", "bad")
 """Statuses from harmless to worst; a note says that something could not be judged."""
@@ -73,9 +85,9 @@ def _no_offset(channel: ChannelAssessment, reason: str) -> Judgement:
 def check_trend(quality: QualityAssessment, channel: ChannelAssessment) -> Judgement:
     """Is the drift over the record small against the accuracy?"""
     ratio, deviations = abs(channel.drift) / channel.accuracy, channel.trend_deviations
-    significant = deviations > stats.norm.isf(channel.settings.significance / 2)
+    significant = deviations > stats.norm.isf(SIGNIFICANCE / 2)
     return judgement_of(
-        graded_status(ratio, channel.settings.drift_levels) if significant else "good",
+        graded_status(ratio, DRIFT_LEVELS) if significant else "good",
         f"drift {milli_text(channel, channel.drift)} in {channel.duration:.3g} s, "
         f"{deviations:.1f} standard errors and {100 * ratio:.2g} % of the accuracy",
         "let the bench settle, look for a leak or a warming sensor, and record again",
@@ -86,7 +98,7 @@ def check_noise(quality: QualityAssessment, channel: ChannelAssessment) -> Judge
     """Is the noise as small as the report's?"""
     deviation = channel.normality.standard_deviation
     ratio = deviation / channel.sensor.noise
-    quiet = graded_status(1.0 / max(ratio, 1e-9), channel.settings.quiet_levels)
+    quiet = graded_status(1.0 / max(ratio, 1e-9), QUIET_LEVELS)
     if channel.dithered and quiet != "good":
         return Judgement(
             quiet,
@@ -94,7 +106,7 @@ def check_noise(quality: QualityAssessment, channel: ChannelAssessment) -> Judge
             "check the unit and scaling of the channel, since a reading too small has noise too small",
         )
     return judgement_of(
-        graded_status(ratio, channel.settings.noise_levels),
+        graded_status(ratio, NOISE_LEVELS),
         f"noise {milli_text(channel, deviation)} before rounding, {ratio:.2f} times the usual, "
         f"signal-to-noise ratio {channel.description.signal_to_noise:.1f} dB",
         "check shielding, ground and supply of the sensor",
@@ -118,7 +130,7 @@ def check_resolution(quality: QualityAssessment, channel: ChannelAssessment) -> 
     ratio = channel.quantum / channel.sensor.resolution
     steps = channel.normality.standard_deviation / channel.quantum if channel.quantum else np.inf
     return judgement_of(
-        "doubt" if ratio > channel.settings.coarse_step or not channel.dithered else "good",
+        "doubt" if ratio > COARSE_STEP or not channel.dithered else "good",
         f"one step is {milli_text(channel, channel.quantum)}, {ratio:.2f} times the usual range in 12 "
         f"bits, and the noise is {steps:.2g} steps",
         "check the converter's range and bits, since rounding errors do not average out",
@@ -139,7 +151,7 @@ def check_outliers(quality: QualityAssessment, channel: ChannelAssessment) -> Ju
     factor, limit = channel.description.outlier_factor, channel.outlier_limit
     at = int(np.argmax(np.abs(channel.residual))) * quality.period
     return judgement_of(
-        graded_status(factor / limit, channel.settings.outlier_levels),
+        graded_status(factor / limit, OUTLIER_LEVELS),
         f"greatest outlier {factor:.2f} standard deviations, at {at:.4g} s; 99.9 % of normal records "
         f"stay below {limit:.2f}",
         "look for switching interference and loose contacts, and record again",
@@ -152,9 +164,7 @@ def check_normality(quality: QualityAssessment, channel: ChannelAssessment) -> J
     if test.degrees < 1:
         return Judgement("note", "the record holds too few codes to test their distribution")
     return judgement_of(
-        graded_status(test.effect, quality.settings.effect_levels)
-        if test.probability < quality.settings.significance
-        else "good",
+        graded_status(test.effect, EFFECT_LEVELS) if test.probability < SIGNIFICANCE else "good",
         f"counts per code against normal: chi-square {test.statistic:.1f} with {test.degrees} "
         f"degrees of freedom, {p_value_text(test.probability)}, effect {test.effect:.2f}, "
         f"kurtosis {channel.description.kurtosis:.2f}, skewness {channel.description.skewness:.2f}",
@@ -169,9 +179,7 @@ def check_whiteness(quality: QualityAssessment, channel: ChannelAssessment) -> J
         return Judgement("note", "the signal never changes, so there is nothing to correlate")
     frequency = test.peak_frequency / (2 * quality.period)
     return judgement_of(
-        _dependence_status(test, quality.settings)
-        if test.probability < quality.settings.significance
-        else "good",
+        _dependence_status(test) if test.probability < SIGNIFICANCE else "good",
         f"Ljung-Box {p_value_text(test.probability)}, greatest autocorrelation {test.peak:.3f}, a "
         f"mean has {test.inflation:.2f} times the variance of independent samples",
         f"most power is near {frequency:.3g} Hz: mains hum if that is 50 or 60 Hz, else a filter or a "
@@ -179,10 +187,10 @@ def check_whiteness(quality: QualityAssessment, channel: ChannelAssessment) -> J
     )
 
 
-def _dependence_status(test: WhitenessTest, settings: QualitySettings) -> str:
+def _dependence_status(test: WhitenessTest) -> str:
     """The worse status of the greatest autocorrelation and of the variance of a mean."""
-    peak = graded_status(test.peak, settings.effect_levels)
-    inflation = graded_status(test.inflation, settings.inflation_levels)
+    peak = graded_status(test.peak, EFFECT_LEVELS)
+    inflation = graded_status(test.inflation, INFLATION_LEVELS)
     return max(peak, inflation, key=SEVERITY.index)
 
 
@@ -194,9 +202,7 @@ def check_correlation(quality: QualityAssessment, channel: ChannelAssessment) ->
     other, pair = max(partners.items(), key=lambda item: abs(item[1].peak))
     family_wise = min(1.0, pair.peak_probability * len(quality.pairs))
     return judgement_of(
-        graded_status(abs(pair.peak), quality.settings.effect_levels)
-        if family_wise < quality.settings.significance
-        else "good",
+        graded_status(abs(pair.peak), EFFECT_LEVELS) if family_wise < SIGNIFICANCE else "good",
         f"greatest cross-correlation {pair.peak:.3f}, with {other} at a lag of "
         f"{1e3 * quality.period * abs(pair.peak_lag):.3g} ms, family-wise {p_value_text(family_wise)}",
         "look for crosstalk, a shared ground or a shared supply",
@@ -224,43 +230,25 @@ CHECKS: Mapping[str, Callable[[QualityAssessment, ChannelAssessment], Judgement]
 """The checks by name; together they pass a perfect bench in 99 % of records or more."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class CheckResult:
-    """One check of one channel."""
-
-    channel: str
-    """One of recording.CHANNELS."""
-    check: str
-    """One of CHECKS."""
-    status: str
-    """'good', 'doubt' or 'bad'; 'note' if it could not be judged."""
-    text: str
-    """One sentence: the figures and, unless good, what to do."""
-
-
-def check_results(quality: QualityAssessment, name: str) -> tuple[CheckResult, ...]:
+def check_results(quality: QualityAssessment, name: str) -> dict[str, Judgement]:
     """All checks of one channel; of one that never changes, only its offset and its resolution."""
     channel = quality.channels[name]
     checks = CHECKS if channel.whiteness else {"offset": check_offset, "resolution": check_resolution}
-    judged = {check: judge(quality, channel) for check, judge in checks.items()}
-    return tuple(
-        CheckResult(channel=name, check=check, status=judgement.status, text=judgement.text)
-        for check, judgement in judged.items()
-    )
+    return {check: judge(quality, channel) for check, judge in checks.items()}
 
 
-def worst_status(results: Sequence[CheckResult]) -> str:
+def worst_status(results: Mapping[str, Judgement]) -> str:
     """Worst status among some results."""
-    return max((result.status for result in results), key=SEVERITY.index)
+    return max((result.status for result in results.values()), key=SEVERITY.index)
 
 
 def channel_verdict(quality: QualityAssessment, name: str) -> Verdict:
     """One channel's verdict: what is not good about it, or its figures if all is."""
-    results = {result.check: result for result in check_results(quality, name)}
-    status = worst_status(tuple(results.values()))
+    results = check_results(quality, name)
+    status = worst_status(results)
     if status == "good":
         text = f"no fault found; {results['offset'].text}; {results['noise'].text}."
     else:
-        faults = [result for result in results.values() if result.status in ("doubt", "bad")]
-        text = " ".join(f"{result.check}: {result.text}." for result in faults)
+        faults = {c: result.text for c, result in results.items() if result.status in ("doubt", "bad")}
+        text = " ".join(f"{check}: {fault}." for check, fault in faults.items())
     return Verdict(status=status, text=f"{name}: {text}")

@@ -106,10 +106,9 @@ def test_points_in_time_are_read_to_the_nanosecond_and_zones_are_taken_off():
     values, begin = seconds(points_in_time("a", ["2026-03-01T12:00", "", "2026-03-01T12:00:00.5"]))
     np.testing.assert_array_equal(values, [0.0, np.nan, 0.5])
     assert begin == np.datetime64("2026-03-01T12:00")
-    with pytest.raises(ImportingError, match="a day or time that does not exist"):
-        points_in_time("a", ["2026-02-30T12:00"])
-    with pytest.raises(ImportingError, match="no point in time"):
-        points_in_time("a", ["2026-03-01T12:00", "yesterday"])
+    for wrong in ("2026-02-30T12:00", "yesterday"):
+        with pytest.raises(ImportingError, match=rf"no point in time .*{wrong}"):
+            points_in_time("a", ["2026-03-01T12:00", wrong])
 
 
 def test_channels_with_and_without_a_known_begin_are_not_put_side_by_side(bench, tmp_path):

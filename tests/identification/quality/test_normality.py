@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from identification.quality.noise_tests import assess_normality, probability_plot
+from identification.quality.noise_tests import assess_normality
 
 SAMPLES = 10_000
 
@@ -79,15 +79,6 @@ def test_two_codes_are_too_few():
     quality = assessed(np.array([0.0, 1.0] * 500), 1.0)
     assert quality.degrees < 1
     assert np.isnan(quality.probability)
-
-
-def test_the_probability_plot_of_normal_noise_has_its_deviation_as_slope():
-    quantiles, ordered, slope, offset = probability_plot(
-        1.0 + 2.0 * np.random.default_rng(6).standard_normal(SAMPLES)
-    )
-    assert (slope, offset) == (pytest.approx(2.0, rel=0.02), pytest.approx(1.0, abs=0.1))
-    assert quantiles.shape == ordered.shape == (SAMPLES,)
-    assert np.all(np.diff(ordered) >= 0)
 
 
 def test_a_drift_of_millions_of_steps_needs_little_memory():

@@ -13,7 +13,6 @@ from identification.quality.section import (
     STATISTICS,
     TREND_SLOPES,
     as_json,
-    as_text,
     quality_section,
 )
 from identification.recordings.recording import CHANNELS
@@ -75,9 +74,3 @@ def test_json_is_strict_and_complete(which):
     assert len(content["correlations"]) == (10, 6)[which]
     assert content["channels"]["I"]["status"] == "good"
     assert (content["channels"]["U"]["statistics"]["kurtosis"] is None) == bool(which)
-
-
-def test_text_has_a_line_per_channel():
-    lines = as_text(qualities()[1]).splitlines()
-    assert [line.split()[0] for line in lines] == ["channel", *CHANNELS]
-    assert lines[2].split()[1] == "bad"

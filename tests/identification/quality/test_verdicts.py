@@ -30,7 +30,7 @@ def perfect():
 
 
 def statuses(quality, name):
-    return {finding.check: finding.status for finding in check_results(quality, name)}
+    return {check: result.status for check, result in check_results(quality, name).items()}
 
 
 def faulty(name, value, **changes):
