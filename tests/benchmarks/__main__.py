@@ -119,7 +119,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="few repetitions, short runs")
     options = parser.parse_args()
-    print(f"{platform.processor()}, {available_cores()} cores, numba {numba.__version__}")
+    print(f"{platform.machine()}, {available_cores()} cores, numba {numba.__version__}")
     repetitions, share = (3, 0.1) if options.quick else (9, 1.0)
     task = Task(flows=flows(32, HIGHEST_LASTING_FLOW), transient=32 if options.quick else 1024)
     environments(repetitions, share)

@@ -77,7 +77,7 @@ def _vector(n: int, share: float) -> Run:
 def _single(share: float) -> Run:
     """One environment, its reset included."""
     env = gymnasium.make(IDENTIFIER)
-    commands = actions(1, share)[:, 0].tolist()
+    commands = actions(1, max(share, 1.0))[:, 0].tolist()  # long, beside the reset
 
     def run() -> int:
         env.reset(seed=0)
@@ -102,7 +102,7 @@ def _learning(share: float) -> Run:
 
     torch.set_num_threads(1)
     env = make_sb3_env(IDENTIFIER, 256)
-    model = PPO("MlpPolicy", env, n_steps=max(round(128 * share), 2), batch_size=512, device="cpu")
+    model = PPO("MlpPolicy", env, n_steps=16 * max(round(8 * share), 1), batch_size=512, device="cpu")
 
     def run() -> int:
         before = model.num_timesteps
