@@ -53,18 +53,18 @@ def test_conditions_are_an_option_of_reset_that_lasts_one_episode():
     assert not np.array_equal(first, again)
 
 
-@pytest.mark.parametrize("name", PROBABILITIES)
-def test_a_probability_is_the_share_of_the_episodes(name):
-    found, plain = starts(**{name: 0.5})
-    changed = sum(a is not b for a, b in zip(found, plain, strict=True))
-    assert 70 <= changed <= 130  # four standard deviations of 200 coins
+def test_a_probability_is_the_share_of_the_episodes():
+    for name in PROBABILITIES:
+        found, plain = starts(**{name: 0.5})
+        changed = sum(a is not b for a, b in zip(found, plain, strict=True))
+        assert 70 <= changed <= 130, name  # four standard deviations of 200 coins
 
 
 @pytest.mark.parametrize("name", ["rest", "worn", "frozen_p3"])
 def test_what_a_condition_draws_does_not_depend_on_the_others_probabilities(name):
     alone, _ = starts(**{name: 0.3})
     beside, _ = starts(**{name: 0.3, "noisy": 1.0})
-    for a, b in zip(alone, beside, strict=True):
+    for a, b in zip(alone[:40], beside[:40], strict=True):
         assert str(a) == str(replace(b, noise_factor=a.noise_factor, noise=a.noise))
 
 
