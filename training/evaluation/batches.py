@@ -1,7 +1,7 @@
 """Episodes in batches that run in several processes; what is finished stays finished.
 
 A batch is data: it names a controller, seeds and conditions, so it gives the same figures, to the bit,
-in whatever process and order it runs. Finished batches lie in a journal (epv_env/common/journal.py).
+in whatever process and order it runs. Finished batches lie in a journal (epv_env/common/files.py).
 """
 
 import sys
