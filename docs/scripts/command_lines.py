@@ -3,11 +3,13 @@
 import argparse
 import os
 import runpy
+import shlex
 import sys
 from pathlib import Path
 from unittest.mock import patch
 
 from epv_env.common.commands import commands
+from training.epv import PACKAGES
 
 ROOT = Path(__file__).parents[2]
 """The repository's root."""
@@ -20,25 +22,19 @@ class _Captured(Exception):
 
 
 def shown_commands() -> list[str]:
-    """Every command of the page, as a user types it after `python`."""
-    library = [f"-m identification {name}" for name in commands(["identification.commands"])]
-    scripts = [
-        f"training/{file.name}"
-        for file in sorted((ROOT / "training").glob("*.py"))
-        if "__main__" in file.read_text(encoding="utf-8")
-    ]
-    return [*library, *scripts, "-m docs.examples.tank"]
+    """Every command of the page, as a user types it."""
+    return [*(f"epv {name}" for name in commands(PACKAGES)), "python -m docs.examples.tank"]
 
 
 def parser_of(command: str) -> argparse.ArgumentParser:
-    """The parser of a command of `shown_commands`, or of another one that `python` runs.
+    """The parser of a command: `epv NAME`, `python -m MODULE ...` or `python FILE`.
 
     The command is started, and stopped at the moment it reads its options.
     Raises RuntimeError if the command reads none.
     """
-    first, *rest = command.split()
-    module = first == "-m"
-    name, *arguments = rest if module else (first, *rest)
+    words = shlex.split(command.replace("epv ", "python -m training.epv ", 1))
+    module = words[1] == "-m"
+    name, *arguments = words[2:] if module else words[1:]
 
     def stop(parser: argparse.ArgumentParser, *_: object) -> None:
         raise _Captured(parser)
@@ -54,7 +50,7 @@ def parser_of(command: str) -> argparse.ArgumentParser:
                 runpy.run_path(str(ROOT / name), run_name="__main__")
         except _Captured as captured:
             return captured.args[0]
-    raise RuntimeError(f"python {command} reads no options: take it off the reference page's list")
+    raise RuntimeError(f"{command} reads no options: take it off the reference page's list")
 
 
 def page() -> str:
@@ -65,7 +61,7 @@ def page() -> str:
 def _section(command: str) -> str:
     """Heading, meaning, usage and a table of the options."""
     parser = parser_of(command)
-    parser.prog = f"python {command}"
+    parser.prog = command
     with patch.dict(os.environ, {"COLUMNS": WIDTH, "NO_COLOR": "1"}):
         usage = parser.format_usage()
     rows = [_row(action) for action in parser._actions if action.dest != "help"]

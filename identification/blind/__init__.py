@@ -1,0 +1,1 @@
+"""The blind check: causes are drawn and committed to, the campaigns diagnosed blind, then scored."""
