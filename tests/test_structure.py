@@ -10,6 +10,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("epv_env", "identification", "controllers", "training")
 VALVE_FREE = (
     "epv_env.common",
+    "identification.block_bootstrap",
     "identification.gap",
     "identification.report",
     "identification.report_2003",
@@ -40,9 +41,10 @@ def imports(path: Path, known: dict[str, Path]) -> set[str]:
 
 
 def folder_graph(root: Path) -> dict[str, set[str]]:
-    """Folders that each folder imports from, both as dotted names."""
+    """Folders that each folder imports from, as dotted names; a package's own files count as folders."""
     known = modules(root)
-    folder = {name: ".".join(path.relative_to(root).parent.parts) for name, path in known.items()}
+    parents = {name: ".".join(path.relative_to(root).parent.parts) for name, path in known.items()}
+    folder = {name: name if parent in PACKAGES else parent for name, parent in parents.items()}
     graph: dict[str, set[str]] = {}
     for name, path in known.items():
         targets = {folder[target] for target in imports(path, known)}

@@ -11,7 +11,7 @@ from epv_env.common.units import BAR
 from epv_env.plant.channels import SENSORS, Sensor
 from epv_env.plant.plantfile import VOLTAGE
 from identification.recordings.recording import HOLD, ROLES
-from identification.report_2003.cases import (
+from identification.report_2003 import (
     CALIBRATION_CASES,
     CIRCUIT_PRESSURE,
     ENERGISED_VOLTAGE,

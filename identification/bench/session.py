@@ -26,7 +26,7 @@ from identification.recordings.recording import (
     Recording,
 )
 from identification.recordings.rules import RULES, RecordingRules
-from identification.report_2003.cases import SAMPLING_RATE
+from identification.report_2003 import SAMPLING_RATE
 
 RELATIVE_TOLERANCE = 1e-8
 """Of the bench's solver: errors below 0.1 mbar, a thirtieth of an ADC step."""

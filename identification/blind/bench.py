@@ -23,7 +23,7 @@ from identification.bench.session import (
 from identification.blind.forms import currents_at_terminals, right_hand_side
 from identification.blind.truth import Trial
 from identification.recordings.recording import Campaign
-from identification.report_2003.cases import SAMPLING_RATE
+from identification.report_2003 import SAMPLING_RATE
 
 OMITTED_PROGRAMMES = ("rest", "high_voltage")
 """Programmes of the diagnosis suite that are not run. A record at rest would remove a constant sensor

@@ -15,10 +15,10 @@ from epv_env.plant.parameters import Parameters, table
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.bench.session import TrueSignals
 from identification.blind.truth import NOMINAL, UNIT_SCATTER, UNIT_SCATTER_LIMIT, Trial
+from identification.calibration.problem import ParameterVector
 from identification.recordings.recording import OUTPUTS, UNITS
-from identification.replay.batch_simulation import Replay
 from identification.replay.model_inputs import ModelInputs
-from identification.replay.parameter_vector import ParameterVector
+from identification.replay.replay import Replay
 from identification.valve_gap.causes import PARAMETER_COMPONENTS
 
 DIFFERENCE_STEP = 1e-4

@@ -1,17 +1,39 @@
-"""The calibration stage: both methods from every start, errors before and after, and warnings."""
+"""The calibration (section 6.2): both methods from every start, errors before and after, warnings."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from epv_env.common.files import Journal
 from epv_env.plant.parameters import Parameters
-from identification.calibration.calibration_warnings import calibration_warnings
-from identification.calibration.multi_start import best_search, search_from_all_starts, starting_points
 from identification.calibration.problem import CalibrationProblem
-from identification.calibration.search_methods import SearchResult
-from identification.calibration.settings import CALIBRATION, CalibrationSettings
-from identification.replay.responses import Response, responses
+from identification.calibration.search import (
+    METHODS,
+    SearchResult,
+    best_search,
+    reached_best,
+    search_from_all_starts,
+    starting_points,
+)
+from identification.recordings.noise import coarse_step_warnings
+from identification.replay.replay import Response, responses
+
+STARTS = 6
+"""Searches of each method: one from the reference, the others spread over the domains."""
+
+NEAR_BOUND = 1e-3
+"""Share of a domain's width from its end, within which an estimate counts as on that end."""
+
+ILL_CONDITIONED = 30.0
+"""Condition number of the normalised sensitivities from which collinearity is strong (Belsley 1980)."""
+
+INVOLVED_WEIGHT = 0.3
+"""Weight of a parameter in the flattest direction from which the warning names the parameter."""
+
+EXPLAINED = 1.2
+"""Root mean square residual, in noise deviations, up to which the model explains the recordings."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,8 +48,6 @@ class Calibration:
     """Of the calibration recordings at the start's parameters (Table 11)."""
     after: Mapping[str, list[Response]]
     """By method (Table 13)."""
-    settings: CalibrationSettings = CALIBRATION
-    """What the calibration was made with."""
 
     def best(self, method: str) -> SearchResult:
         """The search of a method that ended at the least error."""
@@ -43,7 +63,7 @@ def calibrate(
     *,
     journal: Path,
     subject: Mapping[str, object],
-    settings: CalibrationSettings = CALIBRATION,
+    starts: int = STARTS,
     seed: int = 0,
 ) -> Calibration:
     """Fit by both methods from several starts; finished searches are kept in the journal.
@@ -51,15 +71,15 @@ def calibrate(
     Args:
         journal: file of the finished searches.
         subject: hashes of the recordings, so that a journal of other recordings is not used.
+        starts: searches of each method.
         seed: of the starts.
     """
-    points = starting_points(problem.vector, settings.starts, seed)
+    points = starting_points(problem.vector, starts, seed)
     symbols = list(problem.vector.symbols)
     reference = dict(problem.vector.reference)
-    about = {**subject, "symbols": symbols, "reference": reference, "seed": seed}
+    about = {**subject, "symbols": symbols, "reference": reference, "seed": seed, "starts": starts}
     about |= {"bounds": problem.vector.domains.tolist(), "prior": problem.vector.known()}
-    about |= {"starts": settings.starts, **settings.changed()}
-    fits = search_from_all_starts(problem, points, Journal(journal, about), settings)
+    fits = search_from_all_starts(problem, points, Journal(journal, about))
     after = {
         method: responses(problem.calibration, problem.vector.parameters(best_search(searches).z))
         for method, searches in fits.items()
@@ -67,8 +87,91 @@ def calibrate(
     return Calibration(
         problem=problem,
         fits=fits,
-        warnings=calibration_warnings(problem, fits, settings),
+        warnings=calibration_warnings(problem, fits),
         before=responses(problem.calibration, problem.vector.reference),
         after=after,
-        settings=settings,
     )
+
+
+def calibration_warnings(
+    problem: CalibrationProblem, fits: Mapping[str, list[SearchResult]]
+) -> list[str]:
+    """Every reason for doubt, as a sentence with its figures and what to do; fits: by method."""
+    warnings = coarse_step_warnings(problem.steps)
+    for method in METHODS:
+        best = best_search(fits[method])
+        warnings += _not_converged(method, best)
+        warnings += _on_bounds(problem, method, best)
+        warnings += _other_minima(method, fits[method])
+    best = best_search(fits["least squares"])
+    warnings += _conditioning(problem, best)
+    return warnings + _unexplained(best)
+
+
+def _not_converged(method: str, fit: SearchResult) -> list[str]:
+    if fit.converged:
+        return []
+    return [
+        f"{method} has not converged after {fit.evaluations} evaluations ({fit.message}): do not use "
+        "its estimate; start nearer, or fit fewer parameters"
+    ]
+
+
+def symbols_on_bounds(problem: CalibrationProblem, fit: SearchResult) -> list[str]:
+    """Parameters that ended on an end of their domain."""
+    low, high = problem.vector.bounds.T
+    margin = NEAR_BOUND * (high - low)
+    at = (fit.z < low + margin) | (fit.z > high - margin)
+    return [symbol for symbol, on_bound in zip(problem.vector.symbols, at, strict=True) if on_bound]
+
+
+def _on_bounds(problem: CalibrationProblem, method: str, fit: SearchResult) -> list[str]:
+    return [
+        f"{method} ends at the end of {symbol}'s domain: the recordings ask for a value outside it, so "
+        "the model lacks something or another parameter is wrong"
+        for symbol in symbols_on_bounds(problem, fit)
+    ]
+
+
+def _other_minima(method: str, fits: list[SearchResult]) -> list[str]:
+    same = reached_best(fits)
+    if same[0] and np.all(same):
+        return []
+    others = [fit.error for fit, reached in zip(fits, same, strict=True) if not reached]
+    first = "" if same[0] else "; the usual start is among those that do not"
+    return [
+        f"{method}: {np.sum(same)} of {len(fits)} starts reach the least error "
+        f"{best_search(fits).error:.6g}, "
+        f"the others end at {min(others):.6g} or more{first}: there are other local minima"
+    ]
+
+
+def inseparable_symbols(problem: CalibrationProblem, fit: SearchResult) -> tuple[list[str], float]:
+    """Parameters that the recordings cannot separate, if any, and the condition number [1]."""
+    jacobian = np.vstack(problem.least_squares().linearised(fit.z)[1])
+    normalised = jacobian / np.maximum(np.linalg.norm(jacobian, axis=0), np.finfo(float).tiny)
+    condition = float(np.linalg.cond(normalised))
+    if condition < ILL_CONDITIONED:
+        return [], condition
+    direction = np.abs(np.linalg.svd(normalised, full_matrices=False)[2][-1])
+    involved = [s for s, w in zip(problem.vector.symbols, direction, strict=True) if w > INVOLVED_WEIGHT]
+    return involved, condition
+
+
+def _conditioning(problem: CalibrationProblem, fit: SearchResult) -> list[str]:
+    involved, condition = inseparable_symbols(problem, fit)
+    if not involved:
+        return []
+    return [
+        f"the recordings cannot separate {', '.join(involved)} (condition number {condition:.0f}): fix "
+        "one of them, or record what moves them apart"
+    ]
+
+
+def _unexplained(fit: SearchResult) -> list[str]:
+    if fit.error < EXPLAINED:
+        return []
+    return [
+        f"the calibrated model misses the recordings by {fit.error:.3g} noise deviations (1 is the "
+        "floor): the estimates absorb what the model lacks"
+    ]

@@ -14,7 +14,7 @@ from identification.bench.session import run_bench
 from identification.commands.options import add_out, add_plant, add_seed
 from identification.recordings.campaign_files import check_vacant, write_campaign
 from identification.recordings.rules import RULES, rules_of
-from identification.report_2003.cases import SAMPLING_RATE
+from identification.report_2003 import SAMPLING_RATE
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -7,16 +7,15 @@ kept in the folder of results, so that stages which are run one by one share the
 import argparse
 
 from epv_env.plant.plantfile import load_plant
-from identification.calibration.settings import CALIBRATION, CalibrationSettings
+from identification.calibration.calibrate import STARTS
 from identification.commands.options import add_count, add_out, add_plant, add_seed
 from identification.pipeline import run as pipeline
 from identification.pipeline.identification import Identification
-from identification.pipeline.settings import IdentificationSettings
-from identification.pipeline.stages import STAGES
+from identification.pipeline.run import STAGES
 from identification.recordings.campaign_files import read_campaign
 from identification.recordings.recording import campaign_facts
 from identification.recordings.rules import RULES, rules_of
-from identification.report.result_files import as_text, write_results
+from identification.report.page import as_text, write_results
 
 JOURNAL = "searches.jsonl"
 """File of the finished searches in the folder of results."""
@@ -37,7 +36,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     add_plant(parser, help="plant file of another valve than the report's, as its data sheet has it")
     add_seed(parser, help="of starts, draws and resampling")
-    add_count(parser, "--starts", default=CALIBRATION.starts, help="searches of each method")
+    add_count(parser, "--starts", default=STARTS, help="searches of each method")
     parser.add_argument(
         "--report-2003", action="store_true", help="show the figures of the report SCL-001/2003 beside"
     )
@@ -58,13 +57,12 @@ def run(options: argparse.Namespace) -> None:
 def _identification(options: argparse.Namespace) -> Identification:
     plant = load_plant(options.plant) if options.plant else None
     campaign = read_campaign(options.campaign, rules_of(plant) if plant else RULES)
-    settings = IdentificationSettings(calibration=CalibrationSettings(starts=options.starts))
     return Identification(
         campaign,
         options.out / JOURNAL,
         seed=options.seed,
         plant=plant,
-        settings=settings,
+        starts=options.starts,
         report_2003=options.report_2003,
     )
 

@@ -1,4 +1,10 @@
-"""The confidence stage: intervals and joint region of a calibration, and checks of its minimum."""
+"""How sure a calibration is (section 6.3): intervals, joint region, eq. 23, and a check of the minimum.
+
+Eq. 23 of the report: eps_p = eps_opt (1 + v/(k - v) F), with k measured values and v parameters. The
+printed F(k, v - k, p) has negative degrees of freedom; F(v, k - v) quantiles are meant. A parameter's
+interval is where the total error, the other parameters held, stays below eps_p (Figures 16 and 17, Table
+14).
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,16 +12,73 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.stats import chi2, f
 from statsmodels.tools.numdiff import approx_fprime, approx_hess
 
 from epv_env.plant.region import Region
 from identification.calibration.calibrate import Calibration
 from identification.calibration.problem import CalibrationProblem
-from identification.confidence.block_bootstrap import block_bootstrap
-from identification.confidence.covariance import EstimateCovariance, estimate_covariance
-from identification.confidence.report_interval import ReportInterval, report_interval
-from identification.confidence.settings import CONFIDENCE, ConfidenceSettings
+from identification.confidence.covariance import (
+    PROBABILITY,
+    EstimateCovariance,
+    bootstrap_moves,
+    estimate_covariance,
+)
+
+BLOCKS_PER_LAG = 2
+"""Length of the bootstrap's blocks, relative to the lags over which residuals are correlated."""
+
+GRADIENT_STEP, HESSIAN_STEP = 1e-5, 1e-3
+"""Changes of a scaled parameter for the gradient and the Hessian of the total error."""
+
+PROFILE_HALF_WIDTH, PROFILE_POINTS = 0.01, 41
+"""How far to either side a parameter is moved for its profile, relative, and in how many points."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReportInterval:
+    """Eq. 23 around the Nelder-Mead estimate, where the squared total error is quadratic."""
+
+    error: float
+    """eps_opt, a fraction."""
+    ratio: float
+    """eps_p / eps_opt."""
+    curvature: NDArray
+    """J'J of the total error's residuals by the scaled parameters (k, k)."""
+
+    @property
+    def squared_rise(self) -> float:
+        """eps_p^2 - eps_opt^2."""
+        return self.error**2 * (self.ratio**2 - 1.0)
+
+    @property
+    def half_widths(self) -> NDArray:
+        """Of the interval of each parameter while the others are held, scaled (k,), without unit."""
+        return np.sqrt(self.squared_rise / np.diag(self.curvature))
+
+    def holds_jointly(self, apart: NDArray) -> bool:
+        """Whether a vector has a total error below eps_p.
+
+        apart: the vector less the estimate, scaled (k,), without unit.
+        """
+        return bool(apart @ self.curvature @ apart <= self.squared_rise)
+
+
+def limit_ratio(values: int, parameters: int) -> float:
+    """eps_p / eps_opt for a number of measured values and of parameters."""
+    degrees = values - parameters
+    return 1.0 + parameters / degrees * float(f.ppf(PROBABILITY, parameters, degrees))
+
+
+def report_interval(problem: CalibrationProblem, z: NDArray, error: float) -> ReportInterval:
+    """Eq. 23 at the minimum of the total error.
+
+    z: the minimum, scaled (k,). error: the total error there, a fraction.
+    """
+    residuals, jacobians = problem.total_error().linearised(z)
+    ratio = limit_ratio(sum(len(r) for r in residuals), len(z))
+    curvature = np.sum([J.T @ J for J in jacobians], axis=0)
+    return ReportInterval(error=error, ratio=ratio, curvature=curvature)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,18 +109,16 @@ class Confidence:
     """The report's estimate, scaled (k,)."""
     report: ReportInterval
     minimum: Minimum
-    settings: ConfidenceSettings = CONFIDENCE
-    """What the intervals were computed with."""
 
     @property
     def chi_square(self) -> float:
         """Squared Mahalanobis radius of the joint region."""
-        return float(chi2.ppf(self.settings.probability, len(self.estimate)))
+        return float(chi2.ppf(PROBABILITY, len(self.estimate)))
 
     @property
     def half_widths(self) -> NDArray:
         """Of the intervals of each parameter on its own, scaled (k,), without unit."""
-        return np.sqrt(chi2.ppf(self.settings.probability, 1) * np.diag(self.covariance.total))
+        return np.sqrt(chi2.ppf(PROBABILITY, 1) * np.diag(self.covariance.total))
 
     @cached_property
     def disagreement(self) -> float:
@@ -90,9 +151,7 @@ class Confidence:
         return {symbol: (float(low[i]), float(high[i])) for i, symbol in enumerate(vector.symbols)}
 
 
-def assess_confidence(
-    calibration: Calibration, *, seed: int = 0, settings: ConfidenceSettings = CONFIDENCE
-) -> Confidence:
+def assess_confidence(calibration: Calibration, *, seed: int = 0) -> Confidence:
     """Intervals of both estimates, the joint region, and the check of gradient and Hessian.
 
     seed: of the noise drawn for the inputs and of the bootstrap.
@@ -100,35 +159,32 @@ def assess_confidence(
     problem = calibration.problem
     misfit = problem.least_squares()
     z = calibration.best("least squares").z
-    covariance = estimate_covariance(problem, misfit, z, seed=seed, settings=settings)
+    covariance = estimate_covariance(problem, misfit, z, seed=seed)
     residuals, jacobians = misfit.linearised(z)
     simplex = calibration.best("Nelder-Mead")
     return Confidence(
         problem=problem,
         estimate=z,
         covariance=covariance,
-        bootstrap=block_bootstrap(
+        bootstrap=bootstrap_moves(
             residuals,
             jacobians,
-            block=settings.blocks_per_lag * covariance.lags,
+            block=BLOCKS_PER_LAG * covariance.lags,
             prior=problem.vector.prior(z)[1],
             seed=seed,
-            draws=settings.bootstrap_draws,
         ),
         nelder_mead=simplex.z,
-        report=report_interval(problem, simplex.z, simplex.error, settings.probability),
-        minimum=_minimum(problem, simplex.z, settings),
-        settings=settings,
+        report=report_interval(problem, simplex.z, simplex.error),
+        minimum=_minimum(problem, simplex.z),
     )
 
 
-def _minimum(problem: CalibrationProblem, z: NDArray, settings: ConfidenceSettings) -> Minimum:
+def _minimum(problem: CalibrationProblem, z: NDArray) -> Minimum:
     error = problem.total_error().error
-    width = settings.profile_half_width
-    offsets = np.linspace(-width, width, settings.profile_points)
-    hessian = approx_hess(z, error, epsilon=np.full(len(z), settings.hessian_step))
+    offsets = np.linspace(-PROFILE_HALF_WIDTH, PROFILE_HALF_WIDTH, PROFILE_POINTS)
+    hessian = approx_hess(z, error, epsilon=np.full(len(z), HESSIAN_STEP))
     return Minimum(
-        gradient=np.atleast_1d(approx_fprime(z, error, epsilon=settings.gradient_step, centered=True)),
+        gradient=np.atleast_1d(approx_fprime(z, error, epsilon=GRADIENT_STEP, centered=True)),
         eigenvalues=np.linalg.eigvalsh(0.5 * (hessian + hessian.T)),
         offsets=offsets,
         profiles=np.array([[error(z * (1 + d * axis)) for d in offsets] for axis in np.eye(len(z))]),

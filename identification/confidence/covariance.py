@@ -6,6 +6,9 @@ of the sandwich H M H sums what neighbouring samples have in common (Newey & Wes
 that the model takes as known (U, p1) carry noise too, of which the residuals show nothing: its share is
 found by drawing that noise anew. What is known of the parameters before adds its
 information to J'W'WJ and, as one more reading each, to M.
+
+A block bootstrap checks the sandwich without its normality: the estimate is moved by one Gauss-Newton
+step under each draw's weights (Davidson & MacKinnon 1999), which needs no simulation.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,12 +19,17 @@ from numpy.typing import NDArray
 from statsmodels.stats.sandwich_covariance import S_hac_simple
 from statsmodels.tsa.stattools import acf
 
-from identification.calibration.problem import CalibrationProblem
-from identification.confidence.settings import CONFIDENCE, ConfidenceSettings
+from identification.block_bootstrap import block_sums, block_weights
+from identification.calibration.problem import CalibrationProblem, WeightedResiduals
 from identification.recordings.recording import OUTPUTS, Recording
-from identification.replay.batch_simulation import Replay
 from identification.replay.model_inputs import ModelInputs, model_inputs
-from identification.replay.weighted_residuals import WeightedResiduals
+from identification.replay.replay import Replay
+
+PROBABILITY = 0.95
+"""Of every interval and of the joint region."""
+
+INPUT_DRAWS = 8
+"""Times that the noise of the inputs is drawn anew for each recording."""
 
 INPUTS = ("U", "p1")
 """Channels that the model takes as known."""
@@ -55,7 +63,6 @@ def estimate_covariance(
     z: NDArray,
     *,
     seed: int = 0,
-    settings: ConfidenceSettings = CONFIDENCE,
 ) -> EstimateCovariance:
     """Covariance of an estimate that minimises one of the problem's weighted residuals.
 
@@ -70,13 +77,37 @@ def estimate_covariance(
     lags = max(correlation_lags(residual) for residual in residuals)
     middle = sum(S_hac_simple(s, nlags=lags) for s in score_series(residuals, jacobians))
     influence = [H @ J.T for J in jacobians]
-    inputs = _input_share(problem, misfit, z, influence, seed, settings.input_draws)
+    inputs = _input_share(problem, misfit, z, influence, seed)
     return EstimateCovariance(
         independent=variance * H,
         residual=H @ (middle + known) @ H,
         inputs=inputs + _offset_share(problem, misfit, z, influence),
         lags=lags,
     )
+
+
+def bootstrap_moves(
+    residuals: Sequence[NDArray],
+    jacobians: Sequence[NDArray],
+    *,
+    block: int,
+    prior: NDArray | None = None,
+    seed: int = 0,
+) -> NDArray:
+    """Movements of the scaled estimate (draws, k), without unit, under random weights of blocks.
+
+    Args:
+        residuals: weighted, per recording (3 samples,).
+        jacobians: by the scaled parameters, per recording (3 samples, k).
+        block: length of the blocks [samples].
+        prior: derivatives (p, k) of what is known before, which no draw changes; None: nothing is.
+        seed: of the draws.
+    """
+    known = 0.0 if prior is None else prior.T @ prior
+    H = np.linalg.inv(sum(J.T @ J for J in jacobians) + known)
+    sums = [block_sums(scores.T, block) for scores in score_series(residuals, jacobians)]
+    weights = block_weights([len(blocks) for blocks in sums], seed, PROBABILITY)[1:]
+    return (weights - 1.0) @ np.vstack(sums) @ H
 
 
 def score_series(residuals: Sequence[NDArray], jacobians: Sequence[NDArray]) -> list[NDArray]:
@@ -113,21 +144,20 @@ def _input_share(
     z: NDArray,
     influence: Sequence[NDArray],
     seed: int,
-    draws: int,
 ) -> NDArray:
     """Mean square of how far redrawn input noise moves the estimate, summed over the recordings.
 
     influence: H J' per recording (k, 3 samples).
     """
-    redrawn = _redrawn(problem, misfit.replay.drives, np.random.default_rng(seed), draws)
+    redrawn = _redrawn(problem, misfit.replay.drives, np.random.default_rng(seed))
     values = misfit.vector.values(z)
     known = misfit.replay.outputs(values)
     noisy = Replay(redrawn, misfit.vector.reference).outputs(values)
     share = np.zeros((len(z), len(z)))
     for r, (influenced, weights) in enumerate(zip(influence, misfit.weights, strict=True)):
-        for model in noisy[r * draws : (r + 1) * draws]:
+        for model in noisy[r * INPUT_DRAWS : (r + 1) * INPUT_DRAWS]:
             moved = influenced @ (weights * (model - known[r])[:, :, 0]).ravel()
-            share += np.outer(moved, moved) / draws
+            share += np.outer(moved, moved) / INPUT_DRAWS
     return share
 
 
@@ -164,15 +194,15 @@ def _shifted(drive: ModelInputs, channel: str, error: float) -> ModelInputs:
 
 
 def _redrawn(
-    problem: CalibrationProblem, drives: Sequence[ModelInputs], rng: np.random.Generator, draws: int
+    problem: CalibrationProblem, drives: Sequence[ModelInputs], rng: np.random.Generator
 ) -> list[ModelInputs]:
-    """`draws` inputs per recording, as they would follow from other noise on the same inputs."""
+    """INPUT_DRAWS inputs per recording, as they would follow from other noise on the same inputs."""
     return [
         _with_start_of(
             drive, model_inputs(_noisy(recording, drive, problem.noise, rng), problem.vector.reference)
         )
         for recording, drive in zip(problem.calibration, drives, strict=True)
-        for _ in range(draws)
+        for _ in range(INPUT_DRAWS)
     ]
 
 

@@ -10,7 +10,7 @@ from identification.gap.fitting_problem import Estimate, FittingProblem
 from identification.gap.gauss_newton import linearised_run
 from identification.gap.plant import GreyBox, noise_weighted
 from identification.gap.variable_projection import LinearisedRun, normal_equations, without_run_nuisances
-from identification.report_2003.output_error import partial_error, relative_error, total_error
+from identification.report_2003 import partial_error, relative_error, total_error
 
 SETTLING_STEPS = 3
 """Gauss-Newton steps for a cause's run parameters when a run is predicted; the outputs are nearly linear

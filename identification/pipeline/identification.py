@@ -7,12 +7,11 @@ from pathlib import Path
 
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
-from identification.calibration.calibrate import Calibration, calibrate
+from identification.calibration.calibrate import STARTS, Calibration, calibrate
 from identification.calibration.problem import CalibrationProblem, calibration_problem
 from identification.confidence.confidence import Confidence, assess_confidence
-from identification.pipeline.settings import IDENTIFICATION, IdentificationSettings
 from identification.recordings.recording import Campaign
-from identification.validation.validate import Validation, validate
+from identification.validation import Validation, validate
 
 ESTIMATOR = "least squares"
 """The method whose estimate goes on: it weighs the outputs by their noise, so it scatters least."""
@@ -29,8 +28,8 @@ class Identification:
     """Of starts, draws and resampling."""
     plant: Plant | None = None
     """The valve as its data sheet describes it; None: the report's, from Table 10."""
-    settings: IdentificationSettings = IDENTIFICATION
-    """Judgements of every stage."""
+    starts: int = STARTS
+    """Searches of each calibration method."""
     report_2003: bool = False
     """Whether the pages show, beside the results, what the report SCL-001/2003 prints."""
 
@@ -44,8 +43,7 @@ class Identification:
         """What is to be fitted to which recordings. Raises CampaignError."""
         if self.plant is None:
             return calibration_problem(self.campaign)
-        start, free = self.plant.parameters, self.plant.free
-        return calibration_problem(self.campaign, start=start, free=free)
+        return calibration_problem(self.campaign, start=self.plant.parameters, free=self.plant.free)
 
     @cached_property
     def calibration(self) -> Calibration:
@@ -57,19 +55,19 @@ class Identification:
                 "software": version("epv-valve"),
                 "recordings": {r.name: r.digest() for r in self.campaign.recordings},
             },
-            settings=self.settings.calibration,
+            starts=self.starts,
             seed=self.seed,
         )
 
     @cached_property
     def confidence(self) -> Confidence:
         """Intervals and joint region."""
-        return assess_confidence(self.calibration, seed=self.seed, settings=self.settings.confidence)
+        return assess_confidence(self.calibration, seed=self.seed)
 
     @cached_property
     def validation(self) -> Validation:
         """The calibrated model on the held-out recordings. Raises CampaignError if there is none."""
-        return validate(self.problem, self.parameters, self.settings.validation)
+        return validate(self.problem, self.parameters)
 
     @property
     def parameters(self) -> Parameters:

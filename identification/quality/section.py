@@ -13,7 +13,7 @@ from identification.quality.noise_tests import white_noise_band
 from identification.quality.verdicts import CHECKS, channel_verdict, check_results, worst_status
 from identification.recordings.recording import CHANNELS, UNITS
 from identification.report.page import Picture, Section, Table, Text
-from identification.report_2003.printed_values import correlation_matrix
+from identification.report_2003 import correlation_matrix
 
 NOT_PRINTED = "–"
 """Stands where the report has no value."""

@@ -16,7 +16,20 @@ from scipy.stats import chi2
 
 from identification.recordings.noise import reading_step, rounding_error
 from identification.recordings.recording import HOLD, Recording
-from identification.replay.settings import REPLAY, ReplaySettings
+
+SMOOTHING_WINDOW = 0.01
+"""Window in which p2 is smoothed before the air drawn from the supply is read off p2 [s]."""
+
+BLOCK = 0.02
+"""Length of the blocks over which what remains of a signal must average out [s]."""
+
+WHITE_PROBABILITY = 1e-4
+"""Probability, as white noise, of what remains of a signal below which no simple course replaces the
+signal."""
+
+ROUNDING_MARGIN = 1.4
+"""Scatter over a rounding error up to which rounding explains what remains of a signal: readings that
+waver between two codes reach 1.7, and the noise of fine steps lies far beyond."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,46 +55,42 @@ class ModelInputs:
         return float(self.p1[0])
 
 
-def model_inputs(
-    recording: Recording, p: Mapping[str, float], settings: ReplaySettings = REPLAY
-) -> ModelInputs:
+def model_inputs(recording: Recording, p: Mapping[str, float]) -> ModelInputs:
     """The inputs that the model is given for a recording; p: volumes and temperature by symbol [SI]."""
     start = slice(0, max(2, round(HOLD / recording.period)))
     return ModelInputs(
         period=recording.period,
-        U=smooth_voltage(recording, settings),
-        p1=smooth_supply(recording, p, settings),
+        U=smooth_voltage(recording),
+        p1=smooth_supply(recording, p),
         sigma_S=recording.sigma_S,
         U_start=float(np.mean(recording.U[start])),
         p2_start=float(np.mean(recording.p2[start])),
     )
 
 
-def smooth_voltage(recording: Recording, settings: ReplaySettings = REPLAY) -> NDArray:
+def smooth_voltage(recording: Recording) -> NDArray:
     """U with each stretch between switchings at its mean, if only noise hides that [V], (samples,)."""
     U = recording.U.copy()
     borders = np.flatnonzero(np.diff(recording.energised)) + 1
     for stretch in np.split(U, borders):  # views: assigning to one changes U
         residual = stretch - np.mean(stretch)
-        if len(stretch) > 2 and _is_white(residual, recording.period, settings):
+        if len(stretch) > 2 and _is_white(residual, recording.period):
             stretch[:] = np.mean(stretch)
     return U
 
 
-def smooth_supply(
-    recording: Recording, p: Mapping[str, float], settings: ReplaySettings = REPLAY
-) -> NDArray:
+def smooth_supply(recording: Recording, p: Mapping[str, float]) -> NDArray:
     """p1 without its noise [Pa], (samples,).
 
     Reservoirs lose the air that is drawn from them, by which p1 falls in proportion (R T / V1). Where
     this leaves more than white noise and more than the rounding of coarse readings, because the supply
     has a life of its own, a smoothing spline (generalised cross-validation) takes its place.
     """
-    fitted = _air_balance(recording, p, settings.smoothing_window)
+    fitted = _air_balance(recording, p)
     residual = recording.p1 - fitted
-    if _is_white(residual, recording.period, settings) or _is_rounding(residual, recording.p1, settings):
+    if _is_white(residual, recording.period) or _is_rounding(residual, recording.p1):
         return fitted
-    return _spline(recording, settings.block)
+    return _spline(recording)
 
 
 def without_offsets(recording: Recording, offsets: Mapping[str, float]) -> Recording:
@@ -90,49 +99,47 @@ def without_offsets(recording: Recording, offsets: Mapping[str, float]) -> Recor
     return replace(recording, **corrected)
 
 
-def _air_balance(
-    recording: Recording, p: Mapping[str, float], window: float = REPLAY.smoothing_window
-) -> NDArray:
+def _air_balance(recording: Recording, p: Mapping[str, float]) -> NDArray:
     """Least squares of p1 on a constant, a line in time, and the air drawn so far."""
-    drawn = _air_drawn(recording, p, window)
+    drawn = _air_drawn(recording, p)
     basis = np.stack([np.ones_like(drawn), recording.time, drawn], axis=1)
     basis /= np.maximum(np.max(np.abs(basis), axis=0), np.finfo(float).tiny)
     return basis @ np.linalg.lstsq(basis, recording.p1, rcond=None)[0]
 
 
-def _air_drawn(recording: Recording, p: Mapping[str, float], window: float) -> NDArray:
+def _air_drawn(recording: Recording, p: Mapping[str, float]) -> NDArray:
     """What the circuit holds and has consumed, and what has filled the control chamber [kg]."""
-    samples = min(2 * round(0.5 * window / recording.period) + 1, len(recording) // 2 * 2 - 1)
+    samples = min(2 * round(0.5 * SMOOTHING_WINDOW / recording.period) + 1, len(recording) // 2 * 2 - 1)
     p2, p3 = np.asarray(savgol_filter([recording.p2, recording.p3], samples, 1))
     filling = np.cumsum(np.diff(p3, prepend=p3[0]) * recording.energised)
     stored = (p["V2"] * p2 + p["V3"] * filling) / (p["R_gas"] * p["T_env"])
     return stored + np.cumsum(recording.sigma_S) * recording.period
 
 
-def _is_white(residual: NDArray, period: float, settings: ReplaySettings) -> bool:
+def _is_white(residual: NDArray, period: float) -> bool:
     """Whether block means scatter no more than independent samples of the same spread allow.
 
     The spread is read off differences between neighbours, which slow courses hardly enter.
     """
-    length = min(max(2, round(settings.block / period)), len(residual))
+    length = min(max(2, round(BLOCK / period)), len(residual))
     blocks = residual[: len(residual) // length * length].reshape(-1, length)
     variance = 0.5 * np.mean(np.diff(residual) ** 2)
     statistic = length * np.sum(np.mean(blocks, axis=1) ** 2)
-    return bool(statistic <= variance * chi2.isf(settings.white_probability, len(blocks)))
+    return bool(statistic <= variance * chi2.isf(WHITE_PROBABILITY, len(blocks)))
 
 
-def _is_rounding(residual: NDArray, readings: NDArray, settings: ReplaySettings) -> bool:
+def _is_rounding(residual: NDArray, readings: NDArray) -> bool:
     """Whether a residual scatters no more than the rounding of readings, (samples,), explains."""
-    explained = settings.rounding_margin * rounding_error(reading_step(readings))
+    explained = ROUNDING_MARGIN * rounding_error(reading_step(readings))
     return bool(np.sqrt(np.mean(residual**2)) <= explained)
 
 
-def _spline(recording: Recording, block: float) -> NDArray:
+def _spline(recording: Recording) -> NDArray:
     """Smoothing spline through means of a few samples each, which keep it cheap.
 
     Its search for the least cross-validation error needs knots about 1 apart.
     """
-    every = max(1, round(0.1 * block / recording.period))
+    every = max(1, round(0.1 * BLOCK / recording.period))
     count = len(recording) // every
     means = recording.p1[: count * every].reshape(count, every).mean(axis=1)
     spline = make_smoothing_spline(np.arange(count), means - means[0])

@@ -1,22 +1,34 @@
 """A self-contained HTML report: sections of verdicts, text, tables and figures.
 
 The page's form stands in page.html, a Jinja2 template, and its looks in page.css; here is only what goes
-into it.
+into it. Figures become SVG images, which stay sharp at every zoom.
 """
 
+import base64
+import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from epv_env.common.extras import how_to_install
-from epv_env.common.files import write_text
+from epv_env.common.files import write_json, write_text
 
 if TYPE_CHECKING:
     from jinja2 import Template
     from matplotlib.figure import Figure
+
+
+LARGEST_CLOUD = 500
+"""Points of one line with markers [1]: more are drawn as pixels, for each point costs 80 characters."""
+
+RESOLUTION = 200
+"""Of what is drawn as pixels [dots per inch]: sharp in print and at twice the screen's size."""
 
 LABELS = {"good": "good", "doubt": "in doubt", "bad": "not acceptable", "note": "note"}
 """What the page says for each status of a verdict."""
@@ -73,10 +85,8 @@ class Picture:
     @property
     def link(self) -> str:
         """The figure as the address of an image, drawn anew at each call."""
-        # Only where a figure is drawn: matplotlib is slow to load.
-        from identification.report.svg import as_data_link
-
-        return as_data_link(self.figure)
+        encoded = base64.b64encode(as_svg(self.figure).encode("utf-8")).decode("ascii")
+        return f"data:image/svg+xml;base64,{encoded}"
 
 
 Block = Text | Table | Picture
@@ -153,3 +163,65 @@ def _template() -> "Template":
         lstrip_blocks=True,
     )
     return environment.get_template("page.html")
+
+
+def write_results(
+    out: Path,
+    name: str,
+    *,
+    title: str,
+    sections: Sequence[Section],
+    content: Mapping[str, Any],
+    facts: Mapping[str, str] | None = None,
+    report_2003: bool = False,
+) -> None:
+    """Write `out/name.json` and the self-contained `out/name.html`, each whole or not at all.
+
+    facts: what the page rests on, by name. report_2003: whether the page says where the report prints
+    the like.
+    """
+    write_json(out / f"{name}.json", content, allow_nan=False)
+    write_page(
+        out / f"{name}.html",
+        title=title,
+        sections=sections,
+        facts=facts,
+        footer=f"Written by epv-valve {version('epv-valve')}.",
+        report_2003=report_2003,
+    )
+
+
+def as_text(sections: Sequence[Section]) -> str:
+    """The verdicts, for a terminal."""
+    lines = []
+    for section in sections:
+        lines += ["", section.title]
+        lines += [f"  {verdict.status:5} {verdict.text}" for verdict in section.verdicts]
+    return "\n".join(lines).lstrip()
+
+
+def as_svg(figure: "Figure") -> str:
+    """The figure as SVG text, always the same for the same figure; its clouds become pixels for good."""
+    from matplotlib import rc_context  # only where a figure is drawn: matplotlib is slow to load
+
+    for line in figure.findobj(_is_cloud):
+        line.set_rasterized(True)
+    stream = io.StringIO()
+    # Letters become paths, so that they look alike on machines without matplotlib's fonts; a fixed salt
+    # makes the same names in every file; lines are simplified within a fifth of a pixel.
+    with rc_context(
+        {"svg.fonttype": "path", "svg.hashsalt": "epv-valve", "path.simplify_threshold": 0.2}
+    ):
+        figure.savefig(
+            stream, format="svg", dpi=RESOLUTION, bbox_inches="tight", metadata={"Date": None}
+        )
+    return stream.getvalue()
+
+
+def _is_cloud(artist: object) -> bool:
+    """Whether an artist is a line with so many markers that each as a shape would fill the file."""
+    from matplotlib.lines import Line2D
+
+    if not isinstance(artist, Line2D) or artist.get_marker() in ("", " ", "None", None):
+        return False
+    return np.size(artist.get_xdata()) > LARGEST_CLOUD

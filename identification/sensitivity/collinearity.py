@@ -16,14 +16,21 @@ from numpy.typing import NDArray
 from epv_env.plant.channels import SENSORS
 from epv_env.plant.parameters import table
 from identification.recordings.recording import OUTPUTS, UNITS
-from identification.replay.batch_simulation import Replay
-from identification.sensitivity.report_conditions import (
-    REPORT_CONDITIONS,
-    StudyConditions,
-    output_samples,
-    run_cases,
-)
-from identification.sensitivity.settings import SENSITIVITY, SensitivitySettings
+from identification.replay.replay import Replay
+from identification.sensitivity.one_at_a_time import output_samples, run_cases
+
+DIFFERENCE_STEP = 2e-3
+"""Step of the central differences: in the logarithm of a value; in half widths of the domain where the
+value is zero."""
+
+STATED_CHANGE = 0.1
+"""Change for which effects are stated, in the measure of `DIFFERENCE_STEP`: that of Table 8."""
+
+CRITICAL_INDEX = 10.0
+"""Collinearity index from which parameters are poorly identifiable (Brun et al.: 10 to 15)."""
+
+ZERO_EIGENVALUE = 1e-12
+"""A least eigenvalue below this is zero within the accuracy of the differences."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,12 +39,9 @@ class OutputSensitivities:
 
     symbols: tuple[str, ...]
     columns: NDArray
-    """Change of each output sample for the stated change, in deviations of noise, (samples, "
-    "parameters)."""
+    """Change of each output for the stated change, (samples, parameters) [deviations of noise]."""
     where: str = "the outputs"
     """What the samples are of, for a sentence."""
-    settings: SensitivitySettings = SENSITIVITY
-    """Steps, stated change and limits."""
 
     def columns_of(self, symbols: Sequence[str]) -> NDArray:
         """The columns of some parameters, (samples, symbols) [deviations of noise]."""
@@ -55,14 +59,12 @@ class OutputSensitivities:
 
     def index(self, symbols: Sequence[str]) -> float:
         """Collinearity index of a set of parameters; infinite if one can replace another exactly."""
-        return collinearity_index(self.columns_of(symbols), self.settings.zero_eigenvalue)
+        return collinearity_index(self.columns_of(symbols))
 
     def inseparable_pairs(self) -> list[tuple[str, str, float]]:
         """(symbol, symbol, index) of every pair above the critical index, the worst first."""
         pairs = [(a, b, self.index((a, b))) for a, b in combinations(self.symbols, 2)]
-        return sorted(
-            (pair for pair in pairs if pair[2] > self.settings.critical_index), key=lambda pair: -pair[2]
-        )
+        return sorted((p for p in pairs if p[2] > CRITICAL_INDEX), key=lambda p: -p[2])
 
 
 def cosines(columns: NDArray) -> NDArray:
@@ -71,58 +73,49 @@ def cosines(columns: NDArray) -> NDArray:
     return np.clip(unit.T @ unit, -1.0, 1.0)
 
 
-def collinearity_index(columns: NDArray, zero: float = SENSITIVITY.zero_eigenvalue) -> float:
-    """Brun et al.'s index of columns (samples, n) [any unit]: between 1 and infinity.
-
-    zero: least eigenvalue below which one column replaces the others exactly.
-    """
+def collinearity_index(columns: NDArray) -> float:
+    """Brun et al.'s index of columns (samples, n) [any unit]: between 1 and infinity."""
     least = np.linalg.eigvalsh(cosines(columns))[0]
-    return float(1 / np.sqrt(least)) if least > zero else np.inf
+    return float(1 / np.sqrt(least)) if least > ZERO_EIGENVALUE else np.inf
 
 
-def stepped(symbol: str, value: float, step: float = SENSITIVITY.difference_step) -> NDArray:
+def stepped(symbol: str, value: float) -> NDArray:
     """A value [SI] one step down and up, (2,).
 
     Steps in the logarithm: two parameters that act by their ratio then have opposite columns exactly.
     """
     domain = table()[symbol].domain
     if value == 0.0 and domain is not None:
-        return value + step * (domain[1] - domain[0]) / 2 * np.array([-1.0, 1.0])
-    return value * np.exp(step * np.array([-1.0, 1.0]))
+        return value + DIFFERENCE_STEP * (domain[1] - domain[0]) / 2 * np.array([-1.0, 1.0])
+    return value * np.exp(DIFFERENCE_STEP * np.array([-1.0, 1.0]))
 
 
 def sensitivities_of_outputs(
-    nominal: Mapping[str, float],
-    symbols: Sequence[str],
-    conditions: StudyConditions = REPORT_CONDITIONS,
-    settings: SensitivitySettings = SENSITIVITY,
+    nominal: Mapping[str, float], symbols: Sequence[str]
 ) -> OutputSensitivities:
     """How p2, p3 and I respond in the report's test cases, in units of Table 3's noise.
 
     Raises SimulationError.
     """
-    runs = run_cases(_both_ways(nominal, symbols, settings.difference_step), conditions)
+    runs = run_cases(_both_ways(nominal, symbols))
     noise = {name: SENSORS[name].noise * UNITS[name][1] for name in OUTPUTS}
     samples = [np.stack(output_samples(run)) for run in runs]
-    return _central_differences(symbols, samples, noise, "the report's test cases", settings)
+    return _central_differences(symbols, samples, noise, "the report's test cases")
 
 
 def sensitivities_on_recordings(
-    replay: Replay,
-    symbols: Sequence[str],
-    noise: Mapping[str, float],
-    settings: SensitivitySettings = SENSITIVITY,
+    replay: Replay, symbols: Sequence[str], noise: Mapping[str, float]
 ) -> OutputSensitivities:
     """How the outputs respond on recorded inputs, in units of the measured noise by output [SI]."""
-    samples = replay.outputs(_both_ways(replay.base, symbols, settings.difference_step))
-    return _central_differences(symbols, samples, noise, "the calibration recordings", settings)
+    samples = replay.outputs(_both_ways(replay.base, symbols))
+    return _central_differences(symbols, samples, noise, "the calibration recordings")
 
 
-def _both_ways(nominal: Mapping[str, float], symbols: Sequence[str], step: float) -> dict[str, NDArray]:
+def _both_ways(nominal: Mapping[str, float], symbols: Sequence[str]) -> dict[str, NDArray]:
     """Parameters by symbol (2 symbols,): each symbol one step down and up, the others nominal."""
     p = {symbol: np.full(2 * len(symbols), value) for symbol, value in nominal.items()}
     for row, symbol in enumerate(symbols):
-        p[symbol][2 * row : 2 * row + 2] = stepped(symbol, nominal[symbol], step)
+        p[symbol][2 * row : 2 * row + 2] = stepped(symbol, nominal[symbol])
     return p
 
 
@@ -131,15 +124,11 @@ def _central_differences(
     samples: Sequence[NDArray],
     noise: Mapping[str, float],
     where: str,
-    settings: SensitivitySettings,
 ) -> OutputSensitivities:
     """Sensitivities from the outputs (3, samples, 2 symbols) of `_both_ways` in each test case."""
     deviation = np.array([noise[name] for name in OUTPUTS])[:, None, None]
-    width = 2 * settings.difference_step * deviation
+    width = 2 * DIFFERENCE_STEP * deviation
     columns = [
-        ((y[..., 1::2] - y[..., ::2]) * settings.stated_change / width).reshape(-1, len(symbols))
-        for y in samples
+        ((y[..., 1::2] - y[..., ::2]) * STATED_CHANGE / width).reshape(-1, len(symbols)) for y in samples
     ]
-    return OutputSensitivities(
-        symbols=tuple(symbols), columns=np.concatenate(columns), where=where, settings=settings
-    )
+    return OutputSensitivities(symbols=tuple(symbols), columns=np.concatenate(columns), where=where)

@@ -18,9 +18,19 @@ from SALib.analyze import sobol as sobol_analysis
 from SALib.sample import morris as morris_sample
 from SALib.sample import sobol as sobol_sample
 
-from identification.sensitivity.one_at_a_time import changed_values
-from identification.sensitivity.report_conditions import REPORT_CONDITIONS, StudyConditions, total_errors
-from identification.sensitivity.settings import SENSITIVITY, SensitivitySettings
+from identification.sensitivity.one_at_a_time import changed_values, total_errors
+
+GRID_LEVELS = 4
+"""Levels of Morris's grid."""
+
+RESAMPLES = 1000
+"""Draws of the bootstrap intervals."""
+
+SPAN = 0.5
+"""Part of the change of Tables 8 and 9 over which the parameters vary together."""
+
+BATCH = 512
+"""Valves simulated together; the record of 512 takes 100 MB."""
 
 Model = Callable[[NDArray], NDArray]
 """Parameter sets (samples, parameters) [SI] -> outputs (samples,)."""
@@ -36,8 +46,7 @@ class MorrisEffects:
     half_width: NDArray
     """Of the bootstrap 95 % interval of mu*, (parameters,)."""
     spread: NDArray
-    """sigma, (parameters,): beyond mu*, the effect depends on the other parameters or changes its "
-    "sign."""
+    """sigma, (parameters,): beyond mu*, the effect depends on other parameters or changes its sign."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,38 +64,28 @@ class SobolIndices:
     """Of the bootstrap 95 % interval."""
 
 
-def ranges(
-    nominal: Mapping[str, float], symbols: Sequence[str], span: float = SENSITIVITY.span
-) -> NDArray:
+def ranges(nominal: Mapping[str, float], symbols: Sequence[str]) -> NDArray:
     """Least and greatest value of each parameter [SI], (parameters, 2)."""
     rows = [changed_values(symbol, nominal[symbol]) for symbol in symbols]
     centre = np.array([[nominal[symbol]] for symbol in symbols])
-    return centre + span * (np.array(rows) - centre)
+    return centre + SPAN * (np.array(rows) - centre)
 
 
-def total_error_model(
-    nominal: Mapping[str, float],
-    symbols: Sequence[str],
-    conditions: StudyConditions = REPORT_CONDITIONS,
-    *,
-    batch: int = SENSITIVITY.batch,
-) -> Model:
+def total_error_model(nominal: Mapping[str, float], symbols: Sequence[str]) -> Model:
     """Total error (eq. 21) against the nominal model in percent, as a function of parameter sets."""
 
     def model(samples: NDArray) -> NDArray:
-        pieces = [samples[at : at + batch] for at in range(0, len(samples), batch)]
-        return np.concatenate([_errors(nominal, symbols, piece, conditions) for piece in pieces])
+        pieces = [samples[at : at + BATCH] for at in range(0, len(samples), BATCH)]
+        return np.concatenate([_errors(nominal, symbols, piece) for piece in pieces])
 
     return model
 
 
-def _errors(
-    nominal: Mapping[str, float], symbols: Sequence[str], samples: NDArray, conditions: StudyConditions
-) -> NDArray:
+def _errors(nominal: Mapping[str, float], symbols: Sequence[str], samples: NDArray) -> NDArray:
     p = {symbol: np.full(1 + len(samples), value) for symbol, value in nominal.items()}
     for symbol, column in zip(symbols, samples.T, strict=True):
         p[symbol][1:] = column
-    return 100 * total_errors(p, conditions)
+    return 100 * total_errors(p)
 
 
 def morris_effects(
@@ -96,17 +95,16 @@ def morris_effects(
     *,
     trajectories: int,
     seed: int,
-    settings: SensitivitySettings = SENSITIVITY,
 ) -> MorrisEffects:
     """Morris's screening: trajectories x (parameters + 1) evaluations; bounds: (parameters, 2) [SI]."""
     problem = _problem(symbols, bounds)
-    samples = morris_sample.sample(problem, trajectories, num_levels=settings.grid_levels, seed=seed)
+    samples = morris_sample.sample(problem, trajectories, num_levels=GRID_LEVELS, seed=seed)
     effects = morris_analysis.analyze(
         problem,
         samples,
         model(samples),
-        num_levels=settings.grid_levels,
-        num_resamples=settings.resamples,
+        num_levels=GRID_LEVELS,
+        num_resamples=RESAMPLES,
         seed=seed,
     )
     return MorrisEffects(
@@ -124,7 +122,6 @@ def sobol_indices(
     *,
     samples: int,
     seed: int,
-    settings: SensitivitySettings = SENSITIVITY,
 ) -> SobolIndices:
     """Sobol's first-order and total indices: samples x (parameters + 2) evaluations.
 
@@ -136,7 +133,7 @@ def sobol_indices(
         problem,
         model(drawn),
         calc_second_order=False,
-        num_resamples=settings.resamples,
+        num_resamples=RESAMPLES,
         seed=np.random.SeedSequence(seed),  # SALib takes the number 0 for "no seed"
     )
     return SobolIndices(

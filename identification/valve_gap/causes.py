@@ -6,8 +6,8 @@ from epv_env.plant.effects.record import Size
 from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.parameters import Parameters, table
 from epv_env.plant.region import CALIBRATED_SYMBOLS
+from identification.calibration.problem import ParameterVector
 from identification.gap.plant import Cause, FreeParameter, NuisanceParameter
-from identification.replay.parameter_vector import ParameterVector
 
 PARAMETER_RANGE = 0.1
 """Share by which a parameter that is not calibrated may be off [-]: Tables 8 and 9 vary them so far."""

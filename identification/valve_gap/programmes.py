@@ -17,9 +17,9 @@ from identification.gap.experiment_design import (
 )
 from identification.gap.verdict import PARTIAL, UNKNOWN, Ranking
 from identification.recordings.recording import CHANNELS, Recording
-from identification.replay.batch_simulation import Replay
 from identification.replay.model_inputs import ModelInputs
-from identification.report_2003.cases import Case
+from identification.replay.replay import Replay
+from identification.report_2003 import Case
 from identification.valve_gap.valve import Valve, as_run
 
 CASES = (

@@ -13,9 +13,8 @@ from identification.calibration.problem import calibration_problem
 from identification.gap.plant import Channel, NuisanceParameter, Run, StateEquation, StateTrace
 from identification.recordings.noise import coarse_step_warnings, reliable_step, rounding_error
 from identification.recordings.recording import OUTPUTS, UNITS, Campaign, Recording
-from identification.replay.batch_simulation import Replay
 from identification.replay.model_inputs import model_inputs
-from identification.replay.weighted_residuals import measured_outputs
+from identification.replay.replay import Replay, measured_outputs
 from identification.valve_gap import causes
 from identification.valve_gap.equations import EQUATIONS, forced_changes, modelled, regimes, traces
 

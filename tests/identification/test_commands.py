@@ -4,7 +4,6 @@ import argparse
 import importlib
 import json
 import re
-from functools import partial
 from typing import Any
 
 import gymnasium
@@ -16,11 +15,9 @@ from epv_env.common.commands import commands, help_line, parser_of
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import load_plant
 from identification.__main__ import main
-from identification.calibration import multi_start as starts
-from identification.commands import run as run_command
-from identification.pipeline.settings import IdentificationSettings
+from identification.calibration import search as starts
 from identification.recordings.campaign_files import read_campaign
-from identification.sensitivity.settings import SensitivitySettings
+from identification.sensitivity import section as sensitivity
 from tests.identification.browser import DESK, PHONE, box, check_layout, opened
 
 
@@ -38,10 +35,9 @@ def campaign(tmp_path_factory):
 def finished(campaign, tmp_path_factory):
     """A folder in which `run` has worked on it; with few valves, on which only the indices depend."""
     out = tmp_path_factory.mktemp("run")
-    few = SensitivitySettings(trajectories=4, samples=16, scatter_points=3)
-    short = partial(IdentificationSettings, sensitivity=few)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run_command, "IdentificationSettings", short)
+        patch.setattr(sensitivity, "TRAJECTORIES", 4)
+        patch.setattr(sensitivity, "SAMPLES", 16)
         assert main(["run", str(campaign), "--out", str(out), "--starts", "2"]) == 0
     return out
 

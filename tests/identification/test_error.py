@@ -3,8 +3,14 @@
 import numpy as np
 import pytest
 
-from identification.report_2003.cases import CALIBRATION_CASES, SAMPLING_RATE, VALIDATION_CASE
-from identification.report_2003.output_error import partial_error, relative_error, total_error
+from identification.report_2003 import (
+    CALIBRATION_CASES,
+    SAMPLING_RATE,
+    VALIDATION_CASE,
+    partial_error,
+    relative_error,
+    total_error,
+)
 
 TIME = np.linspace(0.0, 2.0, 2001)
 

@@ -14,14 +14,12 @@ from identification.bench.programmes import DIAGNOSIS_SUITE, REPORT_SUITE
 from identification.bench.session import TrueSignals, measured_campaign, run_programme
 from identification.calibration.calibrate import Calibration, calibrate
 from identification.calibration.problem import CalibrationProblem, calibration_problem
-from identification.calibration.settings import CalibrationSettings
 from identification.recordings.recording import CHANNELS, UNITS, Campaign, Recording
 
 TRUE = Parameters.calibrated()
 PROGRAMMES = {programme.name: programme for programme in DIAGNOSIS_SUITE}
 REPORT = tuple(programme.name for programme in REPORT_SUITE)
 SWITCHING = tuple(name for name in REPORT if name != "rest")
-ONE_START = CalibrationSettings(starts=1)
 
 
 @cache
@@ -46,9 +44,7 @@ def problem(seed: int = 1) -> CalibrationProblem:
 def calibration() -> Calibration:
     """The measured suite, calibrated from Table 10 alone."""
     with TemporaryDirectory() as folder:
-        return calibrate(
-            problem(), journal=Path(folder) / "journal.jsonl", subject={}, settings=ONE_START
-        )
+        return calibrate(problem(), journal=Path(folder) / "journal.jsonl", subject={}, starts=1)
 
 
 def exact_recording(name: str, rate: float = 2000.0, share: float = 1e-6, seed: int = 0) -> Recording:

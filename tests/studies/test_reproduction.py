@@ -17,7 +17,7 @@ from docs.studies.reproduction.errata import (
 from docs.studies.reproduction.noise_errata import signal_to_noise
 from docs.studies.reproduction.study import FOLDER, figure_checks, main, page_parts
 from identification.recordings.recording import CHANNELS
-from identification.report_2003.printed_values import printed_errors
+from identification.report_2003 import printed_errors
 
 STATUS = {check.where: check.status for check in figure_checks()}
 PUBLISHED = json.loads((FOLDER / "reproduce.json").read_text(encoding="utf-8"))

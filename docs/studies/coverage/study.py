@@ -29,9 +29,9 @@ from epv_env.plant.valves import available_cores
 from identification.bench.programmes import REPORT_SUITE
 from identification.bench.session import TrueSignals, measured_campaign, run_programme
 from identification.calibration.problem import calibration_problem
-from identification.calibration.search_methods import nelder_mead, weighted_least_squares
+from identification.calibration.search import nelder_mead, weighted_least_squares
+from identification.confidence.confidence import report_interval
 from identification.confidence.covariance import estimate_covariance
-from identification.confidence.report_interval import report_interval
 
 FOLDER = Path(__file__).parent
 CAMPAIGNS, QUICK = 200, 2

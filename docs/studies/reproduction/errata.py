@@ -9,12 +9,14 @@ from scipy import stats
 
 from epv_env.plant.parameters import Parameters, confidence_intervals, table
 from identification.recordings.recording import OUTPUTS
-from identification.report_2003.cases import CALIBRATION_CASES, SAMPLING_RATE
-from identification.report_2003.output_error import partial_error, total_error
-from identification.report_2003.printed_values import (
+from identification.report_2003 import (
+    CALIBRATION_CASES,
+    SAMPLING_RATE,
+    partial_error,
     printed_errors,
     printed_sensitivities,
     printed_total,
+    total_error,
 )
 from identification.sensitivity.one_at_a_time import FACTORS, THRESHOLD
 

@@ -12,7 +12,7 @@ from identification.quality.section import (
     TREND_OFFSETS,
 )
 from identification.recordings.recording import UNITS
-from identification.report_2003.printed_values import correlation_matrix
+from identification.report_2003 import correlation_matrix
 
 STANDARD_ERRORS = 3.0
 """Deviation of a statistic from its expected value that is still no doubt [standard errors]."""

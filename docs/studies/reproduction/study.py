@@ -18,25 +18,21 @@ import numpy as np
 from docs.studies.common import PAGE, fill, study_options, study_parser, table, write_result
 from docs.studies.reproduction.errata import ERRATUM, FigureCheck, error_table_checks, parameter_checks
 from docs.studies.reproduction.noise_errata import noise_checks
+from docs.studies.reproduction.sensitivity_tables import run_one_at_a_time, sensitivity_tables
 from epv_env.common.command_line import fail_clearly
 from epv_env.plant.parameters import Parameters, confidence_intervals
 from identification.bench.programmes import REPORT_SUITE
 from identification.bench.session import run_bench
-from identification.calibration.multi_start import METHODS
-from identification.calibration.settings import CalibrationSettings
-from identification.confidence import confidence_figures
+from identification.calibration.calibrate import STARTS
+from identification.calibration.search import METHODS
+from identification.confidence.section import region
 from identification.pipeline.identification import Identification
-from identification.pipeline.settings import IdentificationSettings
 from identification.quality.assessment import assess_recording
 from identification.quality.section import as_json as quality_json
-from identification.replay.error_tables import errors_as_json
-from identification.replay.response_figures import response_figure
-from identification.replay.responses import responses
-from identification.sensitivity.printed_agreement import sensitivity_tables
-from identification.sensitivity.sensitivity_study import run_one_at_a_time
+from identification.replay.replay import responses
+from identification.replay.response_blocks import errors_as_json, response_figure
 
 FOLDER = Path(__file__).parent
-QUICK = IdentificationSettings(calibration=CalibrationSettings(starts=1))
 
 
 def reproduce(identification: Identification) -> dict[str, Any]:
@@ -133,16 +129,16 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0, help="of the virtual bench's noise")
     options = study_options(parser)
     campaign = run_bench(REPORT_SUITE, Parameters.calibrated(), seed=options.seed)
-    settings = QUICK if options.quick else IdentificationSettings()
+    starts = 1 if options.quick else STARTS
     identification = Identification(
-        campaign, options.out / "reproduce.jsonl", seed=options.seed, settings=settings
+        campaign, options.out / "reproduce.jsonl", seed=options.seed, starts=starts
     )
     results = reproduce(identification)
     write_result(options.out / "reproduce.json", results)
     fill(options.out / PAGE, page_parts(results))
     pictures = {
         "calibration.png": response_figure(identification.calibration.after[METHODS[0]][0]),
-        "region.png": confidence_figures.region(identification.confidence),
+        "region.png": region(identification.confidence),
     }
     for name, picture in pictures.items():
         picture.savefig(options.out / name, dpi=100, bbox_inches="tight")

@@ -16,7 +16,7 @@ from identification.bench.programmes import (
     save_programmes,
 )
 from identification.recordings.campaign_files import read_campaign
-from identification.report_2003.cases import Case
+from identification.report_2003 import Case
 
 SHORT = Programme(
     name="short", role="calibration", p1=9.3e5, p2=5.1e5, U_on=22.5,

@@ -11,7 +11,7 @@ from epv_env.plant.plantfile import Plant, load_plant
 from identification.bench.programmes import REPORT_SUITE, at_voltage
 from identification.bench.session import measured_campaign, run_programme
 from identification.calibration.problem import CalibrationProblem, calibration_problem
-from identification.calibration.search_methods import weighted_least_squares
+from identification.calibration.search import weighted_least_squares
 from identification.confidence.covariance import estimate_covariance
 from identification.recordings.rules import rules_of
 
@@ -61,9 +61,3 @@ def test_its_data_sheet_does_not():
 def test_the_report_s_limits_would_refuse_it():
     with pytest.raises(ParameterError, match="R = 12 Ohm is outside its domain"):
         Plant.calibrated().parameters.replace(R=plant().parameters["R"])
-
-
-def test_suites_are_recorded_at_the_voltage_of_the_coil():
-    assert at_voltage(REPORT_SUITE, Plant.calibrated().voltage) == tuple(REPORT_SUITE)
-    halved = at_voltage(REPORT_SUITE, plant().voltage)
-    assert [2 * p.U_on for p in halved] == [p.U_on for p in REPORT_SUITE]

@@ -8,22 +8,19 @@ import pytest
 from epv_env.common.files import Journal
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import CALIBRATED_SYMBOLS
-from identification.calibration import multi_start as starts
-from identification.calibration.calibrate import calibrate
-from identification.calibration.calibration_warnings import calibration_warnings
-from identification.calibration.multi_start import (
+from identification.calibration import search as starts
+from identification.calibration.calibrate import calibrate, calibration_warnings
+from identification.calibration.problem import ParameterVector
+from identification.calibration.search import (
     METHODS,
     reached_best,
     search_from_all_starts,
     starting_points,
 )
-from identification.calibration.settings import CalibrationSettings
-from identification.replay.parameter_vector import ParameterVector
 from tests.identification.twins import calibration, problem
 
 START = Parameters.initial_guess()
 FOUR = ParameterVector(CALIBRATED_SYMBOLS, START)
-TWO_STARTS, THREE_STARTS = CalibrationSettings(starts=2), CalibrationSettings(starts=3)
 
 BAD_BASIN = (1.06, 0.92, 4.2, 0.95)
 """Of the reference: with so much reluctance the armature hardly moves."""
@@ -35,7 +32,7 @@ def calls(monkeypatch):
     asked = []
 
     def searching(method):
-        def search(misfit, start, settings):
+        def search(misfit, start):
             asked.append((method, tuple(start)))
             error = float(np.sum((start - 1.0) ** 2))
             return replace(calibration().best(method), start=start, z=start, error=error)
@@ -47,18 +44,12 @@ def calls(monkeypatch):
     return asked
 
 
-def test_the_first_start_is_the_reference_and_the_others_lie_in_the_domains():
-    points = starting_points(FOUR, 50, 0)
-    low, high = FOUR.bounds.T
-    assert points.shape == (50, 4)
-    np.testing.assert_array_equal(points[0], np.ones(4))
-    assert np.all((low <= points) & (points <= high))
-
-
-def test_each_symbol_is_spread_evenly_over_its_logarithm():
+def test_starts_are_the_reference_and_others_spread_evenly_over_the_logarithm():
     """A Latin hypercube puts one point into each of as many equal strips."""
     low, high = FOUR.bounds.T
-    share = np.log(starting_points(FOUR, 41, 0)[1:] / low) / np.log(high / low)
+    points = starting_points(FOUR, 41, 0)
+    np.testing.assert_array_equal(points[0], np.ones(4))
+    share = np.log(points[1:] / low) / np.log(high / low)
     np.testing.assert_array_equal(
         np.sort(np.floor(40 * share), axis=0), np.arange(40)[:, None] + np.zeros(4)
     )
@@ -80,14 +71,10 @@ def test_one_seed_gives_one_set_of_starts():
     assert np.all(starting_points(FOUR, 6, 3)[1:] != starting_points(FOUR, 6, 4)[1:])
 
 
-def test_one_start_is_the_reference_alone():
-    np.testing.assert_array_equal(starting_points(FOUR, 1, 0), np.ones((1, 4)))
-
-
-def test_a_start_in_another_basin_is_reported(tmp_path):
-    settings = CalibrationSettings(most_evaluations=200)
+def test_a_start_in_another_basin_is_reported(tmp_path, monkeypatch):
+    monkeypatch.setattr(starts, "MOST_EVALUATIONS", 200)
     points = np.array([np.ones(4), BAD_BASIN])
-    fits = search_from_all_starts(problem(), points, Journal(tmp_path / "journal", {}), settings)
+    fits = search_from_all_starts(problem(), points, Journal(tmp_path / "journal", {}))
     for method in METHODS:
         assert reached_best(fits[method]).tolist() == [True, False]
         assert fits[method][1].error > 5 * fits[method][0].error
@@ -109,19 +96,9 @@ def test_ends_agree_relative_to_the_best_and_at_zero():
 
 
 def test_finished_searches_are_not_done_again(tmp_path, calls):
-    first = calibrate(
-        problem(),
-        journal=tmp_path / "journal",
-        subject={"of": "a"},
-        settings=THREE_STARTS,
-    )
+    first = calibrate(problem(), journal=tmp_path / "journal", subject={"of": "a"}, starts=3)
     assert len(calls) == len(set(calls)) == 6
-    again = calibrate(
-        problem(),
-        journal=tmp_path / "journal",
-        subject={"of": "a"},
-        settings=THREE_STARTS,
-    )
+    again = calibrate(problem(), journal=tmp_path / "journal", subject={"of": "a"}, starts=3)
     assert len(calls) == 6
     for method in METHODS:
         pairs = zip(first.fits[method], again.fits[method], strict=True)
@@ -130,45 +107,23 @@ def test_finished_searches_are_not_done_again(tmp_path, calls):
 
 def test_an_interrupted_run_goes_on_where_it_was(tmp_path, calls):
     path = tmp_path / "journal"
-    calibrate(problem(), journal=path, subject={}, settings=THREE_STARTS)
+    calibrate(problem(), journal=path, subject={}, starts=3)
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join(lines[:4]) + lines[4][:20])
     calls.clear()
-    calibrate(problem(), journal=path, subject={}, settings=THREE_STARTS)
+    calibrate(problem(), journal=path, subject={}, starts=3)
     assert [method for method, _ in calls] == ["least squares", "Nelder-Mead", "least squares"]
     assert path.read_text().splitlines() == [line.rstrip("\n") for line in lines]
 
 
-@pytest.mark.parametrize(
-    "change", [{"subject": {"of": "b"}}, {"seed": 1}, {"settings": CalibrationSettings(starts=4)}]
-)
+@pytest.mark.parametrize("change", [{"subject": {"of": "b"}}, {"seed": 1}, {"starts": 4}])
 def test_searches_of_another_subject_are_not_used(tmp_path, calls, change):
     """Another number of starts moves all of them but the first."""
-    usual = {"subject": {"of": "a"}, "settings": THREE_STARTS, "seed": 0}
+    usual = {"subject": {"of": "a"}, "starts": 3, "seed": 0}
     calibrate(problem(), journal=tmp_path / "journal", **usual)
     calls.clear()
     calibrated = calibrate(problem(), journal=tmp_path / "journal", **{**usual, **change})
-    assert len(calls) == 2 * {**usual, **change}["settings"].starts
+    assert len(calls) == 2 * {**usual, **change}["starts"]
     ends = np.array([fit.start for fit in calibrated.fits["Nelder-Mead"]])
     expected = starting_points(problem().vector, len(ends), {**usual, **change}["seed"])
     np.testing.assert_array_equal(ends, expected)
-
-
-def test_searches_with_another_precision_are_not_used(tmp_path, calls):
-    for precision in (1e-6, 1e-4):
-        settings = CalibrationSettings(starts=2, precision=precision)
-        calibrate(problem(), journal=tmp_path / "journal", subject={}, settings=settings)
-    assert len(calls) == 8
-
-
-def test_searches_of_another_reference_are_not_used(tmp_path, calls):
-    calibrate(problem(), journal=tmp_path / "journal", subject={}, settings=TWO_STARTS)
-    moved = replace(problem().vector, reference=problem().vector.reference.replace(d1=0.0181))
-    calls.clear()
-    calibrate(
-        replace(problem(), vector=moved),
-        journal=tmp_path / "journal",
-        subject={},
-        settings=TWO_STARTS,
-    )
-    assert len(calls) == 4

@@ -7,11 +7,10 @@ import pytest
 
 from epv_env.plant.channels import SENSORS
 from epv_env.plant.parameters import ParameterError
-from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.calibration.problem import calibration_problem
-from identification.calibration.search_methods import SearchResult, nelder_mead, weighted_least_squares
+from identification.calibration.search import nelder_mead, weighted_least_squares
 from identification.recordings.recording import CHANNELS, UNITS, CampaignError
-from identification.replay.responses import total_response_error
+from identification.replay.replay import total_response_error
 from tests.identification.twins import TRUE, calibration, exact_problem, freed, problem, twin
 
 TOLERANCE = {"alphaMV": 3e-4, "alphaPV": 9e-4, "RML": 8e-4, "R": 3e-4}
@@ -73,11 +72,7 @@ def test_errors_fall_to_the_noise():
     assert dict(calibrated.parameters("least squares"))["R"] == pytest.approx(TRUE["R"], rel=3e-4)
 
 
-def test_a_good_calibration_warns_of_nothing():
-    assert calibration().warnings == []
-
-
-@pytest.mark.parametrize("symbols", [("alphaPV",), ("R", "RML"), ("alphaMV", "alphaPV", "R")])
+@pytest.mark.parametrize("symbols", [("alphaPV",), ("alphaMV", "alphaPV", "R")])
 def test_fewer_parameters_can_be_fitted(symbols):
     moved = {symbol: 0.97 * TRUE[symbol] for symbol in symbols}
     posed = calibration_problem(twin(), start=TRUE.replace(**moved), free=freed(*symbols))
@@ -91,13 +86,6 @@ def test_other_parameters_than_the_report_s_can_be_fitted():
         twin(), start=TRUE.replace(mMV=0.0024, V2=0.95e-3), free=freed("mMV", "V2")
     )
     assert np.max(np.abs(apart(posed, fitted(posed).z))) < 0.01
-
-
-def test_500_hz_are_enough():
-    coarse = calibration_problem(twin(rate=500.0))
-    z = fitted(coarse).z
-    assert np.max(np.abs(apart(coarse, z))) < 2 * max(TOLERANCE.values())
-    assert fitted(coarse).error == pytest.approx(1.0, abs=0.06)
 
 
 def test_without_a_record_at_rest_nothing_is_subtracted():
@@ -123,11 +111,6 @@ def test_the_campaign_s_ambient_is_the_model_s():
     assert (reference["T_env"], reference["p_env"]) == (300.0, 0.98e5)
 
 
-def test_roles_stay_apart():
-    assert [r.name for r in problem().calibration] == ["test1", "test2", "test3", "test4"]
-    assert [r.name for r in problem().validation] == ["validation"]
-
-
 def test_a_campaign_without_a_recording_to_fit_to_is_refused():
     rest = replace(twin(), recordings=twin().with_role("quality"))
     with pytest.raises(CampaignError, match="no recording with role 'calibration': give at least one"):
@@ -139,20 +122,8 @@ def test_a_campaign_without_a_recording_to_fit_to_is_refused():
     [
         (("a1", "R"), "a1 starts at 0, from which a relative change leads nowhere: start elsewhere"),
         (("x", "R"), "x cannot be calibrated: choose from .*alphaMV"),
-        (("kappa",), "kappa cannot be calibrated"),
     ],
 )
 def test_symbols_that_cannot_be_fitted_are_refused(symbols, message):
     with pytest.raises(ParameterError, match=message):
         calibration_problem(twin(), free=freed(*symbols))
-
-
-def test_a_fit_comes_back_from_json():
-    fit = calibration().best("least squares")
-    again = SearchResult.from_json(fit.as_json())
-    assert again.as_json() == fit.as_json()
-    np.testing.assert_array_equal(again.z, fit.z)
-
-
-def test_the_report_s_four_are_fitted_by_default():
-    assert problem().vector.symbols == CALIBRATED_SYMBOLS

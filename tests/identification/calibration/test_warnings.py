@@ -5,12 +5,10 @@ from dataclasses import replace
 import pytest
 
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.region import CALIBRATED_SYMBOLS
-from identification.calibration.calibrate import calibrate
-from identification.calibration.calibration_section import calibration_json, calibration_section
-from identification.calibration.calibration_warnings import calibration_warnings
+from identification.calibration import search
+from identification.calibration.calibrate import calibrate, calibration_warnings
 from identification.calibration.problem import calibration_problem
-from identification.calibration.settings import CalibrationSettings
+from identification.calibration.section import calibration_section
 from tests.identification.twins import TRUE, calibration, freed, problem, twin
 
 START = Parameters.initial_guess()
@@ -20,10 +18,8 @@ START = Parameters.initial_guess()
 def warnings(tmp_path):
     """The warnings of a problem, calibrated from its reference."""
 
-    def sentences_of(problem, **changes):
-        settings = CalibrationSettings(starts=1, **changes)
-        path = tmp_path / "journal"
-        return calibrate(problem, journal=path, subject={}, settings=settings).warnings
+    def sentences_of(problem):
+        return calibrate(problem, journal=tmp_path / "journal", subject={}, starts=1).warnings
 
     return sentences_of
 
@@ -35,8 +31,11 @@ def fits(**changes):
     }
 
 
-def test_a_good_calibration_has_none():
-    assert calibration_warnings(problem(), calibration().fits) == []
+def test_a_good_calibration_has_none_and_its_section_no_doubt():
+    assert calibration().warnings == []
+    assert [v.status for v in calibration_section(calibration()).verdicts] == ["good"]
+    doubted = calibration_section(replace(calibration(), warnings=["the one"]))
+    assert [v.text for v in doubted.verdicts if v.status == "doubt"] == ["the one"]
 
 
 def test_an_estimate_on_the_end_of_a_domain_is_named(warnings):
@@ -47,8 +46,7 @@ def test_an_estimate_on_the_end_of_a_domain_is_named(warnings):
     assert not any("end of R's domain" in warning for warning in sentences)
 
 
-@pytest.mark.parametrize("end", [0, 1])
-@pytest.mark.parametrize("symbol", CALIBRATED_SYMBOLS)
+@pytest.mark.parametrize(("symbol", "end"), [("alphaMV", 0), ("R", 1)])
 def test_either_end_of_any_domain_counts(symbol, end):
     vector = problem().vector
     z = calibration().best("least squares").z.copy()
@@ -62,8 +60,9 @@ def test_either_end_of_any_domain_counts(symbol, end):
     assert vector.parameters(z)[symbol] == pytest.approx(vector.domains[at, end])
 
 
-def test_a_search_that_is_cut_short_is_not_trusted(warnings):
-    sentences = warnings(problem(), most_evaluations=20)
+def test_a_search_that_is_cut_short_is_not_trusted(warnings, monkeypatch):
+    monkeypatch.setattr(search, "MOST_EVALUATIONS", 20)
+    sentences = warnings(problem())
     assert any("Nelder-Mead has not converged after" in warning for warning in sentences)
     assert not any("least squares has not converged" in warning for warning in sentences)
 
@@ -84,27 +83,6 @@ def test_recordings_that_the_model_cannot_explain_are_noticed(warnings):
     sentences = warnings(calibration_problem(twin(), free=freed("alphaMV")))
     assert any("misses the recordings by" in warning for warning in sentences)
     assert not any("cannot separate" in warning for warning in sentences)
-
-
-def test_the_section_shows_every_warning_as_a_doubt():
-    doubted = replace(calibration(), warnings=["the one", "the other"])
-    section = calibration_section(doubted)
-    assert [verdict.text for verdict in section.verdicts if verdict.status == "doubt"] == [
-        "the one",
-        "the other",
-    ]
-    good = calibration_section(calibration())
-    assert [verdict.status for verdict in good.verdicts] == ["good"]
-
-
-def test_the_json_holds_estimates_searches_and_warnings():
-    content = calibration_json(replace(calibration(), warnings=["the one"]))
-    assert content["warnings"] == ["the one"]
-    estimate = content["estimates"]["least squares"]
-    assert estimate == {
-        s: calibration().parameters("least squares")[s] for s in problem().vector.symbols
-    }
-    assert len(content["searches"]["Nelder-Mead"]) == 1
 
 
 def test_coarse_steps_are_said():

@@ -8,7 +8,7 @@ from epv_env.plant.channels import SENSORS
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised, simulate
 from identification.recordings.recording import CHANNELS, UNITS, Campaign, Recording
-from identification.report_2003.cases import CALIBRATION_CASES, SAMPLING_RATE
+from identification.report_2003 import CALIBRATION_CASES, SAMPLING_RATE
 
 
 @cache

@@ -85,13 +85,6 @@ def test_a_click_enlarges_a_figure_and_another_closes_it(page_file):
     assert 0 <= after["top"] < DESK[1]  # the reader is where the reader was
 
 
-def test_a_phone_shows_figures_at_their_own_size(page_file):
-    """Shrunk to 400 pixels the letters of a figure of nine inches could not be read."""
-    with opened(page_file, PHONE) as page:
-        natural = page.evaluate("document.querySelector('figure img').naturalWidth")
-        assert box(page, "figure img")["width"] >= 0.99 * natural
-
-
 def test_the_checks_can_fail(page_file, tmp_path):
     bad = tmp_path / "bad.html"
     text = page_file.read_text(encoding="utf-8")

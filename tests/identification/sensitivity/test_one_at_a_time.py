@@ -1,18 +1,20 @@
 """The report's sensitivity study comes back: Tables 8 and 9, without any measured data."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
 from epv_env.plant.parameters import Parameters, table
+from identification.report_2003 import printed_sensitivities
 from identification.sensitivity.one_at_a_time import (
     ErrorSensitivity,
     changed_values,
     sensitivities,
+    studied_symbols,
+    total_errors,
     variants,
 )
-from identification.sensitivity.printed_agreement import percentages, printed_rows
-from identification.sensitivity.report_conditions import StudyConditions, total_errors
-from tests.identification.sensitivity.study import one_at_a_time
 
 PNEUMATIC = (
     "dMVexh", "R", "alphaMV", "V3", "cPV", "alphaPV", "V2", "dMVin", "d1", "d2", "xPV0", "xPVmax",
@@ -21,23 +23,28 @@ PNEUMATIC = (
 """Whatever does not move the armature, and R, whose own effect on I is greater."""
 
 
+@cache
+def exact():
+    """Tables 8 and 9 with the plant's own integrator."""
+    return sensitivities(Parameters.nominal(), studied_symbols())
+
+
 @pytest.mark.parametrize("symbol", PNEUMATIC)
 def test_exact_sensitivity_is_the_report_s(symbol):
-    percents = percentages(one_at_a_time().exact[symbol])
-    for value, reported in zip(percents, printed_rows()[symbol], strict=True):
+    percents = exact()[symbol].percentages
+    for value, reported in zip(percents, printed_sensitivities()[symbol], strict=True):
         assert value == pytest.approx(reported, rel=0.1, abs=0.1 if reported > 1 else 0.01)
 
 
 def test_exactly_located_stops_class_all_parameters_but_one_as_the_report():
     """RML, 2.04 % in the report, stays just below 2 %."""
-    symbols = {symbol for symbol, row in one_at_a_time().exact.items() if row.sensitive}
+    symbols = {symbol for symbol, row in exact().items() if row.sensitive}
     assert symbols == {symbol for symbol, row in table().items() if row.sensitive} - {"RML"}
 
 
 def test_stroke_of_the_armature_weighs_little_because_bores_limit_the_flow():
     """With the curtain areas alone, xMVmax would weigh as much as dMVin (correction 3)."""
-    exact = one_at_a_time().exact
-    assert exact["xMVmax"].minus < 0.3 * exact["dMVin"].minus
+    assert exact()["xMVmax"].minus < 0.3 * exact()["dMVin"].minus
 
 
 def test_an_unchanged_valve_has_no_error():
@@ -63,5 +70,5 @@ def test_two_percent_in_either_direction_is_sensitive():
 
 def test_other_conditions_give_other_figures():
     """The comparison can fail: at 24 V the armature's rows are far from the report's."""
-    values = sensitivities(Parameters.nominal(), ["cMV"], conditions=StudyConditions(U_on=24.0))["cMV"]
-    assert 100 * values.minus < 0.6 * printed_rows()["cMV"][0]
+    values = sensitivities(Parameters.nominal(), ["cMV"], U_on=24.0)["cMV"]
+    assert 100 * values.minus < 0.6 * printed_sensitivities()["cMV"][0]

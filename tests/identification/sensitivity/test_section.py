@@ -3,25 +3,23 @@
 import json
 
 from epv_env.plant.parameters import Parameters
-from identification.report.page import Picture, write_page
+from identification.report.page import Picture, Table, write_page
 from identification.sensitivity.global_indices import (
     morris_effects,
     ranges,
     sobol_indices,
     total_error_model,
 )
-from identification.sensitivity.sensitivity_export import as_json
-from identification.sensitivity.sensitivity_section import sensitivity_section
-from identification.sensitivity.sensitivity_study import SensitivityStudy
-from tests.identification.sensitivity.study import one_at_a_time
+from identification.sensitivity.section import SensitivityStudy, sensitivity_json, sensitivity_section
 from tests.identification.sensitivity.test_collinearity import nominal_sensitivities
+from tests.identification.sensitivity.test_one_at_a_time import exact
 
 
 def short_study() -> SensitivityStudy:
     p, symbols = Parameters.nominal(), ["d1", "R"]
     model, bounds = total_error_model(p, symbols), ranges(p, symbols)
     return SensitivityStudy(
-        one_at_a_time=one_at_a_time(),
+        one_at_a_time=exact(),
         outputs=nominal_sensitivities(),
         screening=morris_effects(model, symbols, bounds, trajectories=4, seed=1),
         indices=sobol_indices(model, symbols, bounds, samples=8, seed=1),
@@ -33,10 +31,10 @@ def test_section_and_data(tmp_path):
     section = sensitivity_section(study)
     assert [verdict.status for verdict in section.verdicts] == ["good", "note", "note"]
     assert sum(isinstance(block, Picture) for block in section.blocks) == 2
-    beside = sensitivity_section(study, report_2003=True)
-    assert [verdict.status for verdict in beside.verdicts] == ["good", "doubt", "good", "note", "note"]
-    assert sum(isinstance(block, Picture) for block in beside.blocks) == 3
+    beside = sensitivity_section(study, report_2003=True).blocks[0]
+    assert isinstance(beside, Table)
+    assert beside.columns[-1] == "the report [%]"
     write_page(tmp_path / "page.html", title="Sensitivity", sections=[section])
-    data = json.loads(json.dumps(as_json(study), allow_nan=False))
+    data = json.loads(json.dumps(sensitivity_json(study), allow_nan=False))
     assert data["collinearity"]["all_sensitive"] is None
     assert set(data["sobol"]) == {"d1", "R"}

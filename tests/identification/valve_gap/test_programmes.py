@@ -13,7 +13,7 @@ from identification.bench.session import measured_campaign, run_programme
 from identification.gap.diagnosis import rank_hypotheses
 from identification.gap.experiment_design import Rivals
 from identification.gap.verdict import PARTIAL, Ranking
-from identification.report_2003.cases import Case
+from identification.report_2003 import Case
 from identification.valve_gap.programmes import (
     CANDIDATES,
     described,

@@ -5,8 +5,8 @@ import pytest
 
 from identification.calibration.problem import calibration_problem
 from identification.gap.prediction import percentage_errors
-from identification.replay.responses import total_response_error
-from identification.validation.validate import validate
+from identification.replay.replay import total_response_error
+from identification.validation import validate
 from identification.valve_gap.valve import Valve
 from tests.identification.valve_gap.test_valve import campaign
 

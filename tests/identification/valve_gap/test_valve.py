@@ -11,7 +11,7 @@ from identification.bench.programmes import DIAGNOSIS_SUITE
 from identification.bench.session import measured_campaign, run_programme
 from identification.gap.diagnosis import rank_hypotheses
 from identification.recordings.recording import Campaign
-from identification.replay.responses import responses
+from identification.replay.replay import responses
 from identification.valve_gap.causes import effects, parameters
 from identification.valve_gap.valve import Valve
 

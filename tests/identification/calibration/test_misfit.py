@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.replay.weighted_residuals import (
+from identification.calibration.problem import (
     WeightedResiduals,
     measured_outputs,
     noise_weights,
     report_weights,
 )
-from identification.report_2003.output_error import partial_error, relative_error, total_error
+from identification.report_2003 import partial_error, relative_error, total_error
 from tests.identification.twins import TRUE, problem
 
 
@@ -46,13 +46,6 @@ def moved(**changes):
     ]
     residuals = [np.concatenate(m.residuals(true_vector())) for m in (before, after)]
     return np.linalg.norm(residuals[1] - residuals[0]) / np.sqrt(sum(np.sum(a**2) for a in apart))
-
-
-@pytest.mark.parametrize("z", [(1.0, 1.0, 1.0, 1.0), (0.95, 1.1, 1.08, 1.004), (1.0, 1.1, 1.0, 0.97)])
-def test_the_weighted_error_is_eq_21_less_what_nuisances_explain(z):
-    misfit = problem().total_error()
-    whole = eq21(misfit, np.array(z))
-    assert 0.3 * whole < misfit.error(np.array(z)) <= whole * (1 + 1e-9)
 
 
 def test_it_is_eq_21_where_nuisances_explain_nothing():
@@ -108,16 +101,7 @@ def test_a_wrong_start_of_p2_is_hardly_seen():
     assert np.linalg.norm(after - before) < 1e-3 * np.linalg.norm(before)
 
 
-def test_a_wrong_start_would_be_seen_without_the_nuisance():
-    misfit, z = problem().least_squares(), true_vector()
-    values = misfit.vector.values(np.stack([z, z]))
-    models = misfit.replay.outputs(values, np.array([0.0, 200.0]))
-    apart = [w * (m[:, :, 1] - m[:, :, 0]) for w, m in zip(misfit.weights, models, strict=True)]
-    before = np.concatenate(misfit.residuals(z))
-    assert np.sqrt(sum(np.sum(a**2) for a in apart)) > 0.05 * np.linalg.norm(before)
-
-
-@pytest.mark.parametrize("away", [1.0, 1.0005, 1.005])
+@pytest.mark.parametrize("away", [1.0, 1.005])
 def test_derivatives_are_central_differences(away):
     """Up to the share that the nuisances' own change has, which grows with the residual."""
     misfit, z = problem().least_squares(), away * true_vector()
@@ -126,31 +110,6 @@ def test_derivatives_are_central_differences(away):
         ends = [np.concatenate(misfit.residuals(z + way * axis)) for way in (-1, 1)]
         difference = (ends[1] - ends[0]) / 2e-5
         assert np.linalg.norm(column - difference) < 0.02 * np.linalg.norm(difference)
-
-
-def test_residuals_are_the_same_with_and_without_derivatives():
-    misfit, z = problem().least_squares(), true_vector()
-    for alone, among in zip(misfit.residuals(z), misfit.linearised(z)[0], strict=True):
-        np.testing.assert_allclose(alone, among, rtol=1e-9, atol=1e-9)
-
-
-def test_derivatives_on_a_bound_are_taken_inwards(monkeypatch):
-    misfit = problem().least_squares()
-    asked = []
-    outputs = misfit.replay.outputs
-
-    def spy(candidates, p2_shift=0.0):
-        asked.append(candidates)
-        return outputs(candidates, p2_shift)
-
-    monkeypatch.setattr(misfit.replay, "outputs", spy)
-    low, high = misfit.vector.bounds.T
-    for end in (low, high):
-        misfit.linearised(end)
-    for candidates in asked:
-        for symbol, first, last in zip(misfit.vector.symbols, low, high, strict=True):
-            scaled = candidates[symbol] / misfit.vector.reference[symbol]
-            assert np.all((first - 1e-12 <= scaled) & (scaled <= last + 1e-12))
 
 
 def test_the_least_error_lies_at_the_truth():

@@ -1,6 +1,7 @@
 """The model on recorded inputs: every recording and every candidate of the parameters in one batch."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,21 +12,24 @@ from epv_env.plant.equations import Inputs, State
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
-from identification.recordings.recording import OUTPUTS
-from identification.replay.model_inputs import ModelInputs
-from identification.replay.settings import REPLAY, ReplaySettings
+from identification.recordings.recording import OUTPUTS, Recording
+from identification.replay.model_inputs import ModelInputs, model_inputs
+from identification.report_2003 import partial_error, relative_error, total_error
+
+LARGEST_BATCH = 1_500_000
+"""Samples times valves that are simulated at once: about 40 MB of outputs."""
+
+RECORDED_PERIODS = 100
+"""Sampling periods whose states are kept at a time: few enough to stay in the processor's cache."""
 
 
 class Replay:
     """Simulates recordings under candidate parameters."""
 
-    def __init__(
-        self, drives: Sequence[ModelInputs], base: Parameters, settings: ReplaySettings = REPLAY
-    ):
+    def __init__(self, drives: Sequence[ModelInputs], base: Parameters):
         """base: values of the parameters that the candidates do not change [SI]."""
         self.drives = list(drives)
         self.base = base
-        self.settings = settings
 
     def outputs(
         self,
@@ -73,7 +77,7 @@ class Replay:
             lanes = {s: _lanes(value, group) for s, value in each.items()}
             shifts = lanes.pop("")
             drives, p = [self.drives[r] for r in group], {**self.base, **lanes}
-            answers += _simulate(drives, p, shifts, n, self.settings.recorded_periods)
+            answers += _simulate(drives, p, shifts, n)
         return answers
 
     def _groups(self, n: int, chosen: Sequence[int]) -> list[list[int]]:
@@ -82,11 +86,54 @@ class Replay:
         longest = 0
         for index in chosen:
             longest = max(longest, len(self.drives[index].U))
-            if groups[-1] and longest * n * (len(groups[-1]) + 1) > self.settings.largest_batch:
+            if groups[-1] and longest * n * (len(groups[-1]) + 1) > LARGEST_BATCH:
                 groups.append([])
                 longest = len(self.drives[index].U)
             groups[-1].append(index)
         return groups
+
+
+def measured_outputs(recording: Recording) -> NDArray:
+    """OUTPUTS of a recording, (3, samples) [Pa, Pa, A]."""
+    return np.stack([recording.channel(output) for output in OUTPUTS])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Response:
+    """One recording and the model's response to its inputs."""
+
+    recording: Recording
+    measured: NDArray
+    """OUTPUTS, (3, samples) [Pa, Pa, A]."""
+    model: NDArray
+    """OUTPUTS of the model, (3, samples) [Pa, Pa, A]."""
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """Eq. 19 by output, as fractions."""
+        time = self.recording.time
+        pairs = zip(OUTPUTS, self.measured, self.model, strict=True)
+        return {output: float(relative_error(y, model, time)) for output, y, model in pairs}
+
+    @property
+    def partial(self) -> float:
+        """Eq. 20, as a fraction."""
+        return float(partial_error([np.array(error) for error in self.errors.values()]))
+
+
+def responses(recordings: Sequence[Recording], parameters: Parameters) -> list[Response]:
+    """The model's responses from each recording's steady start; nothing is fitted. parameters: [SI]."""
+    replay = Replay([model_inputs(recording, parameters) for recording in recordings], parameters)
+    one = {"R": np.array([parameters["R"]])}
+    return [
+        Response(recording=recording, measured=measured_outputs(recording), model=model[:, :, 0])
+        for recording, model in zip(recordings, replay.outputs(one), strict=True)
+    ]
+
+
+def total_response_error(responses: Sequence[Response]) -> float:
+    """Eq. 21, as a fraction."""
+    return float(total_error([np.array(response.partial) for response in responses]))
 
 
 def _lanes(value: NDArray, recordings: Sequence[int]) -> NDArray:
@@ -97,11 +144,11 @@ def _lanes(value: NDArray, recordings: Sequence[int]) -> NDArray:
 
 
 def _simulate(
-    drives: list[ModelInputs], tiled: Mapping[str, ArrayLike], shift: NDArray, n: int, together: int
+    drives: list[ModelInputs], tiled: Mapping[str, ArrayLike], shift: NDArray, n: int
 ) -> list[NDArray]:
     """One batch: lane r n + j is candidate j on recording r.
 
-    tiled, shift: by lane. together: number of periods whose states are kept at a time.
+    tiled, shift: by lane.
     """
     valves = Valves(n * len(drives))
     valves.set_parameters(np.arange(valves.n), tiled)
@@ -117,7 +164,7 @@ def _simulate(
     outputs = np.empty((len(OUTPUTS), 1 + steps, valves.n))
     outputs[:, 0] = _read(valves.state, tiled)
     # A delayed voltage needs the whole record at once.
-    together = steps if np.any(tiled["t_delay"]) else together
+    together = steps if np.any(tiled["t_delay"]) else RECORDED_PERIODS
     for first in range(0, steps, max(together, 1)):
         part = slice(first, first + together)
         every = Inputs(**{name: np.repeat(field[part], n, axis=1) for name, field in inputs.items()})

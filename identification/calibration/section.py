@@ -4,11 +4,11 @@ from typing import Any
 
 from epv_env.plant.parameters import table
 from identification.calibration.calibrate import Calibration
-from identification.calibration.multi_start import METHODS, reached_best
-from identification.replay.error_tables import error_table, errors_as_json, percent
-from identification.replay.response_figures import response_figure
-from identification.replay.responses import total_response_error
+from identification.calibration.search import METHODS, reached_best
+from identification.replay.replay import total_response_error
+from identification.replay.response_blocks import error_table, errors_as_json, percent, response_figure
 from identification.report.page import Picture, Section, Table, Text, Verdict
+from identification.report_2003 import ACCEPTED_ERROR
 
 
 def calibration_section(calibration: Calibration) -> Section:
@@ -61,12 +61,11 @@ def _verdict(calibration: Calibration) -> Verdict:
         total_response_error(calibration.before),
     )
     rms = calibration.best("least squares").error
-    limit = calibration.settings.accepted_error
-    good = error < limit
+    good = error < ACCEPTED_ERROR
     return Verdict(
         status="good" if good else "bad",
         text=f"The total error falls from {percent(before)} to {percent(error)} %, "
-        f"{'below' if good else 'not below'} the limit of {100 * limit:.0f} %; the "
+        f"{'below' if good else 'not below'} the limit of {100 * ACCEPTED_ERROR:.0f} %; the "
         f"residual of the least-squares fit is {rms:.3g} times the noise (1 is the floor).",
     )
 
@@ -109,9 +108,7 @@ def _starts(calibration: Calibration) -> Table:
     rows = []
     for method in METHODS:
         fits = calibration.fits[method]
-        for fit, reached in zip(
-            fits, reached_best(fits, calibration.settings.same_minimum), strict=True
-        ):
+        for fit, reached in zip(fits, reached_best(fits), strict=True):
             rows.append(
                 [
                     method,

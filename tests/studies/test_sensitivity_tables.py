@@ -1,0 +1,121 @@
+"""Tables 8 and 9 come back with the fixed step, and the count can tell when they do not."""
+
+import json
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from docs.studies.reproduction.fixed_step import simulate_fixed_step
+from docs.studies.reproduction.sensitivity_tables import (
+    OneAtATime,
+    agreement_with_printed,
+    is_reproduced,
+    run_one_at_a_time,
+    sensitivity_tables,
+)
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.simulate import SimulationError, energised, simulate
+from identification.report_2003 import CALIBRATION_CASES, printed_sensitivities
+
+ARMATURE = ("mMV", "kMV", "xMVmax")
+NO_ARMATURE = ("V2", "alphaPV", "a1", "alphaMV", "V3")
+
+
+@cache
+def one_at_a_time() -> OneAtATime:
+    return run_one_at_a_time()
+
+
+def test_the_fixed_step_reproduces_tables_8_and_9():
+    met = agreement_with_printed(one_at_a_time().fixed_step)
+    assert met.figures == 46
+    assert met.reproduced >= 36
+    assert met.classes_differ == ()
+    assert met.worst_factor < 2.0
+
+
+def test_exact_stops_reproduce_fewer():
+    met = agreement_with_printed(one_at_a_time().exact)
+    assert met.reproduced >= 33
+    assert met.classes_differ == ("RML",)
+
+
+def test_another_class_is_noticed():
+    rows = dict(one_at_a_time().fixed_step)
+    rows["d1"] = replace(rows["d1"], minus=0.001, plus=0.001)
+    met = agreement_with_printed(rows)
+    assert met.classes_differ == ("d1",)
+    assert met.worst_factor > 100
+    assert met.reproduced == agreement_with_printed(one_at_a_time().fixed_step).reproduced - 2
+
+
+@pytest.mark.parametrize(
+    ("found", "printed", "expected"),
+    [(11.0, 10.0, True), (11.1, 10.0, False), (0.12, 0.02, True), (0.13, 0.02, False)],
+)
+def test_tolerance_is_ten_percent_or_a_tenth_of_a_point(found, printed, expected):
+    assert is_reproduced(found, printed) is expected
+
+
+def test_the_tables_have_the_report_s_rows():
+    content = json.loads(json.dumps(sensitivity_tables(one_at_a_time()), allow_nan=False))
+    assert len(content["table8"]) == 17
+    assert list(content["table9"]) == ["a1", "a2", "alphaMV", "alphaPV", "kMV", "kPV", "RML"]
+    assert set(content["table8"]["cMV"]) == {"minus10", "plus10", "sensitive"}
+    assert content["table8"]["d1"]["minus10"] == pytest.approx(19.3, rel=0.1)
+    assert content["comparison"]["fixed_step"]["reproduced"] >= 36
+
+
+def test_a1_comes_back_with_the_ends_of_its_domain():
+    row, printed = one_at_a_time().fixed_step["a1"], printed_sensitivities()["a1"]
+    assert (100 * row.minus, 100 * row.plus) == pytest.approx(printed, rel=0.05)
+
+
+@cache
+def deviation(step: float) -> float:
+    """Root mean square of p3 against the exact integrator [Pa], sampled each millisecond."""
+    p = Parameters.nominal()
+    start = energised(p, p1=12.5e5, p2=6.8e5, U=18.9)
+    every = round(1e-3 / step)
+    U = CALIBRATION_CASES[0].voltage(18.9, 1 / step)
+    fine = simulate_fixed_step(p, initial=start, U=U, period=step).state.p3[::every, 0]
+    exact = simulate(p, initial=start, U=U[::every], period=1e-3).state.p3
+    return float(np.sqrt(np.mean((fine - exact) ** 2)))
+
+
+def test_it_converges_to_the_exact_integrator():
+    assert deviation(1e-5) < 50.0
+    assert deviation(1e-5) < 0.1 * deviation(5e-4)
+
+
+def test_strokes_stay_within_the_stops():
+    p = Parameters.nominal()
+    U = CALIBRATION_CASES[0].voltage(18.9, 2000)
+    start = energised(p, p1=12.5e5, p2=6.8e5, U=18.9)
+    state = simulate_fixed_step(p, initial=start, U=U, period=5e-4).state
+    for x, top in ((state.xPV, p["xPVmax"]), (state.xMV, p["xMVmax"])):
+        assert np.min(x) == 0.0
+        assert np.max(x) == top
+
+
+@pytest.mark.parametrize("symbol", ARMATURE)
+def test_its_scatter_lifts_the_armature_s_rows_to_the_report_s_size(symbol):
+    exact, scatter = one_at_a_time().exact[symbol], one_at_a_time().scatter[symbol]
+    assert np.median(scatter[:, 0]) > 1.5 * exact.minus
+    assert np.median(scatter[:, 1]) > 1.5 * exact.plus
+
+
+@pytest.mark.parametrize("symbol", NO_ARMATURE)
+def test_rows_that_leave_the_armature_alone_carry_no_scatter(symbol):
+    """No pressure acts on the armature, so its scatter is the same in both runs and cancels."""
+    scatter = one_at_a_time().scatter[symbol]
+    assert np.ptp(scatter, axis=0).max() < 0.03 * scatter.mean()
+
+
+def test_a_step_that_is_too_long_is_refused():
+    p = Parameters.nominal().replace(kMV=10.0, mMV=0.001)
+    start = energised(p, p1=12.5e5, p2=6.8e5, U=18.9)
+    with np.errstate(all="ignore"), pytest.raises(SimulationError, match="shorter"):
+        simulate_fixed_step(p, initial=start, U=np.tile([0.0, 18.9], 200), period=5e-2)
