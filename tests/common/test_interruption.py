@@ -44,8 +44,7 @@ def alive(pid: int) -> bool:
 
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/stat"), reason="counts processes as Linux shows them")
-@pytest.mark.parametrize("pool", ["joblib", "futures"])
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(("pool", "number"), [("joblib", signal.SIGTERM), ("futures", signal.SIGINT)])
 def test_a_stopped_command_leaves_no_worker_and_no_traceback(pool, number, tmp_path):
     script, started = tmp_path / "command.py", tmp_path / "started"
     script.write_text(COMMAND)

@@ -136,14 +136,6 @@ def test_lists_give_each_sub_environment_its_own():
     assert infos["consumption_g_per_s"][1] >= 0.1
 
 
-def test_a_list_equals_single_environments_with_those_options():
-    targets = [6.0, 7.0, 8.0]
-    found, _ = native("EPValve-v0", 3).reset(seed=0, options={"target_bar": targets})
-    for i, target in enumerate(targets):
-        alone, _ = valve().reset(seed=i, options={"target_bar": target})
-        np.testing.assert_array_equal(found[i], alone)
-
-
 def test_options_of_a_masked_reset_reach_the_masked_alone():
     env = native("EPValve-v0", 3, autoreset_mode="Disabled")
     before, _ = env.reset(seed=0)

@@ -7,7 +7,6 @@ from typing import Any
 import gymnasium
 import pytest
 
-import epv_env
 from epv_env.env import EPValveEnv, EPValvePWMEnv
 from epv_env.vector_env import EPValvePWMVectorEnv, EPValveVectorEnv
 from tests.env.rollouts import IDS, native
@@ -40,12 +39,6 @@ def test_an_episode_lasts_ten_seconds(identifier):
     env: Any = gymnasium.make(identifier)
     assert env.spec.max_episode_steps * env.unwrapped.settings.control_period == 10.0
     assert native(identifier, 1).max_episode_steps == env.spec.max_episode_steps
-
-
-def test_registering_again_is_harmless():
-    before = {identifier: gymnasium.spec(identifier) for identifier in IDS}
-    epv_env.register_envs()
-    assert {identifier: gymnasium.spec(identifier) for identifier in IDS} == before
 
 
 def test_ids_work_from_a_foreign_folder_without_an_import(tmp_path):

@@ -100,31 +100,6 @@ def test_a_recorded_consumption_is_drawn_as_it_was_measured():
         assert env.step(1)[-1]["consumption_g_per_s"] == pytest.approx(mean, rel=1e-6)
 
 
-def test_vector_and_single_follow_signals_alike():
-    options = {
-        "target_bar": lambda t: 8.0 + np.sin(t), "supply": 12.0, "p2_bar": 7.0,
-        "scenario": RecordedConsumption.from_samples([0.0, 0.2], [0.0, 4.0]),
-        "effects": {"eddy_current": (0.0, 0.004)},
-    }  # fmt: skip
-    batch = gymnasium.make_vec("EPValve-v0", num_envs=3, privileged=True, **options)
-    alone = [gymnasium.make("EPValve-v0", privileged=True, **options) for _ in range(3)]
-    first, infos = batch.reset(seed=5)
-    for i, env in enumerate(alone):
-        observation, info = env.reset(seed=5 + i)
-        assert np.array_equal(first[i], observation)
-        assert np.array_equal(infos["parameters"][i], info["parameters"])
-    for action in np.random.default_rng(0).integers(0, 2, size=(60, 3)):
-        seen, rewards, *_, infos = batch.step(action)
-        for i, env in enumerate(alone):
-            observation, reward, *_, info = env.step(action[i])
-            assert np.array_equal(seen[i], observation)
-            assert rewards[i] == reward
-            for key, value in info.items():
-                assert isinstance(value, np.ndarray)
-                assert np.array_equal(infos[key][i], value)
-                assert infos[f"_{key}"][i]
-
-
 def test_the_truth_belongs_to_the_observation_shown():
     for mode in ("NextStep", "SameStep"):
         env = gymnasium.make_vec(

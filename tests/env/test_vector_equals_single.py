@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
+from epv_env.signals import RecordedConsumption
 from tests.env.rollouts import (
     ENDING,
     IDS,
@@ -29,6 +30,17 @@ def test_trajectories_are_those_of_sync_vector_env(identifier, n):
     commands = actions(identifier, n, PERIODS)
     found = run(native(identifier, n, **EVERYTHING), commands, seed=n)
     assert_same(found, run(side_by_side(identifier, n, **EVERYTHING), commands, seed=n))
+
+
+def test_signals_and_effects_are_followed_alike(identifier):
+    options = {
+        "target_bar": lambda t: 8.0 + np.sin(t), "supply": 12.0, "p2_bar": 7.0, "privileged": True,
+        "scenario": RecordedConsumption.from_samples([0.0, 0.2], [0.0, 4.0]),
+        "effects": {"eddy_current": (0.0, 0.004)},
+    }  # fmt: skip
+    commands = actions(identifier, 3, PERIODS)
+    found = run(native(identifier, 3, **options), commands)
+    assert_same(found, run(side_by_side(identifier, 3, **options), commands))
 
 
 @pytest.mark.parametrize("seed", [5, [7, 1, 7], [7, 2**40, 0]])
