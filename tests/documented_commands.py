@@ -21,7 +21,6 @@ SHORT_FORMS: dict[str, str] = {
     "python -m docs.examples.research.tianshou_dqn": "tests/test_research_examples.py",
     "python -m docs.examples.research.torchrl_ppo": "tests/test_research_examples.py",
     "python -m docs.examples.pendulum": "tests/test_recorded_examples.py",
-    "python -m docs.studies.NAME.study": "tests/studies/test_common.py",
     "python -m docs.studies.reproduction.study": "tests/studies/test_reproduction.py",
     "python -m docs.studies.coverage.study": "tests/studies/test_coverage.py",
     "python docs/scripts/film.py": "tests/test_docs.py",
@@ -93,9 +92,11 @@ def recipe(target: str) -> str:
     variables = dict(re.findall(r"^(\w+) :?\??= ?(.*)$", text, re.M))
     rules = {
         name: (needs.split(), body)
-        for name, needs, body in re.findall(r"^([a-z][a-z-]*):([^#\n]*).*\n((?:\t.*\n?)*)", text, re.M)
+        for name, needs, body in re.findall(r"^([a-z][a-z-]*%?):([^#\n]*).*\n((?:\t.*\n?)*)", text, re.M)
     }
-    needs, body = rules[target]
+    study = target.removeprefix("study-")
+    needs, body = rules[target if study == target else "study-%"]
+    body = body.replace("$*", study)
     for _ in range(3):  # a variable may hold another one
         body = re.sub(r"\$\((\w+)\)", lambda found: variables.get(found[1], ""), body)
     needed = "\n".join(recipe(name) for name in needs if name in rules)

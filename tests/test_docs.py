@@ -138,8 +138,6 @@ def test_options_shown_are_those_of_the_commands(tmp_path, monkeypatch):
             r"epv .|python training/|python -m (identification|docs.(examples.tank|studies))", command
         ):
             continue
-        if "NAME" in command:
-            continue
         parser = parser_of(command)
         try:
             parser.parse_args(rest)

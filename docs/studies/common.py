@@ -1,4 +1,4 @@
-"""What the studies share: their two options, result files, and pages with generated parts.
+"""What the studies share: their two options, and pages with generated parts.
 
 A generated part of a page stands between two markers:
 
@@ -8,11 +8,9 @@ A generated part of a page stands between two markers:
 """
 
 import argparse
-import json
 import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from epv_env.common.files import write_text
 
@@ -43,22 +41,20 @@ def study_parser(description: str, folder: Path) -> argparse.ArgumentParser:
 def study_options(
     parser: argparse.ArgumentParser, arguments: Sequence[str] | None = None
 ) -> argparse.Namespace:
-    """The options. Another folder than the study's gets a copy of the page, so a trial run changes
-    nothing that is published."""
+    """The options, and `work`: the folder for what is kept between runs, such as a journal.
+
+    Another folder than the study's gets a copy of the page: a trial run changes nothing published.
+    """
     options = parser.parse_args(arguments)
+    runs, name = ROOT / "runs", options.folder.name
     if options.out is None:
-        quick = ROOT / "runs" / f"{options.folder.name}-quick"
-        options.out = quick if options.quick else options.folder
+        options.out = runs / f"{name}-quick" if options.quick else options.folder
+    options.work = options.out if options.quick else runs / name
     options.out.mkdir(parents=True, exist_ok=True)
     page = options.folder / PAGE
     if options.out.resolve() != options.folder.resolve() and page.exists():
         shutil.copy(page, options.out / PAGE)
     return options
-
-
-def write_result(path: Path, result: Mapping[str, Any]) -> None:
-    """Write a study's result file as JSON, whole or not at all."""
-    write_text(path, json.dumps(result, indent=1) + "\n")
 
 
 def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -67,26 +63,17 @@ def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
-def check_page(page: Path, parts: Sequence[str]) -> None:
-    """Raises ValueError if `fill` could not fill one of the parts of these names."""
-    if not page.is_file():
-        raise ValueError(f"no page {page}: give a Markdown file with generated parts")
-    text = page.read_text(encoding="utf-8")
-    for name in parts:
-        if _end(name) not in text.partition(_begin(name))[2]:
-            raise ValueError(f"{page}: put {_begin(name)} and {_end(name)} where this part belongs")
-
-
 def fill(page: Path, parts: Mapping[str, str]) -> None:
     """Write a page's generated parts, given by name; the rest of the page stays as it is.
 
-    Raises ValueError as `check_page`, before anything is written.
+    Raises ValueError for a part that the page has no markers for, before anything is written.
     """
-    check_page(page, list(parts))
     text = page.read_text(encoding="utf-8")
     for name, part in parts.items():
         before, begin, rest = text.partition(_begin(name))
         _, end, after = rest.partition(_end(name))
+        if not end:
+            raise ValueError(f"{page}: put {_begin(name)} and {_end(name)} where this part belongs")
         text = f"{before}{begin}\n{part.strip()}\n{end}{after}"
     write_text(page, text)
 

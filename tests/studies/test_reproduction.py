@@ -24,10 +24,9 @@ PUBLISHED = json.loads((FOLDER / "reproduce.json").read_text(encoding="utf-8"))
 
 
 @pytest.mark.slow
-def test_the_short_form_gives_the_published_tables(tmp_path, monkeypatch):
+def test_the_short_form_gives_the_published_tables(tmp_path):
     """All that does not depend on the number of searches is equal; the estimates agree."""
-    monkeypatch.setattr("sys.argv", ["study", "--quick", "--out", str(tmp_path)])
-    assert main() == 0
+    assert main(["--quick", "--out", str(tmp_path)]) == 0
     found = json.loads((tmp_path / "reproduce.json").read_text(encoding="utf-8"))
     for name in ("table8", "table9", "comparison"):
         assert found[name].keys() == PUBLISHED[name].keys()

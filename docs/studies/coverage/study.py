@@ -3,7 +3,7 @@
     python -m docs.studies.coverage.study
 
 writes coverage.json, coverage.png and the table of README.md. The truth of each virtual campaign is
-Table 12; its noise is its own. Finished campaigns are kept in coverage.jsonl and not repeated.
+Table 12; its noise is its own. Finished campaigns are kept in runs/coverage and not repeated.
 """
 
 import sys
@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from scipy.stats import binomtest, chi2
 from threadpoolctl import threadpool_limits
 
-from docs.studies.common import PAGE, fill, study_options, study_parser, table, write_result
+from docs.studies.common import PAGE, fill, study_options, study_parser, table
 from epv_env.common.command_line import fail_clearly
-from epv_env.common.files import Journal
+from epv_env.common.files import Journal, write_json
 from epv_env.common.results_folder import progress
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.valves import available_cores
@@ -139,18 +139,22 @@ def _squared_distance(deviation: NDArray, covariance: NDArray) -> float:
     return float(deviation @ np.linalg.solve(covariance, deviation))
 
 
-def main() -> int:
-    """Command line; returns the exit status."""
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the study; returns the exit status."""
     parser = study_parser(__doc__ or "", FOLDER)
     parser.add_argument("--campaigns", type=int, help=f"default: {CAMPAIGNS}; {QUICK} with --quick")
     parser.add_argument("--seed", type=int, default=0, help="of the campaigns' noise")
-    options = study_options(parser)
+    options = study_options(parser, arguments)
     count = options.campaigns or (QUICK if options.quick else CAMPAIGNS)
-    found = calibrated_campaigns(options.out / "coverage.jsonl", campaigns=count, seed=options.seed)
+    found = calibrated_campaigns(options.work / "coverage.jsonl", campaigns=count, seed=options.seed)
     shares = coverage(found)
-    write_result(options.out / "coverage.json", shares)
+    write_json(options.out / "coverage.json", shares)
     distance_quantiles(found).savefig(options.out / "coverage.png", dpi=100)
-    rows = [[name, *(f"{100 * value:.1f}" for value in s.values())] for name, s in shares.items()]
+    rows = [
+        [name, *(f"{100 * value:.1f}" for value in held.values())]
+        for name, held in shares.items()
+        if "interval of" not in name
+    ]
     fill(options.out / PAGE, {"coverage": table(["", "Share [%]", "low", "high"], rows)})
     return 0
 

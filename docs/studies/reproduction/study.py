@@ -15,11 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from docs.studies.common import PAGE, fill, study_options, study_parser, table, write_result
+from docs.studies.common import PAGE, fill, study_options, study_parser, table
 from docs.studies.reproduction.errata import ERRATUM, FigureCheck, error_table_checks, parameter_checks
 from docs.studies.reproduction.noise_errata import noise_checks
 from docs.studies.reproduction.sensitivity_tables import run_one_at_a_time, sensitivity_tables
 from epv_env.common.command_line import fail_clearly
+from epv_env.common.files import write_json
 from epv_env.plant.parameters import Parameters, confidence_intervals
 from identification.bench.programmes import REPORT_SUITE
 from identification.bench.session import run_bench
@@ -119,22 +120,26 @@ def _estimates(bench: Mapping[str, Any]) -> str:
 
 
 def _errata(checks: Sequence[Mapping[str, str]]) -> str:
-    rows = [[c["where"], c["printed"], c["recomputed"]] for c in checks if c["status"] == ERRATUM]
+    rows = [
+        [check["where"], check["printed"], check["recomputed"].partition(":")[0]]
+        for check in checks
+        if check["status"] == ERRATUM
+    ]
     return table(["Where", "Printed", "Recomputed"], rows)
 
 
-def main() -> int:
-    """Command line; returns the exit status."""
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the study; returns the exit status."""
     parser = study_parser(__doc__ or "", FOLDER)
     parser.add_argument("--seed", type=int, default=0, help="of the virtual bench's noise")
-    options = study_options(parser)
+    options = study_options(parser, arguments)
     campaign = run_bench(REPORT_SUITE, Parameters.calibrated(), seed=options.seed)
     starts = 1 if options.quick else STARTS
     identification = Identification(
-        campaign, options.out / "reproduce.jsonl", seed=options.seed, starts=starts
+        campaign, options.work / "reproduce.jsonl", seed=options.seed, starts=starts
     )
     results = reproduce(identification)
-    write_result(options.out / "reproduce.json", results)
+    write_json(options.out / "reproduce.json", results)
     fill(options.out / PAGE, page_parts(results))
     pictures = {
         "calibration.png": response_figure(identification.calibration.after[METHODS[0]][0]),
