@@ -156,18 +156,47 @@ StartValues = Callable[[Run], Mapping[str, float]]
 """Start values of a run, such as initial states, by variable of the FMU, in the FMU's units."""
 
 
-@dataclass(frozen=True, kw_only=True)
 class FmuSimulator:
-    """Simulator of one candidate for `BlackBoxPlant`; can be pickled for a pool of processes.
+    """Simulator of one candidate for `BlackBoxPlant`, from an FMU for co-simulation or model exchange.
 
-    Keep to processes: FMPy changes the working directory, which threads share.
+    FMI 1 to 3. Signals between two samples of an input lie on a straight line. A symbol that the FMU
+    lacks, such as the lag of a sensor, is left to a function around this one. It can be pickled for a
+    pool of processes; keep to processes, as FMPy changes the working directory, which threads share.
     """
 
-    path: Path
-    inputs: Mapping[str, str]
-    outputs: Sequence[str]
-    parameters: Mapping[str, str]
-    start_values: StartValues | None
+    def __init__(
+        self,
+        path: Path | str,
+        inputs: Mapping[str, str],
+        outputs: Sequence[str],
+        parameters: Mapping[str, str],
+        start_values: StartValues | None = None,
+    ):
+        """Read the FMU.
+
+        Args:
+            path: the FMU.
+            inputs: variable of the FMU by name of an input in `Run.inputs`.
+            outputs: variables of the FMU, one for each channel, in SI.
+            parameters: variable of the FMU by symbol of a parameter, cause or nuisance, in SI.
+            start_values: further start values of each run; None: none.
+
+        Raises:
+            ImportError: FMPy is not installed.
+            ValueError: the FMU cannot be read, or lacks a variable.
+        """
+        self.path = Path(path).resolve()
+        self.inputs, self.outputs, self.parameters = inputs, outputs, parameters
+        self.start_values = start_values
+        _, _, _, description = _unpacked(self.path)
+        known = {variable.name for variable in description.modelVariables}
+        named = (*inputs.values(), *outputs, *parameters.values())
+        missing = [name for name in named if name not in known]
+        if missing:
+            raise ValueError(
+                f"{self.path}: the FMU has no variable {', '.join(missing)}: take names from its "
+                "modelDescription.xml"
+            )
 
     def __call__(self, values: Mapping[str, float], run: Run) -> NDArray:
         """Outputs (channels, samples) of the FMU at the run's instants, in the FMU's units.
@@ -175,14 +204,14 @@ class FmuSimulator:
         values: by symbol [SI]. run: its inputs drive the FMU. Raises ArithmeticError where the FMU stops
         before the end.
         """
-        unpacked = _unpacked(self.path)
+        fmpy, call_failed, folder, description = _unpacked(self.path)
         start = dict(self.start_values(run)) if self.start_values else {}
         start |= {variable: values[symbol] for symbol, variable in self.parameters.items()}
         signals = self._signals(run)
         try:
-            found = unpacked.fmpy.simulate_fmu(
-                unpacked.folder.name,
-                model_description=unpacked.description,
+            found = fmpy.simulate_fmu(
+                folder.name,
+                model_description=description,
                 start_time=float(run.time[0]),
                 stop_time=float(run.time[-1]),
                 output_interval=float(run.time[-1] - run.time[0]) / (len(run.time) - 1),
@@ -190,7 +219,7 @@ class FmuSimulator:
                 input=signals,
                 output=list(self.outputs),
             )
-        except (unpacked.call_failed, RuntimeError) as error:  # of the FMU, of the solver CVode
+        except (call_failed, RuntimeError) as error:  # of the FMU, of the solver CVode
             raise ArithmeticError(f"{self.path}: {error}") from error
         if found["time"][-1] < 0.5 * (run.time[-2] + run.time[-1]):
             raise ArithmeticError(f"{self.path}: the FMU stopped at {found['time'][-1]:g} s")
@@ -208,57 +237,12 @@ class FmuSimulator:
         return signals
 
 
-def fmu_simulator(
-    path: Path | str,
-    inputs: Mapping[str, str],
-    outputs: Sequence[str],
-    parameters: Mapping[str, str],
-    start_values: StartValues | None = None,
-) -> FmuSimulator:
-    """A simulator for `BlackBoxPlant` from an FMU for co-simulation or model exchange (FMI 1 to 3).
-
-    Signals between two samples of an input lie on a straight line. A symbol that the FMU does not have,
-    such as the lag of a sensor, is left to a function around this one.
-
-    Args:
-        path: the FMU.
-        inputs: variable of the FMU by name of an input in `Run.inputs`.
-        outputs: variables of the FMU, one for each channel, in SI.
-        parameters: variable of the FMU by symbol of a parameter, cause or nuisance, in SI.
-        start_values: further start values of each run; None: none.
-
-    Raises:
-        ImportError: FMPy is not installed.
-        ValueError: the FMU cannot be read, or lacks a variable.
-    """
-    path = Path(path).resolve()
-    known = {variable.name for variable in _unpacked(path).description.modelVariables}
-    missing = [name for name in (*inputs.values(), *outputs, *parameters.values()) if name not in known]
-    if missing:
-        raise ValueError(
-            f"{path}: the FMU has no variable {', '.join(missing)}: take names from its "
-            "modelDescription.xml"
-        )
-    return FmuSimulator(
-        path=path, inputs=inputs, outputs=outputs, parameters=parameters, start_values=start_values
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Unpacked:
-    """An FMU on disk. FMPy has no type information."""
-
-    fmpy: Any
-    call_failed: type[Exception]
-    """What FMPy raises where a function of the FMU reports an error."""
-    folder: TemporaryDirectory
-    """Removed with this record, when the process ends."""
-    description: Any
-
-
 @cache
-def _unpacked(path: Path) -> _Unpacked:
-    """The FMU, unpacked once per process into a temporary folder."""
+def _unpacked(path: Path) -> tuple[Any, type[Exception], TemporaryDirectory, Any]:
+    """FMPy, what it raises where a function of the FMU fails, the FMU's folder and its description.
+
+    Unpacked once per process; the folder is removed when the process ends. FMPy has no types.
+    """
     try:
         fmpy = importlib.import_module("fmpy")
         call_failed = importlib.import_module("fmpy.fmi1").FMICallException
@@ -272,4 +256,4 @@ def _unpacked(path: Path) -> _Unpacked:
         description = fmpy.read_model_description(folder.name)
     except Exception as error:  # FMPy raises bare exceptions
         raise ValueError(f"{path} cannot be read as an FMU: {error}: export it again") from error
-    return _Unpacked(fmpy=fmpy, call_failed=call_failed, folder=folder, description=description)
+    return fmpy, call_failed, folder, description

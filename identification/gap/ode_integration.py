@@ -1,9 +1,4 @@
-"""Integration of plain differential equations for many candidates, with stops at thresholds.
-
-Steps are those of the classical Runge-Kutta method. A step counts only where no stage of it lies
-beyond a threshold, so that its order is kept. Otherwise it is shortened until the threshold is near
-enough to be passed in one tiny step. A state that both sides of a threshold push back slides along it,
-to first order, and exactly where it sticks.
+"""Integration of plain differential equations for many candidates.
 
 Inputs are held over each sampling period, and delayed where the plant reacts late: the mean of a delayed
 input over a sub-step is taken from the input's integral. Without a delay it is the sample itself, and it
@@ -22,6 +17,8 @@ import numpy as np
 from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
+from identification.gap.runge_kutta import advancing, together_step, workspace
+
 STEP_ERROR = 0.05
 """Largest change of a reading by halving the sub-steps [noise deviations]: far below what the readings
 can show."""
@@ -29,17 +26,6 @@ can show."""
 MOST_STEPS = 256
 """Most sub-steps in a sampling period that are tried; a model that needs more is stiff, and an explicit
 method is the wrong one for it."""
-
-APPROACH_FACTOR = 8.0
-"""By what a sub-step is divided when it would pass a threshold; computing time only."""
-
-SHORTEST_STEP = 1e-8
-"""Sub-step at which a threshold is passed, relative to the ordinary sub-step [1]: a threshold is located
-to this accuracy, well above rounding."""
-
-MOST_EVENT_STEPS = 600
-"""Most steps within one sub-step near thresholds; ten crossings in one sub-step fit in."""
-
 
 TIME = "t"
 """Field of the inputs that holds the time since the start of the run [s]."""
@@ -119,131 +105,6 @@ def delayed_means(total: NDArray, since: NDArray, length: float) -> NDArray:
         k = np.clip(np.floor(end).astype(int), 0, len(total) - 2)
         values.append(total[k, lanes] + (end - k) * (total[k + 1, lanes] - total[k, lanes]))
     return (values[1] - values[0]) / length
-
-
-def advancing(rate: Callable, thresholds: Callable, count: int, wrap: Callable) -> Callable:
-    """A function (x, t, h, u, p, push, work) that advances one candidate's states x (states,) by h [s].
-
-    push: forcing of the rates, (states,). work: scratch of `workspace`, (rows, states).
-
-    Args:
-        rate: derivatives of the states, as `Records.flat` makes it.
-        thresholds: functions whose change of sign marks a threshold, likewise.
-        count: number of thresholds.
-        wrap: compiles a function, or leaves it as it is.
-    """
-
-    @wrap
-    def slope(x, t, u, p, push, out):
-        rate(x, t, u, p, out)
-        for i in range(len(x)):
-            out[i] += push[i]
-
-    @wrap
-    def passed(x, t, u, p, before, level):
-        """Index of a threshold that lies between x and where `before` was taken; -1 for none."""
-        if count > 0:
-            thresholds(x, t, u, p, level)
-            for i in range(count):
-                if before[i] * level[i] < 0.0:
-                    return i
-        return -1
-
-    @wrap
-    def try_step(x, t, h, u, p, push, before, level, work):
-        """A step into work[5]; returns whether no stage has passed a threshold."""
-        slope(x, t, u, p, push, work[0])
-        for stage in range(1, 4):
-            part = h if stage == 3 else 0.5 * h
-            for i in range(len(x)):
-                work[4, i] = x[i] + part * work[stage - 1, i]
-            if passed(work[4], t + part, u, p, before, level) >= 0:
-                return False
-            slope(work[4], t + part, u, p, push, work[stage])
-        for i in range(len(x)):
-            inner = work[0, i] + 2.0 * work[1, i] + 2.0 * work[2, i] + work[3, i]
-            work[5, i] = x[i] + h / 6.0 * inner
-        return passed(work[5], t + h, u, p, before, level) < 0
-
-    @wrap
-    def pass_threshold(x, t, tiny, left, u, p, push, before, level, work):
-        """Pass a threshold by a tiny step, or stay on it where both sides push back (Filippov)."""
-        slope(x, t, u, p, push, work[0])
-        work[4] = x + tiny * work[0]
-        i = passed(work[4], t, u, p, before, level)
-        if i >= 0:
-            old, new = before[i], level[i]
-            slope(work[4], t, u, p, push, work[1])
-            work[5] = work[4] + tiny * work[1]
-            thresholds(work[5], t, u, p, level)
-            if new * level[i] < 0.0:
-                share = (new - old) / ((new - old) - (level[i] - new))
-                x += left * (work[0] + share * (work[1] - work[0]))
-                return True
-        x[:] = work[4]
-        return False
-
-    @wrap
-    def advance_past_thresholds(x, t, h, u, p, push, work):
-        tiny, left, size = SHORTEST_STEP * h, h, h
-        before, level = np.empty(count), np.empty(count)
-        thresholds(x, t, u, p, before)
-        if np.any(before == 0.0):
-            # On a threshold the sign is open: the rate decides to which side the state leaves it.
-            slope(x, t, u, p, push, work[0])
-            x += tiny * work[0]
-            thresholds(x, t, u, p, before)
-        for _ in range(MOST_EVENT_STEPS):
-            size = min(size, left)
-            if try_step(x, t, size, u, p, push, before, level, work):
-                x[:] = work[5]
-                t, left = t + size, left - size
-            elif size > tiny:
-                size = max(size / APPROACH_FACTOR, tiny)
-                continue
-            elif pass_threshold(x, t, tiny, left, u, p, push, before, level, work):
-                return
-            else:
-                t, left = t + tiny, left - tiny
-                size = left
-            if left <= tiny:
-                return
-            thresholds(x, t, u, p, before)
-
-    @wrap
-    def advance(x, t, h, u, p, push, work):
-        if count > 0:
-            advance_past_thresholds(x, t, h, u, p, push, work)
-        else:
-            try_step(x, t, h, u, p, push, push, push, work)
-            x[:] = work[5]
-
-    return advance
-
-
-def workspace(states: int) -> NDArray:
-    """Scratch of a step: four slopes, a stage and the end, (6, states)."""
-    return np.empty((6, states))
-
-
-def together_step(
-    rate: Callable, x: NDArray, t: float, h: float, u: NDArray, p: NDArray, push: NDArray
-) -> tuple[NDArray, list[NDArray]]:
-    """A step of many candidates: the states after h [s], (states, n), and its three stages likewise.
-
-    The arguments are those of `advancing`, with an axis of candidates.
-    """
-
-    def slope(y: NDArray, time: float) -> NDArray:
-        return rate(y, time, u, p, np.empty_like(y)) + push
-
-    k1 = slope(x, t)
-    x2 = x + 0.5 * h * k1
-    k2 = slope(x2, t + 0.5 * h)
-    x3 = x + 0.5 * h * k2
-    k3 = slope(x3, t + 0.5 * h)
-    x4 = x + h * k3
-    return x + (h / 6.0) * (k1 + 2.0 * (k2 + k3) + slope(x4, t + h)), [x2, x3, x4]
 
 
 Simulation = Callable[[Sequence["Job"]], list[tuple[NDArray, NDArray]]]

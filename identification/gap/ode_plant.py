@@ -19,92 +19,6 @@ from identification.gap.plant import (
 )
 
 
-def checked_runs(runs: Sequence[Run], channels: Sequence[Channel]) -> tuple[Run, ...]:
-    """The runs. Raises ValueError where inputs or channels differ from what the functions expect."""
-    if not runs:
-        raise ValueError("OdePlant.runs is empty: give at least one run to fit and one held out")
-    wanted = tuple(runs[0].inputs)
-    for run in runs:
-        if tuple(run.inputs) != wanted:
-            raise ValueError(
-                f"run '{run.name}' has the inputs {list(run.inputs)}, and '{runs[0].name}' has "
-                f"{list(wanted)}: give every run the same inputs in the same order"
-            )
-        if len(run.measured) != len(channels):
-            raise ValueError(
-                f"run '{run.name}' has {len(run.measured)} rows of readings for {len(channels)} "
-                "channels: give one row per channel"
-            )
-    return tuple(runs)
-
-
-def nominal_values(
-    parameters: Sequence[FreeParameter],
-    causes: Sequence[Cause],
-    nuisances: Sequence[NuisanceParameter],
-) -> dict[str, float]:
-    """Value of every symbol in the nominal model [SI]. Raises ValueError where two claims differ."""
-    free = [*parameters, *(p for cause in causes for p in cause.parameters)]
-    own = [*nuisances, *(p for cause in causes for p in cause.run_parameters)]
-    claims = [(p.symbol, p.nominal) for p in free] + [(p.symbol, p.centre) for p in own]
-    values: dict[str, float] = {}
-    for symbol, value in claims:
-        if values.setdefault(symbol, value) != value:
-            raise ValueError(
-                f"symbol '{symbol}' has the nominal values {values[symbol]:g} and {value:g}: give it "
-                "one value, or two symbols"
-            )
-    return values
-
-
-def checked_names(records: Records, given: Mapping[str, Mapping[str, Any] | None]) -> None:
-    """Raises ValueError where a member by state has a name that is no state."""
-    for member, by_state in given.items():
-        for name in by_state or {}:
-            if name not in records.states:
-                raise ValueError(
-                    f"{member} has '{name}', which is none of the states {list(records.states)}: "
-                    "correct the name"
-                )
-
-
-def probe(
-    plant: Any,
-    records: Records,
-    rate: Callable,
-    readings: Callable,
-    thresholds: Callable | None,
-    delays: Mapping[str, str],
-) -> int:
-    """Number of thresholds. Raises ValueError where a function's results or a name do not fit."""
-    if TIME in records.inputs:
-        raise ValueError(f"input '{TIME}' has the name of the time in seconds: rename the input")
-    for name, symbol in delays.items():
-        if name not in records.inputs or symbol not in records.symbols:
-            raise ValueError(
-                f"delays: '{name}': '{symbol}' is no pair of an input {list(records.inputs)} and a "
-                f"symbol {list(records.symbols)}: correct the names"
-            )
-    run = plant.runs[0]
-    p = records.p(*plant.nominal.values())
-    u = records.u(0.0, *(float(signal[0]) for signal in run.inputs.values()))
-    begun = _counted("start", plant._start(run, p), len(records.states), "state")
-    x = records.x(*(float(value) for value in begun))
-    _counted("rate", rate(x, u, p), len(records.states), "state")
-    _counted("readings", readings(x, u, p), len(plant.channels), "channel")
-    return len(thresholds(x, u, p)) if thresholds else 0
-
-
-def _counted(name: str, results: Any, count: int, kind: str) -> Any:
-    if not hasattr(results, "__len__") or len(results) != count:
-        found = len(results) if hasattr(results, "__len__") else "a number instead of"
-        raise ValueError(
-            f"OdePlant: {name} gives {found} results for {count} {kind}(s): return a tuple with one "
-            f"value per {kind}, as in `return (first,)`"
-        )
-    return results
-
-
 class OdePlant:
     """`GreyBox` for a user's functions of records: `x.v` a state, `u.force` an input, `p.mass` a symbol.
 
@@ -164,17 +78,18 @@ class OdePlant:
         Raises:
             ValueError: for names, numbers of results or a mode that do not fit.
         """
-        self.runs, self.channels = checked_runs(runs, channels), tuple(channels)
+        self.runs, self.channels = tuple(runs), tuple(channels)
+        inputs = _shared_inputs(self.runs)
         self.parameters, self.causes = tuple(parameters), tuple(causes)
         self.run_offsets, self.tolerances = tuple(run_offsets), tuple(tolerances)
-        self.nominal = nominal_values(parameters, causes, (*run_offsets, *tolerances))
-        self._records = Records(states, tuple(self.runs[0].inputs), tuple(self.nominal))
+        self.nominal = _nominal_values(parameters, causes, (*run_offsets, *tolerances))
+        self._records = Records(states, inputs, tuple(self.nominal))
         self._start, self._regimes, self._mode = start, regimes, mode
         self._delays = dict(delays or {})
-        self._units = dict.fromkeys((*states, *self.runs[0].inputs), ("", 1.0)) | dict(units or {})
-        checked_names(self._records, {"components": components, "forcing_steps": forcing_steps})
+        self._units = dict.fromkeys((*states, *inputs), ("", 1.0)) | dict(units or {})
         self.equations = self._state_equations(components or {}, forcing_steps or {})
-        count = probe(self, self._records, rate, readings, thresholds, self._delays)
+        self._check_names({"components": components, "forcing_steps": forcing_steps})
+        count = self._thresholds(rate, readings, thresholds)
         none = thresholds or (lambda x, u, p: ())
         functions = (rate, len(states)), (readings, len(channels)), (none, count)
         self._simulate = simulator(self._records, functions, mode)
@@ -272,6 +187,30 @@ class OdePlant:
             for name in self._records.states
         )
 
+    def _check_names(self, by_state: Mapping[str, Mapping[str, Any] | None]) -> None:
+        """Raises ValueError for a name that is no state, no input or no symbol."""
+        names = self._records
+        for member, given in by_state.items():
+            for name in {*(given or {})} - {*names.states}:
+                raise ValueError(f"{member} has '{name}', which is none of the states {names.states}")
+        for name, symbol in self._delays.items():
+            if name not in names.inputs or symbol not in names.symbols:
+                raise ValueError(
+                    f"delays: '{name}': '{symbol}' is no pair of an input {names.inputs} and a symbol "
+                    f"{names.symbols}: correct the names"
+                )
+
+    def _thresholds(self, rate: Callable, readings: Callable, thresholds: Callable | None) -> int:
+        """Number of thresholds. Raises ValueError where a function has another number of results."""
+        names, run = self._records, self.runs[0]
+        p = names.p(*self.nominal.values())
+        u = names.u(0.0, *(float(signal[0]) for signal in run.inputs.values()))
+        begun = _counted("start", self._start(run, p), len(names.states), "state")
+        x = names.x(*(float(value) for value in begun))
+        _counted("rate", rate(x, u, p), len(names.states), "state")
+        _counted("readings", readings(x, u, p), len(self.channels), "channel")
+        return len(thresholds(x, u, p)) if thresholds else 0
+
     def _settled(self) -> int:
         """Sub-steps whose halving changes no reading noticeably, nominal or at a trial of a cause."""
         trials = [
@@ -293,3 +232,47 @@ class OdePlant:
 
 def _first(values: Mapping[str, NDArray]) -> dict[str, NDArray]:
     return {symbol: np.asarray(v)[:1] for symbol, v in values.items()}
+
+
+def _shared_inputs(runs: Sequence[Run]) -> tuple[str, ...]:
+    """Names of the inputs. Raises ValueError where runs differ in them."""
+    if not runs:
+        raise ValueError("OdePlant.runs is empty: give at least one run to fit and one held out")
+    wanted = tuple(runs[0].inputs)
+    for run in runs:
+        if tuple(run.inputs) != wanted:
+            raise ValueError(
+                f"run '{run.name}' has the inputs {tuple(run.inputs)}, '{runs[0].name}' has {wanted}: "
+                "give every run the same inputs in the same order"
+            )
+    if TIME in wanted:
+        raise ValueError(f"input '{TIME}' has the name of the time in seconds: rename the input")
+    return wanted
+
+
+def _nominal_values(
+    parameters: Sequence[FreeParameter],
+    causes: Sequence[Cause],
+    nuisances: Sequence[NuisanceParameter],
+) -> dict[str, float]:
+    """Value of every symbol in the nominal model [SI]. Raises ValueError where two claims differ."""
+    free = [*parameters, *(p for cause in causes for p in cause.parameters)]
+    own = [*nuisances, *(p for cause in causes for p in cause.run_parameters)]
+    values: dict[str, float] = {}
+    for symbol, value in [*((p.symbol, p.nominal) for p in free), *((p.symbol, p.centre) for p in own)]:
+        if values.setdefault(symbol, value) != value:
+            raise ValueError(
+                f"symbol '{symbol}' has the nominal values {values[symbol]:g} and {value:g}: give it "
+                "one value, or two symbols"
+            )
+    return values
+
+
+def _counted(name: str, results: Any, count: int, kind: str) -> Any:
+    if not hasattr(results, "__len__") or len(results) != count:
+        found = len(results) if hasattr(results, "__len__") else "a number instead of"
+        raise ValueError(
+            f"OdePlant: {name} gives {found} results for {count} {kind}(s): return a tuple with one "
+            f"value per {kind}, as in `return (first,)`"
+        )
+    return results

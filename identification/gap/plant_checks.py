@@ -10,23 +10,14 @@ from numpy.typing import NDArray
 
 from identification.gap.plant import (
     Cause,
-    Channel,
     FreeParameter,
     GreyBox,
-    NuisanceParameter,
     PlantError,
     Run,
 )
 
-MEMBERS = (
-    "channels", "runs", "parameters", "causes", "tolerances", "run_offsets", "outputs", "equations",
-    "states", "regimes", "forced",
-)  # fmt: skip
-"""Members of `GreyBox`."""
-
 UNEVEN_PERIOD = 0.01
-"""Largest deviation of a sampling instant from a uniform course [sampling periods]: rounding of a
-logger's clock."""
+"""Largest deviation from uniform sampling [sampling periods]: rounding of a logger's clock."""
 
 TRIAL_STEP = 0.05
 """Change of a calibrated parameter that must show in the outputs, as a share of its range [1]: far
@@ -40,8 +31,7 @@ SIDE_BY_SIDE_ERROR = 1e-3
 magnitude [1]: a solver whose steps candidates share differs by less, mixed-up candidates by more."""
 
 ALIKE = 0.999
-"""Correlation of the changes by two calibrated parameters from which they act alike [1]: recordings then
-determine one number for both."""
+"""Correlation of the changes by two parameters [1] from which recordings determine one number only."""
 
 
 def check(plant: GreyBox) -> list[str]:
@@ -56,22 +46,13 @@ def check(plant: GreyBox) -> list[str]:
     Raises:
         PlantError: every finding is one line that names the member, the rule and the remedy.
     """
-    _refuse(
-        f"{name}: the plant has no such member: add it as identification/gap/plant.py describes"
-        for name in MEMBERS
-        if not hasattr(plant, name)
-    )
     _refuse([*_recording_faults(plant), *_number_faults(plant), *_symbol_faults(plant)])
-    alone = _simulated(plant, [{}])
-    _refuse(_nominal_faults(plant, alone))
-    beside = _simulated(plant, [{}, next(iter(_trials(plant).values()))])
-    _refuse(_mixing_faults(plant, alone, beside))
+    _refuse(_output_faults(plant))
     _refuse(_shape_faults(plant))
     return _effect_warnings(plant)
 
 
 def _refuse(faults: Iterable[str]) -> None:
-    """Raise an error with all faults, if there are any."""
     lines = list(faults)
     if lines:
         raise PlantError("\n".join(lines))
@@ -81,37 +62,21 @@ def _repeated(names: Iterable[str]) -> list[str]:
     return [name for name, count in Counter(names).items() if count > 1]
 
 
-def _positive(number: float) -> bool:
-    return isfinite(number) and number > 0
-
-
 def _recording_faults(plant: GreyBox) -> Iterator[str]:
     if not plant.channels:
         yield "channels: there is none, but a gap is seen in measured outputs: give one or more"
     for name in _repeated(channel.name for channel in plant.channels):
         yield f"channels: two are named {name}, but results are listed by name: rename one"
-    for channel in plant.channels:
-        yield from _channel_faults(channel)
     if not plant.runs:
         yield "runs: there is none: give two or more, one of them with held_out=True"
-    for held_out, word, use in ((True, "held-out", "a gap is judged"), (False, "fitted", "a fit rests")):
+    for held_out, word, use in ((True, "held out", "a gap is judged"), (False, "fitted", "a fit rests")):
         own = [run for run in plant.runs if run.held_out == held_out]
         if plant.runs and not own:
             yield f"runs: no run is {word}, but {use} on such runs: set held_out={held_out} in one"
         elif own and not any(np.any(run.trusted) for run in own):
-            yield f"runs: no reading of a {word} run is trusted: set `trusted` where readings count"
+            yield f"runs: no reading of the runs that are {word} is trusted: set it where they count"
     for run in plant.runs:
         yield from _run_faults(plant, run)
-
-
-def _channel_faults(channel: Channel) -> Iterator[str]:
-    member = f"channels, {channel.name}"
-    if channel.noise is not None and not _positive(channel.noise):
-        yield f"{member}: noise {channel.noise:g} is not positive: leave it out where it is not known"
-    if not (isfinite(channel.resolution) and channel.resolution >= 0):
-        yield f"{member}: resolution {channel.resolution:g} is no step: give a positive one, or 0"
-    if not _positive(channel.scale):
-        yield f"{member}: scale {channel.scale:g} is not positive: give the size of the unit in SI"
 
 
 def _run_faults(plant: GreyBox, run: Run) -> Iterator[str]:
@@ -120,7 +85,10 @@ def _run_faults(plant: GreyBox, run: Run) -> Iterator[str]:
         shape = np.shape(run.time)
         yield f"{member}: time has the shape {shape}: record three samples or more, or leave the run out"
         return
-    yield from _time_faults(member, run.time)
+    uniform, step = np.linspace(run.time[0], run.time[-1], samples, retstep=True)
+    late = np.abs(run.time - uniform) > UNEVEN_PERIOD * step
+    if np.any(late):
+        yield f"{member}: time does not rise uniformly at sample {int(np.argmax(late))}: resample it"
     expected = len(plant.channels), samples
     shapes = {"measured": np.shape(run.measured), "trusted": np.shape(run.trusted)}
     for name, shape in shapes.items():
@@ -130,10 +98,8 @@ def _run_faults(plant: GreyBox, run: Run) -> Iterator[str]:
         yield f"{member}: trusted is no boolean array: convert it with astype(bool)"
     elif set(shapes.values()) == {expected}:
         for c, i in np.argwhere(run.trusted & ~np.isfinite(run.measured))[:1]:
-            yield (
-                f"{member}: channel {plant.channels[c].name} is not finite at sample {i}, but trusted "
-                "there: set trusted to False where a reading is missing"
-            )
+            name = plant.channels[c].name
+            yield f"{member}: channel {name} is not finite at sample {i}: set trusted to False there"
     for name, signal in run.inputs.items():
         if np.shape(signal) != (samples,):
             yield f"{member}: input {name} has the shape {np.shape(signal)}, not ({samples},)"
@@ -142,73 +108,58 @@ def _run_faults(plant: GreyBox, run: Run) -> Iterator[str]:
             yield f"{member}: input {name} is not finite at sample {first}: fill the gap or cut the run"
 
 
-def _time_faults(member: str, time: NDArray) -> Iterator[str]:
-    rising = np.diff(time) > 0
-    if not np.all(rising):
-        first = int(np.argmin(rising))
-        yield f"{member}: time does not rise from sample {first} to {first + 1}: sort or cut the run"
-        return
-    period = (time[-1] - time[0]) / (len(time) - 1)
-    late = np.abs(time - np.linspace(time[0], time[-1], len(time))) > UNEVEN_PERIOD * period
-    if np.any(late):
-        yield (
-            f"{member}: time is not uniform: sample {int(np.argmax(late))} is off the period of "
-            f"{period:.6g} s: resample the run, or let samples that a channel lacks be untrusted"
-        )
-
-
 def _number_faults(plant: GreyBox) -> Iterator[str]:
-    """Numbers of parameters, causes, nuisances and equations that no search can use."""
+    """Numbers of channels, parameters, causes, nuisances and equations that no search can use."""
+    for place, name, value in _positive_numbers(plant):
+        if not (isfinite(value) and value > 0):
+            yield f"{place}: {name} {value:g} is not positive: correct it, or leave it out"
+    for channel in plant.channels:
+        if not (isfinite(channel.resolution) and channel.resolution >= 0):
+            yield f"channels, {channel.name}: resolution {channel.resolution:g} is no step: give 0"
+    for equation in plant.equations:
+        if not (isfinite(equation.step) and equation.step >= 0):
+            yield f"equations, {equation.name}: step {equation.step:g} is negative: give 0 or more"
     if not plant.parameters and not plant.causes:
         yield "parameters, causes: both are empty, so nothing can be fitted: give one parameter or cause"
     for p in plant.parameters:
-        yield from _range_faults(f"parameters, {p.symbol}", p, [("nominal", p.nominal)])
+        yield from _range_faults(f"parameters, {p.symbol}", p, "nominal", [p.nominal])
     for cause in plant.causes:
-        member = f"causes, {cause.label}"
         if not cause.parameters:
-            yield f"{member}: it has no parameters, so nothing can be fitted: give it a size"
-        if not _positive(cause.prior):
-            yield f"{member}: prior {cause.prior:g} is not positive: give 1, or leave the cause out"
+            yield f"causes, {cause.label}: it has no parameters, so nothing can be fitted: give a size"
         for p in cause.parameters:
-            place = f"{member}, {p.symbol}"
-            yield from _range_faults(place, p, [("trial", t) for t in p.trials])
+            place = f"causes, {cause.label}, {p.symbol}"
+            yield from _range_faults(place, p, "trial", p.trials)
             if not p.trials:
                 yield f"{place}: it has no trials, but the search begins there: give one value or more"
             if p.nominal in p.trials:
                 yield f"{place}: trial {p.nominal:g} is the nominal value, where no cause acts"
-        yield from _nuisance_faults(member, cause.run_parameters)
-    yield from _nuisance_faults("tolerances", plant.tolerances)
-    yield from _nuisance_faults("run_offsets", plant.run_offsets)
-    for equation in plant.equations:
-        if not (isfinite(equation.step) and equation.step >= 0):
-            yield (
-                f"equations, {equation.name}: step {equation.step:g} is negative: give a positive "
-                "forcing, or 0 for an equation that lacks nothing"
-            )
 
 
-def _range_faults(place: str, p: FreeParameter, starts: Sequence[tuple[str, float]]) -> Iterator[str]:
-    """starts: what lies in the range, such as a trial, and its value [SI]."""
+def _positive_numbers(plant: GreyBox) -> Iterator[tuple[str, str, float]]:
+    """Where it stands, its name, and its value."""
+    for channel in plant.channels:
+        yield f"channels, {channel.name}", "scale", channel.scale
+        if channel.noise is not None:
+            yield f"channels, {channel.name}", "noise", channel.noise
+    for p in plant.parameters:
+        yield f"parameters, {p.symbol}", "scale", p.scale
+    for cause in plant.causes:
+        yield f"causes, {cause.label}", "prior", cause.prior
+        yield from ((f"causes, {cause.label}, {p.symbol}", "scale", p.scale) for p in cause.parameters)
+    nuisances = {"tolerances": plant.tolerances, "run_offsets": plant.run_offsets}
+    nuisances |= {f"causes, {cause.label}": cause.run_parameters for cause in plant.causes}
+    for member, own in nuisances.items():
+        for nuisance in own:
+            yield f"{member}, {nuisance.symbol}", "sd", nuisance.sd
+            yield f"{member}, {nuisance.symbol}", "step", nuisance.step
+
+
+def _range_faults(place: str, p: FreeParameter, name: str, starts: Sequence[float]) -> Iterator[str]:
     if not (isfinite(p.low) and isfinite(p.high) and p.low < p.high):
         yield f"{place}: low {p.low:g} and high {p.high:g} are no range: give low below high"
-    if not _positive(p.scale):
-        yield f"{place}: scale {p.scale:g} is not positive: leave it out, or give a usual size"
-    for name, value in starts:
+    for value in starts:
         if not p.low <= value <= p.high:
-            yield (
-                f"{place}: {name} {value:g} lies outside {p.low:g} to {p.high:g}, but the search begins "
-                "there: widen the range or correct the value"
-            )
-
-
-def _nuisance_faults(member: str, nuisances: Sequence[NuisanceParameter]) -> Iterator[str]:
-    for nuisance in nuisances:
-        for name, value in (("sd", nuisance.sd), ("step", nuisance.step)):
-            if not _positive(value):
-                yield (
-                    f"{member}, {nuisance.symbol}: {name} {value:g} is not positive: give a positive "
-                    "one, or leave it out"
-                )
+            yield f"{place}: {name} {value:g} lies outside {p.low:g} to {p.high:g}: widen the range"
 
 
 def _symbol_faults(plant: GreyBox) -> Iterator[str]:
@@ -216,10 +167,8 @@ def _symbol_faults(plant: GreyBox) -> Iterator[str]:
     calibrated = [p.symbol for p in plant.parameters]
     offsets = [n.symbol for n in plant.run_offsets]
     tolerances = [n.symbol for n in plant.tolerances]
-    labels = [cause.label for cause in plant.causes]
-    members = {
-        "parameters": calibrated, "tolerances": tolerances, "run_offsets": offsets, "causes": labels
-    }  # fmt: skip
+    members = {"parameters": calibrated, "tolerances": tolerances, "run_offsets": offsets}
+    members |= {"causes": [cause.label for cause in plant.causes]}
     members |= {f"causes, {cause.label}": _symbols(cause) for cause in plant.causes}
     for member, symbols in members.items():
         for symbol in _repeated(symbols):
@@ -229,16 +178,10 @@ def _symbol_faults(plant: GreyBox) -> Iterator[str]:
             yield f"{other}, {symbol}: it is one of `{one}` as well: strike one of them"
     for cause in plant.causes:
         for symbol in sorted({*_symbols(cause)} & {*calibrated, *offsets}):
-            yield (
-                f"causes, {cause.label}: {symbol} is a calibrated parameter or a run offset as well: "
-                "give the cause a symbol of its own"
-            )
+            yield f"causes, {cause.label}: {symbol} is a parameter or run offset too: rename one"
     for one, other in combinations(plant.causes, 2):
         for symbol in sorted({*_symbols(one)} & {*_symbols(other)} if one.name != other.name else ()):
-            yield (
-                f"causes, {one.label} and {other.label}: both have {symbol}: give each its own symbol, "
-                "or make them variants of one name"
-            )
+            yield f"causes, {one.label} and {other.label}: both have {symbol}: rename one"
 
 
 def _symbols(cause: Cause) -> list[str]:
@@ -260,10 +203,9 @@ def _trials(plant: GreyBox) -> dict[str, dict[str, float]]:
 def _side_by_side(
     plant: GreyBox, changes: Sequence[Mapping[str, float]], *, all_symbols: bool = False
 ) -> dict[str, NDArray]:
-    """Values (n,) [SI] by symbol of n candidates.
+    """Values (n,) [SI] by symbol of n candidates, of each of which `changes` is not nominal.
 
-    changes: what of each of them is not nominal [SI]. all_symbols: whether causes that do not act are
-    given with their nominal values, or left out.
+    all_symbols: whether causes that do not act are given with their nominal values, or left out.
     """
     sizes = [p for cause in plant.causes for p in cause.parameters]
     nominal = {p.symbol: p.nominal for p in (*sizes, *plant.parameters)}
@@ -294,23 +236,22 @@ def _simulated(plant: GreyBox, changes: Sequence[Mapping[str, float]]) -> list[N
     return outputs
 
 
-def _nominal_faults(plant: GreyBox, outputs: Sequence[NDArray]) -> Iterator[str]:
-    for run, output in zip(plant.runs, outputs, strict=True):
-        for c, i in np.argwhere(run.trusted & ~np.isfinite(output[..., 0]))[:1]:
-            yield (
-                f"outputs: run {run.name}, channel {plant.channels[c].name} is not finite at sample {i} "
-                "at the nominal values: correct the model or the values, or leave the run out"
-            )
-
-
-def _mixing_faults(plant: GreyBox, alone: Sequence[NDArray], beside: Sequence[NDArray]) -> Iterator[str]:
+def _output_faults(plant: GreyBox) -> Iterator[str]:
+    """Runs that the nominal candidate cannot simulate, or that depend on the candidate beside it."""
+    alone, beside = _simulated(plant, [{}]), _simulated(plant, [{}, next(iter(_trials(plant).values()))])
     for run, one, two in zip(plant.runs, alone, beside, strict=True):
+        wrong = np.argwhere(run.trusted & ~np.isfinite(one[..., 0]))
         error = np.abs(two[..., 0] - one[..., 0]) / _magnitudes(one)[:, None]
-        if np.any(run.trusted & ~(error <= SIDE_BY_SIDE_ERROR)):
+        if len(wrong):
+            channel, sample = plant.channels[wrong[0, 0]].name, wrong[0, 1]
             yield (
-                f"outputs: run {run.name} of the nominal candidate changes when another candidate is "
-                "simulated beside it, or a cause is given its nominal value: keep candidates apart "
-                "along the last axis, and let no cause act at its nominal value"
+                f"outputs: run {run.name}, channel {channel} is not finite at sample {sample} at the "
+                "nominal values: correct the model or the values, or leave the run out"
+            )
+        elif np.any(run.trusted & ~(error <= SIDE_BY_SIDE_ERROR)):
+            yield (
+                f"outputs: run {run.name} of the nominal candidate changes beside another one: keep "
+                "candidates apart along the last axis, and let no cause act at its nominal value"
             )
 
 
@@ -328,14 +269,9 @@ def _shape_faults(plant: GreyBox) -> Iterator[str]:
     edges = np.array([0, (samples - 1) // 2, samples - 1])
     expected = len(plant.channels), samples, len(edges) - 1
     for equation in plant.equations:
-        if not equation.step:
-            continue
-        shape = np.shape(plant.forced(values, equation, run, edges))
+        shape = np.shape(plant.forced(values, equation, run, edges)) if equation.step else expected
         if shape != expected:
-            yield (
-                f"forced: equation {equation.name} has the shape {shape}, not (channels, samples, "
-                f"windows) = {expected}: return the change of the outputs for each window"
-            )
+            yield f"forced: equation {equation.name} has the shape {shape}, not {expected}"
 
 
 def _magnitudes(outputs: NDArray) -> NDArray:
@@ -345,10 +281,7 @@ def _magnitudes(outputs: NDArray) -> NDArray:
 
 
 def _effect_warnings(plant: GreyBox) -> list[str]:
-    """Sentences on parameters and causes without effect, and on calibrated parameters that act alike.
-
-    Runs are simulated, the shortest first, until nothing is in doubt.
-    """
+    """What has no effect or acts alike; runs are simulated, the shortest first, while in doubt."""
     trials = _trials(plant)
     members, calibrated = list(trials), np.arange(len(trials)) < len(plant.parameters)
     seen = np.zeros(len(trials), dtype=bool)
@@ -383,10 +316,7 @@ def _changes(plant: GreyBox, tried: Sequence[Mapping[str, float]], run: int) -> 
 
 
 def _alike(gram: NDArray, calibrated: NDArray) -> NDArray:
-    """Pairs of calibrated parameters whose changes correlate, boolean (trials, trials).
-
-    gram: products of the changes, (trials, trials). calibrated: boolean (trials,).
-    """
+    """Pairs of calibrated parameters whose changes correlate, boolean (trials, trials)."""
     size = np.sqrt(np.diag(gram))
     counts = calibrated & (size > 0)
     correlation = np.abs(gram) / np.maximum(np.outer(size, size), np.finfo(float).tiny)

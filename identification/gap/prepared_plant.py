@@ -91,9 +91,16 @@ def _from_differences(series: Sequence[NDArray], order: int) -> float:
     if not blocks:
         return float("nan")
     freedom = min(len(block) for block in blocks) / _correlated_readings(order)
-    # The median of a chi-square variable over its mean (Wilson and Hilferty 1931).
-    median_to_mean = (1.0 - 2.0 / (9.0 * max(freedom, 1.0))) ** 3
-    return float(np.sqrt(np.median([np.mean(block**2) for block in blocks]) / median_to_mean))
+    return noise_of_blocks([float(np.mean(block**2)) for block in blocks], max(freedom, 1.0))
+
+
+def noise_of_blocks(variances: NDArray | Sequence[float], freedom: float) -> float:
+    """Standard deviation of white noise from its variance in blocks of readings, a few of them lively.
+
+    variances: (blocks,). freedom: independent values in a block. The median of a chi-square variable
+    becomes its mean (Wilson and Hilferty 1931).
+    """
+    return float(np.sqrt(np.median(variances) / (1.0 - 2.0 / (9.0 * freedom)) ** 3))
 
 
 def _blocks(differences: NDArray, length: int) -> list[NDArray]:

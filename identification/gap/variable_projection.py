@@ -5,7 +5,7 @@ problem. Eliminating them from the normal equations leaves equations in the para
 (Golub and Pereyra 1973; Schur complement).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -181,22 +181,14 @@ class NormalEquations:
 
 
 def normal_equations(runs: Sequence[LinearisedRun]) -> NormalEquations:
-    """Normal equations of several runs together.
-
-    Args:
-        runs: the same hypothesis linearised in each of them.
-    """
-    products = [run_products(run) for run in runs]
-    return equations_of(products, runs[0].slopes.shape[1])
+    """Normal equations of several runs together: the same hypothesis linearised in each of them."""
+    columns = [_columns(run) for run in runs]
+    products = [_with_priors(own.T @ own, run) for own, run in zip(columns, runs, strict=True)]
+    return _equations(products, runs[0].slopes.shape[1])
 
 
-def equations_of(products: Sequence[RunProducts], k: int) -> NormalEquations:
-    """Normal equations from the products of several runs.
-
-    Args:
-        products: of each run, the same k slopes in all.
-        k: number of parameters.
-    """
+def _equations(products: Sequence[RunProducts], k: int) -> NormalEquations:
+    """Normal equations in k slopes from the products of several runs."""
     m = products[0].gram.shape[0] - len(products[0].bound) - 1 - k
     gram = _together(products, k, [np.full(len(run.bound), np.nan) for run in products])
     free = _eliminated(gram, np.arange(1 + k, 1 + k + m), np.arange(1 + k))
@@ -307,24 +299,13 @@ def _eliminated(gram: NDArray, columns: NDArray, kept: NDArray) -> NDArray:
     return gram[np.ix_(kept, kept)] - cross.T @ np.linalg.solve(own, cross)
 
 
-def run_products(run: LinearisedRun) -> RunProducts:
-    """Products of a run's columns."""
-    columns = columns_of(run)
-    return with_priors(columns.T @ columns, run)
-
-
-def columns_of(run: LinearisedRun) -> NDArray:
+def _columns(run: LinearisedRun) -> NDArray:
     """Residual, slopes, tolerance slopes and slopes of run nuisances (values, 1 + k + m + l)."""
     return np.column_stack([run.residual, run.slopes, run.tolerance_slopes, run.run_slopes])
 
 
-def with_priors(gram: NDArray, run: LinearisedRun) -> RunProducts:
-    """Products with the priors of the run nuisances.
-
-    Args:
-        gram: of the columns, those of the run nuisances last, (1 + k + m + l, 1 + k + m + l) [1].
-        run: whose nuisances these are.
-    """
+def _with_priors(gram: NDArray, run: LinearisedRun) -> RunProducts:
+    """Products of a run's columns, those of the run nuisances last, with these nuisances' priors."""
     own = len(run.run_sd)
     if own:
         nuisances = np.arange(len(gram) - own, len(gram))
@@ -334,62 +315,45 @@ def with_priors(gram: NDArray, run: LinearisedRun) -> RunProducts:
     return RunProducts(gram=gram, bound=LARGEST_DEVIATION * run.run_sd)
 
 
-class ChangedRun:
-    """Products of a linearised run's columns with n changes of its outputs."""
-
-    def __init__(self, run: LinearisedRun, changes: Sequence[NDArray]):
-        """Multiply each change by the columns once.
-
-        Args:
-            run: the linearised run.
-            changes: n changes of the outputs, (values,) each [noise deviations].
-        """
-        self.run = run
-        columns, table = columns_of(run), np.array(changes)
-        self._gram = columns.T @ columns
-        self._cross = table @ columns
-        self._squares = np.einsum("ij,ij->i", table, table)
-
-    def explained(self, change: int) -> RunProducts:
-        """The products after one change has been added to the model's outputs."""
-        gram, cross = self._gram.copy(), self._cross[change]
-        gram[0] -= cross
-        gram[:, 0] -= cross
-        gram[0, 0] += self._squares[change]
-        return with_priors(gram, self.run)
-
-    def with_slope(self, change: int) -> RunProducts:
-        """The products with one change as a further slope, after the others."""
-        place = 1 + self.run.slopes.shape[1]
-        row = np.insert(self._cross[change], place, self._squares[change])
-        gram = np.insert(np.insert(self._gram, place, 0.0, axis=0), place, 0.0, axis=1)
-        gram[place], gram[:, place] = row, row
-        return with_priors(gram, self.run)
-
-
 class ChangedRuns:
-    """Several linearised runs of one estimate, and n changes of the outputs in all of them."""
+    """Runs linearised at one estimate, and n changes of their outputs."""
 
-    def __init__(
-        self,
-        runs: Sequence[LinearisedRun],
-        changes: Sequence[Sequence[NDArray]],
-    ):
+    def __init__(self, runs: Sequence[LinearisedRun], changes: Sequence[Sequence[NDArray]]):
         """Multiply each change by the columns of its run once.
 
         Args:
             runs: the same estimate linearised in each of them.
             changes: n changes, each per run (values,) [noise deviations].
         """
+        self._runs = list(runs)
         self._slopes = runs[0].slopes.shape[1]
-        self._runs = [ChangedRun(run, [change[r] for change in changes]) for r, run in enumerate(runs)]
+        tables = [np.array([change[r] for change in changes]) for r in range(len(self._runs))]
+        columns = [_columns(run) for run in runs]
+        self._grams = [own.T @ own for own in columns]
+        self._crosses = [table @ own for table, own in zip(tables, columns, strict=True)]
+        self._squares = [np.einsum("ij,ij->i", table, table) for table in tables]
 
     def explained(self, change: int) -> NormalEquations:
         """Normal equations after one change has been added to the model's outputs."""
-        products = [run.explained(change) for run in self._runs]
-        return equations_of(products, self._slopes)
+        products = []
+        for run, own, crosses, squares in self._parts():
+            gram, cross = own.copy(), crosses[change]
+            gram[0] -= cross
+            gram[:, 0] -= cross
+            gram[0, 0] += squares[change]
+            products.append(_with_priors(gram, run))
+        return _equations(products, self._slopes)
 
     def with_slope(self, change: int) -> NormalEquations:
         """Normal equations with one change as a further slope, after the others."""
-        products = [run.with_slope(change) for run in self._runs]
-        return equations_of(products, self._slopes + 1)
+        place, products = 1 + self._slopes, []
+        for run, own, crosses, squares in self._parts():
+            row = np.insert(crosses[change], place, squares[change])
+            gram = np.insert(np.insert(own, place, 0.0, axis=0), place, 0.0, axis=1)
+            gram[place], gram[:, place] = row, row
+            products.append(_with_priors(gram, run))
+        return _equations(products, self._slopes + 1)
+
+    def _parts(self) -> Iterable[tuple[LinearisedRun, NDArray, NDArray, NDArray]]:
+        """Each run with its products of columns, of changes by columns, and squares of changes."""
+        return zip(self._runs, self._grams, self._crosses, self._squares, strict=True)

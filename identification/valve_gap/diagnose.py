@@ -73,12 +73,8 @@ def _report(
 ) -> str:
     """Write what people use of it; returns what to record next."""
     steps("next experiment")
-    experiment = next_experiment(
-        found.ranking,
-        valve,
-        at_voltage(CANDIDATES, valve.plant.voltage),
-        verdict=found.conclusion.verdict,
-    )
+    programmes = at_voltage(CANDIDATES, valve.plant.voltage)
+    experiment = next_experiment(found.ranking, valve, found.conclusion.verdict, programmes)
     (out / PROGRAMME).unlink(missing_ok=True)
     if experiment.programme:
         save_programmes([experiment.programme], out / PROGRAMME, valve.plant.sensors)

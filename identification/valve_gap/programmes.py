@@ -93,62 +93,39 @@ class Option:
 class NextExperiment:
     """What to record next, and why."""
 
-    programme: Programme | None
-    """None where no programme can be chosen."""
     text: str
     """One sentence for people."""
-    rivals: tuple[str, ...]
-    """Between which it decides, the most probable first."""
-    before: tuple[float, ...]
-    """Probabilities of the rivals now; sums to 1."""
-    after: tuple[float, ...]
-    """Expected probability of each rival after the experiment, if it is the right one."""
-    best: float
-    """Expected probability, after the experiment, of the rival that is then the most probable."""
-    splits: bool
-    """Whether the experiment is expected to tell the rivals apart."""
-    alternatives: tuple[Option, ...]
-    """All candidates, the most telling first; `programme` is the first one's."""
+    options: tuple[Option, ...]
+    """All candidates, the most telling first; empty where no programme can be chosen."""
+
+    @property
+    def programme(self) -> Programme | None:
+        """The most telling programme; None where none can be chosen."""
+        return self.options[0].programme if self.options else None
 
 
 def next_experiment(
-    ranking: Ranking,
-    valve: Valve,
-    programmes: Sequence[Programme] = CANDIDATES,
-    verdict: str | None = None,
+    ranking: Ranking, valve: Valve, verdict: str, programmes: Sequence[Programme] = CANDIDATES
 ) -> NextExperiment:
     """The programme after which the least doubt between the most probable hypotheses is expected.
 
     Args:
         ranking: the hypotheses and their probabilities.
         valve: the campaign that was diagnosed.
+        verdict: of the diagnosis. No programme can separate hypotheses that are not there: where the
+            cause is unknown, or known but for a remainder without a name, the shape of the missing term
+            comes first.
         programmes: candidates.
-        verdict: of the diagnosis; None: unknown where that is more probable than all causes together.
-            No programme can separate hypotheses that are not there: where the cause is unknown, or known
-            but for a remainder without a name, the shape of the missing term comes first.
     """
     rivals = select_rivals(ranking)
-    if verdict == UNKNOWN or (verdict is None and ranking.unknown > sum(ranking.probabilities)):
-        return _none_can_be_chosen(rivals, NOTHING_EXPLAINS)
+    if verdict == UNKNOWN:
+        return NextExperiment(text=NOTHING_EXPLAINS, options=())
     if verdict == PARTIAL and rivals.probability[0] > CERTAIN:
-        return _none_can_be_chosen(rivals, REST_WITHOUT_NAME.format(rivals.titles[0]))
-    plan = planned(valve, programmes)
-    found = expected_information(ranking.problem, plan, rivals)
+        return NextExperiment(text=REST_WITHOUT_NAME.format(rivals.titles[0]), options=())
+    found = expected_information(ranking.problem, planned(valve, programmes), rivals)
     options = [Option(programme=p, information=i) for p, i in zip(programmes, found, strict=True)]
     options.sort(key=lambda option: option.information.sort_key)
-    best = options[0]
-    doubt = SEPARATING_SHARE * (1.0 - rivals.probability[0])
-    splits = 1.0 - best.information.expected_best <= doubt
-    return NextExperiment(
-        programme=best.programme,
-        text=sentence(best, rivals, splits),
-        rivals=rivals.names,
-        before=rivals.probability,
-        after=best.information.expected_probability,
-        best=best.information.expected_best,
-        splits=splits,
-        alternatives=tuple(options),
-    )
+    return NextExperiment(text=sentence(options[0], rivals), options=tuple(options))
 
 
 def planned(valve: Valve, programmes: Sequence[Programme]) -> Valve:
@@ -167,7 +144,7 @@ def planned(valve: Valve, programmes: Sequence[Programme]) -> Valve:
     return plan
 
 
-def sentence(option: Option, rivals: Rivals, splits: bool) -> str:
+def sentence(option: Option, rivals: Rivals) -> str:
     """What to record, and the expected odds."""
     names = _listed(rivals.titles)
     before = ":".join(f"{100 * p:.0f}" for p in rivals.probability)
@@ -178,7 +155,8 @@ def sentence(option: Option, rivals: Rivals, splits: bool) -> str:
             f"None is needed ({rivals.titles[0]}: {odds_text(rivals.probability[0])}); {record} would "
             f"tell {names} apart best ({RUN})"
         )
-    if splits:
+    doubt = 1.0 - rivals.probability[0]
+    if 1.0 - option.information.expected_best <= SEPARATING_SHARE * doubt:
         return f"Record {record}: expected to bring {before} between {names} to {after} ({RUN})"
     return (
         f"No feasible programme splits {names}: even the best, {record}, is expected to bring "
@@ -203,19 +181,6 @@ def described(programme: Programme) -> str:
 def _listed(words: Sequence[str]) -> str:
     """a, b and c."""
     return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0]
-
-
-def _none_can_be_chosen(rivals: Rivals, text: str) -> NextExperiment:
-    return NextExperiment(
-        programme=None,
-        text=text,
-        rivals=rivals.names,
-        before=rivals.probability,
-        after=rivals.probability,
-        best=rivals.probability[0],
-        splits=False,
-        alternatives=(),
-    )
 
 
 def _expected(programme: Programme, period: float) -> Recording:

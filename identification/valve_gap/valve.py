@@ -11,6 +11,7 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from identification.calibration.problem import calibration_problem
 from identification.gap.plant import Channel, NuisanceParameter, Run, StateEquation, StateTrace
+from identification.gap.prepared_plant import noise_of_blocks
 from identification.recordings.noise import coarse_step_warnings, reliable_step, rounding_error
 from identification.recordings.recording import OUTPUTS, UNITS, Campaign, Recording
 from identification.replay.model_inputs import model_inputs
@@ -31,7 +32,7 @@ def noise_of(recordings: Sequence[Recording], channel: str) -> float:
     variances = np.concatenate([part for part, _ in estimates])
     length = min(length for _, length in estimates)
     freedom = 2.0 * length / 3.0  # differences of white noise are correlated by -1/2
-    found = float(np.sqrt(np.median(variances) / (1.0 - 2.0 / (9.0 * freedom)) ** 3))
+    found = noise_of_blocks(variances, freedom)
     step = reliable_step(np.concatenate([recording.channel(channel) for recording in recordings]))
     return max(found, rounding_error(step))
 

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from docs.examples.tank.plant import Tank
-from docs.examples.tank.recordings import virtual_recordings
+from docs.examples.tank import Tank, virtual_recordings
 from identification.gap.black_box import LearningRun, ridge_on_random_features
 from identification.gap.held_out import p_value
 

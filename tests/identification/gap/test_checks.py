@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from docs.examples.tank.plant import Tank
-from docs.examples.tank.recordings import virtual_recordings
+from docs.examples.tank import Tank, virtual_recordings
 from identification.gap.diagnosis import diagnose
 from identification.gap.plant import (
     Cause,
@@ -19,7 +18,7 @@ from identification.gap.plant import (
     StateEquation,
     StateTrace,
 )
-from identification.gap.plant_checks import MEMBERS, check
+from identification.gap.plant_checks import check
 from tests.identification.gap.tanks import TANKS
 
 
@@ -96,44 +95,32 @@ MISTAKES: dict[str, tuple[Callable[[], Tank], str]] = {
     ),
     "no noise": (
         lambda: with_channel(noise=0.0),
-        r"channels, h: noise 0 is not positive: leave it out",
+        r"channels, h: noise 0 is not positive.*leave it out",
     ),
-    "noise NaN": (lambda: with_channel(noise=np.nan), "channels, h: noise nan is not positive"),
     "resolution": (lambda: with_channel(resolution=-1.0), "channels, h: resolution -1 is no step"),
-    "unit": (lambda: with_channel(scale=0.0), "channels, h: scale 0 is not positive"),
-    "no runs": (lambda: Described(runs=()), "runs: there is none: give two or more"),
-    "none held out": (lambda: Described(runs=runs(False)), "runs: no run is held-out.*held_out=True"),
+    "none held out": (lambda: Described(runs=runs(False)), "runs: no run is held out.*held_out=True"),
     "all held out": (lambda: Described(runs=runs(True)), "runs: no run is fitted.*held_out=False"),
     "time falls": (
         lambda: with_run(time=TIME[::-1]),
-        "run test_1: time does not rise from sample 0 to 1",
+        "run test_1: time does not rise uniformly at sample 0",
     ),
     "time is not uniform": (
         lambda: with_run(time=TIME**1.1),
-        "run test_1: time is not uniform.*resample",
+        "run test_1: time does not rise uniformly.*resample",
     ),
-    "short": (lambda: with_run(time=TIME[:2]), r"run test_1: time has the shape \(2,\).*three samples"),
     "readings": (
         lambda: with_run(measured=np.zeros(240)),
         r"run test_1: measured .* \(240,\), not .*1, 240",
     ),
-    "masks": (
-        lambda: with_run(trusted=np.ones((1, 9), bool)),
-        r"test_1: trusted has the shape \(1, 9\)",
-    ),
     "no masks": (lambda: with_run(trusted=np.ones((1, 240))), "trusted is no boolean array: convert"),
     "nothing trusted": (
         lambda: Described(runs=[replace(r, trusted=np.zeros((1, 240), bool)) for r in runs(False)]),
-        "runs: no reading of a fitted run is trusted",
+        "runs: no reading of the runs that are fitted is trusted",
     ),
     "inputs": (lambda: with_run(inputs={"q": np.zeros(3)}), r"test_1: input q has the shape \(3,\)"),
-    "input NaN": (
-        lambda: with_run(inputs={"q": TIME / 0 * 0}),
-        "input q is not finite at sample 0: fill",
-    ),
     "NaN": (
         lambda: with_reading(np.nan, True),
-        "run test_2: channel h is not finite at sample 7.*set trusted",
+        "run test_2: channel h is not finite at sample 7: set trusted",
     ),
     "range": (lambda: with_c(low=0.2), "parameters, c: low 0.2 and high 0.1 are no range"),
     "nominal": (lambda: with_c(nominal=0.5), "parameters, c: nominal 0.5 lies outside 0.001 to 0.1"),
@@ -142,11 +129,8 @@ MISTAKES: dict[str, tuple[Callable[[], Tank], str]] = {
         lambda: Described(parameters=(), causes=()),
         "parameters, causes: both are empty",
     ),
-    "symbols": (lambda: Described(parameters=(C, C)), "parameters: two are named c: rename one"),
-    "symbol of a cause": (lambda: with_cause(symbol="c"), "causes, leak: c is a calibrated parameter"),
-    "symbol of an offset": (lambda: with_cause(symbol="zero"), "causes, leak: zero is a .* run offset"),
+    "symbol of a cause": (lambda: with_cause(symbol="c"), "causes, leak: c is a parameter"),
     "symbol of two causes": (lambda: with_cause(symbol="lag"), "causes, leak and lag: both have lag"),
-    "causes alike": (lambda: Described(causes=(LEAK, LEAK)), "causes: two are named leak: rename one"),
     "nominal is nuisance": (
         lambda: Described(tolerances=(NuisanceParameter(symbol="c", sd=1.0, step=1.0),)),
         "tolerances, c: it is one of `parameters` as well",
@@ -155,18 +139,10 @@ MISTAKES: dict[str, tuple[Callable[[], Tank], str]] = {
         lambda: Described(causes=(replace(LEAK, parameters=()),)),
         "causes, leak: it has no parameters",
     ),
-    "prior": (
-        lambda: Described(causes=(replace(LEAK, prior=0.0),)),
-        "causes, leak: prior 0 is not posit",
-    ),
     "no trials": (lambda: with_cause(trials=()), "causes, leak, leak: it has no trials"),
     "trial is nominal": (lambda: with_cause(trials=(0.0,)), "leak: trial 0 is the nominal value"),
     "trial out of range": (lambda: with_cause(trials=(9.0,)), "leak: trial 9 lies outside 0 to 0.05"),
     "nuisance sd": (lambda: with_nuisance(sd=0.0, step=1.0), "run_offsets, zero: sd 0 is not positive"),
-    "nuisance step": (
-        lambda: with_nuisance(sd=1.0, step=-1.0),
-        "run_offsets, zero: step -1 is not posit",
-    ),
     "forcing": (lambda: Described(equations=(equation(-1.0),)), "equations, f1: step -1 is negative"),
 }
 
@@ -189,21 +165,6 @@ def test_all_mistakes_are_told_at_once():
     plant = with_channel(noise=0.0)
     plant.parameters = (replace(C, scale=0.0),)
     assert [line.split(":")[0] for line in findings(plant)] == ["channels, h", "parameters, c"]
-
-
-def test_the_diagnosis_begins_with_the_checks():
-    with pytest.raises(PlantError, match="no run is held-out"):
-        diagnose(Described(runs=runs(False)))
-
-
-def test_a_member_that_is_missing_is_named():
-    class Half:
-        channels = ()
-
-    with pytest.raises(PlantError) as caught:
-        check(Half())  # type: ignore[arg-type]
-    lines = str(caught.value).split("\n")
-    assert [line.split(":")[0] for line in lines] == [name for name in MEMBERS if name != "channels"]
 
 
 def test_what_is_allowed_is_not_blamed():
@@ -276,7 +237,7 @@ def test_a_cause_that_acts_at_its_nominal_value_is_named():
     [
         ("states", r"states: h of run test_1 has the shape \(3,\), not \(samples,\) = \(240,\)"),
         ("regimes", r"regimes: late of run test_1 is not boolean"),
-        ("forced", r"forced: equation f1 has the shape \(1, 240\), not .*\(1, 240, 2\)"),
+        ("forced", r"forced: equation f1 has the shape \(1, 240\), not \(1, 240, 2\)"),
     ],
 )
 def test_what_the_localisation_needs_has_its_shape(member, sentence):

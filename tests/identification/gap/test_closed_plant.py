@@ -5,8 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from docs.examples.tank.plant import Tank
-from docs.examples.tank.recordings import virtual_recordings
+from docs.examples.tank import Tank, virtual_recordings
 from identification.gap import sensor_faults
 from identification.gap.diagnosis import Diagnosis, diagnose
 from identification.gap.gap_json import as_json

@@ -6,8 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from docs.examples.tank.plant import Tank
-from docs.examples.tank.recordings import NOISE, virtual_recordings
+from docs.examples.tank import NOISE, Tank, virtual_recordings
 from identification.gap.fitting_problem import Estimate, FittingProblem, Hypothesis
 from identification.gap.gauss_newton import fit
 from identification.gap.held_out import (

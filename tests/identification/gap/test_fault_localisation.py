@@ -5,8 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from docs.examples.tank.plant import Tank
-from docs.examples.tank.recordings import virtual_recordings
+from docs.examples.tank import Tank, virtual_recordings
 from identification.gap.evidence import evaluate
 from identification.gap.fitting_problem import Estimate, FittingProblem
 from identification.gap.forcing import quadratic_forms, window_edges

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from docs.examples.tank.plant import Tank
-from docs.examples.tank.recordings import virtual_recordings
+from docs.examples.tank import Tank, virtual_recordings
 from identification.gap.diagnosis import rank_hypotheses
 from identification.gap.recalibration import recalibrate
 from identification.gap.verdict import Ranking

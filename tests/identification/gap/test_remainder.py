@@ -8,8 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from docs.examples.tank.plant import Tank
-from docs.examples.tank.recordings import virtual_recordings
+from docs.examples.tank import Tank, virtual_recordings
 from identification.block_bootstrap import Interval
 from identification.gap.diagnosis import Diagnosis, diagnose, hypothesis_label
 from identification.gap.gap_json import (

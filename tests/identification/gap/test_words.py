@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from docs.examples.tank.plant import Tank
-from docs.examples.tank.recordings import virtual_recordings
+from docs.examples.tank import Tank, virtual_recordings
 from identification.gap.diagnosis import diagnose
 from identification.gap.gap_json import as_json
 from identification.gap.report_page import calibrated_values, sections

@@ -52,11 +52,6 @@ def test_a_true_effect_is_found_under_a_slow_ripple():
     assert ranked(rippled(campaign(G_eddy=4e-3))).inclusion["eddy_current"] > 0.9
 
 
-def test_a_true_effect_is_found_in_pressures_of_50_mbar():
-    found = ranked(round_pressures(short_campaign(G_eddy=4e-3), 0.05))
-    assert found.inclusion["eddy_current"] > 0.9
-
-
 @pytest.mark.xfail(strict=True, reason="three recordings have too few blocks of ten correlations")
 def test_a_slow_ripple_on_three_recordings_is_no_gap():
     assert ranked(rippled(short_campaign())).no_cause > NO_CAUSE_DOUBT

@@ -26,13 +26,9 @@ def recording(noise: float, seed: int, steps: float = 0.0) -> Recording:
 
 @pytest.mark.parametrize("steps", [0.0, 1e4])
 def test_noise_is_found_whatever_the_course(steps):
-    found = [noise_of([recording(300.0, seed, steps)], "p2") for seed in range(20)]
+    found = [noise_of([recording(300.0, seed, steps)], "p2") for seed in range(10)]
     assert np.mean(found) == pytest.approx(300.0, rel=0.01)
     assert np.std(found) < 0.03 * 300.0
-
-
-def test_more_noise_is_more():
-    assert noise_of([recording(600.0, 0)], "p2") > 1.8 * noise_of([recording(300.0, 0)], "p2")
 
 
 @pytest.mark.parametrize("noise", [0.0, 300.0])

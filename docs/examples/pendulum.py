@@ -1,8 +1,10 @@
-"""The pendulum: angle'' = -w2 sin(angle) - c angle', from hanging [rad].
+"""A pendulum that swings freely, recorded by others: angle'' = -w2 sin(angle) - c angle' [rad].
 
-The nominal model has viscous friction alone.
+python -m docs.examples.pendulum --data FOLDER --out DIR, from the repository's root. The nominal model
+has viscous friction alone; angles count from hanging.
 """
 
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -10,7 +12,8 @@ from typing import Any
 import numpy as np
 from scipy.io import loadmat
 
-from docs.examples.recorded_plants import cause, found, run_of
+from docs.examples.recorded_plants import cause, command, found, run_of
+from epv_env.common.command_line import fail_clearly
 from identification.gap.ode_plant import OdePlant
 from identification.gap.plant import Channel, FreeParameter, NuisanceParameter, Run
 
@@ -106,3 +109,7 @@ def recordings(folder: Path) -> tuple[list[Run], float, float]:
     first = run_of("first", period, angle[:, :cut].copy(), {}, held_out=False)
     rest = run_of("rest", period, angle.copy(), {}, held_out=True, begin=cut)
     return [first, rest], float(slopes[-1]), float(slopes[-2])
+
+
+if __name__ == "__main__":
+    sys.exit(fail_clearly(lambda: command("a pendulum", "pendulum", pendulum)))

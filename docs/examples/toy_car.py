@@ -1,15 +1,18 @@
-"""The toy car's drive: m dv/dt = (a - b v) throttle - c v.
+"""The drive of a toy car of 1:10 (DART), recorded by others: m dv/dt = (a - b v) throttle - c v.
 
-The nominal model is linear in the throttle, and its friction is viscous.
+python -m docs.examples.toy_car --data FOLDER --out DIR, from the repository's root. The nominal model is
+linear in the throttle, and its friction is viscous.
 """
 
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from docs.examples.recorded_plants import cause, found, run_of
+from docs.examples.recorded_plants import cause, command, found, run_of
+from epv_env.common.command_line import fail_clearly
 from identification.gap.ode_plant import OdePlant
 from identification.gap.plant import Channel, FreeParameter, Run
 
@@ -98,3 +101,7 @@ def recordings(folder: Path) -> list[Run]:
         throttle = {"throttle": table[8] * (table[7] == 1)}
         runs.append(run_of(path.stem, PERIOD, table[6:7], throttle, held_out=number % 2 == 1))
     return runs
+
+
+if __name__ == "__main__":
+    sys.exit(fail_clearly(lambda: command("a toy car", "toy-car", toy_car)))

@@ -1,8 +1,12 @@
-"""The thermal lab: m c dT/dt = U A (ambient - T) + alpha Q for each heater.
+"""Two heaters and two thermometers on a board (TCLab), recorded by others.
 
-The nominal model has convection alone. Its thermometers are at the heaters' temperature.
+python -m docs.examples.thermal_lab --data FOLDER --out DIR, from the repository's root.
+
+m c dT/dt = U A (ambient - T) + alpha Q for each heater. The nominal model has convection alone, and its
+thermometers are at the heaters' temperature.
 """
 
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -10,7 +14,8 @@ from typing import Any
 import numba
 import numpy as np
 
-from docs.examples.recorded_plants import cause, found, run_of
+from docs.examples.recorded_plants import cause, command, found, run_of
+from epv_env.common.command_line import fail_clearly
 from identification.gap.ode_plant import OdePlant
 from identification.gap.plant import Channel, FreeParameter, NuisanceParameter, Run
 
@@ -112,3 +117,7 @@ def recordings(folder: Path) -> list[Run]:
         inputs = {"Q1": table[1, :end], "Q2": table[2, :end]}
         runs.append(run_of(name, period, table[3:5, :end].copy(), inputs, held_out, begin))
     return runs
+
+
+if __name__ == "__main__":
+    sys.exit(fail_clearly(lambda: command("a thermal lab", "thermal-lab", thermal_lab)))
