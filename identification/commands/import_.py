@@ -10,13 +10,12 @@ from epv_env.common.command_line import MOST
 from epv_env.plant.plantfile import load_plant
 from identification.commands.options import add_number, add_out, add_plant
 from identification.importing.import_campaign import (
-    check_imported,
     import_text,
     read_files,
     read_source,
     source_table,
 )
-from identification.recordings.campaign_files import check_vacant, write_campaign
+from identification.recordings.campaign_files import check_campaign, check_vacant, write_campaign
 from identification.recordings.rules import RULES, rules_of
 
 
@@ -70,7 +69,7 @@ def run(options: argparse.Namespace) -> None:
     )
     print(import_text(imported), end="\n\n")
     if options.dry_run:
-        check_imported(imported, options.out)
+        check_campaign(imported.campaign, options.out)
         print("dry run: all checks passed, nothing is written")
         return
     write_campaign(imported.campaign, options.out, provenance=imported.provenance())

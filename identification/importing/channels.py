@@ -19,27 +19,18 @@ from identification.importing.source_file import ImportingError, SourceChannel, 
 from identification.importing.units import PhysicalUnit, needed_unit, parsed_unit
 
 
-@dataclass(frozen=True, kw_only=True)
-class Clock:
-    """When the samples of a channel were taken."""
-
-    times: NDArray
-    """(samples,) [s]; NaN where a row has no time."""
-    begin: np.datetime64 | None
-    """The point in time of 0 s; None: not told."""
-
-
 def clock_of(
     source: SourceFile, mapping: MappingFile, channel: SourceChannel, named: str | None
-) -> Clock:
-    """The clock of a channel. Raises ImportingError if none or several can be meant.
+) -> tuple[NDArray, np.datetime64 | None]:
+    """Times of a channel's samples, (samples,) [s] or NaN, and the point in time of 0 s.
 
+    Raises ImportingError if none or several can be meant.
     named: the channel of times that the mapping file gives for this one; None: it gives none.
     """
     if named is not None:
         return _read(source, mapping, named_channel(source, named))
     if channel.time is not None:
-        return Clock(times=channel.time, begin=channel.begin)
+        return channel.time, channel.begin
     wanted = mapping.channels.get("time")
     table: str | None = channel.table
     while table is not None:
@@ -83,13 +74,15 @@ def _only(source: SourceFile, channel: SourceChannel, found: list[SourceChannel]
     return found[0]
 
 
-def _read(source: SourceFile, mapping: MappingFile, times: SourceChannel) -> Clock:
-    """A channel of times as a clock; the mapping file's unit and factor come before the file's own."""
+def _read(
+    source: SourceFile, mapping: MappingFile, times: SourceChannel
+) -> tuple[NDArray, np.datetime64 | None]:
+    """The mapping file's unit and factor come before the file's own."""
     wanted = mapping.channels.get("time")
     text = (wanted.unit if wanted else None) or times.unit or split_name(times.name)[1] or "s"
     unit = needed_unit(text, "time", f"{source.path}, {times.name}")
     factor = wanted.factor if wanted else 1.0
-    return Clock(times=times.values * unit.size * factor, begin=times.begin)
+    return times.values * unit.size * factor, times.begin
 
 
 SUPPLY_PAIR = ("p1a", "p1b")
@@ -192,8 +185,8 @@ def _mapped(
                 "the mapping file"
             )
         offset = ambient
-    clock = clock_of(source, mapping, channel, entry.time)
-    time, values = _filled(place, clock.times, channel.values)
+    times, begin = clock_of(source, mapping, channel, entry.time)
+    time, values = _filled(place, times, channel.values)
     return MappedChannel(
         name=name,
         source=channel,
@@ -201,7 +194,7 @@ def _mapped(
         reference=reference,
         factor=entry.factor,
         time=time,
-        begin=clock.begin,
+        begin=begin,
         values=entry.factor * unit.size * values + offset,
     )
 

@@ -1,13 +1,14 @@
 """`import_campaign`: measurement files of a bench become a campaign."""
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from epv_env.common.units import BAR
@@ -15,12 +16,24 @@ from identification.importing.binary_files import read_matlab, read_mdf, read_pa
 from identification.importing.channels import MappedChannel, mapped_channels, supply_pair_mean
 from identification.importing.common_grid import GriddedSignals, on_common_grid, usual_rate
 from identification.importing.mapping_file import MappingFile, RecordingEntry, meaning, read_mapping
-from identification.importing.source_file import ImportingError, SourceChannel, SourceFile
+from identification.importing.source_file import ImportingError, SourceFile
 from identification.importing.text_files import read_text
-from identification.recordings.campaign_files import check_campaign, write_campaign
+from identification.recordings.campaign_files import write_campaign
 from identification.recordings.plausibility import switches
-from identification.recordings.recording import Campaign, Recording
+from identification.recordings.recording import CHANNELS, Campaign, Recording
 from identification.recordings.rules import RULES, RecordingRules
+
+FORMATS = (
+    ("MDF", read_mdf, (".mf4", ".mdf", ".dat")),
+    ("MATLAB", read_matlab, (".mat",)),
+    ("TDMS", read_tdms, (".tdms",)),
+    ("Parquet", read_parquet, (".parquet", ".pq")),
+    ("text", read_text, (".csv", ".txt", ".tsv", ".asc")),
+)
+"""Name, reader and suffixes of every format. A new one is a reader and a line here.
+
+A reader takes a path and returns the version or dialect, and the channels; it may raise ImportingError.
+"""
 
 USUAL_TEMPERATURE, USUAL_PRESSURE = 293.0, 1.0 * BAR
 """Ambient conditions that are assumed, and said to be, where nobody gives them [K, Pa absolute]."""
@@ -79,7 +92,9 @@ def read_files(
         ImportingError: a file cannot be read, or a channel's meaning, unit or time is unclear.
         ValueError: the mapping file is wrong.
     """
-    content = _mapping(mapping)
+    content = mapping if isinstance(mapping, MappingFile) else MappingFile()
+    if isinstance(mapping, str | PathLike):
+        content = read_mapping(Path(mapping))
     sources = [read_source(Path(file)) for file in files]
     _check_mapped_files(content, sources)
     pressure = content.environment.pressure_bar if ambient_bar is None else ambient_bar
@@ -110,17 +125,6 @@ def import_campaign(
     return imported
 
 
-def check_imported(imported: ImportedCampaign, out: str | PathLike[str]) -> None:
-    """Every check of `import_campaign`, without writing. Raises CampaignError."""
-    check_campaign(imported.campaign, Path(out))
-
-
-def _mapping(mapping: str | PathLike[str] | MappingFile | None) -> MappingFile:
-    if mapping is None:
-        return MappingFile()
-    return mapping if isinstance(mapping, MappingFile) else read_mapping(Path(mapping))
-
-
 def _check_mapped_files(content: MappingFile, sources: Sequence[SourceFile]) -> None:
     names = {source.path.name for source in sources}
     for name in content.recordings:
@@ -140,18 +144,14 @@ def _imported(
     """One file as a recording; ambient: p_env [Pa absolute], None if nobody gave it."""
     channels = mapped_channels(source, content, ambient)
     gridded = on_common_grid(str(source.path), channels, rate)
-    signals = supply_pair_mean(gridded.signals)
+    signals: dict[str, Any] = supply_pair_mean(gridded.signals)
     entry = content.recordings.get(source.path.name, RecordingEntry())
     recording = Recording(
         name=entry.name or source.path.stem,
         role=entry.role or _proposed_role(source.path, signals["U"]),
         period=gridded.period,
         sigma_S=signals.get("sigma_S", np.zeros_like(signals["U"])),
-        I=signals["I"],
-        U=signals["U"],
-        p1=signals["p1"],
-        p2=signals["p2"],
-        p3=signals["p3"],
+        **{name: signals[name] for name in CHANNELS},
     )
     return ImportedFile(source=source, channels=tuple(channels), gridded=gridded, recording=recording)
 
@@ -185,37 +185,24 @@ def _assumptions(
 
 
 def _file_provenance(file: ImportedFile) -> dict[str, Any]:
+    channels = {
+        channel.name: {
+            "source": channel.source.name,
+            "unit": channel.unit.text,
+            **({"reference": channel.reference} if channel.reference else {}),
+            "to_SI": channel.conversion,
+            "resampled": channel.name in file.gridded.resampled,
+        }
+        for channel in file.channels
+    }
     return {
         "recording": file.recording.name,
         "source": file.source.path.name,
         "sha256": file.source.sha256,
         "format": file.source.format,
         "rate_Hz": 1.0 / file.gridded.period,
-        "channels": {c.name: _channel_provenance(c, file.gridded) for c in file.channels},
+        "channels": channels,
     }
-
-
-def _channel_provenance(channel: MappedChannel, gridded: GriddedSignals) -> Mapping[str, Any]:
-    return {
-        "source": channel.source.name,
-        "unit": channel.unit.text,
-        **({"reference": channel.reference} if channel.reference else {}),
-        "to_SI": channel.conversion,
-        "resampled": channel.name in gridded.resampled,
-    }
-
-
-FORMATS = (
-    ("MDF", read_mdf, (".mf4", ".mdf", ".dat")),
-    ("MATLAB", read_matlab, (".mat",)),
-    ("TDMS", read_tdms, (".tdms",)),
-    ("Parquet", read_parquet, (".parquet", ".pq")),
-    ("text", read_text, (".csv", ".txt", ".tsv", ".asc")),
-)
-"""Name, reader and suffixes of every format. A new one is a reader and a line here.
-
-A reader takes a path and returns the version or dialect, and the channels; it may raise ImportingError.
-"""
 
 
 def read_source(path: Path) -> SourceFile:
@@ -248,16 +235,21 @@ def read_source(path: Path) -> SourceFile:
 
 def source_table(source: SourceFile) -> str:
     """The channels of a file: name, unit, range, rate, and what its name means."""
-    rows = [_source_row(channel) for channel in source.channels]
-    title = f"{source.path} ({source.format})"
-    return f"{title}\n{_aligned(('channel', 'unit', 'range', 'rate', 'proposed'), rows)}"
+    rows = []
+    for channel in source.channels:
+        values = channel.values[np.isfinite(channel.values)]
+        span = f"{np.min(values):.5g} to {np.max(values):.5g}" if len(values) else "empty"
+        timed = channel.time is not None and len(channel.time) > 1 and np.ptp(channel.time) > 0
+        rate = f"{usual_rate(channel.time):.6g} Hz" if timed and channel.time is not None else ""
+        rows.append((channel.name, channel.unit, span, rate, meaning(channel) or ""))
+    heads = ("channel", "unit", "range", "rate", "proposed")
+    return f"{source.path} ({source.format})\n{_table(heads, rows)}"
 
 
 def import_text(imported: ImportedCampaign) -> str:
     """What every file becomes, and what was assumed."""
-    parts = [_file_text(file) for file in imported.files]
-    parts += [f"assumed: {sentence}" for sentence in imported.assumptions]
-    return "\n\n".join(parts[: len(imported.files)]) + "\n\n" + "\n".join(parts[len(imported.files) :])
+    assumed = "\n".join(f"assumed: {sentence}" for sentence in imported.assumptions)
+    return "\n\n".join([*(_file_text(file) for file in imported.files), assumed])
 
 
 def _file_text(file: ImportedFile) -> str:
@@ -278,22 +270,8 @@ def _file_text(file: ImportedFile) -> str:
         f"{len(recording)} samples at {1 / recording.period:.6g} Hz"
     )
     heads = ("becomes", "channel", "unit", "to SI", "rate", "samples")
-    return f"{title}\n{_aligned(heads, rows)}"
+    return f"{title}\n{_table(heads, rows)}"
 
 
-def _source_row(channel: SourceChannel) -> tuple[str, ...]:
-    values = channel.values[np.isfinite(channel.values)]
-    span = f"{np.min(values):.5g} to {np.max(values):.5g}" if len(values) else "empty"
-    timed = channel.time is not None and len(channel.time) > 1 and np.ptp(channel.time) > 0
-    rate = f"{usual_rate(channel.time):.6g} Hz" if timed and channel.time is not None else ""
-    return channel.name, channel.unit, span, rate, meaning(channel) or ""
-
-
-def _aligned(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Columns as wide as their widest cell."""
-    lines = [heads, *rows]
-    widths = [max(len(line[column]) for line in lines) for column in range(len(heads))]
-    return "\n".join(
-        "  " + "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
-        for line in lines
-    )
+def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    return pd.DataFrame(rows, columns=list(heads)).to_string(index=False)

@@ -103,14 +103,19 @@ def check_units(
         period: between samples [s].
         ambient_bar: p_env [bar absolute].
     """
-    electrical = {"U": columns["U_V"], "I": columns["I_A"]}
     names = {"U": "U_V", "I": "I_A"}
-    swapped = _exchanges(names)
-    voltages = [*swapped, *_scales(names, ("U",), VOLTAGE_FACTORS, "V")]
-    _refuse(file, names, electrical, lambda s, _: _voltage(s["U"], rules), voltages, rules)
-    currents = [*swapped, *_scales(names, ("I",), CURRENT_FACTORS, "A")]
-    _refuse(file, names, electrical, lambda s, _: _electrical(s, period, rules), currents, rules)
-
+    _refuse(
+        file,
+        names,
+        {name: columns[column] for name, column in names.items()},
+        lambda s, _: _electrical(s["U"], s["I"], period, rules),
+        [
+            *_exchanges(names),
+            *_scales(names, ("U",), VOLTAGE_FACTORS, "V"),
+            *_scales(names, ("I",), CURRENT_FACTORS, "A"),
+        ],
+        rules,
+    )
     on = energised_samples(columns["U_V"], rules)
     for supply in (column for column, name in CHANNEL_OF.items() if name == "p1" and column in columns):
         names = {"p1": supply, "p2": "p2_bar", "p3": "p3_bar"}
@@ -228,40 +233,33 @@ def _starting_state(energised: NDArray) -> slice:
     return slice(0, int(changes[0]) + 1 if changes.size else len(energised))
 
 
-def _voltage(U: NDArray, rules: RecordingRules) -> Iterator[str]:
-    """What a coil's voltage (samples,) [V] cannot be."""
+def _electrical(U: NDArray, current: NDArray, period: float, rules: RecordingRules) -> Iterator[str]:
+    """What voltage [V] and current [A], (samples,), cannot be: U/R while the coil holds, then none."""
     on = energised_samples(U, rules)
+    start = _starting_state(on)
     low, high = rules.operating_voltages
-    level = float(np.median(U[_starting_state(on)]))
+    level = float(np.median(U[start]))
+    if switches(U) and not np.any(on):
+        yield f"U switches at {np.max(np.abs(U)):.4g} V, and {low:g} to {high:g} V are usual"
+    if not on[0] and abs(level) > rules.sensors["U"].accuracy * rules.sensors["U"].high:
+        yield f"the voltage is {level:.4g} V, neither off nor on"
+    settled = current[start]
     if on[0]:
         if not low <= level <= high:
             yield f"the energised coil has {level:.4g} V, and {low:g} to {high:g} V are usual"
         off = float(np.median(U[~on])) if np.any(~on) else 0.0
         if abs(off) > MOST_REST_VOLTAGE * float(np.max(U)):
             yield f"the voltage is {off:.4g} V while the coil is off"
-    elif abs(level) > rules.sensors["U"].accuracy * rules.sensors["U"].high:
-        yield f"the voltage is {level:.4g} V, neither off nor on"
-    if switches(U) and not np.any(on):
-        yield f"U switches at {np.max(np.abs(U)):.4g} V, and {low:g} to {high:g} V are usual"
-
-
-def _electrical(signals: Signals, period: float, rules: RecordingRules) -> Iterator[str]:
-    """What voltage and current cannot be: U/R while the coil holds, and none when it is off."""
-    U, current = signals["U"], signals["I"]
-    yield from _voltage(U, rules)
-    on = energised_samples(U, rules)
-    start = _starting_state(on)
-    settled = start if not on[0] else np.flatnonzero(_time_off(on, period) > DECAY_TIME)
-    if on[0]:
         least, greatest = rules.coil_resistances
-        volts, ampere = float(np.median(U[start])), float(np.median(current[start]))
-        resistance = volts / ampere if ampere else np.inf
+        held = float(np.median(current[start]))
+        resistance = level / held if held else np.inf
         if not least <= resistance <= greatest:
             yield (
-                f"{volts:.4g} V and a holding current of {ampere:.4g} A make {resistance:.4g} ohm, and "
+                f"{level:.4g} V and a holding current of {held:.4g} A make {resistance:.4g} ohm, and "
                 f"coils have {least:g} to {greatest:g} ohm"
             )
-    rest = float(np.median(current[settled])) if len(current[settled]) else 0.0
+        settled = current[_time_off(on, period) > DECAY_TIME]
+    rest = float(np.median(settled)) if len(settled) else 0.0
     if abs(rest) > MOST_REST_CURRENT * rules.sensors["I"].high:
         yield f"a current of {rest:.4g} A flows while the coil is off"
 

@@ -92,7 +92,7 @@ OTHERS = {
     "mA, flipped": (scaled(-1e3, 0, "I"), looks(("I",), "mA with the sign flipped")),
     "mV": (scaled(1e3, 0, "U"), looks(("U",), "mV")),
     "kV": (scaled(1e-3, 0, "U"), looks(("U",), "kV")),
-    "mV and mA": (scaled(1e3, 0, "U", "I"), looks(("U",), "mV")),
+    "mV and mA": (scaled(1e3, 0, "U", "I"), "6 to 32.32 V are usual: check unit"),
     "offset of I": (scaled(1, 0.1, "I"), "a current of 0.1 A flows while the coil is off: check unit"),
     "offset of U": (scaled(1, 4.0, "U"), "the voltage is 4 V while the coil is off: check unit"),
     "ms": (timed(1e3), "time_s looks like ms: give s"),
