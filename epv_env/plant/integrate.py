@@ -32,7 +32,6 @@ from epv_env.plant.lanes import (
     state_at,
 )
 from epv_env.plant.primitives import FLAGS, inlined, source_digest, wide_vectors
-from epv_env.plant.runge_kutta import DEFAULT_STEP as DEFAULT_STEP
 from epv_env.plant.stepping import UNLIMITED, locate_event, try_steps
 
 MAX_STEPS = 200_000

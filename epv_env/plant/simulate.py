@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from epv_env.plant.effects.coil import COPPER
 from epv_env.plant.equations import Inputs, State
-from epv_env.plant.integrate import DEFAULT_STEP
 from epv_env.plant.primitives import CRITICAL_RATIO, LAMINAR_DROP, Value, bracket_over_drop
+from epv_env.plant.runge_kutta import DEFAULT_STEP
 from epv_env.plant.valves import Valves
 
 BISECTIONS = 40

@@ -18,6 +18,7 @@ from epv_env.plant.effects.registry import effect_constants, has_effects
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.lanes import LANES, N_INPUT, N_STATE
 from epv_env.plant.parameters import Parameters
+from epv_env.plant.runge_kutta import DEFAULT_STEP
 
 LANES_PER_TASK = 4 * LANES
 """Fewest lanes, times periods, worth a thread of their own."""
@@ -111,7 +112,7 @@ class Valves:
     Each valve's trajectory is the same to the bit whatever n, its place in the batch, and threads.
     """
 
-    def __init__(self, n: int, *, step: float = integrate.DEFAULT_STEP, threads: int | None = None):
+    def __init__(self, n: int, *, step: float = DEFAULT_STEP, threads: int | None = None):
         """n: number of valves. step: largest integration step [s]. threads: None = all cores."""
         self.n = n
         self.step = step

@@ -17,9 +17,9 @@ pytest.importorskip("safetensors")
 from controllers.learned import TRAINED, load_policy
 from epv_env.common.units import BAR
 from epv_env.plant.equations import Inputs, State
-from epv_env.plant.integrate import DEFAULT_STEP
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
+from epv_env.plant.runge_kutta import DEFAULT_STEP
 from epv_env.task import LimitingTask
 from identification.bench.hybrid_automaton import piecewise_schedule
 from identification.bench.reference_simulation import simulate_reference

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from epv_env.plant.equations import State
-from epv_env.plant.integrate import DEFAULT_STEP
 from epv_env.plant.parameters import Parameters
+from epv_env.plant.runge_kutta import DEFAULT_STEP
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
 from identification.bench.hybrid_automaton import Schedule, piecewise_schedule

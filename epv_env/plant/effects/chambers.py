@@ -120,7 +120,7 @@ def _per_near_share(p: Mapping[str, NDArray]) -> NDArray:
 def _pipe_rate(p: Mapping[str, NDArray]) -> NDArray:
     """Rate at which the pressures before and behind the pipe meet [1/s].
 
-    An orifice's flow rises steepest within its laminar region, where the bracket of flow.py is 2.
+    An orifice's flow rises steepest within its laminar region, where the bracket of `mass_flux` is 2.
     """
     RT = p["R_gas"] * p["T_env"]
     steepest = np.sqrt(2 * RT / LAMINAR_DROP)

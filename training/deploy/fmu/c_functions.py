@@ -198,7 +198,7 @@ class Translation:
         return self._functions[key]
 
     def _traced(self, python: Callable[..., Any], types: tuple[str, ...]) -> tuple[str, CFunction]:
-        """C of a function that primitives/compiled.py generated from text: one expression, traced."""
+        """C of a function that `primitives.generated` made from text: one expression, traced."""
         kinds = {name: kind for kind, name in self.structures.items()}
         names = list(inspect.signature(python).parameters)
         arguments = [

@@ -72,7 +72,7 @@ def source_digest(*others: Path) -> str:
     digest is compiled anew when any equation it inlines has changed.
     """
     digest = hashlib.sha256()
-    for path in sorted({*Path(__file__).parent.rglob("*.py"), *others}):
+    for path in sorted({*Path(__file__).parents[1].rglob("*.py"), *others}):
         digest.update(path.read_bytes())
     return digest.hexdigest()
 
