@@ -1,7 +1,6 @@
 """The protocol of all controllers: observations of a batch in, actions of a batch out."""
 
-from dataclasses import replace
-from typing import Any, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 from numpy.typing import NDArray
 
@@ -35,18 +34,3 @@ class Privileged(Controller, Protocol):
     def watch(self, task: LimitingTask) -> None:
         """Take in the episodes that have just begun; called after the environment's reset."""
         ...
-
-
-@runtime_checkable
-class Graded(Controller, Protocol):
-    """A controller that says how clearly it prefers an action: a policy."""
-
-    def logits(self, observations: NDArray) -> NDArray:
-        """Of each action (n, actions); `act` takes the largest. Advances a memory as `act` does."""
-        ...
-
-
-def with_period(controller: Controller, period: float) -> Controller:
-    """The controller for another control period [s], if it has a setting for it."""
-    own: Any = controller
-    return replace(own, control_period=period) if hasattr(own, "control_period") else own

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.registration import CHEAP, Choice, Range, Registration
+from controllers.registration import Choice, Range, Registration
 from epv_env.observation import P2_LAGS, decode
 
 
@@ -66,7 +66,6 @@ HYSTERESIS = Registration(
     controller=Hysteresis,
     build=lambda values, plant: Hysteresis(name="hysteresis", **values),
     search_space=_THRESHOLDS,
-    cost=CHEAP,
 )
 """The plain two-point controller."""
 
@@ -80,6 +79,5 @@ EXTRAPOLATING_HYSTERESIS = Registration(
         "shut_lookahead": Range(low=0.0, high=0.06, most=0.5),
         "lag": Choice(values=P2_LAGS),
     },
-    cost=CHEAP,
 )
 """The same with extrapolation of the measured pressure."""

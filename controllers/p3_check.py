@@ -10,11 +10,22 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.base import Controller, Privileged, with_period
+from controllers.base import Controller, Privileged
 from epv_env.observation import LONGEST_WAIT, decode
 
 CHANGE = "p3_change_4"
 """The entry of the observation whose magnitude says whether p3 moves."""
+
+WAIT = 25e-3
+"""Time for which the coil has been as it is before p3 must move [s]: the armature's delay, the latency
+of the command, and the four periods over which the change is observed."""
+STILL = 0.02
+"""Change over four periods below which p3 stands still [bar]: twice the standard deviation that Table
+3's noise gives it. A chamber that fills or empties moves many times as much."""
+MARGIN = 0.5
+"""Distance of p3 from the end that it goes to, within which it may stand still [bar]."""
+AMBIENT = 1.0
+"""Pressure that the chamber empties to [bar]."""
 
 
 @dataclass(kw_only=True)
@@ -25,16 +36,6 @@ class P3Check:
     """For the on/off environment."""
     fallback: Controller
     """For the same environment; it must not read p3."""
-    wait: float = 25e-3
-    """Time for which the coil has been as it is before p3 must move [s]: the armature's delay, the
-    latency of the command, and the four periods over which the change is observed."""
-    still: float = 0.02
-    """Change over four control periods below which p3 stands still [bar]: twice the standard deviation
-    that Table 3's noise gives it. A chamber that fills or empties moves many times as much."""
-    margin: float = 0.5
-    """Distance of p3 from the end that it goes to, within which it may stand still [bar]."""
-    ambient: float = 1.0
-    """Pressure that the chamber empties to [bar]."""
     control_period: float = 5e-3
     """[s]"""
     name: str = ""
@@ -51,8 +52,6 @@ class P3Check:
                 f"{self.fallback.name!r} is for {self.fallback.environment} and {self.main.name!r} for "
                 f"{self.main.environment}: the one that takes over must act in the same environment"
             )
-        self.main = with_period(self.main, self.control_period)
-        self.fallback = with_period(self.fallback, self.control_period)
         self.name = self.name or f"{self.main.name}, p3 checked"
         self.environment = self.main.environment
 
@@ -82,8 +81,8 @@ class P3Check:
             decode(observations, name) for name in ("p1", "p3", "action", "since_switching", CHANGE)
         )
         on = coil > 0.5
-        remains = np.where(on, p1 - p3, p3 - self.ambient)
+        remains = np.where(on, p1 - p3, p3 - AMBIENT)
         # What happened before the first observation is not known: the coil may have switched just then.
         known = np.minimum(lasted, self._periods * self.control_period)
-        waited = known > min(self.wait, LONGEST_WAIT) - self.control_period / 2  # whole periods
-        return waited & (np.abs(change) < self.still) & (remains > self.margin)
+        waited = known > min(WAIT, LONGEST_WAIT) - self.control_period / 2  # whole periods
+        return waited & (np.abs(change) < STILL) & (remains > MARGIN)

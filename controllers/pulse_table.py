@@ -1,168 +1,341 @@
-"""Lookup table of a pulse: how long must the coil be off to add this much pressure?
+"""Lookup table of a pulse: how far does p2 rise if the coil stays off for this long?
 
 While the coil is off the control chamber vents through its exhaust: ln p3 falls at one constant rate
 while the exhaust is choked, and more slowly below 1.9 times the ambient pressure. The measured p3
-therefore says how far a pulse has come, whatever p3 it began at, and one table serves pulses from rest,
-pulses in quick succession and a valve that begins wide open: pressure gained, as a function of p1,
-p2/p1, the age of the venting (since p3 stood 5 % above the opening pressure) and the time that the coil
-stays off.
+therefore says how far a pulse has come, whatever p3 it began at. One table serves pulses from rest,
+pulses in quick succession and a valve that begins wide open: the rise of p2 as a function of p1, p2/p1,
+the age of the venting (since p3 stood 5 % above the opening pressure) and the time that the coil stays
+off. Some ten thousand short simulations of the plant in one batch make the table.
+
+All functions that are compiled take numbers in bar and seconds, so that they can be translated to C.
 """
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from itertools import product
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
-from controllers.opening_pressure import opening_pressure
-from controllers.venting_time import venting_time
-from epv_env.common.units import BAR, MILLISECOND
+from epv_env.common.units import BAR, GRAM, MILLISECOND
+from epv_env.plant.consumption import SCENARIOS
+from epv_env.plant.equations import State
+from epv_env.plant.plantfile import Plant
+from epv_env.plant.primitives.constants import QUARTER_PI
+from epv_env.plant.primitives.flow import CRITICAL_RATIO, bracket_over_drop
+from epv_env.plant.simulate import energised
+from epv_env.plant.valves import Valves
+
+compiled: Callable[..., Any] = numba.njit(error_model="numpy")
+"""Decorator of the functions of one valve."""
+
+SUPPLY = np.array([7.0, 11.0, 15.0])
+"""Nodes of p1 [bar]; beyond the ends of an axis its end holds."""
+RATIO = np.array([0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98])
+"""Nodes of p2/p1 [1]; denser where the flow falls steeply with the ratio."""
+AGE = np.array([*range(0, 26, 2), 30, 40, 50, 70, 100, 150, 200, 300]) * MILLISECOND
+"""Nodes of the venting's age [s]; after the last one the chamber is empty."""
+STAY = np.array([*range(0, 30, 2), 35, 40, 50, 70, 100]) * MILLISECOND
+"""Nodes of the time that the coil stays off [s]."""
+START_RATIO = 1.05
+"""p3 over the opening pressure at age zero [1]: the valve stays shut for some milliseconds more."""
+HARDEST_FLOW = SCENARIOS["emergency"].flow[1] * GRAM
+"""Flow of the hardest application [kg/s]."""
+
+TIME_STEP, MOST_STEPS = 5e-3, 60
+"""Time step in which simulated valves are watched until they have shut [s]; steps after which a valve
+counts as one that does not shut."""
+HELD_VOLUME = 1e9
+"""Factor of the circuit's volume that holds its pressure while the control chamber vents [1]."""
+VENTING_TIMES = np.array([0.0, 20e-3, 40e-3])
+"""Start, and two later times between which the control chamber's venting rate is taken [s]."""
+
+LEAST_RATIO, MOST_RATIO, RATIOS = 1.002, 50.0, 512
+"""Chamber pressures over the ambient one for which venting times are tabulated [1], and their number."""
 
 
-def _milliseconds(*values: float) -> NDArray:
-    return np.array(values) * MILLISECOND
+class PulseTable(NamedTuple):
+    """What p2 gains by leaving the coil off for a while, of m plants. Bar and seconds."""
 
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PulseGrid:
-    """Nodes of the table's axes, and where the age of the venting counts from."""
-
-    supply: NDArray = field(default_factory=lambda: np.array([7.0, 11.0, 15.0]) * BAR)
-    """Nodes of p1 [Pa]; beyond the ends of an axis its end holds."""
-    ratio: NDArray = field(
-        default_factory=lambda: np.array([0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98])
-    )
-    """Nodes of p2/p1 [1]; denser where the flow falls steeply with the ratio."""
-    age: NDArray = field(
-        default_factory=lambda: _milliseconds(*range(0, 26, 2), 30, 40, 50, 70, 100, 150, 200, 300)
-    )
-    """Nodes of the venting's age [s]; after the last one the chamber is empty."""
-    stay: NDArray = field(default_factory=lambda: _milliseconds(*range(0, 30, 2), 35, 40, 50, 70, 100))
-    """Nodes of the time that the coil stays off [s]."""
-    start_ratio: float = 1.05
-    """p3 over the opening pressure at age zero [1]: the valve stays shut for some milliseconds more."""
-
-    @property
-    def shape(self) -> tuple[int, int, int, int]:
-        """Lengths of the axes supply, ratio, age and stay."""
-        return len(self.supply), len(self.ratio), len(self.age), len(self.stay)
-
-
-GRID = PulseGrid()
-"""The grid of the pulse controllers."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class PulseTable:
-    """What p2 gains by leaving the coil off for a while. Bar and seconds.
-
-    Arguments of the methods are arrays (n,): measured p1, p2, p3 [bar absolute] with the coil off. Each
-    valve's answer is the same to the bit whatever n.
-    """
-
-    parameters: Mapping[str, Any]
-    """Of the plant, by symbol."""
-    vent_rate: float | NDArray
-    """-d ln(p3)/dt while the coil is off and the exhaust is choked [1/s]."""
-    release_lag: float | NDArray
-    """From switching off to the control chamber's venting [s]."""
+    seat_ratio: NDArray
+    """Area of the seat over that of the piston (m,) [1]."""
+    spring: NDArray
+    """Force of the spring on the shut piston over its area (m,) [bar]."""
+    ambient: NDArray
+    """Pressure that the control chamber vents to (m,) [bar]."""
+    vent_rate: NDArray
+    """-d ln(p3)/dt while the coil is off and the exhaust is choked (m,) [1/s]."""
+    release_lag: NDArray
+    """From switching off to the control chamber's venting (m,) [s]."""
+    hardest_fall: NDArray
+    """Fall of p2 by the hardest application (m,) [bar/s]."""
     gain: NDArray
-    """p2 added until the valve has shut again [bar]; shape of the grid (supply, ratio, age, stay)."""
+    """p2 added until the valve has shut again [bar], (m, supply, ratio, age, stay)."""
     lasts: NDArray
     """From now until the valve has shut again [s]; the same shape."""
-    grid: PulseGrid = GRID
-
-    def of(self, who: NDArray) -> "PulseTable":
-        """The table of some of the valves, indices (m,), where parameters differ between them."""
-        own = {s: v[who] if isinstance(v, np.ndarray) else v for s, v in self.parameters.items()}
-        return replace(self, parameters=own)
-
-    def venting_age(self, p1: NDArray, p2: NDArray, p3: NDArray) -> NDArray:
-        """Time since p3 stood at the grid's start ratio [s], (n,); negative: it is yet to come."""
-        opening = opening_pressure(self.parameters, p1 * BAR, p2 * BAR) / BAR
-        ambient = self.parameters["p_env"] / BAR
-        start = self.grid.start_ratio * np.maximum(opening, 1.0) / ambient
-        return (venting_time(start) - venting_time(p3 / ambient)) / self.vent_rate
-
-    def time_to_open(self, p1: NDArray, p2: NDArray, p3: NDArray) -> NDArray:
-        """Time with the coil off until p3 passes the opening pressure [s], (n,); negative: it has."""
-        return np.log(self.grid.start_ratio) / self.vent_rate - self.venting_age(p1, p2, p3)
-
-    def gained(
-        self, p1: NDArray, p2: NDArray, p3: NDArray, stay: NDArray, slope: NDArray | float = 0.0
-    ) -> NDArray:
-        """Change of p2 until the valve has shut, if the coil stays off for `stay` (n,) [s] [bar].
-
-        slope: of p2 by consumption [bar/s], a number or (n,). A stay that ends before age zero adds
-        nothing and counts as one until then.
-        """
-        age = self.venting_age(p1, p2, p3)
-        curve = self._curve(p1, p2, age, slope)
-        node, share = _place(self.grid.stay, stay + np.minimum(age, 0.0))
-        row = np.arange(len(curve))
-        return curve[row, node] * (1 - share) + curve[row, node + 1] * share
-
-    def gained_at_once(self, p1: NDArray, p2: NDArray, p3: NDArray) -> NDArray:
-        """`gained` without stay and slope (n,) [bar]: what is under way if the coil is switched on."""
-        gain = np.zeros(len(p1))
-        for weight, nodes in self._corners(p1, p2, self.venting_age(p1, p2, p3)):
-            gain += weight * self._rows(self.gain[..., 0], nodes)
-        return gain
-
-    def duration(
-        self, p1: NDArray, p2: NDArray, p3: NDArray, asked: NDArray, slope: NDArray | float = 0.0
-    ) -> NDArray:
-        """The inverse of `gained`: how long the coil must stay off to change p2 by `asked` (n,) [s].
-
-        Zero where more than that is under way already; at most the table's end, long past opening.
-        """
-        age = self.venting_age(p1, p2, p3)
-        curve = self._curve(p1, p2, age, slope)
-        stays = self.grid.stay
-        # Before the valve opens the curve only falls, below its first value: beyond that it is monotone.
-        node = np.clip(np.sum(curve < asked[:, None], axis=1) - 1, 0, len(stays) - 2)
-        row = np.arange(len(curve))
-        low, high = curve[row, node], curve[row, node + 1]
-        share = np.clip((asked - low) / np.where(high > low, high - low, 1.0), 0.0, 1.0)
-        stay = stays[node] * (1 - share) + stays[node + 1] * share
-        return np.where(asked > curve[:, 0], stay - np.minimum(age, 0.0), 0.0)
-
-    def _curve(self, p1: NDArray, p2: NDArray, age: NDArray, slope: NDArray | float) -> NDArray:
-        """Change of p2 over the nodes of stay (n, stay), linear between the nodes of the other axes."""
-        gain, lasts = np.zeros((2, len(p1), len(self.grid.stay)))
-        for weight, nodes in self._corners(p1, p2, age):
-            gain += weight[:, None] * self._rows(self.gain, nodes)
-            lasts += weight[:, None] * self._rows(self.lasts, nodes)
-        return gain + np.reshape(slope, (-1, 1)) * (lasts - np.minimum(age, 0.0)[:, None])
-
-    def _corners(
-        self, p1: NDArray, p2: NDArray, age: NDArray
-    ) -> Iterator[tuple[NDArray, tuple[NDArray, ...]]]:
-        """Weights (n,) and nodes (n,) of the cells' eight corners on the axes supply, ratio and age."""
-        grid = self.grid
-        axes = ((grid.supply, p1 * BAR), (grid.ratio, p2 / p1), (grid.age, age))
-        places = [_place(axis, value) for axis, value in axes]
-        nodes = [(node, node + 1) for node, _ in places]
-        shares = [(1 - share, share) for _, share in places]
-        for i, j, k in product(range(2), repeat=3):
-            yield shares[0][i] * shares[1][j] * shares[2][k], (nodes[0][i], nodes[1][j], nodes[2][k])
-
-    def _rows(self, table: NDArray, nodes: tuple[NDArray, ...]) -> NDArray:
-        """The table at nodes (n,) of its axes supply, ratio and age: rows (n, stay), or (n,)."""
-        return table[nodes]
 
 
-class PulseTables(PulseTable):
-    """A table for each of n valves: arrays with a first axis (n,), parameters (n,) by symbol."""
+def relative_flux(ratio: NDArray) -> NDArray:
+    """Flux out of a chamber over its choked flux (report eq. 13, 14), (n,) [1].
 
-    def _rows(self, table: NDArray, nodes: tuple[NDArray, ...]) -> NDArray:
-        return table[np.arange(len(table)), *nodes]
+    ratio: pressure over the one behind the orifice (n,) [1]; 1.002 at least counts.
+    """
+    choked = 1 - CRITICAL_RATIO
+    drop = np.minimum(1 - 1 / np.maximum(ratio, LEAST_RATIO), choked)
+    return np.sqrt(bracket_over_drop(drop) * drop / (bracket_over_drop(np.array(choked)) * choked))
 
 
-def _place(axis: NDArray, value: NDArray) -> tuple[NDArray, NDArray]:
-    """The node below each value (n,) and how far beyond it the value is, as a share of the interval."""
-    value = np.minimum(np.maximum(value, axis[0]), axis[-1])  # np.clip takes longer
-    node = np.minimum(np.searchsorted(axis, value, side="right") - 1, len(axis) - 2)
-    return node, (value - axis[node]) / (axis[node + 1] - axis[node])
+_LOGS = np.linspace(np.log(LEAST_RATIO), np.log(MOST_RATIO), RATIOS)
+_FINE = np.linspace(_LOGS[0], _LOGS[-1], 16 * (RATIOS - 1) + 1)
+VENTING_TIME = cumulative_trapezoid(1 / relative_flux(np.exp(_FINE)), _FINE, initial=0.0)[::16].copy()
+"""Time of venting to the ambient pressure from each ratio, times the choked rate [1]."""
+_FIRST_LOG, _LOG_STEP = float(_LOGS[0]), float(_LOGS[1] - _LOGS[0])
+
+
+@compiled
+def venting_time(ratio):
+    """Time of venting from a pressure to the ambient one, times the choked rate k [1].
+
+    While the exhaust is choked the pressure falls at a constant rate k = -d ln(p)/dt, and below the
+    critical ratio at k flux(p) / choked flux(p). ratio: pressure over the ambient one, absolute [1].
+    """
+    place = (np.log(min(max(ratio, LEAST_RATIO), MOST_RATIO)) - _FIRST_LOG) / _LOG_STEP
+    node = min(int(place), RATIOS - 2)
+    share = place - node
+    return VENTING_TIME[node] * (1 - share) + VENTING_TIME[node + 1] * share
+
+
+@compiled
+def opens_at(table, t, p1, p2):
+    """p3 below which the valve opens [bar]: the piston's balance at rest (report eq. 22)."""
+    return p1 - (p1 - p2) * table.seat_ratio[t] - table.spring[t]
+
+
+@compiled
+def venting_age(table, t, offset, p1, p2, p3):
+    """Time since p3 stood at START_RATIO times the opening pressure [s]; negative: it is yet to come.
+
+    offset: of the opening pressure from the table's [bar].
+    """
+    opening = opens_at(table, t, p1, p2) + offset
+    start = START_RATIO * max(opening, 1.0) / table.ambient[t]
+    return (venting_time(start) - venting_time(p3 / table.ambient[t])) / table.vent_rate[t]
+
+
+@compiled
+def time_to_open(table, t, offset, p1, p2, p3):
+    """Time with the coil off until p3 passes the opening pressure [s]; negative: it has."""
+    return np.log(START_RATIO) / table.vent_rate[t] - venting_age(table, t, offset, p1, p2, p3)
+
+
+@compiled
+def place(axis, value):
+    """The node below a value, and how far beyond it the value is, as a share of the interval."""
+    node = 0
+    for k in range(1, len(axis) - 1):
+        if value >= axis[k]:
+            node = k
+    share = (value - axis[node]) / (axis[node + 1] - axis[node])
+    return node, min(max(share, 0.0), 1.0)
+
+
+@compiled
+def cell_of(p1, p2, age):
+    """The table's cell on the axes supply, ratio and age: nodes and shares."""
+    i, x = place(SUPPLY, p1)
+    j, y = place(RATIO, p2 / p1)
+    k, z = place(AGE, age)
+    return i, j, k, x, y, z
+
+
+@compiled
+def within(values, t, cell, stay):
+    """`gain` or `lasts` of plant t within a cell, at a node of stay."""
+    i, j, k, x, y, z = cell
+    total = 0.0
+    for a in range(2):
+        for b in range(2):
+            for c in range(2):
+                weight = (x if a else 1 - x) * (y if b else 1 - y) * (z if c else 1 - z)
+                total += weight * values[t, i + a, j + b, k + c, stay]
+    return total
+
+
+@compiled
+def gained_at_once(table, t, offset, p1, p2, p3):
+    """What p2 still rises if the coil is switched on now [bar]."""
+    age = venting_age(table, t, offset, p1, p2, p3)
+    return within(table.gain, t, cell_of(p1, p2, age), 0)
+
+
+@compiled
+def change(table, t, cell, age, slope, stay):
+    """Change of p2 until the valve has shut, if the coil stays off until a node of stay [bar]."""
+    lasts = within(table.lasts, t, cell, stay) - min(age, 0.0)
+    return within(table.gain, t, cell, stay) + slope * lasts
+
+
+@compiled
+def gained(table, t, offset, p1, p2, p3, stay, slope):
+    """Change of p2 until the valve has shut, if the coil stays off for `stay` [s] [bar].
+
+    slope: of p2 by consumption [bar/s]. A stay that ends before age zero adds nothing.
+    """
+    age = venting_age(table, t, offset, p1, p2, p3)
+    cell = cell_of(p1, p2, age)
+    node, share = place(STAY, stay + min(age, 0.0))
+    low = change(table, t, cell, age, slope, node)
+    return low * (1 - share) + change(table, t, cell, age, slope, node + 1) * share
+
+
+@compiled
+def duration(table, t, offset, p1, p2, p3, asked, slope):
+    """The inverse of `gained`: how long the coil must stay off to change p2 by `asked` [bar] [s].
+
+    Zero where more than that is under way already; at most the table's end, long past opening.
+    """
+    age = venting_age(table, t, offset, p1, p2, p3)
+    cell = cell_of(p1, p2, age)
+    if asked <= change(table, t, cell, age, slope, 0):
+        return 0.0
+    # Before the valve opens the curve only falls, below its first value: beyond that it is monotone.
+    node = 0
+    for k in range(1, len(STAY) - 1):
+        if change(table, t, cell, age, slope, k) < asked:
+            node = k
+    low = change(table, t, cell, age, slope, node)
+    high = change(table, t, cell, age, slope, node + 1)
+    share = min(max((asked - low) / (high - low), 0.0), 1.0) if high > low else 1.0
+    return STAY[node] * (1 - share) + STAY[node + 1] * share - min(age, 0.0)
+
+
+def pulse_table(p: Mapping[str, float], *, supply_voltage: float = 24.0) -> PulseTable:
+    """The table of a plant; takes about a third of a second.
+
+    Args:
+        p: parameters by symbol.
+        supply_voltage: of the coil when on [V].
+
+    Raises:
+        ValueError: some valve stays open after the coil is switched on.
+    """
+    vent_rate, release_lag = _venting(p, supply_voltage)
+    p1, ratio = (axis.ravel() for axis in np.meshgrid(SUPPLY * BAR, RATIO, indexing="ij"))
+    under_way = _vented(p, p1, ratio * p1, supply_voltage)
+    left_off = _record(p, under_way, STAY)
+    p2, shutting = _shut_again(p, left_off, supply_voltage)
+
+    def on_grid(values: NDArray) -> NDArray:
+        shaped = values.reshape(len(AGE), len(SUPPLY), len(RATIO), len(STAY))
+        return np.ascontiguousarray(np.moveaxis(shaped, 0, 2))[None]
+
+    piston, seat = QUARTER_PI * p["d1"] ** 2, QUARTER_PI * p["d2"] ** 2
+    numbers = (
+        seat / piston, p["cPV"] * p["xPV0"] / piston / BAR, p["p_env"] / BAR, vent_rate, release_lag,
+        HARDEST_FLOW * p["R_gas"] * p["T_env"] / p["V2"] / BAR,
+    )  # fmt: skip
+    return PulseTable(
+        *(np.array([number]) for number in numbers),
+        gain=on_grid((p2 - left_off.p2[:, :1]) / BAR), lasts=on_grid(STAY + shutting),
+    )  # fmt: skip
+
+
+def nominal_table(plant: Plant) -> PulseTable:
+    """The table that a controller of this nominal plant starts from. A plant's table is made once."""
+    return _cached_table(tuple(plant.parameters.items()), plant.voltage)
+
+
+def pulse_tables(plants: Sequence[Mapping[str, float]], supply_voltage: float = 24.0) -> PulseTable:
+    """The table of m plants (parameters by symbol), in their order. A plant's table is made once.
+
+    supply_voltage: of their coils when on [V].
+    """
+    tables = [_cached_table(tuple(plant.items()), supply_voltage) for plant in plants]
+    return PulseTable(*(np.concatenate(parts) for parts in zip(*tables, strict=True)))
+
+
+@lru_cache(maxsize=1024)
+def _cached_table(plant: tuple[tuple[str, float], ...], supply_voltage: float) -> PulseTable:
+    """The table of a plant. Searches and evaluations meet the same plants again and again."""
+    return pulse_table(dict(plant), supply_voltage=supply_voltage)
+
+
+def opening_pressure(p: Mapping[str, float], p1: NDArray, p2: NDArray) -> NDArray:
+    """Control pressure p3 below which the protection valve opens (n,) [Pa absolute] (report eq. 22).
+
+    Args:
+        p: parameters by symbol.
+        p1: supply pressure (n,) [Pa absolute].
+        p2: circuit pressure (n,) [Pa absolute].
+    """
+    piston, seat = QUARTER_PI * p["d1"] ** 2, QUARTER_PI * p["d2"] ** 2
+    return p1 - ((p1 - p2) * seat + p["cPV"] * p["xPV0"]) / piston
+
+
+def _valves(p: Mapping[str, float], state: State, U: float) -> Valves:
+    """Valves in the given state (fields that broadcast to (n,)) under a constant voltage [V]."""
+    valves = Valves(np.size(state.p2))
+    valves.set_parameters(np.arange(valves.n), p)
+    for field, value in zip(valves.state, state, strict=True):
+        field[:] = value
+    valves.inputs.U[:] = U
+    return valves
+
+
+def _record(p: Mapping[str, float], state: State, times: NDArray) -> State:
+    """States at `times` [s], the first being 0, with the coil off; fields (n, times)."""
+    valves = _valves(p, state, 0.0)
+    periods = np.diff(times)[:, None]
+    later = valves.record(valves.inputs._replace(U=np.zeros_like(periods)), periods)
+    return State(
+        *(
+            np.concatenate([np.broadcast_to(first, (1, valves.n)), rest]).T
+            for first, rest in zip(state, later, strict=True)
+        )
+    )
+
+
+def _venting(p: Mapping[str, float], U: float) -> tuple[float, float]:
+    """Rate of ln p3 with the coil off [1/s], and the armature's lag before it falls [s]."""
+    p1 = SUPPLY[1:2] * BAR
+    times = VENTING_TIMES
+    start = energised(p, p1=p1, p2=RATIO[3] * p1, U=U)
+    logs = np.log(_record(p, start, times).p3[0])
+    rate = (logs[1] - logs[2]) / (times[2] - times[1])
+    return float(rate), float(times[1] - (logs[0] - logs[1]) / rate)
+
+
+def _vented(p: Mapping[str, float], p1: NDArray, p2: NDArray, U: float) -> State:
+    """States at the ages of a pulse under way that has not raised p2 yet; fields (ages n,).
+
+    p1, p2: (n,) [Pa].
+    """
+    start = energised(p, p1=p1, p2=p2, U=U)
+    p3 = START_RATIO * opening_pressure(p, p1, p2)
+    released = start._replace(p3=p3, xMV=0.0, I=0.0, I_coil=0.0)
+    under_way = _record({**p, "V2": HELD_VOLUME * p["V2"]}, released, AGE)
+    return State(*(field.T.ravel() for field in under_way))
+
+
+def _shut_again(p: Mapping[str, float], state: State, U: float) -> tuple[NDArray, NDArray]:
+    """After switching on in states (n, stay): p2 once the valve has shut [Pa], and when that is [s].
+
+    Both (n, stay); the time is known to within half a time step. Raises ValueError for a plant that
+    stays open.
+    """
+    valves = _valves(p, State(*(field.ravel() for field in state)), U)
+    shutting = np.zeros(valves.n)
+    for _ in range(MOST_STEPS):
+        valves.advance(TIME_STEP)
+        still_open = valves.state.xPV > 0
+        shutting += np.where(still_open, TIME_STEP, 0.0)
+        if not np.any(still_open):
+            return valves.state.p2.reshape(state.p2.shape), shutting.reshape(
+                state.p2.shape
+            ) + TIME_STEP / 2
+    raise ValueError(
+        f"a pulse cannot be planned: {MOST_STEPS * TIME_STEP:g} s after switching on with {U:g} V "
+        "some valve is still open; check the plant's parameters"
+    )

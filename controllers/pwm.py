@@ -7,13 +7,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.opening_pressure import opening_pressure
+from controllers.pulse_table import opening_pressure
 from controllers.pwm_design import Design, design
-from controllers.registration import CHEAP, Range, Registration
+from controllers.registration import Range, Registration
 from epv_env.common.units import BAR
 from epv_env.observation import decode
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
+
+PERIOD = 20e-3
+"""Period of the PWM [s]: the environment's."""
 
 
 @dataclass(kw_only=True)
@@ -36,7 +39,7 @@ class PWM:
     """Largest distance of the wanted p3 below the opening pressure [bar]: limits the PV's stroke."""
     setpoint: float = 0.0
     """Setpoint of p2 - target in the cascade [bar]."""
-    control_period: float = 20e-3
+    control_period: float = PERIOD
     """Period of the PWM [s]."""
     name: str = "PWM"
     environment: str = "EPValvePWM-v0"
@@ -69,19 +72,11 @@ class PWM:
         return (2 * np.clip(duty, 0.0, 1.0) - 1)[:, None].astype(np.float32)
 
 
-@dataclass(frozen=True, kw_only=True)
-class DesignPoint:
-    """Where the loop is designed."""
-
-    p1: float = 11.5 * BAR
-    """Supply pressure: the middle of the reservoirs' range [Pa]."""
-    p2: float = 8.0 * BAR
-    """Circuit pressure: near the middle of the targets' range [Pa]."""
-    period: float = 20e-3
-    """Period of the PWM [s]: the environment's."""
+DESIGN_P1, DESIGN_P2 = 11.5 * BAR, 8.0 * BAR
+"""Where the loop is designed: the middle of the reservoirs' range, and of the targets' [Pa]."""
 
 
-def build(values: Mapping[str, Any], plant: Plant, point: DesignPoint = DesignPoint()) -> PWM:
+def build(values: Mapping[str, Any], plant: Plant) -> PWM:
     """The controller with a loop shaped for a plant.
 
     values: quantities of the search space by name. Raises ValueError if no gain keeps the phase margin.
@@ -89,10 +84,9 @@ def build(values: Mapping[str, Any], plant: Plant, point: DesignPoint = DesignPo
     loop = {name: values[name] for name in ("inner_time", "phase_margin", "integral_time")}
     rest = {name: value for name, value in values.items() if name not in loop}
     shaped = design(
-        plant.parameters, p1=point.p1, p2=point.p2, period=point.period,
-        supply_voltage=plant.voltage, **loop,
-    )  # fmt: skip
-    return PWM(design=shaped, parameters=plant.parameters, control_period=point.period, **rest)
+        plant.parameters, p1=DESIGN_P1, p2=DESIGN_P2, period=PERIOD, supply_voltage=plant.voltage, **loop
+    )
+    return PWM(design=shaped, parameters=plant.parameters, **rest)
 
 
 REGISTRATION = Registration(
@@ -108,5 +102,4 @@ REGISTRATION = Registration(
         "engage_below": Range(low=-0.4, high=0.3, least=-0.5, most=0.5),
         "rest_above": Range(low=-0.3, high=0.4, least=-0.5, most=0.5),
     },
-    cost=CHEAP,
 )

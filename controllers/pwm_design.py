@@ -1,38 +1,110 @@
-"""Design of the PWM controller: shape the loop of the linearised valve with python-control.
+"""Design of the PWM controller: linearise the averaged valve, and shape its loop with python-control.
+
+Averaged over a PWM period, the control chamber fills for the duty d and vents for the rest, the piston
+stands where its spring balances p3, and the circuit integrates the flow. Around an operating point with
+the protection valve a little open this is an integrator behind a lag:
+
+    d(p3)/dt = a p3 + b d,   d(p2)/dt = g p3          (deviations)
 
 The loop is a cascade at the PWM period: p3 is fed back by a gain, p2 by a PI around it. The inner loop
 takes the slow lag of the control chamber out of the outer loop.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import control
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import root_scalar
 
-from controllers.pwm_linearisation import OPENING, OperatingPoint, linearise, switching_lag
 from epv_env.common.units import BAR
+from epv_env.plant.coefficients import coefficients
+from epv_env.plant.equations import Coefficients
 from epv_env.plant.parameters import Parameters
+from epv_env.plant.primitives.constants import QUARTER_PI
+from epv_env.plant.primitives.flow import mass_flux
+from epv_env.plant.simulate import energised, simulate
+
+OUTER_GAINS = np.geomspace(3.0, 1e-2, 40)
+"""Outer gains that are tried, the largest first [1]."""
+FREQUENCIES = 400
+"""Number of frequencies at which the loop's margins are read."""
+OPENING = 0.05
+"""Share of the stroke at which the plant is linearised [1]: barely open, where the loop works."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class DesignSettings:
-    """How the loop is linearised and its gain searched."""
+class OperatingPoint:
+    """Where the averaged valve rests barely open, and its linearisation there. SI units."""
 
-    opening: float = OPENING
-    """Share of the stroke at which the plant is linearised [1]."""
-    largest_gain: float = 3.0
-    """Largest outer gain that is tried [1]."""
-    smallest_gain: float = 1e-2
-    """Smallest outer gain that is tried [1]."""
-    gains: int = 40
-    """Number of gains between them, in equal ratios."""
-    frequencies: int = 400
-    """Number of frequencies at which the loop's margins are read."""
+    p3: float
+    """Control pressure [Pa absolute]."""
+    duty: float
+    """Duty that holds p3 [1]."""
+    a: float
+    """Slope of dp3/dt over p3 [1/s]."""
+    b: float
+    """Slope of dp3/dt over duty [Pa/s]."""
+    g: float
+    """Slope of dp2/dt over p3 [1/s]; negative: a lower p3 opens the valve."""
 
 
-DESIGN = DesignSettings()
-"""The design of the PWM controller."""
+def _static_stroke(p3: float, p1: float, p2: float, c: Coefficients) -> float:
+    """Stroke at which the spring balances the pressures, within the stops [m] (eq. 22 at rest)."""
+    seat_area = QUARTER_PI * c.seat_diameter**2
+    force = (p1 - p3) * c.piston_area - (p1 - p2) * seat_area
+    return float(np.clip(force / c.cPV - c.xPV0, 0.0, c.xPVmax))
+
+
+def _p3_rate(p3: float, duty: float, p1: float, c: Coefficients) -> float:
+    """Averaged dp3/dt [Pa/s]: the armature's flights are short against the period (eq. 7)."""
+    fill = c.orifice_in * mass_flux(p1, p3, c.inverse_sqrt_RT)
+    vent = c.orifice_exh * mass_flux(p3, c.p_env, c.inverse_sqrt_RT)
+    return c.RT_V3 * (duty * fill - (1 - duty) * vent)
+
+
+def switching_lag(p: Parameters, *, p1: float, p2: float, supply_voltage: float) -> float:
+    """How much later the armature answers switching on than switching off [s], by simulation.
+
+    The coil's current has to build up before it moves the armature; so the valve fills for less of a
+    period than the coil is on.
+    """
+    sampling = 50e-6
+    half = round(40e-3 / sampling)  # long against both answers
+    U = np.repeat([supply_voltage, 0.0, supply_voltage], half)
+    start = energised(p, p1=p1, p2=p2, U=supply_voltage)
+    run = simulate(p, initial=start, U=U, period=sampling)
+    pulled_in = np.asarray(run.state.xMV) > p["xMVmax"] / 2
+    released = np.argmax(~pulled_in[half : 2 * half])
+    answered = np.argmax(pulled_in[2 * half :])
+    return float(answered - released) * sampling
+
+
+def _root(function: Callable[[float], float], low: float, high: float) -> float:
+    """Zero of a function that changes sign between low and high."""
+    return float(root_scalar(function, bracket=(low, high)).root)
+
+
+def linearise(p: Parameters, *, p1: float, p2: float, opening: float = OPENING) -> OperatingPoint:
+    """The averaged plant at a supply p1 and circuit pressure p2 [Pa absolute].
+
+    opening: share of the stroke [1].
+    """
+    c = Coefficients(*coefficients(p)[:, 0].tolist())
+    stroke = opening * c.xPVmax
+    p3 = _root(lambda x: _static_stroke(x, p1, p2, c) - stroke, c.p_env, p1)
+    duty = _root(lambda d: _p3_rate(p3, d, p1, c), 0.0, 1.0)
+    small = 1e-3 * p3
+    flux = mass_flux(p1, p2, c.inverse_sqrt_RT)
+    opening_slope = -c.piston_area / c.cPV  # of the static stroke between its stops
+    return OperatingPoint(
+        p3=p3,
+        duty=duty,
+        a=(_p3_rate(p3 + small, duty, p1, c) - _p3_rate(p3 - small, duty, p1, c)) / (2 * small),
+        b=(_p3_rate(p3, duty + 1e-3, p1, c) - _p3_rate(p3, duty - 1e-3, p1, c)) / 2e-3,
+        g=c.RT_V2 * c.curtain_PV * opening_slope * flux,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,10 +158,9 @@ def response(
     inner_gain: float,
     integral_time: float,
     period: float,
-    frequencies: int = DESIGN.frequencies,
 ) -> control.FrequencyResponseData:
     """`outer_loop` from 0.1 rad/s to half the sampling frequency, as python-control takes it."""
-    frequency = np.geomspace(0.1, np.pi / period, frequencies)
+    frequency = np.geomspace(0.1, np.pi / period, FREQUENCIES)
     z = np.exp(1j * frequency * period)
     return control.frd(outer_loop(point, inner_gain, integral_time, period, z), frequency)
 
@@ -109,7 +180,6 @@ def design(
     integral_time: float,
     period: float,
     supply_voltage: float = 24.0,
-    settings: DesignSettings = DESIGN,
 ) -> Design:
     """The largest outer gain that keeps a phase margin on the discrete loop.
 
@@ -122,17 +192,16 @@ def design(
         integral_time: Tn of the outer PI [s].
         period: of the PWM [s].
         supply_voltage: of the coil when on [V].
-        settings: of linearisation and search.
 
     Raises:
         ValueError: no gain keeps the margin.
     """
-    point = linearise(p, p1=p1, p2=p2, opening=settings.opening)
+    point = linearise(p, p1=p1, p2=p2)
     pole, drift = np.exp(-period / inner_time), np.exp(point.a * period)
     lag = switching_lag(p, p1=p1, p2=p2, supply_voltage=supply_voltage)
     inner_gain = float((drift - pole) / ((drift - 1) / point.a * point.b / BAR))
-    unit = response(point, inner_gain, integral_time, period, settings.frequencies)
-    for gain in np.geomspace(settings.largest_gain, settings.smallest_gain, settings.gains):
+    unit = response(point, inner_gain, integral_time, period)
+    for gain in OUTER_GAINS:
         margin, phase, _, crossover = map(float, control.margin(gain * unit))
         if margin > 1 and phase >= phase_margin:
             return Design(

@@ -1,4 +1,4 @@
-"""What a controller's file says about its controller: how it is built, tuned, and what it costs to run.
+"""What a controller's file says about its controller: how it is built and tuned.
 
 The record stands beside the class, in the controller's own file. controllers/registry.py lists it.
 """
@@ -68,39 +68,6 @@ SearchSpace = Mapping[str, Range | Choice]
 
 
 @dataclass(frozen=True, kw_only=True)
-class CostClass:
-    """How much computing a controller takes, and how much fewer episodes it therefore runs."""
-
-    simulates_plant: bool = False
-    """Whether it simulates the plant as it decides: a second or more of computing per episode."""
-    relative_cpu_time: int = 1
-    """CPU time of an episode over a cheap controller's [1]; measured, 16 side by side against 512."""
-    episode_divisor: int = 1
-    """How many times fewer episodes a comparison runs: the first ones, so that the pairing holds."""
-    paired_random_episodes: int = 0
-    """Least number of random episodes on plant sets where controllers are compared in pairs, if the
-    others run as many."""
-    most_trials: int | None = None
-    """Most trials of its tuning; None: as many as the others."""
-    most_episodes: int | None = None
-    """Most episodes of a trial; None: as many as the others."""
-
-
-CHEAP = CostClass()
-"""Decides by a formula or a table."""
-
-TABLE_PER_PLANT = CostClass(relative_cpu_time=30, episode_divisor=8, paired_random_episodes=512)
-"""Makes a table of each plant that it meets."""
-
-SIMULATING = CostClass(
-    simulates_plant=True, relative_cpu_time=200, episode_divisor=128, paired_random_episodes=128,
-    most_trials=16, most_episodes=32,
-)  # fmt: skip
-"""Simulates the plant as it decides. Its smaller tuning budget still takes a
-thousand times the computing of the others' budget."""
-
-
-@dataclass(frozen=True, kw_only=True)
 class Registration:
     """A controller's record."""
 
@@ -113,7 +80,6 @@ class Registration:
     quantities contradict each other."""
     search_space: SearchSpace | None
     """The quantities that tuning searches; None: nothing is tuned."""
-    cost: CostClass
 
     def built(self, values: Mapping[str, Any], plant: Plant) -> Controller:
         """The controller, from exactly the quantities of its search space.

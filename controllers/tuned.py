@@ -1,12 +1,12 @@
 """The tuned controllers as data (tuned.json): the values that the search found, and how it searched."""
 
-from collections.abc import Collection
 from dataclasses import asdict, dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from controllers.base import Controller
+from controllers.knowledge import WITH_RULES, with_rules
 from controllers.registry import registration
 from epv_env.common.files import JSONFileError, read_json, write_json
 from epv_env.plant.plantfile import Plant
@@ -14,6 +14,9 @@ from epv_env.plant.plantfile import Plant
 FORMAT = "epv-controllers/1"
 TUNED_FILE = Path(__file__).parent / "tuned.json"
 """The tunings that come with the package."""
+
+ABLATED = ("hysteresis, extrapolating", "pulse, adaptive")
+"""Kinds that stand in tables behind the rules, too."""
 
 
 class ControllersFileError(ValueError):
@@ -29,11 +32,11 @@ class Tuning:
     trials: int
     """Evaluations spent."""
     mean_return: float
-    """Mean return of the best on the tuning scenarios, under the objective."""
+    """Mean return of the best on the tuning scenarios."""
     episodes: int
     """Episodes of one evaluation."""
-    objective: str = "reward"
-    """Whose return was maximised: OBJECTIVES of training/tune.py."""
+    plants: str = "sensitive_ten_percent"
+    """Region of the plants that it was searched on (epv_env.plant.region)."""
     widened: dict[str, tuple[float, float]] = field(default_factory=dict)
     """Ranges that ended at a bound and were searched again, by quantity: the last range searched."""
 
@@ -45,7 +48,7 @@ class TuningsFile:
     search: dict[str, Any]
     """How the tunings were searched: method, budget, seed, plants."""
     controllers: dict[str, Tuning]
-    """Tunings by the controllers' names: kinds, and kinds followed by WITH_MARGIN."""
+    """Tunings by the controllers' kinds."""
 
 
 def load_tunings(path: str | PathLike[str] | None = None) -> dict[str, Tuning]:
@@ -79,7 +82,7 @@ def build(name: str, values: dict[str, Any], plant: Plant) -> Controller:
     """A controller from its tuned quantities.
 
     Args:
-        name: one of the registry's kinds, perhaps followed by WITH_MARGIN; the controller's own then.
+        name: one of the registry's kinds, perhaps followed by WITH_RULES.
         values: tuned quantities by name.
         plant: that it is designed for.
 
@@ -87,13 +90,21 @@ def build(name: str, values: dict[str, Any], plant: Plant) -> Controller:
         ValueError: the kind is unknown, a quantity is missing or unknown, or quantities contradict each
             other.
     """
-    controller = registration(name).built(values, plant)
-    controller.name = name
-    return controller
+    controller = registration(name.removesuffix(WITH_RULES)).built(values, plant)
+    return with_rules(controller, plant) if name.endswith(WITH_RULES) else controller
 
 
-def tuned_controllers(plant: Plant | None = None, *, without: Collection[str] = ()) -> list[Controller]:
+def tuned(name: str, plant: Plant | None = None) -> Controller:
+    """`build` with the tuning that comes with the package; plant None: the report's calibration."""
+    values = load_tunings()[name.removesuffix(WITH_RULES)].values
+    return build(name, values, plant or Plant.calibrated())
+
+
+def tuned_controllers(plant: Plant | None = None) -> list[Controller]:
     """The classic controllers as tuned, designed for a plant (None: the report's calibration)."""
-    described = plant or Plant.calibrated()
-    tunings = load_tunings()
-    return [build(name, tunings[name].values, described) for name in tunings if name not in without]
+    return [tuned(name, plant) for name in load_tunings()]
+
+
+def ablation(plant: Plant | None = None) -> list[Controller]:
+    """Classic controllers behind the rules of the learned policy: what learning adds to them."""
+    return [tuned(name + WITH_RULES, plant) for name in ABLATED]

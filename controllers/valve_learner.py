@@ -1,233 +1,398 @@
-"""What a valve's own pulses tell of it: opening pressure, gain of a pulse, and venting rate.
+"""What a valve's own pulses tell about it: when it opens, how much a pulse adds, how fast it vents.
 
-A table of the nominal plant is fitted to each valve (Åström and Wittenmark, Adaptive Control, 2nd ed.
-1995, chapter 3). The opening pressure and the gain of a pulse are learnt by a bank of Kalman filters
-(controllers/opening_bank.py), the venting rate of the control chamber from the fall of ln p3.
+The table of the nominal plant (controllers/pulse_table.py) is fitted to each valve. The venting rate is
+learnt from the fall of ln p3. Opening pressure and gain are learnt by a bank of Kalman filters: each of
+its members assumes an offset of the opening pressure and estimates the factor between a pulse's rise and
+the table's. How well a member foresees each pulse sets its probability. The filter of p2 is the
+fading-memory g-h filter.
+
+Sources: Astrom and Wittenmark, Adaptive Control, 2nd ed. 1995, chapter 3; Magill, IEEE Trans. Automatic
+Control 10 (1965), and Simon, Optimal State Estimation (Wiley 2006), section 10.2 (multiple models);
+Brookner, Tracking and Kalman Filtering Made Easy (1998), chapter 1.
+
+The compiled functions work on one valve with plain arithmetic, so that they can be translated to C.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+import math
+from pathlib import Path
 from typing import Any
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.opening_bank import BANK, OpeningBank, shifted
-from controllers.opening_pressure import opening_pressure
-from controllers.pulse_table import PulseTable
-from controllers.reserve import fed
-from epv_env.common.units import BAR
-from epv_env.observation import decode
+from controllers.pulse_table import (
+    PulseTable,
+    compiled,
+    gained_at_once,
+    opens_at,
+    time_to_open,
+)
+from epv_env.observation import CENTRE, INDEX, SCALE
+from epv_env.plant.primitives.compiled import source_digest
+from epv_env.reward import BAND_BAR
+
+OFFSETS = np.linspace(-2.2, 2.2, 45)
+"""Offsets of the opening pressure that the members assume [bar]: 4.4 standard deviations."""
+MEMBERS = len(OFFSETS)
+OFFSET_SPREAD = 0.5
+"""Their standard deviation before the first pulse [bar]: piston, seat and spring within ±10 %."""
+OFFSET_DRIFT = 2e-3
+"""Share of a member's probability that goes to each neighbour at a correction [1]: the valve may change,
+and the seat's diameter makes the offset depend on the pressures."""
+GAIN_SPREAD, GAIN_DRIFT = 0.2, 0.02
+"""Standard deviation of the gain's factor before the first pulse, and its growth with each [1]."""
+LEAST_FACTOR, MOST_FACTOR = 0.4, 2.5
+"""Limits of the factors of gain and venting rate [1]."""
+GAIN_READING_ERROR = 0.015
+"""Standard deviation of a rise's measurement by two readings of p2 [bar]."""
+SLOPE_ERROR = 0.7
+"""Standard deviation of the consumption's slope during a pulse [bar/s]: it jumps."""
+TABLE_ERROR = 0.1
+"""Standard deviation of the table's rise beyond a common factor, as a share of it [1]."""
+OPEN_RISE, SHUT_RISE = 0.06, 0.02
+"""Rise of p2 in a period that shows an open valve, three standard deviations of two readings'
+difference, and the rise below which it is seen to be shut [bar]."""
+LATE = 0.9
+"""p3 over a member's opening pressure at which p2 must have begun to rise [1]."""
+CONTRADICTED = 0.1
+"""Factor of the probability of a member that p2 contradicts in a period [1]."""
+PACE_SPREAD, PACE_DRIFT, PACE_READING_ERROR = 0.2, 1e-3, 0.01
+"""Standard deviations of the venting rate's factor before the first reading, of its growth with each
+reading, and of p3 over p3 of a reading [1]."""
+PERIODS_AFTER_RELEASE = 3
+"""Periods with the coil off from which p3 falls at its full rate: the armature has moved."""
+CONFIDENCE, UNKNOWN_CONFIDENCE = 0.95, 0.99
+"""Probability that a valve opens no earlier than "early"; that of a valve that is still unknown [1]."""
+UNKNOWN_DEVIATION = 0.45
+"""Standard deviation of the opening pressure above which a valve is unknown [bar]."""
+LEAST_HEAD = 0.2
+"""p1 - p2 below which the supply does not raise the circuit [bar]."""
+TOLERATED = BAND_BAR - 0.1
+"""Expected breakdown that needs no reserve [bar]: what the band allows, less the scatter at rest."""
+MOST_RESERVE = 0.3
+"""Largest reserve [bar]: above it a pulse's scatter would leave the band upwards."""
+BREAKDOWN_MEMORY, REACHED = 60.0, 0.05
+"""Time in which the memory of a breakdown fades by 1/e [s]; distance below the target from which the
+target counts as reached [bar]: the way up to it is no breakdown."""
+FILTER_TIME = 0.025
+"""Time in which the weight of a reading of p2 fades by 1/e [s]."""
+
+_STATE = (
+    "off_periods", "on_periods", "was_shut", "slope", "pace_variance", "measuring",
+    "end_p1", "end_p2", "end_p3", "end_fall", "reached",
+)  # fmt: skip
+_KNOWN = (
+    "on",  # 1 if the coil is on
+    "p1", "p2", "p3",  # as read [bar]
+    "error",  # p2 - target, filtered while the valve is shut [bar]
+    "fall",  # rate of change of p2 by consumption, at most 0 [bar/s]
+    "offset", "offset_deviation",  # of the opening pressure from the table's [bar]
+    "early_offset",  # the same if the valve opens early [bar]
+    "gain", "gain_deviation",  # rise of a pulse over the table's [1]
+    "pace", "pace_deviation",  # venting rate over the table's [1]
+    "opens_in", "opens_in_early",  # time to open with the coil off from now [s]; negative: it is open
+    "opens_from_rest",  # the same from a full control chamber [s]
+    "forecast",  # p2 - target when the valve opens, if the coil is switched off now [bar]
+    "under_way",  # rise of p2 if the coil is switched on now [bar]
+    "after_period", "after_period_early",  # the same after one period more off; if the valve opens early
+    "reserve",  # how much higher p2 is held where the valve is slow [bar]
+    "deepest",  # deepest breakdown lately [bar]
+    "head",  # p1 - p2 [bar]
+    "advised", "remaining", "margin",  # what the adaptive pulse advises (controllers/pulse.py)
+)  # fmt: skip
+VALVE = np.dtype(
+    [(name, np.float64) for name in (*_STATE, *_KNOWN)]
+    + [(name, np.float64, (MEMBERS,)) for name in ("probability", "member_gain", "member_variance")]
+)
+"""State of a learner and what it knows of one valve."""
+
+_ERROR, _TARGET, _P1, _P3, _COIL, _P2_CHANGE, _P3_CHANGE = (
+    INDEX[name] for name in ("p2_error", "target", "p1", "p3", "action", "p2_change_1", "p3_change_1")
+)
 
 
-@dataclass(frozen=True, kw_only=True)
-class VentingSettings:
-    """How the venting rate is learnt."""
-
-    spread: float = 0.2
-    """Standard deviation of its factor before the first reading [1]: bore, chamber, contraction."""
-    reading_error: float = 0.01
-    """Standard deviation of p3 over p3 of a reading [1]."""
-    drift: float = 1e-3
-    """Growth of the factor's deviation with each reading [1]."""
-    periods_after_release: int = 3
-    """Control periods with the coil off from which p3 falls at its full rate: the armature has moved."""
-    limits: tuple[float, float] = (0.4, 2.5)
-    """Least and greatest factor [1]."""
-
-
-VENTING = VentingSettings()
+@compiled
+def begin(v):
+    """Nothing is known of the valve: an episode begins."""
+    v.off_periods = v.on_periods = v.was_shut = v.slope = v.measuring = v.reached = 0.0
+    v.error = v.deepest = 0.0
+    v.pace, v.pace_variance = 1.0, PACE_SPREAD**2
+    total = 0.0
+    for m in range(MEMBERS):
+        v.probability[m] = math.exp(-0.5 * (OFFSETS[m] / OFFSET_SPREAD) ** 2)
+        total += v.probability[m]
+    for m in range(MEMBERS):
+        v.probability[m] /= total
+        v.member_gain[m], v.member_variance[m] = 1.0, GAIN_SPREAD**2
+    summarise(v)
 
 
-@dataclass(frozen=True, kw_only=True)
-class LearntValve:
-    """What is known of n valves in this control period; arrays (n,)."""
+@compiled
+def begin_informed(v):
+    """The table is the valve's own: nothing has to be learnt."""
+    begin(v)
+    v.pace_variance = 0.0
+    v.offset = v.offset_deviation = v.early_offset = v.gain_deviation = 0.0
+    v.gain = 1.0
 
-    table: PulseTable
-    """With the learnt opening pressures."""
-    pace: NDArray
-    """Venting rate over the table's [1]: times of the table are divided by it."""
-    gain: NDArray
-    """Rise of p2 by a pulse over the table's [1]."""
-    gain_deviation: NDArray
-    """Standard deviation of the learnt gain [1]."""
-    offset_deviation: NDArray
-    """Standard deviation of the learnt opening pressure [bar]."""
-    p1: NDArray
-    """Supply pressure [bar]."""
-    p2: NDArray
-    """Circuit pressure as read [bar]."""
-    p3: NDArray
-    """Control pressure [bar]."""
-    error: NDArray
-    """p2 - target, filtered while the valve is shut [bar]."""
-    fall: NDArray
-    """Rate of change of p2 by consumption, at most 0 [bar/s]."""
-    on: NDArray
-    """Whether the coil is on, bool."""
-    opens_in: NDArray
-    """Time until the piston lifts, the coil being off from now [s]; 0: it is open."""
 
-    @property
-    def shut(self) -> NDArray:
-        """Whether the piston rests on its seat, bool (n,)."""
-        return self.opens_in > 0
+@compiled
+def summarise(v):
+    """Mean and deviation of offset and gain over the members, and an early offset."""
+    offset = gain = 0.0
+    for m in range(MEMBERS):
+        offset += v.probability[m] * OFFSETS[m]
+        gain += v.probability[m] * v.member_gain[m]
+    spread = gain_spread = 0.0
+    for m in range(MEMBERS):
+        spread += v.probability[m] * (OFFSETS[m] - offset) ** 2
+        around = v.member_variance[m] + (v.member_gain[m] - gain) ** 2
+        gain_spread += v.probability[m] * around
+    v.offset, v.offset_deviation = offset, math.sqrt(spread)
+    v.gain, v.gain_deviation = gain, math.sqrt(gain_spread)
+    wanted = UNKNOWN_CONFIDENCE if v.offset_deviation > UNKNOWN_DEVIATION else CONFIDENCE
+    below, early = 0.0, MEMBERS - 1
+    for m in range(MEMBERS):
+        below += v.probability[m]
+        if below >= wanted and early == MEMBERS - 1:
+            early = m
+    v.early_offset = OFFSETS[early]
 
-    @property
-    def opens_from_rest(self) -> NDArray:
-        """`opens_in` with the control chamber full, at p1 (n,) [s]."""
-        return self.table.time_to_open(self.p1, self.p2, self.p1) / self.pace
 
-    def forecast(self, look_ahead: float = 1.0) -> NDArray:
-        """p2 - target when the valve opens, if the coil is switched off now (n,) [bar].
+@compiled
+def normalise(v):
+    """Make the members' probabilities sum to one."""
+    total = 0.0
+    for m in range(MEMBERS):
+        total += v.probability[m]
+    for m in range(MEMBERS):
+        v.probability[m] /= total
 
-        look_ahead: share of the time until then over which p2 is extrapolated [1].
-        """
-        return self.error + self.fall * (look_ahead * (self.opens_in + self.table.release_lag))
 
-    def under_way(self, who: NDArray) -> NDArray:
-        """What p2 of the valves at these indices (m,) still rises by the table if shut now [bar]."""
-        return self.table.of(who).gained_at_once(self.p1[who], self.p2[who], self.p3[who])
+@compiled
+def smear(v):
+    """Move a share of each probability to the neighbours: the valve may have changed."""
+    before = v.probability[0]
+    for m in range(MEMBERS):
+        here = v.probability[m]
+        after = v.probability[m + 1] if m + 1 < MEMBERS else here
+        v.probability[m] = (1 - 2 * OFFSET_DRIFT) * here + OFFSET_DRIFT * (before + after)
+        before = here
 
-    @property
-    def fed(self) -> NDArray:
-        """Whether the supply can raise the circuit, bool (n,)."""
-        return fed(self.p1, self.p2)
+
+@compiled
+def watch_opening(v, table, t, p1, p2, p3, rise):
+    """Doubt members that contradict whether p2 rises while the coil is off.
+
+    rise: of p2 in the last period without what was consumed [bar].
+    """
+    nominal = opens_at(table, t, p1, p2)
+    smear(v)
+    for m in range(MEMBERS):
+        assumed = nominal + OFFSETS[m]
+        too_low = rise > OPEN_RISE and assumed < p3
+        too_high = rise < SHUT_RISE and p3 < LATE * assumed
+        if too_low or too_high:
+            v.probability[m] *= CONTRADICTED
+    normalise(v)
+
+
+@compiled
+def learn_pulse(v, table, t, gained, lasted):
+    """Correct every member by a pulse that has ended, and weigh the members by their surprise.
+
+    gained: measured rise without what was consumed [bar]. lasted: time between the two readings [s].
+    """
+    smear(v)
+    largest = -1e300
+    for m in range(MEMBERS):
+        foreseen = gained_at_once(table, t, OFFSETS[m], v.end_p1, v.end_p2, v.end_p3)
+        variance = v.member_variance[m] + GAIN_DRIFT**2
+        noise = GAIN_READING_ERROR**2 + (SLOPE_ERROR * lasted) ** 2 + (TABLE_ERROR * foreseen) ** 2
+        surprise = gained - v.member_gain[m] * foreseen
+        spread = foreseen**2 * variance + noise
+        correction = variance * foreseen / spread
+        corrected = v.member_gain[m] + correction * surprise
+        v.member_gain[m] = min(max(corrected, LEAST_FACTOR), MOST_FACTOR)
+        v.member_variance[m] = (1 - correction * foreseen) * variance
+        log = math.log(v.probability[m]) - 0.5 * (surprise**2 / spread + math.log(spread))
+        v.probability[m] = log  # until all are known
+        largest = max(largest, log)
+    for m in range(MEMBERS):
+        v.probability[m] = math.exp(max(v.probability[m] - largest, -600.0))
+    normalise(v)
+
+
+@compiled
+def learn_pace(v, table, t, p3, p3_change, period):
+    """Correct the venting rate by the fall of ln p3 over the last period."""
+    nominal = table.vent_rate[t] * period
+    fall = math.log(max(p3 - p3_change, 0.1) / max(p3, 0.1))
+    variance = v.pace_variance + PACE_DRIFT**2
+    correction = variance / (variance + 2 * (PACE_READING_ERROR / nominal) ** 2)
+    pace = v.pace + correction * (fall / nominal - v.pace)
+    v.pace = min(max(pace, LEAST_FACTOR), MOST_FACTOR)
+    v.pace_variance = (1 - correction) * variance
+
+
+@compiled
+def follow_p2(v, error, shut, period, filter_time):
+    """Follow p2 - target [bar] and its slope while the valve is shut; otherwise keep the slope."""
+    fading = math.exp(-period / filter_time)
+    expected = v.error + v.slope * period
+    surprise = error - expected
+    if shut and v.was_shut > 0:
+        v.error = expected + (1 - fading**2) * surprise
+        v.slope += (1 - fading) ** 2 * surprise / period
+    else:
+        v.error = error
+    v.was_shut = 1.0 if shut else 0.0
+
+
+@compiled
+def foresee(v, table, t, p1, p2, p3, period):
+    """What the learnt valve will do: times to open, rises of p2, reserve."""
+    v.opens_in_early = time_to_open(table, t, v.early_offset, p1, p2, p3) / v.pace
+    v.opens_from_rest = time_to_open(table, t, v.offset, p1, p2, p1) / v.pace
+    v.forecast = v.error + v.fall * (v.opens_in + table.release_lag[t])
+    later = p3 if v.on > 0 else p3 * math.exp(-table.vent_rate[t] * v.pace * period)
+    v.under_way = v.gain * gained_at_once(table, t, v.offset, p1, p2, p3)
+    v.after_period = v.gain * gained_at_once(table, t, v.offset, p1, p2, later)
+    early = 0.0
+    if time_to_open(table, t, v.early_offset, p1, p2, later) <= 0:
+        early = gained_at_once(table, t, v.early_offset, p1, p2, later)
+    v.after_period_early = (v.gain + 2 * v.gain_deviation) * early
+    expected = table.hardest_fall[t] * (table.release_lag[t] + v.opens_from_rest)
+    v.reserve = min(max(expected - TOLERATED, 0.0), MOST_RESERVE)
+
+
+@compiled
+def remember_breakdown(v, period):
+    """Keep the largest shortfall below the target, and forget it slowly."""
+    fed = v.head > LEAST_HEAD
+    v.reached = 1.0 if fed and (v.reached > 0 or v.error > -REACHED) else 0.0
+    shortfall = min(max(-v.error, 0.0), BAND_BAR) if v.reached > 0 else 0.0
+    v.deepest = max(v.deepest * math.exp(-period / BREAKDOWN_MEMORY), shortfall)
+
+
+@compiled
+def observe(v, table, t, reading, period, filter_time, informed):
+    """Take in one observation (entries,) of one valve.
+
+    Args:
+        v: record of VALVE, changed.
+        table: of the plants.
+        t: the valve's plant in the table.
+        reading: an observation [-], epv_env.observation.LAYOUT.
+        period: control period [s].
+        filter_time: time in which the weight of a reading of p2 fades by 1/e [s].
+        informed: whether the table is the valve's own, so that nothing is learnt of the valve.
+    """
+    error = reading[_ERROR] * SCALE[_ERROR] + CENTRE[_ERROR]
+    p1 = reading[_P1] * SCALE[_P1] + CENTRE[_P1]
+    p2 = error + reading[_TARGET] * SCALE[_TARGET] + CENTRE[_TARGET]
+    p3 = reading[_P3] * SCALE[_P3] + CENTRE[_P3]
+    p2_change = reading[_P2_CHANGE] * SCALE[_P2_CHANGE] + CENTRE[_P2_CHANGE]
+    p3_change = reading[_P3_CHANGE] * SCALE[_P3_CHANGE] + CENTRE[_P3_CHANGE]
+    on = reading[_COIL] > 0.0
+    if on and v.off_periods > 0:  # the pulse ended at the last reading
+        v.end_p1, v.end_p2, v.end_p3, v.end_fall = v.p1, v.p2, v.p3, v.fall
+        v.measuring = 1.0
+    v.off_periods = 0.0 if on else v.off_periods + 1
+    v.on_periods = v.on_periods + 1 if on else 0.0
+    if not on:
+        v.measuring = 0.0
+    if v.off_periods > 1 and not informed:
+        watch_opening(v, table, t, p1, p2, p3, p2_change - min(v.slope, 0.0) * period)
+        summarise(v)
+    v.opens_in = time_to_open(table, t, v.offset, p1, p2, p3) / v.pace
+    shut = v.opens_in > 0
+    follow_p2(v, error, shut, period, filter_time)
+    if shut and v.off_periods >= PERIODS_AFTER_RELEASE and not informed:
+        learn_pace(v, table, t, p3, p3_change, period)
+    if v.measuring > 0 and shut and v.on_periods > 1:
+        if not informed:
+            lasted = v.on_periods * period
+            learn_pulse(v, table, t, p2 - v.end_p2 - v.end_fall * lasted, lasted)
+            summarise(v)
+        v.measuring = 0.0
+    v.on, v.p1, v.p2, v.p3, v.head = 1.0 if on else 0.0, p1, p2, p3, p1 - p2
+    v.fall = min(v.slope, 0.0)
+    v.pace_deviation = math.sqrt(v.pace_variance)
+    foresee(v, table, t, p1, p2, p3, period)
+    remember_breakdown(v, period)
+
+
+# Closed over by the loops: numba's cache on disk notices a change in their own file only.
+DIGEST = source_digest(*Path(__file__).parent.glob("*.py"))
+
+
+def _loops(digest: str) -> tuple[Any, Any]:
+    """The functions over a batch of valves."""
+
+    @numba.njit(cache=True, nogil=True, error_model="numpy")
+    def begin_all(valves, who, informed):
+        if digest == "":
+            return
+        for i in who:
+            if informed:
+                begin_informed(valves[i])
+            else:
+                begin(valves[i])
+
+    @numba.njit(cache=True, nogil=True, error_model="numpy")
+    def observe_all(valves, table, observations, period, filter_time, informed):
+        if digest == "":
+            return
+        for i in range(len(valves)):
+            t = i if informed else 0
+            observe(valves[i], table, t, observations[i], period, filter_time, informed)
+
+    return begin_all, observe_all
+
+
+_begin_all, _observe_all = _loops(DIGEST)
 
 
 class ValveLearner:
     """Follows n valves from their observations and learns what they are."""
 
-    def __init__(self, table: PulseTable, *, filter_time: float, control_period: float):
+    def __init__(
+        self,
+        table: PulseTable,
+        *,
+        control_period: float = 5e-3,
+        filter_time: float = FILTER_TIME,
+        informed: bool = False,
+    ):
         """
         Args:
-            table: of the nominal plant.
-            filter_time: time in which the weight of a reading of p2 fades by 1/e [s].
+            table: of the nominal plant; of each valve's own plant if `informed`.
             control_period: [s].
+            filter_time: time in which the weight of a reading of p2 fades by 1/e [s].
+            informed: whether the table is of each valve's own plant, so that nothing has to be learnt.
         """
-        self._nominal, self._filter_time, self._control_period = table, filter_time, control_period
+        self.table = table
+        self.control_period = control_period
+        self._filter_time = filter_time
+        self._informed = informed
         self.reset(0)
 
     def reset(self, n: int) -> None:
         """Forget consumption and valves; n episodes begin."""
-        self._bank = OpeningBank(n)
-        self._pace = np.ones(n)
-        self._pace_variance = np.full(n, VENTING.spread**2)
-        self._error, self._slope = np.zeros((2, n))
-        self._was_shut = np.zeros(n, dtype=bool)
-        self._off_periods = np.zeros(n, dtype=np.int64)
-        self._on_periods = np.zeros(n, dtype=np.int64)
-        self._measuring = np.zeros(n, dtype=bool)
-        self._now, self._at_end = np.zeros((2, n, 4))  # p1, p2, p3, fall; the same as the pulse ended
+        self.valves: Any = np.zeros(n, VALVE)
+        """What is known of each valve, records of VALVE (n,)."""
+        self.forget(np.arange(n))
 
     def forget(self, who: NDArray) -> None:
         """Forget consumption and valve of these episodes, indices (m,): others begin in their place."""
-        new = ValveLearner(
-            self._nominal, filter_time=self._filter_time, control_period=self._control_period
-        )
-        new.reset(len(who))
-        for (_, mine, name), (_, fresh, _) in zip(self.arrays(), new.arrays(), strict=True):
-            getattr(mine, name)[who] = getattr(fresh, name)
+        _begin_all(self.valves, who, self._informed)
 
-    def arrays(self) -> Iterator[tuple[str, Any, str]]:
-        """Name, owner and attribute of each array (n, ...) that is kept between control periods."""
-        for name in (
-            "pace", "pace_variance", "error", "slope", "was_shut", "off_periods", "on_periods",
-            "measuring", "now", "at_end",
-        ):  # fmt: skip
-            yield name, self, f"_{name}"
-        yield from self._bank.arrays()
-
-    def observe(self, observations: NDArray) -> LearntValve:
-        """Take in observations (n, entries); what is known then."""
-        error, target, p1, p3, coil, p3_change = (
-            decode(observations, name).astype(float)
-            for name in ("p2_error", "target", "p1", "p3", "action", "p3_change_1")
-        )
-        p2_change = decode(observations, "p2_change_1").astype(float)
-        p2, on = error + target, coil > 0.5
-        self._off_periods = np.where(on, 0, self._off_periods + 1)
-        self._on_periods = np.where(on, self._on_periods + 1, 0)
-        self._watch_opening(p1, p2, p3, p2_change)
-        table = shifted(self._nominal, self._bank.offset)
-        opens_in = table.time_to_open(p1, p2, p3) / self._pace
-        shut = opens_in > 0
-        self._follow(error, shut)
-        self._learn_venting(p3, p3_change, shut)
-        self._learn_pulses(p2, on & shut)
-        fall = np.minimum(self._slope, 0.0)
-        self._now = np.stack([p1, p2, p3, fall], axis=1)
-        return LearntValve(
-            table=table, pace=self._pace, gain=self._bank.gain, p1=p1, p2=p2, p3=p3,
-            gain_deviation=self._bank.gain_deviation, offset_deviation=self._bank.offset_deviation,
-            error=self._error, fall=fall, on=on, opens_in=opens_in,
+    def observe(self, observations: NDArray) -> Any:
+        """Take in observations (n, entries); what is known then, records of VALVE (n,)."""
+        _observe_all(
+            self.valves, self.table, np.ascontiguousarray(observations, dtype=np.float64),
+            self.control_period, self._filter_time, self._informed,
         )  # fmt: skip
-
-    def earliest(self, probability: float | NDArray) -> PulseTable:
-        """The table of valves that open as early as the learnt ones may: earlier ones are improbable.
-
-        probability: that a valve opens no earlier, a number or (n,).
-        """
-        return shifted(self._nominal, self._bank.offset_quantile(probability))
-
-    @property
-    def measuring(self) -> NDArray:
-        """Whether the gain of the last pulse is still being measured, bool (n,)."""
-        return self._measuring
-
-    def decided(self, action: NDArray) -> None:
-        """Take in the decisions (n,) of this period: the end of a pulse is measured later."""
-        ended = (self._on_periods == 0) & (action == 1)
-        self._at_end = np.where(ended[:, None], self._now, self._at_end)
-        self._measuring |= ended
-
-    def _follow(self, error: NDArray, shut: NDArray) -> None:
-        """Follow p2 - target (n,) [bar] and its slope while the valve is shut, as `Pulse` does."""
-        fading = np.exp(-self._control_period / self._filter_time)
-        expected = self._error + self._slope * self._control_period
-        surprise = error - expected
-        follows = shut & self._was_shut
-        self._error = np.where(follows, expected + (1 - fading**2) * surprise, error)
-        growth = (1 - fading) ** 2 * surprise / self._control_period
-        self._slope = self._slope + np.where(follows, growth, 0.0)
-        self._was_shut = shut
-
-    def _learn_venting(self, p3: NDArray, p3_change: NDArray, shut: NDArray) -> None:
-        """Correct the pace by the fall of ln p3 (n,) where the chamber vents and the piston rests."""
-        reads = shut & (self._off_periods >= VENTING.periods_after_release)
-        fall = np.log(np.maximum(p3 - p3_change, 0.1) / np.maximum(p3, 0.1))
-        nominal = self._nominal.vent_rate * self._control_period
-        noise = 2 * (VENTING.reading_error / nominal) ** 2
-        variance = self._pace_variance + VENTING.drift**2
-        correction = np.where(reads, variance / (variance + noise), 0.0)
-        pace = self._pace + correction * (fall / nominal - self._pace)
-        self._pace = np.clip(pace, *VENTING.limits)
-        self._pace_variance = np.where(reads, (1 - correction) * variance, self._pace_variance)
-
-    def _watch_opening(self, p1: NDArray, p2: NDArray, p3: NDArray, p2_change: NDArray) -> None:
-        """Tell the bank which valves open in a pulse; all (n,) [bar], p2_change over one period."""
-        who = np.flatnonzero(self._off_periods > 1)
-        if len(who):
-            opening = opening_pressure(self._nominal.parameters, p1[who] * BAR, p2[who] * BAR) / BAR
-            consumed = np.minimum(self._slope[who], 0.0) * self._control_period
-            self._bank.watch(who, opening, p3[who], p2_change[who] - consumed)
-
-    def _learn_pulses(self, p2: NDArray, shut_again: NDArray) -> None:
-        """Give the bank the gain of each pulse after which the valve has just shut, p2 (n,) [bar].
-
-        A pulse that is continued before is not measured: its end is another's beginning.
-        """
-        who = np.flatnonzero(self._measuring & shut_again & (self._on_periods > 1))
-        if len(who):
-            p1, before, p3, slope = self._at_end[who].T
-            lasted = self._on_periods[who] * self._control_period
-            members = len(BANK.offsets)
-
-            def each(values: NDArray) -> NDArray:
-                return np.repeat(values, members)
-
-            assumed = shifted(self._nominal, np.tile(BANK.offsets, len(who)))
-            foreseen = assumed.gained_at_once(each(p1), each(before), each(p3)).reshape(-1, members)
-            self._bank.learn(who, foreseen, p2[who] - before - slope * lasted, lasted)
-        self._measuring[who] = False
-        self._measuring &= self._on_periods > 0
+        return self.valves

@@ -7,7 +7,7 @@ import pytest
 
 from controllers.hysteresis import Hysteresis
 from controllers.p3_check import P3Check
-from controllers.privileged_pulse import PrivilegedPulse
+from controllers.pulse import InformedPulse
 from epv_env.observation import LAYOUT, encode
 
 VALVES = 3
@@ -82,13 +82,6 @@ def test_the_first_observations_are_believed():
     assert actions == [0, 0, 0, 0, 1, 1]
 
 
-def test_both_controllers_get_the_control_period():
-    check = checked(control_period=4e-3)
-    for controller in (check.main, check.fallback):
-        assert isinstance(controller, Constant)
-        assert controller.control_period == 4e-3
-
-
 def test_a_fallback_for_other_actions_is_refused():
     other = Hysteresis(open_below=-0.1, shut_above=0.0, environment="EPValvePWM-v0")
     with pytest.raises(ValueError, match="must act in the same environment"):
@@ -97,4 +90,4 @@ def test_a_fallback_for_other_actions_is_refused():
 
 def test_a_controller_that_reads_no_sensor_is_refused():
     with pytest.raises(ValueError, match="reads no sensor"):
-        P3Check(main=PrivilegedPulse(), fallback=Constant(action=1))
+        P3Check(main=InformedPulse(), fallback=Constant(action=1))

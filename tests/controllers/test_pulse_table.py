@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from controllers.opening_bank import shifted
-from controllers.opening_pressure import opening_pressure
-from controllers.pulse_simulation import pulse_table
-from controllers.pulse_table import GRID
+from controllers import pulse_table as lookup
+from controllers.pulse_table import STAY, opening_pressure, pulse_table
 from epv_env.common.units import BAR
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised
@@ -36,6 +34,12 @@ def cases():
     return p1, p2, p3
 
 
+def each(name, table, *arguments):
+    """A compiled lookup of the table's one plant, for many valves: numbers or arrays (n,)."""
+    function = getattr(lookup, name)
+    return np.array([function(table, 0, 0.0, *numbers) for numbers in np.broadcast(*arguments)])
+
+
 def pulsed(plant, p1, p2, p3, stay, *, at_rest=False):
     """p2 added by a real pulse from an armature that has let go, or from rest with p3 = p1."""
     valves = Valves(len(p1), threads=1)
@@ -54,11 +58,11 @@ def pulsed(plant, p1, p2, p3, stay, *, at_rest=False):
 
 def test_gains_between_the_nodes_are_those_of_the_simulation(plant, table, cases):
     p1, p2, p3 = cases
-    stay = table.time_to_open(p1, p2, p3) + np.linspace(-5e-3, 15e-3, len(p1))
+    stay = each("time_to_open", table, p1, p2, p3) + np.linspace(-5e-3, 15e-3, len(p1))
     added = pulsed(plant, p1, p2, p3, stay)
     small = added < 0.6
     assert np.sum(small) > 100
-    error = np.abs(table.gained(p1, p2, p3, stay) - added)
+    error = np.abs(each("gained", table, p1, p2, p3, stay, 0.0) - added)
     assert np.max(error[small]) < CLOSE
     assert np.max(error / np.maximum(added, 0.6)) < 0.05
 
@@ -66,14 +70,14 @@ def test_gains_between_the_nodes_are_those_of_the_simulation(plant, table, cases
 def test_a_pulse_from_rest_adds_what_was_asked(plant, table, cases):
     p1, p2, _ = cases
     asked = np.linspace(0.02, 0.6, len(p1))
-    duration = table.duration(p1, p2, p1, asked) + table.release_lag
+    duration = each("duration", table, p1, p2, p1, asked, 0.0) + table.release_lag[0]
     assert np.max(np.abs(pulsed(plant, p1, p2, p1, duration, at_rest=True) - asked)) < CLOSE
 
 
 def test_a_pulse_begun_before_p3_has_recovered_adds_what_was_asked(plant, table, cases):
     p1, p2, p3 = cases
     asked = np.linspace(0.02, 0.6, len(p1))
-    added = pulsed(plant, p1, p2, p3, table.duration(p1, p2, p3, asked))
+    added = pulsed(plant, p1, p2, p3, each("duration", table, p1, p2, p3, asked, 0.0))
     assert np.max(np.abs(added - asked)) < CLOSE
 
 
@@ -81,45 +85,38 @@ def test_the_check_can_fail_a_pulse_planned_for_another_valve_misses(plant, case
     other = pulse_table(plant.replace(alphaMV=1.1 * plant["alphaMV"]))
     p1, p2, p3 = cases
     asked = np.full(len(p1), 0.3)
-    added = pulsed(plant, p1, p2, p3, other.duration(p1, p2, p3, asked))
+    added = pulsed(plant, p1, p2, p3, each("duration", other, p1, p2, p3, asked, 0.0))
     assert np.mean(np.abs(added - asked)) > 3 * CLOSE
 
 
 def test_consumption_during_a_pulse_is_allowed_for(table, cases):
     """With a slope the change of p2 is meant, without one the gain: they differ by what is consumed."""
     p1, p2, p3 = cases
-    stay = table.time_to_open(p1, p2, p3) + 8e-3
-    fall = table.gained(p1, p2, p3, stay, -2.0) - table.gained(p1, p2, p3, stay)
+    stay = each("time_to_open", table, p1, p2, p3) + 8e-3
+    fall = each("gained", table, p1, p2, p3, stay, -2.0) - each("gained", table, p1, p2, p3, stay, 0.0)
     assert np.all(fall < -2.0 * stay)
     assert np.all(fall > -2.0 * (stay + 60e-3))
-    longer = table.duration(p1, p2, p3, np.full(len(p1), 0.1), -2.0)
-    assert np.all(longer > table.duration(p1, p2, p3, np.full(len(p1), 0.1)))
-    back = table.gained(p1, p2, p3, longer, -2.0)
+    longer = each("duration", table, p1, p2, p3, np.full(len(p1), 0.1), -2.0)
+    assert np.all(longer > each("duration", table, p1, p2, p3, np.full(len(p1), 0.1), 0.0))
+    back = each("gained", table, p1, p2, p3, longer, -2.0)
     assert back == pytest.approx(0.1, abs=1e-9)
 
 
 def test_what_is_under_way_is_the_gain_without_a_stay_to_the_bit(table, cases):
     p1, p2, p3 = cases
     p3 = p3 * np.linspace(0.2, 1.0, len(p3))
-    at_once = table.gained_at_once(p1, p2, p3)
+    at_once = each("gained_at_once", table, p1, p2, p3)
     assert np.ptp(at_once) > 0.1
-    assert np.array_equal(at_once, table.gained(p1, p2, p3, np.zeros(len(p1))))
-
-
-def test_the_table_of_some_valves_answers_as_that_of_all(table, cases):
-    each = shifted(table, np.linspace(-0.5, 0.5, len(cases[0])))
-    some = np.array([3, 1])
-    few = each.of(some).time_to_open(*(values[some] for values in cases))
-    assert np.array_equal(few, each.time_to_open(*cases)[some])
+    assert np.array_equal(at_once, each("gained", table, p1, p2, p3, np.zeros(len(p1)), 0.0))
 
 
 def test_nothing_is_to_be_added_where_enough_is_under_way(table):
     wide_open = (np.array([11.5]), np.array([8.0]), np.array([5.0]))
-    under_way = table.gained(*wide_open, np.zeros(1))
+    under_way = each("gained", table, *wide_open, np.zeros(1), 0.0)
     assert under_way[0] > 0.3
-    assert table.duration(*wide_open, 0.9 * under_way)[0] == 0.0
-    assert table.duration(*wide_open, 1.1 * under_way)[0] > 0.0
-    assert table.duration(*wide_open, np.array([99.0]))[0] <= GRID.stay[-1]
+    assert each("duration", table, *wide_open, 0.9 * under_way, 0.0)[0] == 0.0
+    assert each("duration", table, *wide_open, 1.1 * under_way, 0.0)[0] > 0.0
+    assert each("duration", table, *wide_open, np.array([99.0]), 0.0)[0] <= STAY[-1]
 
 
 def test_p3_vents_at_one_rate_until_the_valve_opens(plant, table):
@@ -131,7 +128,7 @@ def test_p3_vents_at_one_rate_until_the_valve_opens(plant, table):
         valves.state, energised(plant, p1=p1 * BAR, p2=p2 * BAR, U=24.0), strict=True
     ):
         field[:] = value
-    valves.advance(float(table.time_to_open(p1, p2, p1)[0]) + table.release_lag)
+    valves.advance(float(each("time_to_open", table, p1, p2, p1)[0]) + table.release_lag[0])
     assert valves.state.p3 == pytest.approx(opening, rel=1e-3)
 
 
@@ -149,9 +146,9 @@ def test_an_empty_chamber_is_seen_to_shut_late(plant, table):
     valves.advance(150e-3)
     assert not np.any(valves.state.xPV)
     p3 = np.full(3, plant["p_env"] / BAR)
-    foreseen = table.gained(p1, p2, p3, np.zeros(3))
+    foreseen = each("gained", table, p1, p2, p3, np.zeros(3), 0.0)
     np.testing.assert_allclose(foreseen, valves.state.p2 / BAR - p2, rtol=0.05)
-    assert np.all(foreseen > 1.3 * table.gained(p1, p2, np.full(3, 3.0), np.zeros(3)))
+    assert np.all(foreseen > 1.3 * each("gained", table, p1, p2, np.full(3, 3.0), np.zeros(3), 0.0))
 
 
 def test_a_chamber_vents_in_the_time_foretold(plant, table):
@@ -166,18 +163,9 @@ def test_a_chamber_vents_in_the_time_foretold(plant, table):
     seen = []
     for _ in range(30):
         valves.advance(10e-3)
-        seen.append(float(table.venting_age(p1, p2, valves.state.p3 / BAR)[0]))
+        seen.append(float(each("venting_age", table, p1, p2, valves.state.p3 / BAR)[0]))
     assert valves.state.p3 < 1.3 * BAR
     np.testing.assert_allclose(np.diff(seen[2:]), 10e-3, rtol=0.02)
-
-
-def test_one_valve_is_answered_as_a_batch_to_the_bit(table, cases):
-    asked = np.linspace(0.0, 1.0, len(cases[0]))
-    together = table.duration(*cases, asked, -1.5), table.gained(*cases, asked / 20, -1.5)
-    for i in range(0, len(asked), 7):
-        one = [x[i : i + 1] for x in (*cases, asked)]
-        assert table.duration(*one, -1.5)[0] == together[0][i]
-        assert table.gained(*one[:3], one[3] / 20, -1.5)[0] == together[1][i]
 
 
 def test_a_coil_too_weak_to_shut_the_valve_is_refused(plant):

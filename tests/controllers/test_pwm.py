@@ -7,8 +7,7 @@ import pytest
 
 pytest.importorskip("control")
 
-from controllers.pwm_design import design, outer_loop
-from controllers.pwm_linearisation import linearise
+from controllers.pwm_design import design, linearise, outer_loop
 from epv_env.plant.equations import Inputs
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised

@@ -14,20 +14,27 @@ pytest.importorskip("control")
 
 import controllers
 import epv_env  # noqa: F401 - registers the environments
-from controllers.causal_bound import CausalBound
-from controllers.learned import LearnedPolicy
+from controllers.knowledge import WithRules
 from controllers.p3_check import P3Check
-from controllers.registration import CHEAP, Choice, Range, Registration, RegistrationError, SearchSpace
-from controllers.registry import REGISTRY, cost_class, registration
-from controllers.supervisor import Supervisor
-from controllers.tuned import Tuning, build, load_tunings
+from controllers.policy import Policy
+from controllers.pulse import InformedPulse
+from controllers.registration import Choice, Range, Registration, RegistrationError, SearchSpace
+from controllers.registry import REGISTRY, TUNED_KINDS, registration
+from controllers.tuned import (
+    ControllersFileError,
+    Tuning,
+    ablation,
+    build,
+    load_tunings,
+    save_tunings,
+    tuned_controllers,
+)
 from epv_env.plant.plantfile import Plant
 
 UNREGISTERED = {
-    LearnedPolicy: "training writes it into folders, each of which names itself",
-    Supervisor: "worn around a controller, which has a record of its own",
+    Policy: "training writes it into folders, each of which names itself",
+    WithRules: "worn around a controller, which has a record of its own",
     P3Check: "worn around a controller, which has a record of its own",
-    CausalBound: "a yardstick of training/regret.py, too slow for the comparison",
 }
 """Controllers that the registry does not list, each with the reason."""
 
@@ -103,7 +110,9 @@ def test_every_controller_class_is_registered():
 
 def test_a_class_that_is_not_registered_is_named():
     (sentence,) = unregistered(controller_classes(), REGISTRY[:-1])
-    assert sentence.startswith("controllers.oracle.Oracle has no record in controllers/registry.py")
+    assert sentence.startswith(
+        "controllers.pulse.InformedPulse has no record in controllers/registry.py"
+    )
 
 
 @pytest.mark.parametrize("entry", REGISTRY, ids=lambda entry: entry.kind)
@@ -129,17 +138,12 @@ def test_kinds_are_unique():
             {"search_space": dict.fromkeys(("open_below", "shut_above"), Range(low=0.0, high=1.0))},
             "its tuned values leave its search space",
         ),
-        ({"build": lambda values, plant: LearnedPolicy(layers=[])}, "it builds a LearnedPolicy"),
-        ({"build": lambda values, plant: LearnedPolicy(**values)}, "cannot be built"),
+        ({"build": lambda values, plant: InformedPulse()}, "it builds a InformedPulse"),
+        ({"build": lambda values, plant: InformedPulse(**values)}, "cannot be built"),
     ],
 )
 def test_what_an_incomplete_record_lacks_is_named(changes, words):
     assert words in " ".join(problems(replace(registration("hysteresis"), **changes), load_tunings()))
-
-
-def test_a_forgotten_field_is_named():
-    with pytest.raises(TypeError, match="search_space"):
-        Registration(kind="new", controller=LearnedPolicy, build=build, cost=CHEAP)  # type: ignore[call-arg]
 
 
 def test_an_unknown_kind_and_a_forgotten_value_get_one_sentence():
@@ -151,5 +155,19 @@ def test_an_unknown_kind_and_a_forgotten_value_get_one_sentence():
         build("hysteresis", {"open_below": -0.1}, Plant.calibrated())
 
 
-def test_a_learned_policy_is_cheap():
-    assert cost_class("PPO, recurrent") == CHEAP
+def test_classic_controllers_are_tuned_alike_and_come_in_the_tables_order():
+    tunings = load_tunings()
+    assert tuple(tunings) == TUNED_KINDS
+    assert {(tuning.trials, tuning.episodes) for tuning in tunings.values()} == {(100, 128)}
+    assert [controller.name for controller in tuned_controllers()] == list(TUNED_KINDS)
+    for controller in ablation():
+        assert controller.name.removesuffix(", with rules") in TUNED_KINDS
+
+
+def test_tunings_survive_a_round_trip_and_another_version_is_refused(tmp_path):
+    tunings = {"hysteresis": Tuning(values={"open_below": -0.1}, trials=3, mean_return=-1.5, episodes=4)}
+    save_tunings(tunings, tmp_path / "t.json", {"seed": 0})
+    assert load_tunings(tmp_path / "t.json") == tunings
+    (tmp_path / "t.json").write_text('{"format": "epv-controllers/0"}')
+    with pytest.raises(ControllersFileError, match="tune anew"):
+        load_tunings(tmp_path / "t.json")

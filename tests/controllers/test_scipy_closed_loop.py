@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 pytest.importorskip("safetensors")
 
-from controllers.learned import TRAINED, load_policy
+from controllers.policy import load_policy
 from epv_env.common.units import BAR
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.plantfile import Plant
@@ -66,7 +66,7 @@ def closed_loop(
     flow_factor: float = 1.0,
 ) -> tuple[NDArray, NDArray]:
     """p2 - target [bar] and the policy's actions, (periods, episodes), on plants within ±10 %."""
-    policy = load_policy(TRAINED / "recurrent" / "seed-7")
+    policy = load_policy()
     region = Region.named(TUNING_REGION, Plant.calibrated().parameters)
     env: Any = make_env(policy, episodes, parameters=region)
     valves = env.task.valves

@@ -1,1 +1,1 @@
-"""Learning policies: PPO, imitation, distillation with a memory."""
+"""Training of the learned policy with stable-baselines3's PPO."""

@@ -1,221 +1,282 @@
-"""PPO on the native vector environment: model, imitation, training with selection and resume."""
+"""Training with stable-baselines3's PPO: the model, the choice of the best policy, and resumption."""
 
-import hashlib
+import csv
 import io
-import pickle
-from dataclasses import asdict, replace
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from stable_baselines3 import PPO
-from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
-from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
+from stable_baselines3.common.callbacks import BaseCallback, CheckpointCallback
+from stable_baselines3.common.vec_env import VecEnv
+from tqdm import tqdm
 
-from controllers.learned import LearnedPolicy
-from controllers.supervised import supervised
-from controllers.tuned import build, load_tunings
+from controllers.policy import Policy
+from controllers.policy_files import read_policy, write_policy
+from epv_env.actions import OnOff
+from epv_env.common.files import write_text
+from epv_env.conditions import Conditions
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
-from training.learners.batch_ppo import BatchPPO
-from training.learners.checkpoint_selection import Selection, validation_points
-from training.learners.hyperparameters import Hyperparameters, training_weights
-from training.learners.imitation import imitate
-from training.learners.learning_log import TrainingLog
-from training.learners.policy_files import greedy_policy, policy_bytes, put_layers, put_student
-from training.learners.provenance import plant_digest
-from training.learners.recurrent_actor_critic import RecurrentActorCritic
-from training.learners.resumption import restore_progress
-from training.learners.run_folder import TENSORBOARD_FOLDER
-from training.learners.run_state import (
-    CHECKPOINT_FILE,
-    Run,
-    RunError,
-    as_json,
-    new_run,
-    unfinished_run,
-    with_nan,
-)
-from training.learners.schedules import FadingEntropy, linear
-from training.learners.sequence_ppo import SequencePPO
-from training.learners.student import END_TO_END_NAME
-from training.learners.training_env import make_training_env, seed_episodes
-from training.learners.validation import ValidationSettings
+from training.evaluation.metrics import EpisodeMetrics
+from training.evaluation.rollout import run_episodes
+from training.evaluation.seeds import VALIDATION_SEED
+from training.learners.actor import AdvisedPolicy, network_of
+from training.learners.environment import NUM_ENVS, ROLLOUT, make_training_env
 
-TEACHER = "pulse"
-"""Controller that a model imitates first: the best that does not simulate, on the calibrated plant."""
+TIMESTEPS = 8_000_000
+"""Environment steps of a training."""
+LEARNING_RATE, LAST_LEARNING_RATE = 1.5e-3, 2e-5
+"""Adam's step size at the start and at the end; it falls linearly."""
+ENTROPY = 0.003
+"""Entropy coefficient at the start; it falls linearly to zero, since the policy is used greedily."""
+PPO_SETTINGS: dict[str, Any] = {
+    "n_steps": ROLLOUT,
+    "batch_size": 4096,
+    "n_epochs": 1,  # another environment step costs less than another pass over a rollout
+    "gamma": 0.998,
+    "policy_kwargs": {
+        "net_arch": {"pi": [64, 64], "vf": [64, 64]},
+        "optimizer_kwargs": {"fused": True, "eps": 1e-5},
+    },
+}
+"""Of stable-baselines3's PPO; the rest is its default."""
+
+FIRST_VALIDATION = 0.6
+"""Share of the training before the first validation."""
+VALIDATIONS = 5
+"""Policies that are validated, evenly from there to the end."""
+VALIDATION_DURATION = 6.0
+"""Length of a validation episode [s]."""
+VALIDATION_CONDITIONS = Conditions(extreme=0.5, braking=0.5)
+"""Plants from the region's corners and hard applications are frequent in validation."""
+VIOLATION_PRICE = 300.0
+"""Loss of score by an episode that leaves the band, beside its return: somewhat more than a good episode
+loses in all. Violations are rare, so the mean return would hardly show one."""
+
+CHECKPOINTS = "checkpoints"
+"""Folder of stable-baselines3's archives, within that of the training."""
+BEST = "best"
+"""Folder of the best validated policy, within that of the training."""
+VALIDATION_FILE = "validation.csv"
+CHECKPOINT_STEPS = 1_000_000
+"""Environment steps between two checkpoints."""
 
 
-FUSED_ADAM = {"fused": True, "eps": 1e-5}
-"""stable-baselines3's settings of Adam, its update in one kernel."""
+def linear(first: float, last: float, remaining: float) -> float:
+    """The value between `first` and `last` when the share `remaining` of a training lies ahead [1]."""
+    return last + (first - last) * remaining
 
 
-def make_model(
-    h: Hyperparameters, env: VecEnv, *, seed: int, device: str, cells: int | None = None
-) -> PPO:
-    """A new PPO model. device: of torch. cells: of a recurrent unit that learns; None: it has none."""
-    kind: Any = BatchPPO
-    own: dict[str, Any] = {"policy": "MlpPolicy"}
-    policy: dict[str, Any] = {"net_arch": [h.width, h.width]}
-    if cells is not None:
-        kind = SequencePPO
-        own = {
-            "policy": RecurrentActorCritic, "critic_rate": h.critic_rate, "critic_first": h.critic_first,
-            "restarts": h.restarts,
-        }  # fmt: skip
-        policy = {
-            "memory": cells, "width": h.width, "critic_width": h.critic_width, "averaging": h.averaging,
-        }  # fmt: skip
-    model: PPO = kind(
-        env=env,
-        n_steps=h.n_steps,
-        batch_size=h.batch_size,
-        n_epochs=h.n_epochs,
-        learning_rate=partial(linear, h.learning_rate, h.last_learning_rate),
-        gamma=h.gamma,
-        gae_lambda=h.gae_lambda,
-        ent_coef=h.ent_coef,
-        clip_range=h.clip_range,
-        policy_kwargs={**policy, "optimizer_kwargs": FUSED_ADAM},
+def make_model(env: VecEnv, *, seed: int) -> PPO:
+    """A new model that begins as the adaptive pulse with some exploration."""
+    return PPO(
+        AdvisedPolicy,
+        env,
+        learning_rate=partial(linear, LEARNING_RATE, LAST_LEARNING_RATE),
+        ent_coef=ENTROPY,
         seed=seed,
-        device=device,
-        **own,
+        device="cpu",
+        **PPO_SETTINGS,
     )
-    model.set_logger(Logger(folder=None, output_formats=[]))  # its own leaves an empty folder in /tmp
-    seed_episodes(env, seed)  # the model has seeded them, too, and other trainings' alike
-    return model
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """What a policy is trained for, and validated on."""
+
+    plant: Plant
+    """Centre of the region."""
+    scenario: str = "mixed"
+    """Of the consumption."""
+    parameters: str = "sensitive_ten_percent"
+    """Region that plants are drawn from."""
+    weights: RewardWeights = field(default_factory=RewardWeights)
+    """Prices of the reward; some are raised for the training."""
+
+
+def validate(policy: Policy, task: Task, *, episodes: int, duration: float) -> EpisodeMetrics:
+    """The policy's metrics on the validation episodes."""
+    options = {**vars(task), "conditions": VALIDATION_CONDITIONS}
+    seeds = list(range(VALIDATION_SEED, VALIDATION_SEED + episodes))
+    return run_episodes(policy, seeds=seeds, duration=duration, options=options)[0]
+
+
+def score(metrics: EpisodeMetrics) -> float:
+    """How good a policy is: its mean return less the price of its violations."""
+    return float(metrics.episode_return.mean() - VIOLATION_PRICE * (~metrics.stayed).mean())
+
+
+class Selection(BaseCallback):
+    """Validates the greedy policy at some points of the training, and keeps the best in a folder."""
+
+    def __init__(
+        self, task: Task, folder: Path, *, total: int, episodes: int, duration: float,
+        provenance: dict[str, Any],
+    ):  # fmt: skip
+        super().__init__()
+        self._task, self._folder, self._total = task, folder, total
+        self._episodes, self._duration, self._provenance = episodes, duration, provenance
+        self._points = [
+            round(share * total) for share in np.linspace(FIRST_VALIDATION, 1.0, VALIDATIONS)
+        ]
+        self.rows: list[dict[str, float]] = []
+        """One for each validation."""
+
+    def _on_training_start(self) -> None:
+        """Forget what was validated after the checkpoint that the training goes on from."""
+        done = self.num_timesteps
+        self.rows = [row for row in read_rows(self._folder) if row["timesteps"] <= done]
+        self._points = [point for point in self._points if point > done]
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_start(self) -> None:
+        assert isinstance(self.model, PPO)
+        self.model.ent_coef = linear(ENTROPY, 0.0, max(1 - self.num_timesteps / self._total, 0.0))
+        self._validate_if_due()
+
+    def _on_training_end(self) -> None:
+        self._validate_if_due()
+
+    def _validate_if_due(self) -> None:
+        """Validate once for all points that have been passed since the last time."""
+        later = [point for point in self._points if point > self.num_timesteps]
+        if len(later) == len(self._points):
+            return
+        self._points = later
+        assert isinstance(self.model, PPO)
+        network = network_of(self.model)
+        policy = Policy(network=network, plant=self._task.plant)
+        metrics = validate(policy, self._task, episodes=self._episodes, duration=self._duration)
+        best = max((row["score"] for row in self.rows), default=-np.inf)
+        row = {"timesteps": float(self.num_timesteps), **figures(metrics)}
+        if row["score"] > best:
+            write_policy(
+                network, self._folder / BEST, control_period=OnOff.default_period,
+                provenance={**self._provenance, "timesteps": self.num_timesteps},
+            )  # fmt: skip
+        self.rows.append(row)
+        write_rows(self._folder, self.rows)
+
+
+def figures(metrics: EpisodeMetrics) -> dict[str, float]:
+    """A row of the validation's table; `left` counts episodes that leave the band."""
+    return {
+        "score": score(metrics),
+        "episodes": float(len(metrics)),
+        "left": float((~metrics.stayed).sum()),
+        "mean_return": float(metrics.episode_return.mean()),
+        "rms_error_bar": float((metrics.rms_bar**2).mean() ** 0.5),
+        "switchings_per_s": float(metrics.switchings_per_s.mean()),
+    }
+
+
+class Progress(BaseCallback):
+    """A progress bar with the share of episodes that stay within the band while the policy explores."""
+
+    def __init__(self, total: int):
+        super().__init__()
+        self._total = total
+
+    def _on_training_start(self) -> None:
+        self._bar = tqdm(
+            total=self._total, initial=self.num_timesteps, desc="PPO", unit="step",
+            unit_scale=True, mininterval=0.5,
+        )  # fmt: skip
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_end(self) -> None:
+        self._bar.update(min(self.num_timesteps, self._total) - self._bar.n)
+        if self.model.ep_success_buffer:
+            self._bar.set_postfix(stayed=f"{np.mean(self.model.ep_success_buffer):.0%}")
+
+    def _on_training_end(self) -> None:
+        self._bar.close()
 
 
 def train(
-    h: Hyperparameters,
-    *,
+    task: Task,
     folder: Path,
-    plant: Plant,
-    scenario: str,
-    parameters: str,
-    weights: RewardWeights,
-    timesteps: int,
-    seed: int,
-    device: str,
-    resume: bool,
-    student: LearnedPolicy | None = None,
-    run: str | None = None,
-    quiet: bool = False,
-) -> tuple[LearnedPolicy, TrainingLog]:
-    """Train until `timesteps` and return the best validated policy (checkpoint_selection.py).
+    *,
+    seed: int = 0,
+    timesteps: int = TIMESTEPS,
+    num_envs: int = NUM_ENVS,
+    validation_episodes: int = 1024,
+    validation_duration: float = VALIDATION_DURATION,
+    resume: bool = False,
+    provenance: dict[str, Any] | None = None,
+) -> list[dict[str, float]]:
+    """Train until `timesteps`, and write the best validated policy into the folder.
 
-    An interruption leaves the newest checkpoint behind. A run that is resumed from it gives, to the bit,
-    the policy of an uninterrupted one (on the same machine, and device "cpu").
-
-    Raises RunError if the folder's checkpoint is of another run or subject, or damaged.
+    A training that was stopped goes on from its newest checkpoint, with other episodes than an
+    uninterrupted one would meet.
 
     Args:
-        h: hyperparameters.
-        folder: of checkpoint, learning curve and validations.
-        plant: centre of the region.
-        scenario: of the consumption.
-        parameters: region that plants are drawn from.
-        weights: prices of the reward; some are raised for the training (`Hyperparameters`).
-        timesteps: environment steps in all.
+        task: what the policy is for.
+        folder: of policy, checkpoints and validations.
         seed: of the training.
-        device: of torch.
-        resume: whether to go on from the folder's checkpoint.
-        student: a policy to go on from; its recurrent unit learns if `h.end_to_end`, or stays as it is.
-            None: the model imitates the TEACHER first.
-        run: identity of the run; None: that of the folder's checkpoint, or a new one.
-        quiet: no progress bar.
+        timesteps: environment steps in all.
+        num_envs: episodes side by side.
+        validation_episodes: of each validation.
+        validation_duration: length of one of them [s].
+        resume: whether to go on from the folder's newest checkpoint.
+        provenance: of the training, for the policy's file.
+
+    Returns:
+        A row for each validation.
     """
-    subject = _subject(
-        h, plant, student, seed=seed, scenario=scenario, parameters=parameters, weights=asdict(weights)
-    )
-    found = unfinished_run(folder, subject, run) if resume else None
-    begun = found.run if found else Run(run=run or new_run(), subject=as_json(subject))
-    done = begun.timesteps
     torch.set_num_threads(1)  # sums do not depend on the machine's cores; the plant uses them all
-    task: dict[str, Any] = {
-        "plant": plant, "parameters": parameters, "scenario": scenario,
-        "weights": training_weights(weights, h),
-    }  # fmt: skip
-    learns = student if h.end_to_end else None  # whose recurrent unit learns
-    shown = student.cell if student and not learns else None
-    env = make_training_env(h, seed=seed, cell=shown, privileged=learns is not None, **task)
-    model = make_model(h, env, seed=seed, device=device, cells=learns.cells if learns else None)
-    if found:
-        _restore(model, folder / CHECKPOINT_FILE, device=device)
-        restore_progress(model, found.progress)
-    elif learns:
-        put_student(model, learns, h.sharpness)
-    elif h.imitation_epochs:
-        _start(model, h, env, plant, student=student, seed=seed)
-    greedy = partial(greedy_policy, student=student)
+    env = make_training_env(seed=seed, num_envs=num_envs, **vars(task))
+    newest = newest_checkpoint(folder) if resume else None
+    if newest is None:
+        model = make_model(env, seed=seed)
+        env.seed(seed * num_envs)  # the model has seeded them, too, and other trainings' alike
+    else:
+        model = PPO.load(newest, env=env, device="cpu")
     selection = Selection(
-        points=validation_points(timesteps, first_share=h.first_validation, count=h.validations),
-        settings=ValidationSettings(episodes=h.validation_episodes, duration=h.validation_duration),
-        options={**task, "conditions": h.validation_conditions},
-        controller=lambda model: supervised(greedy(model), plant) if learns else greedy(model),
-        rows=with_nan(begun.validations),
-        best=found.best if found else None,
-    )
-    log = TrainingLog(folder, begun, selection, total=timesteps, quiet=quiet)
-    callbacks: list[BaseCallback] = [
-        FadingEntropy(h.ent_coef, total=timesteps),
-        selection,
-        log,  # last: what it saves at the end has been validated
-    ]
-    if done < timesteps:
-        model.num_timesteps = done
-        events = TensorBoardOutputFormat(str(folder / TENSORBOARD_FOLDER))
-        model.set_logger(Logger(folder=None, output_formats=[events]))
-        model.learn(timesteps - done, callback=callbacks, reset_num_timesteps=found is None)
-        events.close()
-    if selection.best is None:
-        raise RunError(
-            f"the run in {folder} has done {done} steps, and none of its policies is validated yet: "
-            f"resume it with more than {timesteps} steps"
-        )
-    best_model: Any = io.BytesIO(selection.best)  # stable-baselines3 takes streams, too
-    model.set_parameters(best_model, device=device)
-    policy = greedy(model)
-    return (replace(policy, name=END_TO_END_NAME) if learns else policy), log
-
-
-def _restore(model: PPO, checkpoint: Path, *, device: str) -> None:
-    """Give the model a checkpoint's parameters. Raises RunError if they are another network's."""
-    try:
-        model.set_parameters(str(checkpoint), device=device)
-    except (ValueError, RuntimeError, KeyError, pickle.UnpicklingError) as error:
-        raise RunError(
-            f"{checkpoint} does not fit this training's networks ({error}): give --force to begin anew, "
-            "or choose another --out"
-        ) from None
-
-
-def _subject(
-    h: Hyperparameters, plant: Plant, student: LearnedPolicy | None, **options: Any
-) -> dict[str, Any]:
-    """All that a training depends on but its length, ready for JSON."""
-    return {
-        **options, "hyperparameters": asdict(h), "plant": plant_digest(plant),
-        "student": hashlib.sha256(policy_bytes(student)).hexdigest() if student else None,
-    }  # fmt: skip
-
-
-def _start(
-    model: PPO,
-    h: Hyperparameters,
-    env: VecEnvWrapper,
-    plant: Plant,
-    *,
-    student: LearnedPolicy | None,
-    seed: int,
-) -> None:
-    """Start from a student, whose returns the critic learns, or from an imitation of the TEACHER."""
-    teacher = student or build(TEACHER, load_tunings()[TEACHER].values, plant)
-    if student:
-        put_layers(model, student, h.sharpness)
-    imitate(
-        model, teacher, env, steps=h.episode_steps - 1, epochs=h.imitation_epochs, seed=seed,
-        learn_actor=student is None,
+        task, folder, total=timesteps, episodes=validation_episodes, duration=validation_duration,
+        provenance={"seed": seed, **(provenance or {})},
     )  # fmt: skip
+    checkpoints = CheckpointCallback(
+        max(CHECKPOINT_STEPS // num_envs, 1), str(folder / CHECKPOINTS), name_prefix="ppo"
+    )
+    if model.num_timesteps < timesteps:
+        model.learn(
+            timesteps - model.num_timesteps,
+            callback=[selection, checkpoints, Progress(timesteps)],
+            reset_num_timesteps=newest is None,
+        )
+    contract, network = read_policy(folder / BEST)
+    write_policy(network, folder, control_period=OnOff.default_period, provenance=contract.provenance)
+    return read_rows(folder)
+
+
+def newest_checkpoint(folder: Path) -> Path | None:
+    """The archive with the most environment steps in a training's folder; None if there is none."""
+    archives = (folder / CHECKPOINTS).glob("ppo_*_steps.zip")
+    return max(archives, key=lambda path: int(path.stem.split("_")[1]), default=None)
+
+
+def read_rows(folder: Path) -> list[dict[str, float]]:
+    """The table of a folder's validations; empty if there was none."""
+    path = folder / VALIDATION_FILE
+    if not path.exists():
+        return []
+    with path.open(newline="", encoding="utf-8") as stream:
+        return [{name: float(v) for name, v in row.items()} for row in csv.DictReader(stream)]
+
+
+def write_rows(folder: Path, rows: list[dict[str, float]]) -> None:
+    """Write the table of the validations."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(rows[0]))
+    writer.writeheader()
+    writer.writerows(rows)
+    write_text(folder / VALIDATION_FILE, text.getvalue())

@@ -1,0 +1,234 @@
+"""A learned policy's network and its files: safetensors, and the contract that says what they mean.
+
+Loading a policy runs no code from its files: the weights are arrays, the contract is checked data.
+"""
+
+import json
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+import numba
+import numpy as np
+from numpy.typing import NDArray
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
+
+from controllers.knowledge import LEARNT, RULES
+from epv_env.common.files import read_bytes, write_bytes
+from epv_env.common.json_files import JSONFileError, read_json, write_json
+from epv_env.observation import LAYOUT, contract
+
+FORMAT = "epv-policy/2"
+WEIGHTS_FILE = "policy.safetensors"
+CONTRACT_FILE = "policy.json"
+MOST_LAYERS = 64
+"""More than any policy has; a number of layers beyond is a damaged file."""
+ADVICE = "advice.weight"
+"""Name of the array of the advice's weights."""
+
+ControlPeriod = Annotated[float, msgspec.Meta(ge=0.5e-3, le=0.1)]
+"""Time between two decisions, as an environment allows it [s]."""
+
+
+class PolicyError(ValueError):
+    """A policy cannot be used here: the message says why and what to do."""
+
+
+class Observation(msgspec.Struct, kw_only=True):
+    """What the policy reads, as `epv_env.observation.contract` writes it."""
+
+    control_period_s: ControlPeriod
+    """Time between two observations [s]."""
+    format: str = ""
+    """Version of the layout's form."""
+    entries: list[Any] = []
+    """The layout: name, unit and scaling of each entry."""
+
+
+class PolicyContract(msgspec.Struct, kw_only=True):
+    """The fields of policy.json."""
+
+    format: str
+    """Version of this form."""
+    layers: Annotated[int, msgspec.Meta(ge=1, le=MOST_LAYERS)]
+    """Number of dense layers."""
+    observation: Observation
+    """The readings: the first inputs."""
+    learnt: list[Any] = []
+    """The learnt quantities, the inputs behind them: name, unit and scaling of each entry."""
+    rules: list[str] = []
+    """The rules in front of the network."""
+    name: str = "PPO"
+    """In tables and figures."""
+    environment: Literal["EPValve-v0"] = "EPValve-v0"
+    """Id of the environment whose actions the policy chooses."""
+    activation: Literal["tanh"] = "tanh"
+    """Of all layers but the last."""
+    action: str = ""
+    """What the network's outputs mean, for readers."""
+    provenance: dict[str, Any] = {}
+    """Of the training, free-form."""
+
+
+@numba.njit(cache=True, nogil=True)
+def _sums(signal: NDArray, weight: NDArray, bias: NDArray) -> NDArray:
+    """bias + signal @ weight, added in the order of the inputs; weight: (inputs, outputs).
+
+    The products of a linear algebra library are summed in blocks that depend on the number of rows: the
+    same episode could end differently in a larger batch, or on another machine.
+    """
+    inputs, outputs = weight.shape
+    out = np.empty((len(signal), outputs), signal.dtype)
+    for row in range(len(signal)):
+        for j in range(outputs):
+            out[row, j] = bias[j]
+        for i in range(inputs % 4):  # the inner loop runs over outputs: a CPU can vectorise it
+            for j in range(outputs):
+                out[row, j] += signal[row, i] * weight[i, j]
+        for i in range(inputs % 4, inputs, 4):  # four inputs at a time: fewer reads of the output row
+            a, b, c, d = signal[row, i], signal[row, i + 1], signal[row, i + 2], signal[row, i + 3]
+            for j in range(outputs):
+                total = out[row, j] + a * weight[i, j]
+                total = total + b * weight[i + 1, j]
+                total = total + c * weight[i + 2, j]
+                out[row, j] = total + d * weight[i + 3, j]
+    return out
+
+
+def dense_layer(signal: NDArray, weight: NDArray, bias: NDArray) -> NDArray:
+    """signal @ weight.T + bias.
+
+    Args:
+        signal: (n, inputs).
+        weight: (outputs, inputs), of the signal's precision.
+        bias: (outputs,), of the signal's precision.
+
+    Returns:
+        (n, outputs), of the same precision, in which the sums are also taken.
+    """
+    return _sums(np.ascontiguousarray(signal), np.ascontiguousarray(weight.T), bias)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Network:
+    """A multilayer perceptron with tanh layers, and the weight of the advice beside it."""
+
+    layers: list[tuple[NDArray, NDArray]]
+    """Weight (outputs, inputs) and bias (outputs,) of each layer; the last gives two logits."""
+    advice_weight: NDArray
+    """Weights (2,) of the advice, the last of the inputs (-1: off, 1: on), in the logits."""
+
+    def logits(self, inputs: NDArray) -> NDArray:
+        """Logits (n, 2) of coil off and coil on; inputs: readings and learnt quantities (n, all)."""
+        signal = inputs.astype(self.layers[0][0].dtype)
+        advice = signal[:, -1:]
+        for weight, bias in self.layers[:-1]:
+            signal = np.tanh(dense_layer(signal, weight, bias))
+        return dense_layer(signal, *self.layers[-1]) + advice * self.advice_weight
+
+
+def learnt_contract() -> list[dict[str, Any]]:
+    """The learnt quantities as data."""
+    return [vars(quantity) for quantity in LEARNT]
+
+
+def holds_policy(folder: Path) -> bool:
+    """Whether a policy has been written into a folder: its contract is written last."""
+    return (folder / CONTRACT_FILE).exists()
+
+
+def write_policy(
+    network: Network, folder: Path, *, control_period: float, provenance: dict[str, Any]
+) -> None:
+    """Write a policy's weights, and the meaning of its inputs and outputs.
+
+    Args:
+        network: to write.
+        folder: to write into.
+        control_period: of the observations [s].
+        provenance: of the training, ready for JSON.
+    """
+    arrays = {ADVICE: network.advice_weight}
+    for i, (weight, bias) in enumerate(network.layers):
+        arrays[f"{i}.weight"], arrays[f"{i}.bias"] = weight, bias
+    content = {
+        "format": FORMAT,
+        "name": "PPO",
+        "environment": "EPValve-v0",
+        "layers": len(network.layers),
+        "activation": "tanh",
+        "action": "argmax of the logits plus the advice times its weights: 0 = coil off, 1 = coil on",
+        "rules": list(RULES),
+        "observation": contract(control_period),
+        "learnt": learnt_contract(),
+        "provenance": provenance,
+    }
+    write_bytes(folder / WEIGHTS_FILE, save(arrays))
+    write_json(folder / CONTRACT_FILE, content)
+
+
+def read_policy(folder: str | PathLike[str]) -> tuple[PolicyContract, Network]:
+    """Contract and network of a policy's folder.
+
+    Raises PolicyError if a file is missing or damaged, if an array is not what the contract says, or if
+    the policy was trained on other inputs than this version's.
+    """
+    folder = Path(folder)
+    found = read_contract(folder)
+    try:
+        arrays = load(read_bytes(folder / WEIGHTS_FILE))
+    except (OSError, ValueError, SafetensorError) as error:
+        raise PolicyError(
+            f"cannot read a policy from {folder}: {error}; give a folder that training wrote, with "
+            f"{CONTRACT_FILE} and {WEIGHTS_FILE}"
+        ) from None
+    _check_arrays(arrays, found, folder)
+    layers = [(arrays[f"{i}.weight"], arrays[f"{i}.bias"]) for i in range(found.layers)]
+    return found, Network(layers=layers, advice_weight=arrays[ADVICE])
+
+
+def read_contract(folder: Path) -> PolicyContract:
+    """A policy folder's contract. Raises PolicyError if it is missing, damaged or of other inputs."""
+    remedy = (
+        f"train it anew, or give a folder that training wrote, with {CONTRACT_FILE} and {WEIGHTS_FILE}"
+    )
+    try:
+        found = read_json(folder / CONTRACT_FILE, PolicyContract, version=FORMAT, remedy=remedy)
+    except JSONFileError as error:
+        raise PolicyError(f"cannot read a policy from {folder}: {error}") from None
+    expected = contract(found.observation.control_period_s), learnt_contract(), list(RULES)
+    own = msgspec.to_builtins(found.observation), found.learnt, found.rules
+    if list(own) != json.loads(json.dumps(expected)):
+        raise PolicyError(
+            f"policy {folder} was trained on other observations, learnt quantities or rules than this "
+            "version's: train it anew, or use the version that wrote it"
+        )
+    return found
+
+
+def _check_arrays(arrays: dict[str, NDArray], found: PolicyContract, folder: Path) -> None:
+    """Raises PolicyError unless the arrays have the contract's shapes, one precision, finite values."""
+    shapes: dict[str, tuple[int, ...]] = {ADVICE: (2,)}
+    inputs = len(LAYOUT) + len(LEARNT)
+    for i in range(found.layers):
+        bias = arrays.get(f"{i}.bias", np.zeros(0))  # the width of a hidden layer is the policy's own
+        outputs = 2 if i == found.layers - 1 else len(bias) if bias.ndim == 1 else 1
+        shapes |= {f"{i}.weight": (outputs, inputs), f"{i}.bias": (outputs,)}
+        inputs = outputs
+    for name, shape in shapes.items():
+        if name not in arrays:
+            raise PolicyError(
+                f"policy {folder} lacks the array {name!r} in {WEIGHTS_FILE}: train it anew"
+            )
+        array, wrong = arrays[name], None
+        if array.shape != shape:
+            wrong = f"shape {array.shape}, not {shape}"
+        elif array.dtype not in ("float32", "float64") or array.dtype != arrays[ADVICE].dtype:
+            wrong = f"type {array.dtype}, where all arrays are float32, or all float64"
+        elif not bool(abs(array).max(initial=0.0) < float("inf")):
+            wrong = "values that are not finite"
+        if wrong:
+            raise PolicyError(f"array {name!r} of policy {folder} has {wrong}: train it anew")

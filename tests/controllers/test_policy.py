@@ -1,0 +1,120 @@
+"""The learned policy: its network, its files, and the policy that comes with the package."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("safetensors")
+from safetensors.numpy import load_file, save_file
+
+from controllers.knowledge import LEARNT, READINGS
+from controllers.policy import TRAINED, Policy, load_policy
+from controllers.policy_files import (
+    CONTRACT_FILE,
+    WEIGHTS_FILE,
+    Network,
+    PolicyError,
+    dense_layer,
+    read_policy,
+    write_policy,
+)
+from epv_env.plant.plantfile import Plant
+from training.evaluation.rollout import run_episodes
+
+pytestmark = pytest.mark.training
+INPUTS = READINGS + len(LEARNT)
+
+
+def layer(rng: np.random.Generator, inputs: int, outputs: int):
+    return rng.normal(size=(outputs, inputs)).astype("f4"), rng.normal(size=outputs).astype("f4")
+
+
+def network(seed: int = 0) -> Network:
+    rng = np.random.default_rng(seed)
+    layers = [layer(rng, INPUTS, 16), layer(rng, 16, 16), layer(rng, 16, 2)]
+    return Network(layers=layers, advice_weight=np.array([-0.5, 0.5], "f4"))
+
+
+@pytest.mark.parametrize("inputs", [1, 3, 4, 9])
+def test_a_layer_adds_its_inputs_in_their_order(inputs):
+    """To the bit, as exported C does; another order rounds otherwise."""
+    rng = np.random.default_rng(inputs)
+    (weight, bias), signal = layer(rng, inputs, 5), rng.normal(size=(200, inputs)).astype("f4")
+    total = np.broadcast_to(bias, (200, 5))
+    for i in range(inputs):
+        total = total + signal[:, i : i + 1] * weight[:, i]
+    np.testing.assert_array_equal(dense_layer(signal, weight, bias), total)
+    np.testing.assert_allclose(total, signal @ weight.T + bias, atol=1e-5)
+
+
+def test_a_state_is_decided_the_same_in_every_batch_and_the_advice_counts():
+    inputs, net = np.random.default_rng(1).normal(size=(300, INPUTS)).astype("f4"), network()
+    alone = np.concatenate([net.logits(row[None]) for row in inputs])
+    assert np.array_equal(net.logits(inputs), alone)
+    advised = replace(net, advice_weight=np.array([-99.0, 99.0], "f4")).logits(inputs)
+    assert np.array_equal(np.argmax(advised, axis=1), (inputs[:, -1] > 0).astype(int))
+
+
+def test_a_policy_is_read_as_it_was_written(tmp_path):
+    write_policy(network(), tmp_path, control_period=5e-3, provenance={"seed": 3})
+    contract, read = read_policy(tmp_path)
+    assert contract.provenance == {"seed": 3}
+    assert [entry["name"] for entry in contract.learnt] == [entry.name for entry in LEARNT]
+    inputs = np.random.default_rng(2).normal(size=(50, INPUTS)).astype("f4")
+    assert np.array_equal(read.logits(inputs), network().logits(inputs))
+
+
+@pytest.mark.parametrize(
+    ("damage", "words"),
+    [
+        (lambda content: content["observation"]["entries"].reverse(), "other observations"),
+        (lambda content: content["learnt"].pop(), "other observations"),
+        (lambda content: content.pop("layers"), "field 'layers' is missing"),
+        (lambda content: content.update(layers=4), "lacks the array '3.weight'"),
+    ],
+)
+def test_a_contract_that_does_not_fit_is_refused(tmp_path, damage, words):
+    write_policy(network(), tmp_path, control_period=5e-3, provenance={})
+    content = json.loads((tmp_path / CONTRACT_FILE).read_text())
+    damage(content)
+    (tmp_path / CONTRACT_FILE).write_text(json.dumps(content))
+    with pytest.raises(PolicyError, match=words):
+        read_policy(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"0.weight": np.zeros((16, 5), "f4")}, "has shape"),
+        ({"0.bias": np.full(16, np.nan, "f4")}, "not finite"),
+        ({"0.bias": np.zeros(16, "f8")}, "has type float64"),
+    ],
+)
+def test_weights_that_do_not_fit_are_refused(tmp_path, changes, words):
+    write_policy(network(), tmp_path, control_period=5e-3, provenance={})
+    save_file({**load_file(tmp_path / WEIGHTS_FILE), **changes}, tmp_path / WEIGHTS_FILE)
+    with pytest.raises(PolicyError, match=words):
+        read_policy(tmp_path)
+    (tmp_path / WEIGHTS_FILE).write_bytes(b"no weights")
+    with pytest.raises(PolicyError, match="cannot read a policy"):
+        read_policy(tmp_path)
+
+
+def test_the_rules_hold_whatever_the_network_says():
+    off = replace(network(), advice_weight=np.zeros(2, "f4"))
+    off.layers[-1][1][:] = [1e3, -1e3]
+    policy = Policy(network=off, plant=Plant.calibrated())
+    options = {"scenario": "none", "parameters": "sensitive_ten_percent"}
+    metrics, _ = run_episodes(policy, seeds=list(range(8)), duration=1.5, options=options)
+    assert metrics.excursion_bar.max() < 0.6
+
+
+def test_the_package_holds_one_policy_which_holds_the_band_on_unknown_valves():
+    files = {path.name for path in TRAINED.rglob("*") if path.is_file()}
+    assert files == {CONTRACT_FILE, WEIGHTS_FILE}
+    options = {"parameters": "sensitive_ten_percent"}
+    metrics, _ = run_episodes(load_policy(), seeds=list(range(64)), duration=5.0, options=options)
+    assert metrics.stayed.mean() > 0.98
+    assert metrics.rms_bar.mean() < 0.12

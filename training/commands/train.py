@@ -1,0 +1,200 @@
+"""train the PPO controller, and compare it with the classic ones
+
+python training/train_ppo.py
+python training/train_ppo.py --quick
+
+The command writes the policy's files (policy.json, policy.safetensors), the validations, the comparison
+and two pictures, and ends with a verdict. A training that was stopped goes on with --resume.
+"""
+
+import argparse
+import shutil
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from controllers.base import Controller
+from controllers.policy import load_policy
+from controllers.policy_files import CONTRACT_FILE, WEIGHTS_FILE
+from controllers.tuned import ablation, tuned_controllers
+from epv_env.common.files import write_text
+from epv_env.common.results_folder import CONFIG, check_same, read_config, write_options
+from epv_env.plant.consumption import check_scenario
+from epv_env.plant.plantfile import Plant, load_plant
+from epv_env.plant.region import REGIONS
+from epv_env.reward import RewardWeights
+from training.commands.options import add_folder, count, seconds, seed
+from training.evaluation.plots import plt, save_figure
+from training.evaluation.scenarios import EvaluationScenario
+from training.studies.comparison import as_text, compare, differences, figure, rows
+
+QUICK: dict[str, Any] = {
+    "out": Path("runs/quick-ppo"), "timesteps": 65_536, "episodes": 16, "duration": 2.0,
+}  # fmt: skip
+QUICK_TRAINING: dict[str, Any] = {
+    "num_envs": 64, "validation_episodes": 16, "validation_duration": 2.0,
+}  # fmt: skip
+TIMESTEPS = 8_000_000
+REGION = "sensitive_ten_percent"
+"""Plants that are trained on, and on which the verdict is given."""
+LEFT_OUT = "hysteresis"
+"""Not in the verdict's table, which has six rows: it is far worse than the others."""
+RIVAL = "pulse, adaptive"
+"""Whom the verdict sets the policy against: the best classic controller."""
+SAME_WHEN_RESUMED = ("seed", "plant", "scenario", "parameters", "switching_price")
+"""Options that a resumed training must share with its beginning."""
+OWN = (
+    CONTRACT_FILE, WEIGHTS_FILE, CONFIG, "validation.csv", "comparison.csv", "comparison.png",
+    "learning_curve.png",
+)  # fmt: skip
+OWN_FOLDERS = ("best", "checkpoints")
+"""What a training writes into its folder."""
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    add_folder(parser, "runs/ppo")
+    parser.add_argument("--timesteps", type=count, default=TIMESTEPS, help="environment steps of PPO")
+    parser.add_argument("--episodes", type=count, default=1024, help="of the comparison")
+    parser.add_argument("--duration", type=seconds, default=10.0, help="length of one of them [s]")
+    parser.add_argument("--seed", type=seed, default=0, help="of the training")
+    parser.add_argument("--plant", type=Path, help="plant file (default: the report's calibration)")
+    parser.add_argument("--scenario", default="mixed", help="consumption scenario of the training")
+    parser.add_argument("--parameters", choices=REGIONS, default=REGION, help="plants to train on")
+    parser.add_argument(
+        "--switching-price", type=float, default=RewardWeights().switching,
+        help="reward's price of one switching of the coil: trades wear against breakdown",
+    )  # fmt: skip
+    again = parser.add_mutually_exclusive_group()
+    again.add_argument("--resume", action="store_true", help="go on from the folder's checkpoint")
+    again.add_argument(
+        "--force", action="store_true", help="begin anew in a folder that holds a training already"
+    )
+
+
+def run(options: argparse.Namespace) -> None:
+    """Train, write the policy down, compare it, and print the verdict.
+
+    Raises ValueError for a folder that holds another training, and for options that do not fit.
+    """
+    plant = load_plant(options.plant)
+    check_scenario(options.scenario)
+    weights = RewardWeights(switching=options.switching_price)
+    begin_folder(options)
+    write_options(options.out, configuration(options, plant))
+
+    from training.learners.ppo import Task, train  # torch takes seconds to import
+
+    task = Task(plant=plant, scenario=options.scenario, parameters=options.parameters, weights=weights)
+    shorter = QUICK_TRAINING if options.quick else {}
+    provenance = {"plant": plant.name, "switching_price": options.switching_price}
+    validations = train(
+        task, options.out, seed=options.seed, timesteps=options.timesteps, resume=options.resume,
+        provenance=provenance, **shorter,
+    )  # fmt: skip
+    save_figure(learning_curve(validations), options.out / "learning_curve.png")
+    print(verdict(options, plant, weights))
+
+
+def begin_folder(options: argparse.Namespace) -> None:
+    """Make the folder free for a new training, or check that it holds the one to go on with.
+
+    Raises ValueError if the folder holds another training, or none to resume.
+    """
+    folder: Path = options.out
+    earlier = read_config(folder, dict[str, Any])
+    if options.resume:
+        if earlier is None:
+            raise ValueError(f"nothing to resume in {folder}: leave --resume out")
+        same = {name: _plain(getattr(options, name)) for name in SAME_WHEN_RESUMED}
+        check_same(earlier["options"], same, f"{folder} was trained with", "resume with the same")
+        return
+    if options.force or options.quick:
+        for name in OWN:
+            (folder / name).unlink(missing_ok=True)
+        for name in OWN_FOLDERS:
+            shutil.rmtree(folder / name, ignore_errors=True)
+    elif earlier is not None:
+        raise ValueError(
+            f"{folder} holds a training: give --resume to go on, --force to begin anew, or choose "
+            "another --out"
+        )
+
+
+def _plain(value: Any) -> Any:
+    return str(value) if isinstance(value, Path) else value
+
+
+def configuration(options: argparse.Namespace, plant: Plant) -> dict[str, Any]:
+    """Options, plant and versions: what is needed to repeat the training."""
+    return {
+        "options": {name: _plain(value) for name, value in vars(options).items()},
+        "plant": {"name": plant.name, "parameters": dict(plant.parameters)},
+        "versions": {
+            package: version(package)
+            for package in ("epv-valve", "gymnasium", "numba", "numpy", "stable-baselines3", "torch")
+        },
+    }
+
+
+def contenders(folder: Path, plant: Plant) -> dict[str, Controller]:
+    """The policy and the classic controllers of the verdict's table, by label."""
+    classic = [*ablation(plant), *reversed(tuned_controllers(plant))]
+    every: list[Controller] = [load_policy(folder, plant), *classic]
+    return {controller.name: controller for controller in every if controller.name != LEFT_OUT}
+
+
+def verdict(options: argparse.Namespace, plant: Plant, weights: RewardWeights) -> str:
+    """Compare; write table and picture; a sentence, a table, and where the picture lies."""
+    results = compare(
+        contenders(options.out, plant), plant=plant, plant_sets=[REGION],
+        scenarios={"random": EvaluationScenario(meaning="as in training", options={"weights": weights})},
+        episodes=options.episodes, duration=options.duration,
+    )  # fmt: skip
+    table = rows(results)
+    write_text(options.out / "comparison.csv", table.to_csv(index=False))
+    save_figure(figure(table), options.out / "comparison.png")
+    if options.quick:
+        sentence = "This was a short run that shows that all works: nothing was learnt."
+    else:
+        sentence = sentence_of(differences(results, RIVAL), options.episodes)
+    picture = f"picture: {options.out / 'comparison.png'}"
+    return f"\n{sentence}\n\n{as_text(table)}\n\n{picture}"
+
+
+def sentence_of(paired: pd.DataFrame, episodes: int) -> str:
+    """Whether the policy is better than the RIVAL, and by what.
+
+    paired: rows of `differences` against it.
+    """
+    mine = paired[paired["controller"] == "PPO"].set_index("score")
+    gain = mine.loc["return"]
+    left, switchings = mine.loc["share that leaves [%]"], mine.loc["switchings [1/s]"]
+    if gain["low"] > 0:
+        judged = "is better than"
+    elif gain["high"] < 0:
+        judged = "is worse than"
+    else:
+        judged = "cannot be told from"
+    return (
+        f"The policy {judged} the {RIVAL!r} controller on {episodes} unseen episodes within ±10 %: "
+        f"return {gain['difference']:+.3g} ({gain['low']:+.3g} to {gain['high']:+.3g}), "
+        f"{left['difference']:+.2g} % of the episodes leave the band, "
+        f"{switchings['difference']:+.2g} switchings a second."
+    )
+
+
+def learning_curve(validations: list[dict[str, float]]) -> Any:
+    """The validation score that selects the policy, over environment steps."""
+    drawn, axes = plt.subplots(figsize=(6, 3.5), layout="constrained")
+    steps = [row["timesteps"] / 1e6 for row in validations]
+    axes.plot(steps, [row["score"] for row in validations], "o-")
+    for row, step in zip(validations, steps, strict=True):
+        left = f"{row['left']:.0f} of {row['episodes']:.0f} leave"
+        axes.annotate(left, (step, row["score"]), xytext=(4, 4), textcoords="offset points", fontsize=7)
+    axes.set_xlabel("environment steps [millions]")
+    axes.set_ylabel("validation score")
+    axes.grid(alpha=0.3)
+    return drawn

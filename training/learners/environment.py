@@ -1,0 +1,90 @@
+"""The episodes that PPO trains on: drawn plants, hard applications, stricter prices."""
+
+from dataclasses import replace
+
+import gymnasium
+from gymnasium.vector import AutoresetMode
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
+
+import epv_env  # noqa: F401 - registers the ids
+from controllers.knowledge import LearntObservation
+from epv_env.conditions import Conditions
+from epv_env.plant.plantfile import Plant
+from epv_env.reward import RewardWeights
+from epv_env.sb3 import SB3VectorEnv
+from training.evaluation.seeds import training_seeds
+
+NUM_ENVS = 1024
+"""Episodes that run side by side."""
+ROLLOUT = 32
+"""Periods between two updates."""
+SHORTEST, LONGEST = 300, 600
+"""Lengths of the training episodes [control periods]. Different lengths keep the environments out of
+step: every rollout sees all parts of an episode."""
+CONDITIONS = Conditions(braking=0.5)
+"""Half of the training episodes brake hard: a good policy leaves the band only there."""
+REWARD_SCALE = 0.02
+"""Factor of the rewards that PPO sees [1]: the critic's errors become about as large as the actor's
+advantages, whose gradients PPO clips together."""
+PRICES = {"band": 6.0, "breakdown": 1.0, "switching": 3.0}
+"""Least prices in training. A good policy hardly ever leaves the band, so leaving has to cost more."""
+
+
+class ScaledReward(VecEnvWrapper):
+    """Rewards times REWARD_SCALE; the monitor inside counts them as they are."""
+
+    def reset(self) -> VecEnvObs:
+        """First observations (n, all)."""
+        return self.venv.reset()
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """Observations (n, all), scaled rewards (n,), ends (n,) and infos."""
+        observation, reward, done, infos = self.venv.step_wait()
+        return observation, REWARD_SCALE * reward, done, infos
+
+
+def training_weights(weights: RewardWeights) -> RewardWeights:
+    """The reward's prices in training: at least PRICES."""
+    dearer = {name: max(price, getattr(weights, name)) for name, price in PRICES.items()}
+    return replace(weights, **dearer)
+
+
+def make_training_env(
+    *,
+    plant: Plant,
+    seed: int,
+    num_envs: int = NUM_ENVS,
+    scenario: str = "mixed",
+    parameters: str = "sensitive_ten_percent",
+    weights: RewardWeights,
+) -> VecEnv:
+    """Episodes on drawn plants, the learnt quantities among the observations, the rules in front.
+
+    Args:
+        plant: centre of the region.
+        seed: of the training. Trainings with different seeds meet different episodes.
+        num_envs: episodes side by side.
+        scenario: of the consumption.
+        parameters: region that plants are drawn from.
+        weights: prices of the reward.
+
+    Raises:
+        ValueError: the seed is too large (training/evaluation/seeds.py).
+    """
+    lengths = range(SHORTEST, LONGEST + 1, ROLLOUT)
+    env = gymnasium.make_vec(
+        "EPValve-v0",
+        num_envs=num_envs,
+        vectorization_mode="vector_entry_point",
+        autoreset_mode=AutoresetMode.SAME_STEP,
+        max_episode_steps=[lengths[i % len(lengths)] for i in range(num_envs)],
+        plant=plant,
+        scenario=scenario,
+        parameters=parameters,
+        conditions=CONDITIONS,
+        weights=training_weights(weights),
+    )
+    scaled = ScaledReward(VecMonitor(SB3VectorEnv(LearntObservation(env, rules=True))))
+    scaled.seed(training_seeds(seed, num_envs)[0])
+    return scaled
