@@ -17,8 +17,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from controllers.knowledge import LEARNT, RULES
-from epv_env.common.files import read_bytes, write_bytes
-from epv_env.common.json_files import JSONFileError, read_json, write_json
+from epv_env.common.files import JSONFileError, read_bytes, read_json, write_bytes, write_json
 from epv_env.observation import LAYOUT, contract
 
 FORMAT = "epv-policy/2"

@@ -23,8 +23,7 @@ from epv_env.common.units import BAR, GRAM, MILLISECOND
 from epv_env.plant.consumption import SCENARIOS
 from epv_env.plant.equations import State
 from epv_env.plant.plantfile import Plant
-from epv_env.plant.primitives.constants import QUARTER_PI
-from epv_env.plant.primitives.flow import CRITICAL_RATIO, bracket_over_drop
+from epv_env.plant.primitives import CRITICAL_RATIO, QUARTER_PI, bracket_over_drop
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
 

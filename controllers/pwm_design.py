@@ -22,8 +22,7 @@ from epv_env.common.units import BAR
 from epv_env.plant.coefficients import coefficients
 from epv_env.plant.equations import Coefficients
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.primitives.constants import QUARTER_PI
-from epv_env.plant.primitives.flow import mass_flux
+from epv_env.plant.primitives import QUARTER_PI, mass_flux
 from epv_env.plant.simulate import energised, simulate
 
 OUTER_GAINS = np.geomspace(3.0, 1e-2, 40)

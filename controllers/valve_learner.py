@@ -29,7 +29,7 @@ from controllers.pulse_table import (
     time_to_open,
 )
 from epv_env.observation import CENTRE, INDEX, SCALE
-from epv_env.plant.primitives.compiled import source_digest
+from epv_env.plant.primitives import source_digest
 from epv_env.reward import BAND_BAR
 
 OFFSETS = np.linspace(-2.2, 2.2, 45)

@@ -59,5 +59,5 @@ def network_of(model: PPO) -> Network:
     )
 
 
-def _array(parameter: torch.Tensor) -> np.ndarray:
+def _array(parameter: Any) -> np.ndarray:
     return parameter.detach().cpu().numpy().copy()
