@@ -1,0 +1,128 @@
+"""Training: the network is what stable-baselines3 trains, the best is kept, and a stopped run goes on."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+pytest.importorskip("stable_baselines3")
+import torch
+from stable_baselines3.common.callbacks import BaseCallback
+
+from controllers.knowledge import LEARNT, READINGS
+from controllers.policy import load_policy
+from controllers.policy_files import read_policy
+from epv_env.plant.plantfile import Plant
+from epv_env.reward import RewardWeights
+from training.commands.train import sentence_of
+from training.evaluation.metrics import EpisodeMetrics
+from training.learners import ppo
+from training.learners.actor import network_of
+from training.learners.environment import PRICES, make_training_env, training_weights
+from training.learners.ppo import Task, make_model, newest_checkpoint, read_rows, score, train
+
+pytestmark = pytest.mark.training
+TASK = Task(plant=Plant.calibrated())
+SHORT = {"num_envs": 8, "validation_episodes": 8, "validation_duration": 1.0}
+
+
+@pytest.fixture(scope="module")
+def env():
+    return make_training_env(
+        plant=Plant.calibrated(), seed=0, num_envs=4, weights=RewardWeights(), parameters="exact"
+    )
+
+
+def test_the_written_network_is_the_actor_that_is_trained(env):
+    model = make_model(env, seed=3)
+    inputs = np.random.default_rng(0).normal(size=(200, READINGS + len(LEARNT))).astype("f4")
+    with torch.no_grad():
+        expected = model.policy.get_distribution(torch.from_numpy(inputs)).distribution.logits.numpy()
+    logits = network_of(model).logits(inputs)
+    difference = np.diff(logits, axis=1) - np.diff(expected, axis=1)  # torch normalises its logits
+    assert np.max(np.abs(difference)) < 1e-5
+
+
+def test_before_training_the_policy_acts_as_the_advice(env):
+    inputs = np.random.default_rng(0).normal(size=(200, READINGS + len(LEARNT))).astype("f4")
+    inputs[:, -1] = np.sign(inputs[:, -1])
+    logits = network_of(make_model(env, seed=3)).logits(inputs)
+    assert np.array_equal(np.argmax(logits, axis=1), (inputs[:, -1] > 0).astype(int))
+
+
+def test_training_is_stricter_than_the_reward_but_never_cheaper():
+    dear = training_weights(RewardWeights(switching=10 * PRICES["switching"]))
+    assert dear.switching == 10 * PRICES["switching"]
+    usual = training_weights(RewardWeights())
+    assert all(getattr(usual, name) >= price for name, price in PRICES.items())
+    assert usual.band_bar < RewardWeights().band_bar
+
+
+def test_rewards_are_scaled_and_the_monitor_counts_them_as_they_are(env):
+    env.reset()
+    total, ended = np.zeros(4), []
+    for _ in range(400):
+        _, rewards, dones, infos = env.step(np.ones(4, int))
+        total += rewards
+        ended = [i for i in np.flatnonzero(dones) if "episode" in infos[i]]
+        if ended:
+            break
+    i = ended[0]
+    assert infos[i]["episode"]["r"] * 0.02 == pytest.approx(total[i], rel=1e-3)
+    assert infos[i]["terminal_observation"].shape == env.observation_space.shape
+
+
+def metrics(returns, stayed) -> EpisodeMetrics:
+    """Metrics of which only return and staying count."""
+    names = EpisodeMetrics.__dataclass_fields__
+    zeros = {name: np.zeros(len(returns)) for name in names}
+    given = {"episode_return": np.array(returns), "stayed": np.array(stayed)}
+    return EpisodeMetrics(**{**zeros, **given})
+
+
+def test_an_episode_that_leaves_costs_more_than_a_good_one_loses():
+    good, leaving = metrics([-150.0] * 4, [True] * 4), metrics([-120.0] * 4, [True, True, True, False])
+    assert score(good) > score(leaving)
+
+
+class Stop(BaseCallback):
+    """Ends a training as a kill would: nothing more is written."""
+
+    def _on_step(self) -> bool:
+        if self.num_timesteps >= 1500:
+            raise KeyboardInterrupt
+        return True
+
+
+def test_a_stopped_training_goes_on_from_its_checkpoint(tmp_path: Path, monkeypatch):
+    monkeypatch.setattr(ppo, "CHECKPOINT_STEPS", 512)
+    monkeypatch.setattr(ppo, "Progress", lambda total: Stop())
+    with pytest.raises(KeyboardInterrupt):
+        train(TASK, tmp_path, timesteps=2048, **SHORT)
+    stopped = newest_checkpoint(tmp_path)
+    assert stopped is not None
+    assert not (tmp_path / "policy.json").exists()
+    monkeypatch.undo()
+    rows = train(TASK, tmp_path, timesteps=2048, resume=True, **SHORT)
+    steps = [row["timesteps"] for row in rows]
+    assert steps == sorted(set(steps))
+    assert steps[-1] == 2048
+    assert read_rows(tmp_path) == rows
+    best = max(rows, key=lambda row: row["score"])
+    assert read_policy(tmp_path)[0].provenance["timesteps"] == best["timesteps"]
+    policy = load_policy(tmp_path)
+    policy.reset(2)
+    assert set(policy.act(np.zeros((2, READINGS)))) <= {0, 1}
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "words"),
+    [(1.0, 3.0, "is better than"), (-3.0, -1.0, "is worse than"), (-1.0, 1.0, "cannot be told from")],
+)
+def test_the_verdict_says_what_the_interval_allows(low, high, words):
+    scores = ["return", "share that leaves [%]", "switchings [1/s]"]
+    paired = pd.DataFrame(
+        {"controller": "PPO", "score": scores, "difference": 0.5, "low": low, "high": high}
+    )
+    assert words in sentence_of(paired, 100)
