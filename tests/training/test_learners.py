@@ -1,4 +1,4 @@
-"""Training: the network is what stable-baselines3 trains, the best is kept, and a stopped run goes on."""
+"""Training: the net is what stable-baselines3 trains, the best is kept, a stopped run goes on."""
 
 from pathlib import Path
 
