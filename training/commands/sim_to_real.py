@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from controllers.base import Controller
-from controllers.learned import holds_policy, load_policy
+from controllers.policy import load_policy
+from controllers.policy_files import holds_policy
 from controllers.tuned import tuned_controllers
-from epv_env.actions import OnOff
 from epv_env.common.commands import parse
 from epv_env.common.files import Journal, decoded, write_json, write_text
 from epv_env.common.results_folder import check_options, write_options
@@ -50,8 +50,6 @@ TRAINING_REGION = "ten_percent"
 SWITCHING_PRICE = 0.2
 """Price of a switching in the reward [1]. Below the default: at a high price, so short a training has
 not learned to control yet."""
-HYPERPARAMETERS: dict[str, Any] = {"num_envs": 128, "batch_size": 1024, "n_epochs": 4}
-"""Of PPO: many updates per environment step, so that it learns in a quarter of the steps."""
 
 WITHHELD, CAMPAIGN = "withheld/plant.json", "campaign"
 GAP, CORRECTED = "diagnosis/gap.json", "diagnosis/plant.json"
@@ -118,21 +116,17 @@ def diagnose(options: argparse.Namespace) -> dict[str, Any]:
 def trained(folder: Path, plant: Plant, options: argparse.Namespace) -> Controller:
     """PPO trained on plants around this one, or as it was trained before."""
     if not holds_policy(folder):
-        from training.learners.hyperparameters import Hyperparameters
-        from training.learners.policy_files import save_policy  # torch takes seconds to import: only now
-        from training.learners.ppo import train
+        from training.learners.ppo import Task, train  # torch takes seconds to import: only now
 
-        policy, log = train(
-            Hyperparameters(**HYPERPARAMETERS), folder=folder, plant=plant, scenario=SCENARIO,
-            parameters=TRAINING_REGION, weights=RewardWeights(switching=SWITCHING_PRICE),
-            timesteps=options.timesteps, seed=options.seed, device="cpu", resume=True,
+        task = Task(
+            plant=plant, scenario=SCENARIO, parameters=TRAINING_REGION,
+            weights=RewardWeights(switching=SWITCHING_PRICE),
         )  # fmt: skip
-        provenance = {
-            "run": log.run.run, "plant": plant.name, "timesteps": options.timesteps,
-            "seed": options.seed,
-        }  # fmt: skip
-        save_policy(policy, folder, control_period=OnOff.default_period, provenance=provenance)
-    return load_policy(folder)
+        train(
+            task, folder, seed=options.seed, timesteps=options.timesteps, resume=True,
+            provenance={"plant": plant.name},
+        )  # fmt: skip
+    return load_policy(folder, plant)
 
 
 def stage(name: str, simulated: Plant, options: argparse.Namespace) -> Deployments:

@@ -72,7 +72,7 @@ def tune(
         print(f"{kind}: the search ended at a bound again after {WIDENINGS} wider ones; it is kept")
     return Tuning(
         values=study.best_params, trials=trials, mean_return=study.best_value, episodes=episodes,
-        widened=_named(space, searched),
+        widened=_named(space, searched), plants=options["parameters"],
     )  # fmt: skip
 
 

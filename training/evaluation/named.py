@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from controllers.base import Controller
-from controllers.learned import load_policy
-from controllers.policy_contract import CONTRACT_FILE, WEIGHTS_FILE
+from controllers.policy import load_policy
+from controllers.policy_files import CONTRACT_FILE, WEIGHTS_FILE
 from controllers.registry import REGISTRY
 from controllers.tuned import build, load_tunings
 from epv_env.plant.plantfile import Plant
