@@ -1,6 +1,7 @@
 """Training: the net is what stable-baselines3 trains, the best is kept, a stopped run goes on."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -38,7 +39,8 @@ def test_the_written_network_is_the_actor_that_is_trained(env):
     model = make_model(env, seed=3)
     inputs = np.random.default_rng(0).normal(size=(200, READINGS + len(LEARNT))).astype("f4")
     with torch.no_grad():
-        expected = model.policy.get_distribution(torch.from_numpy(inputs)).distribution.logits.numpy()
+        distribution: Any = model.policy.get_distribution(torch.from_numpy(inputs)).distribution
+    expected = distribution.logits.numpy()
     logits = network_of(model).logits(inputs)
     difference = np.diff(logits, axis=1) - np.diff(expected, axis=1)  # torch normalises its logits
     assert np.max(np.abs(difference)) < 1e-5
@@ -61,7 +63,7 @@ def test_training_is_stricter_than_the_reward_but_never_cheaper():
 
 def test_rewards_are_scaled_and_the_monitor_counts_them_as_they_are(env):
     env.reset()
-    total, ended = np.zeros(4), []
+    total, ended, infos = np.zeros(4), [], []
     for _ in range(400):
         _, rewards, dones, infos = env.step(np.ones(4, int))
         total += rewards
