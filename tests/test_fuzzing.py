@@ -18,8 +18,8 @@ from hypothesis import strategies as st
 pytest.importorskip("torch")
 pytest.importorskip("statsmodels")
 
-from controllers.learned import TRAINED, load_policy
-from controllers.policy_contract import CONTRACT_FILE, WEIGHTS_FILE
+from controllers.policy import TRAINED
+from controllers.policy_files import CONTRACT_FILE, WEIGHTS_FILE, read_policy
 from epv_env.common.commands import commands, main, parser_of
 from epv_env.common.files import Journal
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
@@ -78,7 +78,7 @@ def _places(value: Any):
 
 
 def _policy(folder: Path) -> None:
-    source = next(TRAINED.rglob(CONTRACT_FILE)).parent
+    source = TRAINED
     for name in (CONTRACT_FILE, WEIGHTS_FILE):
         (folder / name).write_bytes((source / name).read_bytes())
 
@@ -120,8 +120,8 @@ FORMATS: dict[str, tuple[Callable[[Path], object], Callable[[Path], object]]] = 
         _json(MAPPING, "mapping.json"),
         lambda folder: read_mapping(folder / "mapping.json"),
     ),
-    CONTRACT_FILE: (_policy, load_policy),
-    WEIGHTS_FILE: (_policy, load_policy),
+    CONTRACT_FILE: (_policy, read_policy),
+    WEIGHTS_FILE: (_policy, read_policy),
     "recording.csv": (
         _table,
         lambda folder: read_columns("recording.csv", (folder / "recording.csv").read_bytes()),
