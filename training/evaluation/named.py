@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from controllers.base import Controller
+from controllers.knowledge import WITH_RULES
 from controllers.policy import load_policy
 from controllers.policy_files import CONTRACT_FILE, WEIGHTS_FILE
 from controllers.registry import REGISTRY
@@ -55,8 +56,8 @@ def named_controllers(
 def _named(source: str, plant: Plant) -> tuple[str, Controller, bytes]:
     """Label, controller, and the bytes that define it."""
     tunings = load_tunings()
-    if source in tunings:
-        values = tunings[source].values
+    if source.removesuffix(WITH_RULES) in tunings:
+        values = tunings[source.removesuffix(WITH_RULES)].values
         return source, build(source, values, plant), json.dumps(values, sort_keys=True).encode()
     if source in UNTUNED:
         return source, build(source, {}, plant), source.encode()
@@ -69,7 +70,7 @@ def _named(source: str, plant: Plant) -> tuple[str, Controller, bytes]:
             f"no controller {source!r}: give a folder that training wrote, MODULE:CLASS, or one of "
             f"{', '.join(tunings)}"
         )
-    policy = load_policy(path)
+    policy = load_policy(path, plant)
     content = (path / CONTRACT_FILE).read_bytes() + (path / WEIGHTS_FILE).read_bytes()
     return label or policy.name, policy, content
 
