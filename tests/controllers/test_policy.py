@@ -53,7 +53,8 @@ def test_a_state_is_decided_the_same_in_every_batch_and_the_advice_counts():
     inputs, net = np.random.default_rng(1).normal(size=(300, INPUTS)).astype("f4"), network()
     alone = np.concatenate([net.logits(row[None]) for row in inputs])
     assert np.array_equal(net.logits(inputs), alone)
-    advised = replace(net, advice_weight=np.array([-99.0, 99.0], "f4")).logits(inputs)
+    inputs[:, -1] = np.sign(inputs[:, -1])
+    advised = replace(net, advice_weight=np.array([-999.0, 999.0], "f4")).logits(inputs)
     assert np.array_equal(np.argmax(advised, axis=1), (inputs[:, -1] > 0).astype(int))
 
 

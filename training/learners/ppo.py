@@ -33,9 +33,10 @@ LEARNING_RATE, LAST_LEARNING_RATE = 1.5e-3, 2e-5
 """Adam's step size at the start and at the end; it falls linearly."""
 ENTROPY = 0.003
 """Entropy coefficient at the start; it falls linearly to zero, since the policy is used greedily."""
+BATCH = 4096
+"""Transitions of a gradient step."""
 PPO_SETTINGS: dict[str, Any] = {
     "n_steps": ROLLOUT,
-    "batch_size": 4096,
     "n_epochs": 1,  # another environment step costs less than another pass over a rollout
     "gamma": 0.998,
     "policy_kwargs": {
@@ -45,9 +46,9 @@ PPO_SETTINGS: dict[str, Any] = {
 }
 """Of stable-baselines3's PPO; the rest is its default."""
 
-FIRST_VALIDATION = 0.6
+FIRST_VALIDATION = 0.8
 """Share of the training before the first validation."""
-VALIDATIONS = 5
+VALIDATIONS = 3
 """Policies that are validated, evenly from there to the end."""
 VALIDATION_DURATION = 6.0
 """Length of a validation episode [s]."""
@@ -78,6 +79,7 @@ def make_model(env: VecEnv, *, seed: int) -> PPO:
         env,
         learning_rate=partial(linear, LEARNING_RATE, LAST_LEARNING_RATE),
         ent_coef=ENTROPY,
+        batch_size=min(BATCH, ROLLOUT * env.num_envs),
         seed=seed,
         device="cpu",
         **PPO_SETTINGS,
