@@ -38,17 +38,14 @@ def test_the_right_cause():
     found = score_trial(label(), answer("known", EDDY, CLAMP))
     assert all((found.named_right, found.truth_in_set, found.component_right, is_well_judged(found)))
     assert (found.set_size, found.probability, found.tied) == (1, 0.9, False)
+    second = score_trial(label(effects=["flyback_voltage"]), answer("ambiguous", EDDY, CLAMP, named=2))
+    assert (second.named_right, second.truth_in_set, second.set_size) == (False, True, 2)
 
 
 def test_the_wrong_cause():
     found = score_trial(label(effects=["seat_leak"]), answer("known", EDDY))
     assert not any((found.named_right, found.truth_in_set, found.component_right, is_well_judged(found)))
     assert (found.probability, found.false_held) == (0, ("eddy_current",))
-
-
-def test_a_truth_that_is_second_in_the_set():
-    found = score_trial(label(effects=["flyback_voltage"]), answer("ambiguous", EDDY, CLAMP, named=2))
-    assert (found.named_right, found.truth_in_set, found.set_size) == (False, True, 2)
 
 
 def test_the_order_of_a_pair_does_not_matter_and_a_hidden_effect_need_not_be_named():
