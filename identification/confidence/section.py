@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from epv_env.plant.parameters import table
 from identification.confidence.confidence import Confidence
-from identification.report.page import Picture, Section, Table, Text, Verdict
+from identification.report.page import Picture, Section, Table, Verdict
 
 PRECISE = 0.05
 """Half width of an interval, relative to the estimate, below which the estimate is precise."""
@@ -30,7 +30,6 @@ def confidence_section(confidence: Confidence, *, report_2003: bool = False) -> 
             _intervals(confidence, report_2003),
             _deviations(confidence),
             _correlations(confidence),
-            Text(text=_gradient(confidence)),
             Picture(
                 figure=profiles(confidence, report_2003=report_2003),
                 caption="Model error over one parameter at a time.",
@@ -101,16 +100,6 @@ def _decrease(confidence: Confidence) -> float:
     minimum = confidence.minimum
     steepest = float(minimum.gradient @ minimum.gradient)
     return 0.5 * steepest / (float(np.min(np.abs(minimum.eigenvalues))) * confidence.report.error)
-
-
-def _gradient(confidence: Confidence) -> str:
-    gradient = ", ".join(f"{value:.2g}" for value in confidence.minimum.gradient)
-    eigenvalues = ", ".join(f"{value:.3g}" for value in confidence.minimum.eigenvalues)
-    return (
-        f"Gradient of the total error by the parameters relative to the start: {gradient}; it could "
-        f"lower the error by at most {100 * _decrease(confidence):.2g} % of itself. Eigenvalues of the "
-        f"Hessian: {eigenvalues}."
-    )
 
 
 def _intervals(confidence: Confidence, report_2003: bool) -> Table:

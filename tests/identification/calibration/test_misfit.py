@@ -87,11 +87,6 @@ def test_a_drift_of_them_is_seen(channel, size):
     assert moved(**{channel: lambda time, values: values + size * time}) > 0.3
 
 
-def test_a_p2_that_reads_high_is_hardly_seen():
-    """The start follows it, and the flow through the valve does so but for its pressure ratio."""
-    assert moved(p2=lambda time, values: values + 1e3) < 0.2
-
-
 def test_a_wrong_start_of_p2_is_hardly_seen():
     """200 Pa in the first 40 ms go into the start, out of which the nuisance takes them again."""
     before = np.concatenate(problem().least_squares().residuals(true_vector()))
@@ -110,10 +105,3 @@ def test_derivatives_are_central_differences(away):
         ends = [np.concatenate(misfit.residuals(z + way * axis)) for way in (-1, 1)]
         difference = (ends[1] - ends[0]) / 2e-5
         assert np.linalg.norm(column - difference) < 0.02 * np.linalg.norm(difference)
-
-
-def test_the_least_error_lies_at_the_truth():
-    misfit, z = problem().total_error(), true_vector()
-    at = misfit.error(z)
-    for axis in np.eye(4):
-        assert misfit.error(z + 0.005 * axis) > at < misfit.error(z - 0.005 * axis)

@@ -66,11 +66,6 @@ def test_domains_that_hold_zero_are_spread_over_evenly():
     )
 
 
-def test_one_seed_gives_one_set_of_starts():
-    np.testing.assert_array_equal(starting_points(FOUR, 6, 3), starting_points(FOUR, 6, 3))
-    assert np.all(starting_points(FOUR, 6, 3)[1:] != starting_points(FOUR, 6, 4)[1:])
-
-
 def test_a_start_in_another_basin_is_reported(tmp_path, monkeypatch):
     monkeypatch.setattr(starts, "MOST_EVALUATIONS", 200)
     points = np.array([np.ones(4), BAD_BASIN])
@@ -103,17 +98,6 @@ def test_finished_searches_are_not_done_again(tmp_path, calls):
     for method in METHODS:
         pairs = zip(first.fits[method], again.fits[method], strict=True)
         assert all(one.as_json() == other.as_json() for one, other in pairs)
-
-
-def test_an_interrupted_run_goes_on_where_it_was(tmp_path, calls):
-    path = tmp_path / "journal"
-    calibrate(problem(), journal=path, subject={}, starts=3)
-    lines = path.read_text().splitlines(keepends=True)
-    path.write_text("".join(lines[:4]) + lines[4][:20])
-    calls.clear()
-    calibrate(problem(), journal=path, subject={}, starts=3)
-    assert [method for method, _ in calls] == ["least squares", "Nelder-Mead", "least squares"]
-    assert path.read_text().splitlines() == [line.rstrip("\n") for line in lines]
 
 
 @pytest.mark.parametrize("change", [{"subject": {"of": "b"}}, {"seed": 1}, {"starts": 4}])

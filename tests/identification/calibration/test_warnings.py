@@ -38,14 +38,6 @@ def test_a_good_calibration_has_none_and_its_section_no_doubt():
     assert [v.text for v in doubted.verdicts if v.status == "doubt"] == ["the one"]
 
 
-def test_an_estimate_on_the_end_of_a_domain_is_named(warnings):
-    """With too small a chamber the flow into it must be smaller than alphaMV may become."""
-    sentences = warnings(calibration_problem(twin(), start=START.replace(V3=2e-6)))
-    assert any("least squares ends at the end of alphaMV's domain" in warning for warning in sentences)
-    assert any("Nelder-Mead ends at the end of alphaMV's domain" in warning for warning in sentences)
-    assert not any("end of R's domain" in warning for warning in sentences)
-
-
 @pytest.mark.parametrize(("symbol", "end"), [("alphaMV", 0), ("R", 1)])
 def test_either_end_of_any_domain_counts(symbol, end):
     vector = problem().vector
@@ -65,11 +57,6 @@ def test_a_search_that_is_cut_short_is_not_trusted(warnings, monkeypatch):
     sentences = warnings(problem())
     assert any("Nelder-Mead has not converged after" in warning for warning in sentences)
     assert not any("least squares has not converged" in warning for warning in sentences)
-
-
-def test_parameters_that_act_by_their_ratio_cannot_be_separated(warnings):
-    sentences = warnings(calibration_problem(twin(), free=freed("alphaMV", "V3")))
-    assert any("the recordings cannot separate alphaMV, V3" in warning for warning in sentences)
 
 
 def test_only_those_are_named_that_cannot_be_separated():

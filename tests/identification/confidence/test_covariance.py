@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from identification.calibration.search import weighted_least_squares
 from identification.confidence import covariance as stage
-from identification.confidence.covariance import bootstrap_moves, correlation_lags, estimate_covariance
+from identification.confidence.covariance import bootstrap_moves, estimate_covariance
 from tests.identification.confidence.results import twin_confidence
 from tests.identification.twins import TRUE, problem
 
@@ -74,18 +74,6 @@ def test_so_does_the_bootstrap_moves(covariance_of, phi):
     moved = bootstrap_moves(*misfit.linearised(None), block=2 * lags, seed=1)
     assert np.all(np.abs(np.mean(moved, axis=0)) < 0.1 * np.std(moved, axis=0))
     np.testing.assert_allclose(np.var(moved, axis=0) / np.diag(known(misfit, phi)), 1.0, atol=0.25)
-
-
-def test_blocks_of_two_samples_would_promise_too_much():
-    misfit = coloured(0.8)
-    moved = bootstrap_moves(*misfit.linearised(None), block=2, seed=1)
-    assert np.all(np.var(moved, axis=0) < 0.3 * np.diag(known(misfit, 0.8)))
-
-
-def test_more_correlated_residuals_are_summed_over_more_lags():
-    lags = [correlation_lags(coloured(phi).residuals[0]) for phi in (0.0, 0.8, 0.95)]
-    assert lags[0] < lags[1] < lags[2]
-    assert lags[0] >= int(4 * (SAMPLES / 100) ** (2 / 9))
 
 
 def test_on_the_bench_all_three_agree():

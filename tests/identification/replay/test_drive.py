@@ -10,7 +10,6 @@ from identification.replay.model_inputs import (
     model_inputs,
     smooth_supply,
     smooth_voltage,
-    without_offsets,
 )
 from tests.identification.twins import TRUE, exact_recording, truth
 
@@ -103,14 +102,6 @@ def test_the_start_is_the_mean_of_the_hold():
     assert inputs.p2_start == pytest.approx(truth("test1").channels["p2"][0], abs=4 * 980 / np.sqrt(80))
     assert inputs.U_start == pytest.approx(18.9, abs=0.006)
     assert inputs.p1_start == inputs.p1[0]
-
-
-def test_offsets_are_subtracted_from_their_channels_alone():
-    recording = exact_recording("test1")
-    corrected = without_offsets(recording, {"p2": 700.0, "U": -0.01})
-    np.testing.assert_allclose(recording.p2 - corrected.p2, 700.0)
-    np.testing.assert_allclose(recording.U - corrected.U, -0.01)
-    assert corrected.p1 is recording.p1
 
 
 @pytest.mark.parametrize("name", ["test2"])

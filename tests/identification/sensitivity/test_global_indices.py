@@ -35,17 +35,6 @@ def test_elementary_effects_of_a_linear_function_are_its_slopes_times_the_ranges
     assert effects.spread == pytest.approx([0.0, 0.0], abs=1e-9)
 
 
-@pytest.mark.parametrize("seed", [0])
-def test_a_seed_repeats_the_study(seed):
-    first, again, other = (
-        sobol_indices(ishigami, ISHIGAMI, ISHIGAMI_BOUNDS, samples=64, seed=each)
-        for each in (seed, seed, seed + 1)
-    )
-    assert np.array_equal(first.total, again.total)
-    assert np.array_equal(first.total_half_width, again.total_half_width)
-    assert not np.array_equal(first.total, other.total)
-
-
 def test_screening_of_the_valve_finds_what_matters():
     """In a short form: piston and exhaust weigh a hundred times as much as the armature's mass."""
     p, symbols = Parameters.nominal(), ["d1", "dMVexh", "mMV", "mPV"]

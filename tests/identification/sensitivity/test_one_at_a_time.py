@@ -2,18 +2,14 @@
 
 from functools import cache
 
-import numpy as np
 import pytest
 
 from epv_env.plant.parameters import Parameters, table
 from identification.report_2003 import printed_sensitivities
 from identification.sensitivity.one_at_a_time import (
-    ErrorSensitivity,
     changed_values,
     sensitivities,
     studied_symbols,
-    total_errors,
-    variants,
 )
 
 PNEUMATIC = (
@@ -29,11 +25,12 @@ def exact():
     return sensitivities(Parameters.nominal(), studied_symbols())
 
 
-@pytest.mark.parametrize("symbol", PNEUMATIC)
-def test_exact_sensitivity_is_the_report_s(symbol):
-    percents = exact()[symbol].percentages
-    for value, reported in zip(percents, printed_sensitivities()[symbol], strict=True):
-        assert value == pytest.approx(reported, rel=0.1, abs=0.1 if reported > 1 else 0.01)
+def test_exact_sensitivity_is_the_report_s():
+    for symbol in PNEUMATIC:
+        percents = exact()[symbol].percentages
+        for value, reported in zip(percents, printed_sensitivities()[symbol], strict=True):
+            limit = 0.1 if reported > 1 else 0.01
+            assert value == pytest.approx(reported, rel=0.1, abs=limit), symbol
 
 
 def test_exactly_located_stops_class_all_parameters_but_one_as_the_report():
@@ -47,25 +44,9 @@ def test_stroke_of_the_armature_weighs_little_because_bores_limit_the_flow():
     assert exact()["xMVmax"].minus < 0.3 * exact()["dMVin"].minus
 
 
-def test_an_unchanged_valve_has_no_error():
-    p = {symbol: np.full(3, value) for symbol, value in Parameters.nominal().items()}
-    assert total_errors(p).tolist() == [0.0, 0.0]
-
-
-def test_variants_change_one_value_each():
-    p = variants({"R": 40.0, "N": 1000.0}, ["N"])
-    assert p["R"].tolist() == [40.0, 40.0, 40.0]
-    assert p["N"].tolist() == pytest.approx([1000.0, 900.0, 1100.0])
-
-
 def test_a_parameter_that_is_zero_goes_to_the_ends_of_its_domain():
     assert changed_values("a1", 0.0) == (-0.1, 0.1)
     assert changed_values("a2", 2e-4) == pytest.approx((1.8e-4, 2.2e-4))
-
-
-def test_two_percent_in_either_direction_is_sensitive():
-    assert ErrorSensitivity(minus=0.0, plus=0.02).sensitive
-    assert not ErrorSensitivity(minus=0.0199, plus=0.0199).sensitive
 
 
 def test_other_conditions_give_other_figures():
