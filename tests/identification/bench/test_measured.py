@@ -1,12 +1,10 @@
 """The bench's sensors: Tables 1 to 3 are recovered from its records, and seeds mean what they say."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from epv_env.plant.channels import SENSORS
-from identification.bench.programmes import DIAGNOSIS_SUITE, SUITES
+from identification.bench.programmes import DIAGNOSIS_SUITE
 from identification.bench.session import (
     measured_campaign,
     measured_recording,
@@ -42,12 +40,6 @@ def test_offset_and_trend_of_table_2_are_in_the_rest_record(channel):
     assert slope == pytest.approx(SENSORS[channel].trend, abs=4 * np.sqrt(12) * error / 5.0)
 
 
-@pytest.mark.parametrize("channel", ["p2", "p3", "U"])
-def test_the_offsets_are_far_enough_from_zero_to_be_noticed(channel):
-    offset, _, _, samples = line(channel)
-    assert abs(offset) > 4 * 2 * deviation(channel) / np.sqrt(samples)
-
-
 @pytest.mark.parametrize("channel", CHANNELS)
 def test_the_noise_is_table_3_s(channel):
     assert line(channel)[2] == pytest.approx(deviation(channel), rel=0.03)
@@ -76,15 +68,8 @@ def test_a_recording_s_noise_does_not_depend_on_how_many_others_there_are():
         np.testing.assert_array_equal(alone.p2, among.p2)
 
 
-def test_recordings_of_a_campaign_have_noise_of_their_own():
-    """The same truth twice."""
-    one, other = measured_campaign([truth("rest")] * 2, TRUE, seed=1).recordings
-    assert abs(np.corrcoef(one.p3, other.p3)[0, 1]) < 0.04
-
-
-@pytest.mark.parametrize("suite", SUITES)
-def test_a_written_campaign_keeps_every_rule_and_comes_back(tmp_path, suite):
-    names = [programme.name for programme in SUITES[suite]]
+def test_a_written_campaign_keeps_every_rule_and_comes_back(tmp_path):
+    names = [programme.name for programme in DIAGNOSIS_SUITE]
     campaign = measured_campaign([truth(name) for name in names], TRUE, seed=3)
     write_campaign(campaign, tmp_path)
     reads = read_campaign(tmp_path)
@@ -95,20 +80,3 @@ def test_a_written_campaign_keeps_every_rule_and_comes_back(tmp_path, suite):
     for read, written in zip(reads.recordings, campaign.recordings, strict=True):
         np.testing.assert_allclose(read.p2, written.p2, atol=0.51)
         np.testing.assert_allclose(read.I, written.I, atol=0.51e-6)
-
-
-def test_the_bench_measures_at_the_truth_s_ambient():
-    campaign = measured_campaign([], TRUE.replace(T_env=280.0, p_env=0.95e5), seed=0)
-    assert (campaign.temperature, campaign.pressure) == (280.0, 0.95e5)
-
-
-def test_roles_are_the_programmes():
-    recordings = measured_campaign([truth(p.name) for p in DIAGNOSIS_SUITE], TRUE, seed=0).recordings
-    assert [r.role for r in recordings] == [p.role for p in DIAGNOSIS_SUITE]
-
-
-def test_a_recording_of_another_truth_differs_by_more_than_noise():
-    true = truth("test1")
-    hotter = replace(true, channels={**true.channels, "I": 0.98 * true.channels["I"]})
-    one, other = (measured_recording(t, np.random.default_rng(0)) for t in (true, hotter))
-    assert np.sqrt(np.mean((one.I - other.I) ** 2)) > 5 * SENSORS["I"].noise

@@ -44,14 +44,6 @@ def test_what_is_written_is_read_back(tmp_path):
     assert load_programmes(tmp_path / "suite.json") == suite
 
 
-def test_units_at_the_door_are_bar_and_ms(tmp_path):
-    (programme,) = load_programmes(written(tmp_path / "next.json", entry()))
-    assert programme == Programme(
-        name="next", role="calibration", p1=9e5, p2=5e5, U_on=24.0,
-        case=Case(name="next", openings=(0.4,), duration=1.2, first=0.05, pause=0.209),
-    )  # fmt: skip
-
-
 def test_the_bench_runs_a_file(tmp_path):
     save_programmes([SHORT], tmp_path / "next.json")
     out = tmp_path / "campaign"
@@ -61,13 +53,6 @@ def test_the_bench_runs_a_file(tmp_path):
     assert np.mean(recording.p1[:100]) == pytest.approx(9.3e5, abs=2e3)
     assert np.mean(recording.p2[:100]) == pytest.approx(5.1e5, abs=2e3)
     assert np.sum(~recording.energised) == 40 + 70
-
-
-def test_a_file_and_a_suite_are_not_both_run(tmp_path, capsys):
-    arguments = ["--suite", "diagnosis", "--programme", "next.json", "--out", str(tmp_path / "out")]
-    with pytest.raises(SystemExit):
-        main(["bench", *arguments])
-    assert "not allowed with" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -108,11 +93,6 @@ def test_a_file_that_is_none_is_refused(text, message, tmp_path):
     (tmp_path / "next.json").write_text(text)
     with pytest.raises(ProgrammeError, match=message):
         load_programmes(tmp_path / "next.json")
-
-
-def test_a_missing_file_is_refused():
-    with pytest.raises(ProgrammeError, match="cannot read /no/next"):
-        load_programmes("/no/next.json")
 
 
 def test_nothing_is_written_that_could_not_be_read_back(tmp_path):

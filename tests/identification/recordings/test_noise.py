@@ -54,11 +54,6 @@ def test_a_hold_of_40_ms_is_enough_and_less_is_refused():
         noise_of_energised_start(recording(0, 79))
 
 
-def test_a_recording_without_a_switch_is_a_hold_throughout():
-    steady = recording(0, 200)
-    assert energised_start_length(replace(steady, U=np.full(400, 24.0))) == 400
-
-
 def test_noise_finer_than_a_step_counts_as_a_rounding_error():
     noise = noise_of_energised_start(recording(0, 200, noisy=0.0))
     assert noise["U"] == pytest.approx(SENSORS["U"].resolution / np.sqrt(12))
