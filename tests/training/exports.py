@@ -1,21 +1,37 @@
-"""What the tests of the export share: exports of policies that need no training, and what they hold."""
+"""What the tests of the export share: a policy of random weights, exports, and what they hold."""
 
 import re
 import shutil
 import subprocess
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from controllers.hysteresis import Hysteresis
+from controllers.policy_files import Network, write_policy
 from epv_env.common.commands import main_of
-from epv_env.observation import LAYOUT
-from tests.training.policies import Layers, write_policy
 from training.deploy.agreement import STATES_EPISODES as EPISODES
 from training.deploy.agreement import STATES_PERIODS as PERIODS
+from training.deploy.c_code import INPUTS
 
 GOOD = Hysteresis(open_below=-0.1, shut_above=0.0, shut_lookahead=0.03, name="good")
 QUICK = ("--episodes", "4", "--duration", "1")
+
+
+def random_policy(folder: Path, *, seed: int = 0, widths: tuple[int, ...] = (24, 40, 8)) -> Path:
+    """A policy whose weights mean nothing, written as training writes it; returns the folder."""
+    rng = np.random.default_rng(seed)
+    layers = [
+        (
+            rng.normal(scale=1.5 / np.sqrt(before), size=(after, before)).astype(np.float32),
+            rng.normal(scale=0.3, size=after).astype(np.float32),
+        )
+        for before, after in pairwise([INPUTS, *widths, 2])
+    ]
+    network = Network(layers=layers, advice_weight=rng.normal(size=2).astype(np.float32))
+    write_policy(network, folder, control_period=5e-3, provenance={"seed": seed})
+    return folder
 
 
 def command(*words: object) -> int:
@@ -27,23 +43,16 @@ def export(policy: Path, out: Path, *more: str) -> int:
     return command(policy, "--out", out, *QUICK, *more)
 
 
-def export_of(layers: Layers, folder: Path) -> tuple[Path, Path]:
-    """Folders of a policy and of its export."""
-    policy = write_policy(layers, folder / "policy")
-    assert export(policy, folder / "ecu") == 0
-    return policy, folder / "ecu"
-
-
 def column(folder: Path, name: str) -> np.ndarray:
     """One of states.csv, (episodes, periods)."""
     table = np.genfromtxt(folder / "states.csv", delimiter=",", names=True)
     return table[name].reshape(EPISODES, PERIODS)
 
 
-def observations(folder: Path) -> np.ndarray:
-    """Observations (episodes, periods, entries) of states.csv, as float32."""
-    table = np.genfromtxt(folder / "states.csv", delimiter=",", skip_header=1)[:, 7:20]
-    return table.astype(np.float32).reshape(EPISODES, PERIODS, len(LAYOUT))
+def inputs(folder: Path) -> np.ndarray:
+    """Inputs (states, entries) of the network in states.csv, as float32."""
+    table = np.genfromtxt(folder / "states.csv", delimiter=",", skip_header=1)
+    return table[:, 7 : 7 + INPUTS].astype(np.float32)
 
 
 def parity(folder: Path, *options: str) -> subprocess.CompletedProcess:

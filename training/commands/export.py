@@ -17,17 +17,16 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from controllers.learned import LearnedPolicy, load_policy
-from controllers.policy_contract import WEIGHTS_FILE, read_contract
+from controllers.policy import load_policy
+from controllers.policy_files import WEIGHTS_FILE, read_contract
 from epv_env.common.command_line import writable_folder
 from epv_env.common.files import write_bytes
-from epv_env.plant.plantfile import load_plant
+from epv_env.plant.plantfile import Plant, load_plant
 from training.commands.options import count, seconds
 from training.deploy import agreement as verdict
 from training.deploy import compiled
-from training.deploy.c_code import Export, ExportError, checks, deployment_contract, sources
+from training.deploy.c_code import CODE, Export, checks, deployment_contract, sources
+from training.deploy.controller_c import ExportError
 from training.deploy.fmu.archive import fmu
 from training.deploy.fmu.models import plant_model, policy_model
 from training.deploy.onnx_model import onnx_model
@@ -35,8 +34,8 @@ from training.deploy.onnx_model import onnx_model
 PLANT = "plant"
 """What is exported in place of a policy's folder."""
 FILES = {
-    "policy.onnx", "epv_policy.h", "epv_policy.c", "contract.json", "states.csv", "states.h",
-    "parity.c", "bench.c", "report.json", "epv_policy.fmu",
+    *CODE, "policy.onnx", "contract.json", "states.csv", "states.h", "parity.c", "bench.c",
+    "report.json", "epv_policy.fmu",
 }  # fmt: skip
 """What the export of a policy consists of."""
 BUILT = {"parity", "bench"}
@@ -50,7 +49,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--out", dest="folder", type=writable_folder, required=True, help="folder to write"
     )
     parser.add_argument("--fmu", action="store_true", help="an FMU of the policy, too")
-    parser.add_argument("--plant", type=Path, help=f"plant file of `{PLANT}` (default: the report's)")
+    parser.add_argument(
+        "--plant",
+        type=Path,
+        help="plant file: exported, or nominal for a policy (default: the report's)",
+    )
     parser.add_argument(
         "--compiler", default=os.environ.get("CC", "cc"),
         help="C compiler; '' for a plant's sources alone (default: cc)",
@@ -74,33 +77,24 @@ def run(options: argparse.Namespace) -> None:
         return
     check_free(options.folder)
     compiler = compiled.find_compiler(options.compiler)
-    export = prepared(Path(options.what))
+    export = prepared(Path(options.what), load_plant(options.plant))
     files, report = verified(export, compiler, options.episodes, options.duration)
     contract = deployment_contract(export)
     files["contract.json"] = json.dumps(contract, indent=1) + "\n"
     files["report.json"] = json.dumps(report, indent=1) + "\n"
     content = {name: text.encode() for name, text in files.items()}
-    content["policy.onnx"] = onnx_model(export.policy, period=export.period).SerializeToString()
+    content["policy.onnx"] = onnx_model(export.policy.network, period=export.period).SerializeToString()
     if options.fmu:
         content["epv_policy.fmu"] = fmu(policy_model(export.period, files), options.compiler)
     write_folder(options.folder, content)
     print(f"{verdict.as_text(report, contract)}\nwritten to {options.folder}")
 
 
-def prepared(folder: Path) -> Export:
-    """The policy in a folder that training wrote. Raises ExportError for another kind of policy."""
-    policy: LearnedPolicy = load_policy(folder)
-    outputs = len(policy.layers[-1][1])
-    if policy.environment != "EPValve-v0" or outputs != 2 or policy.cells:
-        raise ExportError(
-            f"the policy in {folder} is no perceptron that decides between off and on: only "
-            "such ones can be exported"
-        )
-    if not all(np.all(np.isfinite(array)) for layer in policy.layers for array in layer):
-        raise ExportError(f"the policy in {folder} has weights that are not finite: train it anew")
+def prepared(folder: Path, plant: Plant) -> Export:
+    """The controller in a folder that training wrote. plant: nominal, from which the learner starts."""
     content = read_contract(folder)
     return Export(
-        policy=policy,
+        controller=load_policy(folder, plant),
         period=content.observation.control_period_s,
         weights_sha256=hashlib.sha256((folder / WEIGHTS_FILE).read_bytes()).hexdigest(),
         provenance=content.provenance,
@@ -113,24 +107,24 @@ def verified(
     """The C files by name and the report, once compiled code has passed. Raises ExportError.
 
     Args:
-        export: the policy.
+        export: the controller.
         compiler: the words of its command.
         episodes: under the compiled code.
         duration: length of one of them [s].
     """
-    policy = export.policy
-    states = verdict.visit(policy)
+    states = verdict.visit(export.controller)
+    inputs = verdict.inputs_along(export, states)
     files = sources(export)
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         _write(folder, files)
         code = compiled.library(compiler, folder)
-        agreement = verdict.agreement(policy, code, states)
+        agreement = verdict.agreement(export, code, states, inputs)
         tests = checks(states.actions.size, agreement["rounding_of_c"])
-        tests["states.csv"] = verdict.states_table(states, verdict.margins(policy, states))
+        tests["states.csv"] = verdict.states_table(states, inputs, verdict.margins(export, inputs))
         _write(folder, tests)
         compiled.run_parity(compiler, folder)
-        loop = verdict.closed_loop(policy, code, episodes=episodes, duration=duration)
+        loop = verdict.closed_loop(export.controller, code, episodes=episodes, duration=duration)
         report = {
             "agreement": agreement,
             "closed_loop": {"episodes": episodes, "duration_s": duration, "controllers": loop},

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.observation import decode
-from training.deploy.c_code import MEMORY, ExportError
+from training.deploy.c_code import MEMORY
+from training.deploy.controller_c import ExportError
 
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
 """What the exported code is compiled with here."""
@@ -56,7 +57,7 @@ def build(compiler: list[str], folder: Path, *options: str, output: str) -> Path
 
 def library(compiler: list[str], folder: Path) -> ctypes.CDLL:
     """The policy as a library, loaded."""
-    built = build(compiler, folder, "-shared", "-fPIC", "epv_policy.c", output="policy.so")
+    built = build(compiler, folder, "-shared", "-fPIC", "epv_policy.c", "-lm", output="policy.so")
     code = ctypes.CDLL(str(built))
     code.epv_policy_step.argtypes = (ctypes.c_void_p, ctypes.c_void_p)
     code.epv_policy_logits.argtypes = (ctypes.c_void_p, ctypes.c_void_p)
@@ -92,31 +93,31 @@ class CompiledPolicy:
 
     def reset(self, n: int) -> None:
         """n valves, nothing remembered."""
-        self._memory = np.zeros(n, dtype=MEMORY)
+        self.memory = np.zeros(n, dtype=MEMORY)
 
     def act(self, observations: NDArray) -> NDArray:
         """Actions (n,) for the readings behind observations (n, entries)."""
         readings = np.zeros(len(observations), dtype=READINGS_TYPE)
         for name, values in readings_of(observations).items():
             readings[name] = values
-        memory, reading = self._memory.ctypes.data, readings.ctypes.data
+        memory, reading = self.memory.ctypes.data, readings.ctypes.data
         memory_size, size = MEMORY.itemsize, READINGS_TYPE.itemsize
         step, n = self.code.epv_policy_step, len(readings)
         return np.array([step(memory + i * memory_size, reading + i * size) for i in range(n)])
 
 
-def logits_of(code: ctypes.CDLL, observations: NDArray) -> NDArray:
-    """Logits (n, 2) of the compiled code for observations (n, entries)."""
-    inputs = np.ascontiguousarray(observations, dtype=np.float32)
-    logits = np.empty((len(inputs), 2), dtype=np.float32)
-    for row, result in zip(inputs, logits, strict=True):
+def logits_of(code: ctypes.CDLL, inputs: NDArray) -> NDArray:
+    """Logits (n, 2) of the compiled network for inputs (n, all)."""
+    rows = np.ascontiguousarray(inputs, dtype=np.float32)
+    logits = np.empty((len(rows), 2), dtype=np.float32)
+    for row, result in zip(rows, logits, strict=True):
         code.epv_policy_logits(row.ctypes.data, result.ctypes.data)
     return logits
 
 
 def run_parity(compiler: list[str], folder: Path) -> str:
     """Compile and run parity.c in the folder; what it printed. Raises ExportError if it fails."""
-    program = build(compiler, folder, "parity.c", "epv_policy.c", output="parity")
+    program = build(compiler, folder, "parity.c", "epv_policy.c", "-lm", output="parity")
     done = subprocess.run([program], cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode:
         raise ExportError(f"the parity test failed: {' '.join((done.stdout + done.stderr).split())}")
@@ -125,7 +126,7 @@ def run_parity(compiler: list[str], folder: Path) -> str:
 
 def run_bench(compiler: list[str], folder: Path) -> dict[str, float]:
     """Compile and run bench.c in the folder: microseconds for a decision."""
-    program = build(compiler, folder, "bench.c", "epv_policy.c", output="bench")
+    program = build(compiler, folder, "bench.c", "epv_policy.c", "-lm", output="bench")
     done = subprocess.run([program], cwd=folder, capture_output=True, text=True, check=True)
     row = next(csv.DictReader(done.stdout.splitlines()))
     return {name: float(value) for name, value in row.items()}

@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("onnx")
 pytest.importorskip("safetensors")
 
-from controllers.learned import TRAINED
+from controllers.policy import TRAINED
 from epv_env.plant.plantfile import Plant
 from tests.training.exports import PERIODS, column, export
 from tests.training.fmu.unit import OK, Instance, Unit
@@ -29,7 +29,7 @@ HALF_A_BAR = 5e4
 def ecu(tmp_path_factory) -> Path:
     """The export of a policy that comes with the package."""
     folder = tmp_path_factory.mktemp("policy") / "ecu"
-    assert export(TRAINED / "plain" / "seed-0", folder, "--fmu") == 0
+    assert export(TRAINED, folder, "--fmu") == 0
     return folder
 
 
@@ -60,7 +60,7 @@ def decisions(unit: Unit, inputs: list[dict[str, float]]) -> list[float]:
 
 
 def test_it_decides_as_the_policy_on_visited_states(ecu, unit):
-    actions = column(ecu, "policy_action")
+    actions = column(ecu, "action")
     for episode in range(3):
         assert decisions(unit, readings(ecu, episode)) == list(actions[episode])
 

@@ -29,7 +29,7 @@ from epv_env.plant.stepping import (
     release,
     turning_point,
 )
-from training.deploy.c_code import TITLE, filled
+from training.deploy.c_code import CODE, TITLE, filled
 from training.deploy.fmu.archive import TEMPLATES, Model, Variable
 from training.deploy.fmu.c_expressions import NUMBER, TRUTH, Symbol, written
 from training.deploy.fmu.c_functions import HELPERS, Translation, field_texts
@@ -221,7 +221,7 @@ def _any(prefix: str, names: list[str]) -> str:
 
 def policy_model(period: float, files: Mapping[str, str]) -> Model:
     """The model of an exported policy. period: of its control [s]. files: of the export, by name."""
-    sources = {name: files[name] for name in ("epv_policy.h", "epv_policy.c")}
+    sources = {name: files[name] for name in CODE}
     sources["model.h"] = filled(TEMPLATES / "policy.h", {"period_us": round(1e6 * period)})
     return Model(
         name="Policy for an electro-pneumatic protection valve",

@@ -1,6 +1,6 @@
 /* How long does a decision take, from the readings to the action? In the folder of the export:
  *
- *     cc -std=c99 -O2 bench.c epv_policy.c -o bench && ./bench
+ *     cc -std=c99 -O2 bench.c epv_policy.c -lm -o bench && ./bench
  *
  * Each state is decided REPEATS times. `slowest_state` is the longest over the states of each state's
  * shortest time: what the code needs. `slowest_call` is the longest of all: it holds what interrupts and

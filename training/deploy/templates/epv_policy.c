@@ -5,16 +5,19 @@
  *
  * All numbers are float, in the units of the readings and of the observation.
  */
+#include <math.h>
+
 #include "epv_policy.h"
+#include "epv_learner.h"
 
 enum { LAYERS = $layers, WIDEST = $widest, LONGEST_WAIT = $longest_wait };
 
 static const float PERIOD = $period;
 static const float LONGEST = $longest;
 
-static const float CENTRE[EPV_POLICY_INPUTS] = {$centre};
-static const float SCALE[EPV_POLICY_INPUTS] = {$scale};
-static const float LIMIT[EPV_POLICY_INPUTS] = {$limit};
+static const float CENTRE[EPV_POLICY_READINGS] = {$centre};
+static const float SCALE[EPV_POLICY_READINGS] = {$scale};
+static const float LIMIT[EPV_POLICY_READINGS] = {$limit};
 
 typedef struct {
     const float *weight; /* row after row */
@@ -22,6 +25,8 @@ typedef struct {
     int inputs;
     int outputs;
 } layer;
+
+static const float ADVICE[2] = {$advice};
 
 $arrays
 static float limited(float value, float limit)
@@ -91,9 +96,9 @@ static float change(const float *ring, int newest, int lag)
 }
 
 void epv_policy_observe(epv_policy_memory *m, const epv_policy_readings *now,
-                       float observation[EPV_POLICY_INPUTS])
+                        float inputs[EPV_POLICY_INPUTS])
 {
-    float value[EPV_POLICY_INPUTS];
+    float value[EPV_POLICY_READINGS];
     float since;
     int i;
     remember(m, now);
@@ -101,14 +106,56 @@ void epv_policy_observe(epv_policy_memory *m, const epv_policy_readings *now,
     if (since > LONGEST)
         since = LONGEST;
 $values
-    for (i = 0; i < EPV_POLICY_INPUTS; i++)
-        observation[i] = entry(value[i], i);
+    for (i = 0; i < EPV_POLICY_READINGS; i++)
+        inputs[i] = entry(value[i], i);
 }
 
-void epv_policy_logits(const float observation[EPV_POLICY_INPUTS], float logits[2])
+/* An entry of the observation in its unit. */
+static float seen(const float *inputs, int i)
+{
+    return inputs[i] * SCALE[i] + CENTRE[i];
+}
+
+/* Whether p3 stands still where the coil should move it (controllers/p3_check.py). */
+static int implausible(const epv_policy_memory *m, const float *inputs)
+{
+    const float p3 = seen(inputs, $p3), moved = seen(inputs, $p3_change);
+    const float remains = m->coil ? seen(inputs, $p1) - p3 : p3 - $ambient;
+    const float known = lesser(seen(inputs, $since), (float)m->periods * PERIOD);
+    return known > $wait && fabsf(moved) < $still && remains > $margin;
+}
+
+/* Two points with extrapolation (controllers/hysteresis.py), which does not read p3. */
+static void hysteresis(epv_policy_memory *m, const float *inputs)
+{
+    const float error = seen(inputs, $p2_error), slope = seen(inputs, $p2_change) / $slope_time;
+    if (m->fallback)
+        m->fallback = !(error + $open_lookahead * slope < $open_below);
+    else
+        m->fallback = error + $shut_lookahead * slope > $shut_above;
+}
+
+int epv_policy_learn(epv_policy_memory *m, float inputs[EPV_POLICY_INPUTS])
+{
+    if (m->periods == 0) {
+        fn_begin(&m->valve);
+        m->fallback = 1;
+    }
+    if (m->periods < 65535)
+        m->periods++;
+    if (implausible(m, inputs))
+        m->p3_failed = 1;
+    hysteresis(m, inputs);
+    fn_observe(&m->valve, inputs, EPV_POLICY_READINGS, PERIOD, $filter_time, 0.0f);
+    fn_plan(&m->valve, PERIOD);
+    fn_describe(&m->valve, inputs, EPV_POLICY_INPUTS);
+    return fn_cannot_raise(&m->valve) != 0.0f || fn_would_rise_too_far(&m->valve) != 0.0f;
+}
+
+void epv_policy_logits(const float inputs[EPV_POLICY_INPUTS], float logits[2])
 {
     float buffers[2][WIDEST];
-    const float *signal = observation;
+    const float *signal = inputs;
     int k, j;
     for (k = 0; k < LAYERS - 1; k++) {
         float *out = buffers[k % 2];
@@ -117,19 +164,19 @@ void epv_policy_logits(const float observation[EPV_POLICY_INPUTS], float logits[
         signal = out;
     }
     for (j = 0; j < 2; j++)
-        logits[j] = row(&NETWORK[LAYERS - 1], j, signal);
-}
-
-int epv_policy_decide(const float observation[EPV_POLICY_INPUTS])
-{
-    float logits[2];
-    epv_policy_logits(observation, logits);
-    return logits[0] >= logits[1] ? 0 : 1; /* not-a-number compares false: 1, shut */
+        logits[j] = row(&NETWORK[LAYERS - 1], j, signal) + ADVICE[j] * inputs[EPV_POLICY_INPUTS - 1];
 }
 
 int epv_policy_step(epv_policy_memory *m, const epv_policy_readings *now)
 {
-    float observation[EPV_POLICY_INPUTS];
-    epv_policy_observe(m, now, observation);
-    return epv_policy_decide(observation);
+    float inputs[EPV_POLICY_INPUTS], logits[2];
+    int must_shut;
+    if (!(fabsf(now->p1) + fabsf(now->p2) + fabsf(now->p3) + fabsf(now->target) < 1e6f))
+        return 1; /* a reading is not a number: shut, and remember nothing of it */
+    epv_policy_observe(m, now, inputs);
+    must_shut = epv_policy_learn(m, inputs);
+    if (m->p3_failed)
+        return m->fallback;
+    epv_policy_logits(inputs, logits);
+    return must_shut || !(logits[0] >= logits[1]);
 }

@@ -1,7 +1,7 @@
 /* $title
  *
  * The policy in single precision, from the readings to the decision.
- * Plain C99: no library, no heap, no global that changes.
+ * C99 and expf, logf, sqrtf of its mathematical library; no heap, no global that changes.
  * $source
  *
  * Once every control period, right after the sensors were read:
@@ -19,6 +19,7 @@
 extern "C" {
 #endif
 
+#define EPV_POLICY_READINGS $readings
 #define EPV_POLICY_INPUTS $inputs
 #define EPV_POLICY_HISTORY $history
 #define EPV_POLICY_PERIOD_US $period_us
@@ -33,6 +34,8 @@ typedef struct {
     uint8_t coil; /* 1: the coil was energised in the period that has just ended, 0: it was not */
 } epv_policy_readings;
 
+/* What is learnt of one valve; controllers/valve_learner.py says what each entry means. */
+$valve
 /* What one valve's controller remembers. Keep one for each valve; set to zero, it begins anew and
  * takes the first readings for its past. */
 typedef struct {
@@ -42,20 +45,22 @@ typedef struct {
     uint8_t newest; /* place of the newest readings in the rings */
     uint8_t coil;
     uint8_t begun;
+    uint8_t fallback; /* what the controller that does not read p3 has decided */
+    uint8_t p3_failed; /* 1: p3 was found implausible, and that controller decides */
+    uint16_t periods; /* since the start, saturating */
+    epv_valve valve;
 } epv_policy_memory;
 
 /* One period: remember the readings, return what the coil shall do next (0 off, 1 on). */
 int epv_policy_step(epv_policy_memory *memory, const epv_policy_readings *now);
 
-/* Its two halves: readings to observation (contract.json has the order), observation to decision.
- * A reading that is not a number gives 1: the valve shuts. */
+/* Its parts: the readings as the observation (the first EPV_POLICY_READINGS entries of the inputs), what is
+ * learnt and advised (the entries behind them; returns whether a rule keeps the coil on), and the network's
+ * {off, on}. */
 void epv_policy_observe(epv_policy_memory *memory, const epv_policy_readings *now,
-                        float observation[EPV_POLICY_INPUTS]);
-int epv_policy_decide(const float observation[EPV_POLICY_INPUTS]);
-
-/* What the decision compares: {off, on}. */
-void epv_policy_logits(const float observation[EPV_POLICY_INPUTS],
-                      float logits[2]);
+                        float inputs[EPV_POLICY_INPUTS]);
+int epv_policy_learn(epv_policy_memory *memory, float inputs[EPV_POLICY_INPUTS]);
+void epv_policy_logits(const float inputs[EPV_POLICY_INPUTS], float logits[2]);
 
 #ifdef __cplusplus
 }

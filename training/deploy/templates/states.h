@@ -12,9 +12,9 @@ enum { STATES = $states };
 typedef struct {
     int episode;
     epv_policy_readings readings;
-    float observation[EPV_POLICY_INPUTS]; /* as the Python environment encodes it */
-    int action;                          /* of the Python policy */
-    float margin;                        /* its logit of on minus that of off */
+    float inputs[EPV_POLICY_INPUTS]; /* observation and learnt quantities, as Python has them */
+    int action;                          /* of the Python controller */
+    float margin;                        /* the network's logit of on minus that of off */
 } state;
 
 static state STATE[STATES];
@@ -49,7 +49,7 @@ static void read_states(const char *path)
         s->readings.target = number(file);
         s->readings.coil = (uint8_t)number(file);
         for (i = 0; i < EPV_POLICY_INPUTS; i++)
-            s->observation[i] = number(file);
+            s->inputs[i] = number(file);
         s->action = (int)number(file);
         s->margin = number(file);
     }
