@@ -16,7 +16,7 @@ pytest.importorskip("safetensors")
 
 from controllers.policy import TRAINED, load_policy
 from controllers.policy_files import learnt_contract, read_policy
-from epv_env.observation import INDEX, P3_LAGS, contract
+from epv_env.observation import CENTRE, INDEX, P3_LAGS, SCALE, contract, decode
 from tests.training.exports import (
     GOOD,
     column,
@@ -77,7 +77,7 @@ def any_copy(exported, tmp_path):
 
 
 def test_an_export_is_complete_and_within_its_bars(exported):
-    policy, out = exported
+    _, out = exported
     assert {path.name for path in out.iterdir()} == FILES - {"epv_policy.fmu"}
     report = json.loads((out / "report.json").read_text())
     assert report["agreement"]["states"] == 10_000
@@ -189,8 +189,12 @@ def test_the_controller_behind_the_check_of_p3_takes_over(fitted, tmp_path):
     code = library(["cc"], copied(out, tmp_path))
     along = visit(GOOD, first_seed=9, episodes=8, periods=300)
     frozen = along.observations.copy()
-    for name in ("p3", *(f"p3_change_{lag}" for lag in P3_LAGS)):
-        frozen[:, 100:, INDEX[name]] = frozen[:, 100:101, INDEX[name]] if name == "p3" else 0.0
+    p3 = decode(frozen, "p3")
+    p3[:, 100:] = p3[:, 100:101]
+    frozen[..., INDEX["p3"]] = (p3 - CENTRE[INDEX["p3"]]) / SCALE[INDEX["p3"]]
+    for lag in P3_LAGS:
+        before = np.concatenate([np.repeat(p3[:, :1], lag, axis=1), p3[:, :-lag]], axis=1)
+        frozen[..., INDEX[f"p3_change_{lag}"]] = (p3 - before) / SCALE[INDEX[f"p3_change_{lag}"]]
     states = replace(along, observations=frozen)
     controller = load_policy(folder)
     wanted = follow(controller, states)
