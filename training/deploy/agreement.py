@@ -140,7 +140,7 @@ def states_table(states: VisitedStates, inputs: NDArray, exact: NDArray) -> str:
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     names = [entry.name for entry in (*LAYOUT, *LEARNT)]
-    writer.writerow(["episode", *READINGS, *names, "action", "margin"])
+    writer.writerow(["episode", *READINGS, *names, "decision", "logit_margin"])
     readings = readings_of(states.flat)
     periods = states.actions.shape[1]
     for k, (row, action) in enumerate(zip(inputs, states.actions.ravel(), strict=True)):

@@ -60,7 +60,7 @@ def decisions(unit: Unit, inputs: list[dict[str, float]]) -> list[float]:
 
 
 def test_it_decides_as_the_policy_on_visited_states(ecu, unit):
-    actions = column(ecu, "action")
+    actions = column(ecu, "decision")
     for episode in range(3):
         assert decisions(unit, readings(ecu, episode)) == list(actions[episode])
 
