@@ -16,9 +16,6 @@ EVALUATION_SEED = 2_000_000
 VALIDATION_SEED = 3_000_000
 """On which a training chooses among the policies that it passes through."""
 
-DISTILLATION_SEED = 4_000_000
-"""On which a student imitates a privileged controller; each training seed has its own stretch."""
-
 SWEEP_SEED = 5_000_000
 """Of sweeps; --seed counts from here."""
 
@@ -44,14 +41,6 @@ def training_seeds(seed: int, num_envs: int) -> range:
             f"training seed {seed} would meet episodes kept for tuning: give one up to {most}"
         )
     return range(first, first + num_envs)
-
-
-def distillation_seeds(seed: int, count: int) -> range:
-    """Of the episodes of a distillation. Raises ValueError if others are swept on them."""
-    first = DISTILLATION_SEED + seed * count
-    if first + count > SWEEP_SEED:
-        raise ValueError(f"training seed {seed} would meet episodes kept for sweeps")
-    return range(first, first + count)
 
 
 def check_first_seed(seed: int, episodes: int) -> None:
