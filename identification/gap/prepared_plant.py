@@ -156,10 +156,8 @@ class PreparedPlant:
             for channel, ratio in zip(self.channels, ratios, strict=True)
         )
         corrected.noise_source = {
-            channel.name: source if ratio == 1 else "estimated"
-            for (channel, ratio), source in zip(
-                zip(self.channels, ratios, strict=True), self.noise_source.values(), strict=True
-            )
+            channel.name: self.noise_source[channel.name] if ratio == 1 else "estimated"
+            for channel, ratio in zip(self.channels, ratios, strict=True)
         }
         return corrected
 

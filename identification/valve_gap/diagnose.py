@@ -4,6 +4,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import version
+from itertools import count
 from os import PathLike
 from pathlib import Path
 from time import perf_counter
@@ -31,10 +32,6 @@ REPORT, PLANT, JOURNAL = "report.html", "plant.json", "fits.jsonl"
 REGION_PROBABILITY = 0.95
 """Probability that the plant file's region holds the parameters [-]."""
 
-STEP_COUNT = 18
-"""Steps of a diagnosis with pairs. Without pairs there are two less; more effects than two, or a
-disturbance on the readings, take more, of which no estimate is given."""
-
 
 def diagnose_campaign(
     campaign: Path,
@@ -60,7 +57,7 @@ def diagnose_campaign(
     recorded = read_campaign(campaign, rules_of(described) if described else RULES)
     valve = Valve(recorded, described, without=without, noise=noise)
     journal = Journal(out / JOURNAL, _subject(valve, without, noise or {}))
-    steps = Steps(began) if report else _silent
+    steps = _steps(began) if report else lambda step: None
     found = diagnose(valve, seed=seed, cache=FitCache(valve, journal, steps))
     found = replace(found, warnings=[*valve.warnings, *found.warnings])
     text = _report(found, valve, recorded, out, steps) if report else ""
@@ -123,26 +120,12 @@ def refitted_plant(found: Diagnosis, valve: Valve, name: str) -> Plant:
     )
 
 
-def _silent(step: str) -> None:
-    """Says nothing: many diagnoses run side by side."""
-
-
-class Steps:
-    """Says on stderr which step has begun, and about how long the rest will take."""
-
-    def __init__(self, began: float):
-        self.began = began
-        self.number = 0
-
-    def __call__(self, step: str) -> None:
-        elapsed = perf_counter() - self.began
-        left = (
-            f", about {elapsed * (STEP_COUNT - self.number) / self.number:.0f} s left"
-            if 0 < self.number < STEP_COUNT
-            else ""
-        )
-        self.number += 1
-        print(f"[{self.number}] {step} ({elapsed:.0f} s{left})", file=sys.stderr)
+def _steps(began: float) -> Callable[[str], None]:
+    """Says on stderr which step has begun; began: start of the diagnosis, of `perf_counter` [s]."""
+    numbers = count(1)
+    return lambda step: print(
+        f"[{next(numbers)}] {step} ({perf_counter() - began:.0f} s)", file=sys.stderr
+    )
 
 
 def _subject(valve: Valve, without: Sequence[str], noise: Mapping[str, float]) -> dict:
