@@ -1,0 +1,87 @@
+"""Film an episode of the valve under a controller, or show it in a window.
+
+epv watch                                   # valve.gif: adaptive pulse control
+epv watch runs/ppo --file policy.gif        # a policy that training wrote
+epv watch PWM --window                      # on the screen
+"""
+
+import argparse
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+from PIL import Image
+
+import epv_env  # noqa: F401 - registers the ids
+from controllers.base import Controller
+from epv_env.common.command_line import writable_file
+from epv_env.plant.plantfile import load_plant
+from training.commands.options import seconds, seed
+from training.evaluation.named import HELP, named_controllers
+
+SIZE = (800, 450)
+"""Width and height of a frame of the film [pixels]."""
+FRAME_PERIODS = 2
+"""Control periods from one frame of the film to the next."""
+SLOWNESS = 4.0
+"""How much slower than the valve the film runs: a pulse of 20 ms is to be seen."""
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    parser.add_argument("controller", nargs="?", default="pulse, adaptive", help=HELP)
+    parser.add_argument("--file", type=writable_file, default=Path("valve.gif"), help="film to write")
+    parser.add_argument("--window", action="store_true", help="show a window; no film")
+    parser.add_argument("--scenario", default="steps", help="consumption")
+    parser.add_argument("--duration", type=seconds, default=2.4, help="of the episode [s]")
+    parser.add_argument("--seed", type=seed, default=4, help="of the episode")
+    parser.add_argument("--plant", type=Path, help="plant file (default: the report's calibration)")
+
+
+def run(options: argparse.Namespace) -> None:
+    """Run the episode and write the film. Raises ValueError for an unknown controller or scenario."""
+    plant = load_plant(options.plant)
+    (controller,) = named_controllers([options.controller], plant)[0].values()
+    env = gymnasium.make(
+        controller.environment,
+        plant=plant,
+        scenario=options.scenario,
+        render_mode="human" if options.window else "rgb_array",
+    )
+    frames = episode(env, controller, seed=options.seed, duration=options.duration)
+    if not options.window:
+        write_film(options.file, frames, env)
+        print(f"{options.file}: {len(frames)} frames, {options.file.stat().st_size / 1e6:.1f} MB")
+    env.close()
+
+
+def episode(
+    env: gymnasium.Env, controller: Controller, *, seed: int, duration: float
+) -> list[Image.Image]:
+    """Frames of an episode under a controller; none if the environment shows a window.
+
+    duration: of the episode [s].
+    """
+    frames = []
+    observation, _ = env.reset(seed=seed)
+    controller.reset(1)
+    for step in range(round(duration / _period(env))):
+        action = controller.act(observation[None])[0]
+        observation, *_ = env.step(action)
+        if env.render_mode == "rgb_array" and step % FRAME_PERIODS == 0:
+            picture = Image.fromarray(np.asarray(env.render()))
+            frames.append(picture.resize(SIZE, Image.Resampling.LANCZOS))
+    return frames
+
+
+def write_film(path: Path, frames: list[Image.Image], env: gymnasium.Env) -> None:
+    """Write frames of an episode as an animated GIF on one palette of colours."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    palette = frames[-1].quantize(256)
+    first, *others = (frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
+    duration = round(1000 * FRAME_PERIODS * _period(env) * SLOWNESS)
+    first.save(path, save_all=True, append_images=others, loop=0, optimize=True, duration=duration)
+
+
+def _period(env: gymnasium.Env) -> float:
+    return env.unwrapped.settings.control_period  # type: ignore[attr-defined]
