@@ -63,13 +63,13 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
         self.plant = load_plant(plant)
         self.settings = make_settings(self.plant, control_period=period, **options)
         self.render_mode = render_mode
-        self._mode: Literal["rgb_array", "human"] | None = render_mode
         self.action = self.action_form(period)
         self.action_space = self.action.space()
         self.observation_space = observation_space()
         self.task = LimitingTask(1, self.settings, threads=1)
         self.privileged = privileged
-        self._renderer: Renderer | None = None
+        fps = self.metadata["render_fps"]
+        self._renderer = None if render_mode is None else Renderer(render_mode, fps)
         self._consumption = 0.0
 
     def reset(
@@ -81,8 +81,7 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
         self._consumption = 0.0
         if self._renderer is not None:
             self._renderer.reset()
-        if self.render_mode == "human":
-            self.render()
+            self._show()
         return observation, self._truth()
 
     def _truth(self) -> dict[str, Any]:
@@ -96,8 +95,8 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
         result = self.task.step(*self.action.decode(np.asarray(action)[None]))
         info = {key: value[0, ...] for key, value in step_info(result).items()}
         self._consumption = float(result.consumption[0])
-        if self.render_mode == "human":
-            self.render()
+        if self._renderer is not None:
+            self._show()
         reward, failed = float(result.reward[0]), bool(result.failed[0])
         return result.observation[0], reward, failed, False, info | self._truth()
 
@@ -122,17 +121,22 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
 
     def render(self) -> Any:
         """An RGB frame (rgb_array), or None (human: a window; None: nothing)."""
-        if self._mode is None:
+        if self._renderer is None:
             gymnasium.logger.warn("render() without a render_mode: pass render_mode to make()")
             return None
-        if self._renderer is None:
-            self._renderer = Renderer(self._mode, self.metadata["render_fps"])
         return self._renderer.draw(self.snapshot())
+
+    def _show(self) -> None:
+        """Draw in a window; otherwise note the period for the charts of the next frame."""
+        assert self._renderer is not None
+        if self.render_mode == "human":
+            self._renderer.draw(self.snapshot())
+        else:
+            self._renderer.note(self.snapshot())
 
     def close(self) -> None:
         if self._renderer is not None:
             self._renderer.close()
-            self._renderer = None
 
 
 class EPValveEnv(_ValveEnv):

@@ -1,6 +1,6 @@
 """The renderer: composes the frame, and hands it out as an array or shows it in a window."""
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,6 +76,10 @@ class Renderer:
         """Forget the strip chart's history: a new episode begins."""
         self._strip.reset()
 
+    def note(self, snapshot: Snapshot) -> None:
+        """Add a snapshot to the charts without drawing a frame."""
+        self._strip.append(snapshot)
+
     def draw(self, snapshot: Snapshot) -> NDArray[np.uint8] | None:
         """Draw one frame. Mode 'rgb_array': returns it, uint8 (720, 1280, 3). 'human': shows it."""
         if not self.is_open:
@@ -86,6 +90,10 @@ class Renderer:
             return image
         self._show(image)
         return None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy or a pickle takes along: the history, not the window."""
+        return {**self.__dict__, "_canvas": None, "_window": None, "_clock": None}
 
     def close(self) -> None:
         """Shut the window and free the memory. May be called twice; drawing again starts anew."""

@@ -1,5 +1,7 @@
 """The renderer: what a frame is, what it shows, and what it needs."""
 
+import copy
+import pickle
 import subprocess
 import sys
 from dataclasses import replace
@@ -166,3 +168,26 @@ def test_importing_the_renderer_imports_no_graphics() -> None:
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert result.returncode == 0, result.stderr
+
+
+def test_the_first_picture_shows_what_has_been() -> None:
+    """Its charts hold every period of the episode, as those of one that was drawn all along."""
+    pictures = []
+    for drawn in (False, True):
+        env = gymnasium.make("EPValve-v0", render_mode="rgb_array", scenario="steps")
+        env.reset(seed=2)
+        for step in range(40):
+            env.step(step // 10 % 2)
+            if drawn:
+                env.render()
+        pictures.append(env.render())
+    np.testing.assert_array_equal(*pictures)
+
+
+def test_an_environment_with_a_picture_can_be_copied() -> None:
+    env = gymnasium.make("EPValve-v0", render_mode="rgb_array").unwrapped
+    env.reset(seed=2)
+    env.step(0)
+    picture = env.render()
+    for copied in (copy.deepcopy(env), pickle.loads(pickle.dumps(env))):
+        np.testing.assert_array_equal(copied.render(), picture)
