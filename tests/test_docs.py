@@ -18,6 +18,7 @@ pytestmark = pytest.mark.training
 
 from markdown.extensions.toc import slugify_unicode  # noqa: E402
 
+from docs.scripts.effects_table import effects_table  # noqa: E402
 from epv_env.common.commands import commands, parse  # noqa: E402
 from training.epv import PACKAGES as COMMAND_PACKAGES  # noqa: E402
 
@@ -42,7 +43,9 @@ def text(page: str) -> str:
 def blocks(page: str, language: str) -> list[str]:
     """The examples of a page in one language, without their indentation."""
     found = re.findall(rf"^ *```{language}\n(.*?)^ *```", text(page), re.S | re.M)
-    return [re.sub(r"^   +(?=\S)", "", block, flags=re.M) if language == "sh" else block for block in found]
+    return [
+        re.sub(r"^   +(?=\S)", "", block, flags=re.M) if language == "sh" else block for block in found
+    ]
 
 
 def run(*command, cwd: Path) -> subprocess.CompletedProcess:
@@ -64,7 +67,9 @@ def shell_commands(shell: str) -> Iterator[list[str]]:
     """The commands of shell lines as lists of words, without comments and assignments."""
     for line in shell.replace("\\\n", " ").splitlines():
         for part in line.split("#")[0].split("&&"):
-            words = [word for word in shlex.split(part) if not re.fullmatch(r"[A-Z_]+=.*", word)]
+            words = shlex.split(part)
+            while words and re.fullmatch(r"[A-Z_]+=.*", words[0]):
+                words.pop(0)
             if words:
                 yield words
 
@@ -85,7 +90,12 @@ def command_of(words: list[str]) -> tuple[str, list[str]] | None:
 
 def test_commands_shown_are_those_of_the_parsers(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    lines = [(page, words) for page in PAGES for block in blocks(page, "sh") for words in shell_commands(block)]
+    lines = [
+        (page, words)
+        for page in PAGES
+        for block in blocks(page, "sh")
+        for words in shell_commands(block)
+    ]
     found = [(page, *command) for page, words in lines if (command := command_of(words)) is not None]
     assert len(found) > 15
     for page, module, options in found:

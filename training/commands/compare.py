@@ -1,4 +1,4 @@
-"""compare controllers on the same unseen episodes, and say how sure the differences are
+"""Compare controllers on the same unseen episodes, with intervals of the differences.
 
 python training/compare.py --out runs/comparison
 python training/compare.py --controllers "pulse, adaptive" PPO=runs/ppo --out runs/mine

@@ -1,4 +1,4 @@
-"""turn a policy into C, ONNX and an FMU, or the plant into an FMU
+"""Turn a policy into C, ONNX and an FMU, or the plant into an FMU.
 
 epv export runs/ppo --out runs/ecu            # C and ONNX
 epv export runs/ppo --out runs/ecu --fmu      # and epv_policy.fmu

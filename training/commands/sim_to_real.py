@@ -1,4 +1,4 @@
-"""train on the nominal plant, deploy on a bench, diagnose, retrain, deploy again
+"""Train on the nominal plant, deploy on a bench, diagnose, retrain, deploy again.
 
 epv sim-to-real --out runs/sim-to-real
 

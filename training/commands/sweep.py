@@ -1,4 +1,4 @@
-"""robustness of controllers: plants, effects, sensors and timing that deviate by a known amount
+"""Robustness of controllers against plants, effects, sensors and timing that deviate.
 
 python training/sweep.py --out runs/sweep
 python training/sweep.py --out runs/friction --designs effects --factors piston_friction

@@ -1,4 +1,4 @@
-"""train the PPO controller, and compare it with the classic ones
+"""Train the PPO controller, and compare it with the classic ones.
 
 python training/train_ppo.py
 python training/train_ppo.py --quick

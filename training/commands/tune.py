@@ -1,4 +1,4 @@
-"""search the classic controllers' settings: the same budget, scenarios and objective for each
+"""Search the classic controllers' settings with the same budget for each.
 
 epv tune --trials 100 --out controllers/tuned.json
 epv tune --only "pulse, adaptive" --out controllers/tuned.json    # keeps the file's others
