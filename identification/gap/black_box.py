@@ -58,11 +58,7 @@ samples) [noise deviations]."""
 
 
 def predict_residuals(
-    plant: GreyBox,
-    model: Prediction,
-    learner: Learner,
-    seed: int,
-    scale: float,
+    plant: GreyBox, model: Prediction, learner: Learner, seed: int, scale: float
 ) -> list[NDArray]:
     """A model's residuals of the held-out runs as the black box predicts them.
 
@@ -102,9 +98,7 @@ def _thinned(features: NDArray, target: NDArray, stride: int) -> LearningRun:
 
 
 def ridge_on_random_features(
-    learning: Sequence[LearningRun],
-    features: Sequence[NDArray],
-    seed: int,
+    learning: Sequence[LearningRun], features: Sequence[NDArray], seed: int
 ) -> list[NDArray]:
     """Ridge regression with the penalty that predicts left-out runs best.
 
@@ -149,11 +143,7 @@ def _solutions(gram: NDArray, moment: NDArray, linear: int, penalties: NDArray) 
 
     The choices are: no prediction; by penalty, the linear features alone; by penalty, all features.
 
-    Args:
-        gram: products of the features, (features, features).
-        moment: products of features and targets, (features, channels).
-        linear: number of the linear features, which come first.
-        penalties: of the ridge, (penalties,) [1].
+    gram, moment: products of the features, and with the targets. linear: features that come first.
     """
     weights = np.zeros((len(gram), 1 + 2 * len(penalties), moment.shape[1]))
     for first, size in ((1, linear), (1 + len(penalties), len(gram))):

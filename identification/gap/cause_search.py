@@ -80,12 +80,7 @@ def is_small(plant: GreyBox) -> bool:
 class HypothesisPool:
     """Refitted sets of causes; grows while the search goes on."""
 
-    def __init__(
-        self,
-        problem: FittingProblem,
-        recalibrated: EvaluatedHypothesis,
-        cache: FitCache,
-    ):
+    def __init__(self, problem: FittingProblem, recalibrated: EvaluatedHypothesis, cache: FitCache):
         """Begin with the model without causes."""
         self.problem = problem
         self.recalibrated = recalibrated
@@ -166,10 +161,7 @@ def search_causes(
 
 
 def _fit_singles(
-    pool: HypothesisPool,
-    base: Estimate,
-    screened: Sequence[Start],
-    separability: Separability,
+    pool: HypothesisPool, base: Estimate, screened: Sequence[Start], separability: Separability
 ) -> None:
     """Single causes: the promising ones, those that look like the best, and the best refined."""
     problem = pool.problem

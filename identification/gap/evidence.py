@@ -51,6 +51,11 @@ class EvaluatedHypothesis:
         return self.estimate.converged
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the causes."""
+        return tuple(cause.name for cause in self.estimate.hypothesis.causes)
+
+    @property
     def labels(self) -> tuple[str, ...]:
         """Labels of the causes."""
         return self.estimate.hypothesis.labels
@@ -102,9 +107,7 @@ def evaluate(problem: FittingProblem, estimates: Sequence[Estimate]) -> list[Eva
 
 
 def evaluate_linearised(
-    problem: FittingProblem,
-    estimate: Estimate,
-    runs: Sequence[LinearisedRun],
+    problem: FittingProblem, estimate: Estimate, runs: Sequence[LinearisedRun]
 ) -> EvaluatedHypothesis:
     """An estimate on all runs, linearised."""
     tolerances = normal_equations(runs).tolerances

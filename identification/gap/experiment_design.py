@@ -101,9 +101,7 @@ class InformationGain:
 
 
 def expected_information(
-    problem: FittingProblem,
-    plan: GreyBox,
-    rivals: Rivals,
+    problem: FittingProblem, plan: GreyBox, rivals: Rivals
 ) -> list[InformationGain]:
     """Expected information of each run of a plan; none where a rival cannot simulate the run.
 
@@ -248,59 +246,43 @@ def outcome_distributions(
     gram = columns.T @ columns
     if effects.shape[1]:
         errors = FORM_ERROR / np.sqrt(n) * effects
-        gram -= explained_by_form_errors(columns, errors, channels, period, SEGMENT_DURATION)
-    coordinates = _coordinates(gram, LEAST_VARIANCE)
+        gram -= _explained_by_form_errors(columns, errors, channels, period)
+    coordinates = _coordinates(gram)
     ends = np.cumsum([n, *(spread.shape[1] for spread in spreads)])
     own = np.split(coordinates, ends[:-1], axis=1)
     covariances = [np.eye(len(coordinates)) + spread @ spread.T for spread in own[1:]]
     return own[0].T, np.stack(covariances)
 
 
-def _coordinates(gram: NDArray, least_variance: float) -> NDArray:
+def _coordinates(gram: NDArray) -> NDArray:
     """Columns with these products (n, n) in the fewest coordinates, (d, n)."""
     values, vectors = np.linalg.eigh(gram)
-    wide = values > least_variance * values[-1]
+    wide = values > LEAST_VARIANCE * values[-1]
     return np.sqrt(values[wide])[:, None] * vectors[:, wide].T
 
 
-def segments(series: NDArray, period: float, duration: float) -> NDArray:
-    """A series (samples,) of any unit in segments (segments, samples of one), the last one zero-padded.
-
-    period: of sampling [s]. duration: of a segment [s].
-    """
-    length = max(1, round(duration / period))
-    count = -(-len(series) // length)
-    padded = np.zeros(count * length)
-    padded[: len(series)] = series
-    return padded.reshape(count, length)
+def _segments(columns: NDArray, length: int) -> NDArray:
+    """Columns (samples, n) in segments, (segments, length, n), the last one zero-padded."""
+    count = -(-len(columns) // length)
+    padded = np.zeros((count * length, columns.shape[1]))
+    padded[: len(columns)] = columns
+    return padded.reshape(count, length, -1)
 
 
-def segment_columns(columns: NDArray, period: float, duration: float) -> NDArray:
-    """Columns (samples, n) of any unit in segments, (segments, samples of one, n).
-
-    period: of sampling [s]. duration: of a segment [s].
-    """
-    return np.stack([segments(column, period, duration) for column in columns.T], axis=2)
-
-
-def explained_by_form_errors(
-    columns: NDArray, errors: NDArray, channels: int, period: float, duration: float
+def _explained_by_form_errors(
+    columns: NDArray, errors: NDArray, channels: int, period: float
 ) -> NDArray:
     """Part of the products of columns that errors of form explain, (n, n) [1].
 
-    Args:
-        columns: predictions and derivatives, (channels x samples, n) [noise deviations].
-        errors: effects of causes times the size of their form error, (channels x samples, causes).
-        channels: number of channels.
-        period: of sampling [s].
-        duration: of a segment, in which an error is constant [s].
+    columns: predictions and derivatives, (channels x samples, n) [noise deviations]. errors: effects of
+    causes times the size of their form error, (channels x samples, causes).
     """
     total = np.zeros((columns.shape[1], columns.shape[1]))
+    length = max(1, round(SEGMENT_DURATION / period))
     for own_columns, own_errors in zip(
         np.split(columns, channels), np.split(errors, channels), strict=True
     ):
-        parts = segment_columns(own_columns, period, duration)
-        effects = segment_columns(own_errors, period, duration)
+        parts, effects = _segments(own_columns, length), _segments(own_errors, length)
         gram = np.eye(effects.shape[2]) + effects.transpose(0, 2, 1) @ effects
         products = np.linalg.solve(np.linalg.cholesky(gram), effects.transpose(0, 2, 1) @ parts)
         flat = products.reshape(-1, products.shape[2])

@@ -92,55 +92,42 @@ class NuisanceElimination:
     run; N = k + m + l runs.
     """
 
-    def __init__(self, runs: Sequence[LinearisedRun], counted: Sequence[NDArray], regularisation: float):
+    def __init__(self, runs: Sequence[LinearisedRun], counted: Sequence[NDArray]):
         """Collect the normal equations of the eliminated numbers.
 
-        Args:
-            runs: one estimate, linearised in each run.
-            counted: readings that count, per run boolean (values,).
-            regularisation: precision added to every number [1].
+        runs: one estimate, linearised in each run. counted: per run, readings that count, (values,).
         """
-        k, m = runs[0].slopes.shape[1], runs[0].tolerance_slopes.shape[1]
-        self._count = k + m
+        k = runs[0].slopes.shape[1]
+        shared = k + runs[0].tolerance_slopes.shape[1]
         own = runs[0].run_slopes.shape[1]
-        total = self._count + own * len(runs)
-        self._places = [self._place(r, own) for r in range(len(runs))]
+        total = shared + own * len(runs)
+        self._counted = counted
+        firsts = [shared + own * r for r in range(len(runs))]
+        self._places = [np.r_[0:shared, first : first + own] for first in firsts]
+        """Per run, indices of the numbers that act in it, (k + m + l,)."""
         self._columns = [
             np.hstack([run.slopes, run.tolerance_slopes, run.run_slopes]) * each[:, None]
             for run, each in zip(runs, counted, strict=True)
         ]
         # Neither forcings nor numbers explain a reading that does not count: it has no residual.
         self._residuals = [run.residual * each for run, each in zip(runs, counted, strict=True)]
-        self._counted = counted
         self._hessian, self._gradient = np.zeros((total, total)), np.zeros(total)
         chi_square = 0.0
         for run, place, columns, residual in zip(
             runs, self._places, self._columns, self._residuals, strict=True
         ):
-            chi_square += self._add(run, place, columns, residual)
-        tolerances = np.arange(k, self._count)
+            precision, nuisances = 1.0 / run.run_sd**2, place[shared:]
+            self._hessian[np.ix_(place, place)] += columns.T @ columns
+            self._hessian[nuisances, nuisances] += precision
+            self._gradient[place] += columns.T @ residual
+            self._gradient[nuisances] -= precision * run.run_values
+            chi_square += float(residual @ residual + precision @ run.run_values**2)
+        tolerances = np.arange(k, shared)
         self._hessian[tolerances, tolerances] += 1.0
-        self._hessian[np.diag_indices_from(self._hessian)] += regularisation
+        self._hessian[np.diag_indices_from(self._hessian)] += REGULARISATION
         explained = self._gradient @ np.linalg.solve(self._hessian, self._gradient)
         self.chi_square = float(chi_square - explained)
         """Sum of squares of the residual after the elimination [1]."""
-
-    def _place(self, r: int, own: int) -> NDArray:
-        """Indices of the numbers that act in a run, (k + m + l,)."""
-        first = self._count + own * r
-        return np.r_[0 : self._count, first : first + own]
-
-    def _add(self, run: LinearisedRun, place: NDArray, columns: NDArray, residual: NDArray) -> float:
-        """Add a run with its priors; returns its part of the sum of squares [1].
-
-        columns: changes of its readings by each number, (values, numbers). residual: (values,).
-        """
-        precision, own = 1.0 / run.run_sd**2, place[self._count :]
-        self._hessian[np.ix_(place, place)] += columns.T @ columns
-        self._hessian[own, own] += precision
-        self._gradient[place] += columns.T @ residual
-        self._gradient[own] -= precision * run.run_values
-        return float(residual @ residual + precision @ run.run_values**2)
 
     def moment_and_precision(
         self, columns: Sequence[NDArray], *, shared: bool = False
@@ -173,10 +160,7 @@ class NuisanceElimination:
 
 
 def quadratic_forms(
-    problem: FittingProblem,
-    estimate: Estimate,
-    runs: Sequence[int],
-    scale: float,
+    problem: FittingProblem, estimate: Estimate, runs: Sequence[int], scale: float
 ) -> tuple[LocalisationDesign, list[QuadraticForm]]:
     """Quadratic form of every equation that can lack something, and of every fault of the readings.
 
@@ -202,7 +186,7 @@ def quadratic_forms(
     ]
     linearised = linearise(problem, [estimate], runs)[0]
     counted = [_counted(plant, r, ends) for r, ends in zip(runs, edges, strict=True)]
-    elimination = NuisanceElimination(linearised, counted, REGULARISATION)
+    elimination = NuisanceElimination(linearised, counted)
     forms = []
     for equation in plant.equations:
         if equation.step:
@@ -273,7 +257,7 @@ def most_misfitting_runs(problem: FittingProblem, residuals: Sequence[NDArray]) 
 
     residuals: per run (channels, samples) [noise deviations].
     """
-    runs, samples = problem.plant.runs, SAMPLES
+    runs = problem.plant.runs
     lengths = np.array([len(run.time) for run in runs])
     misfit = np.array([np.sum(residual**2) for residual in residuals]) / lengths
     begins = np.array([np.argmax(np.any(run.trusted, axis=0)) for run in runs]) / lengths
@@ -281,7 +265,7 @@ def most_misfitting_runs(problem: FittingProblem, residuals: Sequence[NDArray]) 
     if not np.all(late):
         misfit = np.where(late, -1.0, misfit)
     first, *others = [run for run in np.argsort(-misfit, kind="stable").tolist() if misfit[run] >= 0]
-    chosen, left = [first], samples - lengths[first]
+    chosen, left = [first], SAMPLES - lengths[first]
     for run in others:
         if lengths[run] <= left:
             chosen.append(run)
@@ -290,11 +274,7 @@ def most_misfitting_runs(problem: FittingProblem, residuals: Sequence[NDArray]) 
 
 
 def resolving_edges(
-    time: NDArray,
-    traces: Mapping[str, StateTrace],
-    scale: float,
-    most: int,
-    first: int,
+    time: NDArray, traces: Mapping[str, StateTrace], scale: float, most: int, first: int
 ) -> NDArray:
     """Edges of windows that follow the motion: more than usual, and of a part of the run, if need be.
 
@@ -335,8 +315,8 @@ def window_edges(time: NDArray, traces: Mapping[str, StateTrace], windows: int) 
     time: (samples,) [s]. traces: states of the run by name. windows: most windows. No window is empty.
     """
     uniform = np.full(len(time) - 1, 1.0 / (len(time) - 1))
-    share = UNIFORM_SHARE
-    density = share * uniform + (1 - share) * np.mean([*_motion(traces), uniform], axis=0)
+    motion = np.mean([*_motion(traces), uniform], axis=0)
+    density = UNIFORM_SHARE * uniform + (1 - UNIFORM_SHARE) * motion
     progress = np.concatenate([[0.0], np.cumsum(density)]) / np.sum(density)
     ends = np.searchsorted(progress, np.linspace(0.0, 1.0, windows + 1)[1:-1])
     return np.unique([0, *ends, len(time) - 1])

@@ -53,11 +53,7 @@ class GapDraws:
     """Gaps of several models by bootstrap draw; row 0 of every array is the estimate."""
 
     def __init__(
-        self,
-        plant: GreyBox,
-        residuals: Mapping[str, Sequence[NDArray]],
-        seed: int,
-        scale: float,
+        self, plant: GreyBox, residuals: Mapping[str, Sequence[NDArray]], seed: int, scale: float
     ):
         """Sum squares over blocks of the held-out runs.
 
@@ -217,11 +213,7 @@ def regime_gaps(
 
 
 def _sums(
-    plant: GreyBox,
-    masks: Sequence[NDArray],
-    residuals: Sequence[NDArray],
-    block: float,
-    fewest: int,
+    plant: GreyBox, masks: Sequence[NDArray], residuals: Sequence[NDArray], block: float, fewest: int
 ) -> tuple[NDArray, NDArray, bool]:
     """Sums over parts of held-out runs, or of all runs where those are fewer than `fewest`, and which.
 

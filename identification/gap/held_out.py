@@ -177,11 +177,7 @@ def _share(part: float, whole: float) -> float:
 
 
 def p_value(
-    plant: GreyBox,
-    residuals: Sequence[NDArray],
-    predicted: Sequence[NDArray],
-    seed: int,
-    scale: float,
+    plant: GreyBox, residuals: Sequence[NDArray], predicted: Sequence[NDArray], seed: int, scale: float
 ) -> float:
     """Probability that blocks of the residual in random order agree as well with the prediction.
 

@@ -161,10 +161,7 @@ class IdentifiableSubspace:
 
 
 def locate(
-    problem: FittingProblem,
-    estimate: Estimate,
-    residuals: Sequence[NDArray],
-    seed: int,
+    problem: FittingProblem, estimate: Estimate, residuals: Sequence[NDArray], seed: int
 ) -> Localisation:
     """Locate what a model, recalibrated or with causes, leaves unexplained.
 
@@ -307,11 +304,7 @@ def _slow_covariance(windows: Sequence[Window]) -> NDArray:
     return np.where(run[:, None] == run, np.exp(-np.abs(time[:, None] - time) / memory), 0.0)
 
 
-def _fit(
-    subspace: IdentifiableSubspace,
-    design: LocalisationDesign,
-    kind: str,
-) -> ProcessFit:
+def _fit(subspace: IdentifiableSubspace, design: LocalisationDesign, kind: str) -> ProcessFit:
     """Evidence averaged over the amplitudes, and the forcing at the most likely amplitude."""
     smooth, own = _covariance(subspace.form, kind)
     smooth_root = smooth @ subspace.root

@@ -117,9 +117,7 @@ class Posterior:
 
 
 def posterior(
-    problem: FittingProblem,
-    recalibrated: EvaluatedHypothesis,
-    hypotheses: Sequence[EvaluatedHypothesis],
+    problem: FittingProblem, recalibrated: EvaluatedHypothesis, hypotheses: Sequence[EvaluatedHypothesis]
 ) -> Posterior:
     """Probabilities of hypotheses with causes, of no cause and of an unknown one."""
     every = [recalibrated, *hypotheses]
@@ -154,16 +152,12 @@ def posterior(
 
 
 def _no_cause_score(
-    every: Sequence[EvaluatedHypothesis],
-    misfits: NDArray,
-    discrepancies: Sequence[ChannelDiscrepancy],
+    every: Sequence[EvaluatedHypothesis], misfits: NDArray, discrepancies: Sequence[ChannelDiscrepancy]
 ) -> float:
-    """Log posterior of no cause, but for a constant.
+    """Log posterior of no cause, which has no form that could err, but for a constant.
 
-    No cause has no form that could err. So the whole difference to the nearest hypothesis counts, in
-    variances of all that remains, and what the floor, known to some percent, cannot be.
-
-    every: no cause and each hypothesis. misfits: of these, (1 + n,) [nats].
+    So the whole difference to the nearest hypothesis counts, in variances of all that remains, and what
+    the floor, known to some percent, cannot be. every: no cause and each hypothesis.
     """
     nearest = every[int(np.argmin(misfits))]
     gained = every[0].nuisance_penalty - nearest.nuisance_penalty
@@ -261,7 +255,7 @@ def log_completeness(hypotheses: Sequence[EvaluatedHypothesis], misfits: NDArray
         hypotheses: sets of causes, n of them.
         misfits: of each beyond noise, (n,) [nats].
     """
-    names = _names(hypotheses)
+    names = [frozenset(each.names) for each in hypotheses]
     possible = [not each.at_bound for each in hypotheses]
     reached = np.maximum(misfits, 0.0) + CHANCE_MISFIT
     shares = np.ones(len(hypotheses))
@@ -277,10 +271,7 @@ def log_completeness(hypotheses: Sequence[EvaluatedHypothesis], misfits: NDArray
 
 
 def with_hidden_causes(
-    probabilities: NDArray,
-    hypotheses: Sequence[EvaluatedHypothesis],
-    misfits: NDArray,
-    scores: NDArray,
+    probabilities: NDArray, hypotheses: Sequence[EvaluatedHypothesis], misfits: NDArray, scores: NDArray
 ) -> NDArray:
     """Probabilities of sets of causes where one more cause may hide in errors of form, (n,).
 
@@ -293,7 +284,7 @@ def with_hidden_causes(
         misfits: of each beyond noise, (n,) [nats].
         scores: log probability of each, but for a constant, (n,) [nats].
     """
-    names = _names(hypotheses)
+    names = [frozenset(each.names) for each in hypotheses]
     spread = probabilities.copy()
     for i, own in enumerate(names):
         larger = [
@@ -307,8 +298,3 @@ def with_hidden_causes(
         spread[i] -= share * probabilities[i]
         spread[larger] += share * probabilities[i] * softmax(scores[larger])
     return spread
-
-
-def _names(hypotheses: Sequence[EvaluatedHypothesis]) -> list[frozenset[str]]:
-    """Names of the causes of each hypothesis."""
-    return [frozenset(cause.name for cause in each.estimate.hypothesis.causes) for each in hypotheses]

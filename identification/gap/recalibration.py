@@ -25,11 +25,7 @@ noise is corrected [1]: less changes no judgement."""
 
 
 def recalibrate(
-    plant: GreyBox,
-    cache: FitCache | None = None,
-    *,
-    thorough: bool = False,
-    prefix: str = "",
+    plant: GreyBox, cache: FitCache | None = None, *, thorough: bool = False, prefix: str = ""
 ) -> tuple[FittingProblem, Estimate]:
     """The nominal model with its calibrated parameters refitted, and the problem with its nuisances.
 
@@ -61,10 +57,7 @@ def refit(problem: FittingProblem, base: Estimate, starts: Sequence[Start]) -> l
 
 
 def with_own_nuisances(
-    problem: FittingProblem,
-    evaluated: Sequence[EvaluatedHypothesis],
-    name: str,
-    cache: FitCache,
+    problem: FittingProblem, evaluated: Sequence[EvaluatedHypothesis], name: str, cache: FitCache
 ) -> list[EvaluatedHypothesis]:
     """Hypotheses fitted further, with nuisance slopes taken at each estimate; name: in the journal."""
     if not evaluated:

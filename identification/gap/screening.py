@@ -161,9 +161,9 @@ def screen_causes(
     cause with a threshold is far from linear; calibrated and nuisance parameters adapt linearly.
 
     Args:
-        problem: readings and settings.
+        problem: the plant with its readings.
         base: the estimate to which the causes are added.
-        base_runs: the base estimate linearised in the fitted runs.
+        base_runs: the same linearised in the fitted runs.
         signatures: from `simulate_signatures` beside the same base.
         every_start: return all starts of each cause, not only the best.
     """
@@ -240,11 +240,7 @@ def _adapted(
 ) -> Start:
     """An estimate that adds causes to the base, the base's own parameters adapted by one linear step.
 
-    Args:
-        problem: readings and settings.
-        base: the estimate without the causes.
-        estimate: the base's parameters and the causes' values.
-        equations: of the base's parameters, with the causes' changes of the outputs.
+    equations: of the base's parameters, with the causes' changes of the outputs.
     """
     step, decrease = equations.step(*problem.ends(base), damping=0.0)
     vector = estimate.vector.copy()
@@ -285,28 +281,17 @@ def _bounded_last_step(equations: NormalEquations, low: float, high: float) -> t
 
 
 def promising_pairs(
-    base_runs: Sequence[LinearisedRun],
-    signatures: Sequence[CauseSignature],
+    base_runs: Sequence[LinearisedRun], signatures: Sequence[CauseSignature]
 ) -> list[frozenset[str]]:
     """Pairs of labels by falling decrease of chi-square, both changes taken as linear in their sizes.
 
     A negative size is none where the range begins at off.
 
-    Args:
-        base_runs: the base estimate linearised in the fitted runs.
-        signatures: from `simulate_signatures` beside the same base; the first of each cause counts.
+    base_runs: the base estimate linearised in the fitted runs. signatures: beside the same base.
     """
-    first: dict[str, CauseSignature] = {}
-    for signature in signatures:
-        first.setdefault(signature.cause.label, signature)
+    first, equations, k = _with_signatures(base_runs, signatures)
     labels, causes = list(first), [signature.cause for signature in first.values()]
     least = np.array([signature.shares[0] for signature in first.values()])
-    runs = [
-        replace(run, slopes=np.column_stack([run.slopes, *(s.changes[r] for s in first.values())]))
-        for r, run in enumerate(base_runs)
-    ]
-    equations = normal_equations(runs)
-    k = base_runs[0].slopes.shape[1]
     hessian, gradient = equations.hessian, equations.gradient
     own = hessian[:k, :k] + 1e-9 * np.eye(k)
     solved = np.linalg.solve(own, np.column_stack([gradient[:k], hessian[:k, k:]]))
@@ -324,25 +309,14 @@ def promising_pairs(
 
 
 def assess_separability(
-    base_runs: Sequence[LinearisedRun],
-    signatures: Sequence[CauseSignature],
+    base_runs: Sequence[LinearisedRun], signatures: Sequence[CauseSignature]
 ) -> Separability:
     """Separability of the causes at their first trial values.
 
-    Args:
-        base_runs: the base estimate linearised in the fitted runs.
-        signatures: from `simulate_signatures` beside the same base.
+    base_runs: the base estimate linearised in the fitted runs. signatures: beside the same base.
     """
-    first: dict[str, CauseSignature] = {}
-    for signature in signatures:
-        first.setdefault(signature.cause.label, signature)
-    runs = [
-        replace(run, slopes=np.column_stack([run.slopes, *(s.changes[r] for s in first.values())]))
-        for r, run in enumerate(base_runs)
-    ]
-    hessian = normal_equations(runs).hessian
-    k = base_runs[0].slopes.shape[1]
-    cross = hessian[:k, k:]
+    first, equations, k = _with_signatures(base_runs, signatures)
+    hessian, cross = equations.hessian, equations.hessian[:k, k:]
     gram = hessian[k:, k:] - cross.T @ np.linalg.solve(hessian[:k, :k] + 1e-9 * np.eye(k), cross)
     norms = np.sqrt(np.maximum(np.diag(gram), 0.0))
     divisors = np.maximum(norms, np.sqrt(np.finfo(float).tiny))
@@ -351,3 +325,17 @@ def assess_separability(
         signature_norms=norms,
         correlation=gram / np.outer(divisors, divisors),
     )
+
+
+def _with_signatures(
+    base_runs: Sequence[LinearisedRun], signatures: Sequence[CauseSignature]
+) -> tuple[dict[str, CauseSignature], NormalEquations, int]:
+    """The first signature of each cause, normal equations with them as slopes, and number of others."""
+    first: dict[str, CauseSignature] = {}
+    for signature in signatures:
+        first.setdefault(signature.cause.label, signature)
+    runs = [
+        replace(run, slopes=np.column_stack([run.slopes, *(s.changes[r] for s in first.values())]))
+        for r, run in enumerate(base_runs)
+    ]
+    return first, normal_equations(runs), base_runs[0].slopes.shape[1]

@@ -33,9 +33,7 @@ class ReadingFault:
 
 
 def reading_faults(
-    plant: GreyBox,
-    values: Mapping[str, NDArray],
-    runs: Sequence[int],
+    plant: GreyBox, values: Mapping[str, NDArray], runs: Sequence[int]
 ) -> list[ReadingFault]:
     """A fault of every sensor, and one of the clock.
 

@@ -52,7 +52,7 @@ class Ranking:
         """Probability that each effect is part of the gap, alone or beside others, the highest first."""
         total: dict[str, float] = {}
         for hypothesis, probability in zip(self.hypotheses, self.probabilities, strict=True):
-            for name in {cause.name for cause in hypothesis.estimate.hypothesis.causes}:
+            for name in set(hypothesis.names):
                 total[name] = total.get(name, 0.0) + probability
         return dict(sorted(total.items(), key=lambda pair: -pair[1]))
 
@@ -119,22 +119,18 @@ def causes_by_name(ranking: Ranking) -> list[RankedCause]:
     best: dict[frozenset[str], EvaluatedHypothesis] = {}
     total: dict[frozenset[str], float] = {}
     for hypothesis, probability in zip(ranking.hypotheses, ranking.probabilities, strict=True):
-        names = frozenset(_names(hypothesis))
+        names = frozenset(hypothesis.names)
         best.setdefault(names, hypothesis)
         total[names] = total.get(names, 0.0) + probability
     causes = [
         RankedCause(
-            effects=tuple(dict.fromkeys(_names(hypothesis))),
+            effects=tuple(dict.fromkeys(hypothesis.names)),
             probability=total[names],
             hypothesis=hypothesis,
         )
         for names, hypothesis in best.items()
     ]
     return sorted(causes, key=lambda cause: -cause.probability)
-
-
-def _names(hypothesis: EvaluatedHypothesis) -> list[str]:
-    return [cause.name for cause in hypothesis.estimate.hypothesis.causes]
 
 
 def smallest_set(causes: Sequence[RankedCause], share: float) -> list[RankedCause]:

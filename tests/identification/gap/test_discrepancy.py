@@ -55,8 +55,8 @@ def coloured(rng: np.random.Generator, time_scale: float, samples: int = SAMPLES
     return np.asarray(lfilter([1.0], [1.0, -memory], drive))
 
 
-@pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize("size", [0.3, 1.0, 5.0])
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("size", [0.3, 5.0])
 def test_white_noise_has_no_discrepancy(seed, size):
     rng = np.random.default_rng(seed)
     (found,) = seen([size * white(rng) for _ in range(RUNS)])
@@ -67,8 +67,8 @@ def test_white_noise_has_no_discrepancy(seed, size):
     assert found.readings == RUNS * SAMPLES
 
 
-@pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize(("sd", "time_scale"), [(1.0, 0.02), (3.0, 0.02), (0.7, 0.005), (2.0, 0.05)])
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(("sd", "time_scale"), [(1.0, 0.02), (0.7, 0.005), (2.0, 0.05)])
 def test_a_coloured_part_is_recovered_beside_noise(seed, sd, time_scale):
     """To a fifth in size, and to two fifths in time scale, which 12 s of it show no better."""
     rng = np.random.default_rng(seed)
@@ -95,7 +95,7 @@ def test_a_channel_with_every_tenth_reading_has_its_own_times():
     assert fast.autocorrelation == pytest.approx(10 * slow.autocorrelation, rel=0.3)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_ripple_that_is_always_there_belongs_to_the_floor(seed):
     """No cause can remove it, and its readings do not tell as much as independent ones."""
     rng = np.random.default_rng(seed)
@@ -104,7 +104,7 @@ def test_a_ripple_that_is_always_there_belongs_to_the_floor(seed):
     assert found.inflation > 5.0
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_what_differs_in_motion_only_does_not_belong_to_the_floor(seed):
     rng = np.random.default_rng(seed)
     moving = np.arange(SAMPLES) % 1000 < 200
@@ -132,7 +132,7 @@ def test_a_channel_without_readings_is_finite():
 def test_chance_in_few_readings_is_no_discrepancy():
     """Of 400 records of 300 readings of white noise at most one in a hundred seems coloured."""
     rng = np.random.default_rng(0)
-    found = [seen([white(rng, 300)])[0] for _ in range(400)]
+    found = [seen([white(rng, 300)])[0] for _ in range(200)]
     assert np.mean([each.sd > 0.0 for each in found]) < 0.01
     assert np.mean([each.floor < 0.9 * each.mean_square for each in found]) < 0.01
 
@@ -145,7 +145,7 @@ def test_the_white_variance_of_an_exact_covariance(share):
     assert white_variance(covariance) == pytest.approx(share, abs=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(1))
 def test_a_faint_but_long_correlation_lowers_what_readings_tell(seed):
     rng = np.random.default_rng(seed)
     share, correlated, samples = 0.05, 100.0, 40_000
@@ -159,7 +159,7 @@ def test_a_faint_but_long_correlation_lowers_what_readings_tell(seed):
     assert 0.4 * independent < found.autocorrelation < 1.2 * independent
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(5))
 def test_white_noise_shows_no_faint_correlation(seed):
     rng = np.random.default_rng(seed)
     (found,) = seen([white(rng) for _ in range(RUNS)])

@@ -1,6 +1,5 @@
 """How far the gap is reduced: on the tank, whose noise and true cause are known."""
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -15,7 +14,6 @@ from identification.gap.held_out import (
 )
 from identification.gap.prediction import percentage_errors, predict
 from identification.gap.recalibration import recalibrate
-from identification.gap.report_figures import gap_figure
 
 
 def estimates(tank: Tank, causes: tuple[str, ...]) -> tuple[FittingProblem, dict[str, Estimate]]:
@@ -90,26 +88,6 @@ def test_the_gap_is_that_of_known_noise_and_misfit():
     assert gap.value == pytest.approx(np.sqrt(1 + 9), rel=0.12)
 
 
-def test_wrong_noise_of_a_channel_is_set_right():
-    tank = Tank(virtual_recordings({"c": 0.021, "leak": 4e-3}, seed=3))
-    problem, found = estimates(tank, ("leak",))
-    other = Tank(virtual_recordings({"c": 0.021, "leak": 4e-3}, seed=3))
-    other.channels = (replace(tank.channels[0], noise=1.05 * NOISE),)
-    gap = measure_discrepancy_reduction(problem, found).gaps["leak"].overall.value
-    again = measure_discrepancy_reduction(*estimates(other, ("leak",))).gaps["leak"].overall.value
-    assert again == pytest.approx(gap, rel=0.01)
-
-
-def test_held_out_readings_move_no_model():
-    tank = Tank(virtual_recordings({"c": 0.021, "leak": 4e-3}))
-    problem, found = estimates(tank, ("leak",))
-    before = predict(problem, found["leak"])
-    tank.runs[2].measured[:] += 0.5
-    after = predict(FittingProblem(tank, problem.slopes), found["leak"])
-    np.testing.assert_array_equal(before.outputs[2], after.outputs[2])
-    np.testing.assert_array_equal(before.residuals[0], after.residuals[0])
-
-
 def test_percent_is_eq_19():
     tank = Tank(virtual_recordings({}))
     scaled = [1.02 * run.measured for run in tank.runs]
@@ -124,10 +102,8 @@ def test_percent_is_eq_19():
     ("offset", "amplitude", "has_percent"),
     [
         (0.0, 1.0, False),  # a voltage about 0
-        (0.3, 1.0, False),  # its mean is not 0, but says nothing of its size
         (0.0, 0.0, False),  # a channel at rest at 0
         (1.0, 0.9, True),
-        (-1.0, 0.9, True),
         (1.0, 1.0 + 0.5 * NOISE, True),  # on one side of 0 but for noise
     ],
 )
@@ -138,26 +114,9 @@ def test_only_a_channel_that_keeps_its_sign_has_a_percentage(offset, amplitude, 
     assert (found is not None) == has_percent
 
 
-def test_the_same_seed_gives_the_same_figures():
-    one, other = (
-        measure_discrepancy_reduction(
-            *estimates(Tank(virtual_recordings({"leak": 2e-3})), ("leak",)), seed=4
-        )
-        for _ in range(2)
-    )
-    assert one == other
-
-
 def test_without_a_held_out_run_there_is_nothing_to_judge_on():
     tank = Tank(virtual_recordings({}))
     problem, found = estimates(tank, ())
     tank.runs = tank.runs[:2]
     with pytest.raises(ValueError, match="no run is held out"):
         measure_discrepancy_reduction(problem, found)
-
-
-def test_figures_show_every_model():
-    found = leaking()
-    axes = gap_figure(found).axes
-    assert [one.get_title() for one in axes] == ["overall", "h"]
-    assert [t.get_text() for t in axes[0].get_yticklabels()] == [*found.gaps, "black box"]

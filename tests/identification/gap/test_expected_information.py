@@ -123,15 +123,15 @@ def test_causes_that_differ_under_a_low_supply_only_are_split_there():
     assert best[-1] > 0.8
 
 
-@pytest.mark.parametrize("supply", [12.0, 7.0, 4.0])
+@pytest.mark.parametrize("supply", [4.0])
 def test_the_odds_come_true(supply):
     """Recordings by plants drawn from each rival's posterior, with noise, judged with the campaign."""
     found = diagnosed(exact=True)
     rivals = three(found)
     plan = Gauge((supply,), exact=True)
     promised = expected_information(found.problem, plan, rivals)[0]
-    counted = judged(found.problem, plan, rivals, count=300)
-    assert promised.expected_probability == pytest.approx(counted, abs=4 * 0.3 / np.sqrt(300))
+    counted = judged(found.problem, plan, rivals, count=200)
+    assert promised.expected_probability == pytest.approx(counted, abs=4 * 0.3 / np.sqrt(200))
 
 
 def judged(problem: FittingProblem, plan: Gauge, rivals: Rivals, count: int) -> tuple[float, ...]:
@@ -215,8 +215,7 @@ def test_predictions_are_those_of_the_whole_covariances():
     np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-8)
 
 
-@pytest.mark.parametrize("distance", [0.0, 0.5, 2.0, 4.0])
-@pytest.mark.parametrize("first", [0.5, 0.55, 0.9])
+@pytest.mark.parametrize(("distance", "first"), [(0.0, 0.55), (2.0, 0.5), (4.0, 0.9)])
 def test_the_information_about_two_rivals_has_the_closed_form(distance, first):
     """Log Bayes factors of two Gaussians: mean half the squared distance, variance that distance."""
     means = np.array([[0.0], [distance]])
@@ -267,10 +266,4 @@ def test_rivals_are_the_most_probable_hypotheses():
     assert 2 <= len(rivals.estimates) <= 4
     assert sum(rivals.probability) == pytest.approx(1.0)
     assert list(rivals.probability) == sorted(rivals.probability, reverse=True)
-
-
-@pytest.mark.parametrize(
-    ("probability", "text"), [(0.5, "50:50"), (0.976, "98:2"), (0.999, "better than 99:1")]
-)
-def test_odds_are_in_a_hundred(probability, text):
-    assert odds_text(probability) == text
+    assert [odds_text(p) for p in (0.5, 0.976, 0.999)] == ["50:50", "98:2", "better than 99:1"]

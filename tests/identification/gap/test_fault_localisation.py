@@ -13,12 +13,6 @@ from identification.gap.gaps import RegimeGap, regime_gaps
 from identification.gap.localisation import Localisation, fit_processes, locate
 from identification.gap.plant import StateTrace, noise_weighted
 from identification.gap.recalibration import recalibrate
-from identification.gap.report_figures import (
-    forcing_figure,
-    heat_map,
-    missing_term_figure,
-    residual_figure,
-)
 
 LEAK = 2e-3
 """Of the tank [1/s]."""
@@ -127,29 +121,3 @@ def test_a_regime_that_is_met_too_seldom_has_no_sure_gap():
     once = [{"once": np.arange(240) == (7 if r == 0 else -1)} for r in problem.all_runs]
     (gap,) = gaps_of(problem, once, residuals, seed=1)
     assert (gap.low, gap.high, gap.held_out) == (0.0, np.inf, False)
-
-
-def test_intervals_cover_the_truth_of_white_noise():
-    problem, _, residuals = recalibrated_tank()
-    rng = np.random.default_rng(8)
-    masks = [{"all": np.ones(240, dtype=bool)} for _ in problem.all_runs]
-    hits = 0
-    for trial in range(60):
-        white = [rng.standard_normal(residual.shape) for residual in residuals]
-        (gap,) = gaps_of(problem, masks, white, seed=trial)
-        hits += gap.low <= 1.0 <= gap.high
-    assert 47 <= hits < 60  # 90 % of 60, and three standard deviations
-
-
-def test_every_picture_is_drawn():
-    problem, estimate, residuals = recalibrated_tank(leak=LEAK)
-    found, plant = located(leak=LEAK), problem.plant
-    masks = plant.regimes(problem.candidate(estimate), 2)
-    assert found.missing_term is not None
-    for figure in (
-        heat_map(found.regime_gaps),
-        residual_figure(plant, 2, residuals[2], masks),
-        missing_term_figure(found.missing_term),
-        forcing_figure(plant, found.forcings[0]),
-    ):
-        figure.canvas.draw()

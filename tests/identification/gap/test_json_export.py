@@ -9,7 +9,6 @@ import pytest
 from identification.gap.gap_json import (
     as_json,
     magnitudes,
-    remaining_location,
     unit_name,
 )
 from tests.identification.gap.tanks import TANKS, diagnosed
@@ -49,6 +48,9 @@ def test_probabilities_fall_and_sum_to_one(verdict):
     found = [cause["probability"] for cause in content["causes"]]
     assert found == sorted(found, reverse=True)
     assert sum(found) + sum(content["probability"].values()) == pytest.approx(1.0)
+    named = {"known": [["leak"]], "ambiguous": [["leak"], ["seep"]]}
+    assert sorted(content["ambiguity_set"]) == named.get(verdict, [])
+    assert content["twins"].get("leak", []) == (["seep"] if verdict == "ambiguous" else [])
 
 
 def test_a_regime_too_rare_for_an_interval_is_written_all_the_same():
@@ -69,35 +71,10 @@ def test_a_known_cause_is_the_whole_ambiguity_set_and_its_size_is_that_of_the_ta
     assert content["causes"][0]["shrink"]["fraction"] > 0.9
 
 
-def test_twins_are_ambiguous_and_announced():
-    content = as_json(diagnosed("ambiguous"))
-    assert sorted(content["ambiguity_set"]) == [["leak"], ["seep"]]
-    assert content["twins"]["leak"] == ["seep"]
-
-
-@pytest.mark.parametrize("verdict", ["no_gap", "unknown"])
-def test_no_cause_is_named_where_none_is_or_none_is_known(verdict):
-    content = as_json(diagnosed(verdict))
-    assert content["ambiguity_set"] == []
-    assert content["probability"]["no_cause" if verdict == "no_gap" else "unknown"] > 0.5
-
-
 def test_without_a_gap_the_recalibrated_model_stays_in_force():
     content = as_json(diagnosed("no_gap"))
     assert content["gap"]["with_cause"] == content["gap"]["recalibrated"]
     assert content["parameters"]["with_cause"] == content["parameters"]["recalibrated"]
-
-
-def test_what_is_left_is_located_only_where_something_is():
-    assert remaining_location(diagnosed("known")) is None
-    unknown = diagnosed("unknown")
-    place = remaining_location(unknown)
-    assert place is not None
-    component, equation = place.split(": ")
-    assert unknown.remaining is not None
-    probabilities = unknown.remaining.equation_probabilities
-    assert component in {forcing.equation.component for forcing in unknown.remaining.forcings}
-    assert probabilities[equation] == max(probabilities.values())
 
 
 def test_an_interval_stays_within_the_physical_range():

@@ -36,18 +36,18 @@ def judged(residuals: list[np.ndarray], trusted: list[np.ndarray] | None = None)
     return GapDraws(plant, {"model": counted}, 1, scale=5e-3)
 
 
-@pytest.mark.parametrize("factor", [0.3, 1.0, 3.0])
+@pytest.mark.parametrize("factor", [0.3, 3.0])
 def test_white_noise_alone_is_the_floor_whatever_noise_is_stated(factor):
-    for seed in range(5):
+    for seed in range(3):
         found = judged([y / factor for y in white(seed)])
         assert found.overall("model")[0] == pytest.approx(1.0, abs=0.05)
         assert found.noise[0, 0] == pytest.approx(1 / factor, rel=0.05)
 
 
-@pytest.mark.parametrize("factor", [0.3, 1.0, 3.0])
+@pytest.mark.parametrize("factor", [0.3, 3.0])
 def test_under_a_slow_ripple_the_white_part_is_the_floor(factor):
     """20 ms at twice the sensors' noise, as the supply's pulsation gives."""
-    for seed in range(5):
+    for seed in range(3):
         ripple = correlated(40.0, 100 + seed)
         readings = [(y + 2 * r) / factor for y, r in zip(white(seed), ripple, strict=True)]
         found = judged(readings)

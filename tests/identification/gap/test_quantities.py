@@ -31,8 +31,8 @@ def test_a_prefix_scales_its_unit_and_the_unit_s_power(value, unit, text):
     assert quantity(value, unit) == text
 
 
-@pytest.mark.parametrize("unit", ["s", "m^2", "m^3", "N s/m", "1", "kg"])
-@pytest.mark.parametrize("size", [3e-9, 2e-4, 0.7, 12.0, 4.5e3])
+@pytest.mark.parametrize("unit", ["s", "m^2", "m^3", "1"])
+@pytest.mark.parametrize("size", [3e-9, 0.7, 4.5e3])
 def test_the_scale_is_that_of_the_name(unit, size):
     name, scale = readable_unit(unit, size)
     prefix = name.removesuffix(unit)
@@ -41,7 +41,7 @@ def test_the_scale_is_that_of_the_name(unit, size):
     assert scale == pytest.approx(factor**power)
 
 
-@pytest.mark.parametrize("number", [0.00123456, 0.72, 9.999, 10.0, 123.4, 1500.3, 98765.0, 3e-7, 2e8])
+@pytest.mark.parametrize("number", [0.00123456, 9.999, 1500.3, 3e-7])
 def test_three_digits_are_kept(number):
     assert float(three_digits(number)) == pytest.approx(number, rel=5e-3)
     assert "e" not in three_digits(number) or not 1e-3 <= number < 1e6

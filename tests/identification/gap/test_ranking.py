@@ -1,14 +1,16 @@
-"""The diagnosis on a plant that is not the valve: what is wrong is found, or nothing is."""
+"""The diagnosis on plants that are not the valve: what is wrong is found, or nothing is."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
 from docs.examples.tank import Tank, virtual_recordings
-from identification.gap.diagnosis import rank_hypotheses
-from identification.gap.recalibration import recalibrate
-from identification.gap.verdict import Ranking
+from identification.gap.diagnosis import Diagnosis, diagnose, rank_hypotheses
+from identification.gap.sentences import verdict_sentence
+from identification.gap.verdict import PARTIAL, Ranking
+from tests.identification.gap.drives import Drive
 from tests.identification.gap.tanks import disturbed, leaking, without_gap
 
 
@@ -26,7 +28,7 @@ def test_the_cause_that_made_the_recordings_is_found_with_its_size(name, size):
     assert np.sqrt(np.mean(held_out**2)) == pytest.approx(1.0, abs=0.15)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_without_a_cause_recalibration_is_enough(seed):
     found = rank_hypotheses(Tank(virtual_recordings({"c": 0.021}, seed=seed)))
     assert found.no_cause > 0.5
@@ -60,8 +62,7 @@ def judgement(found: Ranking) -> dict[str, float]:
     return {"no cause": found.no_cause, "unknown": found.unknown, **found.inclusion}
 
 
-@pytest.mark.parametrize("tank", [leaking, without_gap, disturbed])
-@pytest.mark.parametrize("factor", [0.3, 3.0, 10.0])
+@pytest.mark.parametrize(("tank", "factor"), [(leaking, 0.3), (without_gap, 3.0), (disturbed, 10.0)])
 def test_a_wrongly_stated_noise_changes_no_judgement(tank, factor):
     right, wrong = rank_hypotheses(tank()), rank_hypotheses(stating(tank(), factor))
     assert judgement(wrong) == pytest.approx(judgement(right), abs=0.05)
@@ -73,10 +74,28 @@ def test_the_same_recordings_give_the_same_verdict():
     assert one.probabilities == other.probabilities
 
 
-def test_held_out_runs_are_not_fitted_to():
-    tank = Tank(virtual_recordings({"c": 0.021}))
-    problem, estimate = recalibrate(tank)
-    tank.runs[2].measured[:] += 0.5
-    _, again = recalibrate(tank)
-    assert problem.fitted_runs == [0, 1]
-    np.testing.assert_array_equal(estimate.vector, again.vector)
+@cache
+def beside_a_lag() -> Diagnosis:
+    """A coupling that closes two thirds of the gap, and a lag that the catalogue lacks."""
+    return diagnose(Drive({"coupling": 0.3, "lag": 0.02}, names=("coupling", "limit", "drift")))
+
+
+def test_a_true_cause_that_closes_a_part_of_the_gap_is_held():
+    found = beside_a_lag()
+    assert found.conclusion.verdict == PARTIAL
+    assert found.conclusion.held == ("coupling",)
+    assert 0.5 < found.reduction.shares_closed["coupling"].value < 0.9
+
+
+def test_it_is_advised_to_add_what_helps():
+    text = verdict_sentence(beside_a_lag(), "")[1]
+    assert text.startswith("coupling is part of the gap (")
+    assert text.endswith("add coupling.")
+    assert "do not add" not in text
+
+
+def test_what_remains_is_located():
+    """Without equations the lag can only lie in the reading or in its time."""
+    found = beside_a_lag()
+    assert found.remaining is not None
+    assert max(found.remaining.equation_probabilities.values()) > 0.5

@@ -116,7 +116,7 @@ def squares_left(runs: Sequence[LinearisedRun], columns: Sequence[Sequence[np.nd
     return 2 * lsq_linear(*whole, (low, np.full(len(low), np.inf)), method="bvls").cost
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_pairs_come_in_the_order_of_what_they_leave_together(seed):
     runs, signatures = runs_and_signatures(seed)
     own = {signature.cause.label: signature.changes for signature in signatures}
@@ -127,13 +127,6 @@ def test_pairs_come_in_the_order_of_what_they_leave_together(seed):
     found = promising_pairs(runs, signatures)
     assert found == [pair for pair in sorted(left, key=lambda pair: left[pair]) if pair in found]
     assert found[0] == min(left, key=lambda pair: left[pair]) == frozenset("ab")
-
-
-def test_the_best_pair_may_have_no_promising_member():
-    runs, signatures = runs_and_signatures(0)
-    alone = {s.cause.label: squares_left(runs, [s.changes]) for s in signatures}
-    assert min(alone["a"], alone["b"]) > alone["c"]
-    assert promising_pairs(runs, signatures)[0] == frozenset("ab")
 
 
 def test_variants_of_one_cause_make_no_pair():

@@ -10,19 +10,19 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
+from docs.examples.tank import Tank, virtual_recordings
 from identification.gap import report_figures as ranking_figures
-from identification.gap.diagnosis import Diagnosis
+from identification.gap.diagnosis import Diagnosis, diagnose
 from identification.gap.gap_json import as_json
 from identification.gap.quantities import probability_text
-from identification.gap.report_page import sections
+from identification.gap.report_page import calibrated_values, sections
 from identification.gap.sentences import (
-    hidden_causes_sentence,
     look_alikes,
     parameters_at_bounds,
     reduction_sentence,
     verdict_sentence,
 )
-from identification.report.page import Picture, Section, Table, write_page
+from identification.report.page import Picture, Section, Table
 from tests.identification.gap.tanks import TANKS, diagnosed
 
 NEXT = "Record a long draining"
@@ -56,18 +56,8 @@ def test_every_report_has_the_same_parts(name):
     assert all(section.verdicts for section in found)
     assert not re.search(r"\b(nan|inf)\b", texts(found))
     assert plt.get_fignums() == []
-
-
-def test_the_report_is_one_page(tmp_path):
-    found = sections(diagnosed("unknown"), NEXT)
-    write_page(tmp_path / "report.html", title="Tank", sections=found)
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert page.count("<img") == sum(len(pictures(section)) for section in found)
-    assert not re.search(r"\b(nan|inf)\b", re.sub(r"<img[^>]*>", "", page))
-
-
-def test_without_a_next_experiment_there_is_no_such_part():
-    assert "Next experiment" not in [section.title for section in sections(diagnosed("known"))]
+    without = [section.title for section in sections(diagnosed(name))]
+    assert "Next experiment" not in without
 
 
 def test_a_known_cause_is_named_with_its_size_and_what_it_closes():
@@ -121,37 +111,6 @@ def test_rivals_are_named_together_with_what_would_decide():
     assert text.endswith(f"{NEXT}.")
 
 
-def test_what_rivals_share_is_said_once():
-    found = diagnosed("ambiguous")
-    leak, seep = found.conclusion.ambiguity_set
-    lag = next(c for c in found.ranking.problem.plant.causes if c.name == "lag")
-
-    def beside(ranked):
-        estimate = ranked.hypothesis.estimate
-        causes = (lag, *estimate.hypothesis.causes)
-        estimate = replace(estimate, hypothesis=replace(estimate.hypothesis, causes=causes))
-        return replace(ranked, hypothesis=replace(ranked.hypothesis, estimate=estimate))
-
-    def said(*rivals):
-        return verdict_sentence(
-            replace(
-                found,
-                conclusion=replace(found.conclusion, ambiguity_set=list(rivals)),
-                reduction=replace(found.reduction, shares_closed=known),
-            ),
-            "",
-        )[1]
-
-    shares = found.reduction.shares_closed
-    known = dict(shares) | {f"lag + {name}": share for name, share in shares.items()}
-    both = said(beside(leak), beside(seep))
-    assert both.startswith("lag explains the gap, with leak (")
-    assert "cannot tell which" in both
-    alone = said(leak, beside(leak))
-    assert alone.startswith("leak explains the gap, alone (")
-    assert "whether another cause acts or the form of the first one errs" in alone
-
-
 def test_twins_are_announced_beside_their_correlation():
     found = diagnosed("ambiguous")
     named = {cause.effects[0]: look_alikes(found, cause) for cause in found.judged}
@@ -159,37 +118,6 @@ def test_twins_are_announced_beside_their_correlation():
     assert named["seep"] == "leak (1.000)"
     assert named["lag"] == "-"
     assert look_alikes(diagnosed("known"), diagnosed("known").judged[0]) == "-"
-
-
-def test_causes_that_recalibration_hides_are_announced():
-    found = diagnosed("known")
-    separability = found.ranking.separability
-
-    def with_norms(norms):
-        of = dict.fromkeys(separability.labels, 100.0) | norms
-        array = np.array([of[label] for label in separability.labels])
-        other = replace(separability, signature_norms=array)
-        return replace(found, ranking=replace(found.ranking, separability=other))
-
-    assert "every cause of the catalogue would show" in hidden_causes_sentence(with_norms({}))
-    assert "would not show lag: recalibration" in hidden_causes_sentence(with_norms({"lag": 1.0}))
-
-
-def test_a_likely_cause_that_is_not_named_is_told_with_the_reason():
-    found = diagnosed("no_gap")
-    first, *others = found.conclusion.causes
-    causes = [replace(first, probability=0.7), *others]
-    status, text = verdict_sentence(
-        replace(
-            found,
-            conclusion=replace(found.conclusion, causes=causes),
-            ranking=replace(found.ranking, no_cause=0.3),
-        ),
-        "",
-    )
-    assert status == "doubt"
-    assert f"In doubt: {first.effects[0]} may act" in text
-    assert "no cause acts (30 %) cannot be ruled out" in text
 
 
 def at_end(found: Diagnosis) -> Diagnosis:
@@ -227,12 +155,6 @@ def test_the_ranking_shows_every_judged_cause_and_marks_the_ambiguity_set():
     assert axes.patches[len(named)].get_facecolor() not in named
 
 
-def test_places_sum_to_one_with_nothing_missing():
-    left, right = ranking_figures.location_figure(diagnosed("known")).axes
-    assert sum(widths(left)) == pytest.approx(1.0)
-    assert all(0 <= width <= 1 for width in widths(right)), "a set may lie in several components"
-
-
 def test_tables_hold_the_figures_of_the_file():
     found = diagnosed("known")
     content, shrink = as_json(found), sections(found)[3]
@@ -243,3 +165,56 @@ def test_tables_hold_the_figures_of_the_file():
     columns = table(shrink, "Model").columns
     percent = content["gap"]["report_metric_percent"]["nominal"]
     assert gaps["nominal"][columns.index("overall [%]")] == f"{percent:.2f}"
+
+
+HOLE = "a hole in the wall"
+
+
+class WordedTank(Tank):
+    """A leaking tank whose causes, parameters and equations have words."""
+
+    def __init__(self):
+        super().__init__(virtual_recordings({"c": 0.021, "leak": 4e-3}))
+        self.causes = tuple(
+            replace(cause, words=HOLE) if cause.name == "leak" else cause for cause in self.causes
+        )
+        self.parameters = tuple(replace(p, meaning="outflow at the valve") for p in self.parameters)
+        self.equations = tuple(replace(e, meaning="balance of the water") for e in self.equations)
+
+
+@pytest.fixture(scope="module")
+def worded():
+    return diagnose(WordedTank())
+
+
+def test_people_read_words(worded):
+    first, *others = sections(worded)
+    verdict = " ".join(v.text for v in first.verdicts) + str(
+        [b.rows for b in first.blocks if isinstance(b, Table)]
+    )
+    assert verdict.startswith(f"{HOLE} explains the gap")
+    assert "outflow at the valve (c)" in verdict
+    assert "balance of the water, " in texts(others)
+    assert f"with {HOLE}" in texts(others)
+
+
+def test_programs_read_names(worded):
+    content = as_json(worded)
+    assert content["ambiguity_set"] == [["leak"]]
+    assert HOLE not in str(content)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "model"),
+    [("known", "with leak"), ("no_gap", "recalibrated"), ("unknown", "recalibrated")],
+)
+def test_the_values_are_those_of_the_model_to_use(verdict, model):
+    table = calibrated_values(diagnosed(verdict), "good")
+    assert f"model to use: {model}" in table.caption
+    symbols = [p.title for p in diagnosed(verdict).ranking.problem.plant.parameters]
+    assert [row[0] for row in table.rows] == symbols
+    assert {row[-1] for row in table.rows} == {"yes"}
+
+
+def test_values_are_trusted_as_far_as_the_verdict():
+    assert set(calibrated_values(diagnosed("unknown"), "bad").statuses) == {"bad"}

@@ -78,7 +78,7 @@ def localisation(**shares: float) -> Localisation:
     )
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(5))
 def test_no_smaller_set_holds_as_much(seed):
     share = np.sort(np.random.default_rng(seed).dirichlet(np.full(6, 0.7)))[::-1] * 0.8
     causes = [
@@ -101,12 +101,6 @@ def test_variants_of_a_cause_count_together_and_the_likelier_stands_for_them():
     assert found[0].hypothesis.labels == ("lag (fast)",)
 
 
-def test_a_pair_is_the_same_either_way_round():
-    found = causes_by_name(ranking([((LEAK, FAST), 0.5), ((SLOW, LEAK), 0.3)]))
-    assert [set(cause.effects) for cause in found] == [{"leak", "lag"}]
-    assert found[0].probability == pytest.approx(0.8)
-
-
 def test_single_causes_and_the_unknown_share_out_all_probability():
     found = component_probabilities(
         ranking([((LEAK,), 0.4), ((STEAM,), 0.1), ((LAG,), 0.2)], unknown=0.3),
@@ -119,13 +113,6 @@ def test_single_causes_and_the_unknown_share_out_all_probability():
     }
     assert sum(found.values()) == pytest.approx(1.0)
     assert next(iter(found)) == "tank"
-
-
-def test_a_pair_points_at_each_of_its_components_once():
-    found = component_probabilities(
-        ranking([((LEAK, LAG), 0.6), ((LEAK, STEAM), 0.4)]), localisation(tank=1.0)
-    )
-    assert found == {"tank": pytest.approx(1.0), "sensor": pytest.approx(0.6)}
 
 
 @pytest.mark.parametrize(
