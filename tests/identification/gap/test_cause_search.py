@@ -66,17 +66,6 @@ def test_a_cause_that_has_become_superfluous_is_left_out():
     assert pool.ranked()[0][0].labels == ("lag",)
 
 
-def test_a_useless_cause_makes_a_set_less_probable():
-    found = rank_hypotheses(Drive(THREE))
-    by_set = {
-        frozenset(each.labels): p for each, p in zip(found.hypotheses, found.probabilities, strict=True)
-    }
-    true = frozenset(THREE)
-    larger = [own for own in by_set if own > true]
-    assert larger
-    assert all(by_set[own] < 0.1 * by_set[true] for own in larger)
-
-
 def test_a_catalogue_without_the_true_causes_names_none():
     found = rank_hypotheses(Drive(FAINT_AMONG_FOUR, names=("limit", "drag")))
     assert found.unknown > 0.8

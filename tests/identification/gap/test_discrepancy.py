@@ -78,23 +78,6 @@ def test_a_coloured_part_is_recovered_beside_noise(seed, sd, time_scale):
     assert found.mean_square == pytest.approx(1.0 + sd**2, rel=0.2)
 
 
-def test_a_channel_with_every_tenth_reading_has_its_own_times():
-    rng = np.random.default_rng(0)
-    trusted = np.zeros((2, 10 * SAMPLES), dtype=bool)
-    trusted[0], trusted[1, ::10] = True, True
-    residuals = [
-        np.vstack([white(rng, 10 * SAMPLES), white(rng, 10 * SAMPLES)])
-        + 2.0 * coloured(rng, 0.1, 10 * SAMPLES)
-        for _ in range(RUNS)
-    ]
-    fast, slow = seen(residuals, trusted)
-    assert (fast.readings, slow.readings) == (RUNS * 10 * SAMPLES, RUNS * SAMPLES)
-    for found in (fast, slow):
-        assert found.sd == pytest.approx(2.0, rel=0.2)
-        assert found.time_scale == pytest.approx(0.1, rel=0.4)
-    assert fast.autocorrelation == pytest.approx(10 * slow.autocorrelation, rel=0.3)
-
-
 @pytest.mark.parametrize("seed", range(2))
 def test_a_ripple_that_is_always_there_belongs_to_the_floor(seed):
     """No cause can remove it, and its readings do not tell as much as independent ones."""
@@ -122,11 +105,6 @@ def test_recordings_without_noise_have_a_finite_floor(misfit):
     assert np.all(np.isfinite(numbers))
     assert found.floor > 0.0
     assert found.floor <= max(found.mean_square, np.finfo(float).tiny)
-
-
-def test_a_channel_without_readings_is_finite():
-    (found,) = seen([np.zeros((1, SAMPLES))], np.zeros((1, SAMPLES), dtype=bool))
-    assert (found.readings, found.floor, found.sd) == (0, 1.0, 0.0)
 
 
 def test_chance_in_few_readings_is_no_discrepancy():
@@ -157,10 +135,3 @@ def test_a_faint_but_long_correlation_lowers_what_readings_tell(seed):
     )
     independent = 1.0 + share / (1.0 + share) * 2.0 * correlated
     assert 0.4 * independent < found.autocorrelation < 1.2 * independent
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_white_noise_shows_no_faint_correlation(seed):
-    rng = np.random.default_rng(seed)
-    (found,) = seen([white(rng) for _ in range(RUNS)])
-    assert found.autocorrelation < 1.1

@@ -1,14 +1,13 @@
 """Experiment design: the chosen experiment tells the rivals apart, and as well as expected."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.integrate import quad
-from scipy.special import expit, logsumexp
+from scipy.special import expit
 from scipy.stats import norm
 
 from identification.gap.diagnosis import rank_hypotheses
@@ -21,13 +20,10 @@ from identification.gap.experiment_design import (
     kullback_leibler_divergences,
     odds_text,
     outcome_distributions,
-    parameter_posteriors,
     select_rivals,
 )
-from identification.gap.fitting_problem import FittingProblem
-from identification.gap.gauss_newton import linearise, nuisance_slopes
 from identification.gap.plant import Cause, Channel, FreeParameter, NuisanceParameter, Run
-from identification.gap.variable_projection import LinearisedRun, normal_equations
+from identification.gap.variable_projection import LinearisedRun
 from identification.gap.verdict import Ranking
 
 NOISE, SAMPLES, PERIOD = 0.02, 40, 1e-3
@@ -106,12 +102,6 @@ def two(found: Ranking) -> Rivals:
     return Rivals(estimates=(estimates["offset",], estimates["bend",]), probability=(0.55, 0.45))
 
 
-def three(found: Ranking) -> Rivals:
-    """The two causes and none, as if the campaign had left them open."""
-    estimates = (*two(found).estimates, found.recalibrated.estimate)
-    return Rivals(estimates=estimates, probability=(0.4, 0.35, 0.25))
-
-
 def test_causes_that_differ_under_a_low_supply_only_are_split_there():
     found = diagnosed(exact=False)
     rivals = two(found)
@@ -121,65 +111,6 @@ def test_causes_that_differ_under_a_low_supply_only_are_split_there():
     assert np.argmin([gain.expected_entropy for gain in promised]) == SUPPLIES.index(4.0)
     assert best[-1] > best[-2] > best[-3] > 0.56
     assert best[-1] > 0.8
-
-
-@pytest.mark.parametrize("supply", [4.0])
-def test_the_odds_come_true(supply):
-    """Recordings by plants drawn from each rival's posterior, with noise, judged with the campaign."""
-    found = diagnosed(exact=True)
-    rivals = three(found)
-    plan = Gauge((supply,), exact=True)
-    promised = expected_information(found.problem, plan, rivals)[0]
-    counted = judged(found.problem, plan, rivals, count=200)
-    assert promised.expected_probability == pytest.approx(counted, abs=4 * 0.3 / np.sqrt(200))
-
-
-def judged(problem: FittingProblem, plan: Gauge, rivals: Rivals, count: int) -> tuple[float, ...]:
-    """Mean probability of each rival over recordings that it made."""
-    rng = np.random.default_rng(9)
-    nominal = [np.zeros(len(plan.tolerances))]
-    slopes = nuisance_slopes(FittingProblem(plan), rivals.estimates[:1], nominal)[0]
-    planned = [replace(estimate, slopes=None) for estimate in rivals.estimates]
-    predicted = [lines[0] for lines in linearise(FittingProblem(plan, slopes), planned, [0])]
-    campaign = linearise(problem, rivals.estimates, problem.fitted_runs)
-    found = []
-    known_numbers = parameter_posteriors(problem, rivals.estimates)
-    for right, (estimate, known) in enumerate(zip(rivals.estimates, known_numbers, strict=True)):
-        k = len(estimate.vector)
-        drawn = known.mean + rng.standard_normal((count, len(known.mean))) @ known.factor.T
-        parameters = (*plan.parameters, *estimate.hypothesis.parameters)
-        scaled = (estimate.vector + drawn[:, :k]).T
-        values = {p.symbol: column * p.scale for p, column in zip(parameters, scaled, strict=True)}
-        values["curve"] = plan.tolerances[0].sd * drawn[:, k]
-        values["zero"] = plan.run_offsets[0].sd * rng.standard_normal(count)
-        clean = response(values, plan.runs[0].inputs["u"]).T
-        own = []
-        before = np.log(rivals.probability) - [log_evidence(old) for old in campaign]
-        for seen in (clean + rng.normal(0.0, NOISE, clean.shape)) / NOISE:
-            scores = before + [
-                log_evidence([*old, replace(new, residual=seen + new.residual)])
-                for old, new in zip(campaign, predicted, strict=True)
-            ]
-            own.append(np.exp(scores[right] - logsumexp(scores)))
-        found.append(float(np.mean(own)))
-    return tuple(found)
-
-
-def log_evidence(runs: Sequence[LinearisedRun]) -> float:
-    """Of linearised runs, all numbers integrated out but for a constant."""
-    together = [
-        replace(
-            run,
-            slopes=np.column_stack([run.slopes, run.tolerance_slopes]),
-            tolerance_slopes=np.zeros((SAMPLES, 0)),
-        )
-        for run in runs
-    ]
-    found = normal_equations(together)
-    k = runs[0].slopes.shape[1]
-    hessian = found.hessian + np.diag([0.0] * k + [1.0] * (len(found.hessian) - k))
-    gain = found.gradient @ np.linalg.solve(hessian, found.gradient)
-    return float(-0.5 * (found.least - gain + np.linalg.slogdet(hessian)[1]))
 
 
 def test_predictions_are_those_of_the_whole_covariances():

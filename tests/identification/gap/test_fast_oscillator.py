@@ -45,10 +45,6 @@ def test_a_missing_drag_is_found_in_the_equation_of_the_speed(truth):
     assert found.forcings[0].explained > 0.9
 
 
-def test_without_a_missing_drag_nothing_is_missing():
-    assert located().nothing_missing > 0.9
-
-
 def test_quadratic_drag_has_the_shape_of_a_parabola():
     term = drag(quadratic=0.05)
     error = (term.y + 0.05 * term.x * np.abs(term.x)) / term.sd
@@ -73,12 +69,6 @@ def test_of_a_run_that_is_too_long_the_first_part_counts():
     assert len(edges) - 1 <= 400
     assert np.median(np.diff(edges)) <= 3
     assert 20 * 25 < edges[-1] < 20 * 60
-
-
-def test_the_part_of_a_long_run_begins_with_its_readings():
-    edges = resolving_edges(*sine(1000), 0.19, 400, 5000)
-    assert edges[0] == 5000
-    assert 5000 + 20 * 25 < edges[-1] < 5000 + 20 * 60
 
 
 def test_windows_are_few_where_runs_are_many_or_long():

@@ -11,7 +11,7 @@ from identification.gap.fitting_problem import Estimate, FittingProblem
 from identification.gap.forcing import quadratic_forms, window_edges
 from identification.gap.gaps import RegimeGap, regime_gaps
 from identification.gap.localisation import Localisation, fit_processes, locate
-from identification.gap.plant import StateTrace, noise_weighted
+from identification.gap.plant import noise_weighted
 from identification.gap.recalibration import recalibrate
 
 LEAK = 2e-3
@@ -49,14 +49,6 @@ def test_without_a_gap_nothing_is_missing():
     assert found.missing_term is None
 
 
-def test_probabilities_sum_to_one_and_the_same_seed_tells_the_same():
-    found = located(leak=LEAK)
-    assert sum(found.equation_probabilities.values()) + found.nothing_missing == pytest.approx(1)
-    again = locate(*recalibrated_tank(leak=LEAK), seed=4)
-    assert again.regime_gaps == found.regime_gaps
-    assert again.equation_probabilities == found.equation_probabilities
-
-
 def test_the_shape_is_that_of_the_missing_term():
     """What a leak does beyond what the outlet's coefficient absorbs, over the level."""
     problem, estimate, _ = recalibrated_tank(leak=LEAK)
@@ -91,17 +83,6 @@ def test_a_forcing_is_recovered_but_for_noise_and_what_calibration_absorbs():
 
 def gaps_of(problem: FittingProblem, masks: list, residuals: list, seed: int) -> list[RegimeGap]:
     return regime_gaps(problem.plant, masks, residuals, seed, scale=0.005)
-
-
-def test_windows_are_dense_where_states_move():
-    time = np.arange(1000) * 0.1
-    moving = StateTrace(unit="m", scale=1.0, values=np.clip((time - 50.0) / 5.0, 0.0, 1.0))
-    edges = window_edges(time, {"x": moving}, 80)
-    assert edges[0] == 0
-    assert edges[-1] == len(time) - 1
-    assert np.all(np.diff(edges) > 0)
-    inside = np.sum((time[edges] >= 50) & (time[edges] <= 55))
-    assert inside > 0.25 * len(edges)
 
 
 def test_regime_gaps_are_root_mean_squares_with_intervals_that_hold_them():

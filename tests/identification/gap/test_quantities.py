@@ -8,9 +8,7 @@ from identification.gap.quantities import (
     probability_text,
     quantity,
     quantity_with_interval,
-    readable_unit,
     share_text,
-    three_digits,
 )
 
 
@@ -29,22 +27,6 @@ from identification.gap.quantities import (
 )
 def test_a_prefix_scales_its_unit_and_the_unit_s_power(value, unit, text):
     assert quantity(value, unit) == text
-
-
-@pytest.mark.parametrize("unit", ["s", "m^2", "m^3", "1"])
-@pytest.mark.parametrize("size", [3e-9, 0.7, 4.5e3])
-def test_the_scale_is_that_of_the_name(unit, size):
-    name, scale = readable_unit(unit, size)
-    prefix = name.removesuffix(unit)
-    power = int(unit[2]) if "^" in unit else 1
-    factor = {"": 1, "M": 1e6, "k": 1e3, "d": 0.1, "c": 0.01, "m": 1e-3, "u": 1e-6, "n": 1e-9}[prefix]
-    assert scale == pytest.approx(factor**power)
-
-
-@pytest.mark.parametrize("number", [0.00123456, 9.999, 1500.3, 3e-7])
-def test_three_digits_are_kept(number):
-    assert float(three_digits(number)) == pytest.approx(number, rel=5e-3)
-    assert "e" not in three_digits(number) or not 1e-3 <= number < 1e6
 
 
 def test_an_interval_has_one_unit():

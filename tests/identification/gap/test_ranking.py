@@ -42,15 +42,6 @@ def test_what_the_catalogue_lacks_is_unknown():
     assert all(probability < 0.1 for probability in found.inclusion.values())
 
 
-def test_two_causes_are_found_together():
-    found = rank_hypotheses(Tank(virtual_recordings({"leak": 4e-3, "lag": 5.0})))
-    assert set(found.hypotheses[0].labels) == {"leak", "lag"}
-    assert found.probabilities[0] > 0.8
-    assert found.inclusion["leak"] > 0.9
-    assert found.inclusion["lag"] > 0.9
-    assert found.inclusion["evaporation"] < 0.2
-
-
 def stating(tank: Tank, factor: float) -> Tank:
     """The tank with its noise stated as a multiple of the true one."""
     (channel,) = tank.channels

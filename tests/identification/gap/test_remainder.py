@@ -1,7 +1,6 @@
 """What remains beside named causes: verdict partial, advice by held-out benefit, disturbances."""
 
 import json
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -20,12 +19,9 @@ from identification.gap.gap_json import (
     term_table,
     write_results,
 )
-from identification.gap.held_out import RECALIBRATED
 from identification.gap.posterior import variance_inflation
-from identification.gap.report_page import sections
 from identification.gap.sentences import verdict_sentence
 from identification.gap.verdict import NO_GAP, PARTIAL, UNKNOWN
-from identification.report.page import Picture, Table
 
 
 @cache
@@ -103,16 +99,6 @@ def test_a_nearest_cause_that_surely_helps_is_never_forbidden():
     assert "that it is the true cause is doubtful (" in text
 
 
-def test_a_nearest_cause_that_harms_is_said_to():
-    found = closing(unknown(), 0.0, 0.0, 0.1)
-    gap = found.reduction.gaps[RECALIBRATED]
-    worse = Interval(value=2 * gap.overall.value, low=1.0, high=99.0)
-    gaps = {**found.reduction.gaps, "leak": replace(gap, overall=worse)}
-    text = verdict_sentence(replace(found, reduction=replace(found.reduction, gaps=gaps)), "")[1]
-    assert "makes recordings never fitted to worse" in text
-    assert "do not add it" in text
-
-
 def with_disturbance(found: Diagnosis, sd: float) -> Diagnosis:
     """No gap, with a disturbance [noise deviations] that is correlated over 20 ms."""
     seen = [replace(d, sd=sd, time_scale=0.02) for d in found.ranking.discrepancies]
@@ -160,22 +146,6 @@ def test_the_missing_term_is_a_file_beside_the_answer(tmp_path):
     assert {len(column) for column in columns.values()} == {len(term.x)}
     assert write_results(replace(found, remaining=None), tmp_path)["remainder"]["term"] is None
     assert not (tmp_path / TERM).exists(), "of an earlier diagnosis"
-
-
-def tables(blocks: Sequence[object], first: str) -> list[Table]:
-    return [block for block in blocks if isinstance(block, Table) and block.columns[0] == first]
-
-
-def test_the_page_shows_inclusion_remainder_and_discrepancy():
-    by_title = {section.title: section for section in sections(partial())}
-    (inclusion,) = tables(by_title["Which cause it is"].blocks, "Effect")
-    assert inclusion.rows[0][0] == "leak"
-    assert inclusion.rows[0][-1] == "yes"
-    rest = by_title["What remains"]
-    assert any(isinstance(block, Picture) for block in rest.blocks)
-    (discrepancy,) = tables(rest.blocks, "Channel")
-    assert discrepancy.rows[0][0] == "h"
-    assert "leak leaves" in rest.verdicts[0].text
 
 
 def test_an_interval_is_as_wide_as_what_remains_is_large_and_correlated():

@@ -56,19 +56,6 @@ def test_the_most_promising_cause_comes_first_and_each_cause_once():
     assert len(names) == len(set(names)) == 6
 
 
-def test_every_start_has_all_trials_and_predictions():
-    """Seven trials and six predictions."""
-    assert len(screened(every_start=True)) == 7 + 6
-
-
-def test_calibrated_parameters_are_adapted_to_a_start():
-    """Recalibration has lowered the gain for the limit; with the limit it rises again."""
-    start = next(start for start in screened() if start.cause.name == "limit")
-    assert start.estimate.vector[0] > 0.98
-    _, base = recalibrate(Drive({"limit": 0.8}))
-    assert base.vector[0] < 0.96
-
-
 def runs_and_signatures(seed: int) -> tuple[list[LinearisedRun], list[CauseSignature]]:
     """Four causes: the first two differ in little, and that little is what the readings show."""
     rng = np.random.default_rng(seed)

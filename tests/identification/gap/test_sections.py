@@ -2,16 +2,12 @@
 
 import re
 from dataclasses import replace
-from typing import cast
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from matplotlib.axes import Axes
-from matplotlib.patches import Rectangle
 
 from docs.examples.tank import Tank, virtual_recordings
-from identification.gap import report_figures as ranking_figures
 from identification.gap.diagnosis import Diagnosis, diagnose
 from identification.gap.gap_json import as_json
 from identification.gap.quantities import probability_text
@@ -35,11 +31,6 @@ def pictures(section: Section) -> list[Picture]:
 def table(section: Section, first: str) -> Table:
     (found,) = [b for b in section.blocks if isinstance(b, Table) and b.columns[0] == first]
     return found
-
-
-def widths(axes: Axes) -> list[float]:
-    """Of bars."""
-    return [cast(Rectangle, patch).get_width() for patch in axes.patches]
 
 
 def texts(found: list[Section]) -> str:
@@ -140,21 +131,6 @@ def test_a_size_at_an_end_of_its_range_is_a_warning():
     assert sections(found)[-1].verdicts[0].status == "good"
 
 
-def test_a_warning_puts_the_verdict_in_doubt():
-    found = replace(diagnosed("known"), warnings=["the recalibration did not converge"])
-    assert verdict_sentence(found, "")[0] == "doubt"
-    assert "the recalibration did not converge." in texts([sections(found)[-1]])
-
-
-def test_the_ranking_shows_every_judged_cause_and_marks_the_ambiguity_set():
-    found = diagnosed("ambiguous")
-    (axes,) = ranking_figures.ranking_figure(found).axes
-    assert sum(widths(axes)) == pytest.approx(1.0, abs=1e-6)
-    named = [bar.get_facecolor() for bar in axes.patches[: len(found.conclusion.ambiguity_set)]]
-    assert len(set(named)) == 1
-    assert axes.patches[len(named)].get_facecolor() not in named
-
-
 def test_tables_hold_the_figures_of_the_file():
     found = diagnosed("known")
     content, shrink = as_json(found), sections(found)[3]
@@ -214,7 +190,3 @@ def test_the_values_are_those_of_the_model_to_use(verdict, model):
     symbols = [p.title for p in diagnosed(verdict).ranking.problem.plant.parameters]
     assert [row[0] for row in table.rows] == symbols
     assert {row[-1] for row in table.rows} == {"yes"}
-
-
-def test_values_are_trusted_as_far_as_the_verdict():
-    assert set(calibrated_values(diagnosed("unknown"), "bad").statuses) == {"bad"}
