@@ -54,7 +54,7 @@ def folder_graph(root: Path) -> dict[str, set[str]]:
 
 def test_no_folder_imports_itself_by_a_detour():
     graph = folder_graph(ROOT)
-    assert len(graph) > 30
+    assert len(graph) > 15
     tuple(TopologicalSorter(graph).static_order())
 
 

@@ -204,10 +204,8 @@ def nearest_cause(diagnosis: Diagnosis, cause: RankedCause) -> str:
             f"{true} is doubtful ({probability_text(cause.probability)})."
         )
     gaps = diagnosis.reduction.gaps
-    before, after = (
-        gaps[RECALIBRATED].overall.value,
-        gaps[hypothesis_label(cause.hypothesis)].overall.value,
-    )
+    before = gaps[RECALIBRATED].overall.value
+    after = gaps[hypothesis_label(cause.hypothesis)].overall.value
     if after > before:
         return (
             f"The nearest cause, {name}, makes recordings never fitted to worse (from "
@@ -248,14 +246,13 @@ def remainder_sentence(diagnosis: Diagnosis) -> str:
 
 def disturbance_sentence(diagnosis: Diagnosis) -> str:
     """Disturbances that are seen beside the noise, with a blank at the end; empty where none is seen."""
-    least = MENTIONED_DISCREPANCY
     ranking, seen = diagnosis.ranking, discrepancy(diagnosis)
     channels = zip(ranking.problem.plant.channels, ranking.discrepancies, strict=True)
     texts = [
         f"{quantity(seen[channel.name]['sd'], channel.unit)} in {channel.name}, correlated over "
         f"{quantity(seen[channel.name]['time_scale_s'], 's')}"
         for channel, own in channels
-        if own.sd >= least
+        if own.sd >= MENTIONED_DISCREPANCY
     ]
     if not texts:
         return ""
@@ -267,16 +264,9 @@ def component_at_fault(diagnosis: Diagnosis) -> str:
     """The component that is most probably at fault, and its likeliest equation or reading."""
     component, probability = next(iter(diagnosis.conclusion.component_probabilities.items()))
     localisation = diagnosis.localisation
-    equations = [
-        forcing.equation.name
-        for forcing in localisation.forcings
-        if forcing.equation.component == component
-    ]
-    equation = max(equations, key=lambda name: localisation.equation_probabilities[name], default="")
-    meaning = next(
-        (f.equation.meaning for f in localisation.forcings if f.equation.name == equation), ""
-    )
-    named = "".join(f"{part}, " for part in (meaning, equation) if part)
+    own = [f.equation for f in localisation.forcings if f.equation.component == component]
+    own.sort(key=lambda equation: -localisation.equation_probabilities[equation.name])
+    named = "".join(f"{part}, " for e in own[:1] for part in (e.meaning, e.name) if part)
     return f"{component.replace('_', ' ')} ({named}{probability_text(probability)})"
 
 
@@ -361,8 +351,7 @@ def at_an_end(parameter: FreeParameter, value: float) -> bool:
 
 def mentioned_causes(diagnosis: Diagnosis) -> Sequence[RankedCause]:
     """Judged causes with a noticeable probability."""
-    least = MENTIONED_PROBABILITY
-    return [cause for cause in diagnosis.judged if cause.probability >= least]
+    return [cause for cause in diagnosis.judged if cause.probability >= MENTIONED_PROBABILITY]
 
 
 def share_closed(diagnosis: Diagnosis, cause: RankedCause) -> str:
