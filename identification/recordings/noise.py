@@ -134,12 +134,6 @@ def pooled_noise(campaign: Campaign) -> dict[str, float]:
     return _pooled(campaign.recordings, stretches, campaign.rules)
 
 
-def noise_of_energised_start(recording: Recording, rules: RecordingRules = RULES) -> dict[str, float]:
-    """As `pooled_noise`, from the energised steady start of one recording [A, V, Pa]."""
-    stretch = (recording, energised_start_length(recording))
-    return _pooled([recording], [stretch], rules)
-
-
 def energised_start_length(recording: Recording) -> int:
     """Length of the energised start [samples]. Raises CampaignError if it lasts less than HOLD."""
     energised = recording.energised

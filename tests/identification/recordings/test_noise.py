@@ -8,7 +8,6 @@ import pytest
 from epv_env.plant.channels import SENSORS
 from identification.recordings.noise import (
     energised_start_length,
-    noise_of_energised_start,
     pooled_noise,
 )
 from identification.recordings.recording import CHANNELS, UNITS, Campaign, CampaignError, Recording
@@ -42,20 +41,20 @@ def campaign(*recordings):
 @pytest.mark.parametrize("drift", [0.0, 0.05])
 def test_the_noise_of_a_long_hold_is_table_3_s(drift):
     """A drift of 50 mbar/s, 50 mA/s and 50 mV/s does not count as noise."""
-    noise = noise_of_energised_start(recording(0, 4000, drift))
+    noise = pooled_noise(campaign(recording(0, 4000, drift)))
     for name in CHANNELS:
         assert noise[name] == pytest.approx(expected(name), rel=0.05)
 
 
 def test_a_hold_of_40_ms_is_enough_and_less_is_refused():
     assert energised_start_length(recording(0, 80)) == 80
-    assert noise_of_energised_start(recording(0, 80))["p2"] == pytest.approx(expected("p2"), rel=0.3)
+    assert pooled_noise(campaign(recording(0, 80)))["p2"] == pytest.approx(expected("p2"), rel=0.3)
     with pytest.raises(CampaignError, match=r"test0: energised for the first 39\.5 ms only"):
-        noise_of_energised_start(recording(0, 79))
+        pooled_noise(campaign(recording(0, 79)))
 
 
 def test_noise_finer_than_a_step_counts_as_a_rounding_error():
-    noise = noise_of_energised_start(recording(0, 200, noisy=0.0))
+    noise = pooled_noise(campaign(recording(0, 200, noisy=0.0)))
     assert noise["U"] == pytest.approx(SENSORS["U"].resolution / np.sqrt(12))
 
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.bench.session import round_pressures
 from identification.recordings.campaign_files import read_campaign, write_campaign
 from identification.recordings.noise import (
     campaign_steps,
@@ -15,6 +14,7 @@ from identification.recordings.noise import (
     reading_step,
 )
 from identification.recordings.recording import CampaignError
+from tests.identification.disturbances import round_pressures
 from tests.identification.recordings.good_campaign import good_campaign
 
 STEP = 0.05

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from epv_env.plant.channels import SENSORS
-from identification.bench.session import add_ripple
 from identification.recordings.recording import Campaign, Recording
 from identification.valve_gap.valve import noise_of
+from tests.identification.disturbances import add_ripple
 
 
 def recording(noise: float, seed: int, steps: float = 0.0) -> Recording:

@@ -8,7 +8,7 @@ import pytest
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import Parameters
 from identification.bench.programmes import DIAGNOSIS_SUITE
-from identification.bench.session import measured_campaign, round_pressures, run_programme
+from identification.bench.session import measured_campaign, run_programme
 from identification.calibration.problem import calibration_problem
 from identification.gap.diagnosis import rank_hypotheses
 from identification.gap.prediction import percentage_errors
@@ -17,6 +17,7 @@ from identification.replay.replay import responses, total_response_error
 from identification.validation import validate
 from identification.valve_gap.causes import effects, parameters
 from identification.valve_gap.valve import Valve
+from tests.identification.disturbances import round_pressures
 from tests.identification.twins import twin
 
 NAMES = ("test1", "test4", "low_supply", "validation", "rest")
