@@ -144,6 +144,11 @@ def _header(
     rows = (dialect.cells(line) for _, line in lines)
     above = list(takewhile(lambda cells: len(cells) != width or not dialect.is_data(cells), rows))
     first = len(above)
+    if first == len(lines):
+        raise ImportingError(
+            f"{file}, line {lines[-1][0]}: the numbers have not the {width} columns of the last line: "
+            "cut the text below them"
+        )
     above = [cells for cells in above if len(cells) == width]
     if not above:
         raise ImportingError(

@@ -122,6 +122,9 @@ def test_wrong_inputs_are_refused_and_nothing_written(bench, tmp_path):
     (tmp_path / "d.csv").write_text("".join(rows[:300] + rows[320:]))
     with pytest.raises(ImportingError, match="no samples from"):
         import_campaign([tmp_path / "d.csv"], tmp_path / "out")
+    (tmp_path / "f.csv").write_text("".join([*rows, "stopped by hand\n"]))
+    with pytest.raises(ImportingError, match="cut the text below them"):
+        import_campaign([tmp_path / "f.csv"], tmp_path / "out")
     (tmp_path / "e.mat").write_bytes(b"not MATLAB")
     with pytest.raises(ImportingError, match=r"damaged or no MATLAB file"):
         import_campaign([tmp_path / "e.mat"], tmp_path / "out")
