@@ -102,4 +102,5 @@ REGISTRATION = Registration(
         "engage_below": Range(low=-0.4, high=0.3, least=-0.5, most=0.5),
         "rest_above": Range(low=-0.3, high=0.4, least=-0.5, most=0.5),
     },
+    tuned_on="exact",  # within ±10 % no tuning holds the band, and the search finds nothing useful
 )

@@ -80,6 +80,8 @@ class Registration:
     quantities contradict each other."""
     search_space: SearchSpace | None
     """The quantities that tuning searches; None: nothing is tuned."""
+    tuned_on: str = "sensitive_ten_percent"
+    """Region of the plants that it is tuned on (epv_env.plant.region); default: the learned policy's."""
 
     def built(self, values: Mapping[str, Any], plant: Plant) -> Controller:
         """The controller, from exactly the quantities of its search space.
@@ -99,6 +101,6 @@ class Registration:
                 raise RegistrationError(
                     f"controller {self.kind!r} {problem} {', '.join(sorted(names))}: its search space "
                     "and its tuned values must name the same quantities; tune anew with "
-                    f"`python training/tune.py --only {self.kind!r}`"
+                    f"`epv tune --only {self.kind!r}`"
                 )
         return self.build(values, plant)

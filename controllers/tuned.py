@@ -65,7 +65,7 @@ def load_search(path: str | PathLike[str] | None = None) -> dict[str, Any]:
 
 
 def _content(path: str | PathLike[str] | None) -> TuningsFile:
-    remedy = "tune anew with `python training/tune.py`"
+    remedy = "tune anew with `epv tune`"
     try:
         return read_json(path or TUNED_FILE, TuningsFile, version=FORMAT, remedy=remedy)
     except JSONFileError as error:

@@ -84,7 +84,7 @@ def problems(entry: Registration, tunings: Mapping[str, Tuning]) -> list[str]:
     space = entry.search_space
     if space is not None and entry.kind not in tunings:
         return [
-            f"controllers/tuned.json lacks {entry.kind!r}: run `python training/tune.py --only "
+            f"controllers/tuned.json lacks {entry.kind!r}: run `epv tune --only "
             f"{entry.kind!r} --out controllers/tuned.json`"
         ]
     try:
@@ -130,7 +130,7 @@ def test_kinds_are_unique():
     [
         (
             {"kind": "new"},
-            "controllers/tuned.json lacks 'new': run `python training/tune.py --only 'new'",
+            "controllers/tuned.json lacks 'new': run `epv tune --only 'new'",
         ),
         ({"search_space": {"gain": Range(low=0.0, high=1.0)}}, "lacks gain"),
         ({"search_space": {}}, "has unknown open_below, shut_above"),

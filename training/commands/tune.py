@@ -23,7 +23,6 @@ from epv_env.common.results_folder import progress
 from epv_env.plant.plantfile import Plant
 from training.commands.options import count, seconds, seed
 from training.evaluation.rollout import run_episodes
-from training.evaluation.scenarios import TUNING_REGION
 from training.evaluation.seeds import TUNING_SEED
 
 WIDENINGS = 2
@@ -151,12 +150,13 @@ def run(options: argparse.Namespace) -> None:
     """
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     settings = {"trials": options.trials, "episodes": options.episodes, "duration": options.duration}
-    region = {"parameters": TUNING_REGION}
-    search = {"method": "Optuna TPE on the mean return", **settings, "seed": options.seed, **region}
+    search = {"method": "Optuna TPE on the mean return", **settings, "seed": options.seed}
     if options.only:
         kept(options.file, search)  # before the work, since it may refuse
     found = {
-        kind: tune(kind, **settings, seed=options.seed, options=region)
+        kind: tune(
+            kind, **settings, seed=options.seed, options={"parameters": registration(kind).tuned_on}
+        )
         for kind in options.only or TUNED_KINDS
     }
     tunings = {**(kept(options.file, search) if options.only else {}), **found}
