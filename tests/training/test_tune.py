@@ -6,13 +6,11 @@ from controllers.registration import Choice, Range
 from controllers.tuned import Tuning, load_tunings, save_tunings
 from epv_env.common.commands import main_of
 from training.commands.tune import _search, kept, widened
-from training.evaluation.scenarios import TUNING_REGION
 
 pytestmark = pytest.mark.training
 SHORT = ("--trials", "1", "--episodes", "1", "--duration", "0.1")
 SEARCH = {
     "method": "Optuna TPE on the mean return", "trials": 1, "episodes": 1, "duration": 0.1, "seed": 0,
-    "parameters": TUNING_REGION,
 }  # fmt: skip
 OTHER = Tuning(values={"open_below": -0.1, "shut_above": 0.1}, trials=1, mean_return=-9.0, episodes=1)
 
