@@ -20,6 +20,7 @@ pytest.importorskip("statsmodels")
 
 from controllers.policy import TRAINED
 from controllers.policy_files import CONTRACT_FILE, WEIGHTS_FILE, read_policy
+from epv_env.common.command_line import Number
 from epv_env.common.commands import commands, main, parser_of
 from epv_env.common.files import Journal
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
@@ -28,7 +29,6 @@ from identification.importing.mapping_file import read_mapping
 from identification.recordings.campaign_files import FILE_NAME, read_campaign, write_campaign
 from identification.recordings.columns import REQUIRED_COLUMNS, read_columns
 from tests.identification.recordings.good_campaign import campaign_of, switching
-from training.commands.options import count, seconds, seed
 
 pytestmark = pytest.mark.training
 PACKAGES = [name for name in ("identification.commands", "training.commands") if find_spec(name)]
@@ -38,8 +38,6 @@ WRONG_VALUES: tuple[Any, ...] = (
     [[]], [None] * 50, {"": {}}, "../../etc/passwd", 2**63,
 )  # fmt: skip
 
-NUMBERS = (int, float, count, seed, seconds)
-"""Types of the options that take a number."""
 
 NO_NUMBERS = ("-1", "nan", "1e999", "9" * 400, "", "x")
 """What no option that takes a number takes: negative, infinite, beyond sense, or no number."""
@@ -162,7 +160,7 @@ def number_options(parser: argparse.ArgumentParser) -> list[str]:
     return [
         action.option_strings[-1]
         for action in parser._actions
-        if action.option_strings and action.type in NUMBERS
+        if action.option_strings and (action.type in (int, float) or isinstance(action.type, Number))
     ]
 
 

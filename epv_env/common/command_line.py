@@ -1,4 +1,4 @@
-"""What the command lines share: checked paths and numbers, --quick, and errors as one sentence.
+"""What the command lines share: options, checked paths and numbers, and errors as one sentence.
 
 Ctrl-C and SIGTERM end a command and its worker processes without a traceback. A first run says that the
 plant is compiled, which takes a minute once and is then read from a cache.
@@ -10,8 +10,9 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from multiprocessing import active_children
 from pathlib import Path
 from types import FrameType
@@ -137,59 +138,61 @@ def writable_folder(text: str) -> Path:
     return path
 
 
-def parse_with_quick(
-    parser: argparse.ArgumentParser, arguments: list[str] | None, quick: Mapping[str, Any]
-) -> argparse.Namespace:
-    """The options. With --quick, `quick` are the defaults: what is given beside it still holds."""
-    parser.add_argument("--quick", action="store_true", help="a short run that shows that all works")
-    if parser.parse_known_args(arguments)[0].quick:
-        parser.set_defaults(**quick)
-    return parser.parse_args(arguments)
+@dataclass(frozen=True)
+class Number:
+    """A number within a range, for argparse. What lies beyond is a slip, and would fail late."""
+
+    kind: type[int] | type[float]
+    low: float
+    high: float
+
+    def __call__(self, text: str) -> float:
+        """The number. Raises ArgumentTypeError, with the range in its sentence."""
+        try:
+            value = self.kind(text)
+        except ValueError:
+            value = math.nan
+        if not self.low <= value <= self.high:  # not true for NaN
+            name = "whole number" if self.kind is int else "number"
+            shown = text if len(text) < 40 else text[:40] + "..."
+            span = f"from {self.low:.10g} to {self.high:.10g}"
+            raise argparse.ArgumentTypeError(f"{shown} must be a {name} {span}")
+        return value
 
 
-MOST = {
-    "workers": 1024,  # more processes than a machine has cores
-    "duration": 3600.0,  # [s] an episode's traces of an hour fill the memory
-    "seconds": 3600.0,  # [s] the same for a film
-    "episodes": 1_000_000,  # their results fill the memory; and seeds end where others' begin
-    **dict.fromkeys(("named", "random", "bound", "tuning", "joint_episodes", "screened"), 1_000_000),
-    "seeds": 1000,  # trainings
-    "recurrent_seeds": 1000,
-    "end_to_end_seeds": 1000,
-    "generations": 10_000,
-    "seed": 2**32 - 1,  # what NumPy's and torch's generators take
-    "switching_price": 1000.0,  # a switching would cost more than any excursion
-    "timesteps": 10**12,  # years
-    "recurrent_timesteps": 10**12,
-    "end_to_end_timesteps": 10**12,
-    "trials": 1_000_000,
-    "decisions": 10**9,
-    "rate": 1e7,  # [Hz] no bench samples pressures faster
-}
-"""Largest sensible values of options by name: what lies beyond is a slip, and would fail late."""
+COUNT = Number(int, 1, 10**9)
+"""Episodes, trials or steps."""
+SEED = Number(int, 0, 2**32 - 1)
+"""What NumPy's and torch's generators take."""
+SECONDS = Number(float, 1e-6, 3600.0)
+"""Length of an episode [s]: the figures of a longer one than an hour fill the memory."""
 
 
-def check_positive(parser: argparse.ArgumentParser, chosen: argparse.Namespace, *names: str) -> None:
-    """End with one sentence unless each of these numbers is above 0 and sensible (MOST), or None."""
-    for name in names:
-        value = getattr(chosen, name)
-        if value is not None and not 0 < value < math.inf:
-            parser.error(f"--{name.replace('_', '-')} must be positive and finite")
-        _check_most(parser, name, value)
+def add_out(
+    parser: argparse.ArgumentParser, default: str | None = None, *, help: str = "folder of results"
+) -> None:
+    """Add --out, a folder that exists or can be made; required unless there is a default."""
+    parser.add_argument(
+        "--out",
+        type=writable_folder,
+        default=default and Path(default),
+        required=default is None,
+        help=help,
+    )
 
 
-def check_not_negative(parser: argparse.ArgumentParser, chosen: argparse.Namespace, *names: str) -> None:
-    """End with one sentence unless each of these numbers is at least 0 and sensible (MOST)."""
-    for name in names:
-        value = getattr(chosen, name)
-        if value < 0:
-            parser.error(f"--{name.replace('_', '-')} must not be negative")
-        if not value < math.inf:
-            parser.error(f"--{name.replace('_', '-')} must be finite")
-        _check_most(parser, name, value)
+def add_plant(
+    parser: argparse.ArgumentParser, *, help: str = "plant file (default: the report's calibration)"
+) -> None:
+    """Add --plant, a plant file."""
+    parser.add_argument("--plant", type=Path, metavar="FILE", help=help)
 
 
-def _check_most(parser: argparse.ArgumentParser, name: str, value: float | None) -> None:
-    most = MOST.get(name, math.inf)
-    if value is not None and value > most:
-        parser.error(f"--{name.replace('_', '-')} must be at most {most:.10g}")
+def add_seed(parser: argparse.ArgumentParser, *, default: int = 0, help: str) -> None:
+    """Add --seed; help: what the seed draws."""
+    parser.add_argument("--seed", type=SEED, default=default, help=help)
+
+
+def add_workers(parser: argparse.ArgumentParser) -> None:
+    """Add --workers, the number of processes."""
+    parser.add_argument("--workers", type=Number(int, 1, 1024), help="processes (default: all cores)")

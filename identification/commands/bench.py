@@ -5,13 +5,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from epv_env.common.command_line import add_out, add_plant, add_seed
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import Domains, Parameters, written_value
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from epv_env.plant.region import Region
 from identification.bench.programmes import SUITES, Programme, at_voltage, load_programmes
 from identification.bench.session import run_bench
-from identification.commands.options import add_out, add_plant, add_seed
 from identification.recordings.campaign_files import check_vacant, write_campaign
 from identification.recordings.rules import RULES, rules_of
 from identification.report_2003 import SAMPLING_RATE

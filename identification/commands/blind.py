@@ -6,12 +6,12 @@ blind, and only then opens the truths and scores. What a folder holds already is
 
 import argparse
 
+from epv_env.common.command_line import COUNT, add_out, add_seed, add_workers
 from epv_env.common.files import write_json
 from epv_env.plant.valves import available_cores
 from identification.blind.report import as_text, reliability_figure, results
 from identification.blind.trials import blind_scores
 from identification.blind.truth import FORM_DEVIATIONS
-from identification.commands.options import add_count, add_out, add_seed, add_workers
 from identification.valve_gap.diagnose import diagnose_campaign
 
 TRIALS = 300
@@ -21,7 +21,7 @@ TRIALS = 300
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the folder of results, the size of the study, and its forms."""
     add_out(parser, help="folder of trials and results")
-    add_count(parser, "--trials", default=TRIALS, help="number of campaigns")
+    parser.add_argument("--trials", type=COUNT, default=TRIALS, help="number of campaigns")
     add_seed(parser, help="of truths and noise")
     add_workers(parser)
     ranges = [f"{name} {100 * a:.0f} to {100 * b:.0f} %%" for name, (a, b) in FORM_DEVIATIONS.items()]

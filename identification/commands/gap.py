@@ -6,8 +6,8 @@ The guide is docs/how-to/diagnose-a-gap.md.
 import argparse
 from pathlib import Path
 
+from epv_env.common.command_line import add_out, add_plant, add_seed
 from epv_env.common.files import decoded
-from identification.commands.options import add_out, add_plant, add_seed
 from identification.gap.gap_json import GAP as GAP_FILE
 from identification.gap.sentences import verdict_sentence
 from identification.valve_gap import diagnose

@@ -6,9 +6,8 @@ The guide is docs/how-to/use-your-recordings.md.
 import argparse
 from pathlib import Path
 
-from epv_env.common.command_line import MOST
+from epv_env.common.command_line import Number, add_out, add_plant
 from epv_env.plant.plantfile import load_plant
-from identification.commands.options import add_number, add_out, add_plant
 from identification.importing.import_campaign import (
     import_text,
     read_files,
@@ -29,23 +28,17 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--mapping", type=Path, default=None, help="JSON file that says what names and units do not"
     )
-    add_number(
-        parser,
+    parser.add_argument(
         "--ambient-bar",
-        kind=float,
-        low=0.01,
-        high=100.0,
+        type=Number(float, 0.01, 100.0),
         help="pressure of the environment [bar absolute]",
     )
-    add_number(
-        parser, "--temperature-K", kind=float, low=1.0, high=1000.0, help="of the environment [K]"
+    parser.add_argument(
+        "--temperature-K", type=Number(float, 1.0, 1000.0), help="of the environment [K]"
     )
-    add_number(
-        parser,
+    parser.add_argument(
         "--rate",
-        kind=float,
-        low=1.0,
-        high=MOST["rate"],
+        type=Number(float, 1.0, 1e7),
         help="samples per second; default: the slowest channel's",
     )
     parser.add_argument("--name", default=None, help="of the campaign; default: the files' folder")

@@ -6,9 +6,9 @@ kept in the folder of results, so that stages which are run one by one share the
 
 import argparse
 
+from epv_env.common.command_line import COUNT, add_out, add_plant, add_seed
 from epv_env.plant.plantfile import load_plant
 from identification.calibration.calibrate import STARTS
-from identification.commands.options import add_count, add_out, add_plant, add_seed
 from identification.pipeline import run as pipeline
 from identification.pipeline.identification import Identification
 from identification.pipeline.run import STAGES
@@ -36,7 +36,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     add_plant(parser, help="plant file of another valve than the report's, as its data sheet has it")
     add_seed(parser, help="of starts, draws and resampling")
-    add_count(parser, "--starts", default=STARTS, help="searches of each method")
+    parser.add_argument("--starts", type=COUNT, default=STARTS, help="searches of each method")
     parser.add_argument(
         "--report-2003", action="store_true", help="show the figures of the report SCL-001/2003 beside"
     )

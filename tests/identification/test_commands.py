@@ -215,4 +215,7 @@ def test_every_option_says_what_it_sets_and_counts_are_checked(module, capsys):
         if action.dest in ("starts", "campaigns", "trials", "workers", "seed"):
             with pytest.raises(SystemExit):
                 parser.parse_args([action.option_strings[0], "-1"])
-            assert f"{action.option_strings[0]} must" in capsys.readouterr().err
+            assert (
+                f"argument {action.option_strings[0]}: -1 must be a whole number"
+                in capsys.readouterr().err
+            )

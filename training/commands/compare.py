@@ -15,9 +15,11 @@ import numpy as np
 import pandas as pd
 
 from controllers.tuned import load_tunings
+from epv_env.common.command_line import COUNT, add_out
 from epv_env.common.files import Journal, write_json, write_text
 from epv_env.plant.plantfile import Plant, load_plant
-from training.commands.options import add_episodes, add_folder, count
+from epv_env.plant.valves import available_cores
+from training.commands.options import add_episodes
 from training.evaluation.named import HELP, named_controllers
 from training.evaluation.plots import episode_overlay, save_figure
 from training.evaluation.rollout import decision_times, run_episodes
@@ -42,7 +44,7 @@ OVERLAID = 6
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    add_folder(parser, "runs/comparison")
+    add_out(parser, "runs/comparison")
     parser.add_argument(
         "--controllers", nargs="+", metavar="NAME", default=list(load_tunings()),
         help=f"{HELP} (default: all tuned kinds)",
@@ -53,8 +55,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--scenarios", nargs="+", metavar="NAME", default=[RANDOM],
         help="scenarios, or the groups named, beyond (beyond training), worn (one effect each)",
     )  # fmt: skip
-    parser.add_argument("--episodes", type=count, default=1024, help="in each scenario and plant set")
-    parser.add_argument("--decisions", type=count, default=1000, help="whose time is measured")
+    parser.add_argument("--episodes", type=COUNT, default=1024, help="in each scenario and plant set")
+    parser.add_argument("--decisions", type=COUNT, default=1000, help="whose time is measured")
     add_episodes(parser)
 
 
@@ -74,7 +76,7 @@ def run(options: argparse.Namespace) -> None:
     results = compare(
         controllers, plant=plant, scenarios=scenarios, episodes=options.episodes,
         duration=options.duration, plant_sets=options.plants, first_seed=first_seed,
-        workers=options.workers, digests=digests,
+        workers=options.workers or available_cores(), digests=digests,
         journal=Journal(options.out / "finished.jsonl", subject(plant, scenarios, options.duration)),
     )  # fmt: skip
     times = {

@@ -19,10 +19,9 @@ from typing import Any
 
 from controllers.policy import load_policy
 from controllers.policy_files import WEIGHTS_FILE, read_contract
-from epv_env.common.command_line import writable_folder
+from epv_env.common.command_line import COUNT, SECONDS, writable_folder
 from epv_env.common.files import write_bytes
 from epv_env.plant.plantfile import Plant, load_plant
-from training.commands.options import count, seconds
 from training.deploy import agreement as verdict
 from training.deploy import compiled
 from training.deploy.c_code import CODE, Export, checks, deployment_contract, sources
@@ -58,8 +57,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--compiler", default=os.environ.get("CC", "cc"),
         help="C compiler; '' for a plant's sources alone (default: cc)",
     )  # fmt: skip
-    parser.add_argument("--episodes", type=count, default=256, help="under the compiled code")
-    parser.add_argument("--duration", type=seconds, default=10.0, help="length of one of them [s]")
+    parser.add_argument("--episodes", type=COUNT, default=256, help="under the compiled code")
+    parser.add_argument("--duration", type=SECONDS, default=10.0, help="length of one of them [s]")
 
 
 def run(options: argparse.Namespace) -> None:

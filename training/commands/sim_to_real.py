@@ -16,13 +16,13 @@ from controllers.base import Controller
 from controllers.policy import load_policy
 from controllers.policy_files import holds_policy
 from controllers.tuned import tuned_controllers
+from epv_env.common.command_line import COUNT, SECONDS, add_out, add_seed
 from epv_env.common.commands import parse
 from epv_env.common.files import Journal, decoded, write_json, write_text
 from epv_env.common.results_folder import check_options, write_options
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.reward import RewardWeights
 from identification.bench.programmes import SUITES
-from training.commands.options import add_folder, count, seconds, seed
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.scenarios import EvaluationScenario
 from training.studies.comparison import compare
@@ -58,15 +58,15 @@ RESULT, PICTURE = "sim-to-real.json", "sim-to-real.png"
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    add_folder(parser, "runs/sim-to-real")
+    add_out(parser, "runs/sim-to-real")
     parser.add_argument(
         "--effect", default="pressure_sensor_lag=0.02,0", metavar="NAME=SIZE",
         help="effect of the bench's valve, withheld from the diagnosis (docs/explanation/effects.md)",
     )  # fmt: skip
-    parser.add_argument("--seed", type=seed, default=0, help="of both trainings, sensors, diagnosis")
-    parser.add_argument("--timesteps", type=count, default=1_200_000, help="steps of each training")
-    parser.add_argument("--episodes", type=count, default=256, help="episodes of each deployment")
-    parser.add_argument("--duration", type=seconds, default=6.0, help="length of one of them [s]")
+    add_seed(parser, help="of both trainings, sensors, diagnosis")
+    parser.add_argument("--timesteps", type=COUNT, default=1_200_000, help="steps of each training")
+    parser.add_argument("--episodes", type=COUNT, default=256, help="episodes of each deployment")
+    parser.add_argument("--duration", type=SECONDS, default=6.0, help="length of one of them [s]")
     parser.add_argument(
         "--suite", choices=SUITES, default="diagnosis", help="recordings that the bench makes"
     )

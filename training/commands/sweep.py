@@ -12,10 +12,12 @@ from typing import Any
 
 import pandas as pd
 
+from epv_env.common.command_line import COUNT, add_out
 from epv_env.common.files import Journal, write_json, write_text
 from epv_env.plant.consumption import check_scenario
 from epv_env.plant.plantfile import Plant, load_plant
-from training.commands.options import add_episodes, add_folder, count
+from epv_env.plant.valves import available_cores
+from training.commands.options import add_episodes
 from training.evaluation.batches import Batch, in_batches, run_batches
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.named import HELP, named_controllers
@@ -49,17 +51,17 @@ FIGURES = {
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    add_folder(parser, "runs/sweep")
+    add_out(parser, "runs/sweep")
     parser.add_argument("--controllers", nargs="+", default=list(DEFAULT), metavar="NAME", help=HELP)
     parser.add_argument("--designs", nargs="+", choices=DESIGNS, default=list(DESIGNS))
     parser.add_argument(
         "--factors", nargs="+", default=[], help="change only these, one at a time (default: all)"
     )
     parser.add_argument(
-        "--episodes", type=count, default=128, help="at each point that changes one thing"
+        "--episodes", type=COUNT, default=128, help="at each point that changes one thing"
     )
     parser.add_argument(
-        "--joint-episodes", type=count, default=4096, help="at each region, and in the hypercube"
+        "--joint-episodes", type=COUNT, default=4096, help="at each region, and in the hypercube"
     )
     parser.add_argument("--scenario", default="mixed", help="consumption, where it is not what changes")
     add_episodes(parser)
@@ -86,7 +88,8 @@ def run(options: argparse.Namespace) -> None:
     }
     found = run_batches(
         [batch for each in batches for batch in each], controllers,
-        journal=Journal(options.out / "finished.jsonl", subject), workers=options.workers, what="sweep",
+        journal=Journal(options.out / "finished.jsonl", subject),
+        workers=options.workers or available_cores(), what="sweep",
     )  # fmt: skip
     metrics = [EpisodeMetrics.joined([found[batch.name] for batch in each]) for each in batches]
     table = point_table(cells, metrics, SWEEP_SEED + options.seed)

@@ -19,13 +19,13 @@ from controllers.base import Controller
 from controllers.policy import load_policy
 from controllers.policy_files import CONTRACT_FILE, WEIGHTS_FILE
 from controllers.tuned import ablation, tuned_controllers
+from epv_env.common.command_line import COUNT, SECONDS, Number, add_out, add_plant, add_seed
 from epv_env.common.files import write_text
 from epv_env.common.results_folder import CONFIG, check_same, read_config, write_options
 from epv_env.plant.consumption import check_scenario
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.region import REGIONS
 from epv_env.reward import RewardWeights
-from training.commands.options import add_folder, count, seconds, seed
 from training.evaluation.plots import plt, save_figure
 from training.evaluation.scenarios import EvaluationScenario
 from training.studies.comparison import as_text, compare, differences, figure, rows
@@ -55,16 +55,16 @@ OWN_FOLDERS = ("best", "checkpoints")
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    add_folder(parser, "runs/ppo")
-    parser.add_argument("--timesteps", type=count, default=TIMESTEPS, help="environment steps of PPO")
-    parser.add_argument("--episodes", type=count, default=1024, help="of the comparison")
-    parser.add_argument("--duration", type=seconds, default=10.0, help="length of one of them [s]")
-    parser.add_argument("--seed", type=seed, default=0, help="of the training")
-    parser.add_argument("--plant", type=Path, help="plant file (default: the report's calibration)")
+    add_out(parser, "runs/ppo")
+    parser.add_argument("--timesteps", type=COUNT, default=TIMESTEPS, help="environment steps of PPO")
+    parser.add_argument("--episodes", type=COUNT, default=1024, help="of the comparison")
+    parser.add_argument("--duration", type=SECONDS, default=10.0, help="length of one of them [s]")
+    add_seed(parser, help="of the training")
+    add_plant(parser)
     parser.add_argument("--scenario", default="mixed", help="consumption scenario of the training")
     parser.add_argument("--parameters", choices=REGIONS, default=REGION, help="plants to train on")
     parser.add_argument(
-        "--switching-price", type=float, default=RewardWeights().switching,
+        "--switching-price", type=Number(float, 0.0, 1000.0), default=RewardWeights().switching,
         help="reward's price of one switching of the coil: trades wear against breakdown",
     )  # fmt: skip
     again = parser.add_mutually_exclusive_group()

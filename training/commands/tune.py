@@ -18,10 +18,9 @@ from optuna.trial import Trial
 from controllers.registration import Choice, Range, SearchSpace
 from controllers.registry import TUNED_KINDS, registration
 from controllers.tuned import Tuning, load_search, load_tunings, save_tunings
-from epv_env.common.command_line import writable_file
+from epv_env.common.command_line import COUNT, SECONDS, add_seed, writable_file
 from epv_env.common.results_folder import progress
 from epv_env.plant.plantfile import Plant
-from training.commands.options import count, seconds, seed
 from training.evaluation.rollout import run_episodes
 from training.evaluation.seeds import TUNING_SEED
 
@@ -131,10 +130,10 @@ def kept(path: Path, search: dict[str, Any]) -> dict[str, Tuning]:
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("--trials", type=count, default=100, help="evaluations for each controller")
-    parser.add_argument("--episodes", type=count, default=128, help="episodes of one evaluation")
-    parser.add_argument("--duration", type=seconds, default=6.0, help="length of an episode [s]")
-    parser.add_argument("--seed", type=seed, default=0, help="of the search")
+    parser.add_argument("--trials", type=COUNT, default=100, help="evaluations for each controller")
+    parser.add_argument("--episodes", type=COUNT, default=128, help="episodes of one evaluation")
+    parser.add_argument("--duration", type=SECONDS, default=6.0, help="length of an episode [s]")
+    add_seed(parser, help="of the search")
     parser.add_argument(
         "--out", dest="file", type=writable_file, required=True, help="JSON file to write"
     )

@@ -14,9 +14,8 @@ from PIL import Image
 
 import epv_env  # noqa: F401 - registers the ids
 from controllers.base import Controller
-from epv_env.common.command_line import writable_file
+from epv_env.common.command_line import SECONDS, add_plant, add_seed, writable_file
 from epv_env.plant.plantfile import load_plant
-from training.commands.options import seconds, seed
 from training.evaluation.named import HELP, named_controllers
 
 SIZE = (800, 450)
@@ -33,9 +32,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--file", type=writable_file, default=Path("valve.gif"), help="film to write")
     parser.add_argument("--window", action="store_true", help="show a window; no film")
     parser.add_argument("--scenario", default="steps", help="consumption")
-    parser.add_argument("--duration", type=seconds, default=2.4, help="of the episode [s]")
-    parser.add_argument("--seed", type=seed, default=4, help="of the episode")
-    parser.add_argument("--plant", type=Path, help="plant file (default: the report's calibration)")
+    parser.add_argument("--duration", type=SECONDS, default=2.4, help="of the episode [s]")
+    add_seed(parser, default=4, help="of the episode")
+    add_plant(parser)
 
 
 def run(options: argparse.Namespace) -> None:
