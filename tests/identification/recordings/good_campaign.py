@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 
-from epv_env.plant.channels import SENSORS
+from epv_env.plant.channels import SENSORS, readings
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised, simulate
 from identification.recordings.recording import CHANNELS, UNITS, Campaign, Recording
@@ -18,15 +18,16 @@ def switching(role: str = "calibration", rate: float = SAMPLING_RATE, name: str 
     U = CALIBRATION_CASES[0].voltage(24.0, rate)
     start = energised(p, p1=12e5, p2=6.8e5, U=24.0)
     state = simulate(p, initial=start, U=U, period=1 / rate).state
-    return _measured(name, role, rate, {"I": state.I, "U": U, **state._asdict()})
+    return _measured(name, role, rate, {"U": U, **readings(state, p)})
 
 
 @cache
 def resting(name: str = "rest") -> Recording:
     """Half a second with the coil off and every chamber vented, measured."""
+    p = Parameters.calibrated()
+    vented = readings(energised(p, p1=1e5, p2=1e5, U=0.0), p)
     count = round(0.5 * SAMPLING_RATE)
-    vented, off = np.full(count, 1e5), np.zeros(count)
-    truth = {"I": off, "U": off, "p1": vented, "p2": vented, "p3": vented}
+    truth = {channel: np.full(count, value) for channel, value in {"U": 0.0, **vented}.items()}
     return _measured(name, "quality", SAMPLING_RATE, truth)
 
 
@@ -44,10 +45,10 @@ def campaign_of(*recordings: Recording) -> Campaign:
 
 def _measured(name: str, role: str, rate: float, truth: dict) -> Recording:
     rng = np.random.default_rng(1)
-    readings = {}
+    measured = {}
     for channel in CHANNELS:
         unit = UNITS[channel][1]
         value = truth[channel] / unit
-        readings[channel] = SENSORS[channel].measure(value, rng.standard_normal(len(value))) * unit
+        measured[channel] = SENSORS[channel].measure(value, rng.standard_normal(len(value))) * unit
     zero = np.zeros(len(truth["U"]))
-    return Recording(name=name, role=role, period=1 / rate, sigma_S=zero, **readings)
+    return Recording(name=name, role=role, period=1 / rate, sigma_S=zero, **measured)

@@ -27,7 +27,8 @@ def recording(seed, held, drift=0.0, role="calibration", noisy=1.0):
     rng = np.random.default_rng(seed)
     after = np.arange(2 * held) >= held
     signals = {}
-    for name, value in HELD.items():
+    for name in CHANNELS:
+        value = HELD.get(name, HELD["p2"])
         true = np.where(after, 0.1 * value, value) + drift * np.arange(2 * held) * PERIOD
         signals[name] = SENSORS[name].measure(true, noisy * rng.standard_normal(2 * held))
         signals[name] *= UNITS[name][1]
