@@ -56,12 +56,8 @@ def plan(v, table, t, p, period):
     `margin` tells how far the forecast lies above the trigger [bar], `remaining` how long a pulse under
     way still lasts [s].
 
-    Args:
-        v: record of controllers.valve_learner.VALVE, changed.
-        table: of the plants.
-        t: the valve's plant in the table.
-        p: a PulsePlan.
-        period: control period [s].
+    v: record of controllers.valve_learner.VALVE, changed. table: of the plants. t: the valve's plant in
+    the table. p: a PulsePlan. period: control period [s].
     """
     fed = v.head > LEAST_HEAD
     ahead = p.look_ahead * (max(v.opens_in, 0.0) + table.release_lag[t])

@@ -280,14 +280,10 @@ def remember_breakdown(v, period):
 def observe(v, table, t, reading, period, filter_time, informed):
     """Take in one observation (entries,) of one valve.
 
-    Args:
-        v: record of VALVE, changed.
-        table: of the plants.
-        t: the valve's plant in the table.
-        reading: an observation [-], epv_env.observation.LAYOUT.
-        period: control period [s].
-        filter_time: time in which the weight of a reading of p2 fades by 1/e [s].
-        informed: whether the table is the valve's own, so that nothing is learnt of the valve.
+    v: record of VALVE, changed. table: of the plants. t: the valve's plant in the table. reading: an
+    observation [-], epv_env.observation.LAYOUT. period: control period [s]. filter_time: time in which
+    the weight of a reading of p2 fades by 1/e [s]. informed: whether the table is the valve's own, so
+    that nothing is learnt of the valve.
     """
     error = reading[_ERROR] * SCALE[_ERROR] + CENTRE[_ERROR]
     p1 = reading[_P1] * SCALE[_P1] + CENTRE[_P1]

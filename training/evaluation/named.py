@@ -35,8 +35,7 @@ def named_controllers(
 
     Args:
         sources: kinds of controllers/tuned.json or UNTUNED, folders that training wrote, LABEL=FOLDER,
-        or
-            MODULE:CLASS.
+            or MODULE:CLASS.
         plant: that the classic ones are designed for.
 
     Raises:
