@@ -5,7 +5,7 @@ from importlib.metadata import PackageNotFoundError, requires
 
 DISTRIBUTION = "epv-valve"
 
-OTHER_NAMES = {"PIL": "pillow", "sklearn": "scikit-learn", "tensorboardX": "tensorboard"}
+OTHER_NAMES = {"PIL": "pillow"}
 """Names on the package index of modules that are called otherwise."""
 
 
