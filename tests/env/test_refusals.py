@@ -48,7 +48,7 @@ AT_CONSTRUCTION = [
 ]
 
 
-@pytest.mark.parametrize(("options", "error", "message"), EITHER_WAY, ids=str)
+@pytest.mark.parametrize(("options", "error", "message"), EITHER_WAY)
 def test_a_bad_option_is_refused_everywhere(options, error, message):
     identifier = IDS[0]
     with pytest.raises(error, match=message):
