@@ -50,7 +50,7 @@ INFORMED_PLAN = PulsePlan(trigger=-0.06, aim=0.10, caution=0.0, doubt=0.0, look_
 
 
 @compiled
-def plan(v, table, t, p, period):
+def plan(v: Any, table: Any, t: int, p: Any, period: float) -> None:
     """Advise one valve: `advised` is 0 (coil off) or 1 (on).
 
     `margin` tells how far the forecast lies above the trigger [bar], `remaining` how long a pulse under

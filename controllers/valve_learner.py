@@ -277,7 +277,9 @@ def remember_breakdown(v, period):
 
 
 @compiled
-def observe(v, table, t, reading, period, filter_time, informed):
+def observe(
+    v: Any, table: Any, t: int, reading: Any, period: float, filter_time: float, informed: bool
+) -> None:
     """Take in one observation (entries,) of one valve.
 
     v: record of VALVE, changed. table: of the plants. t: the valve's plant in the table. reading: an
