@@ -17,6 +17,7 @@ from identification.importing.mapping_file import (
 )
 from identification.importing.source_file import ImportingError, SourceChannel, SourceFile, begin_offsets
 from identification.importing.units import PhysicalUnit, needed_unit, parsed_unit
+from identification.recordings.recording import CHANNELS
 
 
 def clock_of(
@@ -86,7 +87,7 @@ def _read(
 
 
 SUPPLY_PAIR = ("p1a", "p1b")
-REQUIRED = ("I", "U", "p2", "p3")
+REQUIRED = tuple(name for name in CHANNELS if name != "p1")
 
 REMEDY = "name it in a mapping file (docs/how-to/use-your-recordings.md)"
 

@@ -9,22 +9,20 @@ import msgspec
 from epv_env.common.files import read_json
 from identification.importing.source_file import ImportingError, SourceChannel, SourceFile
 from identification.importing.units import parsed_unit
-from identification.recordings.recording import ROLES
+from identification.recordings.recording import CHANNELS, ROLES, UNITS
+
+QUANTITY_OF_UNIT = {"A": "current", "V": "voltage", "bar": "pressure"}
 
 QUANTITY: Mapping[str, str] = {
     "time": "time",
-    "I": "current",
-    "U": "voltage",
-    "p1": "pressure",
+    **{name: QUANTITY_OF_UNIT[unit] for name, (unit, _) in UNITS.items()},
     "p1a": "pressure",
     "p1b": "pressure",
-    "p2": "pressure",
-    "p3": "pressure",
     "sigma_S": "mass flow",
 }
 """What an import looks for, with its quantity. p1a and p1b, two sensors, may stand for p1."""
 
-NAMES: Mapping[str, tuple[str, ...]] = {
+NAMES: Mapping[str, tuple[str, ...]] = {name: (name.lower(),) for name in CHANNELS} | {
     "time": ("time", "t", "zeit", "timestamp", "timestamps", "timechannel", "abszeit", "messzeit"),
     "I": ("i", "current", "strom", "icoil", "imv", "coilcurrent", "solenoidcurrent", "magnetstrom",
           "spulenstrom", "istrom", "currentcoil", "imagnet", "isolenoid"),
@@ -43,7 +41,8 @@ NAMES: Mapping[str, tuple[str, ...]] = {
     "sigma_S": ("sigmas", "consumption", "verbrauch", "massflow", "massenstrom", "consumedair",
                 "luftverbrauch"),
 }  # fmt: skip
-"""Names in lower case, without anything but letters and digits; English and German."""
+"""Names in lower case, without anything but letters and digits; English and German. A channel of the
+bench that is not listed has its own name."""
 
 BRACKETED = re.compile(r"^(.*?)\s*(?:[\[({]\s*([^\])}]+?)\s*[\])}]|\s(?:in|/)\s(\S+)|/(\S+))\s*$")
 """A name with its unit: "p1 [bar]", "p1 (bar)", "p1 in bar", "p1/bar"."""
