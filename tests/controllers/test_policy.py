@@ -113,7 +113,7 @@ def test_the_rules_hold_whatever_the_network_says():
 
 
 def test_the_package_holds_one_policy_which_holds_the_band_on_unknown_valves():
-    files = {path.name for path in TRAINED.iterdir() if path.is_file()}
+    files = {path.name for path in TRAINED.iterdir()}
     assert files == {CONTRACT_FILE, WEIGHTS_FILE}
     options = {"parameters": "sensitive_ten_percent"}
     metrics, _ = run_episodes(load_policy(), seeds=list(range(64)), duration=5.0, options=options)

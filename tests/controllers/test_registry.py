@@ -44,7 +44,7 @@ def controller_classes() -> list[type]:
     modules = [
         import_module(f"controllers.{path.stem}")
         for path in sorted(Path(controllers.__file__).parent.glob("*.py"))
-        if path.stem not in ("__init__", "base", "learned")
+        if path.stem not in ("__init__", "base")
     ]
     return [
         each

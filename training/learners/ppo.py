@@ -29,15 +29,16 @@ from training.learners.environment import NUM_ENVS, ROLLOUT, make_training_env
 
 TIMESTEPS = 8_000_000
 """Environment steps of a training."""
-LEARNING_RATE, LAST_LEARNING_RATE = 1.5e-3, 2e-5
-"""Adam's step size at the start and at the end; it falls linearly."""
+LEARNING_RATE, LAST_LEARNING_RATE = 3e-3, 2e-5
+"""Adam's step size at the start and at the end; it falls linearly. With smaller ones a training ends
+before it has converged, and its policy switches more often."""
 ENTROPY = 0.003
 """Entropy coefficient at the start; it falls linearly to zero, since the policy is used greedily."""
 BATCH = 4096
 """Transitions of a gradient step."""
 PPO_SETTINGS: dict[str, Any] = {
     "n_steps": ROLLOUT,
-    "n_epochs": 1,  # another environment step costs less than another pass over a rollout
+    "n_epochs": 2,  # the second pass costs a sixth of the time, and training converges sooner
     "gamma": 0.998,
     "policy_kwargs": {
         "net_arch": {"pi": [64, 64], "vf": [64, 64]},
