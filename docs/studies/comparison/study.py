@@ -2,8 +2,8 @@
 
     python -m docs.studies.comparison.study
 
-writes comparison.csv, differences.csv, beyond.csv, comparison.png and the table of README.md. What is
-finished is kept in runs/comparison and not run again.
+writes comparison.csv, differences.csv, beyond.csv, comparison.png and the tables of README.md here and at
+the top. What is finished is kept in runs/comparison and not run again.
 """
 
 import shutil
@@ -86,7 +86,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         shutil.copy(work / name, options.out / name)
     shares = beyond_table(pd.read_csv(beyond / "comparison.csv"))
     shares.to_csv(options.out / "beyond.csv", float_format="%.3g")
-    fill(options.out / PAGE, {"controllers": page_table(pd.read_csv(work / "comparison.csv"))})
+    blocks = {"controllers": page_table(pd.read_csv(work / "comparison.csv"))}
+    fill(options.out / PAGE, blocks)
+    if not options.quick:
+        fill(ROOT / "README.md", blocks)
     return 0
 
 
