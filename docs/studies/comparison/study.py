@@ -29,7 +29,7 @@ CONTROLLERS = (
 )
 """The learned one, then what it is built on, classic ones, and one that knows each valve's
 parameters."""
-EPISODES, BEYOND_EPISODES, QUICK = 4096, 512, 4
+EPISODES, BEYOND_EPISODES, QUICK = 4096, 128, 4
 """In each plant set, in each scenario beyond training, and under --quick."""
 PLANTS = "sensitive_ten_percent"
 """Plant set of the page's table and picture, and of the scenarios beyond training."""
