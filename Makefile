@@ -11,10 +11,10 @@ SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile
 
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help venv train test test-oldest identify gap sim-to-real bench tune results robustness export gif docs lint check format wheel clean
+.PHONY: help venv train test test-oldest bench docs lint check format wheel clean
 
 help: ## list the targets
-	@sed -n 's/^\([a-z][a-z-]*\):.*## /\1	/p' Makefile | while IFS='	' read -r name text; do \
+	@sed -n 's/^\([a-z][a-z%-]*\):.*## /\1	/p' Makefile | while IFS='	' read -r name text; do \
 		printf '%-12s %s\n' "$$name" "$$text"; done
 
 venv: $(VENV)/.installed ## create .venv with the pinned packages and this project
@@ -55,37 +55,8 @@ test-oldest: $(OLDEST)/.installed ## run the plant and environment tests on the 
 bench: $(VENV)/.installed ## measure speed and memory beside peers (ten minutes)
 	$(PY) -m tests.benchmarks $(ARGS)
 
-tune: $(VENV)/.installed ## search the classic controllers' settings anew (minutes)
-	$(PY) -m training.epv tune --out controllers/tuned.json $(ARGS)
-
-results: $(VENV)/.installed ## compare six controllers, and write docs/studies/comparison (an hour of one core)
-	$(PY) -m docs.studies.comparison.study $(ARGS)
-
-robustness: $(VENV)/.installed ## sweep parameters, effects and conditions, and write docs/studies/robustness
-	$(PY) -m docs.studies.robustness.study $(ARGS)
-
-export: $(VENV)/.installed ## turn the policy of `make train` into C and ONNX (needs a C compiler)
-	$(PY) -m training.epv export runs/ppo --out runs/ecu $(ARGS)
-
-identify: $(VENV)/.installed ## calibrate a plant on a virtual bench's recordings, with a report
-	rm -rf runs/bench
-	$(PY) -m identification bench --out runs/bench
-	$(PY) -m identification run runs/bench --out runs/identification $(ARGS)
-
-gap: $(VENV)/.installed ## say which effect a virtual bench has that the model lacks (a minute)
-	rm -rf runs/gap-bench
-	$(PY) -m identification bench --suite diagnosis --effect eddy_current=0.004 --out runs/gap-bench
-	$(PY) -m identification gap runs/gap-bench --out runs/gap $(ARGS)
-
-sim-to-real: $(VENV)/.installed ## train, deploy on a bench, diagnose, retrain, deploy again (5 minutes)
-	$(PY) -m docs.studies.sim_to_real.study $(ARGS)
-
-# make study-reproduction, study-coverage ...: the folders of docs/studies
-study-%: $(VENV)/.installed
+study-%: $(VENV)/.installed ## run a study of docs/studies, such as study-comparison
 	$(PY) -m docs.studies.$*.study $(ARGS)
-
-gif: $(VENV)/.installed ## film the valve for the README
-	SDL_VIDEODRIVER=dummy $(PY) docs/scripts/film.py --out docs/images/valve.gif $(ARGS)
 
 .PHONY: docs # a folder has the same name
 docs: $(VENV)/.installed ## build the documentation into site/ (strict: broken links and undocumented names fail)
