@@ -2,8 +2,8 @@
 
     python -m docs.studies.comparison.study
 
-writes comparison.csv, differences.csv, beyond.csv, comparison.png and the tables of README.md here and at
-the top. What is finished is kept in runs/comparison and not run again.
+writes comparison.csv, differences.csv, beyond.csv, comparison.png, and the tables of both README.md.
+What is finished is kept in runs/comparison and not run again.
 """
 
 import shutil
