@@ -80,7 +80,8 @@ class _Announcer(event.Listener):
     def on_start(self, event: Any) -> None:
         """numba begins to compile a function."""
         function = getattr(event.data.get("dispatcher"), "py_func", None)
-        if not self._silent and getattr(function, "__module__", "").startswith(KERNELS):
+        module = getattr(function, "__module__", None) or ""  # None: generated from text
+        if not self._silent and module.startswith(KERNELS):
             self._silent = True
             print("compiling for this machine: a minute or two, once", file=sys.stderr)
 

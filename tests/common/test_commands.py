@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 
+import numba
 import pytest
 
 from epv_env.common.commands import commands, main, main_of
@@ -107,3 +108,11 @@ def test_nothing_stays_of_a_start_that_failed(tmp_path):
     with pytest.raises(OSError, match="no"), only_writer(tmp_path / "a" / "b"):
         raise OSError("no")
     assert not list(tmp_path.iterdir())
+
+
+def test_compiling_generated_code_is_announced_without_fault(package):
+    """Code made from text belongs to no module."""
+    names: dict = {}
+    exec("def double(x):\n    return 2 * x", names)
+    assert main([package], program="epv", arguments=[]) == 0  # from now on compilations are announced
+    assert numba.njit(names["double"])(3) == 6
