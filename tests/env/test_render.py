@@ -172,6 +172,7 @@ def test_importing_the_renderer_imports_no_graphics() -> None:
 
 def test_the_first_picture_shows_what_has_been() -> None:
     """Its charts hold every period of the episode, as those of one that was drawn all along."""
+    pytest.importorskip("pygame")
     pictures = []
     for drawn in (False, True):
         env = gymnasium.make("EPValve-v0", render_mode="rgb_array", scenario="steps")
@@ -185,6 +186,7 @@ def test_the_first_picture_shows_what_has_been() -> None:
 
 
 def test_an_environment_with_a_picture_can_be_copied() -> None:
+    pytest.importorskip("pygame")
     env = gymnasium.make("EPValve-v0", render_mode="rgb_array").unwrapped
     env.reset(seed=2)
     env.step(0)

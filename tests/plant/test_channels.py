@@ -19,7 +19,6 @@ from epv_env.plant.channels import (
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import Trajectory, energised, simulate
 from epv_env.plant.valves import Valves
-from identification.recordings.columns import CHANNEL_OF, REQUIRED_COLUMNS, TIME_COLUMN
 from identification.recordings.recording import CHANNELS, OUTPUTS, Recording
 
 
@@ -30,8 +29,14 @@ def test_the_order_of_channels_is_that_of_files_and_of_drawn_noise():
     assert OUTPUTS[:3] == ("p2", "p3", "I")
     assert CHANNELS[:5] == ("I", "U", "p1", "p2", "p3")
     assert list(SENSORS)[:5] == ["p1", "p2", "p3", "I", "U"]
-    assert REQUIRED_COLUMNS[:5] == (TIME_COLUMN, "I_A", "U_V", "p2_bar", "p3_bar")
-    assert list(CHANNEL_OF)[:7] == ["I_A", "U_V", "p1_bar", "p1a_bar", "p1b_bar", "p2_bar", "p3_bar"]
+
+
+def test_the_order_of_columns_is_that_of_the_channels():
+    columns = pytest.importorskip("identification.recordings.columns", exc_type=ImportError)
+    required = (columns.TIME_COLUMN, "I_A", "U_V", "p2_bar", "p3_bar")
+    assert columns.REQUIRED_COLUMNS[:5] == required
+    names = ["I_A", "U_V", "p1_bar", "p1a_bar", "p1b_bar", "p2_bar", "p3_bar"]
+    assert list(columns.CHANNEL_OF)[:7] == names
 
 
 def test_every_channel_is_a_field_of_a_recording():
