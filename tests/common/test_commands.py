@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+from typing import Any
 
 import numba
 import pytest
@@ -115,4 +116,5 @@ def test_compiling_generated_code_is_announced_without_fault(package):
     names: dict = {}
     exec("def double(x):\n    return 2 * x", names)
     assert main([package], program="epv", arguments=[]) == 0  # from now on compilations are announced
-    assert numba.njit(names["double"])(3) == 6
+    double: Any = numba.njit(names["double"])
+    assert double(3) == 6
