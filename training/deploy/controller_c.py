@@ -7,26 +7,22 @@ of the pulses are constants. What such functions do not hold is named and ends t
 """
 
 import ast
-import builtins
-import inspect
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from textwrap import dedent, fill
+from textwrap import fill
 from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
+
+from training.deploy.syntax import COMPARISONS, OPERATORS, meaning, syntax_tree
 
 
 class ExportError(ValueError):
     """A policy cannot be exported: the message says why and what to do."""
 
 
-OPERATORS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
-COMPARISONS = {
-    ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
-}  # fmt: skip
 MATHEMATICS: dict[Any, str] = {
     math.exp: "expf", math.log: "logf", math.sqrt: "sqrtf", np.log: "logf", np.sqrt: "sqrtf",
     np.exp: "expf", abs: "fabsf", min: "lesser", max: "greater",
@@ -123,8 +119,7 @@ class _Body:
     """One function on its way to C."""
 
     def __init__(self, c: ControllerC, python: Callable[..., Any], kinds: tuple[str, ...]):
-        tree = ast.parse(dedent(inspect.getsource(python))).body[0]
-        assert isinstance(tree, ast.FunctionDef)
+        tree = syntax_tree(python)
         self.c, self.python, self.tree = c, python, tree
         self.given = dict(zip((each.arg for each in tree.args.args), kinds, strict=True))
         self.locals: dict[str, str] = {}
@@ -297,9 +292,8 @@ class _Body:
 
     def meant(self, node: ast.expr) -> Any:
         """What a name outside of the function stands for."""
-        names = {**vars(builtins), **self.python.__globals__}
         try:
-            return eval(compile(ast.Expression(node), "<name>", "eval"), names)
+            return meaning(node, self.python)
         except (NameError, AttributeError):
             self.refuse(node)
 

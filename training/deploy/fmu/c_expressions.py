@@ -6,7 +6,6 @@ they are evaluated once on symbols that write down what is done.
 """
 
 import ast
-import builtins
 import inspect
 import math
 from collections.abc import Callable
@@ -14,6 +13,8 @@ from dataclasses import dataclass
 from typing import Any, NoReturn, Protocol
 
 import numpy as np
+
+from training.deploy.syntax import COMPARISONS, OPERATORS, meaning
 
 
 class TranslationError(ValueError):
@@ -66,10 +67,6 @@ def written(value: Any) -> str:
 NUMBER, TRUTH = "double", "int"
 """C types of numbers and of truth values; the other types are structures."""
 
-OPERATORS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
-COMPARISONS = {
-    ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
-}  # fmt: skip
 JUNCTIONS = {ast.BitAnd: "&&", ast.BitOr: "||", ast.And: "&&", ast.Or: "||"}
 BUILT_IN: dict[Any, str] = {min: "lesser", max: "greater", abs: "fabs"}
 BUILT_IN |= {getattr(math, name): name for name in ("sqrt", "exp", "log", "log1p", "sin", "cos", "pow")}
@@ -166,9 +163,8 @@ class Expressions:
 
     def meant(self, node: ast.expr) -> Any:
         """What a name outside of the function stands for."""
-        names = {**vars(builtins), **self.python.__globals__}
         try:
-            return eval(compile(ast.Expression(node), "<name>", "eval"), names)
+            return meaning(node, self.python)
         except NameError:
             self.refuse(node)
 

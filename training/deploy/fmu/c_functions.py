@@ -14,7 +14,6 @@ from typing import Any
 
 from training.deploy.fmu.c_expressions import (
     NUMBER,
-    OPERATORS,
     TRUTH,
     CFunction,
     Declarations,
@@ -23,6 +22,7 @@ from training.deploy.fmu.c_expressions import (
     TranslationError,
     written,
 )
+from training.deploy.syntax import OPERATORS, syntax_tree
 
 
 def definition(done: CFunction, arguments: dict[str, str], body: str) -> str:
@@ -38,8 +38,7 @@ class Body(Expressions):
     """One function on its way to C."""
 
     def __init__(self, known: Declarations, python: Callable[..., Any], types: tuple[str, ...]):
-        tree = ast.parse(dedent(inspect.getsource(python))).body[0]
-        assert isinstance(tree, ast.FunctionDef)
+        tree = syntax_tree(python)
         self.tree = tree
         self.given = dict(zip((argument.arg for argument in tree.args.args), types, strict=True))
         names = [node for node in ast.walk(tree) if isinstance(node, ast.Name)]
