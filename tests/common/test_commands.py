@@ -1,9 +1,12 @@
 """A command is a module: it is found, listed, parsed and run alone; wrong input is one sentence."""
 
+import importlib
 import os
 import signal
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 from typing import Any
 
 import numba
@@ -118,3 +121,11 @@ def test_compiling_generated_code_is_announced_without_fault(package):
     assert main([package], program="epv", arguments=[]) == 0  # from now on compilations are announced
     double: Any = numba.njit(names["double"])
     assert double(3) == 6
+
+
+def test_the_entry_points_of_the_package_exist():
+    """What pip installs as a command is a function of this code."""
+    pyproject = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text("utf-8"))
+    for target in pyproject["project"]["scripts"].values():
+        module, _, name = target.partition(":")
+        assert callable(getattr(importlib.import_module(module), name))
