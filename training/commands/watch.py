@@ -6,6 +6,7 @@ epv watch PWM --window                      # on the screen
 """
 
 import argparse
+import io
 from pathlib import Path
 
 import gymnasium
@@ -15,6 +16,7 @@ from PIL import Image
 import epv_env  # noqa: F401 - registers the ids
 from controllers.base import Controller
 from epv_env.common.command_line import SECONDS, add_plant, add_seed, writable_file
+from epv_env.common.files import write_bytes
 from epv_env.plant.plantfile import load_plant
 from training.evaluation.named import HELP, named_controllers
 
@@ -74,12 +76,15 @@ def episode(
 
 
 def write_film(path: Path, frames: list[Image.Image], env: gymnasium.Env) -> None:
-    """Write frames of an episode as an animated GIF on one palette of colours."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    """Write frames as an animated GIF on one palette of colours, whole or not at all."""
     palette = frames[-1].quantize(256)
     first, *others = (frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
     duration = round(1000 * FRAME_PERIODS * _period(env) * SLOWNESS)
-    first.save(path, save_all=True, append_images=others, loop=0, optimize=True, duration=duration)
+    film = io.BytesIO()
+    first.save(
+        film, "GIF", save_all=True, append_images=others, loop=0, optimize=True, duration=duration
+    )
+    write_bytes(path, film.getvalue())
 
 
 def _period(env: gymnasium.Env) -> float:
