@@ -193,7 +193,11 @@ def learning_curve(validations: list[dict[str, float]]) -> Any:
     axes.plot(steps, [row["score"] for row in validations], "o-")
     for row, step in zip(validations, steps, strict=True):
         left = f"{row['left']:.0f} of {row['episodes']:.0f} leave"
-        axes.annotate(left, (step, row["score"]), xytext=(4, 4), textcoords="offset points", fontsize=7)
+        axes.annotate(
+            left, (step, row["score"]), xytext=(0, 8), textcoords="offset points", ha="center",
+            fontsize=8, bbox={"facecolor": "white", "edgecolor": "none", "pad": 1},
+        )  # fmt: skip
+    axes.margins(x=0.2, y=0.2)
     axes.set_xlabel("environment steps [millions]")
     axes.set_ylabel("validation score")
     axes.grid(alpha=0.3)

@@ -169,7 +169,7 @@ def as_text(table: pd.DataFrame) -> str:
 
 
 PANELS = {
-    "left_percent": "episodes that leave ±500 mbar [%]",
+    "left_percent": "leave ±500 mbar [%]",
     "C2_event_breakdown_mbar": "breakdown per event [mbar]",
     "switchings_per_s": "switchings [1/s]",
 }
