@@ -164,11 +164,6 @@ def response(
     return control.frd(outer_loop(point, inner_gain, integral_time, period, z), frequency)
 
 
-def open_loop(d: Design) -> control.FrequencyResponseData:
-    """Frequency response of a design's open loop, from p2's error to p2."""
-    return d.outer_gain * response(d.point, d.inner_gain, d.integral_time, d.period)
-
-
 def design(
     p: Parameters,
     *,

@@ -1,9 +1,7 @@
 """The controllers by kind: one line each. docs/extending.md says how to add one."""
 
 from controllers import hysteresis, pulse, pwm
-from controllers.base import Controller
 from controllers.registration import Registration, RegistrationError
-from epv_env.plant.plantfile import Plant
 
 REGISTRY: tuple[Registration, ...] = (
     hysteresis.HYSTERESIS,
@@ -24,8 +22,3 @@ def registration(kind: str) -> Registration:
     if kind not in by_kind:
         raise RegistrationError(f"unknown controller {kind!r}: choose one of {', '.join(by_kind)}")
     return by_kind[kind]
-
-
-def untuned_controllers(plant: Plant) -> list[Controller]:
-    """The registered controllers that have nothing to tune: those that see what no ECU measures."""
-    return [entry.built({}, plant) for entry in REGISTRY if entry.search_space is None]

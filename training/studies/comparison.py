@@ -1,7 +1,6 @@
 """Controllers on the same unseen episodes: figures, differences paired by episode, and a picture."""
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,7 +15,7 @@ from training.evaluation.metrics import EpisodeMetrics, summary, violation_inter
 from training.evaluation.plots import plt
 from training.evaluation.scenarios import EvaluationScenario
 from training.evaluation.seeds import EVALUATION_SEED
-from training.evaluation.statistics import mean_interval, paired_difference
+from training.evaluation.statistics import paired_difference
 
 PLANTS = {
     "calibrated": "the calibrated plant",
@@ -211,9 +210,3 @@ def pooled(results: Results, label: str, members: Sequence[str]) -> Results:
         (*cell, label): EpisodeMetrics.joined([results[(*cell, member)] for member in members])
         for cell in cells
     }
-
-
-def mean_with_interval(values: Any) -> str:
-    """A mean and its 95 % interval as text."""
-    low, high = mean_interval(np.asarray(values, float))
-    return f"{np.mean(values):.3g} ({low:.3g} to {high:.3g})"
