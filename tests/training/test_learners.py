@@ -36,7 +36,7 @@ SHORT = {"num_envs": 8, "validation_episodes": 8, "validation_duration": 1.0}
 @pytest.fixture(scope="module")
 def env():
     return make_training_env(
-        plant=Plant.calibrated(), seed=0, num_envs=4, weights=RewardWeights(), parameters="exact"
+        plant=Plant.calibrated(), num_envs=4, weights=RewardWeights(), parameters="exact"
     )
 
 
@@ -102,23 +102,24 @@ class Stop(BaseCallback):
         return True
 
 
-def test_a_stopped_training_goes_on_from_its_checkpoint(tmp_path: Path, monkeypatch):
+def test_a_stopped_training_ends_with_the_same_policy(tmp_path: Path, monkeypatch):
     monkeypatch.setattr(ppo, "CHECKPOINT_STEPS", 512)
-    monkeypatch.setattr(ppo, "Progress", lambda total: Stop())
-    with pytest.raises(KeyboardInterrupt):
-        train(TASK, tmp_path, timesteps=2048, **SHORT)
-    stopped = newest_checkpoint(tmp_path)
-    assert stopped is not None
-    assert not (tmp_path / "policy.json").exists()
-    monkeypatch.undo()
-    rows = train(TASK, tmp_path, timesteps=2048, resume=True, **SHORT)
-    steps = [row["timesteps"] for row in rows]
-    assert steps == sorted(set(steps))
-    assert steps[-1] == 2048
-    assert read_rows(tmp_path) == rows
+    whole, stopped = tmp_path / "whole", tmp_path / "stopped"
+    rows = train(TASK, whole, timesteps=2048, **SHORT)
+    with monkeypatch.context() as patch:
+        patch.setattr(ppo, "Progress", lambda total: Stop())
+        with pytest.raises(KeyboardInterrupt):
+            train(TASK, stopped, timesteps=2048, **SHORT)
+    newest = newest_checkpoint(stopped)
+    assert newest is not None
+    assert not (stopped / "policy.json").exists()
+    assert train(TASK, stopped, timesteps=2048, resume=True, **SHORT) == rows
+    assert [row["timesteps"] for row in read_rows(stopped)] == sorted({r["timesteps"] for r in rows})
+    name = "policy.safetensors"
+    assert (stopped / name).read_bytes() == (whole / name).read_bytes()
     best = max(rows, key=lambda row: row["score"])
-    assert read_policy(tmp_path)[0].provenance["timesteps"] == best["timesteps"]
-    policy = load_policy(tmp_path)
+    assert read_policy(whole)[0].provenance["timesteps"] == best["timesteps"]
+    policy = load_policy(whole)
     policy.reset(2)
     assert set(policy.act(np.zeros((2, READINGS)))) <= {0, 1}
 

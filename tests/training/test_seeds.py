@@ -12,11 +12,11 @@ def test_the_ranges_do_not_meet():
     assert min(b - a for a, b in pairwise(firsts)) >= seeds.RANGE
 
 
-def test_a_training_seed_that_would_meet_the_tuning_is_refused():
-    assert seeds.training_seeds(3, 256) == range(768, 1024)
-    assert seeds.training_seeds(3905, 256)[-1] < seeds.TUNING_SEED
-    with pytest.raises(ValueError, match=r"training seed 3906 .* give one up to 3905"):
-        seeds.training_seeds(3906, 256)
+def test_a_training_stays_in_its_range_and_each_has_its_own_episodes():
+    firsts = {seeds.first_training_seed(seed, steps, 1024) for seed in range(40) for steps in (0, 10**6)}
+    assert len(firsts) == 80
+    assert min(firsts) >= seeds.TRAINING_SEED
+    assert max(firsts) + 1024 <= seeds.TRAINING_SEED + seeds.RANGE
 
 
 def test_episodes_beyond_their_range_are_refused():

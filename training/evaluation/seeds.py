@@ -4,8 +4,10 @@ An episode depends on its seed alone, so an episode of training, tuning or selec
 a controller's performance on new ones. A range goes from its first seed up to the next range's.
 """
 
+import numpy as np
+
 TRAINING_SEED = 0
-"""Training with seed k uses as many from k times its number of environments on (`training_seeds`)."""
+"""Of the episodes that policies are trained on (`first_training_seed`)."""
 
 TUNING_SEED = 1_000_000
 """On which the classic controllers are tuned."""
@@ -32,15 +34,13 @@ RANGE = 1_000_000
 """Seeds of a range."""
 
 
-def training_seeds(seed: int, num_envs: int) -> range:
-    """Of the first episodes of a training. Raises ValueError if others are tuned on them."""
-    first = TRAINING_SEED + seed * num_envs
-    if first + num_envs > TUNING_SEED:
-        most = (TUNING_SEED - TRAINING_SEED) // num_envs - 1
-        raise ValueError(
-            f"training seed {seed} would meet episodes kept for tuning: give one up to {most}"
-        )
-    return range(first, first + num_envs)
+def first_training_seed(seed: int, steps: int, num_envs: int) -> int:
+    """Seed of the first of the episodes that a training begins after so many environment steps.
+
+    The next environments have the next seeds. seed: of the training.
+    """
+    rng = np.random.default_rng([seed, steps])
+    return int(rng.integers(TRAINING_SEED, TRAINING_SEED + RANGE - num_envs))
 
 
 def check_first_seed(seed: int, episodes: int) -> None:

@@ -13,7 +13,6 @@ from epv_env.conditions import Conditions
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from epv_env.sb3 import SB3VectorEnv
-from training.evaluation.seeds import training_seeds
 
 NUM_ENVS = 1024
 """Episodes that run side by side."""
@@ -59,7 +58,6 @@ def training_weights(weights: RewardWeights) -> RewardWeights:
 def make_training_env(
     *,
     plant: Plant,
-    seed: int,
     num_envs: int = NUM_ENVS,
     scenario: str = "mixed",
     parameters: str = "sensitive_ten_percent",
@@ -69,14 +67,10 @@ def make_training_env(
 
     Args:
         plant: centre of the region.
-        seed: of the training. Trainings with different seeds meet different episodes.
         num_envs: episodes side by side.
         scenario: of the consumption.
         parameters: region that plants are drawn from.
         weights: prices of the reward.
-
-    Raises:
-        ValueError: the seed is too large (training/evaluation/seeds.py).
     """
     lengths = range(SHORTEST, LONGEST + 1, ROLLOUT)
     env = gymnasium.make_vec(
@@ -91,6 +85,4 @@ def make_training_env(
         conditions=CONDITIONS,
         weights=training_weights(weights),
     )
-    scaled = ScaledReward(VecMonitor(SB3VectorEnv(LearntObservation(env, rules=True))))
-    scaled.seed(training_seeds(seed, num_envs)[0])
-    return scaled
+    return ScaledReward(VecMonitor(SB3VectorEnv(LearntObservation(env, rules=True))))

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import torch
 from stable_baselines3 import PPO
-from stable_baselines3.common.callbacks import BaseCallback, CheckpointCallback
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.utils import set_random_seed
 from stable_baselines3.common.vec_env import VecEnv
 from tqdm import tqdm
 
@@ -23,7 +24,7 @@ from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.rollout import run_episodes
-from training.evaluation.seeds import VALIDATION_SEED
+from training.evaluation.seeds import VALIDATION_SEED, first_training_seed
 from training.learners.actor import AdvisedPolicy, network_of
 from training.learners.environment import NUM_ENVS, ROLLOUT, make_training_env
 
@@ -65,7 +66,8 @@ BEST = "best"
 """Folder of the best validated policy, within that of the training."""
 VALIDATION_FILE = "validation.csv"
 CHECKPOINT_STEPS = 1_000_000
-"""Environment steps between two checkpoints."""
+"""Environment steps between two checkpoints. New episodes begin with each, so a training that is resumed
+there meets the same ones as an uninterrupted one."""
 
 
 def linear(first: float, last: float, remaining: float) -> float:
@@ -179,6 +181,39 @@ def figures(metrics: EpisodeMetrics) -> dict[str, float]:
     }
 
 
+class Checkpoints(BaseCallback):
+    """Saves the model from time to time, and begins new episodes then."""
+
+    def __init__(self, seed: int, folder: Path):
+        super().__init__()
+        self._seed, self._folder = seed, folder
+
+    def _on_training_start(self) -> None:
+        self._next = self.num_timesteps + CHECKPOINT_STEPS
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_start(self) -> None:
+        if self.num_timesteps < self._next:
+            return
+        self._next = self.num_timesteps + CHECKPOINT_STEPS
+        assert isinstance(self.model, PPO)
+        self._folder.mkdir(parents=True, exist_ok=True)
+        self.model.save(self._folder / f"ppo_{self.num_timesteps}_steps")
+        seed_episodes(self.model, self._seed)
+        self.model._last_obs = self.training_env.reset()  # type: ignore[assignment]
+        self.model._last_episode_starts = np.ones(self.training_env.num_envs, dtype=bool)
+
+
+def seed_episodes(model: PPO, seed: int) -> None:
+    """Let all that is drawn after the next reset depend on the training's seed and its steps alone."""
+    env = model.get_env()
+    assert env is not None
+    set_random_seed(seed + model.num_timesteps)
+    env.seed(first_training_seed(seed, model.num_timesteps, env.num_envs))
+
+
 class Progress(BaseCallback):
     """A progress bar with the share of episodes that stay within the band while the policy explores."""
 
@@ -218,8 +253,8 @@ def train(
 ) -> list[dict[str, float]]:
     """Train until `timesteps`, and write the best validated policy into the folder.
 
-    A training that was stopped goes on from its newest checkpoint, with other episodes than an
-    uninterrupted one would meet.
+    A training that was stopped goes on from its newest checkpoint, and ends with the same policy as an
+    uninterrupted one.
 
     Args:
         task: what the policy is for.
@@ -236,20 +271,15 @@ def train(
         A row for each validation.
     """
     torch.set_num_threads(1)  # sums do not depend on the machine's cores; the plant uses them all
-    env = make_training_env(seed=seed, num_envs=num_envs, **vars(task))
+    env = make_training_env(num_envs=num_envs, **vars(task))
     newest = newest_checkpoint(folder) if resume else None
-    if newest is None:
-        model = make_model(env, seed=seed)
-        env.seed(seed * num_envs)  # the model has seeded them, too, and other trainings' alike
-    else:
-        model = PPO.load(newest, env=env, device="cpu")
+    model = PPO.load(newest, env=env, device="cpu") if newest else make_model(env, seed=seed)
+    seed_episodes(model, seed)
     selection = Selection(
         task, folder, total=timesteps, episodes=validation_episodes, duration=validation_duration,
         provenance={"seed": seed, **(provenance or {})},
     )  # fmt: skip
-    checkpoints = CheckpointCallback(
-        max(CHECKPOINT_STEPS // num_envs, 1), str(folder / CHECKPOINTS), name_prefix="ppo"
-    )
+    checkpoints = Checkpoints(seed, folder / CHECKPOINTS)
     if model.num_timesteps < timesteps:
         model.learn(
             timesteps - model.num_timesteps,
