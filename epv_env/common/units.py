@@ -1,4 +1,6 @@
-"""SI values of the units used at interfaces."""
+"""SI values of the units used at interfaces, and one spelling of powers in units."""
+
+import re
 
 BAR = 1e5
 """One bar [Pa]."""
@@ -14,3 +16,9 @@ MILLIGRAM = 1e-6
 
 MILLIMETRE = 1e-3
 """One millimetre [m]."""
+
+
+def plain_powers(unit: str) -> str:
+    """A unit in which squares and cubes are written with ^: m²/s, m**2/s and m2/s become m^2/s."""
+    spelled = unit.replace("²", "^2").replace("³", "^3").replace("**", "^")
+    return re.sub(r"([^\W\d_])([23])(?!\w)", r"\1^\2", spelled)

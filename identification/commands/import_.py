@@ -34,6 +34,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="pressure of the environment [bar absolute]",
     )
     parser.add_argument(
+        "--gauge",
+        action="store_true",
+        help="pressures are gauge where no unit says gauge or absolute",
+    )
+    parser.add_argument(
         "--temperature-K", type=Number(float, 1.0, 1000.0), help="of the environment [K]"
     )
     parser.add_argument(
@@ -58,6 +63,7 @@ def run(options: argparse.Namespace) -> None:
         temperature_K=options.temperature_K,
         rate=options.rate,
         name=options.name,
+        gauge=options.gauge,
         rules=rules,
     )
     print(import_text(imported), end="\n\n")

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 
+from epv_env.common.units import plain_powers
 from identification.block_bootstrap import Interval
 
 PREFIXES = {"M": 1e6, "k": 1e3, "": 1.0, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
@@ -59,11 +60,11 @@ def three_digits(number: float) -> str:
 def readable_unit(unit: str, size: float) -> tuple[str, float]:
     """The unit with the prefix that suits numbers of a size [SI], and the size of that unit in SI.
 
-    A unit that takes no prefix stays as it is; '1' is no unit.
+    A unit that takes no prefix stays as it is, as does one with another power; '1' is no unit.
     """
     if unit == "1":
         return "", 1.0
-    first = re.match(r"([A-Za-z]+)(?:\^([23]))?", unit)
+    first = re.match(r"([A-Za-z]+)(?:\^([23]))?(?=$|[\s/·*.])(?!\.\d)", plain_powers(unit))
     if not first or first[1] not in PREFIXED:
         return unit, 1.0
     power = int(first[2] or 1)

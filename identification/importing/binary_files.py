@@ -1,6 +1,7 @@
 """Measurement files of MDF, TDMS, Parquet and MATLAB, read by the packages of their formats."""
 
 from collections.abc import Iterator, Mapping
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -8,32 +9,47 @@ import numpy as np
 import scipy.io
 from numpy.typing import NDArray
 
+from identification.importing.mapping_file import meaning
 from identification.importing.source_file import (
     STAMP,
-    ImportingError,
     SourceChannel,
+    check_number,
+    limited,
     needed_package,
     points_in_time,
     seconds,
 )
+from identification.importing.units import parsed_unit
 
 
 def read_mdf(path: Path) -> tuple[str, list[SourceChannel]]:
-    """Every numeric channel with the times of its master channel."""
+    """Every numeric channel with the times of its master channel; readings marked invalid are NaN."""
     asammdf = needed_package("asammdf", "MDF files")
     with asammdf.MDF(path) as mdf:
-        channels = [
+        channels = (
             SourceChannel(
                 name=signal.name,
                 unit=signal.unit or "",
-                values=np.asarray(signal.samples, dtype=float),
+                values=_valid(mdf, signal),
                 time=np.asarray(signal.timestamps, dtype=float),
                 table=f"group {signal.group_index}",
             )
             for signal in mdf.iter_channels(skip_master=True)
             if np.ndim(signal.samples) == 1 and np.asarray(signal.samples).dtype.kind in "iufb"
-        ]
-        return f"MDF {mdf.version}", channels
+        )
+        return f"MDF {mdf.version}", limited(path, channels)
+
+
+ALL_INVALID = 1
+"""Flag of an MDF 4 channel of which no reading counts; asammdf leaves it to its callers."""
+
+
+def _valid(mdf: Any, signal: Any) -> NDArray:
+    """The samples of an MDF channel, (samples,), NaN where they are marked invalid."""
+    channel = mdf.groups[signal.group_index].channels[signal.channel_index]
+    bits = False if signal.invalidation_bits is None else np.asarray(signal.invalidation_bits)
+    invalid = bits | bool(getattr(channel, "flags", 0) & ALL_INVALID)
+    return np.where(invalid, np.nan, np.asarray(signal.samples, dtype=float))
 
 
 UNIT_PROPERTIES = ("unit_string", "NI_UnitDescription", "unit", "Unit")
@@ -44,13 +60,13 @@ def read_tdms(path: Path) -> tuple[str, list[SourceChannel]]:
     """Every numeric channel; waveforms bring their own times."""
     nptdms = needed_package("nptdms", "TDMS files")
     with nptdms.TdmsFile.open(path) as file:
-        channels = [
+        channels = (
             _tdms_channel(group.name, channel)
             for group in file.groups()
             for channel in group.channels()
             if channel.dtype.kind in "iufM" and len(channel) > 1
-        ]
-    return "TDMS", channels
+        )
+        return "TDMS", limited(path, channels)
 
 
 def _tdms_unit(properties: dict[str, Any]) -> str:
@@ -60,48 +76,70 @@ def _tdms_unit(properties: dict[str, Any]) -> str:
 def _tdms_channel(group: str, channel: Any) -> SourceChannel:
     """A waveform with its times and their begin, or a channel whose times are another channel."""
     values, begin = seconds(np.asarray(channel[:]))
-    waveform = bool(channel.properties.get("wf_increment"))
+    time = _waveform_times(channel.properties, len(values))
     return SourceChannel(
         name=channel.name,
         unit=_tdms_unit(channel.properties) or ("s" if begin is not None else ""),
         values=values,
-        time=channel.time_track() if waveform else None,
-        begin=channel.properties.get("wf_start_time") if waveform else begin,
+        time=time,
+        begin=begin if time is None else channel.properties.get("wf_start_time"),
         table=group,
     )
 
 
+def _waveform_times(properties: Mapping[str, Any], count: int) -> NDArray | None:
+    """Times of a waveform's samples, (count,) [s]; None: it is no waveform over time."""
+    unit = parsed_unit(str(properties.get("wf_xunit_string") or "s"))
+    if not properties.get("wf_increment") or unit is None or unit.quantity != "time":
+        return None
+    start = properties.get("wf_start_offset", 0.0)
+    return unit.size * (start + properties["wf_increment"] * np.arange(count))
+
+
 def read_parquet(path: Path) -> tuple[str, list[SourceChannel]]:
-    """Every numeric column; its unit is the field's metadata `unit`, if there is one."""
+    """Every numeric column, NaN where it is null; its unit is the field's metadata `unit`, if any."""
     parquet = needed_package("pyarrow.parquet", "Parquet files")
+    check_number(path, parquet.read_metadata(path).num_columns)
     table = parquet.read_table(path)
-    channels = []
+    return "Parquet", limited(path, _parquet_channels(path, table))
+
+
+def _parquet_channels(path: Path, table: Any) -> Iterator[SourceChannel]:
     for field in table.schema:
-        values = _numbers_or_times(f"{path}, {field.name}", table.column(field.name).to_numpy())
+        values = _numbers_or_times(f"{path}, {field.name}", table.column(field.name))
         if values.dtype.kind in "iufMm":
             unit = (field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace")
             timed = values.dtype.kind in "Mm"
             numbers, begin = seconds(values)
-            channels.append(
-                SourceChannel(name=field.name, unit="s" if timed else unit, values=numbers, begin=begin)
+            yield SourceChannel(
+                name=field.name, unit="s" if timed else unit, values=numbers, begin=begin
             )
-    return "Parquet", channels
 
 
-def _numbers_or_times(place: str, values: NDArray) -> NDArray:
-    """A column as it is, or as points in time where its texts are some."""
-    texts = values.dtype.kind == "O" and len(values) and isinstance(values[0], str)
-    return points_in_time(place, values) if texts and STAMP.match(values[0]) else values
+def _numbers_or_times(place: str, column: Any) -> NDArray:
+    """A column's numbers, or its points in time where its texts are some."""
+    values = column.to_numpy()
+    first = next((value for value in values if value is not None), None)
+    if isinstance(first, Decimal):
+        return values.astype(float)
+    return points_in_time(place, values) if isinstance(first, str) and STAMP.match(first) else values
 
 
 HDF5_SIGNATURE = b"\x89HDF"
 """First bytes of HDF5; MAT 7.3 has them after its own header of 512 bytes."""
 
 VALUE_FIELDS, TIME_FIELDS, UNIT_FIELDS = ("data", "values", "value"), ("time", "t"), ("unit", "units")
-"""Fields of a struct that holds one channel."""
+NAME_FIELDS = ("label", "name")
+"""Fields of a struct that holds one channel; the name counts in an array of such structs."""
 
 TIME_UNIT_FIELDS = ("time_unit", "t_unit", "timeunit", "time_units")
 """Fields of such a struct that hold the unit of its times."""
+
+START_FIELDS, INTERVAL_FIELDS = ("tstart", "t0", "start"), ("tinterval", "interval", "dt", "ts")
+"""Numbers that stand for the times of the vectors beside them [s]."""
+
+OBJECTS = ("MatlabOpaque", "MatlabFunction")
+"""What scipy makes of timeseries, tables and functions, which hold no numbers to read."""
 
 
 def read_matlab(path: Path) -> tuple[str, list[SourceChannel]]:
@@ -114,82 +152,89 @@ def read_matlab(path: Path) -> tuple[str, list[SourceChannel]]:
     else:
         content = scipy.io.loadmat(path, simplify_cells=True)
         version = "MATLAB 5"
-    return version, list(_matlab_channels(str(path), "", content))
+    return version, limited(path, _matlab_channels("", content))
 
 
-def _matlab_channels(file: str, path: str, content: Mapping[str, Any]) -> Iterator[SourceChannel]:
+def _matlab_channels(path: str, content: Mapping[str, Any]) -> Iterator[SourceChannel]:
     """The channels of a struct, and of the structs in it."""
-    time, units = _simulink_time(content), _units(content)
-    for name, value in content.items():
-        full = f"{path}.{name}" if path else name
-        if name.startswith("__") or (time is not None and name == "time"):
-            continue
-        if isinstance(value, Mapping) and _first(value, VALUE_FIELDS) is not None and time is None:
-            yield from _single(full, value)
-        elif time is not None and name == "signals":
-            yield from _simulink(path, time, value)
-        elif isinstance(value, Mapping):
-            yield from _matlab_channels(file, full, value)
-        elif isinstance(value, np.ndarray):
-            _refuse_object(file, full, value)
-            yield from _matlab_columns(full, value, units.get(name, ""), path)
+    units = _first(content, UNIT_FIELDS)
+    units = units if isinstance(units, Mapping) else {}
+    found = [
+        channel
+        for name, value in content.items()
+        if not name.startswith("__")
+        for channel in _matlab_field(path, f"{path}.{name}" if path else name, value, units.get(name))
+    ]
+    yield from found
+    times = _times_of_interval(content)
+    if times is not None and not any(meaning(channel) == "time" for channel in found):
+        yield from _matlab_columns(f"{path}.time" if path else "time", times, "s", path)
 
 
-def _matlab_columns(
-    name: str, value: NDArray, unit: str, path: str, time: NDArray | None = None
-) -> Iterator[SourceChannel]:
-    """The columns of a numeric array; a row counts as a column."""
+def _matlab_field(path: str, full: str, value: Any, unit: Any) -> Iterator[SourceChannel]:
+    """The channels of one field of a struct; path: of the struct, full: of the field."""
+    if isinstance(value, Mapping):
+        value = _struct_array(full, value)
+    if isinstance(value, Mapping) and _first(value, VALUE_FIELDS) is not None:
+        yield from _single(path, full, value)
+    elif isinstance(value, Mapping):
+        yield from _matlab_channels(full, value)
+    elif isinstance(value, list):
+        for number, one in enumerate(value, start=1):
+            named = isinstance(one, Mapping) and _first(one, NAME_FIELDS)
+            yield from _matlab_field(path, str(named or f"{full}({number})"), one, "")
+    elif isinstance(value, np.ndarray):
+        yield from _matlab_columns(full, value, unit, path)
+
+
+def _struct_array(name: str, struct: Mapping[str, Any]) -> Any:
+    """A list of structs for a struct of lists, as 7.3 has arrays, and for Simulink's only signal."""
+    if isinstance(_first(struct, VALUE_FIELDS), list):
+        lists = {key: value for key, value in struct.items() if isinstance(value, list)}
+        return [dict(zip(lists, one, strict=True)) for one in zip(*lists.values(), strict=True)]
+    return [struct] if name.endswith("signals") else struct
+
+
+def _matlab_columns(name: str, value: NDArray, unit: Any, path: str) -> Iterator[SourceChannel]:
+    """The vectors of a numeric array: its columns, or its rows where these are longer."""
+    unit = unit if isinstance(unit, str) else ""
+    if type(value).__name__ in OBJECTS:
+        name = f"{name} (a MATLAB object such as a timeseries: save its numbers as vectors)"
+        yield SourceChannel(name=name, unit=unit, values=np.empty(0), table=path)
     value = np.squeeze(value)
     if value.dtype.kind not in "iufb" or value.ndim not in (1, 2) or value.shape[0] < 2:
         return
-    if value.ndim == 1:
-        value = value[:, None]
-    for number, column in enumerate(value.T, start=1):
+    rows = np.atleast_2d(value if value.ndim == 1 or value.shape[0] < value.shape[1] else value.T)
+    for number, row in enumerate(rows, start=1):
         yield SourceChannel(
-            name=name if value.shape[1] == 1 else f"{name}({number})",
+            name=name if len(rows) == 1 else f"{name}({number})",
             unit=unit,
-            values=np.asarray(column, dtype=float),
-            time=time,
+            values=np.asarray(row, dtype=float),
             table=path,
         )
 
 
-def _single(name: str, content: Mapping[str, Any]) -> Iterator[SourceChannel]:
+def _single(path: str, name: str, content: Mapping[str, Any]) -> Iterator[SourceChannel]:
     """A struct that holds one channel, perhaps with its own time."""
     unit, time = _first(content, UNIT_FIELDS), _first(content, TIME_FIELDS)
-    yield from _matlab_columns(name, np.asarray(_first(content, VALUE_FIELDS)), str(unit or ""), name)
+    if time is None:
+        time = _times_of_interval(content)
+    table = path if time is None else name
+    yield from _matlab_columns(name, np.asarray(_first(content, VALUE_FIELDS)), unit, table)
     if time is not None:
-        time_unit = str(_first(content, TIME_UNIT_FIELDS) or "")
-        yield from _matlab_columns(f"{name}.time", np.asarray(time), time_unit, name)
+        time_unit = _first(content, TIME_UNIT_FIELDS)
+        yield from _matlab_columns(f"{name}.time", np.asarray(time), time_unit, table)
 
 
-def _simulink(path: str, time: NDArray, signals: Any) -> Iterator[SourceChannel]:
-    """Simulink's structure with time: signals have values and label."""
-    for number, signal in enumerate(signals if isinstance(signals, list) else [signals], start=1):
-        name = str(signal.get("label") or f"{path}.signals({number})")
-        yield from _matlab_columns(name, np.asarray(signal["values"]), "", path, time)
-
-
-def _simulink_time(content: Mapping[str, Any]) -> NDArray | None:
-    if {"time", "signals"} <= set(content):
-        return np.ravel(np.asarray(content["time"], dtype=float))
-    return None
-
-
-def _units(content: Mapping[str, Any]) -> dict[str, str]:
-    """Units by channel, where a struct of that name lists them."""
-    units = _first(content, UNIT_FIELDS)
-    return {k: v for k, v in units.items() if isinstance(v, str)} if isinstance(units, Mapping) else {}
+def _times_of_interval(content: Mapping[str, Any]) -> NDArray | None:
+    """Times that a struct gives by start and interval, (samples,) [s]; None: it does not."""
+    interval, start = _first(content, INTERVAL_FIELDS), _first(content, START_FIELDS)
+    count = max((np.size(value) for value in content.values() if np.ndim(value) == 1), default=0)
+    if not isinstance(interval, int | float) or count < 2:
+        return None
+    return (start if isinstance(start, int | float) else 0.0) + interval * np.arange(count)
 
 
 def _first(content: Mapping[str, Any], names: tuple[str, ...]) -> Any:
     """The first of these fields that a struct has, whatever its case; None if it has none."""
     return next((value for key, value in content.items() if key.lower() in names), None)
-
-
-def _refuse_object(file: str, name: str, value: NDArray) -> None:
-    if type(value).__name__ in ("MatlabOpaque", "MatlabFunction"):
-        raise ImportingError(
-            f"{file}: {name} is a MATLAB object such as a timeseries or table: save its numbers, for "
-            "example with save('file.mat', '-struct', 's') of a struct s of vectors"
-        )

@@ -10,6 +10,7 @@ from identification.importing.mapping_file import (
     QUANTITY,
     ChannelEntry,
     MappingFile,
+    mapping_example,
     meaning,
     named_channel,
     proposed,
@@ -32,7 +33,7 @@ def clock_of(
         return _read(source, mapping, named_channel(source, named))
     if channel.time is not None:
         return channel.time, channel.begin
-    wanted = mapping.channels.get("time")
+    named = mapping.channels.get("time", ChannelEntry()).source
     table: str | None = channel.table
     while table is not None:
         found = [
@@ -41,7 +42,7 @@ def clock_of(
             if other.table == table
             and other is not channel
             and len(other.values) == len(channel.values)
-            and (_is_called(other, wanted.source) if wanted else _holds_times(other))
+            and (_is_called(other, named) if named else _holds_times(other))
         ]
         if found:
             return _read(source, mapping, _only(source, channel, found))
@@ -54,7 +55,8 @@ def clock_of(
 
 def _is_called(channel: SourceChannel, name: str) -> bool:
     """Whether a mapping file's name means a channel; a field's name means it in every struct."""
-    return name in (channel.name, channel.name.rpartition(".")[2], split_name(channel.name)[0])
+    own = channel.name
+    return name in (own, channel.full_name, own.rpartition(".")[2], split_name(own)[0])
 
 
 def _holds_times(channel: SourceChannel) -> bool:
@@ -67,7 +69,7 @@ def _holds_times(channel: SourceChannel) -> bool:
 
 def _only(source: SourceFile, channel: SourceChannel, found: list[SourceChannel]) -> SourceChannel:
     if len(found) > 1:
-        names = " or ".join(repr(each.name) for each in found[:4])
+        names = " or ".join(repr(source.label(each)) for each in found[:4])
         raise ImportingError(
             f"{source.path}: {names} may hold the times of {channel.name}: name one in a mapping file, "
             'as "time" or in the field "time" of the channel'
@@ -121,20 +123,24 @@ class MappedChannel:
 
 def chosen_channels(source: SourceFile, mapping: MappingFile) -> dict[str, SourceChannel]:
     """The channel of the file for each of a recording. Raises ImportingError for what is unclear."""
-    entries = {name: entry for name, entry in mapping.channels.items() if name != "time"}
-    chosen = {name: named_channel(source, entry.source) for name, entry in entries.items()}
+    chosen = {
+        name: named_channel(source, entry.source)
+        for name, entry in mapping.channels.items()
+        if name != "time" and entry.source
+    }
     taken = {id(channel) for channel in chosen.values()}
     free = [channel for channel in source.channels if id(channel) not in taken]
     for name, candidates in proposed(free).items():
         if name == "time" or name in chosen:
             continue
         if len(candidates) > 1:
-            names = " or ".join(repr(channel.name) for channel in candidates[:4])
+            names = " or ".join(repr(source.label(channel)) for channel in candidates[:4])
             raise ImportingError(f"{source.path}: {name} may be {names}: {REMEDY}")
         chosen[name] = candidates[0]
     if "p1" in chosen:
         chosen = {name: channel for name, channel in chosen.items() if name not in SUPPLY_PAIR}
     _check_complete(source, chosen)
+    _check_units(source, mapping, chosen)
     return chosen
 
 
@@ -160,10 +166,25 @@ def _check_complete(source: SourceFile, chosen: Mapping[str, SourceChannel]) -> 
     supply = () if "p1" in chosen or all(name in chosen for name in SUPPLY_PAIR) else ("p1",)
     missing = [name for name in (*supply, *REQUIRED) if name not in chosen]
     if missing:
-        free = [c.name for c in source.channels if c not in chosen.values() and meaning(c) != "time"]
+        used = {id(channel) for channel in chosen.values()}
+        free = [source.label(c) for c in source.channels if id(c) not in used and meaning(c) != "time"]
         raise ImportingError(
             f"{source.path}: no channel is known to be {', '.join(missing)}; not used are "
-            f"{', '.join(free[:20]) or 'none'}: {REMEDY}"
+            f"{', '.join(free[:20]) or 'none'}: name it in a mapping file such as "
+            f"{mapping_example(dict.fromkeys(missing, 'NAME'))}"
+        )
+
+
+def _check_units(source: SourceFile, mapping: MappingFile, chosen: Mapping[str, SourceChannel]) -> None:
+    silent = {
+        name: source.label(channel)
+        for name, channel in chosen.items()
+        if not _unit_text(mapping.channels.get(name, ChannelEntry()), channel)
+    }
+    if silent:
+        raise ImportingError(
+            f"{source.path}: there is no unit of {', '.join(silent)}: give the right ones in a mapping "
+            f"file such as {mapping_example(silent)}"
         )
 
 
@@ -174,10 +195,11 @@ def _mapped(
     channel: SourceChannel,
     ambient: float | None,
 ) -> MappedChannel:
-    entry = mapping.channels.get(name, ChannelEntry(source=channel.name))
+    entry = mapping.channels.get(name, ChannelEntry())
     place = f"{source.path}, {channel.name}"
     unit = _unit(place, name, channel, entry)
-    reference = (unit.reference or "absolute, assumed") if unit.quantity == "pressure" else ""
+    assumed = "gauge" if mapping.gauge else "absolute, assumed"
+    reference = (unit.reference or assumed) if unit.quantity == "pressure" else ""
     offset = 0.0
     if reference == "gauge":
         if ambient is None:
@@ -201,14 +223,8 @@ def _mapped(
 
 
 def _unit(place: str, name: str, channel: SourceChannel, entry: ChannelEntry) -> PhysicalUnit:
-    """From the mapping file, else from the file's field, else from the channel's name."""
     inside = split_name(channel.name)[1]
-    text = entry.unit or channel.unit or inside
-    if not text:
-        raise ImportingError(
-            f"{place} has no unit, so that {name} cannot be read: give its unit in a mapping file "
-            "(docs/how-to/use-your-recordings.md)"
-        )
+    text = _unit_text(entry, channel)
     unit = needed_unit(text, QUANTITY[name], place)
     if not entry.unit and channel.unit and inside:
         other = needed_unit(inside, QUANTITY[name], place)
@@ -218,6 +234,11 @@ def _unit(place: str, name: str, channel: SourceChannel, entry: ChannelEntry) ->
                 "mapping file"
             )
     return unit
+
+
+def _unit_text(entry: ChannelEntry, channel: SourceChannel) -> str:
+    """From the mapping file, else from the file's field, else from the channel's name."""
+    return entry.unit or channel.unit or split_name(channel.name)[1]
 
 
 def _filled(place: str, time: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:

@@ -82,8 +82,9 @@ def _check_times(place: str, channel: MappedChannel) -> None:
     steps = np.diff(channel.time)
     backward = np.flatnonzero(steps <= 0)
     if backward.size:
-        at = channel.time[backward[0]]
-        raise ImportingError(f"{place}: time does not increase after {at:.6g} s: sort the samples")
+        at, equal = channel.time[backward[0]], steps[backward[0]] == 0
+        remedy = "print it with more digits" if equal else "sort the samples"
+        raise ImportingError(f"{place}: time does not increase after {at:.6g} s: {remedy}")
     usual = float(np.median(steps))
     gap = np.flatnonzero(steps > MOST_STEP * usual)
     if gap.size:

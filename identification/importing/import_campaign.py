@@ -1,12 +1,14 @@
 """`import_campaign`: measurement files of a bench become a campaign."""
 
 import hashlib
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -28,12 +30,15 @@ FORMATS = (
     ("MATLAB", read_matlab, (".mat",)),
     ("TDMS", read_tdms, (".tdms",)),
     ("Parquet", read_parquet, (".parquet", ".pq")),
-    ("text", read_text, (".csv", ".txt", ".tsv", ".asc")),
+    ("text", read_text, (".csv", ".txt", ".tsv", ".asc", ".lvm")),
 )
 """Name, reader and suffixes of every format. A new one is a reader and a line here.
 
 A reader takes a path and returns the version or dialect, and the channels; it may raise ImportingError.
 """
+
+LARGEST_FILE = 2**30
+"""Size of the largest file that is read [bytes]: half an hour of the bench at 20 kHz as text."""
 
 USUAL_TEMPERATURE, USUAL_PRESSURE = 293.0, 1.0 * BAR
 """Ambient conditions that are assumed, and said to be, where nobody gives them [K, Pa absolute]."""
@@ -75,6 +80,7 @@ def read_files(
     temperature_K: float | None = None,
     rate: float | None = None,
     name: str | None = None,
+    gauge: bool = False,
     rules: RecordingRules = RULES,
 ) -> ImportedCampaign:
     """The campaign that measurement files make, in memory.
@@ -86,6 +92,7 @@ def read_files(
         temperature_K: T_env [K]; None: likewise, else 293 K.
         rate: samples per second of the recordings [1/s]; None: of each file's slowest channel.
         name: of the campaign; None: that of the first file's folder.
+        gauge: whether pressures are gauge where neither unit nor mapping file says gauge or absolute.
         rules: by which the recordings are checked (`rules_of` for another valve than the report's).
 
     Raises:
@@ -95,6 +102,7 @@ def read_files(
     content = mapping if isinstance(mapping, MappingFile) else MappingFile()
     if isinstance(mapping, str | PathLike):
         content = read_mapping(Path(mapping))
+    content = msgspec.structs.replace(content, gauge=gauge or content.gauge)
     sources = [read_source(Path(file)) for file in files]
     _check_mapped_files(content, sources)
     pressure = content.environment.pressure_bar if ambient_bar is None else ambient_bar
@@ -160,7 +168,7 @@ def _proposed_role(path: Path, U: NDArray) -> str:
     """By the voltage, (samples,) [V], and the file's name."""
     if not switches(U):
         return "quality"
-    return "validation" if "valid" in path.stem.lower() else "calibration"
+    return "validation" if re.search("(?<![a-z])valid", path.stem.lower()) else "calibration"
 
 
 def _assumptions(
@@ -208,15 +216,21 @@ def _file_provenance(file: ImportedFile) -> dict[str, Any]:
 def read_source(path: Path) -> SourceFile:
     """The channels of a measurement file. Raises ImportingError."""
     known = {suffix: (name, read) for name, read, suffixes in FORMATS for suffix in suffixes}
+    if not path.is_file():
+        state = "is no regular file" if path.exists() else "does not exist"
+        state = "is a folder" if path.is_dir() else state
+        raise ImportingError(f"{path} {state}: give the path of a measurement file")
     if path.suffix.lower() not in known:
         raise ImportingError(
             f"{path}: unknown kind of file {path.suffix!r}: give one of {', '.join(sorted(known))}"
         )
-    if not path.is_file():
-        state = "is no regular file" if path.exists() else "does not exist"
-        raise ImportingError(f"{path} {state}: give the path of a measurement file")
     kind, read = known[path.suffix.lower()]
     try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise ImportingError(
+                f"{path} is larger than {LARGEST_FILE:,} bytes: export the bench's channels alone, or "
+                "cut the recording"
+            )
         with path.open("rb") as stream:
             sha256 = hashlib.file_digest(stream, "sha256").hexdigest()
         version, channels = read(path)
@@ -228,8 +242,11 @@ def read_source(path: Path) -> SourceFile:
     except Exception as error:  # the formats' packages raise whatever they like on damaged files
         reason = (str(error).splitlines() or [type(error).__name__])[0][:160]
         raise ImportingError(f"{path} is damaged or no {kind} file ({reason}): export it anew") from None
-    if not channels:
-        raise ImportingError(f"{path}: no series of numbers in it: export the channels as numbers")
+    if not any(channel.known.size for channel in channels):
+        others = ", ".join(channel.name for channel in channels[:20]) or "nothing"
+        raise ImportingError(
+            f"{path}: no series of numbers in it, but {others}: export the channels as numbers"
+        )
     return SourceFile(path=path, format=version, sha256=sha256, channels=tuple(channels))
 
 
@@ -237,11 +254,11 @@ def source_table(source: SourceFile) -> str:
     """The channels of a file: name, unit, range, rate, and what its name means."""
     rows = []
     for channel in source.channels:
-        values = channel.values[np.isfinite(channel.values)]
+        values = channel.known
         span = f"{np.min(values):.5g} to {np.max(values):.5g}" if len(values) else "empty"
         timed = channel.time is not None and len(channel.time) > 1 and np.ptp(channel.time) > 0
         rate = f"{usual_rate(channel.time):.6g} Hz" if timed and channel.time is not None else ""
-        rows.append((channel.name, channel.unit, span, rate, meaning(channel) or ""))
+        rows.append((source.label(channel), channel.unit, span, rate, meaning(channel) or ""))
     heads = ("channel", "unit", "range", "rate", "proposed")
     return f"{source.path} ({source.format})\n{_table(heads, rows)}"
 

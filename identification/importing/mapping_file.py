@@ -1,5 +1,6 @@
 """What names of channels mean, and the mapping file, which says what names do not."""
 
+import json
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -8,7 +9,7 @@ import msgspec
 
 from epv_env.common.files import read_json
 from identification.importing.source_file import ImportingError, SourceChannel, SourceFile
-from identification.importing.units import parsed_unit
+from identification.importing.units import EXAMPLES, parsed_unit
 from identification.recordings.recording import CHANNELS, ROLES, UNITS
 
 QUANTITY_OF_UNIT = {"A": "current", "V": "voltage", "bar": "pressure"}
@@ -23,7 +24,8 @@ QUANTITY: Mapping[str, str] = {
 """What an import looks for, with its quantity. p1a and p1b, two sensors, may stand for p1."""
 
 NAMES: Mapping[str, tuple[str, ...]] = {name: (name.lower(),) for name in CHANNELS} | {
-    "time": ("time", "t", "zeit", "timestamp", "timestamps", "timechannel", "abszeit", "messzeit"),
+    "time": ("time", "t", "zeit", "timestamp", "timestamps", "timechannel", "abszeit", "messzeit",
+             "xvalue"),
     "I": ("i", "current", "strom", "icoil", "imv", "coilcurrent", "solenoidcurrent", "magnetstrom",
           "spulenstrom", "istrom", "currentcoil", "imagnet", "isolenoid"),
     "U": ("u", "v", "voltage", "spannung", "ucoil", "umv", "vcoil", "coilvoltage", "solenoidvoltage",
@@ -44,21 +46,23 @@ NAMES: Mapping[str, tuple[str, ...]] = {name: (name.lower(),) for name in CHANNE
 """Names in lower case, without anything but letters and digits; English and German. A channel of the
 bench that is not listed has its own name."""
 
-BRACKETED = re.compile(r"^(.*?)\s*(?:[\[({]\s*([^\])}]+?)\s*[\])}]|\s(?:in|/)\s(\S+)|/(\S+))\s*$")
-"""A name with its unit: "p1 [bar]", "p1 (bar)", "p1 in bar", "p1/bar"."""
+BRACKETED = re.compile(
+    r"^(.*?)\s*(?:[\[({]\s*((?:[^\[\](){}]|\([^()]*\))+?)\s*[\])}]|\s(?:in|/)\s(\S+)|/(\S+))\s*$"
+)
+"""A name with its unit: "p1 [bar]", "p1 (bar(g))", "p1 in bar", "p1/bar"."""
 
 
 def split_name(name: str) -> tuple[str, str]:
     """A channel's name without its unit, and the unit in it, empty if there is none."""
-    found = BRACKETED.match(name)
-    if found:
-        unit = next(part for part in found.groups()[1:] if part)
-        if parsed_unit(unit) is not None:
-            return found[1], unit
     for place in (i for i, sign in enumerate(name) if sign == "_"):
         unit = parsed_unit(name[place + 1 :].replace("_per_", "/").replace("_", " "))
         if place and unit is not None and unit.quantity in QUANTITY.values():
             return name[:place], unit.text
+    found = BRACKETED.match(name)
+    if found:
+        inside = next(part for part in found.groups()[1:] if part)
+        if parsed_unit(inside) is not None:
+            return found[1], inside
     return name, ""
 
 
@@ -77,7 +81,7 @@ def proposed(channels: Sequence[SourceChannel]) -> dict[str, list[SourceChannel]
     """The channels of a file that names and units propose, by what they mean; several: ambiguous."""
     found: dict[str, list[SourceChannel]] = {}
     for channel in channels:
-        name = meaning(channel)
+        name = meaning(channel) if channel.known.size else None
         if name is not None:
             found.setdefault(name, []).append(channel)
     return found
@@ -85,11 +89,12 @@ def proposed(channels: Sequence[SourceChannel]) -> dict[str, list[SourceChannel]
 
 def named_channel(source: SourceFile, wanted: str) -> SourceChannel:
     """The one channel that a mapping file calls by this name. Raises ImportingError."""
-    found = [channel for channel in source.channels if channel.name == wanted]
+    found = [c for c in source.channels if wanted in (c.name, c.full_name)]
     found = found or [c for c in source.channels if split_name(c.name)[0] == wanted]
+    found = [channel for channel in found if channel.known.size] or found
     if len(found) != 1:
         count = "no channel" if not found else f"{len(found)} channels"
-        known = ", ".join(channel.name for channel in source.channels[:20])
+        known = ", ".join(source.label(channel) for channel in source.channels[:20])
         raise ImportingError(
             f"{source.path}: {count} of the name {wanted!r}; there are {known}: mend the mapping file"
         )
@@ -103,8 +108,9 @@ FORMAT = "epv-mapping/1"
 class ChannelEntry(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
     """Which channel of the files is one of the recording's, and how it reads."""
 
-    source: str
-    """Name of the channel in the files."""
+    source: str | None = None
+    """Name of the channel in the files, after its table and a slash where several have it; None: as
+    names propose."""
     unit: str | None = None
     """Unit, with gauge or absolute for pressures; None: as the file says."""
     factor: float = 1.0
@@ -138,6 +144,14 @@ class MappingFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_on
     """By channel of the recording (channel_names.QUANTITY)."""
     recordings: dict[str, RecordingEntry] = msgspec.field(default_factory=dict)
     """By the measurement file's name without its folder."""
+    gauge: bool = False
+    """Whether pressures are gauge where no unit says gauge or absolute."""
+
+
+def mapping_example(sources: Mapping[str, str]) -> str:
+    """The text of a mapping file for channels of a recording by their names in the files."""
+    channels = {n: {"source": s, "unit": EXAMPLES[QUANTITY[n]]} for n, s in sources.items()}
+    return json.dumps({"format": FORMAT, "channels": channels}, ensure_ascii=False)
 
 
 def read_mapping(path: Path) -> MappingFile:

@@ -36,6 +36,16 @@ class SourceChannel:
     """Channels of one table share their rows; the name of a group, sheet or struct, dots between the
     names of structs within structs."""
 
+    @property
+    def known(self) -> NDArray:
+        """The values that are not missing."""
+        return self.values[np.isfinite(self.values)]
+
+    @property
+    def full_name(self) -> str:
+        """The name after that of the table: a mapping file may use it."""
+        return f"{self.table}/{self.name}" if self.table else self.name
+
 
 @dataclass(frozen=True, kw_only=True)
 class SourceFile:
@@ -48,6 +58,37 @@ class SourceFile:
     """Of the file's bytes."""
     channels: tuple[SourceChannel, ...]
     """In the order of the file."""
+
+    def label(self, channel: SourceChannel) -> str:
+        """A channel's name, after its table where another table has a channel of that name."""
+        same = sum(other.name == channel.name for other in self.channels)
+        return channel.full_name if same > 1 else channel.name
+
+
+MOST_CHANNELS, LONGEST_NAME = 2_000, 300
+"""Most channels of a file, and most characters of a name or unit: an import then ends in seconds."""
+
+
+def limited(path: Path, channels: Iterable[SourceChannel]) -> list[SourceChannel]:
+    """The channels. Raises ImportingError as soon as there are too many or a name is too long."""
+    kept: list[SourceChannel] = []
+    for channel in channels:
+        check_number(path, len(kept) + 1)
+        if max(len(channel.name), len(channel.unit)) > LONGEST_NAME:
+            raise ImportingError(
+                f"{path}: the channel {channel.name[:40]!r}... has a name or unit of more than "
+                f"{LONGEST_NAME} characters: shorten it"
+            )
+        kept.append(channel)
+    return kept
+
+
+def check_number(path: Path, channels: int) -> None:
+    """Raise ImportingError if a file has too many channels."""
+    if channels > MOST_CHANNELS:
+        raise ImportingError(
+            f"{path} has more than {MOST_CHANNELS} channels: export only those of the bench"
+        )
 
 
 EXTRA = "bench-files"

@@ -3,6 +3,8 @@
 import codecs
 import csv
 import io
+import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import takewhile
@@ -13,9 +15,12 @@ import numpy as np
 import pandas as pd
 
 from identification.importing.source_file import (
+    MOST_CHANNELS,
     STAMP,
     ImportingError,
     SourceChannel,
+    check_number,
+    limited,
     points_in_time,
     seconds,
 )
@@ -30,6 +35,15 @@ MARKS = (
 
 COMMENTS = ("#", "%", "//", "!")
 """Beginnings of lines that hold no data."""
+
+COMMENT_COLUMN, UNIT_LABEL = "comment", "Y_Unit_Label"
+"""Of LabVIEW: a name beside those of the numbers, and the title of a row of units."""
+
+TYPES = re.compile(r"(float|double|real|single|long|word|byte|bool|u?int)\d*|[fiu]\d+", re.IGNORECASE)
+"""Types of numbers, of which some tools print a row."""
+
+LONGEST_LINE = 50 * MOST_CHANNELS
+"""Most characters of a line."""
 
 SAMPLE = 40
 """Lines at the middle and at the end of a file from which the dialect is read."""
@@ -63,6 +77,10 @@ class Dialect:
             not cell or self.number(cell) is not None or STAMP.match(cell) for cell in cells
         )
 
+    def is_row(self, cells: Sequence[str], width: int) -> bool:
+        """Whether a line is data of this many columns; a comment or a last separator may follow."""
+        return width <= len(cells) <= width + 1 and self.is_data(cells[:width])
+
 
 DIALECTS = tuple(
     Dialect(separator=separator, decimal=decimal)
@@ -88,8 +106,12 @@ def decoded(file: str, content: bytes) -> tuple[str, str]:
 
 def found_dialect(file: str, lines: Sequence[str]) -> Dialect:
     """The dialect in which most cells of the sampled lines are numbers. Raises ImportingError."""
-    middle = len(lines) // 2
-    sample = [*lines[middle : middle + SAMPLE], *lines[-SAMPLE:]]
+    sample = _sample(lines)
+    if max(map(len, sample), default=0) > LONGEST_LINE:
+        raise ImportingError(
+            f"{file} has lines of more than {LONGEST_LINE:,} characters: export only the bench's "
+            "channels"
+        )
     best = max(DIALECTS, key=lambda dialect: _fit(dialect, sample))
     if _fit(best, sample) <= 0:
         raise ImportingError(
@@ -97,6 +119,11 @@ def found_dialect(file: str, lines: Sequence[str]) -> Dialect:
             "CSV, one line per sample, with times in seconds or as ISO 8601 (2026-03-01T10:00:00.0005)"
         )
     return best
+
+
+def _sample(lines: Sequence[Any]) -> list[Any]:
+    middle = len(lines) // 2
+    return [*lines[middle : middle + SAMPLE], *lines[-SAMPLE:]]
 
 
 def _fit(dialect: Dialect, sample: Sequence[str]) -> int:
@@ -118,55 +145,86 @@ def read_text(path: Path) -> tuple[str, list[SourceChannel]]:
         if line.strip() and not line.lstrip().startswith(COMMENTS)
     ]
     dialect = found_dialect(str(path), [line for _, line in lines])
-    names, units, first = _header(str(path), lines, dialect)
+    names, units, first = _header(path, lines, dialect)
     table: Any = pd.read_csv(
         io.StringIO("\n".join(line for _, line in lines[first:])),
         sep=r"\s+" if dialect.separator == " " else dialect.separator,
         decimal=dialect.decimal,
-        names=list(range(len(names))),
+        names=list(range(len(names) + 1)),
+        index_col=False,
         skipinitialspace=True,
     )
     numbers = [number for number, _ in lines[first:]]
-    channels = [
+    beyond: Any = pd.to_numeric(table[len(names)], errors="coerce")
+    if beyond.notna().any():
+        line = numbers[int(beyond.notna().argmax())]
+        raise ImportingError(
+            f"{path}, line {line} has more than the {len(names)} numbers of the others: mend it, or cut "
+            "the file there"
+        )
+    channels = (
         _channel(str(path), numbers, table[column], name, units[column])
         for column, name in enumerate(names)
         if name
-    ]
+    )
     shown = {"\t": "tab", " ": "blanks"}.get(dialect.separator, f"{dialect.separator!r}")
-    return f"text (separator {shown}, decimal {dialect.decimal!r}, {encoding})", channels
+    return f"text (separator {shown}, decimal {dialect.decimal!r}, {encoding})", limited(path, channels)
 
 
 def _header(
-    file: str, lines: Sequence[tuple[int, str]], dialect: Dialect
+    path: Path, lines: Sequence[tuple[int, str]], dialect: Dialect
 ) -> tuple[list[str], list[str], int]:
     """Names, units and place of the first line of data; what stands above the names is a preamble."""
-    width = len(dialect.cells(lines[-1][1]))
-    rows = (dialect.cells(line) for _, line in lines)
-    above = list(takewhile(lambda cells: len(cells) != width or not dialect.is_data(cells), rows))
-    first = len(above)
-    if first == len(lines):
+    sample = [dialect.cells(line) for _, line in _sample(lines)]
+    data = [cells for cells in sample if dialect.is_data(cells)]
+    width = Counter(map(len, data)).most_common(1)[0][0]
+    check_number(path, width)
+    if not dialect.is_row(sample[-1], width):
         raise ImportingError(
-            f"{file}, line {lines[-1][0]}: the numbers have not the {width} columns of the last line: "
-            "cut the text below them"
+            f"{path}, line {lines[-1][0]} has not the {width} numbers of the lines above: delete it if "
+            "it is text or was cut off"
         )
-    above = [cells for cells in above if len(cells) == width]
+    rows = (dialect.cells(line) for _, line in lines)
+    higher = list(takewhile(lambda cells: not dialect.is_row(cells, width), rows))
+    first, ends_empty = len(higher), not any(cells[-1] for cells in data)
+    above = [row for cells in higher for row in _as_wide(cells, width, ends_empty)]
     if not above:
         raise ImportingError(
-            f"{file}, line {lines[first][0]}: no line of {width} names stands above the numbers: "
+            f"{path}, line {lines[first][0]}: no line of {width} names stands above the numbers: "
             "add a header"
         )
-    with_units = len(above) > 1 and _are_units(above[-1])
-    names = above[-2] if with_units else above[-1]
-    for name in names:
-        if name and names.count(name) > 1:
-            raise ImportingError(f"{file}: column {name!r} stands twice: rename one of them")
-    return names, above[-1] if with_units else [""] * width, first
+    names, units = _names_and_units(above)
+    for name, count in Counter(names).items():
+        if name and count > 1:
+            raise ImportingError(f"{path}: column {name!r} stands twice: rename one of them")
+    return names, units, first
+
+
+def _as_wide(cells: Sequence[str], width: int, ends_empty: bool) -> list[list[str]]:
+    """A line above the data as a row of their width; none if it has other columns.
+
+    Lines may end with a separator only above or only in the data, whose last column is then empty.
+    """
+    filled = list(cells[:width])
+    rest = [cell for cell in cells[width:] if cell and cell.lower() != COMMENT_COLUMN]
+    missing = width - len(filled)
+    return [filled + [""] * missing] if not rest and missing <= ends_empty else []
+
+
+def _names_and_units(above: Sequence[list[str]]) -> tuple[list[str], list[str]]:
+    """Of the lines above the data: the last of units, and the last that is neither units nor types."""
+    units = next((row for row in reversed(above[1:]) if _are_units(row)), [""] * len(above[0]))
+    rest = [
+        row for row in above if row is not units and not all(map(TYPES.fullmatch, filter(None, row)))
+    ]
+    names = next((row for row in reversed(rest) if not _are_units(row)), rest[-1])
+    return names, ["" if cell == UNIT_LABEL else cell for cell in units]
 
 
 def _are_units(cells: Sequence[str]) -> bool:
     """Whether at least half of the filled cells are units."""
     filled = [cell for cell in cells if cell]
-    return bool(filled) and sum(is_unit(cell.strip("[]()")) for cell in filled) * 2 >= len(filled)
+    return bool(filled) and sum(is_unit(cell) for cell in filled) * 2 >= len(filled)
 
 
 def _channel(file: str, lines: Sequence[int], column: Any, name: str, unit: str) -> SourceChannel:

@@ -9,24 +9,37 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+from epv_env.common.units import plain_powers
 from identification.importing.source_file import ImportingError, needed_package
 
 QUANTITIES = {"time": "s", "current": "A", "voltage": "V", "pressure": "Pa", "mass flow": "kg/s"}
 """Quantities of a recording with their SI units."""
 
-REFERENCES = {"gauge": ("gauge", "rel", "relative", "g", "ü", "r"), "absolute": ("absolute", "abs", "a")}
-"""Words that say what a pressure is measured against; ü is the German Überdruck."""
+EXAMPLES = {**QUANTITIES, "pressure": "bar absolute"}
+"""Units that messages give as examples."""
+
+REFERENCES = {
+    "gauge": "gauge", "gage": "gauge", "relative": "gauge", "relativ": "gauge", "rel": "gauge",
+    "überdruck": "gauge", "ü": "gauge", "g": "gauge",
+    "absolute": "absolute", "absolut": "absolute", "abs": "absolute", "a": "absolute",
+}  # fmt: skip
+"""Words after a unit of pressure that say what it is measured against, in any case."""
+
+REFERENCED = re.compile(rf"(.+?)[\s_.,(\[{{-]*({'|'.join(REFERENCES)})[.)\]}}]*", re.IGNORECASE)
+"""A unit of pressure with such a word: barg, bar (g), psi gauge, mbar abs."""
 
 SPELLINGS = {
-    "Bar": "bar", "BAR": "bar", "mBar": "mbar", "MBAR": "mbar", "PSI": "psi", "Psi": "psi",
-    "Volt": "V", "Ampere": "A", "Amp": "A", "amps": "A", "volts": "V", "sec": "s", "Sek": "s",
-    "msec": "ms", "µsec": "us", "KPa": "kPa", "kpa": "kPa", "hpa": "hPa",
-    "μs": "us", "μA": "uA", "seconds": "s", "v": "V",
+    "BAR": "bar", "mBar": "mbar", "MBAR": "mbar", "PSI": "psi", "KPa": "kPa", "kpa": "kPa",
+    "pa": "Pa", "PA": "Pa", "hpa": "hPa", "μs": "us", "μA": "uA", "Sek": "s", "Sekunden": "s",
+    "v": "V", "amps": "A", "Amps": "A", "kg/cm^2": "kgf/cm^2", "kp/cm^2": "kgf/cm^2",
 }  # fmt: skip
-"""Spellings that pint reads differently or not at all."""
+"""Spellings that pint reads differently or not at all; for one such as Volts it looks in lower case."""
 
 LONGEST = 24
 """Longest text that is taken for a unit."""
+
+ENDLESS = re.compile(r"\d[\d.e]|[\d)²³]\s*(\^|\*\*)|(\^|\*\*)\s*\(")
+"""Numbers and powers of powers that no unit needs and that pint may compute for hours."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,46 +56,45 @@ class PhysicalUnit:
     """gauge, absolute, or empty where the text does not say."""
 
 
+@cache
 def parsed_unit(text: str) -> PhysicalUnit | None:
     """The meaning of a unit's text; None if it is no unit."""
-    text = text.strip().strip("[]").strip()
-    if not text or len(text) > LONGEST or text[0].isdigit():
+    unit = re.sub(r"^[\[({](.*)[\])}]$", r"\1", text.strip()).strip()
+    if not unit or len(unit) > LONGEST or unit[0].isdigit() or ENDLESS.search(unit):
         return None
-    whole = _plain(text, text, "")
-    if whole is not None:
-        return whole
-    for reference, words in REFERENCES.items():
-        for word in words:
-            found = re.fullmatch(rf"(.+?)[\s_.(\[-]*{word}[.)\]]*", text, re.IGNORECASE)
-            unit = _plain(text, found[1], reference) if found else None
-            if unit is not None and unit.quantity == "pressure":
-                return unit
-    return None
+    whole = _plain(text, unit, "")
+    found = REFERENCED.fullmatch(unit)
+    if found and (whole is None or whole.quantity not in QUANTITIES):
+        pressure = _plain(text, found[1], REFERENCES[found[2].lower()])
+        if pressure is not None and pressure.quantity == "pressure":
+            return pressure
+    return whole
 
 
 def needed_unit(text: str, quantity: str, where: str) -> PhysicalUnit:
     """The meaning of a unit's text. Raises ImportingError if it is none of that quantity."""
     unit = parsed_unit(text)
     if unit is None or unit.quantity != quantity:
-        example = {"pressure": "mbar gauge", "time": "ms", "current": "mA", "voltage": "V"}
         kind = f"a unit of {unit.quantity}" if unit else "no unit"
         raise ImportingError(
             f"{where}: {text!r} is {kind}, and a unit of {quantity} is needed: give one such as "
-            f"{example.get(quantity, 'kg/s')!r}"
+            f"{EXAMPLES[quantity]!r}"
         )
     return unit
 
 
 def is_unit(text: str) -> bool:
     """Whether a text is a unit, or says that there is none."""
-    return text in ("-", "1", "%") or parsed_unit(text) is not None
+    return text.strip("[]()") in ("-", "1", "%") or parsed_unit(text) is not None
 
 
 def _plain(text: str, unit: str, reference: str) -> PhysicalUnit | None:
     """A unit without words of reference; None if pint does not know it."""
     registry = _registry()
+    unit = plain_powers(unit)
+    unit = SPELLINGS.get(unit, unit)
     try:
-        known = registry.parse_units(SPELLINGS.get(unit, unit))
+        known = registry.parse_units(unit.lower() if unit.istitle() and unit not in registry else unit)
         one = registry.Quantity(1.0, known)
         size = float((2.0 * one).to_base_units().magnitude - one.to_base_units().magnitude)
     except Exception:  # pint raises many kinds of error on texts that are no units

@@ -23,6 +23,13 @@ from identification.gap.quantities import (
         (2e4, "1/m^2", "20000 1/m^2"),
         (0.5, "1", "0.500"),
         (0.0, "V", "0 V"),
+        (2.5e-5, "m2/s", "0.250 cm2/s"),
+        (2.5e-5, "m²/s", "0.250 cm²/s"),
+        (2.5e-5, "m**2/s", "0.250 cm**2/s"),
+        (2.5e-5, "m³/s", "0.0250 dm³/s"),
+        (2.5e-5, "m^4", "2.5e-05 m^4"),
+        (2.5e-5, "m^2.5", "2.5e-05 m^2.5"),
+        (2.5e-5, "m s^-2", "25.0 um s^-2"),
     ],
 )
 def test_a_prefix_scales_its_unit_and_the_unit_s_power(value, unit, text):

@@ -91,21 +91,38 @@ def test_a_mapping_file_names_the_rest(bench, tmp_path):
     assert (made.recordings[0].name, made.recordings[0].role) == ("b", "validation")
 
 
+@pytest.mark.parametrize("ending", ["g", " g", "(g)", " (g)", " gauge", " rel.", "-ü"])
+@pytest.mark.parametrize(("unit", "size"), [("bar", 1e5), ("Psi", 6894.757293), ("kgf/cm2", 98066.5)])
+def test_references_of_pressures_are_read(unit, size, ending):
+    found = parsed_unit(unit + ending)
+    assert found is not None
+    assert (found.quantity, found.reference) == ("pressure", "gauge")
+    assert found.size == pytest.approx(size)
+
+
 @pytest.mark.parametrize(
-    ("unit", "reference"),
+    ("text", "quantity", "size", "reference"),
     [
-        ("barg", "gauge"),
-        ("bar (abs)", "absolute"),
-        ("psig", "gauge"),
-        ("mbar rel", "gauge"),
-        ("bar", ""),
+        ("bar", "pressure", 1e5, ""),
+        ("kPa(a)", "pressure", 1e3, "absolute"),
+        ("[bar (abs)]", "pressure", 1e5, "absolute"),
+        ("Torr", "pressure", 133.322368, ""),
+        ("N/mm²", "pressure", 1e6, ""),
+        ("Volts", "voltage", 1.0, ""),
+        ("Amps", "current", 1.0, ""),
+        ("Seconds", "time", 1.0, ""),
     ],
 )
-def test_references_of_pressures_are_read(unit, reference):
-    found = parsed_unit(unit)
+def test_units_are_read_as_data_sheets_spell_them(text, quantity, size, reference):
+    found = parsed_unit(text)
     assert found is not None
-    assert found.quantity == "pressure"
-    assert found.reference == reference
+    assert (found.quantity, found.reference) == (quantity, reference)
+    assert found.size == pytest.approx(size)
+
+
+@pytest.mark.parametrize("text", ["MBar", "kBar", "min^9999999", "m^9^9^9", "m^(9^9^9)", "bar" * 9])
+def test_what_is_no_unit_is_none_and_found_so_at_once(text):
+    assert parsed_unit(text) is None
 
 
 def test_wrong_inputs_are_refused_and_nothing_written(bench, tmp_path):
@@ -113,7 +130,7 @@ def test_wrong_inputs_are_refused_and_nothing_written(bench, tmp_path):
     gauge = {n: (v, f"{u} gauge" if u == "bar" else u) for n, (v, u) in good.items()}
     with pytest.raises(ImportingError, match="is gauge pressure: give the environment"):
         import_campaign([text(tmp_path / "a.csv", gauge)], tmp_path / "out")
-    with pytest.raises(ImportingError, match="has no unit"):
+    with pytest.raises(ImportingError, match="there is no unit of I, U, p1"):
         import_campaign([text(tmp_path / "b.csv", good, bracket=False)], tmp_path / "out")
     mbar = {n: (v, "mbar" if u == "bar" else u) for n, (v, u) in good.items()}
     with pytest.raises(CampaignError, match="1000 times too small"):
@@ -123,7 +140,7 @@ def test_wrong_inputs_are_refused_and_nothing_written(bench, tmp_path):
     with pytest.raises(ImportingError, match="no samples from"):
         import_campaign([tmp_path / "d.csv"], tmp_path / "out")
     (tmp_path / "f.csv").write_text("".join([*rows, "stopped by hand\n"]))
-    with pytest.raises(ImportingError, match="cut the text below them"):
+    with pytest.raises(ImportingError, match="delete it if it is text"):
         import_campaign([tmp_path / "f.csv"], tmp_path / "out")
     (tmp_path / "e.mat").write_bytes(b"not MATLAB")
     with pytest.raises(ImportingError, match=r"damaged or no MATLAB file"):

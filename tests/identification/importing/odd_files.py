@@ -1,0 +1,207 @@
+"""A recording in files as tools and people leave them: odd headers, cut lines, structs, groups."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from identification.importing.source_file import LONGEST_NAME, MOST_CHANNELS
+from identification.recordings.recording import Recording
+from tests.identification.importing.dialects import columns_of, text
+from tests.identification.importing.timed_files import channels_of, frame, mat5
+
+
+def rows(
+    at: Path, true: Recording, head: list[str], *, sep: str = ";", end: str = "", last: str = ""
+) -> Path:
+    """Lines of a head, then of numbers that end as told, then a last one."""
+    values = np.transpose([values for values, _ in columns_of(true).values()])
+    lines = [sep.join(f"{value:.9f}" for value in row) + end for row in values]
+    at.write_text("\n".join([*head, *lines, last]))
+    return at
+
+
+NAMES, UNITS = ["time", "I", "U", "p1", "p2", "p3"], ["s", "A", "V", "bar", "bar", "bar"]
+BRACKETED = ";".join(f"{name} [{unit}]" for name, unit in zip(NAMES, UNITS, strict=True))
+
+
+def lvm(at: Path, true: Recording) -> Path:
+    head = ["LabVIEW Measurement\t", "Operator\tbench", "***End_of_Header***\t", "\t",
+            "Channels\t5\t\t\t\t\t", "Samples" + 5 * "\t9", "Y_Unit_Label\t" + "\t".join(UNITS[1:]),
+            "***End_of_Header***\t\t\t\t\t", "\t".join(["X_Value", *NAMES[1:], "Comment"])]  # fmt: skip
+    return rows(at.with_suffix(".lvm"), true, head, sep="\t")
+
+
+def three_header_rows(at: Path, true: Recording) -> Path:
+    head = [
+        "record\tTab",
+        "\t".join([*NAMES, ""]),
+        6 * "f8\t",
+        "\t".join(f'"{u}"' for u in UNITS) + "\t",
+    ]
+    return rows(at.with_suffix(".asc"), true, head, sep="\t", end="\t")
+
+
+def waveforms(at: Path, true: Recording, **properties: Any) -> Path:
+    """TDMS of another increment than SI, or without an offset, beside a spectrum."""
+    from nptdms import ChannelObject, TdmsWriter
+
+    objects = [
+        ChannelObject("Log", name, values, properties={"unit_string": unit, **properties})
+        for name, (values, unit) in channels_of(true).items()
+    ]
+    spectrum = {"wf_increment": 10.0, "wf_xunit_string": "Hz"}
+    with TdmsWriter(at.with_suffix(".tdms")) as writer:
+        writer.write_segment([*objects, ChannelObject("FFT", "spectrum", true.U, properties=spectrum)])
+    return at.with_suffix(".tdms")
+
+
+def decimals(at: Path, true: Recording) -> Path:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    table = pa.Table.from_pandas(frame(true, true.time).rename(columns={"time": "time [s]"}))
+    column = table.column("p2 [bar]").cast(pa.decimal128(18, 9), safe=False)
+    pq.write_table(table.set_column(table.schema.get_field_index("p2 [bar]"), "p2 [bar]", column),
+                   at.with_suffix(".parquet"))  # fmt: skip
+    return at.with_suffix(".parquet")
+
+
+def struct_array(true: Recording) -> dict[str, Any]:
+    """Signals in an array of structs, their times in another struct."""
+    kind = [("Name", "O"), ("Unit", "O"), ("Data", "O")]
+    signals = [(name, unit, values) for name, (values, unit) in channels_of(true).items()]
+    return {
+        "run7": {
+            "X": {"Name": "Raster", "Unit": "s", "Data": true.time},
+            "Y": np.array(signals, dtype=kind),
+        }
+    }
+
+
+def interval(true: Recording) -> dict[str, Any]:
+    named = {f"{name}_{unit}": values for name, (values, unit) in channels_of(true).items()}
+    return {"Tstart": -0.02, "Tinterval": true.period, "Length": float(len(true)), **named}
+
+
+def simulink(true: Recording) -> dict[str, Any]:
+    kind = [("values", "O"), ("label", "O"), ("dimensions", "O")]
+    signals = [(values, f"{name}_{unit}", 1.0) for name, (values, unit) in channels_of(true).items()]
+    return {"out": {"time": true.time, "signals": np.array(signals, dtype=kind)}}
+
+
+READ: dict[str, Callable[[Path, Recording], Path]] = {
+    "LabVIEW text with a column of comments": lvm,
+    "names, types and units in three rows": three_header_rows,
+    "a separator at the ends of the data": lambda at, r: rows(
+        at.with_suffix(".csv"), r, [BRACKETED], end=";"
+    ),
+    "a separator at the end of the header": lambda at, r: rows(
+        at.with_suffix(".csv"), r, [BRACKETED + ";"]
+    ),
+    "units in brackets twice": lambda at, r: rows(
+        at.with_suffix(".csv"), r, [BRACKETED.replace("bar", "bar(a)")]
+    ),
+    "TDMS without an offset": lambda at, r: waveforms(at, r, wf_increment=r.period),
+    "TDMS in ms": lambda at, r: waveforms(
+        at, r, wf_increment=1e3 * r.period, wf_start_offset=0.0, wf_xunit_string="ms"
+    ),
+    "Parquet with decimals": decimals,
+    "MATLAB, array of structs": lambda at, r: mat5(at, struct_array(r)),
+    "MATLAB, start and interval": lambda at, r: mat5(at, interval(r)),
+    "MATLAB, structure with time": lambda at, r: mat5(at, simulink(r)),
+}
+
+
+def mdf_groups(
+    at: Path, true: Recording, *, invalid: slice | None = None, second: int | None = None
+) -> Path:
+    """MDF 4 in which readings of p2 carry the invalidation bit, or p2 stands in a second group."""
+    from asammdf import MDF, Signal
+
+    def signal(name: str, every: int = 1) -> Signal:
+        values, unit = channels_of(true)[name]
+        bits = np.zeros(len(values), dtype=bool)
+        if name == "p2" and invalid:
+            bits[invalid] = True
+        given: dict[str, Any] = {"invalidation_bits": bits} if bits.any() else {}
+        return Signal(
+            samples=values[::every], timestamps=true.time[::every], name=name, unit=unit, **given
+        )
+
+    with MDF(version="4.10") as file:
+        file.append([signal(name) for name in NAMES[1:]])
+        if second is not None:
+            file.append([signal("p2", every=second)])
+        return Path(file.save(at.with_suffix(".mf4"), overwrite=True))
+
+
+def nulls(at: Path, true: Recording) -> Path:
+    table = frame(true, true.time)
+    table.loc[100:130, "p2 [bar]"] = None
+    table["p2 [bar]"] = (1000 * table["p2 [bar]"]).round().astype("Int64")
+    table.rename(columns={"p2 [bar]": "p2 [mbar]"}).to_parquet(at.with_suffix(".parquet"))
+    return at.with_suffix(".parquet")
+
+
+def nan(at: Path, true: Recording) -> Path:
+    content = interval(true)
+    content["p2_bar"] = np.where(np.arange(len(true)) // 31 == 4, np.nan, content["p2_bar"])
+    return mat5(at, content)
+
+
+def huge(at: Path) -> Path:
+    at = at.with_suffix(".csv")
+    at.touch()
+    os.truncate(at, 40 * 2**30)
+    return at
+
+
+def table(at: Path, names: list[str]) -> Path:
+    pd.DataFrame(np.arange(5.0 * len(names)).reshape(5, -1), columns=names).to_csv(
+        at.with_suffix(".csv"), index=False
+    )
+    return at.with_suffix(".csv")
+
+
+def folder(at: Path) -> Path:
+    at.mkdir()
+    return at
+
+
+def coarse(at: Path, true: Recording) -> Path:
+    return text(at.with_suffix(".csv"), {**columns_of(true), "time": (np.round(true.time, 3), "s")})
+
+
+REFUSED: dict[str, tuple[Callable[[Path, Recording], Path], str]] = {
+    "a cut last line": (
+        lambda at, r: rows(at.with_suffix(".csv"), r, [BRACKETED], last="0.65;0.44;18.9"),
+        r"line \d+ has not the 6 numbers of the lines above: delete it",
+    ),
+    "text below the numbers": (
+        lambda at, r: rows(at.with_suffix(".csv"), r, [BRACKETED], last="\nstopped by operator\n"),
+        r"line \d+ has not the 6 numbers of the lines above: delete it",
+    ),
+    "times of too few digits": (coarse, "time does not increase after .*: print it with more digits"),
+    "a folder": (lambda at, r: folder(at), "is a folder: give the path of a measurement file"),
+    "40 GB": (lambda at, r: huge(at), "is larger than .* bytes"),
+    "very many columns": (
+        lambda at, r: table(at, [str(i) for i in range(MOST_CHANNELS + 1)]),
+        f"more than {MOST_CHANNELS} channels",
+    ),
+    "lines without end": (
+        lambda at, r: table(at, [str(i) for i in range(100_000)]),
+        "has lines of more",
+    ),
+    "a name without end": (
+        lambda at, r: table(at, ["time", "a" + " " * 10_000 + "b"]),
+        f"more than {LONGEST_NAME} characters: shorten it",
+    ),
+    "a MATLAB file of texts": (
+        lambda at, r: mat5(at, {"a": np.array(["text"], dtype=object)}),
+        "no series of numbers in it",
+    ),
+}

@@ -1,0 +1,126 @@
+"""Files as tools and people leave them: read right, or refused with the remedy."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.io
+
+from epv_env.plant.parameters import Parameters
+from identification.bench.programmes import REPORT_SUITE
+from identification.bench.session import run_bench
+from identification.importing.binary_files import ALL_INVALID
+from identification.importing.import_campaign import read_files, read_source
+from identification.importing.mapping_file import ChannelEntry, MappingFile
+from identification.importing.source_file import ImportingError
+from tests.identification.importing.dialects import columns_of, text
+from tests.identification.importing.odd_files import (
+    NAMES,
+    READ,
+    REFUSED,
+    UNITS,
+    interval,
+    mdf_groups,
+    nan,
+    nulls,
+)
+from tests.identification.importing.timed_files import mat5
+
+
+@pytest.fixture(scope="module")
+def true():
+    """The validation recording of the virtual bench."""
+    return run_bench((REPORT_SUITE[-2],), Parameters.calibrated(), seed=13).recordings[0]
+
+
+@pytest.mark.parametrize("kind", READ)
+def test_the_files_of_many_tools_give_the_recording(true, kind, tmp_path):
+    path = READ[kind](tmp_path / "run", true)
+    made = read_files([path], ambient_bar=1.0).campaign.recordings[0]
+    np.testing.assert_allclose(made.p2, true.p2, rtol=0, atol=1.0)
+    assert made.period == true.period
+
+
+def test_a_matrix_of_signals_times_samples_has_a_channel_per_signal(true, tmp_path):
+    path = mat5(tmp_path / "run", {"ans": [values for values, _ in columns_of(true).values()]})
+    pairs = enumerate(zip(NAMES, UNITS, strict=True), start=1)
+    channels = {n: ChannelEntry(source=f"ans({i})", unit=unit) for i, (n, unit) in pairs}
+    made = read_files([path], mapping=MappingFile(channels=channels), ambient_bar=1.0).campaign
+    np.testing.assert_allclose(made.recordings[0].p2, true.p2, rtol=0, atol=1.0)
+
+
+@pytest.mark.parametrize("write", [lambda at, r: mdf_groups(at, r, invalid=slice(100, 131)), nulls, nan])
+def test_readings_that_a_format_marks_as_invalid_are_missing(true, write, tmp_path):
+    path = write(tmp_path / "run", true)
+    channel = next(c for c in read_source(path).channels if c.name.startswith("p2"))
+    assert np.count_nonzero(np.isnan(channel.values)) == 31
+    with pytest.raises(ImportingError, match=r"no samples from .* a gap is not filled"):
+        read_files([path], ambient_bar=1.0)
+
+
+def test_one_name_in_two_groups_is_chosen_by_its_group(true, tmp_path):
+    path = mdf_groups(tmp_path / "run", true, second=4)
+    with pytest.raises(ImportingError, match="p2 may be 'group 0/p2' or 'group 1/p2'"):
+        read_files([path], ambient_bar=1.0)
+    for group, period in ((0, true.period), (1, 4 * true.period)):
+        mapping = MappingFile(channels={"p2": ChannelEntry(source=f"group {group}/p2")})
+        made = read_files([path], mapping=mapping, ambient_bar=1.0).campaign.recordings[0]
+        assert made.period == period
+
+
+def test_what_holds_no_numbers_does_not_stand_in_the_way(true, tmp_path):
+    from asammdf import MDF, Signal
+
+    path = mdf_groups(tmp_path / "run", true)
+    with MDF(path) as file:
+        file.append([Signal(samples=np.empty(0), timestamps=np.empty(0), name="p2", unit="bar")])
+        file.append([Signal(samples=true.p2, timestamps=true.time, name="p3", unit="bar")])
+        channels: Any = file.groups[-1].channels
+        channels[-1].flags |= ALL_INVALID
+        file.save(path.with_stem("run2"), overwrite=True)
+    path = path.with_stem("run2")
+    assert read_files([path], ambient_bar=1.0).campaign.recordings[0].period == true.period
+
+
+def test_a_matlab_function_stands_in_the_list_and_not_in_the_way(true, tmp_path, monkeypatch):
+    function = scipy.io.matlab.MatlabFunction(np.empty(0, dtype=object))
+    path = mat5(tmp_path / "run", {})
+    monkeypatch.setattr(scipy.io, "loadmat", lambda *_, **__: {**interval(true), "f": function})
+    assert any("f (a MATLAB object" in channel.name for channel in read_source(path).channels)
+    assert read_files([path], ambient_bar=1.0).campaign.recordings[0].period == true.period
+
+
+def test_units_alone_are_a_mapping_and_the_error_shows_it(true, tmp_path):
+    path = text(tmp_path / "run.csv", columns_of(true), bracket=False)
+    with pytest.raises(ImportingError, match="there is no unit of") as error:
+        read_files([path], ambient_bar=1.0)
+    (tmp_path / "map.json").write_text(str(error.value).partition(" such as ")[2])
+    made = read_files([path], mapping=tmp_path / "map.json", ambient_bar=1.0).campaign.recordings[0]
+    units = {"I": {"unit": "A"}, "U": {"unit": "V"}, **{p: {"unit": "bar"} for p in NAMES[3:]}}
+    (tmp_path / "map.json").write_text(json.dumps({"format": "epv-mapping/1", "channels": units}))
+    same = read_files([path], mapping=tmp_path / "map.json", ambient_bar=1.0).campaign.recordings[0]
+    np.testing.assert_array_equal(made.p2, same.p2)
+
+
+def test_a_whole_bench_can_be_gauge(true, tmp_path):
+    columns = {n: (v - (u == "bar"), u) for n, (v, u) in columns_of(true).items()}
+    path = text(tmp_path / "run.csv", columns)
+    made = read_files([path], ambient_bar=1.0, gauge=True).campaign.recordings[0]
+    np.testing.assert_allclose(made.p2, true.p2, rtol=0, atol=1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "role"), [("run_valid", "validation"), ("Validierung3", "validation"),
+                       ("invalid_run", "calibration"), ("run_Invalid", "calibration")],
+)  # fmt: skip
+def test_only_a_name_of_validation_holds_a_file_out(true, name, role, tmp_path):
+    path = text(tmp_path / f"{name}.csv", columns_of(true))
+    assert read_files([path], ambient_bar=1.0).campaign.recordings[0].role == role
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_the_rest_is_refused_with_the_remedy(true, kind, tmp_path):
+    write, message = REFUSED[kind]
+    with pytest.raises(ImportingError, match=message):
+        read_files([write(tmp_path / "run", true)], ambient_bar=1.0)
