@@ -63,8 +63,9 @@ def _holds_times(channel: SourceChannel) -> bool:
     """Whether a channel increases throughout and is called a time, or has a unit of time."""
     unit = parsed_unit(channel.unit or split_name(channel.name)[1])
     called = meaning(channel) == "time" or (unit is not None and unit.quantity == "time")
-    values = channel.values[np.isfinite(channel.values)]
-    return called and (meaning(channel) == "time" or bool(np.all(np.diff(values) > 0)))
+    values = channel.known
+    increases = meaning(channel) == "time" or bool(np.all(np.diff(values) > 0))
+    return called and values.size > 0 and increases
 
 
 def _only(source: SourceFile, channel: SourceChannel, found: list[SourceChannel]) -> SourceChannel:

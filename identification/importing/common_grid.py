@@ -91,7 +91,7 @@ def _check_times(place: str, channel: MappedChannel) -> None:
         first, last = channel.time[gap[0]], channel.time[gap[0] + 1]
         raise ImportingError(
             f"{place}: no samples from {first:.6g} to {last:.6g} s, where the usual step is {usual:.3g} "
-            "s: cut the recording there, since a gap is not filled"
+            "s: cut the recording there, since a gap is not filled, or print the time with more digits"
         )
     if channel.name != "sigma_S" and usual * LEAST_RATE > 1.0 + 1e-3:
         raise ImportingError(

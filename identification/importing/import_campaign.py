@@ -222,7 +222,7 @@ def read_source(path: Path) -> SourceFile:
         raise ImportingError(f"{path} {state}: give the path of a measurement file")
     if path.suffix.lower() not in known:
         raise ImportingError(
-            f"{path}: unknown kind of file {path.suffix!r}: give one of {', '.join(sorted(known))}"
+            f"{path} has no suffix of a known kind: give one of {', '.join(sorted(known))}"
         )
     kind, read = known[path.suffix.lower()]
     try:

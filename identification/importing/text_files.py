@@ -213,7 +213,9 @@ def _as_wide(cells: Sequence[str], width: int, ends_empty: bool) -> list[list[st
 
 def _names_and_units(above: Sequence[list[str]]) -> tuple[list[str], list[str]]:
     """Of the lines above the data: the last of units, and the last that is neither units nor types."""
-    units = next((row for row in reversed(above[1:]) if _are_units(row)), [""] * len(above[0]))
+    units = [""] * len(above[0])
+    if len(above) > 1:
+        units = next((row for row in reversed(above) if _are_units(row)), units)
     rest = [
         row for row in above if row is not units and not all(map(TYPES.fullmatch, filter(None, row)))
     ]

@@ -29,7 +29,7 @@ REFERENCED = re.compile(rf"(.+?)[\s_.,(\[{{-]*({'|'.join(REFERENCES)})[.)\]}}]*"
 """A unit of pressure with such a word: barg, bar (g), psi gauge, mbar abs."""
 
 SPELLINGS = {
-    "BAR": "bar", "mBar": "mbar", "MBAR": "mbar", "PSI": "psi", "KPa": "kPa", "kpa": "kPa",
+    "BAR": "bar", "mBar": "mbar", "MBAR": "mbar", "PSI": "psi", "KPa": "kPa", "kpa": "kPa", "KPA": "kPa",
     "pa": "Pa", "PA": "Pa", "hpa": "hPa", "μs": "us", "μA": "uA", "Sek": "s", "Sekunden": "s",
     "v": "V", "amps": "A", "Amps": "A", "kg/cm^2": "kgf/cm^2", "kp/cm^2": "kgf/cm^2",
 }  # fmt: skip
