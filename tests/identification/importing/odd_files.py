@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from identification.importing.import_campaign import LARGEST_FILE
 from identification.importing.source_file import LONGEST_NAME, MOST_CHANNELS
 from identification.recordings.recording import Recording
 from tests.identification.importing.dialects import columns_of, text
@@ -156,7 +157,7 @@ def nan(at: Path, true: Recording) -> Path:
 def huge(at: Path) -> Path:
     at = at.with_suffix(".csv")
     at.touch()
-    os.truncate(at, 40 * 2**30)
+    os.truncate(at, LARGEST_FILE + 1)
     return at
 
 
@@ -187,7 +188,7 @@ REFUSED: dict[str, tuple[Callable[[Path, Recording], Path], str]] = {
     ),
     "times of too few digits": (coarse, "time does not increase after .*: print it with more digits"),
     "a folder": (lambda at, r: folder(at), "is a folder: give the path of a measurement file"),
-    "40 GB": (lambda at, r: huge(at), "is larger than .* bytes"),
+    "a file above the limit": (lambda at, r: huge(at), "is larger than .* bytes"),
     "very many columns": (
         lambda at, r: table(at, [str(i) for i in range(MOST_CHANNELS + 1)]),
         f"more than {MOST_CHANNELS} channels",
