@@ -9,6 +9,7 @@ nominal model has neither leak nor evaporation, and a sensor without lag.
 import argparse
 import sys
 from collections.abc import Mapping, Sequence
+from copy import copy
 from pathlib import Path
 
 import numpy as np
@@ -183,6 +184,12 @@ class Tank:
         self.equations = (
             StateEquation(name="f1", state="h", component="tank", unit="mm/s", scale=1e-3, step=1e-4),
         )
+
+    def with_runs(self, runs: Sequence[Run]) -> "Tank":
+        """The tank with readings and inputs of which the faulty ones are mended."""
+        other = copy(self)
+        other.runs = tuple(runs)
+        return other
 
     def outputs(self, values: Mapping[str, NDArray], runs: Sequence[int]) -> list[NDArray]:
         """`GreyBox.outputs`."""

@@ -9,6 +9,7 @@ from pathlib import Path
 from epv_env.common.command_line import add_out, add_plant, add_seed
 from epv_env.common.files import decoded
 from identification.gap.gap_json import GAP as GAP_FILE
+from identification.gap.screened import sentences
 from identification.gap.sentences import verdict_sentence
 from identification.valve_gap import diagnose
 from identification.valve_gap.diagnose import diagnose_campaign
@@ -34,5 +35,7 @@ def run(options: argparse.Namespace) -> None:
     )
     content = decoded(options.out / GAP_FILE, remedy="diagnose again")
     print(verdict_sentence(diagnosis, content["next_experiment"])[1])
+    for sentence in sentences(diagnosis.screened):
+        print(f"Left out: {sentence}.")
     written = (diagnose.REPORT, GAP_FILE, diagnose.PLANT)
     print(f"written: {', '.join(str(options.out / name) for name in written)}")

@@ -6,6 +6,7 @@ An FMU (Functional Mock-up Unit, fmi-standard.org) is simulated through FMPy, an
 import importlib
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
+from copy import copy
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -77,6 +78,12 @@ class BlackBoxPlant:
         self.equations: Sequence[StateEquation] = ()
         self._simulation = _Simulation(simulate=simulate, channels=len(self.channels))
         self._regimes, self._executor = regimes, executor
+
+    def with_runs(self, runs: Sequence[Run]) -> "BlackBoxPlant":
+        """The plant with other readings and inputs of its runs; nothing else of them changes."""
+        other = copy(self)
+        other.runs = tuple(runs)
+        return other
 
     def outputs(self, values: Mapping[str, NDArray], runs: Sequence[int]) -> list[NDArray]:
         """`GreyBox.outputs`: (channels, samples, n) [SI] of each run."""

@@ -15,7 +15,7 @@ from identification.gap.held_out import (
 )
 from identification.gap.localisation import Localisation, locate
 from identification.gap.plant import GreyBox
-from identification.gap.plant_checks import check
+from identification.gap.plant_checks import check_description, check_simulator
 from identification.gap.prepared_plant import prepared
 from identification.gap.recalibration import (
     recalibrate,
@@ -23,6 +23,7 @@ from identification.gap.recalibration import (
     with_own_nuisances,
     with_seen_noise,
 )
+from identification.gap.screened import Finding, sentences
 from identification.gap.screening import assess_separability, simulate_signatures
 from identification.gap.verdict import (
     AMBIGUOUS,
@@ -58,8 +59,11 @@ class Diagnosis:
     """The nominal model."""
     judged: list[RankedCause]
     """Causes whose discrepancy reduction was measured, the most probable first."""
+    screened: tuple[Finding, ...]
+    """Faulty readings that no fit uses."""
     warnings: list[str]
-    """Doubts about the plant's description and fits that did not converge, in sentences."""
+    """Faulty readings, doubts about the plant's description, and fits that did not converge, in
+    sentences."""
 
     @property
     def best(self) -> RankedCause | None:
@@ -112,8 +116,10 @@ def diagnose(plant: GreyBox, *, seed: int = 0, cache: FitCache | None = None) ->
         PlantError: something is wrong with the plant or its recordings; each finding is one line.
     """
     cache = cache or FitCache(plant)
-    warnings = check(plant)
-    ranking = rank_hypotheses(prepared(plant), cache)
+    check_description(plant)
+    usable = prepared(plant)
+    warnings = [*sentences(usable.screened), *check_simulator(usable)]
+    ranking = rank_hypotheses(usable, cache)
     cache.announce("where")
     localisation = _locate(ranking, ranking.recalibrated, seed)
     cache.announce("how far it shrinks")
@@ -134,6 +140,7 @@ def diagnose(plant: GreyBox, *, seed: int = 0, cache: FitCache | None = None) ->
         reduction=reduction,
         nominal=nominal,
         judged=judged,
+        screened=usable.screened,
         warnings=[*warnings, *_disturbances(ranking), *_unconverged(ranking.recalibrated, judged)],
     )
 

@@ -99,6 +99,10 @@ def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = 
             "recalibrated": fitted_values(diagnosis, ranking.recalibrated),
             "with_cause": fitted_values(diagnosis, with_cause),
         },
+        "screened": [
+            {"file": own.file, "channel": own.channel, "samples": own.samples, "kind": own.kind}
+            for own in diagnosis.screened
+        ],
         "next_experiment": next_experiment,
         "probability": {"no_cause": ranking.no_cause, "unknown": ranking.unknown},
         "twins": {

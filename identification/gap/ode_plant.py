@@ -1,6 +1,7 @@
 """A plant for the diagnosis from plain differential equations: x' = rate(x, u, p)."""
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from typing import Any
 
@@ -94,6 +95,12 @@ class OdePlant:
         functions = (rate, len(states)), (readings, len(channels)), (none, count)
         self._simulate = simulator(self._records, functions, mode)
         self.steps_per_sample = steps_per_sample or self._settled()
+
+    def with_runs(self, runs: Sequence[Run]) -> "OdePlant":
+        """The plant with other readings and inputs of its runs; nothing else of them changes."""
+        other = copy(self)
+        other.runs = tuple(runs)
+        return other
 
     def outputs(self, values: Mapping[str, NDArray], runs: Sequence[int]) -> list[NDArray]:
         """`GreyBox.outputs`: per run (channels, samples, n) [SI]."""

@@ -59,7 +59,7 @@ class Run:
     """Readings, (channels, samples) [SI]."""
     trusted: NDArray
     """Readings that count, boolean, (channels, samples); a reading at a switching instant does not, nor
-    one that a slower channel lacks. What does not count may be NaN."""
+    one that a slower channel lacks. What does not count may be NaN; NaN that counts is a dropout."""
     inputs: Mapping[str, NDArray]
     """Signals that act on the plant, by name, (samples,) [SI], for figures and the black box."""
 
@@ -189,6 +189,10 @@ class GreyBox(Protocol):
 
     Candidate values are a mapping from symbol to an array: (n,), or (n, runs) for a parameter that takes
     a separate value in every run. A symbol that is left out has its nominal value.
+
+    Two members are optional. `with_runs(runs)` is the plant with other readings and inputs of its runs:
+    without it, a wild sample of an input is refused. `screened` are the faulty readings of a plant that
+    has screened its own recordings (`identification.gap.screened`).
     """
 
     @property

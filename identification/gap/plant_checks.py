@@ -19,6 +19,9 @@ from identification.gap.plant import (
 UNEVEN_PERIOD = 0.01
 """Largest deviation from uniform sampling [sampling periods]: rounding of a logger's clock."""
 
+MOST_JUMPS = 0.1
+"""Share of samples at which a clock may jump and be called uniform elsewhere [1]."""
+
 TRIAL_STEP = 0.05
 """Change of a calibrated parameter that must show in the outputs, as a share of its range [1]: far
 beyond rounding, and small enough that the model can be simulated."""
@@ -34,8 +37,17 @@ ALIKE = 0.999
 """Correlation of the changes by two parameters [1] from which recordings determine one number only."""
 
 
-def check(plant: GreyBox) -> list[str]:
-    """Look for mistakes in the description of a plant, in its recordings and in its simulator.
+def check_description(plant: GreyBox) -> None:
+    """Look for mistakes in the description of a plant and in the form of its recordings.
+
+    Raises:
+        PlantError: every finding is one line that names the member, the rule and the remedy.
+    """
+    _refuse([*_recording_faults(plant), *_number_faults(plant), *_symbol_faults(plant)])
+
+
+def check_simulator(plant: GreyBox) -> list[str]:
+    """Look for mistakes in the simulator of a plant whose description is right.
 
     The nominal model is simulated on every run, alone and beside another candidate. Every parameter and
     cause is tried once, on as few runs as show its effect.
@@ -46,7 +58,6 @@ def check(plant: GreyBox) -> list[str]:
     Raises:
         PlantError: every finding is one line that names the member, the rule and the remedy.
     """
-    _refuse([*_recording_faults(plant), *_number_faults(plant), *_symbol_faults(plant)])
     _refuse(_output_faults(plant))
     _refuse(_shape_faults(plant))
     return _effect_warnings(plant)
@@ -85,10 +96,7 @@ def _run_faults(plant: GreyBox, run: Run) -> Iterator[str]:
         shape = np.shape(run.time)
         yield f"{member}: time has the shape {shape}: record three samples or more, or leave the run out"
         return
-    uniform, step = np.linspace(run.time[0], run.time[-1], samples, retstep=True)
-    late = np.abs(run.time - uniform) > UNEVEN_PERIOD * step
-    if np.any(late):
-        yield f"{member}: time does not rise uniformly at sample {int(np.argmax(late))}: resample it"
+    yield from (f"{member}: {fault}" for fault in _time_faults(run.time))
     expected = len(plant.channels), samples
     shapes = {"measured": np.shape(run.measured), "trusted": np.shape(run.trusted)}
     for name, shape in shapes.items():
@@ -96,16 +104,27 @@ def _run_faults(plant: GreyBox, run: Run) -> Iterator[str]:
             yield f"{member}: {name} has the shape {shape}, not (channels, samples) = {expected}"
     if np.asarray(run.trusted).dtype != bool:
         yield f"{member}: trusted is no boolean array: convert it with astype(bool)"
-    elif set(shapes.values()) == {expected}:
-        for c, i in np.argwhere(run.trusted & ~np.isfinite(run.measured))[:1]:
-            name = plant.channels[c].name
-            yield f"{member}: channel {name} is not finite at sample {i}: set trusted to False there"
     for name, signal in run.inputs.items():
         if np.shape(signal) != (samples,):
             yield f"{member}: input {name} has the shape {np.shape(signal)}, not ({samples},)"
         elif not np.all(np.isfinite(signal)):
             first = int(np.argmin(np.isfinite(signal)))
             yield f"{member}: input {name} is not finite at sample {first}: fill the gap or cut the run"
+
+
+def _time_faults(time: NDArray) -> Iterator[str]:
+    """Jumps of a clock that is uniform elsewhere, or a clock that is not."""
+    uniform, mean = np.linspace(time[0], time[-1], len(time), retstep=True)
+    steps = np.diff(time)
+    usual = float(np.median(steps))
+    jumps = np.flatnonzero(np.abs(steps - usual) > 2 * UNEVEN_PERIOD * usual) + 1
+    if usual > 0 and 0 < len(jumps) < MOST_JUMPS * len(time):
+        yield (
+            f"time jumps by {steps[jumps[0] - 1]:g} s at sample {jumps[0]}, where the period is "
+            f"{usual:g} s: cut the run there into two runs"
+        )
+    elif np.any(late := ~(np.abs(time - uniform) <= UNEVEN_PERIOD * mean)):
+        yield f"time does not rise uniformly at sample {int(np.argmax(late))}: resample it"
 
 
 def _number_faults(plant: GreyBox) -> Iterator[str]:

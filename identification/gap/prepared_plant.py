@@ -1,119 +1,16 @@
-"""A plant as the stages of the diagnosis need it: noise known, time from 0, every reading a number.
-
-White noise shows in differences of neighbouring readings (Rice 1984; second differences: Gasser, Sroka
-and Jennen-Steinmetz 1986), a smooth course hardly does. The median over blocks leaves out where it moves
-fast. Readings in coarse steps may not differ at all: then the step tells how far they may be off.
-"""
+"""A plant as the stages of the diagnosis need it: screened, noise known, every reading a number."""
 
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
-from math import comb
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.gap.plant import Channel, GreyBox, PlantError, Run, StateEquation, StateTrace
-
-BLOCK_READINGS = 20
-"""Length of a block whose noise is estimated by itself [readings]: four blocks in a run of 80 readings,
-and motion in some of them does not move the median."""
-
-DIFFERENCE_ORDERS = (2, 4)
-"""Orders of the differences of neighbouring readings that show the noise; the least estimate counts. The
-second suffices for finely sampled runs; the fourth removes the motion of runs with a few dozen readings
-per transient as well."""
-
-LARGEST_ROUNDING = 1e-9
-"""Distance of two readings that is rounding of the same value, relative to all readings' range [1]."""
-
-STEP_QUANTILE = 0.1
-"""Quantile of the distances of neighbouring values that is tried as the step of a quantised channel [1]:
-most values of a range occur, so that a small quantile is one step."""
-
-STEP_TOLERANCE = 0.05
-"""Distance of a difference from the next multiple of the step up to which it is one [steps]."""
-
-SHARE_OF_MULTIPLES = 0.95
-"""Share of differences that must be multiples of the step [1]: all but faulty readings."""
-
-FEWEST_DISTANCES = 4
-"""Fewest distances of neighbouring values that can show a step: by chance two may be alike."""
-
-STEP_TO_SD = float(np.sqrt(1.0 / 12.0))
-"""Standard deviation of rounding to a step, in steps."""
-
-
-def white_noise(series: Sequence[NDArray]) -> float:
-    """Standard deviation of white noise on readings about a smooth course.
-
-    Args:
-        series: consecutive trusted readings of each run, (readings,) [unit of the readings].
-
-    Returns:
-        In the unit of the readings; 0 where most neighbours are equal, NaN where no run has enough
-        readings.
-    """
-    levels = [_from_differences(series, order) for order in DIFFERENCE_ORDERS]
-    known = [level for level in levels if not np.isnan(level)]
-    return min(known, default=float("nan"))
-
-
-def quantisation_step(series: Sequence[NDArray]) -> float:
-    """Step of which all readings are multiples, but for an offset.
-
-    series: readings of each run, (readings,) [unit of the readings]. Returns the step in the unit of the
-    readings, 0 where there is none.
-    """
-    values = np.unique(np.concatenate([np.zeros(0), *series]))
-    if len(values) < 2:
-        return 0.0
-    gaps = np.diff(values)
-    gaps = gaps[gaps > LARGEST_ROUNDING * (values[-1] - values[0])]
-    if len(gaps) < FEWEST_DISTANCES:
-        return 0.0
-    step = float(np.quantile(gaps, STEP_QUANTILE, method="lower"))
-    multiples = gaps / step
-    close = np.abs(multiples - np.round(multiples)) <= STEP_TOLERANCE
-    return step if np.mean(close) >= SHARE_OF_MULTIPLES else 0.0
-
-
-def _from_differences(series: Sequence[NDArray], order: int) -> float:
-    """Noise by differences of one order; NaN where no run has enough readings."""
-    scale = 1.0 / np.sqrt(comb(2 * order, order))  # root of the sum of squared binomial coefficients
-    blocks = [
-        block
-        for readings in series
-        if len(readings) > order
-        for block in _blocks(scale * np.diff(readings, order), BLOCK_READINGS)
-    ]
-    if not blocks:
-        return float("nan")
-    freedom = min(len(block) for block in blocks) / _correlated_readings(order)
-    return noise_of_blocks([float(np.mean(block**2)) for block in blocks], max(freedom, 1.0))
-
-
-def noise_of_blocks(variances: NDArray | Sequence[float], freedom: float) -> float:
-    """Standard deviation of white noise from its variance in blocks of readings, a few of them lively.
-
-    variances: (blocks,). freedom: independent values in a block. The median of a chi-square variable
-    becomes its mean (Wilson and Hilferty 1931).
-    """
-    return float(np.sqrt(np.median(variances) / (1.0 - 2.0 / (9.0 * freedom)) ** 3))
-
-
-def _blocks(differences: NDArray, length: int) -> list[NDArray]:
-    """Differences (readings,) in blocks of at least this length, or in one block."""
-    return np.array_split(differences, max(1, len(differences) // length))
-
-
-def _correlated_readings(order: int) -> float:
-    """Number of differences of white noise that tell as much as one independent value."""
-    weights = np.diff(np.eye(1, 2 * order + 1, order)[0], order)
-    correlation = np.correlate(weights, weights, "full") / (weights @ weights)
-    return float(np.sum(correlation**2))
-
+from identification.gap.reading_noise import STEP_TO_SD, quantisation_step, white_noise
+from identification.gap.screened import Finding, screen
 
 NoiseSource = Literal["given", "estimated", "resolution"]
 """Where a channel's noise comes from: the user, the readings, or the step between possible readings."""
@@ -123,19 +20,25 @@ class PreparedPlant:
     """`GreyBox` that adds to a plant what its owner may leave out; the plant itself still simulates."""
 
     def __init__(self, plant: GreyBox):
-        """Estimate what is not given.
+        """Screen the recordings, and estimate what is not given.
 
         Args:
-            plant: a plant that passes `check`.
+            plant: a plant whose description passes `check_description`.
 
         Raises:
-            PlantError: a channel's noise is neither given nor seen in its readings.
+            PlantError: recordings cannot be used (`screen`), or a channel's noise is neither given nor
+                seen in its readings.
         """
-        self.plant = plant
+        runs, self.screened = _screened(plant)
+        """Faulty readings that no fit uses."""
+        self.plant = _with_inputs(plant, runs, self.screened)
         self.parameters, self.causes = tuple(plant.parameters), tuple(plant.causes)
         self.tolerances, self.run_offsets = tuple(plant.tolerances), tuple(plant.run_offsets)
         self.equations = tuple(plant.equations)
-        noise = [_noise(plant, c) for c in range(len(plant.channels))]
+        noise = [
+            _noise(channel, [run.measured[c][run.trusted[c]] for run in runs])
+            for c, channel in enumerate(plant.channels)
+        ]
         self.channels: tuple[Channel, ...] = tuple(
             replace(channel, noise=level)
             for channel, (level, _) in zip(plant.channels, noise, strict=True)
@@ -146,7 +49,7 @@ class PreparedPlant:
         """Where the noise of each channel comes from."""
         self.time_scale: float | None = getattr(plant, "time_scale", None)
         """Of the plant [s]; None: its readings show it."""
-        self.runs: tuple[Run, ...] = tuple(_prepared_run(run) for run in plant.runs)
+        self.runs: tuple[Run, ...] = tuple(_prepared_run(run) for run in runs)
 
     def with_noise(self, ratios: Sequence[float]) -> "PreparedPlant":
         """The plant whose channels have their noise times a ratio each, as residuals show it [1]."""
@@ -187,23 +90,45 @@ def prepared(plant: GreyBox) -> PreparedPlant:
     between its trusted neighbours afterwards; nothing weighs it, but figures may show it.
 
     Args:
-        plant: a plant that passes `check`.
+        plant: a plant whose description passes `check_description`.
 
     Raises:
-        PlantError: a channel's noise is neither given nor seen in its readings.
+        PlantError: recordings cannot be used (`screen`), or a channel's noise is neither given nor seen
+            in its readings.
     """
     if isinstance(plant, PreparedPlant):
         return plant
     return PreparedPlant(plant)
 
 
-def _noise(plant: GreyBox, c: int) -> tuple[float, NoiseSource]:
-    """Noise of channel number c [SI] and where it comes from."""
-    channel = plant.channels[c]
+def _screened(plant: GreyBox) -> tuple[Sequence[Run], tuple[Finding, ...]]:
+    """Runs without their faulty readings, and these; a plant with `screened` has seen to it itself."""
+    found = getattr(plant, "screened", None)
+    return screen(plant.runs, plant.channels) if found is None else (plant.runs, tuple(found))
+
+
+def _with_inputs(plant: GreyBox, runs: Sequence[Run], found: Sequence[Finding]) -> GreyBox:
+    """The plant that simulates the screened runs. Raises PlantError if it cannot take their inputs."""
+    if not found or hasattr(plant, "screened"):
+        return plant
+    with_runs = getattr(plant, "with_runs", None)
+    if with_runs:
+        return with_runs(runs)
+    outputs = [channel.name for channel in plant.channels]
+    wild = [own.place for own in found if own.channel not in outputs]
+    if wild:
+        raise PlantError(
+            f"inputs: wild are {'; '.join(wild)}, and the model runs on them: correct them, or give the "
+            "plant a method with_runs(runs) that takes corrected ones"
+        )
+    return plant
+
+
+def _noise(channel: Channel, series: Sequence[NDArray]) -> tuple[float, NoiseSource]:
+    """Noise of a channel [SI] and where it comes from; series: trusted readings of each run."""
     if channel.noise is not None:
         floor = STEP_TO_SD * channel.resolution
         return (channel.noise, "given") if channel.noise >= floor else (floor, "resolution")
-    series = [run.measured[c][run.trusted[c]] for run in plant.runs]
     floor = STEP_TO_SD * (channel.resolution or quantisation_step(series))
     level = white_noise(series)
     if level > floor:

@@ -11,7 +11,8 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from identification.calibration.problem import calibration_problem
 from identification.gap.plant import Channel, NuisanceParameter, Run, StateEquation, StateTrace
-from identification.gap.prepared_plant import noise_of_blocks
+from identification.gap.reading_noise import noise_of_blocks
+from identification.gap.screened import Finding, screen
 from identification.recordings.noise import coarse_step_warnings, reliable_step, rounding_error
 from identification.recordings.recording import OUTPUTS, UNITS, Campaign, Recording
 from identification.replay.model_inputs import model_inputs
@@ -97,6 +98,7 @@ class Valve:
         self.time_scale = TIME_SCALE
         given = _checked_noise(noise or {})
         start, free = (plant.parameters, plant.free) if plant else (None, FREE_PARAMETERS)
+        campaign, found = _screened(campaign)
         problem = calibration_problem(campaign, start=start, free=free)
         self.plant = plant or Plant.calibrated()
         self.base = problem.vector.reference
@@ -110,7 +112,8 @@ class Valve:
             )
             for name in OUTPUTS
         )
-        self.runs = tuple(as_run(recording) for recording in self.recordings)
+        self.runs = tuple(as_run(recording, found) for recording in self.recordings)
+        self.screened = tuple(replace(own, file=f"{own.file}.csv") for own in found)
         self.parameters = tuple(causes.calibrated(problem.vector))
         self.causes = causes.catalogue(self.base, without, free)
         self.tolerances = tuple(
@@ -163,13 +166,30 @@ class Valve:
         return {**self.base, **{s: float(v[run] if np.ndim(v) else v) for s, v in first.items()}}
 
 
-def as_run(recording: Recording) -> Run:
-    """A recording as the grey-box protocol has it: signals (3, samples) of OUTPUTS [Pa, Pa, A]."""
+def _screened(campaign: Campaign) -> tuple[Campaign, tuple[Finding, ...]]:
+    """The campaign with straight lines across its faulty readings, and these."""
+    channels = [Channel(name=name, unit=UNITS[name][0], scale=UNITS[name][1]) for name in OUTPUTS]
+    runs, found = screen([as_run(recording) for recording in campaign.recordings], channels)
+    recordings = tuple(
+        replace(recording, **dict(zip(OUTPUTS, run.measured, strict=True)), **run.inputs)
+        for recording, run in zip(campaign.recordings, runs, strict=True)
+    )
+    return replace(campaign, recordings=recordings), found
+
+
+def as_run(recording: Recording, faulty: Sequence[Finding] = ()) -> Run:
+    """A recording as the grey-box protocol has it: signals (3, samples) of OUTPUTS [Pa, Pa, A].
+
+    faulty: readings that do not count, of this and of other recordings.
+    """
     measured = measured_outputs(recording)
     trusted = np.ones(measured.shape, dtype=bool)
     switched = np.flatnonzero(np.diff(recording.energised)) + 1
     # An eddy current makes the coil's current jump here: the sample may show either value.
     trusted[OUTPUTS.index("I"), switched] = False
+    for own in faulty:
+        if own.file == recording.name and own.channel in OUTPUTS:
+            trusted[OUTPUTS.index(own.channel), list(own.samples)] = False
     return Run(
         name=recording.name,
         held_out=recording.role == "validation",

@@ -18,8 +18,15 @@ from identification.gap.plant import (
     StateEquation,
     StateTrace,
 )
-from identification.gap.plant_checks import check
+from identification.gap.plant_checks import check_description, check_simulator
+from identification.gap.prepared_plant import prepared
 from tests.identification.gap.tanks import TANKS
+
+
+def check(plant: GreyBox) -> list[str]:
+    """Warnings of a plant in order."""
+    check_description(plant)
+    return check_simulator(prepared(plant))
 
 
 class Described(Tank):
@@ -108,6 +115,14 @@ MISTAKES: dict[str, tuple[Callable[[], Tank], str]] = {
         lambda: with_run(time=TIME**1.1),
         "run test_1: time does not rise uniformly.*resample",
     ),
+    "time jumps": (
+        lambda: with_run(time=TIME + 3.0 * (TIME >= 50.0)),
+        "run test_1: time jumps by 3.5 s at sample 100, where the period is 0.5 s: cut",
+    ),
+    "time is lost": (
+        lambda: with_run(time=np.where(TIME == 50.0, np.nan, TIME)),
+        "run test_1: time does not rise uniformly",
+    ),
     "readings": (
         lambda: with_run(measured=np.zeros(240)),
         r"run test_1: measured .* \(240,\), not .*1, 240",
@@ -118,10 +133,6 @@ MISTAKES: dict[str, tuple[Callable[[], Tank], str]] = {
         "runs: no reading of the runs that are fitted is trusted",
     ),
     "inputs": (lambda: with_run(inputs={"q": np.zeros(3)}), r"test_1: input q has the shape \(3,\)"),
-    "NaN": (
-        lambda: with_reading(np.nan, True),
-        "run test_2: channel h is not finite at sample 7: set trusted",
-    ),
     "range": (lambda: with_c(low=0.2), "parameters, c: low 0.2 and high 0.1 are no range"),
     "nominal": (lambda: with_c(nominal=0.5), "parameters, c: nominal 0.5 lies outside 0.001 to 0.1"),
     "scale": (lambda: with_c(scale=0.0), "parameters, c: scale 0 is not positive.*leave it out"),

@@ -1,5 +1,6 @@
 """The valve behind the protocol, and a diagnosis of bench recordings whose effect is known here."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -12,7 +13,7 @@ from identification.bench.session import measured_campaign, run_programme
 from identification.calibration.problem import calibration_problem
 from identification.gap.diagnosis import rank_hypotheses
 from identification.gap.prediction import percentage_errors
-from identification.recordings.recording import Campaign
+from identification.recordings.recording import OUTPUTS, Campaign
 from identification.replay.replay import responses, total_response_error
 from identification.validation import validate
 from identification.valve_gap.causes import effects, parameters
@@ -54,6 +55,34 @@ def test_a_noise_that_is_told_counts_and_the_others_are_estimated():
     assert {c.name: c.noise for c in told.channels} == {
         c.name: 7e3 if c.name == "p3" else c.noise for c in estimated.channels
     }
+
+
+def test_wild_readings_reach_neither_the_model_nor_the_fit():
+    clean = Valve(campaign())
+    spikes = {"U": (30, -20.0), "p1": (600, 3e5), "p2": (20, 2e5), "p3": (400, -1e5), "I": (40, 0.05)}
+
+    def spoilt(recording):
+        changed = {name: recording.channel(name).copy() for name in spikes}
+        for name, (sample, size) in spikes.items():
+            changed[name][sample] += size
+        return replace(recording, **changed)
+
+    wild = Valve(replace(campaign(), recordings=tuple(spoilt(r) for r in campaign().recordings)))
+    found = {(own.file, own.channel): own.samples for own in wild.screened}
+    expected = {
+        (f"{r.name}.csv", name): (s,) for r in campaign().recordings for name, (s, _) in spikes.items()
+    }
+    assert found == expected
+    assert not clean.screened
+    for run, original in zip(wild.runs, clean.runs, strict=True):
+        assert not np.any(run.trusted[[0, 1, 2], [spikes[name][0] for name in OUTPUTS]])
+        assert np.sum(original.trusted & ~run.trusted) <= len(OUTPUTS)
+    nominal = {"R": np.array([clean.base["R"]])}
+    for own, exact in zip(
+        wild.outputs(nominal, range(4)), clean.outputs(nominal, range(4)), strict=True
+    ):
+        noise = np.array([channel.known_noise for channel in clean.channels])
+        assert np.all(np.abs(own - exact) < noise[:, None, None])
 
 
 @pytest.mark.parametrize("noise", [{"p3": 0.0}, {"p3": float("nan")}, {"p1": 1e3}])
