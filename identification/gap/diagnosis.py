@@ -15,7 +15,7 @@ from identification.gap.held_out import (
 )
 from identification.gap.localisation import Localisation, locate
 from identification.gap.plant import GreyBox
-from identification.gap.plant_checks import check_description, check_simulator
+from identification.gap.plant_checks import check, check_description
 from identification.gap.prepared_plant import prepared
 from identification.gap.recalibration import (
     recalibrate,
@@ -23,7 +23,7 @@ from identification.gap.recalibration import (
     with_own_nuisances,
     with_seen_noise,
 )
-from identification.gap.screened import Finding, sentences
+from identification.gap.screened import Finding
 from identification.gap.screening import assess_separability, simulate_signatures
 from identification.gap.verdict import (
     AMBIGUOUS,
@@ -118,7 +118,7 @@ def diagnose(plant: GreyBox, *, seed: int = 0, cache: FitCache | None = None) ->
     cache = cache or FitCache(plant)
     check_description(plant)
     usable = prepared(plant)
-    warnings = [*sentences(usable.screened), *check_simulator(usable)]
+    warnings = check(usable)
     ranking = rank_hypotheses(usable, cache)
     cache.announce("where")
     localisation = _locate(ranking, ranking.recalibrated, seed)

@@ -15,6 +15,8 @@ from identification.gap.plant import (
     PlantError,
     Run,
 )
+from identification.gap.prepared_plant import prepared
+from identification.gap.screened import sentences
 
 UNEVEN_PERIOD = 0.01
 """Largest deviation from uniform sampling [sampling periods]: rounding of a logger's clock."""
@@ -46,21 +48,24 @@ def check_description(plant: GreyBox) -> None:
     _refuse([*_recording_faults(plant), *_number_faults(plant), *_symbol_faults(plant)])
 
 
-def check_simulator(plant: GreyBox) -> list[str]:
-    """Look for mistakes in the simulator of a plant whose description is right.
+def check(plant: GreyBox) -> list[str]:
+    """Look for mistakes in the description of a plant, in its recordings and in its simulator.
 
     The nominal model is simulated on every run, alone and beside another candidate. Every parameter and
     cause is tried once, on as few runs as show its effect.
 
     Returns:
-        Warnings, a sentence each: parameters and causes without effect, parameters that act alike.
+        Warnings, a sentence each: faulty readings, parameters and causes without effect, parameters that
+        act alike.
 
     Raises:
         PlantError: every finding is one line that names the member, the rule and the remedy.
     """
-    _refuse(_output_faults(plant))
-    _refuse(_shape_faults(plant))
-    return _effect_warnings(plant)
+    check_description(plant)
+    usable = prepared(plant)
+    _refuse(_output_faults(usable))
+    _refuse(_shape_faults(usable))
+    return [*sentences(usable.screened), *_effect_warnings(usable)]
 
 
 def _refuse(faults: Iterable[str]) -> None:

@@ -18,15 +18,8 @@ from identification.gap.plant import (
     StateEquation,
     StateTrace,
 )
-from identification.gap.plant_checks import check_description, check_simulator
-from identification.gap.prepared_plant import prepared
+from identification.gap.plant_checks import check
 from tests.identification.gap.tanks import TANKS
-
-
-def check(plant: GreyBox) -> list[str]:
-    """Warnings of a plant in order."""
-    check_description(plant)
-    return check_simulator(prepared(plant))
 
 
 class Described(Tank):
