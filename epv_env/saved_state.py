@@ -6,7 +6,7 @@ restore_state(env, saved)   # as often as wanted, also into another environment 
 
 import io
 import json
-import zipfile
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,13 +15,46 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.env import _ValveEnv
-from epv_env.plant.parameters import Parameters
+from epv_env.period import rules_of
+from epv_env.plant.consumption import APPLICATIONS
+from epv_env.plant.equations import State
+from epv_env.plant.parameters import ParameterError, Parameters
 from epv_env.plant.supply import Supply
+from epv_env.signals import Range
 from epv_env.vector_env import _ValveVectorEnv
 
 ValveEnv = _ValveEnv | _ValveVectorEnv
-FLAGS = {"_begun", "_done"}
-"""Of the vector environment's sub-environments, (n,)."""
+MEMORY = ("episodes", "progress", "noise", "parameter_values", "state", "acting_U", "delay_left")
+"""Of `LimitingTask.memory`; the rest follows from the parameters or is set in every period."""
+MOST = 1e9
+"""More than any finite quantity of an episode has [SI]."""
+
+
+def _each(names: str, low: float, high: float) -> dict[str, Range]:
+    return dict.fromkeys(names.split(), (low, high))
+
+
+LIMITS: dict[str, Range] = {
+    **_each("now", 0, APPLICATIONS - 1),
+    **_each("coil compressor violated _done action", 0, 1),
+    **_each("steps waited offset", 0, 2.0**53),
+    **_each("idle_until p3_frozen_at target_steps_at", 0, np.inf),
+    **_each("target target_steps_to", 0, 100),
+    **_each("reading p2_history p3_history", -20, 20),
+    **_each("cut_in cut_out delivery noise_factor applications span", 0, MOST),
+    **_each("leak", -1e-9, MOST),  # a recorded flow of 0 is a difference of sums
+    **_each("p1_slope", -1e11, 1e11),
+    **_each("p1 p2 p3", 0, 1e7),
+    **_each("xPV xMV", -0.1, 0.1),
+    **_each("vPV vMV I I_coil", -1e3, 1e3),
+    **_each("air_in_PV air_in_MV air_vented coil_energy", -MOST, MOST),
+    **_each("coil_heat heat_3 heat_2 far_pressure supply_drop lag_2 lag_3", -1e7, 1e7),
+    **_each("noise", -MOST, MOST),
+    **_each("acting_U", -32, 32),
+    **_each("delay_left", 0, 1),
+}
+"""Least and greatest value of every field and array [SI, bar, A]: what a restored state may hold. The
+domains of the parameters are the parameter table's."""
 PER_EPISODE = ("supplies", "moving_targets", "recorded_consumptions")
 """Objects of each episode that are not numbers: lists of the task."""
 
@@ -34,8 +67,10 @@ class StateError(ValueError):
 class SavedState:
     """A copy of all that the future of an environment depends on."""
 
+    kind: str
+    """Class of the environment that it is of."""
     arrays: dict[str, NDArray]
-    """Numbers of all episodes."""
+    """Numbers of all episodes, and the rules of the task."""
     generators: list[dict[str, Any] | None]
     """States of the generators: of each episode's noise, then of each environment's episodes."""
     objects: dict[str, list[Any]]
@@ -56,7 +91,9 @@ class SavedState:
                 raise StateError(f"episodes have {name} of their own: only numbers go into a file")
             numbers[name] = np.array([supply.numbers for supply in found])
         stream = io.BytesIO()
-        rest = json.dumps({"generators": self.generators, "elapsed": self.elapsed}, default=_plain)
+        rest = json.dumps(
+            {"kind": self.kind, "generators": self.generators, "elapsed": self.elapsed}, default=_plain
+        )
         np.savez_compressed(stream, rest=np.array(rest), **numbers)  # type: ignore[arg-type]
         return stream.getvalue()
 
@@ -68,17 +105,21 @@ class SavedState:
             with np.load(io.BytesIO(content), allow_pickle=False) as file:
                 arrays = {name: file[name] for name in file.files}
             rest = json.loads(str(arrays.pop("rest")))
-            generators, elapsed = rest["generators"], rest["elapsed"]
-        except (ValueError, KeyError, OSError, EOFError, zipfile.BadZipFile) as error:
+            objects: dict[str, list[Any]] = dict.fromkeys(PER_EPISODE, [None] * task.n)
+            objects["supplies"] = [task.settings.supply] * task.n
+            if "supplies" in arrays:
+                objects["supplies"] = [
+                    Supply.from_numbers(row) for row in arrays.pop("supplies").tolist()
+                ]
+            return cls(
+                kind=rest["kind"],
+                arrays=arrays,
+                generators=rest["generators"],
+                objects=objects,
+                elapsed=rest["elapsed"],
+            )
+        except Exception as error:  # damaged bytes: of zip, zlib, NumPy or JSON
             raise StateError(f"this is no saved state ({error}): save it anew") from None
-        settings = task.settings
-        objects: dict[str, list[Any]] = dict.fromkeys(PER_EPISODE, [None] * task.n)
-        own = arrays.pop("supplies", None)
-        if own is None:
-            objects["supplies"] = [settings.supply] * task.n
-        else:
-            objects["supplies"] = [Supply.from_numbers(row) for row in own.tolist()]
-        return cls(arrays=arrays, generators=generators, objects=objects, elapsed=elapsed)
 
 
 def save_state(env: gymnasium.Env | gymnasium.vector.VectorEnv) -> SavedState:
@@ -91,6 +132,7 @@ def save_state(env: gymnasium.Env | gymnasium.vector.VectorEnv) -> SavedState:
     generators = [*task.noise_of, *_generators(valves)]
     limit = _time_limit(env)
     return SavedState(
+        kind=type(valves).__name__,
         arrays=arrays,
         generators=[None if rng is None else rng.bit_generator.state for rng in generators],
         objects={name: list(getattr(task, name)) for name in PER_EPISODE},
@@ -101,43 +143,111 @@ def save_state(env: gymnasium.Env | gymnasium.vector.VectorEnv) -> SavedState:
 def restore_state(env: gymnasium.Env | gymnasium.vector.VectorEnv, saved: SavedState) -> None:
     """Put an environment into a saved state.
 
-    Raises StateError, before anything is changed, if it has another number of valves.
+    Raises StateError, before anything is changed, unless it is of an environment of the same arguments
+    and every number lies within its limits.
     """
     valves = _unwrapped(env)
-    task, own = valves.task, _arrays(valves)
-    shapes = {name: (array.shape, array.dtype) for name, array in own.items()}
-    if shapes != {name: (array.shape, array.dtype) for name, array in saved.arrays.items()}:
-        raise StateError("the state is of another environment: restore it where it was saved")
-    for name, array in task.memory.items():
-        array[...] = saved.arrays[name]
-    for name in FLAGS & own.keys():
-        setattr(valves, name, saved.arrays[name].copy())
-    symbols = list(Parameters.calibrated())
-    task.parameters[:] = [
-        Parameters.calibrated().replace(**dict(zip(symbols, row, strict=True)))
-        for row in task.parameter_values.tolist()
-    ]
+    task = valves.task
+    _check_origin(valves, saved)
+    _check_numbers(saved.arrays)
+    parameters = _parameters(task.settings.region.centre, saved.arrays["parameter_values"])
+    generators = _checked_generators(saved.generators, task.n + len(_generators(valves)))
+    limit = _time_limit(env)
+    counted = isinstance(saved.elapsed, int) and saved.elapsed >= 0
+    if (limit is None) != (saved.elapsed is None) or not (limit is None or counted):
+        raise StateError(f"the state has counted {saved.elapsed!r} steps: restore it where it was saved")
+    if {len(saved.objects[name]) for name in PER_EPISODE} != {task.n}:
+        raise StateError("the state has objects of other episodes: restore it where it was saved")
+    task.parameters[:] = parameters
     for name in PER_EPISODE:
         getattr(task, name)[:] = saved.objects[name]
-    task.noise_of[:] = [_generator(state) for state in saved.generators[: task.n]]
-    for rng, state in zip(_generators(valves), saved.generators[task.n :], strict=True):
-        if state is not None:
-            rng.bit_generator.state = state
+    p = dict(zip(parameters[0], saved.arrays["parameter_values"].T, strict=True))
+    task.valves.set_parameters(np.arange(task.n), p, [supply.volume for supply in task.supplies])
+    for name in MEMORY:
+        task.memory[name][...] = saved.arrays[name]
+    task.noise_of[:] = generators[: task.n]
+    for rng, found in zip(_generators(valves), generators[task.n :], strict=True):
+        if found is not None:
+            rng.bit_generator.state = found.bit_generator.state
     task.settle()
-    _settle(env, valves, saved.elapsed)
+    if isinstance(valves, _ValveVectorEnv):
+        valves._done = saved.arrays["_done"].copy()
+        valves._some_done = bool(valves._done.any())
+    if limit is not None:
+        limit._elapsed_steps = saved.elapsed
+
+
+def _check_origin(valves: ValveEnv, saved: SavedState) -> None:
+    """Raises StateError unless the state is of an environment of this kind, size and task."""
+    own = _arrays(valves)
+    if saved.kind != type(valves).__name__ or _shapes(own) != _shapes(saved.arrays):
+        raise StateError("the state is of another environment: restore it where it was saved")
+    rules, found = own["rules"], saved.arrays["rules"]
+    if different := [name for name in rules.dtype.names or () if rules[name] != found[name]]:
+        raise StateError(
+            f"the state is of an environment with another {different[0]}: make this one with the same "
+            "arguments"
+        )
+
+
+def _shapes(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
+    return {name: (array.shape, array.dtype) for name, array in arrays.items()}
+
+
+def _check_numbers(arrays: Mapping[str, NDArray]) -> None:
+    """Raises StateError for a number outside its limits, NaN included: compiled code indexes by some."""
+    for name, values in _fields(arrays):
+        low, high = LIMITS[name]
+        if not np.all((values >= low) & (values <= high)):
+            raise StateError(f"{name} of the state lies outside {low:g} to {high:g}: save it anew")
+
+
+def _fields(arrays: Mapping[str, NDArray]) -> Iterator[tuple[str, NDArray]]:
+    """Names as in LIMITS and values of all that a state holds, but the parameters."""
+    for name in ("episodes", "progress"):
+        for field in arrays[name].dtype.names or ():
+            values = arrays[name][field]
+            known = "noise_factor" if field == "noise" else field
+            yield known, values.view(np.uint8) if values.dtype == bool else values
+    yield from zip(State._fields, arrays["state"], strict=True)
+    yield "noise", arrays["noise"]
+    yield "acting_U", np.where(np.isnan(arrays["acting_U"]), 0.0, arrays["acting_U"])  # NaN: none yet
+    yield "delay_left", arrays["delay_left"]
+    if "_done" in arrays:
+        yield "_done", arrays["_done"].view(np.uint8)
+
+
+def _parameters(centre: Parameters, values: NDArray) -> list[Parameters]:
+    """The parameters of each episode from rows of values. Raises StateError."""
+    try:
+        return [centre.replace(**dict(zip(centre, row, strict=True))) for row in values.tolist()]
+    except ParameterError as error:
+        raise StateError(f"the state's {error}") from None
+
+
+def _checked_generators(states: list[Any], count: int) -> list[np.random.Generator | None]:
+    """Generators in these states. Raises StateError."""
+    try:
+        found = [_generator(state) for state in states]
+    except Exception as error:  # NumPy's, of many kinds
+        raise StateError(f"a generator of the state is damaged ({error}): save it anew") from None
+    if len(found) != count:
+        raise StateError(f"the state has {len(found)} generators, not {count}: save it anew")
+    return found
 
 
 def _unwrapped(env: gymnasium.Env | gymnasium.vector.VectorEnv) -> ValveEnv:
-    inner: Any = env.unwrapped
+    inner: Any = getattr(env, "unwrapped", env)
     if not isinstance(inner, ValveEnv):
         raise StateError(f"{inner!r} is no environment of valves: give one that epv_env registers")
     return inner
 
 
 def _arrays(valves: ValveEnv) -> dict[str, NDArray]:
-    """All arrays that hold the state, by name; the environment's own, not copies."""
-    flags = {name: getattr(valves, name) for name in FLAGS if hasattr(valves, name)}
-    return {**valves.task.memory, **flags}
+    """All arrays that hold the state, by name, and the task's rules; the environment's own."""
+    task = valves.task
+    done = {"_done": valves._done} if isinstance(valves, _ValveVectorEnv) else {}
+    return {**{name: task.memory[name] for name in MEMORY}, "rules": rules_of(task.settings), **done}
 
 
 def _generators(valves: ValveEnv) -> list[np.random.Generator]:
@@ -160,16 +270,6 @@ def _time_limit(env: Any) -> gymnasium.wrappers.TimeLimit | None:
             return env
         env = env.env
     return None
-
-
-def _settle(env: Any, valves: ValveEnv, elapsed: int | None) -> None:
-    """Set what the arrays do not hold."""
-    if isinstance(valves, _ValveVectorEnv):
-        valves._all_begun = bool(valves._begun.all())
-        valves._some_done = bool(valves._done.any())
-    limit = _time_limit(env)
-    if limit is not None:
-        limit._elapsed_steps = elapsed
 
 
 def _plain(value: Any) -> Any:

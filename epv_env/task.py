@@ -7,6 +7,7 @@ for the noise, so that two plants compared under one seed meet the same disturba
 
 from collections.abc import Sequence
 
+import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
@@ -45,6 +46,7 @@ class LimitingTask:
         self.period = settings.control_period
         self.valves = Valves(n, threads=threads)
         self.parameters: list[Parameters | None] = [None] * n
+        self._begun = False
         self.parameter_values = np.zeros((n, len(Parameters.calibrated())))
         """The same as numbers, in the order of the parameter table (n, parameters) [SI]."""
         self.supplies = [settings.supply] * n
@@ -97,6 +99,7 @@ class LimitingTask:
 
     def settle(self) -> None:
         """Take note of what `memory` and the lists of each episode's objects hold now."""
+        self._begun = None not in self.parameters
         self.valves.settle()
         self._find_signals()
         self._count_to_noise()
@@ -135,6 +138,7 @@ class LimitingTask:
             e[name][where] = 0
         e["action"][where] = e["coil"][where]
         e["waited"][where] = LONGEST_WAIT
+        self._begun = None not in self.parameters
         self._find_signals()
         self._draw_noise(where)
         self._count_to_noise()
@@ -147,8 +151,10 @@ class LimitingTask:
         """Energise each coil for the first `on_time` (n,) of the period [s], then switch it off.
 
         action: (n,) the fraction that was asked for, as the next observation shows it. Raises ValueError
-        unless there is one of each for every episode.
+        unless there is one of each for every episode, ResetNeeded unless all have begun.
         """
+        if not self._begun:
+            raise gymnasium.error.ResetNeeded("call reset() for every episode before step()")
         if not on_time.shape == action.shape == (self.n,):
             raise ValueError(f"got {len(on_time)} actions for {self.n} episodes: give one each")
         self._until_noise -= 1

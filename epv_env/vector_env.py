@@ -73,8 +73,6 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         self.task = LimitingTask(num_envs, self.settings, threads=threads)
         self.privileged = privileged
         self._rngs = [np_random(None)[0] for _ in range(num_envs)]
-        self._begun = np.zeros(num_envs, dtype=bool)
-        self._all_begun = False
         self._done = np.zeros(num_envs, dtype=bool)
         self._some_done = False
         self._every = np.ones(num_envs, dtype=bool)
@@ -96,8 +94,6 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         return self._begin(where, options), self._truth()
 
     def step(self, actions: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray, dict[str, Any]]:
-        if not self._all_begun:
-            raise gymnasium.error.ResetNeeded("call reset() on all sub-environments before step()")
         stale = self._done
         if self.autoreset_mode is AutoresetMode.DISABLED and self._some_done:
             raise OptionError(
@@ -160,8 +156,6 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         self._done = self._done.copy()
         self._done[where] = False
         self._some_done = bool(self._done.any())
-        self._begun[where] = True
-        self._all_begun = bool(self._begun.all())
         return self.task.begin(where, [self._rngs[i] for i in where], settings)
 
     def _own(self, options: dict[str, Any], i: int) -> dict[str, Any]:

@@ -79,9 +79,10 @@ def test_an_action_outside_its_space_is_refused(identifier, command):
         env.step(np.full(env.action_space.shape, command))
 
 
-def test_a_batch_is_reset_before_its_first_step():
-    with pytest.raises(Exception, match="reset"):
-        native("EPValve-v0", 2).step(np.array([1, 1]))
+@pytest.mark.parametrize(("env", "action"), [(EPValveEnv(), 1), (native(IDS[0], 2), np.array([1, 1]))])
+def test_reset_comes_before_the_first_step(env, action):
+    with pytest.raises(gymnasium.error.ResetNeeded, match=r"call reset\(\)"):
+        env.step(action)
 
 
 @pytest.mark.parametrize("make", [lambda: gymnasium.make(IDS[0]), lambda: native(IDS[0], 2)])

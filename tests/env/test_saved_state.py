@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from dataclasses import replace
 
 import gymnasium
 import numpy as np
@@ -87,10 +88,57 @@ def test_what_cannot_be_restored_is_refused():
     with pytest.raises(StateError, match="call reset"):
         save_state(env)
     env.reset(seed=0)
+    saved = save_state(env)
     other = make("nominal", 2)
-    other.reset(seed=0)
-    with pytest.raises(StateError, match="of another environment"):
-        restore_state(other, save_state(env))
-    for content in (b"", b"no archive", save_state(env).to_bytes()[:100]):
+    slower = gymnasium.make_vec("EPValve-v0", num_envs=3, control_period=0.01)
+    for each, words in ((other, "of another environment"), (slower, "another control_period")):
+        each.reset(seed=0)
+        with pytest.raises(StateError, match=words):
+            restore_state(each, saved)
+    content = saved.to_bytes()
+    for damaged in (b"", b"no archive", content[:100], content[:200] + b"\x00" * 60 + content[260:]):
         with pytest.raises(StateError, match="no saved state"):
-            SavedState.from_bytes(content, env)
+            SavedState.from_bytes(damaged, env)
+
+
+WRONG = {
+    "progress": [("now", 10**6), ("now", -1), ("leak", -1.0), ("leak", np.nan), ("offset", np.inf)],
+    "episodes": [("p1_slope", 1e300), ("steps", -1), ("target", np.nan), ("waited", np.inf)],
+    "noise": [(0, np.nan)],
+    "state": [(0, np.inf), (0, -1.0), (2, 1e3)],
+    "parameter_values": [(0, np.nan), (0, -1.0)],
+    "delay_left": [(slice(None), -1.0)],
+}
+
+
+@pytest.mark.parametrize(
+    ("array", "place", "value"), [(a, *w) for a, all_ in WRONG.items() for w in all_]
+)
+def test_a_number_that_cannot_be_is_refused_and_nothing_changes(array, place, value):
+    env = make("nominal", 2)
+    env.reset(seed=3)
+    saved = save_state(env)
+    saved.arrays[array][place][1] = value
+    with pytest.raises(StateError, match=r"of the state lies outside|the state's parameter"):
+        restore_state(env, saved)
+    untouched = make("nominal", 2)
+    untouched.reset(seed=3)
+    on = np.ones((5, 2), dtype=int)
+    assert driven(env, on) == driven(untouched, on)
+
+
+@pytest.mark.parametrize(
+    ("part", "value"),
+    [
+        ("elapsed", -1),
+        ("elapsed", None),
+        ("elapsed", "x"),
+        ("generators", [None]),
+        ("generators", [7] * 2),
+    ],
+)
+def test_generators_and_steps_that_cannot_be_are_refused(part, value):
+    env = make("nominal", None)
+    env.reset(seed=3)
+    with pytest.raises(StateError, match=r"state has|damaged"):
+        restore_state(env, replace(save_state(env), **{part: value}))
