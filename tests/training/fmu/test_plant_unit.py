@@ -1,5 +1,6 @@
 """The plant's FMU moves as the kernel does, and keeps the contract of its standard."""
 
+import ctypes
 import shutil
 
 import numpy as np
@@ -151,6 +152,21 @@ def test_reset_begins_anew_to_the_bit(unit):
         instance.start()
 
 
+def flipped(content: bytes, first: int) -> list[bytes]:
+    """The content with one bit of a byte from `first` on flipped, at two hundred places."""
+    places = np.random.default_rng(2).integers(first, len(content), 200).tolist()
+    return [content[:k] + bytes([content[k] ^ 1 << k % 8]) + content[k + 1 :] for k in places]
+
+
+def with_nan(content: bytes, first: int) -> bytes:
+    """A serial state whose first number, at byte `first`, is NaN; its checksum (FNV-1a) is right."""
+    numbers = np.array([np.nan]).tobytes() + content[first + 8 : -8]
+    digest = 14695981039346656037
+    for byte in numbers:
+        digest = (digest ^ byte) * 1099511628211 % 2**64
+    return content[:first] + numbers + digest.to_bytes(8, "little")
+
+
 def test_a_saved_state_goes_on_to_the_bit(unit):
     """With a delayed command under way, and through bytes into another instance."""
     p = {"t_delay": 3e-3}
@@ -172,6 +188,9 @@ def test_a_saved_state_goes_on_to_the_bit(unit):
     assert again is not None
     other.restore(again, time)
     assert goes_on(other) == wanted
+    for damaged in (*flipped(content, len(unit.token)), with_nan(content, len(unit.token))):
+        assert other.state_of(damaged) is None
+        assert other.said[-1] == "these bytes are a damaged state: give those that the unit wrote"
     assert other.state_of(content[:-1]) is None
     assert other.state_of(b"?" * len(content)) is None
     assert other.said[-1] == "these bytes are not a state of this unit: give those that it wrote"
@@ -209,6 +228,17 @@ def test_senseless_calls_are_refused(unit):
     assert instance.step_from(1.0, 1e-3) == ERROR
     assert "the step begins at 1 s but the unit is at 0 s" in instance.said[-1]
     assert instance.step_from(0.0, 1e-3) == OK
+
+
+def test_a_step_past_the_stop_time_is_refused(unit):
+    instance = Instance(unit)
+    end = [ctypes.c_double(value) for value in (0.0, 0.0, 2e-3)]
+    assert instance.call("SetupExperiment", False, end[0], end[1], True, end[2]) == OK
+    assert instance.call("EnterInitializationMode") == OK
+    assert instance.call("ExitInitializationMode") == OK
+    assert instance.step(1e-3, U=24.0) == instance.step(1e-3) == OK
+    assert instance.step(1e-3) == ERROR
+    assert instance.said[-1].startswith("the step ends at 0.003 s, after the stop time 0.002 s")
 
 
 def test_another_units_token_is_refused(unit):

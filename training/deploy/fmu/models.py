@@ -87,7 +87,7 @@ def _variables(plant: Plant) -> tuple[Variable, ...]:
     parameters = [
         Variable(
             name=symbol, kind="parameter", unit=row.unit, meaning=row.meaning, start=p[symbol],
-            low=row.domain[0], high=row.domain[1],
+            low=p.domain(symbol)[0], high=p.domain(symbol)[1],
         )
         for symbol, row in table().items()
         if row.domain

@@ -8,6 +8,7 @@
 
 #include <math.h>
 #include <stdarg.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,7 +25,7 @@ static const char *const PHASE[] = {
 typedef struct {
     model model;
     phase phase;
-    double time; /* [s] */
+    double time, stop; /* present and last allowed time [s] */
 } snapshot;
 
 typedef struct {
@@ -48,6 +49,7 @@ static void component_reset(component *c)
     for (i = 0; i < VARIABLES; i++)
         c->now.model.value[i] = VARIABLE[i].start;
     c->now.phase = CREATED;
+    c->now.stop = INFINITY;
 }
 
 /* Whether a call is allowed in the present phase; if not, says so. */
@@ -135,6 +137,9 @@ static int component_step(component *c, double time, double step)
     if (!(fabs(time - c->now.time) <= 1e-9 * (1.0 + fabs(c->now.time)) + 1e-3 * step))
         return refuse(c, "the step begins at %g s but the unit is at %g s: continue where the last "
                       "step ended", time, c->now.time);
+    if (time + step > c->now.stop + 1e-9 * (1.0 + fabs(c->now.stop)))
+        return refuse(c, "the step ends at %g s, after the stop time %g s: end the run there", time + step,
+                      c->now.stop);
     fault = model_advance(&c->now.model, step);
     if (fault != NULL) {
         c->now.phase = FAILED;
@@ -170,31 +175,63 @@ static int component_restore(component *c, const void *saved)
     return 1;
 }
 
-static size_t component_serial_size(void)
+/* FNV-1a: any single flipped bit changes it. */
+static uint64_t checksum(const void *bytes, size_t size)
 {
-    return sizeof TOKEN - 1 + sizeof(snapshot);
+    uint64_t sum = 14695981039346656037u;
+    size_t k;
+    for (k = 0; k < size; k++)
+        sum = (sum ^ ((const unsigned char *)bytes)[k]) * 1099511628211u;
+    return sum;
 }
 
-/* A saved state as bytes: the model's token, then the numbers as this machine holds them. */
+/* Whether a state from outside may be gone on from: nothing in it leads beyond an array or a range. */
+static int sound(const snapshot *s)
+{
+    int i;
+    if ((unsigned)s->phase > FAILED || !isfinite(s->time) || isnan(s->stop))
+        return 0;
+    for (i = 0; i < VARIABLES; i++)
+        if (!(s->model.value[i] >= VARIABLE[i].low && s->model.value[i] <= VARIABLE[i].high))
+            return 0;
+    return model_is_sound(&s->model);
+}
+
+static size_t component_serial_size(void)
+{
+    return sizeof TOKEN - 1 + sizeof(snapshot) + sizeof(uint64_t);
+}
+
+/* A saved state as bytes: the model's token, the numbers as this machine holds them, their checksum. */
 static int component_serialise(component *c, const void *saved, void *bytes, size_t size)
 {
+    char *at = (char *)bytes + sizeof TOKEN - 1;
+    const uint64_t sum = saved == NULL ? 0 : checksum(saved, sizeof(snapshot));
     if (saved == NULL || size != component_serial_size())
         return refuse(c, "a serial state has %zu bytes, not %zu: ask for the size first",
                       component_serial_size(), size);
     memcpy(bytes, TOKEN, sizeof TOKEN - 1);
-    memcpy((char *)bytes + sizeof TOKEN - 1, saved, sizeof(snapshot));
+    memcpy(at, saved, sizeof(snapshot));
+    memcpy(at + sizeof(snapshot), &sum, sizeof sum);
     return 1;
 }
 
 static int component_deserialise(component *c, const void *bytes, size_t size, void **saved)
 {
+    const char *at = (const char *)bytes + sizeof TOKEN - 1;
+    snapshot found;
+    uint64_t sum;
     if (size != component_serial_size() || memcmp(bytes, TOKEN, sizeof TOKEN - 1) != 0)
         return refuse(c, "these bytes are not a state of this unit: give those that it wrote");
+    memcpy(&found, at, sizeof found);
+    memcpy(&sum, at + sizeof found, sizeof sum);
+    if (sum != checksum(at, sizeof found) || !sound(&found))
+        return refuse(c, "these bytes are a damaged state: give those that the unit wrote");
     if (*saved == NULL)
         *saved = malloc(sizeof(snapshot));
     if (*saved == NULL)
         return refuse(c, "there is no memory for a saved state: free others");
-    memcpy(*saved, (const char *)bytes + sizeof TOKEN - 1, sizeof(snapshot));
+    memcpy(*saved, at, sizeof(snapshot));
     return 1;
 }
 

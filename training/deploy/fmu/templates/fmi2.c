@@ -103,10 +103,14 @@ PUBLIC fmi2Status FMI(SetupExperiment)(fmi2Component c, fmi2Boolean has_toleranc
                                 fmi2Real start, fmi2Boolean has_stop, fmi2Real stop)
 {
     instance *i = (instance *)c;
-    UNUSED(has_tolerance), UNUSED(tolerance), UNUSED(has_stop), UNUSED(stop);
+    UNUSED(has_tolerance), UNUSED(tolerance);
     if (!component_may(&i->c, "setting up the experiment", 1u << CREATED))
         return answered(i, 0);
+    if (!isfinite(start) || (has_stop && !(stop >= start)))
+        return answered(i, refuse(&i->c, "the experiment from %g s to %g s has no length: give a finite "
+                                  "start and a later stop", start, stop));
     i->c.now.time = start;
+    i->c.now.stop = has_stop ? stop : INFINITY;
     return fmi2OK;
 }
 

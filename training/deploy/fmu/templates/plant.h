@@ -208,6 +208,17 @@ $start
     return NULL;
 }
 
+/* Whether all numbers of a state from outside are finite. */
+static int model_is_sound(const model *m)
+{
+    const double *state = (const double *)&m->q;
+    size_t k;
+    for (k = 0; k < sizeof m->q / sizeof *state; k++)
+        if (!isfinite(state[k]))
+            return 0;
+    return isfinite(m->acting_U) && m->delay_left >= 0.0 && isfinite(m->delay_left);
+}
+
 /* Apply the inputs for a time [s]; the coil follows its voltage after the command delay. */
 static const char *model_advance(model *m, double h)
 {

@@ -5,6 +5,7 @@
 #ifndef MODEL_H
 #define MODEL_H
 
+#include <math.h>
 #include <string.h>
 
 #include "epv_policy.c"
@@ -42,6 +43,18 @@ static const char *model_begin(model *m)
     m->value[V_coil] = 1.0;
     decide(m);
     return NULL;
+}
+
+/* Whether the memory of a state from outside leads into its rings, and its clock goes on from here. */
+static int model_is_sound(const model *m)
+{
+    const float *learnt = (const float *)&m->memory.valve;
+    size_t k;
+    for (k = 0; k < sizeof m->memory.valve / sizeof *learnt; k++)
+        if (isnan(learnt[k]))
+            return 0;
+    return m->memory.newest < EPV_POLICY_HISTORY && m->elapsed >= 0.0 && isfinite(m->elapsed) &&
+           m->decisions * PERIOD_S >= m->elapsed - PERIOD_S;
 }
 
 /* Decide at each period's start that lies in the coming h [s], on the inputs as they are. */
