@@ -1,12 +1,14 @@
 """What an action means: how long the coil is on within a control period."""
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import gymnasium
 import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from epv_env.signals import shown
 
 
 class ActionError(ValueError):
@@ -26,11 +28,11 @@ class OnOff:
         """Of one action."""
         return gymnasium.spaces.Discrete(2)
 
-    def decode(self, actions: NDArray) -> tuple[NDArray, NDArray]:
+    def decode(self, actions: Any) -> tuple[NDArray, NDArray]:
         """Time on [s] and commanded fraction for actions (n,)."""
         on_time, on, valid = _on_off(_numbers(actions), self.period)
         if not valid:
-            raise ActionError(f"actions {actions!r} are not all 0 (coil off) or 1 (coil on)")
+            raise ActionError(f"actions {shown(actions)} are not all 0 (coil off) or 1 (coil on)")
         return on_time, on
 
 
@@ -52,18 +54,25 @@ class PWM:
         """Of one action."""
         return gymnasium.spaces.Box(-1.0, 1.0, (1,), dtype=np.float32)
 
-    def decode(self, actions: NDArray) -> tuple[NDArray, NDArray]:
+    def decode(self, actions: Any) -> tuple[NDArray, NDArray]:
         """Time on [s] and realised fraction for actions (n, 1)."""
         slots = max(round(self.period / self.resolution), 1)
         on_time, duty, valid = _modulated(_numbers(actions), self.period, slots)
         if not valid:
-            raise ActionError(f"actions {actions!r} are not all finite: give numbers in [-1, 1]")
+            raise ActionError(f"actions {shown(actions)} are not all finite: give numbers in [-1, 1]")
         return on_time, duty
 
 
-def _numbers(actions: NDArray) -> NDArray:
-    """Actions (n,) or (n, 1) of any type of number as float64, (n,)."""
-    return np.asarray(actions, np.float64).reshape(len(actions))
+def _numbers(actions: Any) -> NDArray:
+    """Actions (n,) or (n, 1) of any real type as float64, (n,). Raises ActionError."""
+    try:
+        found = np.asarray(actions)
+    except ValueError:  # of several lengths
+        found = np.empty(0, dtype=object)
+    usable = found.dtype.kind in "biuf" and found.ndim in (1, 2) and found.size == len(found)
+    if not usable or isinstance(actions, np.ma.MaskedArray):
+        raise ActionError(f"actions {shown(actions)}: give one number for each valve, no mask")
+    return found.astype(np.float64).reshape(len(found))
 
 
 @numba.njit(cache=True)

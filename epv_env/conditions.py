@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
-from epv_env.signals import PRESSURE_LIMITS_BAR, OptionError, Range, as_range
+from epv_env.signals import PRESSURE_LIMITS_BAR, OptionError, Range, as_range, check_count, shown
 
 PROBABILITIES = (
     "starved", "far", "vented", "coil_off", "rest", "target_steps", "noisy", "frozen_p3", "worn",
@@ -94,10 +94,7 @@ class Conditions:
         for name, limits in _LIMITS.items():
             ends = as_range(f"conditions: {name}", getattr(self, name), limits)
             object.__setattr__(self, name, ends)  # a number stands for a range of that value
-        if not isinstance(self.most_effects, int) or not 1 <= self.most_effects <= 10:
-            raise OptionError(
-                f"conditions: most_effects = {self.most_effects!r}: give a whole number from 1 to 10"
-            )
+        check_count("conditions: most_effects", self.most_effects, 10)
 
     @property
     def ordinary(self) -> bool:
@@ -129,8 +126,8 @@ def as_conditions(value: Any) -> Conditions:
         return CONDITIONS[value]
     if not isinstance(value, Mapping):
         raise OptionError(
-            f"conditions is {value!r}: give one of {', '.join(CONDITIONS)}, a Conditions, or a mapping "
-            "of its fields"
+            f"conditions is {shown(value)}: give one of {', '.join(CONDITIONS)}, a Conditions, or a "
+            "mapping of its fields"
         )
     known = {entry.name for entry in fields(Conditions)}
     if unknown := sorted(map(str, set(value) - known)):

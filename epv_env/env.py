@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from epv_env.actions import PWM, OnOff
 from epv_env.common.units import BAR, GRAM
 from epv_env.observation import observation_space
-from epv_env.plant.plantfile import load_plant
 from epv_env.render import Renderer, Snapshot
 from epv_env.result import step_info, truth
-from epv_env.settings import make_settings, with_options
+from epv_env.settings import as_plant, checked_options, make_settings, with_options
+from epv_env.signals import OptionError, as_seed, checked_flag, shown
 from epv_env.task import LimitingTask
 
 
@@ -57,17 +57,20 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
         privileged: bool = False,
         **options: Any,
     ):
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise ValueError(f"unknown render_mode {render_mode!r}: use 'rgb_array' or 'human'")
+        if not (
+            render_mode is None
+            or (isinstance(render_mode, str) and render_mode in self.metadata["render_modes"])
+        ):
+            raise OptionError(f"unknown render_mode {shown(render_mode)}: use 'rgb_array' or 'human'")
         period = self.action_form.default_period if control_period is None else control_period
-        self.plant = load_plant(plant)
+        self.plant = as_plant(plant)
         self.settings = make_settings(self.plant, control_period=period, **options)
         self.render_mode = render_mode
         self.action = self.action_form(period)
         self.action_space = self.action.space()
         self.observation_space = observation_space()
         self.task = LimitingTask(1, self.settings, threads=1)
-        self.privileged = privileged
+        self.privileged = checked_flag("privileged", privileged)
         fps = self.metadata["render_fps"]
         self._renderer = None if render_mode is None else Renderer(render_mode, fps)
         self._consumption = 0.0
@@ -75,8 +78,9 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray, dict[str, Any]]:
-        super().reset(seed=seed)
-        settings = with_options(self.settings, options, self.plant) if options else self.settings
+        chosen = checked_options(options)
+        super().reset(seed=as_seed(seed))
+        settings = with_options(self.settings, chosen, self.plant) if chosen else self.settings
         observation = self.task.begin(np.array([0]), [self.np_random], [settings])[0]
         self._consumption = 0.0
         if self._renderer is not None:
@@ -92,7 +96,7 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
         return {key: value[0] for key, value in shown.items()}
 
     def step(self, action: Any) -> tuple[NDArray, SupportsFloat, bool, bool, dict[str, Any]]:
-        result = self.task.step(*self.action.decode(np.asarray(action)[None]))
+        result = self.task.step(*self.action.decode([action]))
         info = {key: value[0, ...] for key, value in step_info(result).items()}
         self._consumption = float(result.consumption[0])
         if self._renderer is not None:

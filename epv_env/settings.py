@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -12,18 +13,39 @@ from epv_env.conditions import Conditions, as_conditions
 from epv_env.plant.consumption import MIXED, Scenario, check_scenario
 from epv_env.plant.effects.registry import effect
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.plantfile import Plant
+from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.region import Region
 from epv_env.plant.supply import Supply
-from epv_env.reward import EMPTY_CIRCUIT_BAR, RewardWeights
+from epv_env.reward import EMPTY_CIRCUIT_BAR, WIDEST_BAND_BAR, RewardWeights
 from epv_env.signals import (
     PRESSURE_LIMITS_BAR,
     MovingTarget,
     OptionError,
     Range,
     RecordedConsumption,
+    as_number,
     as_range,
+    shown,
 )
+
+
+def as_plant(value: Any) -> Plant:
+    """A Plant from itself, the path of a plant file, or None (the report's calibration)."""
+    if not isinstance(value, (Plant, str, PathLike, type(None))):
+        raise OptionError(f"plant is {shown(value)}: give the path of a plant file, a Plant, or None")
+    return load_plant(value)
+
+
+def _plain(value: Any) -> Any:
+    """Arrays and pairs as lists; whole numbers beyond a float's range infinite: no domain holds them."""
+    value = value.tolist() if isinstance(value, np.ndarray) else value
+    if isinstance(value, (list, tuple)):
+        return [_plain(each) for each in value]
+    return np.inf if isinstance(value, int) and abs(value) > LARGEST else value
+
+
+def _choices(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {symbol: _plain(value) for symbol, value in values.items()}
 
 
 def as_region(value: Any, plant: Plant) -> Region:
@@ -33,7 +55,12 @@ def as_region(value: Any, plant: Plant) -> Region:
     if isinstance(value, Parameters):
         return Region(centre=value)
     if isinstance(value, Mapping):
-        return Region.from_choices(value, plant.parameters)
+        return Region.from_choices(_choices(value), plant.parameters)
+    if not isinstance(value, str):
+        raise OptionError(
+            f"parameters is {shown(value)}: give the name of a region, a mapping of values and "
+            "(low, high) by symbol, Parameters, or a Region"
+        )
     if value == "confidence":
         if not plant.region.varies:
             raise OptionError(
@@ -65,10 +92,14 @@ def as_target(value: Any) -> Range | MovingTarget:
 
 def as_scenario(value: Any) -> str | Scenario | RecordedConsumption:
     """A scenario, its name, or a recording of the consumption. Raises ValueError."""
+    if not isinstance(value, (str, Scenario, RecordedConsumption)):
+        raise OptionError(
+            f"scenario is {shown(value)}: give the name of one, a Scenario, or a RecordedConsumption"
+        )
     return value if isinstance(value, RecordedConsumption) else check_scenario(value)
 
 
-def as_weights(value: Any, band_bar: float | None) -> RewardWeights:
+def as_weights(value: Any, band_bar: Any) -> RewardWeights:
     """Weights from themselves or from a mapping of some by name; band_bar: the band's half-width."""
     known = {entry.name for entry in fields(RewardWeights)}
     if isinstance(value, Mapping):
@@ -76,10 +107,13 @@ def as_weights(value: Any, band_bar: float | None) -> RewardWeights:
             raise OptionError(
                 f"unknown reward weight {unknown[0]!r}: known are {', '.join(sorted(known))}"
             )
-        value = RewardWeights(**value)
+        weights = {k: as_number(f"weights: {k}", v, (0.0, LARGEST)) for k, v in value.items()}
+        value = RewardWeights(**weights)
     if not isinstance(value, RewardWeights):
-        raise OptionError(f"weights is {value!r}: give a RewardWeights, or a mapping of its fields")
-    return value if band_bar is None else replace(value, band_bar=band_bar)
+        raise OptionError(f"weights is {shown(value)}: give a RewardWeights, or a mapping of its fields")
+    if band_bar is None:
+        return value
+    return replace(value, band_bar=as_number("band_bar", band_bar, (0.0, WIDEST_BAND_BAR)))
 
 
 def as_effects(value: Any) -> dict[str, Any]:
@@ -88,7 +122,7 @@ def as_effects(value: Any) -> dict[str, Any]:
     value: by the effect's name a size, or where it has several a mapping of sizes by symbol.
     """
     if not isinstance(value, Mapping):
-        raise OptionError(f"effects is {value!r}: give a mapping from an effect's name to its size")
+        raise OptionError(f"effects is {shown(value)}: give a mapping from an effect's name to its size")
     sizes: dict[str, Any] = {}
     for name, given in value.items():
         symbols = effect(name).symbols
@@ -98,12 +132,19 @@ def as_effects(value: Any) -> dict[str, Any]:
                 f"effect {name} is sized by {', '.join(symbols)}: give a mapping from these symbols to "
                 "values or (low, high)"
             )
-        sizes |= own
+        sizes |= _choices(own)
     return sizes
 
 
-MOST_NOISE = 1000.0
-"""Factor of the sensors' noise, at most: beyond, every reading is at an end of its range."""
+LARGEST = 1e9
+"""More than any weight or parameter is."""
+NUMBERS: dict[str, Range] = {
+    "control_period": (0.5e-3, 0.1),
+    "supply_voltage": (0.1, 32.0),  # Table 1
+    "settling_time": (0.0, 3600.0),
+    "sensor_noise": (0.0, 1000.0),  # beyond, every reading is at an end of its range
+}
+"""Fields of Settings that are numbers, and their ranges [SI]."""
 
 OPTIONS = ("parameters", "effects", "scenario", "supply", "target_bar", "p2_bar", "p3_bar", "conditions")
 """Keys that reset(options=...) understands, beside Gymnasium's "reset_mask"."""
@@ -164,20 +205,10 @@ class Settings:
                 "(low, high), or set target_steps to 0"
             )
         assert self.plants  # refuses sizes outside their domains now, not in the first episode
-        for name in ("control_period", "settling_time", "sensor_noise", "supply_voltage"):
+        for name, limits in NUMBERS.items():
             value = getattr(self, name)
-            if isinstance(value, str) or not np.isscalar(value):
-                raise OptionError(f"{name} is {value!r}: give a number")
-        if not 0.5e-3 <= self.control_period <= 0.1:
-            raise OptionError(
-                f"control_period = {self.control_period:g} s must lie between 0.5 ms and 100 ms"
-            )
-        if not 0 <= self.settling_time < np.inf:
-            raise OptionError(f"settling_time = {self.settling_time!r} s must be at least 0")
-        if not 0 <= self.sensor_noise <= MOST_NOISE:
-            raise OptionError(
-                f"sensor_noise = {self.sensor_noise!r} must lie in 0 to {MOST_NOISE:g}: 1 is Table 3's"
-            )
+            switch = name == "sensor_noise" and isinstance(value, bool)
+            object.__setattr__(self, name, as_number(name, float(value) if switch else value, limits))
         self._check_pressures()
 
     def _check_pressures(self) -> None:
@@ -193,10 +224,6 @@ class Settings:
             raise OptionError(
                 f"episodes could begin with p2 = {first:g} bar, and the circuit counts as empty at "
                 f"{EMPTY_CIRCUIT_BAR:g} bar: raise target_bar or p2_bar, or lower drop_bar"
-            )
-        if not 0 < self.supply_voltage <= 32:
-            raise OptionError(
-                f"supply_voltage = {self.supply_voltage:g} V must lie in (0, 32] (Table 1)"
             )
 
 
@@ -220,7 +247,7 @@ def make_settings(
     """Settings from what a user writes; see `EPValveEnv` for the arguments."""
     return Settings(
         region=as_region(parameters, plant),
-        effects=as_effects(effects or {}),
+        effects=as_effects({} if effects is None else effects),
         scenario=as_scenario(scenario),
         supply=as_supply(supply),
         weights=as_weights(RewardWeights() if weights is None else weights, band_bar),
@@ -234,12 +261,19 @@ def make_settings(
     )
 
 
+def checked_options(options: Any) -> dict[str, Any]:
+    """The options of a reset, empty for None. Raises OptionError unless they are a mapping."""
+    if not isinstance(options, (Mapping, type(None))):
+        raise OptionError(f"options is {shown(options)}: give a mapping from {', '.join(OPTIONS)}")
+    return dict(options or {})
+
+
 def with_options(settings: Settings, options: Mapping[str, Any], plant: Plant) -> Settings:
     """The settings of one episode. Raises OptionError for an unknown key."""
-    unknown = sorted(set(options) - set(OPTIONS))
+    unknown = [key for key in options if key not in OPTIONS]
     if unknown:
         raise OptionError(
-            f"unknown reset option {', '.join(map(repr, unknown))}: known are {', '.join(OPTIONS)}"
+            f"unknown reset option {', '.join(map(shown, unknown))}: known are {', '.join(OPTIONS)}"
         )
     chosen = {name: options.get(name, getattr(settings, name)) for name in OPTIONS[2:]}
     made = make_settings(

@@ -1,7 +1,10 @@
 """What may stand for a number: a range, a target that moves, a recorded consumption."""
 
+import math
+import reprlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -23,18 +26,65 @@ class OptionError(ValueError):
     """An environment option is unknown or out of range: the message says which and the remedy."""
 
 
-def check_count(name: str, value: Any) -> None:
-    """Raises OptionError unless the value is a whole number of at least 1."""
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-        raise OptionError(f"{name} = {value!r}: give a whole number of at least 1")
+def shown(value: Any) -> str:
+    """A value as one short line of a message."""
+    try:
+        return " ".join(reprlib.repr(value).split())
+    except ValueError:  # a whole number of thousands of digits
+        return f"a {type(value).__name__} too long to print"
+
+
+def check_count(name: str, value: Any, most: int = 10**9) -> None:
+    """Raises OptionError unless the value is a whole number from 1 to `most`."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 1 <= value <= most:
+        raise OptionError(f"{name} = {shown(value)}: give a whole number from 1 to {most}")
+
+
+def as_seed(value: Any) -> int | None:
+    """A seed that Gymnasium takes. Raises OptionError."""
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 0:
+        raise OptionError(f"seed = {shown(value)}: give a whole number of at least 0, or None")
+    return int(value)
+
+
+def checked_flag(name: str, value: Any) -> bool:
+    """The value, if it is True or False. Raises OptionError."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise OptionError(f"{name} = {shown(value)}: give True or False")
+    return bool(value)
+
+
+def _real(value: Any) -> float:
+    """A real number as a float, infinite beyond its range. Raises TypeError."""
+    value = value.item() if isinstance(value, np.ndarray) and value.ndim == 0 else value
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real):
+        raise TypeError
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
+
+
+def as_number(name: str, value: Any, limits: Range) -> float:
+    """A number inside the limits. Raises OptionError."""
+    low, high = limits
+    try:
+        number = _real(value)
+    except TypeError:
+        raise OptionError(f"{name} is {shown(value)}: give a number from {low:g} to {high:g}") from None
+    if not low <= number <= high:
+        raise OptionError(f"{name} = {number:g} must lie in {low:g} to {high:g}")
+    return number
 
 
 def as_range(name: str, value: Any, limits: Range = PRESSURE_LIMITS_BAR) -> Range:
     """A number or (low, high) as a range inside the limits. Raises OptionError."""
     try:
-        low, high = (float(end) for end in (value if np.ndim(value) else (value, value)))
+        low, high = (_real(end) for end in (value if np.ndim(value) else (value, value)))
     except (TypeError, ValueError):
-        raise OptionError(f"{name} is {value!r}: give a number or (low, high)") from None
+        raise OptionError(f"{name} is {shown(value)}: give a number or (low, high)") from None
     if not limits[0] <= low <= high <= limits[1]:
         raise OptionError(
             f"{name} = [{low:g}, {high:g}] must satisfy {limits[0]:g} <= low <= high <= {limits[1]:g}"
@@ -69,9 +119,15 @@ class MovingTarget:
     def values(self, time: NDArray, limits: tuple[float, float]) -> NDArray:
         """Targets (n,) [bar absolute] at times (n,) [s].
 
-        Raises SignalError for one outside the limits [bar absolute].
+        Raises SignalError for one outside the limits [bar absolute], or that is no number.
         """
-        found = np.array([self.at(seconds) for seconds in time.tolist()], dtype=float)
+        try:
+            found = np.array([_real(self.at(seconds)) for seconds in time.tolist()])
+        except TypeError as error:
+            raise SignalError(
+                f"the target at {time[0]:g} s is no number ({error}): give a function of the time [s] "
+                "that returns bar absolute"
+            ) from error
         wrong = ~((found >= limits[0]) & (found <= limits[1]))  # true for NaN, too
         if np.any(wrong):
             k = int(np.argmax(wrong))

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from epv_env.actions import PWM, OnOff
 from epv_env.observation import observation_space
-from epv_env.plant.plantfile import load_plant
 from epv_env.result import KEYS, step_info, truth
-from epv_env.settings import make_settings, with_options
-from epv_env.signals import OptionError, check_count
+from epv_env.settings import as_plant, checked_options, make_settings, with_options
+from epv_env.signals import OptionError, as_seed, check_count, checked_flag, shown
 from epv_env.task import LimitingTask
 
+MOST_ENVS = 1_000_000
+"""Valves of a batch: more are a slip, and would fill the memory."""
 _MASKS = tuple(f"_{key}" for key in KEYS)
 
 
@@ -52,15 +53,15 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         render_mode: str | None = None,
         **options: Any,
     ):
-        check_count("num_envs", num_envs)
+        check_count("num_envs", num_envs, MOST_ENVS)
         if threads is not None:
             check_count("threads", threads)
         if render_mode is not None:
             raise OptionError("the vector environment does not render: use gymnasium.make instead")
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.autoreset_mode = _checked_mode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         period = self.action_form.default_period if control_period is None else control_period
-        self.plant = load_plant(plant)
+        self.plant = as_plant(plant)
         self.settings = make_settings(self.plant, control_period=period, **options)
         self.num_envs = num_envs
         self.max_episode_steps: Any = _checked_limit(max_episode_steps, num_envs)
@@ -71,7 +72,7 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.task = LimitingTask(num_envs, self.settings, threads=threads)
-        self.privileged = privileged
+        self.privileged = checked_flag("privileged", privileged)
         self._rngs = [np_random(None)[0] for _ in range(num_envs)]
         self._done = np.zeros(num_envs, dtype=bool)
         self._some_done = False
@@ -84,7 +85,7 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         options: dict[str, Any] | None = None,
     ) -> tuple[NDArray, dict[str, Any]]:
         """Start all episodes, or those of options["reset_mask"] (n,) bool."""
-        options = dict(options or {})
+        options = checked_options(options)
         mask = self._checked_mask(options.pop("reset_mask", self._every))
         seeds = self._seeds(seed)
         where = np.flatnonzero(mask)
@@ -169,15 +170,14 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         own = {k: value[i] if isinstance(value, list) else value for k, value in options.items()}
         return {key: value for key, value in own.items() if value is not None}
 
-    def _seeds(self, seed: int | list[int | None] | None) -> list[int | None]:
+    def _seeds(self, seed: Any) -> list[int | None]:
         """One seed for each sub-environment, as SyncVectorEnv gives them."""
-        if seed is None:
-            return [None] * self.num_envs
-        if isinstance(seed, (int, np.integer)):
-            return [int(seed) + i for i in range(self.num_envs)]
+        if not isinstance(seed, (list, tuple, range)) and np.ndim(seed) == 0:
+            first = as_seed(seed)
+            return [None if first is None else first + i for i in range(self.num_envs)]
         if len(seed) != self.num_envs:
             raise OptionError(f"got {len(seed)} seeds for {self.num_envs} environments: give one each")
-        return list(seed)
+        return [as_seed(each) for each in seed]
 
     def _checked_mask(self, mask: NDArray) -> NDArray:
         if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != bool:
@@ -185,6 +185,14 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         if not mask.any():
             raise OptionError("reset_mask selects no environment: set at least one True")
         return mask
+
+
+def _checked_mode(mode: Any) -> AutoresetMode:
+    """The mode, from itself or its value. Raises OptionError."""
+    known = [each.value for each in AutoresetMode]
+    if isinstance(mode, AutoresetMode) or (isinstance(mode, str) and mode in known):
+        return AutoresetMode(mode)
+    raise OptionError(f"autoreset_mode = {shown(mode)}: give one of {', '.join(known)}")
 
 
 def _checked_limit(limit: Any, n: int) -> Any:

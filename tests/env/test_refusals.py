@@ -14,7 +14,7 @@ from tests.env.rollouts import IDS, native
 
 EITHER_WAY = [
     ({"scenario": "rain"}, ValueError, "unknown consumption scenario 'rain': choose one of mixed"),
-    ({"scenario": 7}, ValueError, "unknown consumption scenario"),
+    ({"scenario": 7}, OptionError, "scenario is 7: give the name of one"),
     ({"parameters": "hell"}, ParameterError, "unknown parameter region 'hell': choose one of"),
     ({"parameters": {"R": 60.0}}, ParameterError, r"R = 60 Ohm is outside its domain \[35, 50\]"),
     ({"parameters": {"R": (42.0, 41.0)}}, ParameterError, r"range of R is \[42, 41\]: give low <= h"),
@@ -36,16 +36,62 @@ EITHER_WAY = [
     ),
 ]
 AT_CONSTRUCTION = [
-    ({"control_period": 2.0}, "control_period = 2 s must lie between 0.5 ms and 100 ms"),
-    ({"supply_voltage": 48.0}, r"supply_voltage = 48 V must lie in \(0, 32\]"),
-    ({"settling_time": float("nan")}, "settling_time = nan s must be at least 0"),
-    ({"sensor_noise": -1.0}, "sensor_noise = -1.0 must lie in 0 to 1000"),
-    ({"weights": [1.0]}, "weights is .*: give a RewardWeights"),
+    ({"control_period": 2.0}, "control_period = 2 must lie in 0.0005 to 0.1"),
+    ({"supply_voltage": 48.0}, "supply_voltage = 48 must lie in 0.1 to 32"),
+    ({"settling_time": float("nan")}, "settling_time = nan must lie in 0 to 3600"),
+    ({"sensor_noise": -1.0}, "sensor_noise = -1 must lie in 0 to 1000"),
     ({"weights": {"flood": 2.0}}, "unknown reward weight 'flood'"),
-    ({"weights": {"band": -1.0}}, "must be finite and at least 0"),
+    ({"weights": {"band": -1.0}}, "weights: band = -1 must lie in 0 to"),
     ({"band_bar": 0.0}, "must lie above 0 and at most at 16 bar"),
     ({"drop_bar": (0.0, 5.0)}, "could begin with p2 = 1 bar, and the circuit counts as empty"),
 ]
+WRONG: tuple[Any, ...] = (
+    True, -1, 1e300, 10**400, float("nan"), "x", b"x", [], [[]], {"": {}}, object(), np.ones((2, 2)), 1j,
+    lambda: 1, ("a", "b"), (10**400, 1), Ellipsis,
+)  # fmt: skip
+"""What no argument takes, but `privileged` True, and `sensor_noise` True (1)."""
+ARGUMENTS = (
+    "plant", "parameters", "supply", "scenario", "effects", "target_bar", "p2_bar", "p3_bar",
+    "conditions", "band_bar", "control_period", "supply_voltage", "settling_time", "sensor_noise",
+    "weights", "drop_bar", "privileged", "render_mode",
+)  # fmt: skip
+BATCHES = ("num_envs", "threads", "autoreset_mode", "max_episode_steps")
+
+
+def assert_refused(call, name, value):
+    """The call raises one short sentence of this package that names the argument."""
+    with pytest.raises(ValueError, match=name) as found:
+        call()
+    text = str(found.value)
+    assert "\n" not in text, value
+    assert len(text) < 1000, value
+
+
+@pytest.mark.parametrize("name", ARGUMENTS)
+def test_a_value_that_an_argument_does_not_take_is_refused_in_a_sentence(name):
+    for value in WRONG if name not in ("privileged", "sensor_noise") else WRONG[1:]:
+        pattern = name.removesuffix("_bar").removesuffix("s").replace("parameter", "parameter|region")
+        assert_refused(lambda v=value: EPValveEnv(**{name: v}).reset(), pattern, value)
+
+
+@pytest.mark.parametrize("name", BATCHES)
+def test_a_value_that_a_batch_does_not_take_is_refused_in_a_sentence(name):
+    for value in WRONG:
+        assert_refused(
+            lambda v=value: native(IDS[0], **({"n": 2} | {"n" if name == "num_envs" else name: v})),
+            name,
+            value,
+        )
+
+
+@pytest.mark.parametrize("env", [EPValveEnv(), native(IDS[0], 2)], ids=["single", "batch"])
+def test_what_reset_and_step_do_not_take_is_refused_in_a_sentence(env):
+    env.reset(seed=0)
+    for value in WRONG[1:]:  # True is 1, the coil on
+        assert_refused(lambda v=value: env.reset(options=v), "option", value)
+        assert_refused(lambda v=value: env.step(v), "action", value)
+    for value in (True, -1, 1e300, "x", [1.5, 1], object(), np.float64(3.0)):
+        assert_refused(lambda v=value: env.reset(seed=v), "seed", value)
 
 
 @pytest.mark.parametrize(("options", "error", "message"), EITHER_WAY)
