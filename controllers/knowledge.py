@@ -240,7 +240,7 @@ class WithRules:
 
     main: Controller
     """Decides where no rule does."""
-    plant: Plant
+    plant: Plant = field(repr=False)
     """The nominal plant."""
     control_period: float = 5e-3
     """[s]"""

@@ -29,7 +29,7 @@ class Policy:
     """The network behind the rules."""
 
     network: Network
-    plant: Plant
+    plant: Plant = field(repr=False)
     """The nominal plant, from which the valve learner starts."""
     control_period: float = 5e-3
     """[s]"""

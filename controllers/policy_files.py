@@ -120,6 +120,10 @@ class Network:
     advice_weight: NDArray
     """Weights (2,) of the advice, the last of the inputs (-1: off, 1: on), in the logits."""
 
+    def __repr__(self) -> str:
+        widths = [self.layers[0][0].shape[1], *(len(bias) for _, bias in self.layers)]
+        return f"Network({' x '.join(map(str, widths))}, {self.advice_weight.dtype})"
+
     def logits(self, inputs: NDArray) -> NDArray:
         """Logits (n, 2) of coil off and coil on; inputs: readings and learnt quantities (n, all)."""
         signal = inputs.astype(self.layers[0][0].dtype)

@@ -94,7 +94,7 @@ plan_all = _loop(DIGEST)
 class AdaptivePulse:
     """Acts as `plan` advises, on what it learns about each valve from the valve's own pulses."""
 
-    plant: Plant
+    plant: Plant = field(repr=False)
     """The nominal plant."""
     pulse: PulsePlan = PLAN
     """How pulses are planned."""

@@ -29,7 +29,7 @@ class PWM:
 
     design: Design
     """Gains of the cascade."""
-    parameters: Parameters
+    parameters: Parameters = field(repr=False)
     """Of the plant of the design: areas and spring set the opening pressure (eq. 22)."""
     engage_below: float
     """p2 - target below which the cascade starts [bar]."""

@@ -16,7 +16,7 @@ import controllers
 import epv_env  # noqa: F401 - registers the environments
 from controllers.knowledge import WithRules
 from controllers.p3_check import P3Check
-from controllers.policy import Policy
+from controllers.policy import Policy, load_policy
 from controllers.pulse import InformedPulse
 from controllers.registration import Choice, Range, Registration, RegistrationError, SearchSpace
 from controllers.registry import REGISTRY, TUNED_KINDS, registration
@@ -172,3 +172,9 @@ def test_tunings_survive_a_round_trip_and_another_version_is_refused(tmp_path):
     (tmp_path / "t.json").write_text('{"format": "epv-controllers/0"}')
     with pytest.raises(ControllersFileError, match="tune anew"):
         load_tunings(tmp_path / "t.json")
+
+
+@pytest.mark.parametrize("controller", [*tuned_controllers(), *ablation(), load_policy()], ids=lambda each: each.name)
+def test_a_controller_is_printed_in_a_short_line(controller):
+    assert "\n" not in repr(controller)
+    assert len(repr(controller)) < 1000
