@@ -2,18 +2,20 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controllers.pulse_table import opening_pressure
-from controllers.pwm_design import Design, design
 from controllers.registration import Range, Registration
 from epv_env.common.units import BAR
 from epv_env.observation import decode
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
+
+if TYPE_CHECKING:
+    from controllers.pwm_design import Design
 
 PERIOD = 20e-3
 """Period of the PWM [s]: the environment's."""
@@ -27,7 +29,7 @@ class PWM:
     takes over until p2 is above `rest_above`.
     """
 
-    design: Design
+    design: "Design"
     """Gains of the cascade."""
     parameters: Parameters = field(repr=False)
     """Of the plant of the design: areas and spring set the opening pressure (eq. 22)."""
@@ -81,6 +83,8 @@ def build(values: Mapping[str, Any], plant: Plant) -> PWM:
 
     values: quantities of the search space by name. Raises ValueError if no gain keeps the phase margin.
     """
+    from controllers.pwm_design import design  # needs the extra `control`
+
     loop = {name: values[name] for name in ("inner_time", "phase_margin", "integral_time")}
     rest = {name: value for name, value in values.items() if name not in loop}
     shaped = design(

@@ -11,6 +11,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.common.compilation import announce_compilation
 from epv_env.episode import Start, under_conditions
 from epv_env.observation import LAYOUT, LONGEST_WAIT
 from epv_env.period import (
@@ -41,6 +42,7 @@ class LimitingTask:
 
     def __init__(self, n: int, settings: Settings, *, threads: int | None = None):
         """n: episodes. settings: of an episode begun without others. threads: None = all cores."""
+        announce_compilation()
         self.n = n
         self.settings = settings
         self.period = settings.control_period

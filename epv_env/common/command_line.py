@@ -1,7 +1,6 @@
 """What the command lines share: options, checked paths and numbers, and errors as one sentence.
 
-Ctrl-C and SIGTERM end a command and its worker processes without a traceback. A first run says that the
-plant is compiled, which takes a minute once and is then read from a cache.
+Ctrl-C and SIGTERM end a command and its worker processes without a traceback.
 """
 
 import argparse
@@ -16,10 +15,8 @@ from dataclasses import dataclass
 from multiprocessing import active_children
 from pathlib import Path
 from types import FrameType
-from typing import Any
 
-from numba.core import event
-
+from epv_env.common.compilation import announce_compilation
 from epv_env.common.extras import missing_package
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -65,33 +62,6 @@ def _silent(_: threading.ExceptHookArgs) -> None:
 def ignore_interrupts() -> None:
     """For worker processes: a Ctrl-C in the terminal reaches them too, and their parent ends them."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-KERNELS = ("epv_env.", "controllers.", "identification.")
-"""How the modules begin whose compilation is announced."""
-
-
-class _Announcer(event.Listener):
-    """Says it once, at the first function that no cache holds."""
-
-    def __init__(self) -> None:
-        self._silent = False
-
-    def on_start(self, event: Any) -> None:
-        """numba begins to compile a function."""
-        function = getattr(event.data.get("dispatcher"), "py_func", None)
-        module = getattr(function, "__module__", None) or ""  # None: generated from text
-        if not self._silent and module.startswith(KERNELS):
-            self._silent = True
-            print("compiling for this machine: a minute or two, once", file=sys.stderr)
-
-    def on_end(self, event: Any) -> None:
-        """Nothing is said at the end."""
-
-
-def announce_compilation() -> None:
-    """From now on say when the first function is compiled."""
-    event.register("numba:compile", _Announcer())
 
 
 def fail_clearly(main: Callable[[], int]) -> int:

@@ -19,11 +19,12 @@ import pkgutil
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
+from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
 
 from epv_env.common.command_line import fail_clearly
-from epv_env.common.extras import missing_package
+from epv_env.common.extras import DISTRIBUTION, missing_package
 
 
 def main(packages: Sequence[str], *, program: str, arguments: Sequence[str] | None = None) -> int:
@@ -85,6 +86,9 @@ def _run_named(known: Mapping[str, str], program: str, arguments: list[str]) -> 
     if not arguments or arguments[0] in ("-h", "--help"):
         print(_overview(known, program))
         return 0
+    if arguments[0] == "--version":
+        print(program, version(DISTRIBUTION))
+        return 0
     name, *rest = arguments
     if name not in known:
         close = difflib.get_close_matches(name, known, n=1)
@@ -96,7 +100,7 @@ def _run_named(known: Mapping[str, str], program: str, arguments: list[str]) -> 
 def _overview(known: Mapping[str, str], program: str) -> str:
     width = max(map(len, known))
     lines = [f"  {name:{width}}  {help_line(module)}" for name, module in known.items()]
-    last = f"{program} COMMAND --help lists its options"
+    last = f"{program} COMMAND --help lists its options, {program} --version the version"
     return "\n".join([f"usage: {program} COMMAND [options]", "", *lines, "", last])
 
 

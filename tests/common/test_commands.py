@@ -6,10 +6,9 @@ import signal
 import subprocess
 import sys
 import tomllib
+from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
-import numba
 import pytest
 
 from epv_env.common.commands import commands, main, main_of
@@ -114,13 +113,32 @@ def test_nothing_stays_of_a_start_that_failed(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_compiling_generated_code_is_announced_without_fault(package):
-    """Code made from text belongs to no module."""
-    names: dict = {}
-    exec("def double(x):\n    return 2 * x", names)
-    assert main([package], program="epv", arguments=[]) == 0  # from now on compilations are announced
-    double: Any = numba.njit(names["double"])
-    assert double(3) == 6
+COMPILING = """
+import numba
+from epv_env.env import EPValveEnv
+env = EPValveEnv()
+env.reset()
+env.step(1)
+def double(x):
+    return 2 * x
+for module in {modules}:
+    double.__module__ = module
+    numba.njit(double)(3)
+"""
+
+
+@pytest.mark.parametrize(("modules", "lines"), [([], 0), ([None], 0), (["epv_env.a", "epv_env.b"], 1)])
+def test_what_no_cache_holds_is_announced_once(modules, lines):
+    """A module None is that of code made from text."""
+    subprocess.run([sys.executable, "-c", COMPILING.format(modules=[])], check=True)  # fills the cache
+    code = COMPILING.format(modules=modules)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr == "compiling for this machine: a minute or two, once\n" * lines
+
+
+def test_the_version_is_that_of_the_package(package, capsys):
+    assert main([package], program="epv", arguments=["--version"]) == 0
+    assert capsys.readouterr().out == f"epv {version('epv-valve')}\n"
 
 
 def test_the_entry_points_of_the_package_exist():

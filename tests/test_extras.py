@@ -1,0 +1,102 @@
+"""What an installation with one extra alone promises works: other packages cannot be imported here."""
+
+import os
+import subprocess
+import sys
+import tomllib
+from importlib.metadata import PackageNotFoundError, packages_distributions, requires
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+OWN = ("epv_env", "controllers", "identification", "training", "tests", "docs")
+
+
+def modules(*packages: str, needing: tuple[str, ...] = ()) -> str:
+    """Code that imports every module of the packages, but those `needing` an extra."""
+    return f"""
+import importlib, pkgutil
+for name in {packages}:
+    package = importlib.import_module(name)
+    for module in pkgutil.walk_packages(getattr(package, "__path__", []), name + "."):
+        if not module.name.endswith(("__main__", *{needing})):
+            importlib.import_module(module.name)
+"""
+
+
+def readme(k: int) -> str:
+    """A Python example of README.md."""
+    return (ROOT / "README.md").read_text(encoding="utf-8").split("```python\n")[k + 1].split("```")[0]
+
+
+PROMISES = {
+    "": modules("epv_env", "controllers", "training.epv", needing=(".sb3", ".pwm_design"))
+    + readme(1)
+    + readme(2),
+    "render": readme(0) + modules("epv_env.render"),
+    "control": "from controllers.tuned import tuned_controllers as t; assert len(t()) > 3",
+    "training": modules("training"),
+    "identification": modules("identification"),
+    "bench-files": modules("identification.importing", "identification.commands.import_"),
+}
+"""What README.md and the guides say of an extra, as code; "": of an installation without extras."""
+
+
+def closure(requirements: list[str], extras: frozenset[str] = frozenset()) -> set[str]:
+    """Names of all distributions that these requirements bring, those that are installed here."""
+    found: set[str] = set()
+    waiting = [(text, extras) for text in requirements]
+    while waiting:
+        requirement, chosen = Requirement(waiting[-1][0]), waiting.pop()[1]
+        name = canonicalize_name(requirement.name)
+        wanted = requirement.marker is None or any(
+            requirement.marker.evaluate({"extra": extra}) for extra in chosen or {""}
+        )
+        if not wanted or name in found:
+            continue
+        found.add(name)
+        try:
+            waiting += [(text, frozenset(requirement.extras)) for text in requires(name) or []]
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def blocker(extra: str) -> str:
+    """Code after which only what an installation with one extra brings can be imported."""
+    asked = PROJECT["dependencies"] + (PROJECT["optional-dependencies"][extra] if extra else [])
+    allowed = closure(asked)
+    blocked = {
+        module
+        for module, names in packages_distributions().items()
+        if module not in OWN and not allowed & {canonicalize_name(name) for name in names}
+    }
+    return f"""
+import sys
+class Blocker:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {blocked}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+sys.meta_path.insert(0, Blocker())
+"""
+
+
+@pytest.mark.parametrize("extra", PROMISES)
+def test_an_extra_alone_brings_what_it_promises(extra, tmp_path):
+    code = blocker(extra) + PROMISES[extra]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "SDL_VIDEODRIVER": "dummy"}
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True,
+        timeout=300, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-1500:]
+
+
+def test_pictures_and_films_can_be_installed_together():
+    """MoviePy 2.2 wants a Pillow below 12."""
+    extra = map(Requirement, PROJECT["optional-dependencies"]["render"])
+    assert any(each.name == "pillow" and "11.3" in each.specifier for each in extra)
