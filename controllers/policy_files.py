@@ -179,11 +179,18 @@ def read_policy(folder: str | PathLike[str]) -> tuple[PolicyContract, Network]:
     Raises PolicyError if a file is missing or damaged, if an array is not what the contract says, or if
     the policy was trained on other inputs than this version's.
     """
+    if not isinstance(folder, (str, PathLike)):
+        raise PolicyError(f"a policy is {folder!r}: give the path of a folder that training wrote")
     folder = Path(folder)
     found = read_contract(folder)
     try:
         arrays = load(read_bytes(folder / WEIGHTS_FILE))
-    except (OSError, ValueError, SafetensorError) as error:
+    except (
+        OSError,
+        ValueError,
+        SafetensorError,
+        KeyError,
+    ) as error:  # KeyError: a type unknown to NumPy
         raise PolicyError(
             f"cannot read a policy from {folder}: {error}; give a folder that training wrote, with "
             f"{CONTRACT_FILE} and {WEIGHTS_FILE}"
@@ -227,7 +234,7 @@ def _check_arrays(arrays: dict[str, NDArray], found: PolicyContract, folder: Pat
                 f"policy {folder} lacks the array {name!r} in {WEIGHTS_FILE}: train it anew"
             )
         array, wrong = arrays[name], None
-        if array.shape != shape:
+        if array.shape != shape or array.size == 0:
             wrong = f"shape {array.shape}, not {shape}"
         elif array.dtype not in ("float32", "float64") or array.dtype != arrays[ADVICE].dtype:
             wrong = f"type {array.dtype}, where all arrays are float32, or all float64"

@@ -7,6 +7,7 @@ import os
 import re
 import stat
 import tempfile
+import zlib
 from os import PathLike
 from pathlib import Path
 from typing import Any, TypeVar
@@ -163,6 +164,15 @@ def _sentence(text: str) -> tuple[str, str]:
     return f", {place}" if place else "", rule
 
 
+JOURNAL = "epv-journal/2"
+"""Form of a journal; one of another form starts anew."""
+
+
+def _checksum(name: str, result: Any) -> int:
+    """Of a line of a journal: what is read back is what was added."""
+    return zlib.crc32(json.dumps([name, result]).encode())
+
+
 class Journal:
     """Results by name in a JSON Lines file whose first line says what they belong to."""
 
@@ -173,7 +183,7 @@ class Journal:
         """
         self.path = path
         self._found: dict[str, Any] = {}
-        header = json.dumps({"subject": subject}, sort_keys=True) + "\n"
+        header = json.dumps({"format": JOURNAL, "subject": subject}, sort_keys=True) + "\n"
         content = read_bytes(path) if path.exists() else b""
         complete = content[: content.rfind(b"\n") + 1]  # the last line of a killed run may be torn
         kept = complete if complete.startswith(header.encode()) else header.encode()
@@ -187,8 +197,9 @@ class Journal:
         """Name and result in a line of the file. Raises ValueError if it is damaged."""
         try:
             entry = json.loads(line)
-            if isinstance(entry["name"], str):
-                return entry["name"], entry["result"]
+            name, result = entry["name"], entry["result"]
+            if isinstance(name, str) and entry["check"] == _checksum(name, result):
+                return name, result
         except (ValueError, KeyError, TypeError, RecursionError):
             pass
         raise ValueError(
@@ -207,5 +218,6 @@ class Journal:
     def add(self, name: str, result: Any) -> None:
         """Keep a result, JSON-ready; it is on the disk when this returns."""
         with self.path.open("a", encoding="utf-8") as stream:
-            stream.write(json.dumps({"name": name, "result": result}) + "\n")
+            line = {"name": name, "result": result, "check": _checksum(name, result)}
+            stream.write(json.dumps(line) + "\n")
         self._found[name] = result

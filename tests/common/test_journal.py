@@ -46,3 +46,18 @@ def test_a_torn_last_line_is_dropped_and_written_anew(path, torn):
 def test_a_later_result_replaces_an_earlier_one(path):
     Journal(path, SUBJECT).add("one", 1)
     assert Journal(path, SUBJECT)["one"] == 1
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        ('"z": [0.1', '"z": [0.2'),
+        ('"converged": true', '"x": 1'),
+        ('"check"', '"chec"'),
+        ('"one"', "null"),
+    ],
+)
+def test_a_changed_line_is_refused_with_its_number(path, change):
+    path.write_text(path.read_text().replace(*change))
+    with pytest.raises(ValueError, match="line 2 is damaged: remove this line"):
+        Journal(path, SUBJECT)

@@ -91,6 +91,7 @@ def test_a_contract_that_does_not_fit_is_refused(tmp_path, damage, words):
         ({"0.weight": np.zeros((16, 5), "f4")}, "has shape"),
         ({"0.bias": np.full(16, np.nan, "f4")}, "not finite"),
         ({"0.bias": np.zeros(16, "f8")}, "has type float64"),
+        ({"0.weight": np.zeros((0, INPUTS), "f4"), "0.bias": np.zeros(0, "f4")}, "has shape"),
     ],
 )
 def test_weights_that_do_not_fit_are_refused(tmp_path, changes, words):
@@ -98,9 +99,17 @@ def test_weights_that_do_not_fit_are_refused(tmp_path, changes, words):
     save_file({**load_file(tmp_path / WEIGHTS_FILE), **changes}, tmp_path / WEIGHTS_FILE)
     with pytest.raises(PolicyError, match=words):
         read_policy(tmp_path)
-    (tmp_path / WEIGHTS_FILE).write_bytes(b"no weights")
-    with pytest.raises(PolicyError, match="cannot read a policy"):
-        read_policy(tmp_path)
+    unknown = b'{"0.bias": {"dtype": "BF16", "shape": [16], "data_offsets": [0, 32]}}'
+    for content in (b"no weights", len(unknown).to_bytes(8, "little") + unknown + bytes(32)):
+        (tmp_path / WEIGHTS_FILE).write_bytes(content)
+        with pytest.raises(PolicyError, match="cannot read a policy"):
+            read_policy(tmp_path)
+
+
+@pytest.mark.parametrize("folder", [None, True, b"x", []])
+def test_what_is_no_path_is_refused(folder):
+    with pytest.raises(PolicyError, match="give the path of a folder"):
+        load_policy(folder)
 
 
 def test_the_rules_hold_whatever_the_network_says():

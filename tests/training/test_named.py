@@ -21,6 +21,15 @@ class NeedsArguments:
 class Lacks:
     name, environment = "lacks", "EPValve-v0"
 
+class Elsewhere:
+    name, environment = "elsewhere", "CartPole-v1"
+    def reset(self, n): ...
+    def act(self, observations): ...
+
+class Raises:
+    def __init__(self):
+        raise RuntimeError("two\\nlines")
+
 SOMETHING = 3
 """
 
@@ -55,14 +64,20 @@ def test_a_changed_module_is_another_controller(folder):
     [
         ("nobody", "no controller 'nobody': give a folder that training wrote"),
         ("nowhere:Relay", "No module named 'nowhere': give MODULE:CLASS of a module in"),
-        ("faulty:Relay", "faulty.py has no class Relay"),
-        ("faulty:SOMETHING", "faulty.py has no class SOMETHING"),
+        ("faulty:Relay", "module faulty has no class Relay"),
+        ("faulty:SOMETHING", "module faulty has no class SOMETHING"),
         ("faulty:NeedsArguments", "missing 1 required positional argument: 'low': give every argument"),
+        ("faulty:Elsewhere", "acts in the environment 'CartPole-v1': give a text and one of EPValve-v0"),
+        ("faulty:Raises", "RuntimeError: two lines .*faulty.py, line 16"),
+        ("unreadable:Relay", "SyntaxError: .*correct the module"),
+        ("raising:Relay", "ZeroDivisionError: .*raising.py, line 1.: correct the module"),
+        ("math:Relay", "module math has no class Relay"),
         ("faulty:Lacks", "lacks reset, act: controllers/base.py has the protocol"),
     ],
 )
 def test_what_is_no_controller_is_refused(folder, source, message):
-    (folder / "faulty.py").write_text(FAULTY)
+    for name, text in (("faulty", FAULTY), ("unreadable", "class"), ("raising", "1 / 0")):
+        (folder / f"{name}.py").write_text(text)
     with pytest.raises(ValueError, match=message):
         named_controllers([source], PLANT)
 

@@ -6,6 +6,7 @@ import inspect
 import json
 import os
 import sys
+import traceback
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,9 @@ from controllers.policy import load_policy
 from controllers.policy_files import CONTRACT_FILE, WEIGHTS_FILE
 from controllers.registry import REGISTRY
 from controllers.tuned import build, load_tunings
+from epv_env import MAX_EPISODE_STEPS
 from epv_env.plant.plantfile import Plant
+from epv_env.signals import shown
 
 HELP = (
     "kinds of controllers/tuned.json, folders of policies, LABEL=FOLDER, or MODULE:CLASS of your own, "
@@ -83,7 +86,7 @@ def is_import(source: str) -> bool:
 def _imported(source: str) -> tuple[str, Controller, bytes]:
     """The controller that MODULE:CLASS names, made without arguments, and its module's text.
 
-    Raises ValueError if the module or the class is missing, needs arguments, or is no controller.
+    Raises ValueError if the module or the class is missing, fails, needs arguments, or is no controller.
     """
     module_name, _, class_name = source.partition(":")
     if os.getcwd() not in sys.path:
@@ -94,16 +97,31 @@ def _imported(source: str) -> tuple[str, Controller, bytes]:
         raise ValueError(
             f"controller {source}: {error}: give MODULE:CLASS of a module in {os.getcwd()} or installed"
         ) from None
+    except Exception as error:  # whatever the user's own code raises
+        raise ValueError(_failure(source, error, "correct the module")) from error
     found = getattr(module, class_name, None)
     if not inspect.isclass(found):
-        raise ValueError(f"controller {source}: {module.__file__} has no class {class_name}")
+        raise ValueError(f"controller {source}: module {module_name} has no class {class_name}")
     try:
         controller: Any = found()
-    except TypeError as error:
-        raise ValueError(f"controller {source}: {error}: give every argument a default value") from None
+    except Exception as error:
+        raise ValueError(_failure(source, error, "give every argument a default value")) from error
     lacking = [name for name in ("name", "environment", "reset", "act") if not hasattr(controller, name)]
     if lacking:
         raise ValueError(
             f"controller {source} lacks {', '.join(lacking)}: controllers/base.py has the protocol"
         )
+    if controller.environment not in MAX_EPISODE_STEPS or not isinstance(controller.name, str):
+        raise ValueError(
+            f"controller {source} is called {shown(controller.name)} and acts in the environment "
+            f"{shown(controller.environment)}: give a text and one of {', '.join(MAX_EPISODE_STEPS)}"
+        )
     return controller.name, controller, inspect.getsource(module).encode()
+
+
+def _failure(source: str, error: Exception, remedy: str) -> str:
+    """A sentence on an error of the user's own code: what, and the line that raised it."""
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    place = "" if last.filename == __file__ else f" ({last.filename}, line {last.lineno})"
+    text = " ".join(str(error).split())
+    return f"controller {source}: {type(error).__name__}: {text}{place}: {remedy}"
