@@ -20,7 +20,7 @@ from epv_env.plant.consumption import APPLICATIONS
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import ParameterError, Parameters
 from epv_env.plant.supply import Supply
-from epv_env.signals import Range
+from epv_env.signals import Range, shown
 from epv_env.vector_env import _ValveVectorEnv
 
 ValveEnv = _ValveEnv | _ValveVectorEnv
@@ -180,6 +180,8 @@ def restore_state(env: gymnasium.Env | gymnasium.vector.VectorEnv, saved: SavedS
 def _check_origin(valves: ValveEnv, saved: SavedState) -> None:
     """Raises StateError unless the state is of an environment of this kind, size and task."""
     own = _arrays(valves)
+    if not isinstance(saved, SavedState):
+        raise StateError(f"{shown(saved)} is no SavedState: give what save_state returned")
     if saved.kind != type(valves).__name__ or _shapes(own) != _shapes(saved.arrays):
         raise StateError("the state is of another environment: restore it where it was saved")
     rules, found = own["rules"], saved.arrays["rules"]
@@ -239,7 +241,7 @@ def _checked_generators(states: list[Any], count: int) -> list[np.random.Generat
 def _unwrapped(env: gymnasium.Env | gymnasium.vector.VectorEnv) -> ValveEnv:
     inner: Any = getattr(env, "unwrapped", env)
     if not isinstance(inner, ValveEnv):
-        raise StateError(f"{inner!r} is no environment of valves: give one that epv_env registers")
+        raise StateError(f"{shown(inner)} is no environment of valves: give one that epv_env registers")
     return inner
 
 

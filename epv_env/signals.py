@@ -198,7 +198,7 @@ def _samples(what: str, time: ArrayLike, values: ArrayLike) -> tuple[NDArray, ND
     """Times and values, each (samples,), as arrays. Raises SignalError."""
     try:
         t, v = np.array(time, dtype=float), np.array(values, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise SignalError(f"{what} needs numbers: give two lists of them") from None
     if t.ndim != 1 or t.shape != v.shape or not 0 < t.size <= LONGEST_SIGNAL:
         raise SignalError(f"{what} has shapes {t.shape} and {v.shape}: give a value for each time")

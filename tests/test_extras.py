@@ -40,8 +40,9 @@ PROMISES = {
     "render": readme(0) + modules("epv_env.render"),
     "control": "from controllers.tuned import tuned_controllers as t; assert len(t()) > 3",
     "training": modules("training"),
-    "identification": modules("identification"),
-    "bench-files": modules("identification.importing", "identification.commands.import_"),
+    "identification": modules("identification") + "import tqdm, jinja2",  # imported late
+    "bench-files": modules("identification.importing", "identification.commands.import_")
+    + "import asammdf, h5py, nptdms, pint, pyarrow, pymatreader",
 }
 """What README.md and the guides say of an extra, as code; "": of an installation without extras."""
 
@@ -77,11 +78,12 @@ def blocker(extra: str) -> str:
     }
     return f"""
 import sys
-class Blocker:
-    def find_spec(self, name, path=None, target=None):
-        if name.partition(".")[0] in {blocked}:
-            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
-sys.meta_path.insert(0, Blocker())
+from importlib.machinery import PathFinder
+class Brought(PathFinder):
+    @classmethod
+    def find_spec(cls, name, path=None, target=None):
+        return None if name.partition(".")[0] in {blocked} else super().find_spec(name, path, target)
+sys.meta_path = [Brought if finder is PathFinder else finder for finder in sys.meta_path]
 """
 
 

@@ -3,6 +3,7 @@
 import copy
 import pickle
 from dataclasses import replace
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -89,6 +90,10 @@ def test_what_cannot_be_restored_is_refused():
         save_state(env)
     env.reset(seed=0)
     saved = save_state(env)
+    wrong: list[tuple[Any, Any]] = [(env, b"bytes"), (None, saved)]
+    for target, state in wrong:
+        with pytest.raises(StateError, match="is no"):
+            restore_state(target, state)
     other = make("nominal", 2)
     slower = gymnasium.make_vec("EPValve-v0", num_envs=3, control_period=0.01)
     for each, words in ((other, "of another environment"), (slower, "another control_period")):
