@@ -94,7 +94,7 @@ class Conditions:
         for name, limits in _LIMITS.items():
             ends = as_range(f"conditions: {name}", getattr(self, name), limits)
             object.__setattr__(self, name, ends)  # a number stands for a range of that value
-        check_count("conditions: most_effects", self.most_effects, 10)
+        check_count("conditions: most_effects", self.most_effects, most=10)
 
     @property
     def ordinary(self) -> bool:

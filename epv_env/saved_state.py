@@ -79,45 +79,34 @@ class SavedState:
     """Steps that Gymnasium's time limit has counted; None: there is none."""
 
     def to_bytes(self) -> bytes:
-        """The state for a file. Raises StateError where an episode has recordings or signals of its own.
+        """The state for a file, which holds numbers only.
 
-        The file holds numbers only: recordings and signals are the constructor's.
+        Raises StateError where an episode follows a recording or a moving target.
         """
-        numbers = dict(self.arrays)
-        for name, found in self.objects.items():
-            if all(each is found[0] for each in found):
-                continue
-            if name != "supplies" or any(supply.recording is not None for supply in found):
-                raise StateError(f"episodes have {name} of their own: only numbers go into a file")
-            numbers[name] = np.array([supply.numbers for supply in found])
+        signals = [supply.recording for supply in self.objects["supplies"]]
+        signals += self.objects["moving_targets"] + self.objects["recorded_consumptions"]
+        if any(signal is not None for signal in signals):
+            raise StateError(
+                "an episode follows a recording or a moving target, but only numbers go into a file: "
+                "keep the SavedState itself"
+            )
+        supplies = np.array([supply.numbers for supply in self.objects["supplies"]])
+        others = {"kind": self.kind, "generators": self.generators, "elapsed": self.elapsed}
+        rest = np.array(json.dumps(others, default=_plain))
         stream = io.BytesIO()
-        rest = json.dumps(
-            {"kind": self.kind, "generators": self.generators, "elapsed": self.elapsed}, default=_plain
-        )
-        np.savez_compressed(stream, rest=np.array(rest), **numbers)  # type: ignore[arg-type]
+        np.savez_compressed(stream, rest=rest, supplies=supplies, **self.arrays)  # type: ignore[arg-type]
         return stream.getvalue()
 
     @classmethod
-    def from_bytes(cls, content: bytes, env: gymnasium.Env | gymnasium.vector.VectorEnv) -> "SavedState":
-        """The state in a file, for an environment of the same arguments. Raises StateError."""
-        task = _unwrapped(env).task
+    def from_bytes(cls, content: bytes) -> "SavedState":
+        """The state in a file that `to_bytes` gave. Raises StateError."""
         try:
             with np.load(io.BytesIO(content), allow_pickle=False) as file:
                 arrays = {name: file[name] for name in file.files}
             rest = json.loads(str(arrays.pop("rest")))
-            objects: dict[str, list[Any]] = dict.fromkeys(PER_EPISODE, [None] * task.n)
-            objects["supplies"] = [task.settings.supply] * task.n
-            if "supplies" in arrays:
-                objects["supplies"] = [
-                    Supply.from_numbers(row) for row in arrays.pop("supplies").tolist()
-                ]
-            return cls(
-                kind=rest["kind"],
-                arrays=arrays,
-                generators=rest["generators"],
-                objects=objects,
-                elapsed=rest["elapsed"],
-            )
+            supplies = [Supply.from_numbers(row) for row in arrays.pop("supplies").tolist()]
+            objects = {**dict.fromkeys(PER_EPISODE, [None] * len(supplies)), "supplies": supplies}
+            return cls(arrays=arrays, objects=objects, **rest)
         except Exception as error:  # damaged bytes: of zip, zlib, NumPy or JSON
             raise StateError(f"this is no saved state ({error}): save it anew") from None
 
@@ -229,8 +218,11 @@ def _parameters(centre: Parameters, values: NDArray) -> list[Parameters]:
 
 def _checked_generators(states: list[Any], count: int) -> list[np.random.Generator | None]:
     """Generators in these states. Raises StateError."""
+    found = [None if state is None else np.random.default_rng(0) for state in states]
     try:
-        found = [_generator(state) for state in states]
+        for rng, state in zip(found, states, strict=True):
+            if rng is not None:
+                rng.bit_generator.state = state
     except Exception as error:  # NumPy's, of many kinds
         raise StateError(f"a generator of the state is damaged ({error}): save it anew") from None
     if len(found) != count:
@@ -255,14 +247,6 @@ def _arrays(valves: ValveEnv) -> dict[str, NDArray]:
 def _generators(valves: ValveEnv) -> list[np.random.Generator]:
     """From which the environment draws its next episodes."""
     return valves._rngs if isinstance(valves, _ValveVectorEnv) else [valves.np_random]
-
-
-def _generator(state: dict[str, Any] | None) -> np.random.Generator | None:
-    if state is None:
-        return None
-    rng = np.random.default_rng(0)
-    rng.bit_generator.state = state
-    return rng
 
 
 def _time_limit(env: Any) -> gymnasium.wrappers.TimeLimit | None:

@@ -280,12 +280,9 @@ def with_options(settings: Settings, options: Mapping[str, Any], plant: Plant) -
         plant,
         parameters=options.get("parameters", settings.region),
         effects=options.get("effects"),
-        control_period=settings.control_period,
         drop_bar=settings.drop_bar,
-        supply_voltage=settings.supply_voltage,
-        settling_time=settings.settling_time,
-        sensor_noise=settings.sensor_noise,
         weights=settings.weights,
+        **{name: getattr(settings, name) for name in NUMBERS},
         **chosen,
     )
     return made if "effects" in options else replace(made, effects=settings.effects)

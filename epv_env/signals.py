@@ -34,18 +34,18 @@ def shown(value: Any) -> str:
         return f"a {type(value).__name__} too long to print"
 
 
-def check_count(name: str, value: Any, most: int = 10**9) -> None:
-    """Raises OptionError unless the value is a whole number from 1 to `most`."""
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 1 <= value <= most:
-        raise OptionError(f"{name} = {shown(value)}: give a whole number from 1 to {most}")
+def check_count(name: str, value: Any, least: int = 1, most: int = 10**9) -> None:
+    """Raises OptionError unless the value is a whole number from `least` to `most`."""
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not whole or not least <= value <= most:
+        raise OptionError(f"{name} = {shown(value)}: give a whole number from {least} to {most}")
 
 
 def as_seed(value: Any) -> int | None:
     """A seed that Gymnasium takes. Raises OptionError."""
     if value is None:
         return None
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 0:
-        raise OptionError(f"seed = {shown(value)}: give a whole number of at least 0, or None")
+    check_count("seed", value, least=0, most=2**64)
     return int(value)
 
 

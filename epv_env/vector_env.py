@@ -53,7 +53,7 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         render_mode: str | None = None,
         **options: Any,
     ):
-        check_count("num_envs", num_envs, MOST_ENVS)
+        check_count("num_envs", num_envs, most=MOST_ENVS)
         if threads is not None:
             check_count("threads", threads)
         if render_mode is not None:

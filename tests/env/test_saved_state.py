@@ -57,14 +57,16 @@ def test_what_follows_is_the_same_to_the_bit(kind, count, mode):
 
 
 @pytest.mark.parametrize("count", [None, 3])
-def test_a_state_survives_a_file(count):
-    env = make("nominal", count)
-    env.reset(seed=1)
+@pytest.mark.parametrize("options", [{}, {"supply": 12.0}], ids=str)
+def test_a_state_survives_a_file(count, options):
+    env, other = make("nominal", count), make("nominal", count)
+    env.reset(seed=1, options=options)
+    other.reset(seed=2)
     actions = np.random.default_rng(1).integers(0, 2, size=(50, count) if count else 50)
     content = save_state(env).to_bytes()
     expected = driven(env, actions)
-    restore_state(env, SavedState.from_bytes(content, env))
-    assert driven(env, actions) == expected
+    restore_state(other, SavedState.from_bytes(content))
+    assert driven(other, actions) == expected
 
 
 def test_supplies_of_their_own_survive_a_file():
@@ -79,7 +81,7 @@ def test_supplies_of_their_own_survive_a_file():
     actions = np.random.default_rng(1).integers(0, 2, size=(400, 6))
     content = save_state(env).to_bytes()
     expected = driven(env, actions)
-    restore_state(other, SavedState.from_bytes(content, other))
+    restore_state(other, SavedState.from_bytes(content))
     assert [supply.numbers for supply in tasks[1].supplies] == first
     assert driven(other, actions) == expected
 
@@ -103,7 +105,14 @@ def test_what_cannot_be_restored_is_refused():
     content = saved.to_bytes()
     for damaged in (b"", b"no archive", content[:100], content[:200] + b"\x00" * 60 + content[260:]):
         with pytest.raises(StateError, match="no saved state"):
-            SavedState.from_bytes(damaged, env)
+            SavedState.from_bytes(damaged)
+
+
+def test_signals_do_not_go_into_a_file():
+    env = make("with signals", 2)
+    env.reset(seed=0)
+    with pytest.raises(StateError, match="only numbers go into a file"):
+        save_state(env).to_bytes()
 
 
 WRONG = {
