@@ -45,10 +45,13 @@ LIMITS: dict[str, Range] = {
     **_each("leak", -1e-9, MOST),  # a recorded flow of 0 is a difference of sums
     **_each("p1_slope", -1e11, 1e11),
     **_each("p1 p2 p3", 0, 1e7),
-    **_each("xPV xMV", -0.1, 0.1),
-    **_each("vPV vMV I I_coil", -1e3, 1e3),
+    **_each("xPV xMV", -1e-3, 1.001),  # share of the stroke
+    **_each("vPV vMV", -50, 50),
+    **_each("I I_coil", -10, 10),
     **_each("air_in_PV air_in_MV air_vented coil_energy", -MOST, MOST),
-    **_each("coil_heat heat_3 heat_2 far_pressure supply_drop lag_2 lag_3", -1e7, 1e7),
+    **_each("coil_heat", -1e3, 1e3),
+    **_each("heat_3 heat_2", -1, 10),
+    **_each("far_pressure supply_drop lag_2 lag_3", -1e7, 1e7),
     **_each("noise", -MOST, MOST),
     **_each("acting_U", -32, 32),
     **_each("delay_left", 0, 1),
@@ -138,8 +141,8 @@ def restore_state(env: gymnasium.Env | gymnasium.vector.VectorEnv, saved: SavedS
     valves = _unwrapped(env)
     task = valves.task
     _check_origin(valves, saved)
-    _check_numbers(saved.arrays)
     parameters = _parameters(task.settings.region.centre, saved.arrays["parameter_values"])
+    _check_numbers(saved.arrays)
     generators = _checked_generators(saved.generators, task.n + len(_generators(valves)))
     limit = _time_limit(env)
     counted = isinstance(saved.elapsed, int) and saved.elapsed >= 0
@@ -200,7 +203,10 @@ def _fields(arrays: Mapping[str, NDArray]) -> Iterator[tuple[str, NDArray]]:
             values = arrays[name][field]
             known = "noise_factor" if field == "noise" else field
             yield known, values.view(np.uint8) if values.dtype == bool else values
-    yield from zip(State._fields, arrays["state"], strict=True)
+    p = dict(zip(Parameters.calibrated(), arrays["parameter_values"].T, strict=True))
+    for name, values in zip(State._fields, arrays["state"], strict=True):
+        stroke = p.get(f"{name}max")
+        yield name, values if stroke is None else values[: len(stroke)] / stroke
     yield "noise", arrays["noise"]
     yield "acting_U", np.where(np.isnan(arrays["acting_U"]), 0.0, arrays["acting_U"])  # NaN: none yet
     yield "delay_left", arrays["delay_left"]
