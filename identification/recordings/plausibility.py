@@ -57,6 +57,10 @@ MOST_REST_CURRENT = 0.03
 """Current of a coil that is off, over the sensor's range: three times the accuracy."""
 DECAY_TIME = 0.03
 """Time after which no current flows in a coil that was switched off [s]; six time constants."""
+SENSOR_FAULT = 0.65
+"""Difference of p1 and p3 through an open inlet that a faulty sensor may cause [bar]: the diagnosis is to
+find it. A wrong reference (gauge for absolute) makes 1 bar, a wrong unit more."""
+
 CHOKED_RATIO = 2.2
 """Pressure over ambient above which outflow is choked (from 1.9 on), with room for noise."""
 LEAST_DISCHARGE, LEAST_FALL = 20, 0.25
@@ -295,7 +299,7 @@ def _pressures(
         if p1 > p2 + 2 * margin:
             yield f"at rest, p1 is {p1:.4g} and p2 {p2:.4g} bar, although the open valve joins them"
         return
-    if abs(p1 - p3) > 2 * margin:
+    if abs(p1 - p3) > max(2 * margin, SENSOR_FAULT):
         yield f"with the coil on, p1 is {p1:.4g} and p3 {p3:.4g} bar, although the open inlet joins them"
     if p2 > p1 + 2 * margin:
         yield f"the circuit's p2 of {p2:.4g} bar lies above its supply p1 of {p1:.4g} bar"
