@@ -58,8 +58,8 @@ MOST_REST_CURRENT = 0.03
 DECAY_TIME = 0.03
 """Time after which no current flows in a coil that was switched off [s]; six time constants."""
 SENSOR_FAULT = 0.65
-"""Difference of p1 and p3 through an open inlet that a faulty sensor may cause [bar]: the diagnosis is to
-find it. A wrong reference (gauge for absolute) makes 1 bar, a wrong unit more."""
+"""Difference of p1 and p3 through an open inlet that a faulty sensor may cause [bar]: the diagnosis is
+to find it. A wrong reference (gauge for absolute) makes 1 bar, a wrong unit more."""
 
 CHOKED_RATIO = 2.2
 """Pressure over ambient above which outflow is choked (from 1.9 on), with room for noise."""

@@ -22,7 +22,6 @@ from training.learners import ppo
 from training.learners.actor import network_of
 from training.learners.environment import (
     REWARD_SCALE,
-    SWITCHING_PRICE,
     make_training_env,
     training_weights,
 )
@@ -58,11 +57,10 @@ def test_before_training_the_policy_acts_as_the_advice(env):
     assert np.array_equal(np.argmax(logits, axis=1), (inputs[:, -1] > 0).astype(int))
 
 
-def test_training_is_stricter_than_the_reward_but_never_cheaper():
-    dear = training_weights(RewardWeights(switching=10 * SWITCHING_PRICE))
-    assert dear.switching == 10 * SWITCHING_PRICE
-    usual = training_weights(RewardWeights())
-    assert usual.switching > RewardWeights().switching
+def test_training_is_stricter_than_the_reward_and_follows_its_prices():
+    usual, dear = (training_weights(RewardWeights(switching=price)) for price in (0.3, 3.0))
+    assert dear.switching == pytest.approx(10 * usual.switching)
+    assert usual.switching > 0.3
     assert usual.band_bar < RewardWeights().band_bar
 
 

@@ -36,7 +36,7 @@ QUICK: dict[str, Any] = {
 QUICK_TRAINING: dict[str, Any] = {
     "num_envs": 64, "validation_episodes": 16, "validation_duration": 2.0,
 }  # fmt: skip
-TIMESTEPS = 8_000_000
+TIMESTEPS = 10_000_000
 REGION = "sensitive_ten_percent"
 """Plants that are trained on, and on which the verdict is given."""
 LEFT_OUT = "hysteresis"

@@ -28,8 +28,6 @@ from training.evaluation.seeds import VALIDATION_SEED, first_training_seed
 from training.learners.actor import AdvisedPolicy, network_of
 from training.learners.environment import NUM_ENVS, ROLLOUT, make_training_env
 
-TIMESTEPS = 8_000_000
-"""Environment steps of a training."""
 LEARNING_RATE, LAST_LEARNING_RATE = 3e-3, 2e-5
 """Adam's step size at the start and at the end; it falls linearly. With smaller ones a training ends
 before it has converged, and its policy switches more often."""
@@ -189,6 +187,7 @@ class Checkpoints(BaseCallback):
         self._seed, self._folder = seed, folder
 
     def _on_training_start(self) -> None:
+        self._folder.mkdir(parents=True, exist_ok=True)
         self._next = self.num_timesteps + CHECKPOINT_STEPS
 
     def _on_step(self) -> bool:
@@ -199,7 +198,6 @@ class Checkpoints(BaseCallback):
             return
         self._next = self.num_timesteps + CHECKPOINT_STEPS
         assert isinstance(self.model, PPO)
-        self._folder.mkdir(parents=True, exist_ok=True)
         self.model.save(self._folder / f"ppo_{self.num_timesteps}_steps")
         seed_episodes(self.model, self._seed)
         self.model._last_obs = self.training_env.reset()  # type: ignore[assignment]
@@ -243,8 +241,8 @@ def train(
     task: Task,
     folder: Path,
     *,
+    timesteps: int,
     seed: int = 0,
-    timesteps: int = TIMESTEPS,
     num_envs: int = NUM_ENVS,
     validation_episodes: int = 1024,
     validation_duration: float = VALIDATION_DURATION,
@@ -259,8 +257,8 @@ def train(
     Args:
         task: what the policy is for.
         folder: of policy, checkpoints and validations.
-        seed: of the training.
         timesteps: environment steps in all.
+        seed: of the training.
         num_envs: episodes side by side.
         validation_episodes: of each validation.
         validation_duration: length of one of them [s].
