@@ -185,12 +185,8 @@ def read_policy(folder: str | PathLike[str]) -> tuple[PolicyContract, Network]:
     found = read_contract(folder)
     try:
         arrays = load(read_bytes(folder / WEIGHTS_FILE))
-    except (
-        OSError,
-        ValueError,
-        SafetensorError,
-        KeyError,
-    ) as error:  # KeyError: a type unknown to NumPy
+    # KeyError: a type of numbers that NumPy does not know
+    except (OSError, ValueError, KeyError, SafetensorError) as error:
         raise PolicyError(
             f"cannot read a policy from {folder}: {error}; give a folder that training wrote, with "
             f"{CONTRACT_FILE} and {WEIGHTS_FILE}"

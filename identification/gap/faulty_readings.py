@@ -199,4 +199,5 @@ def _rows(values: NDArray) -> list[tuple[int, int]]:
 
 def _in_row(values: NDArray, length: int) -> NDArray:
     """Which values (n,) stand in a row of at least so many equal ones, boolean (n,)."""
-    return np.repeat([b - a >= length for a, b in _rows(values)], [b - a for a, b in _rows(values)])
+    lengths = np.array([b - a for a, b in _rows(values)], dtype=int)
+    return np.repeat(lengths >= length, lengths)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from identification.gap.plant import Channel, GreyBox, PlantError, Run, StateEquation, StateTrace
 from identification.gap.reading_noise import STEP_TO_SD, quantisation_step, white_noise
-from identification.gap.screened import Finding, screen
+from identification.gap.screened import Finding, bridged, screen
 
 NoiseSource = Literal["given", "estimated", "resolution"]
 """Where a channel's noise comes from: the user, the readings, or the step between possible readings."""
@@ -155,8 +155,7 @@ def _prepared_run(run: Run) -> Run:
 
 def _filled(readings: NDArray, trusted: NDArray) -> NDArray:
     """Readings (samples,) with a straight line between trusted neighbours where they are no number."""
-    samples = np.arange(len(readings))
     if not np.any(trusted):
         return np.zeros(len(readings))
-    between = np.interp(samples, samples[trusted], readings[trusted])
+    between = bridged(readings, np.flatnonzero(~trusted))
     return np.where(np.isfinite(readings), readings, between)

@@ -74,15 +74,13 @@ def screen(
         series = [run.measured[c, own] for run, own in zip(runs, counting, strict=True)]
         for r, kind, places in faults(series, channel):
             samples = counting[r][places]
-            kept[r].measured[c], kept[r].trusted[c, samples] = (
-                _bridged(kept[r].measured[c], samples),
-                False,
-            )
+            kept[r].measured[c] = bridged(kept[r].measured[c], samples)
+            kept[r].trusted[c, samples] = False
             found.append(_finding(runs[r], channel.name, samples, kind))
     for name in dict.fromkeys(name for run in runs for name in run.inputs):
         own = [r for r, run in enumerate(runs) if name in run.inputs]
         for i, kind, samples in faults([runs[r].inputs[name] for r in own]):
-            inputs[own[i]][name] = _bridged(inputs[own[i]][name], samples)
+            inputs[own[i]][name] = bridged(inputs[own[i]][name], samples)
             found.append(_finding(runs[own[i]], name, samples, kind))
     unusable = list(_unusable(runs, kept, outputs))
     if unusable:
@@ -95,7 +93,7 @@ def _finding(run: Run, channel: str, samples: NDArray, kind: Kind) -> Finding:
     return Finding(file=run.name, channel=channel, samples=ordered, kind=kind)
 
 
-def _bridged(signal: NDArray, samples: NDArray) -> NDArray:
+def bridged(signal: NDArray, samples: NDArray) -> NDArray:
     """The signal (samples,) with straight lines across some samples."""
     good = np.setdiff1d(np.arange(len(signal)), samples)
     return np.interp(np.arange(len(signal)), good, signal[good]) if len(good) else signal

@@ -73,7 +73,7 @@ def wrong_pressures() -> dict[str, tuple[Mutation, str]]:
     for name in PRESSURES:
         cases[f"{name} gauge"] = scaled(1, -AMBIENT, name), looks((name,), "gauge pressure")
     for name in ("p1", "p3"):
-        cases[f"{name} offset"] = scaled(1, 7e4, name), "although the open inlet joins them"
+        cases[f"{name} offset"] = scaled(1, 7e4, name), "although the open inlet joins them: check"
     return cases
 
 
