@@ -1,7 +1,10 @@
 """Gymnasium environments of an electro-pneumatic protection valve.
 
+```python
 import gymnasium, epv_env
+
 env = gymnasium.make("EPValve-v0")
+```
 """
 
 from gymnasium.envs.registration import register, registry

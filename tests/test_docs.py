@@ -18,6 +18,7 @@ pytestmark = pytest.mark.training
 
 from markdown.extensions.toc import slugify_unicode  # noqa: E402
 
+from docs.scripts import notebook  # noqa: E402
 from docs.scripts.effects_table import effects_table  # noqa: E402
 from epv_env.common.commands import commands, parse  # noqa: E402
 from training.epv import PACKAGES as COMMAND_PACKAGES  # noqa: E402
@@ -197,6 +198,35 @@ def test_the_site_builds_without_a_warning(tmp_path):
     assert "<code>epv sweep</code>" in (tmp_path / "site/reference/command-lines.html").read_text()
     pages = "".join(path.read_text() for path in (tmp_path / "site").glob("*.html"))
     assert not re.search(r"<(script|link|img)[^>]+(src|href)=\"?https?:", pages)
+    assert '<script src="assets/iframe-worker.js"' in pages  # the search works from the disk
+    assert (tmp_path / "site/search/search_index.js").is_file()
+    assert not re.search(r'(?<!full size">)<img', pages)
+    api = (tmp_path / "site/reference/api/epv_env.html").read_text()
+    assert api.index('class="highlight"') < api.index("epv_env.actions</")
+
+
+def test_the_notebook_prints_and_draws_what_it_shows():
+    """Its outputs are written by `python -m docs.scripts.notebook`."""
+    cells, again = notebook.read()["cells"], notebook.read()["cells"]
+    assert len(cells) == 10
+    notebook.run(again)
+    assert [_shown(cell) for cell in again] == [_shown(cell) for cell in cells]
+    assert len(notebook.pictures()) == 4
+
+
+def _shown(cell: notebook.Cell) -> list[tuple[str, list[str]]]:
+    return [(output["output_type"], output.get("text", [])) for output in cell.get("outputs", [])]
+
+
+def test_how_good_it_is_stands_behind_each_row():
+    """Every figure of an answer is one of the page that the row links to."""
+    page = "docs/results/how-good-is-it.md"
+    rows = re.findall(r"^\| .*\? \| (.*) \| .*\]\(([^)#]*)[^)]*\) \|$", text(page), re.M)
+    assert 4 < len(rows) <= 6
+    for answer, link in rows:
+        behind = ((ROOT / page).parent / link).read_text(encoding="utf-8")
+        for figure in re.findall(r"(?<![\d\w])\d[\d.]*(?<!\.)", answer):
+            assert re.search(rf"(?<![\d.]){re.escape(figure)}(?![\d])", behind), f"{figure}: {link}"
 
 
 def test_the_table_of_effects_is_that_of_the_records():

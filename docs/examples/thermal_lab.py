@@ -48,7 +48,7 @@ def heat(T: Any, Q: Any, alpha: Any, p: Any) -> Any:
 
 
 def rate(x: Any, u: Any, p: Any) -> Sequence[Any]:
-    """Rates of heaters and thermometers [K/s]."""
+    """Rates of heaters and thermometers [°C/s]."""
     between = p.heater_coupling * BETWEEN * (x.T2 - x.T1)
     lag = max(p.sensor_lag, SHORTEST_LAG)
     return (
@@ -102,7 +102,8 @@ def thermal_lab(folder: Path) -> OdePlant:
         ],
         tolerances=[NuisanceParameter(symbol="ambient", centre=ambient, sd=0.3, step=0.1)],
         components={"T1": "heater", "T2": "heater", "C1": "sensor", "C2": "sensor"},
-        units=dict.fromkeys(("T1", "T2", "C1", "C2"), ("K", 1.0)) | {"Q1": ("%", 1.0), "Q2": ("%", 1.0)},
+        units=dict.fromkeys(("T1", "T2", "C1", "C2"), ("°C", 1.0))
+        | {"Q1": ("%", 1.0), "Q2": ("%", 1.0)},
         forcing_steps={"T1": 1e-2, "T2": 1e-2},
         steps_per_sample=1,
     )

@@ -5,6 +5,7 @@ of, and a warning fails a strict build.
 """
 
 import logging
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,7 +16,7 @@ from mkdocs.structure.files import File, Files
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from docs.scripts import command_lines
+from docs.scripts import command_lines, notebook
 
 ROOT = Path(__file__).parents[2]
 """The repository's root."""
@@ -30,8 +31,11 @@ FOLDER_OPTIONS = """    options:
 """Show a folder's docstring only; its modules follow."""
 OWN = (*PACKAGES, "typing", "abc", "object")
 """First words of base classes that do not document the methods of this project's classes."""
-COMMAND_LINES = "<!-- generated: command lines -->"
-"""The line of a page that the list of command lines replaces."""
+GENERATED = {
+    "<!-- generated: command lines -->": command_lines.page,
+    "<!-- generated: notebook -->": notebook.page,
+}
+"""Lines of pages, and what writes the text that replaces them."""
 LOG = logging.getLogger("mkdocs.hooks.public_names")
 """Its warnings fail a strict build."""
 API = "API"
@@ -50,17 +54,25 @@ def on_config(config: Any) -> Any:
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add the API pages."""
-    for path, text in api_pages().items():
-        files.append(File.generated(config, path, content=text))
+    """Add the API pages and the pictures of the notebook."""
+    for path, content in {**api_pages(), **notebook.pictures()}.items():
+        files.append(File.generated(config, path, content=content))
     return files
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Write the list of command lines where a page asks for it."""
-    if COMMAND_LINES not in markdown:
-        return markdown
-    return markdown.replace(COMMAND_LINES, command_lines.page())
+    """Write the list of command lines and the notebook where a page asks for them."""
+    for line, write in GENERATED.items():
+        if line in markdown:
+            markdown = markdown.replace(line, write())
+    return markdown
+
+
+def on_page_content(html: str, **_: Any) -> str:
+    """Make each picture a link to its file, which the browser shows in full size."""
+    return re.sub(
+        r'<img [^>]*src="([^"]+)"[^>]*>', r'<a href="\1" title="show in full size">\g<0></a>', html
+    )
 
 
 def _modules(package: Path) -> list[Path]:

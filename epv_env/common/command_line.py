@@ -6,6 +6,8 @@ Ctrl-C and SIGTERM end a command and its worker processes without a traceback.
 import argparse
 import math
 import os
+import shlex
+import shutil
 import signal
 import sys
 import threading
@@ -85,6 +87,37 @@ def fail_clearly(main: Callable[[], int]) -> int:
     except Interrupted as interruption:
         print("interrupted: what was finished is kept", file=sys.stderr)
         return interruption.status
+
+
+@dataclass(frozen=True)
+class NextStep:
+    """The command to run after a command, or after reading its report."""
+
+    purpose: str
+    """What for, as in "to train a policy"."""
+    words: tuple[object, ...]
+    """The command's name and its arguments."""
+
+    def command(self, program: str = "epv") -> str:
+        """The line to paste into a shell."""
+        return shlex.join([program, *map(str, self.words)])
+
+    def __str__(self) -> str:
+        """For a terminal, where `epv` is not on the path unless the environment is activated."""
+        program = (
+            "epv" if shutil.which("epv") else os.path.relpath(Path(sys.executable).with_name("epv"))
+        )
+        return f"next, {self.purpose}:\n    {self.command(program)}"
+
+
+def plant_option(plant: Path | None) -> tuple[object, ...]:
+    """--plant and its file, for the next command; nothing for the report's calibration."""
+    return ("--plant", plant) if plant else ()
+
+
+def beside(folder: Path, name: str) -> Path:
+    """A folder for what the next command makes of this one: runs/ppo gives runs/ppo-NAME."""
+    return folder.with_name(f"{folder.name}-{name}")
 
 
 def writable_file(text: str) -> Path:

@@ -5,6 +5,7 @@ A command's module has
 - its help line as the first line of its docstring,
 - `add_options(parser)`, which adds the options to an argparse parser,
 - `run(options)`, which raises ValueError or OSError with one sentence for what it cannot use,
+- `next_step(options)`, which says what to run after it, or None where that depends on the user,
 - `QUICK` if it has a short form: what `--quick` sets, as {option: value}.
 
 The file's name is the command's: `sim_to_real.py` is `sim-to-real`, `import_.py` is `import`.
@@ -107,7 +108,10 @@ def _overview(known: Mapping[str, str], program: str) -> str:
 def _run(name: str, program: str, arguments: list[str]) -> int:
     try:
         module = importlib.import_module(name)
-        _alone(module.run, parse(module, program, arguments))
+        options = parse(module, program, arguments)
+        _alone(module.run, options)
+        if step := module.next_step(options):
+            print(f"\n{step}")
     except ModuleNotFoundError as error:
         extra = name.partition(".")[0]  # named as the package
         sentence = missing_package(error.name or "", preferred=extra)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from epv_env.common.command_line import add_out, add_plant, add_seed
+from epv_env.common.command_line import NextStep, add_out, add_plant, add_seed, beside, plant_option
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import Domains, Parameters, written_value
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
@@ -53,6 +53,14 @@ def run(options: argparse.Namespace) -> None:
     if options.truth is not None:
         _save_truth(truth, options)
     print(f"{len(campaign.recordings)} recordings in {options.out}")
+    if options.programme:
+        print("to add them to another campaign, see docs/how-to/diagnose-a-gap.md")
+
+
+def next_step(options: argparse.Namespace) -> NextStep:
+    """Calibrate the model on the campaign."""
+    words = ("run", options.out, "--out", beside(options.out, "results"), *plant_option(options.plant))
+    return NextStep("to calibrate the model on these recordings", words)
 
 
 def _suite(options: argparse.Namespace, plant: Plant) -> Sequence[Programme]:

@@ -6,7 +6,7 @@ blind, and only then opens the truths and scores. What a folder holds already is
 
 import argparse
 
-from epv_env.common.command_line import COUNT, add_out, add_seed, add_workers
+from epv_env.common.command_line import COUNT, NextStep, add_out, add_seed, add_workers
 from epv_env.common.files import write_json
 from epv_env.plant.valves import available_cores
 from identification.blind.report import as_text, reliability_figure, results
@@ -48,3 +48,9 @@ def run(options: argparse.Namespace) -> None:
     reliability_figure(found["calibration"]).savefig(options.out / "reliability.png", dpi=100)
     print(as_text(found))
     print(f"\nwritten: {options.out}/results.json and reliability.png")
+
+
+def next_step(options: argparse.Namespace) -> NextStep:
+    """More trials: those that are done count."""
+    same = ("--seed", options.seed, "--forms", options.forms, "--out", options.out)
+    return NextStep("for narrower intervals", ("blind", "--trials", 2 * options.trials, *same))

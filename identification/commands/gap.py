@@ -6,7 +6,7 @@ The guide is docs/how-to/diagnose-a-gap.md.
 import argparse
 from pathlib import Path
 
-from epv_env.common.command_line import add_out, add_plant, add_seed
+from epv_env.common.command_line import NextStep, add_out, add_plant, add_seed
 from epv_env.common.files import decoded
 from identification.gap.gap_json import GAP as GAP_FILE
 from identification.gap.screened import sentences
@@ -39,3 +39,9 @@ def run(options: argparse.Namespace) -> None:
         print(f"Left out: {sentence}.")
     written = (diagnose.REPORT, GAP_FILE, diagnose.PLANT)
     print(f"written: {', '.join(str(options.out / name) for name in written)}")
+
+
+def next_step(options: argparse.Namespace) -> NextStep:
+    """What the verdict in the folder of results asks for."""
+    verdict = decoded(options.out / GAP_FILE, remedy="diagnose again")["verdict"]
+    return diagnose.next_step(verdict, options.campaign, options.out, options.plant)

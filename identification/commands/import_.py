@@ -6,7 +6,7 @@ The guide is docs/how-to/use-your-recordings.md.
 import argparse
 from pathlib import Path
 
-from epv_env.common.command_line import Number, add_out, add_plant
+from epv_env.common.command_line import NextStep, Number, add_out, add_plant, beside, plant_option
 from epv_env.plant.plantfile import load_plant
 from identification.importing.import_campaign import (
     import_text,
@@ -69,7 +69,15 @@ def run(options: argparse.Namespace) -> None:
     print(import_text(imported), end="\n\n")
     if options.dry_run:
         check_campaign(imported.campaign, options.out)
-        print("dry run: all checks passed, nothing is written")
+        print("dry run: all checks passed, nothing is written; leave --dry-run out to import")
         return
     write_campaign(imported.campaign, options.out, provenance=imported.provenance())
     print(f"{len(imported.files)} recordings in {options.out}")
+
+
+def next_step(options: argparse.Namespace) -> NextStep | None:
+    """Calibrate the model on the campaign; None after a dry run, which says what to leave out."""
+    if options.dry_run:
+        return None
+    words = ("run", options.out, "--out", beside(options.out, "results"), *plant_option(options.plant))
+    return NextStep("to calibrate the model on these recordings", words)

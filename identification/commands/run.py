@@ -6,7 +6,15 @@ kept in the folder of results, so that stages which are run one by one share the
 
 import argparse
 
-from epv_env.common.command_line import COUNT, add_out, add_plant, add_seed
+from epv_env.common.command_line import (
+    COUNT,
+    NextStep,
+    add_out,
+    add_plant,
+    add_seed,
+    beside,
+    plant_option,
+)
 from epv_env.plant.plantfile import load_plant
 from identification.calibration.calibrate import STARTS
 from identification.pipeline import run as pipeline
@@ -48,10 +56,21 @@ def run(options: argparse.Namespace) -> None:
     if options.stage:
         _run_stage(options, identification)
         return
-    plant = pipeline.run(identification, options.out)
+    plant = pipeline.run(identification, options.out, next_step(options))
     for symbol in plant.region.symbols:
         print(f"{symbol:8} {plant.parameters[symbol]:.7g}")
     print(f"written: {options.out / pipeline.PLANT_FILE}, {options.out}/report.html and report.json")
+
+
+def next_step(options: argparse.Namespace) -> NextStep:
+    """Diagnose what the model lacks; after one stage, run them all with the same searches."""
+    plant = plant_option(options.plant)
+    if options.stage:
+        same = ("--seed", options.seed, "--starts", options.starts)
+        words = ("run", options.campaign, "--out", options.out, *plant, *same)
+        return NextStep("to run all stages and write plant.json", words)
+    words = ("gap", options.campaign, "--out", beside(options.out, "gap"), *plant)
+    return NextStep("to find out what the model lacks", words)
 
 
 def _identification(options: argparse.Namespace) -> Identification:
@@ -78,6 +97,7 @@ def _run_stage(options: argparse.Namespace, identification: Identification) -> N
         content=result.content,
         facts=campaign_facts(identification.campaign),
         report_2003=options.report_2003,
+        next_step=next_step(options),
     )
     print(as_text(result.sections))
     print(f"\nwritten: {options.out / stage.name}.html and .json")

@@ -76,7 +76,7 @@ def _bars(axes: Axes, probabilities: Mapping[str, float], colours: Sequence[str]
         axes.text(probability + 0.01, row, probability_text(probability), va="center", fontsize=8)
     axes.set_yticks(rows, list(probabilities), fontsize=8)
     axes.invert_yaxis()
-    axes.set_xlim(0.0, 1.12)
+    axes.set_xlim(0.0, 1.3)  # the figure of a bar that is full stays within the frame
     axes.set_xticks([0.0, 0.5, 1.0], ["0", "50", "100"])
     axes.set_xlabel("probability [%]")
     axes.grid(axis="x", alpha=0.3)

@@ -8,6 +8,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from epv_env.common.command_line import NextStep
 from epv_env.plant.plantfile import Plant, save_plant
 from identification.calibration.section import calibration_json, calibration_section
 from identification.confidence.section import confidence_json, confidence_section
@@ -154,10 +155,11 @@ def result_or_omission(stage: Stage, identification: Identification) -> Result:
     )
 
 
-def run(identification: Identification, out: Path) -> Plant:
+def run(identification: Identification, out: Path, next_step: NextStep) -> Plant:
     """Run all stages; write plant.json, report.html and report.json into `out`.
 
-    Raises CampaignError if the campaign has no recording to fit to.
+    next_step: what the report names at its end. Raises CampaignError if the campaign has no recording
+    to fit to.
     """
     began, done = perf_counter(), 0.0
     results: list[Result] = []
@@ -167,7 +169,7 @@ def run(identification: Identification, out: Path) -> Plant:
         results.append(result_or_omission(stage, identification))
         done += stage.time_share
     plant = calibrated_plant(identification)
-    _write_report(out, identification, plant, results)
+    _write_report(out, identification, plant, results, next_step)
     save_plant(plant, out / PLANT_FILE)
     print(f"[done] {perf_counter() - began:.0f} s", file=sys.stderr)
     return plant
@@ -192,7 +194,11 @@ def calibrated_plant(identification: Identification) -> Plant:
 
 
 def _write_report(
-    out: Path, identification: Identification, plant: Plant, results: list[Result]
+    out: Path,
+    identification: Identification,
+    plant: Plant,
+    results: list[Result],
+    next_step: NextStep,
 ) -> None:
     """Write report.html and report.json."""
     sections: list[Section] = [summary_section(identification)]
@@ -209,6 +215,7 @@ def _write_report(
         content=content,
         facts=campaign_facts(identification.campaign),
         report_2003=identification.report_2003,
+        next_step=next_step,
     )
 
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from epv_env.common.command_line import NextStep
 from epv_env.common.extras import how_to_install
 from epv_env.common.files import write_json, write_text
 
@@ -115,6 +116,7 @@ def write_page(
     facts: Mapping[str, str] | None = None,
     footer: str = "",
     report_2003: bool = False,
+    next_step: NextStep | None = None,
     written: datetime | None = None,
 ) -> None:
     """Write sections as one HTML file that needs no other, whole or not at all.
@@ -129,6 +131,7 @@ def write_page(
         facts: what the page rests on, by name: campaign, recordings.
         footer: a sentence at the end.
         report_2003: whether to say where the report SCL-001/2003 prints the like.
+        next_step: the command that ends the page; None where the reader's plant has none.
         written: date on the page; None for now.
 
     Raises:
@@ -142,6 +145,7 @@ def write_page(
         sections=[section for section in sections if not section.summary],
         footer=footer,
         report_2003=report_2003,
+        next_step=next_step,
     )
     write_text(path, page + "\n")
 
@@ -174,11 +178,12 @@ def write_results(
     content: Mapping[str, Any],
     facts: Mapping[str, str] | None = None,
     report_2003: bool = False,
+    next_step: NextStep | None = None,
 ) -> None:
     """Write `out/name.json` and the self-contained `out/name.html`, each whole or not at all.
 
     facts: what the page rests on, by name. report_2003: whether the page says where the report prints
-    the like.
+    the like. next_step: the command that ends the page.
     """
     write_json(out / f"{name}.json", content, allow_nan=False)
     write_page(
@@ -188,6 +193,7 @@ def write_results(
         facts=facts,
         footer=f"Written by epv-valve {version('epv-valve')}.",
         report_2003=report_2003,
+        next_step=next_step,
     )
 
 

@@ -11,6 +11,7 @@ from time import perf_counter
 
 from scipy.stats import chi2
 
+from epv_env.common.command_line import NextStep, beside, plant_option
 from epv_env.common.files import Journal
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from epv_env.plant.region import Region
@@ -19,6 +20,7 @@ from identification.gap.diagnosis import Diagnosis, diagnose, hypothesis_label
 from identification.gap.fitting_problem import FitCache
 from identification.gap.gap_json import fitted_values, parameter_covariance, write_results
 from identification.gap.report_page import sections
+from identification.gap.verdict import AMBIGUOUS, UNKNOWN
 from identification.recordings.campaign_files import read_campaign
 from identification.recordings.recording import Campaign, campaign_facts
 from identification.recordings.rules import RULES, rules_of
@@ -60,13 +62,34 @@ def diagnose_campaign(
     steps = _steps(began) if report else lambda step: None
     found = diagnose(valve, seed=seed, cache=FitCache(valve, journal, steps))
     found = replace(found, warnings=[*valve.warnings, *found.warnings])
-    text = _report(found, valve, recorded, out, steps) if report else ""
+    step = next_step(found.conclusion.verdict, campaign, out, Path(plant) if plant else None)
+    text = _report(found, valve, recorded, out, steps, step) if report else ""
     write_results(found, out, text, seconds=perf_counter() - began)
     return found
 
 
+def next_step(verdict: str, campaign: Path, out: Path, plant: Path | None) -> NextStep:
+    """What to run after a diagnosis that wrote into `out`; plant: that it began with."""
+    given = plant_option(plant)
+    if verdict == AMBIGUOUS:
+        words = ("bench", "--programme", out / PROGRAMME, "--out", beside(out, "next"), *given)
+        return NextStep("to record what tells these causes apart", words)
+    if verdict == UNKNOWN:
+        purpose = "once the missing effect is in the catalogue (docs/extending.md)"
+        return NextStep(purpose, ("gap", campaign, "--out", out, *given))
+    region = ("--plant", out / PLANT, "--parameters", "confidence")
+    return NextStep(
+        "to train a policy for this plant", ("train", *region, "--out", beside(out, "policy"))
+    )
+
+
 def _report(
-    found: Diagnosis, valve: Valve, campaign: Campaign, out: Path, steps: Callable[[str], None]
+    found: Diagnosis,
+    valve: Valve,
+    campaign: Campaign,
+    out: Path,
+    steps: Callable[[str], None],
+    step: NextStep,
 ) -> str:
     """Write what people use of it; returns what to record next."""
     steps("next experiment")
@@ -82,7 +105,7 @@ def _report(
     footer = f"Written by epv-valve {version('epv-valve')}. Figures and fields: {guide}."
     pages = sections(found, experiment.text)
     facts = campaign_facts(campaign)
-    write_page(out / REPORT, title=title, sections=pages, facts=facts, footer=footer)
+    write_page(out / REPORT, title=title, sections=pages, facts=facts, footer=footer, next_step=step)
     return experiment.text
 
 

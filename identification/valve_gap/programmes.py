@@ -66,7 +66,7 @@ CERTAIN = 0.95
 """Probability of the best rival above which no further experiment is needed [-]."""
 
 FILE_NAME = "next.json"
-RUN = f"bench --programme {FILE_NAME}"
+RUN = f"epv bench --programme {FILE_NAME} --out next"
 """Where the programme is kept, and how the bench runs it."""
 
 

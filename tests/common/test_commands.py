@@ -33,6 +33,10 @@ def run(options):
     if options.times < 1:
         raise ValueError("--times must be positive")
     (options.out / "greeting.txt").write_text("hello " * options.times)
+
+
+def next_step(options):
+    return None
 '''
 
 

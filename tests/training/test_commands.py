@@ -42,7 +42,8 @@ def finished(tmp_path_factory):
 def test_the_short_run_writes_everything_and_says_that_nothing_was_learnt(finished):
     out, result = finished
     assert {path.name for path in out.iterdir()} >= WRITTEN
-    sentence, _, *table, _, picture = result.stdout.strip().splitlines()
+    sentence, _, *table, _, picture, _, _, command = result.stdout.strip().splitlines()
+    assert command.split()[1:] == ["train", "--out", f"{out}-full"]
     assert sentence.endswith("nothing was learnt.")
     assert (
         sum(any(name in line for name in ("PPO", "pulse", "hysteresis", "PWM")) for line in table) == 6

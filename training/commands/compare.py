@@ -1,8 +1,8 @@
 """Compare controllers on the same unseen episodes, with intervals of the differences.
 
-python training/compare.py --out runs/comparison
-python training/compare.py --controllers "pulse, adaptive" PPO=runs/ppo --out runs/mine
-python training/compare.py --scenarios beyond worn --plants sensitive_ten_percent --out runs/beyond
+    python training/compare.py --out runs/comparison
+    python training/compare.py --controllers "pulse, adaptive" PPO=runs/ppo --out runs/mine
+    python training/compare.py --scenarios beyond worn --plants sensitive_ten_percent --out runs/beyond
 
 A comparison that was stopped goes on where it stopped when it is started again.
 """
@@ -15,12 +15,12 @@ import numpy as np
 import pandas as pd
 
 from controllers.tuned import load_tunings
-from epv_env.common.command_line import COUNT, add_out
+from epv_env.common.command_line import COUNT, NextStep, add_out, beside, plant_option
 from epv_env.common.files import Journal, write_json, write_text
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.valves import available_cores
 from training.commands.options import add_episodes
-from training.evaluation.named import HELP, named_controllers
+from training.evaluation.named import HELP, is_own, named_controllers
 from training.evaluation.plots import episode_overlay, save_figure
 from training.evaluation.rollout import decision_times, run_episodes
 from training.evaluation.scenarios import RANDOM, EvaluationScenario, scenario_group
@@ -38,8 +38,8 @@ from training.studies.comparison import (
 QUICK: dict[str, Any] = {"episodes": 8, "duration": 0.8, "decisions": 20}
 LISTED = 100
 """Episodes that leave the band are named by their seeds up to this many."""
-OVERLAID = 6
-"""Most controllers in the picture of one episode."""
+OVERLAID = 3
+"""Most controllers in the picture of one episode: more lines could not be told apart."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -93,6 +93,14 @@ def run(options: argparse.Namespace) -> None:
     print(f"results in {options.out}")
 
 
+def next_step(options: argparse.Namespace) -> NextStep:
+    """Sweep the same controllers."""
+    words = ("--controllers", *options.controllers, "--out", beside(options.out, "sweep"))
+    return NextStep(
+        "to see which changes of the valve they bear", ("sweep", *words, *plant_option(options.plant))
+    )
+
+
 def subject(plant: Plant, scenarios: dict[str, EvaluationScenario], duration: float) -> dict[str, Any]:
     """What the figures depend on beside the batches' names: another subject begins the journal anew."""
     return {
@@ -144,11 +152,12 @@ def draw(
     cell: Any = table[(table["plants"] == options.plants[-1]) & (table["scenario"] == name)]
     save_figure(figure(cell), options.out / "comparison.png")
     traces = {}
-    for label, controller in list(controllers.items())[:OVERLAID]:
+    own = next(filter(is_own, controllers), next(iter(controllers)))
+    for label in list(dict.fromkeys([own, *controllers]))[:OVERLAID]:
         _, trace = run_episodes(
-            controller, seeds=[first_seed], duration=options.duration,
+            controllers[label], seeds=[first_seed], duration=options.duration,
             options={"plant": plant, "scenario": "mixed"}, trace_of=0,
         )  # fmt: skip
         assert trace is not None  # since one was asked for
         traces[label] = trace
-    episode_overlay(traces, options.out / "episode.png")
+    episode_overlay(traces, own, options.out / "episode.png")

@@ -1,8 +1,8 @@
 """Turn a policy into C, ONNX and an FMU, or the plant into an FMU.
 
-epv export runs/ppo --out runs/ecu            # C and ONNX
-epv export runs/ppo --out runs/ecu --fmu      # and epv_policy.fmu
-epv export plant --out runs/fmu               # epv_plant.fmu, of --plant FILE
+    epv export runs/ppo --out runs/ecu            # C and ONNX
+    epv export runs/ppo --out runs/ecu --fmu      # and epv_policy.fmu
+    epv export plant --out runs/fmu               # epv_plant.fmu, of --plant FILE
 
 A policy is written only after its C code was compiled here and agreed with the policy on every one of
 10,000 states. docs/reference/exported-policy.md says what each file is, docs/reference/fmu.md the FMU.
@@ -17,9 +17,9 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from controllers.policy import load_policy
+from controllers.policy import TRAINED, load_policy
 from controllers.policy_files import WEIGHTS_FILE, read_contract
-from epv_env.common.command_line import COUNT, SECONDS, writable_folder
+from epv_env.common.command_line import COUNT, SECONDS, NextStep, beside, plant_option, writable_folder
 from epv_env.common.files import write_bytes
 from epv_env.plant.plantfile import Plant, load_plant
 from training.deploy import agreement as verdict
@@ -87,6 +87,16 @@ def run(options: argparse.Namespace) -> None:
         content["epv_policy.fmu"] = fmu(policy_model(export.period, files), options.compiler)
     write_folder(options.folder, content)
     print(f"{verdict.as_text(report, contract)}\nwritten to {options.folder}")
+
+
+def next_step(options: argparse.Namespace) -> NextStep:
+    """Export the other half of a closed loop of FMUs: the plant of a policy, the policy of a plant."""
+    plant = plant_option(options.plant)
+    if options.what == PLANT:
+        words = ("export", TRAINED, "--fmu", "--out", beside(options.folder, "policy"), *plant)
+        return NextStep("to export the package's policy for the same simulator", words)
+    words = ("export", PLANT, "--out", beside(options.folder, "plant"), *plant)
+    return NextStep("to export the valve that it controls as an FMU", words)
 
 
 def prepared(folder: Path, plant: Plant) -> Export:

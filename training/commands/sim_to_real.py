@@ -1,6 +1,6 @@
 """Train on the nominal plant, deploy on a bench, diagnose, retrain, deploy again.
 
-epv sim-to-real --out runs/sim-to-real
+    epv sim-to-real --out runs/sim-to-real
 
 The bench is a virtual one. Its valve has an effect that is withheld from every other step: training,
 simulation and diagnosis see what a user sees. Finished steps in --out are kept.
@@ -16,7 +16,7 @@ from controllers.base import Controller
 from controllers.policy import load_policy
 from controllers.policy_files import holds_policy
 from controllers.tuned import tuned_controllers
-from epv_env.common.command_line import COUNT, SECONDS, add_out, add_seed
+from epv_env.common.command_line import COUNT, SECONDS, NextStep, add_out, add_seed, beside
 from epv_env.common.commands import parse
 from epv_env.common.files import Journal, decoded, write_json, write_text
 from epv_env.common.results_folder import check_options, write_options
@@ -90,6 +90,14 @@ def run(options: argparse.Namespace) -> None:
     after = stage(AFTER, load_plant(options.out / CORRECTED), options)
     print(report({**before, **after}, diagnosis, options.effect, options.out))
     print(f"\nresults in {options.out}")
+
+
+def next_step(options: argparse.Namespace) -> NextStep:
+    """Compare the two policies on the bench's valve."""
+    policies = [f"{name}={options.out / name}" for name in (BEFORE, AFTER)]
+    valve = ("--plant", options.out / WITHHELD)
+    words = ("compare", "--controllers", *policies, *valve, "--out", beside(options.out, "comparison"))
+    return NextStep("to compare both policies on the bench's valve", words)
 
 
 def record(options: argparse.Namespace) -> None:

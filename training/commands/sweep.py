@@ -1,18 +1,20 @@
 """Robustness of controllers against plants, effects, sensors and timing that deviate.
 
-python training/sweep.py --out runs/sweep
-python training/sweep.py --out runs/friction --designs effects --factors piston_friction
+    python training/sweep.py --out runs/sweep
+    python training/sweep.py --out runs/friction --designs effects --factors piston_friction
 
 A sweep that was stopped goes on where it stopped when it is started again.
 """
 
 import argparse
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from epv_env.common.command_line import COUNT, add_out
+from controllers.policy_files import holds_policy
+from epv_env.common.command_line import COUNT, NextStep, add_out, beside, plant_option
 from epv_env.common.files import Journal, write_json, write_text
 from epv_env.plant.consumption import check_scenario
 from epv_env.plant.plantfile import Plant, load_plant
@@ -95,6 +97,17 @@ def run(options: argparse.Namespace) -> None:
     table = point_table(cells, metrics, SWEEP_SEED + options.seed)
     write_results(options, table, rank_table(cells, metrics), {**subject, "controllers": digests})
     print(f"\nresults in {options.out}")
+
+
+def next_step(options: argparse.Namespace) -> NextStep:
+    """Export the policy that was swept; train one if none was."""
+    folders = [Path(source.rpartition("=")[2]) for source in options.controllers]
+    plant = plant_option(options.plant)
+    if policy := next(filter(holds_policy, folders), None):
+        words = ("export", policy, "--out", beside(options.out, "c"), *plant)
+        return NextStep("to turn the policy into C", words)
+    words = ("train", "--out", beside(options.out, "policy"), *plant)
+    return NextStep("to train a policy beside these controllers", words)
 
 
 def _batches(

@@ -1,7 +1,7 @@
 """Train the PPO controller, and compare it with the classic ones.
 
-python training/train_ppo.py
-python training/train_ppo.py --quick
+    python training/train_ppo.py
+    python training/train_ppo.py --quick
 
 The command writes the policy's files (policy.json, policy.safetensors), the validations, the comparison
 and two pictures, and ends with a verdict. A training that was stopped goes on with --resume.
@@ -19,7 +19,17 @@ from controllers.base import Controller
 from controllers.policy import load_policy
 from controllers.policy_files import CONTRACT_FILE, WEIGHTS_FILE
 from controllers.tuned import ablation, tuned_controllers
-from epv_env.common.command_line import COUNT, SECONDS, Number, add_out, add_plant, add_seed
+from epv_env.common.command_line import (
+    COUNT,
+    SECONDS,
+    NextStep,
+    Number,
+    add_out,
+    add_plant,
+    add_seed,
+    beside,
+    plant_option,
+)
 from epv_env.common.files import write_text
 from epv_env.common.results_folder import CONFIG, check_same, read_config, write_options
 from epv_env.plant.consumption import check_scenario
@@ -96,6 +106,15 @@ def run(options: argparse.Namespace) -> None:
     )  # fmt: skip
     save_figure(learning_curve(validations), options.out / "learning_curve.png")
     print(verdict(options, plant, weights))
+
+
+def next_step(options: argparse.Namespace) -> NextStep:
+    """Compare the policy on more plants; after a short run, train."""
+    plant = plant_option(options.plant)
+    if options.quick:
+        return NextStep("to train a policy", ("train", "--out", beside(options.out, "full"), *plant))
+    words = ("--controllers", RIVAL, f"PPO={options.out}", "--out", beside(options.out, "comparison"))
+    return NextStep("to compare the policy on three sets of plants", ("compare", *words, *plant))
 
 
 def begin_folder(options: argparse.Namespace) -> None:

@@ -1,7 +1,7 @@
 """Search the classic controllers' settings with the same budget for each.
 
-epv tune --trials 100 --out controllers/tuned.json
-epv tune --only "pulse, adaptive" --out controllers/tuned.json    # keeps the file's others
+    epv tune --trials 100 --out controllers/tuned.json
+    epv tune --only "pulse, adaptive" --out controllers/tuned.json    # keeps the file's others
 
 The objective is the mean return on the training scenarios.
 """
@@ -17,8 +17,8 @@ from optuna.trial import Trial
 
 from controllers.registration import Choice, Range, SearchSpace
 from controllers.registry import TUNED_KINDS, registration
-from controllers.tuned import Tuning, load_search, load_tunings, save_tunings
-from epv_env.common.command_line import COUNT, SECONDS, add_seed, writable_file
+from controllers.tuned import TUNED_FILE, Tuning, load_search, load_tunings, save_tunings
+from epv_env.common.command_line import COUNT, SECONDS, NextStep, add_seed, writable_file
 from epv_env.common.results_folder import progress
 from epv_env.plant.plantfile import Plant
 from training.evaluation.rollout import run_episodes
@@ -163,3 +163,10 @@ def run(options: argparse.Namespace) -> None:
     save_tunings(ordered, options.file, search)
     for kind, tuning in found.items():
         print(f"{kind}: mean return {tuning.mean_return:.1f} with {tuning.values}")
+
+
+def next_step(options: argparse.Namespace) -> NextStep:
+    """Compare what was tuned, which all commands read from one file."""
+    kinds = options.only or TUNED_KINDS
+    place = "" if options.file.resolve() == TUNED_FILE else f", once {options.file} is {TUNED_FILE}"
+    return NextStep(f"to compare what was tuned{place}", ("compare", "--controllers", *kinds))

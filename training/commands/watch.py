@@ -15,7 +15,15 @@ from PIL import Image
 
 import epv_env  # noqa: F401 - registers the ids
 from controllers.base import Controller
-from epv_env.common.command_line import SECONDS, add_plant, add_seed, writable_file
+from controllers.tuned import load_tunings
+from epv_env.common.command_line import (
+    SECONDS,
+    NextStep,
+    add_plant,
+    add_seed,
+    plant_option,
+    writable_file,
+)
 from epv_env.common.files import write_bytes
 from epv_env.plant.plantfile import load_plant
 from training.evaluation.named import HELP, named_controllers
@@ -54,6 +62,13 @@ def run(options: argparse.Namespace) -> None:
         write_film(options.file, frames, env)
         print(f"{options.file}: {len(frames)} frames, {options.file.stat().st_size / 1e6:.1f} MB")
     env.close()
+
+
+def next_step(options: argparse.Namespace) -> NextStep:
+    """Compare the controller with the others."""
+    others = [kind for kind in load_tunings() if kind != options.controller]
+    words = ("compare", "--controllers", options.controller, *others, *plant_option(options.plant))
+    return NextStep("to compare this controller with the others", words)
 
 
 def episode(

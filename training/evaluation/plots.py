@@ -25,32 +25,45 @@ def save_figure(figure: Figure, path: Path) -> None:
     plt.close(figure)
 
 
-def episode_overlay(traces: dict[str, Trace], path: Path) -> None:
-    """The same episode under every controller: circuit pressure, coil and consumption."""
-    rows = len(traces)
-    figure, axes = plt.subplots(
-        rows + 2, 1, figsize=(9, 4.2 + 0.65 * rows), sharex=True, layout="constrained",
-        height_ratios=[4, *([0.6] * rows), 1],
-    )  # fmt: skip
-    first = next(iter(traces.values()))
-    target = first.target_bar
-    axes[0].axhspan(target - BAND_BAR, target + BAND_BAR, color="0.92", label="target ±500 mbar")
-    axes[0].axhline(target, color="0.5", lw=0.8)
-    for (name, trace), colour, coil in zip(traces.items(), COLOURS, axes[1:-1], strict=False):
-        axes[0].plot(trace.time, trace.p2_bar, color=colour, lw=1.1, label=name)
-        coil.step(trace.time, trace.coil, where="pre", color=colour, lw=0.8)
-        coil.set(ylim=(-0.15, 1.15), yticks=[0, 1])
-        coil.set_ylabel(
-            f"coil, {name}".replace(", ", "\n"), rotation=0, ha="right", va="center", fontsize=8
-        )
-    axes[0].set_ylabel("circuit pressure p2\n[bar absolute]")
-    figure.legend(
-        *axes[0].get_legend_handles_labels(),
-        fontsize=8,
-        ncols=min(rows + 1, 4),
-        loc="outside upper center",
+WORDS = {
+    "region": "plants",
+    "calibrated": "the plant itself",
+    "exact": "the plant itself",
+    "confidence": "its confidence region",
+    "ten_percent": "4 parameters ±10 %",
+    "sensitive_ten_percent": "13 parameters ±10 %",
+}
+"""What people read instead of the names of plant sets."""
+
+
+def in_words(name: str) -> str:
+    """A plant set, an effect or another factor as people read it."""
+    return WORDS.get(name, name.replace("_", " "))
+
+
+def episode_overlay(traces: dict[str, Trace], own: str, path: Path) -> None:
+    """The same episode under several controllers: circuit pressure, coil and consumption.
+
+    own: label of the controller that stands out, and whose coil is drawn; the others are faint.
+    """
+    figure, (pressure, coil, drawn) = plt.subplots(
+        3, 1, figsize=(7.2, 5), sharex=True, layout="constrained", height_ratios=[4, 1, 1]
     )
-    axes[-1].plot(first.time, first.consumption_g_per_s, color="0.3")
-    axes[-1].set_ylabel("consumption\n[g/s]", rotation=0, ha="right", va="center", fontsize=8)
-    axes[-1].set_xlabel("time [s]     (coil: 1 on, valve shuts; 0 off, valve opens; PWM: duty)")
+    mine = traces[own]
+    target = mine.target_bar
+    pressure.axhspan(target - BAND_BAR, target + BAND_BAR, color="0.94", label="target ±500 mbar")
+    others = {label: trace for label, trace in traces.items() if label != own}
+    for (label, trace), line in zip(others.items(), ("--", ":", "-."), strict=False):
+        pressure.plot(trace.time, trace.p2_bar, line, color="0.6", lw=1.2, label=label)
+    pressure.plot(mine.time, mine.p2_bar, color=COLOURS[0], lw=2, label=own)
+    pressure.set_ylabel("circuit pressure\n[bar absolute]")
+    coil.step(mine.time, mine.coil, where="pre", color=COLOURS[0], lw=1)
+    coil.set(ylim=(-0.15, 1.15), yticks=[0, 1], yticklabels=["valve open", "shut"])
+    coil.set_title(f"coil under {own}", loc="left", fontsize=10)
+    drawn.plot(mine.time, mine.consumption_g_per_s, color="0.3")
+    drawn.set_title("air that the brakes draw [g/s]", loc="left", fontsize=10)
+    drawn.set_xlabel("time [s]")
+    figure.legend(
+        *pressure.get_legend_handles_labels(), ncols=2, loc="outside upper center", frameon=False
+    )
     save_figure(figure, path)

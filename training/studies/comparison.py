@@ -12,7 +12,7 @@ from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
 from training.evaluation.batches import Batch, in_batches, run_batches
 from training.evaluation.metrics import EpisodeMetrics, summary, violation_interval
-from training.evaluation.plots import plt
+from training.evaluation.plots import in_words, plt
 from training.evaluation.scenarios import EvaluationScenario
 from training.evaluation.seeds import EVALUATION_SEED
 from training.evaluation.statistics import paired_difference
@@ -160,6 +160,7 @@ def differences(results: Results, against: str) -> pd.DataFrame:
 
 def as_text(table: pd.DataFrame) -> str:
     """Rows as they are printed: plant set and scenario only where they differ."""
+    table = table.assign(plants=table["plants"].map(in_words))
     same = [name for name in ("plants", "scenario") if len(set(table[name])) == 1]
     shown = table.loc[:, [name for name in COLUMNS if name not in same]].rename(columns=COLUMNS)
     head = "; ".join(f"{name}: {table[name].iloc[0]}" for name in same)
@@ -168,9 +169,9 @@ def as_text(table: pd.DataFrame) -> str:
 
 
 PANELS = {
-    "left_percent": "leave ±500 mbar [%]",
-    "C2_event_breakdown_mbar": "breakdown per event [mbar]",
-    "switchings_per_s": "switchings [1/s]",
+    "left_percent": "episodes that leave\n±500 mbar [%]",
+    "C2_event_breakdown_mbar": "breakdown per\nevent [mbar]",
+    "switchings_per_s": "switchings\n[1/s]",
 }
 """What the picture shows, by column of `rows`."""
 
@@ -182,23 +183,28 @@ def figure(table: pd.DataFrame) -> Figure:
     """
     names = list(table["controller"])
     drawn, panels = plt.subplots(
-        1, len(PANELS), figsize=(9, 1.2 + 0.35 * len(names)), sharey=True, layout="constrained"
+        1, len(PANELS), figsize=(7.2, 1.2 + 0.35 * len(names)), sharey=True, layout="constrained"
     )
     places = np.arange(len(names))
     for axes, (column, label) in zip(panels, PANELS.items(), strict=True):
         values = table[column].to_numpy(float)
         axes.plot(values, places, "o", color="C0")
+        for place, value in enumerate(values):
+            axes.annotate(
+                f"{value:.2g}" if value < 100 else f"{value:.0f}", (value, place), (0, 6),
+                textcoords="offset points", ha="center", fontsize=9,
+            )  # fmt: skip
         if column == "left_percent":
             axes.hlines(places, table["left_low"], table["left_high"], color="C0")
             axes.set_xscale("symlog", linthresh=0.1)
-            axes.set_xlim(-0.01, 110)
+            axes.set_xlim(-0.03, 300)
             axes.set_xticks([0, 0.1, 1, 10, 100], ["0", "0.1", "1", "10", "100"])
         else:
-            axes.set_xlim(0, 1.1 * max(values.max(), 1e-3))
+            axes.set_xlim(0, 1.25 * max(values.max(), 1e-3))
         axes.set_xlabel(label)
         axes.grid(alpha=0.3, axis="x")
     panels[0].set_yticks(places, names)
-    panels[0].set_ylim(len(names) - 0.5, -0.5)
+    panels[0].set_ylim(len(names) - 0.5, -0.7)
     return drawn
 
 

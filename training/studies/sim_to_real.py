@@ -93,7 +93,7 @@ def performance_figure(performance: pd.DataFrame) -> Figure:
     """Share that leaves on the valve itself: open circles simulated, full ones measured; 95 % bars."""
     names = list(dict.fromkeys(performance["controller"]))
     figure, panels = plt.subplots(
-        1, 2, figsize=(8, 1.6 + 0.35 * len(names)), sharey=True, layout="constrained"
+        1, 2, figsize=(7.2, 1.6 + 0.35 * len(names)), sharey=True, layout="constrained"
     )
     own: Any = performance[performance["plants"] == ITSELF]
     for axes, (stage, title) in zip(
@@ -101,14 +101,15 @@ def performance_figure(performance: pd.DataFrame) -> Figure:
         ((BEFORE, "trained on the nominal plant"), (AFTER, "on the corrected plant")),
         strict=True,
     ):
-        for place, fill in ((SIMULATED, "white"), (MEASURED, COLOURS[0])):
+        for place, fill, size in ((SIMULATED, "white", 9), (MEASURED, COLOURS[0], 5)):
             rows = (
                 own[(own["stage"] == stage) & (own["place"] == place)].set_index("controller").loc[names]
             )
             places = np.arange(len(names))
             axes.hlines(places, rows["left_low"], rows["left_high"], color=COLOURS[0], alpha=0.5)
-            axes.plot(rows["left_percent"], places, "o", color=COLOURS[0], mfc=fill)
-        axes.set(title=title, xlabel="episodes that leave ±500 mbar [%]", xlim=(-3, 103))
+            axes.plot(rows["left_percent"], places, "o", color=COLOURS[0], mfc=fill, ms=size)
+        axes.set(xlabel="episodes that leave ±500 mbar [%]", xlim=(-4, 104))
+        axes.set_title(title, fontsize=11)
         axes.grid(alpha=0.3, axis="x")
     panels[0].set_yticks(np.arange(len(names)), names)
     panels[0].set_ylim(len(names) - 0.5, -0.5)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from scipy.stats import spearmanr
 
 from training.evaluation.metrics import EpisodeMetrics, summary, violation_interval
-from training.evaluation.plots import COLOURS, plt
+from training.evaluation.plots import COLOURS, in_words, plt
 from training.studies.sweep_designs import ONE_AT_A_TIME, Point
 
 NAMED_LEVELS = 3
@@ -91,26 +91,30 @@ def share_text(row: Mapping[str, Any]) -> str:
 def region_table(points: pd.DataFrame) -> pd.DataFrame:
     """The regions and the Latin hypercube under each controller, with headings."""
     some: Any = points[points["design"].isin(["regions", "hypercube"])]
-    shown = some.assign(left_text=[share_text(row) for row in some.to_dict("records")])
+    shown = some.assign(
+        left_text=[share_text(row) for row in some.to_dict("records")], level=some["level"].map(in_words)
+    )
     return shown.loc[:, list(HEADINGS)].rename(columns=HEADINGS)
 
 
-def harmful_changes(points: pd.DataFrame) -> pd.DataFrame:
-    """How many changes of one thing raise the share that leaves, and which ones most.
+def hurts(points: pd.DataFrame) -> pd.Series:
+    """Of each point whether its exact interval lies above that of the plant as it is, (points,)."""
+    exact: Any = points[points["level"] == "exact"].set_index("controller")["left_high"]
+    bounds: Any = points["controller"].map(exact)
+    return points["left_low"] > bounds.fillna(0.0)
 
-    A change hurts if its exact interval lies above that of the plant as it is.
-    """
-    table = []
+
+def harmful_changes(points: pd.DataFrame) -> pd.DataFrame:
+    """How many changes of one thing raise the share that leaves, and which ones most."""
+    table, points = [], points.assign(hurts=hurts(points))
     for controller, mine in points.groupby("controller", sort=False):
-        exact: Any = mine.loc[mine["level"] == "exact", "left_high"]
-        bound = float(exact.iloc[0]) if len(exact) else 0.0
         for design in ONE_AT_A_TIME:
             tried: Any = mine[mine["design"] == design]
             for ends in (False, True):
                 some = tried[tried["level"].isin(RANGE_ENDS) == ends]
                 if len(some) == 0:
                     continue
-                hurt = some[some["left_low"] > bound].sort_values("left", ascending=False, kind="stable")
+                hurt = some[some["hurts"]].sort_values("left", ascending=False, kind="stable")
                 named = [
                     f"{row['factor']} {row['level']} ({100 * row['left']:.3g})"
                     for row in hurt.head(NAMED_LEVELS).to_dict("records")
@@ -141,19 +145,22 @@ def strongest_parameters(ranks: pd.DataFrame) -> pd.DataFrame:
 def share_figure(points: pd.DataFrame, designs: Sequence[str]) -> Figure:
     """Share that leaves by what is changed, a colour for each controller; exact 95 % intervals.
 
-    points: of `point_table`. designs: those shown, each at its SHOWN_LEVELS. Changes with which nobody
-    leaves are left out; the title says how many.
+    points: of `point_table`. designs: those shown, each at its SHOWN_LEVELS. Of changes of one thing,
+    those that hurt a controller are drawn; the title says how many do not.
     """
-    some: Any = points[points["design"].isin(designs)]
+    some: Any = points.assign(hurts=hurts(points) | (points["design"] == "regions"))
+    some = some[some["design"].isin(designs)]
     shown = [
         row["level"] in SHOWN_LEVELS.get(row["design"], (row["level"],))
         for row in some.to_dict("records")
     ]
-    some = some[shown].assign(label=lambda rows: rows["factor"] + ": " + rows["level"])
-    worst: Any = some.groupby("label", sort=False)["left"].max()
-    labels = list(worst[worst > 0].index)
+    some = some[shown].assign(
+        label=lambda rows: rows["factor"].map(in_words) + ": " + rows["level"].map(in_words)
+    )
+    drawn: Any = some.groupby("label", sort=False)["hurts"].any()
+    labels = list(drawn[drawn].index)
     controllers = list(dict.fromkeys(some["controller"]))
-    figure, axes = plt.subplots(figsize=(8, 1.6 + 0.28 * len(labels)), layout="constrained")
+    figure, axes = plt.subplots(figsize=(7.2, 1.6 + 0.3 * len(labels)), layout="constrained")
     apart = 0.6 / max(len(controllers), 1)
     for k, (name, colour) in enumerate(zip(controllers, COLOURS, strict=False)):
         mine = some[some["controller"] == name].set_index("label").reindex(labels)
@@ -163,9 +170,9 @@ def share_figure(points: pd.DataFrame, designs: Sequence[str]) -> Figure:
     axes.set_xscale("symlog", linthresh=1.0)
     axes.set(xlabel="episodes that leave ±500 mbar [%], exact 95 % intervals", xlim=(-0.1, 115))
     axes.set_xticks([0, 1, 3, 10, 30, 100], ["0", "1", "3", "10", "30", "100"])
-    axes.set_yticks(np.arange(len(labels)), labels, fontsize=8)
+    axes.set_yticks(np.arange(len(labels)), labels, fontsize=9)
     axes.set_ylim(len(labels) - 0.4, -0.6)
-    axes.set_title(f"{len(worst) - len(labels)} other changes: nobody leaves", fontsize=9)
+    axes.set_title(f"{len(drawn) - len(labels)} other changes hurt no controller", fontsize=10)
     axes.grid(alpha=0.3, axis="x")
-    figure.legend(fontsize=8, ncols=min(len(controllers), 4), loc="outside upper center")
+    figure.legend(ncols=2, loc="outside upper center", frameon=False)
     return figure

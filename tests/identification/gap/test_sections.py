@@ -11,6 +11,7 @@ from docs.examples.tank import Tank, virtual_recordings
 from identification.gap.diagnosis import Diagnosis, diagnose
 from identification.gap.gap_json import as_json
 from identification.gap.quantities import probability_text
+from identification.gap.report_figures import location_figure
 from identification.gap.report_page import calibrated_values, sections
 from identification.gap.sentences import (
     look_alikes,
@@ -190,3 +191,11 @@ def test_the_values_are_those_of_the_model_to_use(verdict, model):
     symbols = [p.title for p in diagnosed(verdict).ranking.problem.plant.parameters]
     assert [row[0] for row in table.rows] == symbols
     assert {row[-1] for row in table.rows} == {"yes"}
+
+
+def test_the_figure_of_a_full_bar_stays_within_the_frame():
+    figure = location_figure(diagnosed("known"))
+    figure.draw_without_rendering()
+    labels = [(text, axes) for axes in figure.axes for text in axes.texts]
+    assert "> 99 %" in {text.get_text() for text, _ in labels}
+    assert all(text.get_window_extent().x1 < axes.bbox.x1 for text, axes in labels)

@@ -106,7 +106,7 @@ def test_the_sentence_tells_splitting_from_not_splitting():
     text = sentence(sharp, rivals)
     assert text.startswith("Record one opening of 400 ms from 9 bar supply into")
     assert "expected to bring 55:45 between" in text
-    assert "to 98:2 (bench --programme next.json)" in text
+    assert "to 98:2 (epv bench --programme next.json --out next)" in text
     blunt = replace(option, information=replace(option.information, expected_best=0.6))
     assert sentence(blunt, rivals).startswith("No feasible programme splits")
     sure = replace(rivals, probability=(0.999, 0.001))
