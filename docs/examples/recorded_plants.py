@@ -14,12 +14,11 @@ from scipy.signal import lfilter
 
 from epv_env.common.command_line import writable_folder
 from identification.gap.diagnosis import Diagnosis, diagnose
-from identification.gap.gap_json import drawn_term, write_results
+from identification.gap.gap_json import write_results
 from identification.gap.ode_plant import OdePlant
 from identification.gap.plant import Cause, FreeParameter, Run
 from identification.gap.prediction import predict
 from identification.gap.prepared_plant import prepared
-from identification.gap.report_figures import missing_term_figure
 from identification.gap.report_page import sections
 from identification.gap.sentences import verdict_sentence
 from identification.report.page import write_page
@@ -64,18 +63,6 @@ def disturbed(plant: OdePlant, disturbance: str, seed: int) -> OdePlant:
 
 
 RECALIBRATED, WITH_CAUSES, MEASURED = "tab:orange", "tab:blue", "black"
-
-
-def write_figures(diagnosis: Diagnosis, folder: Path, name: str) -> list[Path]:
-    """Write recorded-NAME.png, and recorded-NAME-left.png where a state explains what is left."""
-    figures = {f"recorded-{name}.png": prediction_figure(diagnosis)}
-    term = drawn_term(diagnosis.remaining)
-    if term is not None:
-        figures[f"recorded-{name}-left.png"] = missing_term_figure(term)
-    folder.mkdir(parents=True, exist_ok=True)
-    for file, figure in figures.items():
-        figure.savefig(folder / file, dpi=100, bbox_inches="tight")
-    return [folder / file for file in figures]
 
 
 def prediction_figure(diagnosis: Diagnosis) -> Figure:
@@ -182,7 +169,7 @@ def cause(
 def command(title: str, name: str, plant_of: Callable[[Path], OdePlant]) -> int:
     """Diagnose the recordings in --data: gap.json, report.html and the verdict; returns the status.
 
-    title: of the plant, for the report. name: of its pictures. plant_of: from the folder of recordings.
+    title: of the plant, for the report. name: of its picture. plant_of: from the folder of recordings.
     """
     parser = argparse.ArgumentParser(description=f"Why a model of {title} misses its recordings.")
     parser.add_argument("--data", type=Path, required=True, help="folder of the recordings")
@@ -199,7 +186,7 @@ def command(title: str, name: str, plant_of: Callable[[Path], OdePlant]) -> int:
         "--disturb", choices=DISTURBANCES,
         help="state 0.3 or three times the noise, or add a ripple of twice the noise",
     )  # fmt: skip
-    parser.add_argument("--images", type=writable_folder, help="folder of pictures for documents")
+    parser.add_argument("--images", type=writable_folder, help="folder of recorded-NAME.png")
     chosen = parser.parse_args()
     plant = changed(plant_of(chosen.data), without=chosen.without, added=chosen.added)
     plant = disturbed(plant, chosen.disturb, chosen.seed) if chosen.disturb else plant
@@ -208,7 +195,9 @@ def command(title: str, name: str, plant_of: Callable[[Path], OdePlant]) -> int:
     heading = f"Gap between model and recordings: {title}"
     write_page(chosen.out / "report.html", title=heading, sections=sections(diagnosis))
     if chosen.images:
-        write_figures(diagnosis, chosen.images, name)
+        chosen.images.mkdir(parents=True, exist_ok=True)
+        path = chosen.images / f"recorded-{name}.png"
+        prediction_figure(diagnosis).savefig(path, dpi=100, bbox_inches="tight")
     print(verdict_sentence(diagnosis, "")[1])
     print(held_out_errors(diagnosis))
     return 0

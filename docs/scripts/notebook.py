@@ -34,6 +34,7 @@ def read() -> dict[str, Any]:
 def run(cells: list[Cell]) -> None:
     """Run the cells of code and put their outputs into them."""
     namespace: dict[str, Any] = {}
+    plt.close("all")
     for number, cell in enumerate(cells, start=1):
         if cell["cell_type"] == "code":
             cell["outputs"] = list(_outputs("".join(cell["source"]), f"<cell {number}>", namespace))

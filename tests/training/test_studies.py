@@ -26,7 +26,7 @@ def test_the_sweep(tmp_path, monkeypatch):
     monkeypatch.setattr(robustness, "CONTROLLERS", ("hysteresis, extrapolating",))
     assert robustness.main(["--quick", "--out", str(tmp_path)]) == 0
     text = (tmp_path / PAGE).read_text(encoding="utf-8")
-    assert "| Latin hypercube | hysteresis, extrapolating |" in text
+    assert "| 13 parameters ±10 % | hysteresis, extrapolating |" in text
     assert (tmp_path / "robustness-conditions.png").exists()
 
 

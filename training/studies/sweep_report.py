@@ -172,7 +172,8 @@ def share_figure(points: pd.DataFrame, designs: Sequence[str]) -> Figure:
     axes.set_xticks([0, 1, 3, 10, 30, 100], ["0", "1", "3", "10", "30", "100"])
     axes.set_yticks(np.arange(len(labels)), labels, fontsize=9)
     axes.set_ylim(len(labels) - 0.4, -0.6)
-    axes.set_title(f"{len(drawn) - len(labels)} other changes hurt no controller", fontsize=10)
+    if others := len(drawn) - len(labels):
+        axes.set_title(f"{others} other changes hurt no controller", fontsize=10)
     axes.grid(alpha=0.3, axis="x")
     figure.legend(ncols=2, loc="outside upper center", frameon=False)
     return figure
