@@ -20,6 +20,7 @@ from identification.calibration.calibrate import STARTS
 from identification.pipeline import run as pipeline
 from identification.pipeline.identification import Identification
 from identification.pipeline.run import STAGES
+from identification.pipeline.summary import summary_section
 from identification.recordings.campaign_files import read_campaign
 from identification.recordings.recording import campaign_facts
 from identification.recordings.rules import RULES, rules_of
@@ -56,9 +57,8 @@ def run(options: argparse.Namespace) -> None:
     if options.stage:
         _run_stage(options, identification)
         return
-    plant = pipeline.run(identification, options.out, next_step(options))
-    for symbol in plant.region.symbols:
-        print(f"{symbol:8} {plant.parameters[symbol]:.7g}")
+    pipeline.run(identification, options.out, next_step(options))
+    print(as_text([summary_section(identification)]))
     print(f"written: {options.out / pipeline.PLANT_FILE}, {options.out}/report.html and report.json")
 
 

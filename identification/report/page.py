@@ -198,11 +198,14 @@ def write_results(
 
 
 def as_text(sections: Sequence[Section]) -> str:
-    """The verdicts, for a terminal."""
+    """The verdicts, and what a summary judges, for a terminal."""
     lines = []
     for section in sections:
         lines += ["", section.title]
         lines += [f"  {verdict.status:5} {verdict.text}" for verdict in section.verdicts]
+        judged = [block for block in section.blocks if isinstance(block, Table) and section.summary]
+        for row in [row for table in judged for row in [table.columns, *table.rows]]:
+            lines.append(f"  {' | '.join(row)}")
     return "\n".join(lines).lstrip()
 
 
