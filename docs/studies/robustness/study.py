@@ -31,6 +31,7 @@ CONTROLLERS = (
 DESIGNS = ("--designs", "regions", "parameters", "conditions")
 EPISODES = ("--episodes", "64", "--joint-episodes", "1024")
 """At each change, and on the plants of each region: a quarter of an hour of one core."""
+QUICK = ("--quick", "--factors", "R", "V2", "latency")
 PICTURES = ("robustness-parameters.png", "robustness-conditions.png")
 UNSHOWN_REGIONS = ("confidence", "ten_percent")
 """Regions whose figures hardly differ from those of the calibrated plant: in points.csv only."""
@@ -50,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = study_options(study_parser(__doc__ or "", FOLDER), arguments)
     work = (options.out if options.quick else ROOT / "runs") / "robustness"
     work.mkdir(parents=True, exist_ok=True)
-    words = ["--out", str(work), *DESIGNS, *(["--quick"] if options.quick else EPISODES)]
+    words = ["--out", str(work), *DESIGNS, *(QUICK if options.quick else EPISODES)]
     sweep.run(parse(sweep, "sweep", [*words, "--controllers", *CONTROLLERS]))
     for name in ("points.csv", *PICTURES):
         shutil.copy(work / name, options.out / name)
