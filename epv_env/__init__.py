@@ -15,12 +15,15 @@ MAX_EPISODE_STEPS = {"EPValve-v0": 2000, "EPValvePWM-v0": 500}
 
 def register_envs() -> None:
     """Register the environments' ids; harmless when repeated."""
-    for identifier, name in (("EPValve-v0", "EPValve"), ("EPValvePWM-v0", "EPValvePWM")):
+    for identifier, name, vector in (
+        ("EPValve-v0", "EPValve", "make_on_off"),
+        ("EPValvePWM-v0", "EPValvePWM", "make_pwm"),
+    ):
         if identifier not in registry:
             register(
                 id=identifier,
                 entry_point=f"epv_env.env:{name}Env",
-                vector_entry_point=f"epv_env.vector_env:{name}VectorEnv",
+                vector_entry_point=f"epv_env.vector_entry:{vector}",
                 max_episode_steps=MAX_EPISODE_STEPS[identifier],
             )
 

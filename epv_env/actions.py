@@ -1,5 +1,6 @@
 """What an action means: how long the coil is on within a control period."""
 
+import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -8,6 +9,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.plant.primitives import ROUNDING, exact
 from epv_env.signals import shown
 
 
@@ -15,10 +17,28 @@ class ActionError(ValueError):
     """An action is not one of the action space."""
 
 
+@exact
+def on_off(action, period, slots):
+    """Time on [s] and commanded fraction [-] of one action, and whether it is 0 or 1."""
+    return period if action == 1.0 else 0.0, action, (action == 0.0) | (action == 1.0)
+
+
+@exact
+def modulated(action, period, slots):
+    """Time on [s] and duty [-], in whole slots, of one action, and whether it is finite."""
+    asked = min(max((action + 1.0) / 2.0, 0.0), 1.0)
+    duty = ((asked * slots + ROUNDING) - ROUNDING) / slots
+    return period if duty >= 1.0 else duty * period, duty, math.isfinite(action)
+
+
 @dataclass(frozen=True)
 class OnOff:
     """Discrete(2): the coil is off (0, the PV opens) or on (1, it shuts) for the whole period."""
 
+    rule: ClassVar = staticmethod(on_off)
+    """What one action means; an accelerator compiles it, too."""
+    slots: ClassVar[int] = 1
+    """Shares of the period that can be asked for, less one."""
     default_period: ClassVar[float] = 5e-3
     """Control period where none is given [s]."""
     period: float
@@ -43,6 +63,8 @@ class PWM:
     Symmetric because that is what learning libraries ask of a Box.
     """
 
+    rule: ClassVar = staticmethod(modulated)
+    """What one action means; an accelerator compiles it, too."""
     default_period: ClassVar[float] = 20e-3
     """PWM period where none is given [s]."""
     resolution: ClassVar[float] = 0.5e-3
@@ -50,14 +72,18 @@ class PWM:
     period: float
     """PWM period [s]."""
 
+    @property
+    def slots(self) -> int:
+        """Steps of the duty in a period."""
+        return max(round(self.period / self.resolution), 1)
+
     def space(self) -> gymnasium.Space:
         """Of one action."""
         return gymnasium.spaces.Box(-1.0, 1.0, (1,), dtype=np.float32)
 
     def decode(self, actions: Any) -> tuple[NDArray, NDArray]:
         """Time on [s] and realised fraction for actions (n, 1)."""
-        slots = max(round(self.period / self.resolution), 1)
-        on_time, duty, valid = _modulated(_numbers(actions), self.period, slots)
+        on_time, duty, valid = _modulated(_numbers(actions), self.period, self.slots)
         if not valid:
             raise ActionError(f"actions {shown(actions)} are not all finite: give numbers in [-1, 1]")
         return on_time, duty
@@ -77,23 +103,19 @@ def _numbers(actions: Any) -> NDArray:
 
 @numba.njit(cache=True)
 def _on_off(actions: NDArray, period: float) -> tuple[NDArray, NDArray, bool]:
-    """Time on (n,) [s], commanded fraction (n,) [-], and whether all actions (n,) are 0 or 1."""
-    on_time = np.empty(len(actions))
-    valid = True
+    """`on_off` of all actions (n,): times on (n,) [s], fractions (n,) [-], whether all are valid."""
+    on_time, valid = np.empty(len(actions)), True
     for i in range(len(actions)):
-        on_time[i] = period if actions[i] == 1.0 else 0.0
-        valid &= (actions[i] == 0.0) | (actions[i] == 1.0)
+        on_time[i], _, good = on_off(actions[i], period, 1)
+        valid &= good
     return on_time, actions, valid
 
 
 @numba.njit(cache=True)
 def _modulated(actions: NDArray, period: float, slots: int) -> tuple[NDArray, NDArray, bool]:
-    """Time on (n,) [s], duty (n,) [-] in whole slots, and whether all actions (n,) are finite."""
-    on_time, duty = np.empty(len(actions)), np.empty(len(actions))
-    valid = True
+    """`modulated` of all actions (n,): times on (n,) [s], duties (n,) [-], whether all are valid."""
+    on_time, duty, valid = np.empty(len(actions)), np.empty(len(actions)), True
     for i in range(len(actions)):
-        asked = min(max((actions[i] + 1.0) / 2.0, 0.0), 1.0)
-        duty[i] = np.rint(asked * slots) / slots
-        on_time[i] = period if duty[i] >= 1.0 else duty[i] * period
-        valid &= np.isfinite(actions[i])
+        on_time[i], duty[i], good = modulated(actions[i], period, slots)
+        valid &= good
     return on_time, duty, valid

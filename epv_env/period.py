@@ -15,6 +15,7 @@ figures (N_FIGURE, n), observation (n, entries) float32: results.
 first, last: lanes, multiples of LANES.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
@@ -46,7 +47,8 @@ from epv_env.result import CONSUMPTION, DEVIATION, FAILED, N_TERM, REWARD, SUCCE
 from epv_env.reward import BAND_BAR, EMPTY_CIRCUIT_BAR, RewardWeights, priced, total
 from epv_env.settings import Settings
 
-EPISODE = np.dtype(
+# np.record: the fields are attributes where numba's simulator runs the functions as plain Python, too.
+EPISODE = np.dtype((np.record, np.dtype(
     [
         ("target", np.float64),  # [bar absolute]
         ("steps", np.int64),  # control periods so far
@@ -69,20 +71,11 @@ EPISODE = np.dtype(
         ("violated", np.bool_),  # outside the band after settling
     ],
     align=True,
-)
+)))  # fmt: skip
 """Record of a running episode."""
 
-RULES = np.dtype(
-    [
-        (name, np.float64)
-        for name in (
-            "control_period",
-            "supply_voltage",
-            "settling_time",
-            *(f.name for f in fields(RewardWeights)),
-        )
-    ]
-)
+_RULES = ("control_period", "supply_voltage", "settling_time", *(f.name for f in fields(RewardWeights)))
+RULES = np.dtype((np.record, [(name, np.float64) for name in _RULES]))
 """Record of the settings that a period needs, by their names."""
 
 _digitised, _two_point, _scaled = exact(digitised), exact(two_point), exact(scaled)
@@ -229,13 +222,15 @@ _U, _FLOW, _SLOPE, _REFILL = (
 
 
 @exact
-def _prepare(episodes, progress, rules, state, before, inputs, duration, lowest, highest, on_time,
-             action, figures, first, last):  # fmt: skip
+def begin_period(episodes, progress, rules, state, before, inputs, duration, lowest, highest, on_time,
+                 action, figures, first, last):  # fmt: skip
     """Set inputs and durations of both parts of the period, and keep the state."""
     period, voltage = rules[0].control_period, rules[0].supply_voltage
-    before[:, first:last] = state[:, first:last]
-    lowest[first:last] = np.inf
-    highest[first:last] = -np.inf
+    for row in range(N_STATE):
+        for lane in range(first, last):
+            before[row, lane] = state[row, lane]
+    for lane in range(first, last):
+        lowest[lane], highest[lane] = np.inf, -np.inf
     for i in range(first, min(last, len(episodes))):
         e, on = episodes[i], on_time[i]
         figures[SWITCHINGS, i] = switched(e, period, on, action[i])
@@ -248,7 +243,7 @@ def _prepare(episodes, progress, rules, state, before, inputs, duration, lowest,
             inputs[part, _FLOW, i] = flow
             inputs[part, _SLOPE, i] = e.p1_slope
             inputs[part, _REFILL, i] = refill
-        inputs[0, _U, i] = voltage if on > 0.0 else 0.0
+        inputs[0, _U, i], inputs[1, _U, i] = (voltage if on > 0.0 else 0.0), 0.0
         whole = on <= 0.0 or on >= period
         duration[0, i] = period if whole else on
         duration[1, i] = 0.0 if whole else period - on
@@ -262,7 +257,7 @@ def _restore_lost(episodes, state, before, lowest, highest, figures, first, last
     """
     for i in range(first, min(last, len(episodes))):
         figures[FAILED, i] = 0.0
-        if np.isnan(state[_ROW_P2, i]):
+        if math.isnan(state[_ROW_P2, i]):
             figures[FAILED, i] = 1.0
             for row in range(N_STATE):
                 state[row, i] = before[row, i]
@@ -271,8 +266,8 @@ def _restore_lost(episodes, state, before, lowest, highest, figures, first, last
 
 
 @exact
-def _conclude(episodes, rules, noise, state, before, lowest, highest, sensors, figures, observation,
-              first, last):  # fmt: skip
+def end_period(episodes, rules, noise, state, before, lowest, highest, sensors, figures, observation,
+               first, last):  # fmt: skip
     """Judge the period, read the sensors and write the observations."""
     _restore_lost(episodes, state, before, lowest, highest, figures, first, last)
     period = rules[0].control_period
@@ -280,9 +275,8 @@ def _conclude(episodes, rules, noise, state, before, lowest, highest, sensors, f
         e = episodes[i]
         vented = state[_ROW_VENTED, i] - before[_ROW_VENTED, i]
         judge(e, rules[0], state[_ROW_P2, i], lowest[i], highest[i], vented, figures, i)
-        measure(
-            e, state_at(state, STATE, i), sensors[i], noise[i, e.steps % NOISE_BLOCK], e.steps * period
-        )
+        drawn = noise[i, e.steps % noise.shape[1]]
+        measure(e, state_at(state, STATE, i), sensors[i], drawn, e.steps * period)
         remember(e)
         observe(e, observation[i])
 
@@ -307,13 +301,13 @@ def _compiled(digest):
         if digest == "":  # keeps the digest in the closure
             return
         wide_vectors()  # the preference of run_nominal is lost where that is inlined here
-        _prepare(episodes, progress, rules, state, before, inputs, duration, lowest, highest, on_time,
-                 action, figures, first, last)  # fmt: skip
+        begin_period(episodes, progress, rules, state, before, inputs, duration, lowest, highest,
+                     on_time, action, figures, first, last)  # fmt: skip
         parts = 2 if np.any(duration[1, first:last] > 0.0) else 1
         run_nominal(state, coefficients, effects, inputs[:parts], duration[:parts], lowest, highest,
                     record, step, first, last)  # fmt: skip
-        _conclude(episodes, rules, noise, state, before, lowest, highest, sensors, figures,
-                  observation, first, last)  # fmt: skip
+        end_period(episodes, rules, noise, state, before, lowest, highest, sensors, figures,
+                   observation, first, last)  # fmt: skip
 
     @compiled
     def prepare(episodes, progress, rules, noise, state, coefficients, effects, lowest, highest,
@@ -321,8 +315,8 @@ def _compiled(digest):
                 first, last):  # fmt: skip
         if digest == "":
             return
-        _prepare(episodes, progress, rules, state, before, inputs, duration, lowest, highest, on_time,
-                 action, figures, first, last)  # fmt: skip
+        begin_period(episodes, progress, rules, state, before, inputs, duration, lowest, highest,
+                     on_time, action, figures, first, last)  # fmt: skip
 
     @compiled
     def conclude(episodes, progress, rules, noise, state, coefficients, effects, lowest, highest,
@@ -330,8 +324,8 @@ def _compiled(digest):
                  first, last):  # fmt: skip
         if digest == "":
             return
-        _conclude(episodes, rules, noise, state, before, lowest, highest, sensors, figures,
-                  observation, first, last)  # fmt: skip
+        end_period(episodes, rules, noise, state, before, lowest, highest, sensors, figures,
+                   observation, first, last)  # fmt: skip
 
     @compiled
     def begin(episodes, noise, state, sensors, where, observation):

@@ -87,7 +87,7 @@ def priced(
     shortfall = np.maximum(-lowest_error_bar, 0.0)
     return RewardTerms(
         band=-weights.band * scale * outside,
-        tracking=-weights.tracking * scale / BAND_BAR * np.abs(error_bar),
+        tracking=-weights.tracking * scale / BAND_BAR * abs(error_bar),
         breakdown=-weights.breakdown * scale / BAND_BAR * shortfall,
         switching=-weights.switching * switchings,
         vented_air=-weights.vented_air * 1e3 * vented_kg,

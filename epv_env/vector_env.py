@@ -71,12 +71,16 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         self.single_observation_space = observation_space()
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self.task = LimitingTask(num_envs, self.settings, threads=threads)
+        self.task = LimitingTask(self._on_host(num_envs), self.settings, threads=threads)
         self.privileged = checked_flag("privileged", privileged)
-        self._rngs = [np_random(None)[0] for _ in range(num_envs)]
+        self._rngs = [np_random(None)[0] for _ in range(self.task.n)]
         self._done = np.zeros(num_envs, dtype=bool)
         self._some_done = False
         self._every = np.ones(num_envs, dtype=bool)
+
+    def _on_host(self, num_envs: int) -> int:
+        """Episodes that the host keeps."""
+        return num_envs
 
     def reset(
         self,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from epv_env.common.units import BAR
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import ParameterError
-from epv_env.plant.primitives import Value
+from epv_env.plant.primitives import ROUNDING, Value
 
 ADC_BITS = 12
 """Resolution of the data acquisition card (section 3)."""
@@ -24,7 +24,7 @@ def digitised(value, standard_normal, low, noise, resolution, least, greatest):
 
     Arguments are numbers or arrays that broadcast; the environment's step compiles this function.
     """
-    steps = np.rint((value - low + noise * standard_normal) / resolution)
+    steps = ((value - low + noise * standard_normal) / resolution + ROUNDING) - ROUNDING
     return np.minimum(np.maximum(low + steps * resolution, least), greatest)
 
 

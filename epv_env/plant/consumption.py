@@ -138,7 +138,7 @@ def draw_profile(scenario: str | Scenario, rng: np.random.Generator) -> Profile:
     return SCENARIOS[scenario].draw(rng)
 
 
-PROGRESS = np.dtype(
+PROGRESS = np.dtype((np.record, np.dtype(
     [
         ("leak", np.float64),
         ("applications", np.float64, (APPLICATIONS, 5)),
@@ -147,7 +147,7 @@ PROGRESS = np.dtype(
         ("offset", np.float64),
     ],
     align=True,
-)
+)))  # fmt: skip
 """A profile and how far it has been read: leak [kg/s], applications, length of their sequence [s],
 number of the application under way, or else of the next one, and when the sequence began last [s]."""
 

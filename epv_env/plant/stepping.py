@@ -200,65 +200,80 @@ def _locate(start, trial, h, c, work, lane):
     return max(min(fraction * h, released * h + RELEASE_MARGIN), SHORTEST_STEP)
 
 
-@inlined
-def try_steps(work, step, extended):
-    """Take one trial step in every lane; accept it where it passes no event and is accurate enough."""
-    wide_vectors()
-    for lane in range(LANES):
-        q = state_at(work, STATE, lane)
-        c = coefficients_at(work, COEFFICIENT, lane)
-        effects = effects_at(work, EFFECT, lane)
-        u = inputs_at(work, INPUT, lane)
-        remaining, hint, located = work[REMAINING, lane], work[HINT, lane], work[LOCATED, lane]
+def _stepper(lanes):
+    """`try_steps` of a block of so many lanes: LLVM has to know their number."""
 
-        rates, force_PV, force_MV = derivative(q, u, c, effects, 1.0, 1.0, extended)
-        held_PV = is_held(q.xPV, q.vPV, c.xPVmax, force_PV)
-        held_MV = is_held(q.xMV, q.vMV, c.xMVmax, force_MV)
-        free_PV = 0.0 if held_PV else 1.0
-        free_MV = 0.0 if held_MV else 1.0
-        longest = first_step(rates, step, LONGEST * step) if held_PV & held_MV else step
-        h = min(min(longest, hint), remaining)
-        if extended:
-            h = min(h, longest_step(u.U, q, effects, free_PV, free_MV))
-        end, forces, difference = remaining_stages(
-            q, held_still(rates, free_PV, free_MV), u, c, effects, free_PV, free_MV, h, extended
-        )
-        mid_PV, mid_MV, end_PV, end_MV = forces
+    @inlined
+    def try_steps(work, step, extended):
+        """A trial step in every lane; accepted where it passes no event and is accurate enough."""
+        if lanes > 1:
+            wide_vectors()
+        for lane in range(lanes):
+            q = state_at(work, STATE, lane)
+            c = coefficients_at(work, COEFFICIENT, lane)
+            effects = effects_at(work, EFFECT, lane)
+            u = inputs_at(work, INPUT, lane)
+            remaining, hint, located = work[REMAINING, lane], work[HINT, lane], work[LOCATED, lane]
 
-        beyond = _overruns(q.xPV, q.vPV, end.xPV, end.vPV, h, c.xPVmax)
-        beyond |= _overruns(q.xMV, q.vMV, end.xMV, end.vMV, h, c.xMVmax)
-        kinked = _passes(q.xMV, end.xMV, c.kink_in) | _passes(q.xMV, end.xMV, c.kink_exh)
-        let_go = _lets_go(held_PV, force_PV, end_PV) | _lets_go(held_MV, force_MV, end_MV)
-        again = (located == 1.0) & (h > step)  # located once, on too long a step to be exact
-        if extended:
-            again |= (located > 0.0) & (located < RELEASE_LOCATIONS)
-        event = beyond | ((located == 0.0) & (kinked | let_go)) | (again & let_go)
-        error = relative_error(difference, h, step, extended)
-        wrong = (error > 1.0) & (h > step)
-        refused = event | wrong
+            rates, force_PV, force_MV = derivative(q, u, c, effects, 1.0, 1.0, extended)
+            held_PV = is_held(q.xPV, q.vPV, c.xPVmax, force_PV)
+            held_MV = is_held(q.xMV, q.vMV, c.xMVmax, force_MV)
+            free_PV = 0.0 if held_PV else 1.0
+            free_MV = 0.0 if held_MV else 1.0
+            longest = first_step(rates, step, LONGEST * step) if held_PV & held_MV else step
+            h = min(min(longest, hint), remaining)
+            if extended:
+                h = min(h, longest_step(u.U, q, effects, free_PV, free_MV))
+            end, forces, difference = remaining_stages(
+                q, held_still(rates, free_PV, free_MV), u, c, effects, free_PV, free_MV, h, extended
+            )
+            mid_PV, mid_MV, end_PV, end_MV = forces
 
-        xPV, vPV = _landed(end.xPV, end.vPV, c.xPVmax, c.ePV)
-        xMV, vMV = _landed(end.xMV, end.vMV, c.xMVmax, c.eMV)
-        current = coil_current(u.U, end.I, c.R, end.coil_heat, effects) if extended else end.I
-        landed = _with_landing(end, xPV, vPV, xMV, vMV, current)
-        reached = chosen_state(refused, q, landed)
-        if extended:
-            store_state(work, TRIAL, lane, end)
-            store_state(work, STATE, lane, reached)
-        else:
-            store_nominal(work, TRIAL, lane, end)
-            store_nominal(work, STATE, lane, reached)
-        work[REMAINING, lane] = remaining if refused else remaining - h
-        work[TRIED, lane] = h
-        controlled = wrong | (hint < UNLIMITED)
-        work[HINT, lane] = max(next_step(h, error), step) if controlled & (located == 0.0) else UNLIMITED
-        work[LOCATED, lane] = located if refused else 0.0
-        work[EVENT, lane] = 1.0 if event & (not wrong) else 0.0
-        work[FORCE, lane], work[FORCE + 1, lane], work[FORCE + 2, lane] = force_PV, mid_PV, end_PV
-        work[FORCE + 3, lane], work[FORCE + 4, lane] = force_MV, mid_MV
-        work[FORCE + 5, lane] = end_MV
-        work[LOWEST, lane] = min(work[LOWEST, lane], reached.p2)
-        work[HIGHEST, lane] = max(work[HIGHEST, lane], reached.p2)
+            beyond = _overruns(q.xPV, q.vPV, end.xPV, end.vPV, h, c.xPVmax)
+            beyond |= _overruns(q.xMV, q.vMV, end.xMV, end.vMV, h, c.xMVmax)
+            kinked = _passes(q.xMV, end.xMV, c.kink_in) | _passes(q.xMV, end.xMV, c.kink_exh)
+            let_go = _lets_go(held_PV, force_PV, end_PV) | _lets_go(held_MV, force_MV, end_MV)
+            again = (located == 1.0) & (h > step)  # located once, on too long a step to be exact
+            if extended:
+                again |= (located > 0.0) & (located < RELEASE_LOCATIONS)
+            event = beyond | ((located == 0.0) & (kinked | let_go)) | (again & let_go)
+            error = relative_error(difference, h, step, extended)
+            wrong = (error > 1.0) & (h > step)
+            refused = event | wrong
+
+            xPV, vPV = _landed(end.xPV, end.vPV, c.xPVmax, c.ePV)
+            xMV, vMV = _landed(end.xMV, end.vMV, c.xMVmax, c.eMV)
+            current = coil_current(u.U, end.I, c.R, end.coil_heat, effects) if extended else end.I
+            landed = _with_landing(end, xPV, vPV, xMV, vMV, current)
+            reached = chosen_state(refused, q, landed)
+            if extended:
+                store_state(work, TRIAL, lane, end)
+                store_state(work, STATE, lane, reached)
+            else:
+                store_nominal(work, TRIAL, lane, end)
+                store_nominal(work, STATE, lane, reached)
+            work[REMAINING, lane] = remaining if refused else remaining - h
+            work[TRIED, lane] = h
+            controlled = wrong | (hint < UNLIMITED)
+            work[HINT, lane] = (
+                max(next_step(h, error), step) if controlled & (located == 0.0) else UNLIMITED
+            )
+            work[LOCATED, lane] = located if refused else 0.0
+            work[EVENT, lane] = 1.0 if event & (not wrong) else 0.0
+            work[FORCE, lane], work[FORCE + 1, lane], work[FORCE + 2, lane] = force_PV, mid_PV, end_PV
+            work[FORCE + 3, lane], work[FORCE + 4, lane] = force_MV, mid_MV
+            work[FORCE + 5, lane] = end_MV
+            work[LOWEST, lane] = min(work[LOWEST, lane], reached.p2)
+            work[HIGHEST, lane] = max(work[HIGHEST, lane], reached.p2)
+
+    return try_steps
+
+
+try_steps = _stepper(LANES)
+"""Of a block of the CPU."""
+
+try_step = _stepper(1)
+"""Of one valve: an accelerator's thread."""
 
 
 @inlined

@@ -1,5 +1,6 @@
 """A batch of valves: the NumPy side of the compiled integrator, its threads and the coil's delay."""
 
+import math
 import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -7,6 +8,7 @@ from functools import cache
 from itertools import pairwise
 from typing import NamedTuple
 
+import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -18,6 +20,7 @@ from epv_env.plant.effects.registry import effect_constants, has_effects
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.lanes import LANES, N_INPUT, N_STATE
 from epv_env.plant.parameters import Parameters
+from epv_env.plant.primitives import exact
 from epv_env.plant.runge_kutta import DEFAULT_STEP
 
 LANES_PER_TASK = 4 * LANES
@@ -89,6 +92,35 @@ def delayed_inputs(table: NDArray, duration: NDArray, delay: NDArray) -> tuple[N
     return parts, durations
 
 
+@exact
+def acting(commanded, duration, delay, acted, left):
+    """What a coil with a delay sees of a voltage that is commanded for a duration [s].
+
+    acted: the voltage that acted last [V], NaN before the first. left: for how long it still acts [s].
+    Returns for how long it acts now [s], and both as they are afterwards.
+    """
+    if duration <= 0.0:
+        return 0.0, acted, left
+    former = commanded if math.isnan(acted) else acted
+    if former == commanded:
+        return 0.0, commanded, 0.0
+    left = delay if left <= 0.0 else left
+    before = min(left, duration)
+    left -= before
+    return before, (former if left > 0.0 else commanded), left
+
+
+@numba.njit(cache=True)
+def _act(commanded, duration, delay, acted, left, before):
+    """`acting` of all lanes; acted and left (lanes,) change, before (lanes,) [s] is the result."""
+    for i in range(len(commanded)):
+        before[i], acted[i], left[i] = acting(commanded[i], duration[i], delay[i], acted[i], left[i])
+
+
+SENSOR_RECORD = np.dtype((np.record, [(symbol, np.float64) for symbol in SENSOR_SYMBOLS]))
+"""Parameters of one valve's sensors."""
+
+
 class Tables(NamedTuple):
     """Arrays of a batch as the kernels (`integrate.run_nominal`) and the sensors take them."""
 
@@ -131,7 +163,7 @@ class Valves:
         self._delay = np.zeros(lanes)
         self._acting_U = np.full(lanes, np.nan)
         self._delay_left = np.zeros(lanes)
-        self._sensors = np.zeros(lanes, dtype=[(symbol, np.float64) for symbol in SENSOR_SYMBOLS])
+        self._sensors = np.zeros(lanes, dtype=SENSOR_RECORD)
         self.nominal = True
         """Whether no valve has an effect or a delay: `integrate.run_nominal` is then all it takes."""
 
@@ -221,17 +253,12 @@ class Valves:
     def _advance_delayed(self) -> None:
         """Advance under the former voltage as long as it still acts, then under the new one."""
         commanded, total = Inputs(*self._inputs).U.copy(), self._duration.copy()
-        acting = np.where(np.isnan(self._acting_U), commanded, self._acting_U)
-        changed = (commanded != acting) & (self._delay_left <= 0)
-        self._delay_left[:] = np.where(changed, self._delay, self._delay_left)
-        self._delay_left[commanded == acting] = 0.0
-        before = np.minimum(self._delay_left, total)
-        self._delay_left -= before
-        for U, lasts in ((acting, before), (commanded, total - before)):
+        former, before = self._acting_U.copy(), np.empty_like(total)
+        _act(commanded, total, self._delay, self._acting_U, self._delay_left, before)
+        for U, lasts in ((np.where(before > 0, former, commanded), before), (commanded, total - before)):
             Inputs(*self._inputs).U[:] = U
             self._duration[:] = lasts
             self._advance_all()
-        self._acting_U[:] = np.where(self._delay_left > 0, acting, commanded)
 
     def record(self, inputs: Inputs, period: ArrayLike) -> State:
         """Apply a series of inputs, each for `period` [s], and keep every state.

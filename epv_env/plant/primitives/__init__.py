@@ -77,6 +77,11 @@ def source_digest(*others: Path) -> str:
     return digest.hexdigest()
 
 
+ROUNDING = 1.5 * 2.0**52
+"""(x + ROUNDING) - ROUNDING is np.rint(x) below 2^51, since numbers of this size have no fraction. Code
+that is compiled for accelerators does not know np.rint."""
+
+
 QUARTER_PI = 0.7853981633974483
 """pi/4: area of a circle over its squared diameter [-]."""
 
