@@ -63,12 +63,12 @@ def p2(n: int, periods: int, conditions: str, closed: bool, device: str) -> np.n
 
 def p2_of_cpu(n: int, *case: Any) -> np.ndarray:
     """`p2` on the CPU, in a process of its own: in the simulator's, nothing is compiled."""
-    code = "import sys; from docs.studies.device import study as s; "
-    code += "s.p2(*eval(sys.argv[1])).tofile(sys.argv[2])"
+    code = "import json, sys; from docs.studies.device import study as s; "
+    code += "s.p2(*json.loads(sys.argv[1])).tofile(sys.argv[2])"
     environment = {k: v for k, v in os.environ.items() if k not in SIMULATOR}
     with TemporaryDirectory() as folder:
         file = str(Path(folder, "p2"))
-        command = [sys.executable, "-c", code, repr((n, *case, "cpu")), file]
+        command = [sys.executable, "-c", code, json.dumps([n, *case, "cpu"]), file]
         subprocess.run(command, env=environment, check=True)
         return np.fromfile(file).reshape(-1, n)
 
