@@ -202,7 +202,8 @@ def test_the_site_builds_without_a_warning(tmp_path):
     assert (tmp_path / "site/search/search_index.js").is_file()
     assert not re.search(r'(?<!full size">)<img', pages)
     api = (tmp_path / "site/reference/api/epv_env.html").read_text()
-    assert api.index('class="highlight"') < api.index("epv_env.actions</")
+    _, example = api.split("environments of an electro-pneumatic protection valve.</p>", 1)
+    assert example.lstrip().startswith('<div class="language-python highlight">')
 
 
 def test_the_notebook_prints_and_draws_what_it_shows():
