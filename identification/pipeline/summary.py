@@ -92,7 +92,7 @@ def _held_out(identification: Identification) -> list[Reason]:
         return []
     text = (
         f"the model lacks something that the values absorb: held-out {most.output} is missed by "
-        f"{most.rms:.3g} times the noise; the command at the end of this page finds out what"
+        f"{most.rms:.3g} times the noise; the command at the end finds out what"
     )
     return [Reason(status="doubt", text=text)]
 
