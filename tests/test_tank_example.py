@@ -17,6 +17,7 @@ from docs.examples.tank import (
     virtual_recordings,
     write_runs,
 )
+from identification.gap.plant import window_forcing
 
 PERIOD = 0.5
 
@@ -49,7 +50,7 @@ def test_forcings_of_all_windows_make_that_of_the_whole_run():
     plant = Tank(virtual_recordings({}))
     values = {"c": np.array([0.021])}
     whole, parts = (
-        plant.forced(values, plant.equations[0], 0, np.array(edges))
+        plant.forced(values, 0, window_forcing(plant.equations[0], 240, np.array(edges)))
         for edges in ([0, 240], [0, 30, 100, 240])
     )
     assert whole.shape == (1, 240, 1)

@@ -8,7 +8,7 @@ nominal model has neither leak nor evaporation, and a sensor without lag.
 
 import argparse
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from copy import copy
 from pathlib import Path
 
@@ -209,14 +209,13 @@ class Tank:
         rising = np.gradient(self.states(values, run)["h"].values) > 0
         return {"filling": rising, "draining": ~rising}
 
-    def forced(
-        self, values: Mapping[str, NDArray], equation: StateEquation, run: int, edges: NDArray
-    ) -> NDArray:
+    def forced(self, values: Mapping[str, NDArray], run: int, forcing: Mapping[str, NDArray]) -> NDArray:
         """`GreyBox.forced`."""
-        samples = np.arange(len(self.runs[run].time))
-        window = np.searchsorted(edges, samples, side="right")[:, None] - 1
-        acting = equation.step * (window == np.arange(len(edges) - 1))
+        (acting,) = forcing.values()
         return (self._read(values, run, acting) - self._read(values, run))[None]
+
+    def contribution(self, values: Mapping[str, NDArray], symbols: Collection[str], run: int) -> None:
+        """`GreyBox.contribution`: left to the change of the readings."""
 
     def _read(self, values: Mapping[str, NDArray], run: int, forcing: NDArray | None = None) -> NDArray:
         """Readings (samples, n) of the level in a run."""

@@ -4,7 +4,7 @@ An FMU (Functional Mock-up Unit, fmi-standard.org) is simulated through FMPy, an
 """
 
 import importlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import Executor
 from copy import copy
 from dataclasses import dataclass
@@ -110,17 +110,18 @@ class BlackBoxPlant:
         """`GreyBox.regimes`: boolean (samples,) by name, as the owner's function gives them."""
         return self._regimes(self.runs[run], self._first(values, run)) if self._regimes else {}
 
-    def forced(
-        self, values: Mapping[str, NDArray], equation: StateEquation, run: int, edges: NDArray
-    ) -> NDArray:
-        """`GreyBox.forced`, (channels, samples, windows): refused, as no equation is known.
+    def forced(self, values: Mapping[str, NDArray], run: int, forcing: Mapping[str, NDArray]) -> NDArray:
+        """`GreyBox.forced`, (channels, samples, m): refused, as no equation is known.
 
         Raises:
             ValueError: always.
         """
         raise ValueError(
-            f"equation {equation.name} cannot be forced: the equations of a black box are not known"
+            f"{', '.join(forcing)} cannot be forced: the equations of a black box are not known"
         )
+
+    def contribution(self, values: Mapping[str, NDArray], symbols: Collection[str], run: int) -> None:
+        """`GreyBox.contribution`: None, as no equation is known."""
 
     def _candidate(self, values: Mapping[str, NDArray], i: int, run: int) -> dict[str, float]:
         """Values of candidate i in a run, by symbol; nominal ones where none is given."""

@@ -1,22 +1,19 @@
 """Search for the causes: singles, then sets grown by one cause at a time and pruned again."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from itertools import combinations
 
-from identification.gap.evidence import EvaluatedHypothesis, evaluate
+from identification.gap.evidence import EvaluatedHypothesis, evaluate, misfit
 from identification.gap.fitting_problem import Estimate, FitCache, FittingProblem, Hypothesis
 from identification.gap.gauss_newton import fit, linearise
 from identification.gap.plant import GreyBox
-from identification.gap.posterior import NO_CAUSE_DOUBT, Posterior, misfit_beyond_noise, posterior
+from identification.gap.posterior import Posterior, misfit_beyond_white_noise, posterior
 from identification.gap.recalibration import refit, with_own_nuisances
 from identification.gap.screening import (
     CauseSignature,
-    Separability,
     Start,
     best_start_of_each,
     promising_causes,
-    promising_pairs,
     screen_causes,
     simulate_signatures,
     simulated_starts,
@@ -27,15 +24,9 @@ from identification.gap.variable_projection import LinearisedRun
 MOST_CAUSES = 4
 """Largest number of causes that are taken to act together."""
 
-ALIKE_CORRELATION = 0.8
-"""Correlation of signatures [1] above which a cause that resembles one of the best is refitted as well:
-screening by one linear step cannot order causes that look alike."""
-
-SMALL_MISFIT = 30.0
-"""Misfit beyond noise [nats] up to which a set leaves little: another cause can hardly be seen."""
-
-LAST_GAIN = 1.0
-"""Gain in score that another cause must bring for the search to go on [nats]."""
+LITTLE_LEFT, LITTLE_SHARE = 15.0, 3e-3
+"""Misfit beyond white noise up to which a set leaves little, in nats and as a share of the whole [1],
+added: another cause can hardly be seen."""
 
 # Numbers for the sake of computing time.
 
@@ -43,33 +34,24 @@ MULTI_START_CAUSES = 12
 """Largest catalogue of which every cause is refitted from each of its trial values, and every pair:
 causes may help together that do not help alone. A larger one begins at the most promising values."""
 
-REFITTED_CAUSES = 20
+REFITTED_CAUSES = 12
 """Single causes that are refitted, those with the least predicted chi-square."""
 
-FINALISTS = (8, 4)
-"""Single causes refined with nuisance slopes of their own, in the first and the second round."""
-
-SET_FINALISTS = 3
-"""Sets of causes of one size that are refined so."""
-
-FINALIST_LAG = 12.0
-"""Score by which the best fit may lead a fit that is refined [nats]."""
+FINALISTS = 4
+"""Best sets of one size that are fitted further, with slopes and modes of form of their own."""
 
 BASES = 2
 """The best sets of one size to which another cause is added."""
 
-PARTNERS, PARTNERS_OF_SMALL_MISFIT = 8, 3
-"""Causes tried beside a set that leaves a large misfit, and a small one."""
+PARTNERS = 5
+"""Causes tried beside a set."""
 
 SIMULATED_PER_PARTNER = 2
 """Causes of a large catalogue that are simulated beside a set for each that is refitted there."""
 
-STARTS_OF_A_PAIR = 2
-"""Starts from which a pair is refitted, the most promising of all combinations of trial values."""
-
-SCREENED_PAIRS = 2
-"""Pairs of a larger catalogue that are refitted because they promise most together, though neither
-member is among the best."""
+STARTS = 2
+"""Starts from which a cause of a large catalogue is refitted, and a pair of a small one: the most
+promising of all trial values. From one start a fit may end in a local minimum."""
 
 
 def is_small(plant: GreyBox) -> bool:
@@ -90,6 +72,7 @@ class HypothesisPool:
         """Estimate of each set before its refinement. Refined nuisance parameters follow what the set
         lacks; from the first fit another cause is seen better."""
         self._best: dict[frozenset[str], EvaluatedHypothesis] = {}
+        self._refined: set[frozenset[str]] = set()
 
     def add(self, estimates: Iterable[Estimate]) -> None:
         """Evaluate refitted estimates and keep the best of each set of causes."""
@@ -98,19 +81,23 @@ class HypothesisPool:
             if self._keep(evaluated):
                 self.first_fits[labels] = evaluated.estimate
 
-    def refine(self, evaluated: Sequence[EvaluatedHypothesis], name: str) -> None:
-        """Fit hypotheses further, with nuisance slopes of their own; name: of the step."""
-        for refined in with_own_nuisances(self.problem, evaluated, name, self.cache):
-            self._keep(refined, refined=True)
+    def refine(self, number: int) -> None:
+        """Fit the best sets of a number of causes further, with slopes and modes of their own."""
+        ranked = [each for each, _ in self.ranked(number)[:FINALISTS]]
+        best = [each for each in ranked if frozenset(each.labels) not in self._refined]
+        name = f"modes of {number}: {', '.join(' and '.join(each.labels) for each in best)}"
+        for refined in with_own_nuisances(self.problem, best, name, self.cache):
+            self._refined.add(frozenset(refined.labels))
+            self._best[frozenset(refined.labels)] = refined
 
-    def _keep(self, evaluated: EvaluatedHypothesis, refined: bool = False) -> bool:
-        """Keep a fit that is better than the present one of its set; a refined one always."""
+    def _keep(self, evaluated: EvaluatedHypothesis) -> bool:
+        """Keep a fit that is better than the present one of its set."""
         labels = frozenset(evaluated.labels)
         present = self._best.get(labels)
         better = present is None or misfit(evaluated) < misfit(present)
-        if better or refined:
+        if better:
             self._best[labels] = evaluated
-        return better or refined
+        return better
 
     def __contains__(self, labels: frozenset[str]) -> bool:
         """Whether a set of causes was refitted."""
@@ -137,7 +124,6 @@ def search_causes(
     base: Estimate,
     base_runs: Sequence[LinearisedRun],
     signatures: Sequence[CauseSignature],
-    separability: Separability,
 ) -> None:
     """Refit the promising sets of causes into the pool.
 
@@ -146,82 +132,48 @@ def search_causes(
         base: the recalibrated model.
         base_runs: the same linearised in the fitted runs.
         signatures: of all causes beside it.
-        separability: of these signatures.
     """
-    screened = screen_causes(pool.problem, base, base_runs, signatures, every_start=pool.small)
-    _fit_singles(pool, base, screened, separability)
+    screened = screen_causes(pool.problem, base, base_runs, signatures, every_start=True)
+    starts = screened if pool.small else _promising_starts(screened)
+    pool.add(pool.cache("single causes", lambda: refit(pool.problem, base, starts)))
+    pool.refine(1)
     for number in range(2, MOST_CAUSES + 1):
         if not _another_cause_may_act(pool, number):
             break
-        _add_a_cause(pool, number, signatures)
-        if number == 2:
-            _fit_promising_pairs(pool, base, base_runs, signatures, screened)
-        _refine_best(pool, number, SET_FINALISTS, f"sets of {number}")
+        for smaller, _ in pool.ranked(number - 1)[:BASES]:
+            pool.add(_fits_with_another(pool, smaller, signatures))
+        if number == 2 and pool.small:
+            _fit_pairs(pool, base, base_runs, screened)
+        pool.refine(number)
     _leave_causes_out(pool)
 
 
-def _fit_singles(
-    pool: HypothesisPool, base: Estimate, screened: Sequence[Start], separability: Separability
-) -> None:
-    """Single causes: the promising ones, those that look like the best, and the best refined."""
-    problem = pool.problem
-    most = len(screened) if pool.small else REFITTED_CAUSES
-    first, others = screened[:most], screened[most:]
-    pool.add(pool.cache("single causes", lambda: refit(problem, base, first)))
-    best = [each.labels[0] for each, _ in pool.ranked(1)[: FINALISTS[1]]]
-    resembling = {label for own in best for label in separability.alike(own, ALIKE_CORRELATION)}
-    alike = [each for each in others if each.cause.label in resembling]
-    if alike:
-        pool.add(pool.cache("causes like the best", lambda: refit(problem, base, alike)))
-    for number, most in enumerate(FINALISTS, start=1):
-        _refine_best(pool, 1, most, f"single causes, round {number}")
-
-
-def _refine_best(pool: HypothesisPool, number: int, most: int, name: str) -> None:
-    """Refine the best sets of a number of causes."""
-    ranked = pool.ranked(number)[:most]
-    if ranked:
-        best = ranked[0][1]
-        near = [each for each, score in ranked if best - score <= FINALIST_LAG]
-        pool.refine(near, f"{name}: own nuisances")
+def _promising_starts(screened: Sequence[Start]) -> list[Start]:
+    """The best starts of the most promising causes."""
+    first = best_start_of_each(screened)[:REFITTED_CAUSES]
+    kept = {start.labels for start in first}
+    return _best_starts([start for start in screened if start.labels in kept], STARTS)
 
 
 def _another_cause_may_act(pool: HypothesisPool, number: int) -> bool:
-    """Whether sets of `number` causes are worth a search: the last cause helped, or much is left.
+    """Whether sets of `number` causes are worth a search: much is left, and the last cause helped.
 
-    Where four causes act, the second one alone may hardly pay; a small catalogue is searched on.
+    Where four causes act, the second one alone may hardly pay: the search goes on in a small catalogue,
+    and where the gap has no name yet.
     """
-    found = pool.posterior()[1]
-    if found.no_cause > NO_CAUSE_DOUBT:
+    hypotheses, found = pool.posterior()
+    every = [misfit_beyond_white_noise(each, found.discrepancies) for each in hypotheses]
+    whole = misfit_beyond_white_noise(pool.recalibrated, found.discrepancies)
+    if not every or min(every) <= LITTLE_LEFT + LITTLE_SHARE * whole:
         return False
-    if number == 2:
+    if pool.small or number == 2 or found.unknown > sum(found.probabilities):
         return True
     larger, smaller = pool.ranked(number - 1), pool.ranked(number - 2)
-    if not larger:
-        return False
-    left = misfit_beyond_noise(larger[0][0], found.discrepancies)
-    if pool.small and left > SMALL_MISFIT:
-        return True
-    return larger[0][1] > smaller[0][1] + LAST_GAIN
-
-
-def _add_a_cause(pool: HypothesisPool, number: int, signatures: Sequence[CauseSignature]) -> None:
-    """Refit the best smaller sets with each of the causes that promise most beside them."""
-    ranked = pool.ranked(number - 1)
-    left = misfit_beyond_noise(ranked[0][0], pool.posterior()[1].discrepancies) if ranked else 0.0
-    small = left <= SMALL_MISFIT
-    partners = PARTNERS_OF_SMALL_MISFIT if small else PARTNERS
-    for smaller, score in ranked[: 1 if small else BASES]:
-        if ranked[0][1] - score > FINALIST_LAG and not pool.small:
-            break
-        pool.add(_fits_with_another(pool, smaller, signatures, partners))
+    return bool(larger) and larger[0][1] > smaller[0][1]
 
 
 def _fits_with_another(
-    pool: HypothesisPool,
-    smaller: EvaluatedHypothesis,
-    signatures: Sequence[CauseSignature],
-    partners: int,
+    pool: HypothesisPool, smaller: EvaluatedHypothesis, signatures: Sequence[CauseSignature]
 ) -> list[Estimate]:
     """Fits of a set with each of the most promising further causes.
 
@@ -241,38 +193,32 @@ def _fits_with_another(
         base_runs = linearise(problem, [base], problem.fitted_runs)[0]
         causes = promising_causes(problem, base_runs, others)
         if not pool.small:
-            causes = causes[: SIMULATED_PER_PARTNER * partners]
+            causes = causes[: SIMULATED_PER_PARTNER * PARTNERS]
         beside = simulate_signatures(problem, base, causes)
         screened = screen_causes(problem, base, base_runs, beside, every_start=pool.small)
-        kept = screened if pool.small else screened[:partners]
+        kept = screened if pool.small else screened[:PARTNERS]
         return refit(problem, base, kept)
 
     return pool.cache(f"beside {' and '.join(smaller.labels)}", fits) if others else []
 
 
-def _fit_promising_pairs(
+def _fit_pairs(
     pool: HypothesisPool,
     base: Estimate,
     base_runs: Sequence[LinearisedRun],
-    signatures: Sequence[CauseSignature],
     screened: Sequence[Start],
 ) -> None:
-    """Pairs that promise much together; all pairs of a small catalogue."""
+    """All pairs of a small catalogue."""
     problem = pool.problem
-    wanted: list[frozenset[str]] | None = None
-    if not pool.small:
-        labels = promising_pairs(base_runs, signatures)
-        wanted = [own for own in labels if own not in pool][:SCREENED_PAIRS]
     together = [
         _both(problem, base, first, second)
         for first, second in combinations(screened, 2)
         if first.cause.name != second.cause.name
-        and (wanted is None or frozenset((*first.labels, *second.labels)) in wanted)
     ]
 
     def fits() -> list[Estimate]:
         starts = simulated_starts(problem, base, base_runs, together)
-        return refit(problem, base, _best_starts(starts, STARTS_OF_A_PAIR))
+        return refit(problem, base, _best_starts(starts, STARTS))
 
     pool.add(pool.cache("pairs", fits))
 
@@ -312,19 +258,11 @@ def _leave_causes_out(pool: HypothesisPool) -> None:
         values = problem.values(best.estimate)
         causes = best.estimate.hypothesis.causes
         starts = [
-            replace(problem.start(Hypothesis(causes=tuple(kept)), values), slopes=best.estimate.slopes)
+            problem.start(Hypothesis(causes=tuple(kept)), values)
             for kept in combinations(causes, len(causes) - 1)
         ]
         name = f"without one of {' and '.join(best.labels)}"
-        fitted = pool.cache(name, lambda starts=starts: fit(problem, starts))
-        pool.add(
-            replace(estimate, slopes=best.estimate.slopes)  # a journal keeps no slopes
-            for estimate in fitted
-        )
+        pool.add(pool.cache(name, lambda starts=starts: fit(problem, starts)))
+        pool.refine(len(causes) - 1)
         if pool.ranked()[0][0].labels == best.labels:
             return
-
-
-def misfit(evaluated: EvaluatedHypothesis) -> float:
-    """Sum of squares of all channels and nuisance parameters [1]."""
-    return float(evaluated.squares.sum()) + 2.0 * evaluated.nuisance_penalty

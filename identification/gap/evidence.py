@@ -1,7 +1,4 @@
-"""What a refitted hypothesis leaves of the recordings, and the price of its parameters.
-
-The price of each fitted parameter is Laplace's (MacKay 1992).
-"""
+"""What a refitted hypothesis leaves of the recordings."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.fitting_problem import Estimate, FittingProblem, cause_places
+from identification.gap.fitting_problem import Estimate, FittingProblem
 from identification.gap.gauss_newton import linearise
 from identification.gap.prediction import with_settled_runs
 from identification.gap.variable_projection import (
@@ -40,6 +37,9 @@ class EvaluatedHypothesis:
     """Half the squared deviations of all nuisance parameters from their centres [nats]."""
     tolerances: NDArray
     """Tolerances that the fitted runs determine, (m,) [standard deviations from the centres]."""
+    forms: NDArray
+    """Shares of the form modes that they determine, (modes,) [standard deviations]; (0,) where the
+    hypothesis was not refined."""
     covariance: NDArray
     """Of calibrated parameters and parameters of causes for white noise, all else free, (k, k) [SI]."""
     at_bound: bool
@@ -65,30 +65,10 @@ class EvaluatedHypothesis:
         """The causes for people."""
         return self.estimate.hypothesis.titles
 
-    def price(self, inflation: float, least: float) -> float:
-        """Log of the ranges of the causes' parameters over what the data leave (Laplace) [nats].
 
-        Together, or one cause after the other with at least `least` each, whichever is more.
-
-        Args:
-            inflation: of the parameters' variance by correlated readings and by discrepancy [1].
-            least: price of a cause [nats].
-        """
-        parameters = self.estimate.hypothesis.parameters
-        first = len(self.covariance) - len(parameters)
-        widths = np.array([abs(p.high - p.low) for p in parameters])
-        covariance = self.covariance[first:, first:] / np.outer(widths, widths)
-        # Before the data a parameter is uniform over its range, whose variance is a twelfth.
-        precision = np.linalg.pinv(inflation * covariance) + 12.0 * np.eye(len(widths))
-        together = 0.5 * float(np.linalg.slogdet(precision / (2.0 * np.pi))[1])
-        own = -0.5 * np.log(2.0 * np.pi * np.minimum(inflation * np.diag(covariance), 1.0))
-        each = [float(np.sum(own[self._place(place)])) for _, place, _ in cause_places(self.estimate)]
-        return max(together, sum(max(alone, least) for alone in each))
-
-    def _place(self, place: slice) -> slice:
-        """Place of a cause's parameters among those of all causes."""
-        first = self.estimate.cause_start
-        return slice(place.start - first, place.stop - first)
+def misfit(evaluated: EvaluatedHypothesis) -> float:
+    """Sum of squares of all channels and nuisance parameters [1]."""
+    return float(evaluated.squares.sum()) + 2.0 * evaluated.nuisance_penalty
 
 
 def evaluate(problem: FittingProblem, estimates: Sequence[Estimate]) -> list[EvaluatedHypothesis]:
@@ -110,31 +90,33 @@ def evaluate_linearised(
     problem: FittingProblem, estimate: Estimate, runs: Sequence[LinearisedRun]
 ) -> EvaluatedHypothesis:
     """An estimate on all runs, linearised."""
-    tolerances = normal_equations(runs).tolerances
-    freed = [without_run_nuisances(run, tolerances) for run in runs]
+    shared = normal_equations(runs).shared
+    freed = [without_run_nuisances(run, shared) for run in runs]
     residuals = [
         residual.reshape(run.measured.shape)
         for (residual, _), run in zip(freed, problem.plant.runs, strict=True)
     ]
     fitted = normal_equations([runs[r] for r in problem.fitted_runs])
     scales = [parameter.scale for parameter in problem.parameters(estimate)]
-    deviations = _squared_deviations(runs, [step for _, step in freed], tolerances)
+    deviations = _squared_deviations(runs, [step for _, step in freed], shared)
+    count = len(problem.plant.tolerances)
     return EvaluatedHypothesis(
         estimate=estimate,
         residuals=residuals,
         squares=np.sum([np.sum(residual**2, axis=1) for residual in residuals], axis=0),
         nuisance_penalty=0.5 * deviations,
-        tolerances=fitted.tolerances,
+        tolerances=fitted.shared[:count],
+        forms=fitted.shared[count:],
         covariance=_covariance(fitted) * np.outer(scales, scales),
         at_bound=_at_bound(estimate),
     )
 
 
 def _squared_deviations(
-    runs: Sequence[LinearisedRun], steps: Sequence[NDArray], tolerances: NDArray
+    runs: Sequence[LinearisedRun], steps: Sequence[NDArray], shared: NDArray
 ) -> float:
     """Squared deviations of all nuisance parameters from their centres [1]."""
-    return float(tolerances @ tolerances) + sum(
+    return float(shared @ shared) + sum(
         float(np.sum(((run.run_values + step) / run.run_sd) ** 2))
         for run, step in zip(runs, steps, strict=True)
     )

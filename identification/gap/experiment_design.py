@@ -25,7 +25,7 @@ from identification.gap.fitting_problem import (
 )
 from identification.gap.gauss_newton import linearise, nuisance_slopes
 from identification.gap.plant import GreyBox
-from identification.gap.variable_projection import LinearisedRun, normal_equations, tolerances_as_slopes
+from identification.gap.variable_projection import LinearisedRun, normal_equations, shared_as_slopes
 from identification.gap.verdict import Ranking
 
 MOST_RIVALS = 4
@@ -195,18 +195,26 @@ def parameter_posteriors(
     Before the data a parameter is uniform over its range; the Gaussian prior has that variance.
     """
     posteriors = []
+    # The plan allows for errors of form by FORM_ERROR.
+    estimates = [_without_modes(estimate) for estimate in estimates]
     linearised = linearise(problem, estimates, problem.fitted_runs)
     for estimate, runs in zip(estimates, linearised, strict=True):
-        equations = normal_equations([tolerances_as_slopes(run) for run in runs])
+        equations = normal_equations([shared_as_slopes(run) for run in runs])
         parameters = problem.parameters(estimate)
         widths = np.array([(p.high - p.low) / p.scale for p in parameters])
-        prior = np.concatenate([12.0 / widths**2, np.ones(runs[0].tolerance_slopes.shape[1])])
+        prior = np.concatenate([12.0 / widths**2, np.ones(runs[0].shared_slopes.shape[1])])
         precision = equations.hessian + np.diag(prior)
         factor = np.linalg.inv(np.linalg.cholesky(precision)).T
         posteriors.append(
             ParameterPosterior(mean=factor @ (factor.T @ equations.gradient), factor=factor)
         )
     return posteriors
+
+
+def _without_modes(estimate: Estimate) -> Estimate:
+    """The estimate without modes of form."""
+    slopes = estimate.slopes
+    return replace(estimate, slopes=slopes and replace(slopes, forms=None), shares=None)
 
 
 def outcome_distributions(
@@ -232,7 +240,7 @@ def outcome_distributions(
         Means (rivals, d) and covariances (rivals, d, d) [1].
     """
     n = len(runs)
-    slopes = [tolerances_as_slopes(run).slopes for run in runs]
+    slopes = [shared_as_slopes(run).slopes for run in runs]
     expected = [
         own @ posterior.mean - run.residual
         for run, own, posterior in zip(runs, slopes, posteriors, strict=True)

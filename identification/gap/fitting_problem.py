@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from epv_env.common.files import Journal
 from identification.gap.plant import Cause, FreeParameter, GreyBox, NuisanceParameter, noise_weighted
 
+UNSTABLE = 1e9
+"""Weighted output [noise deviations] that only an unstable simulation gives: it counts as failed."""
+
 FAILED_RESIDUAL = 1e3
 """Residual of a reading whose candidate cannot be simulated [noise deviations]: far above every residual
 of a usable candidate, so that the fit moves away."""
@@ -52,6 +55,51 @@ class NuisanceSlopes:
     """Per run: derivatives by the run offsets, (values, offsets) [noise deviations/SI]."""
     tolerance_slopes: list[NDArray]
     """Per run: derivatives by the tolerances, (values, m) [noise deviations/standard deviation]."""
+    calibrated: list[NDArray] | None = None
+    """Per run: derivatives by the calibrated parameters, (values, parameters) [noise deviations], which
+    fits from here keep as long as they help; None where they are taken anew in each step."""
+    forms: "FormSlopes | None" = None
+    """Derivatives by the form modes of the causes; None for an estimate that has none."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FormSlopes:
+    """Derivatives of the outputs by n form modes, which grow with the sizes of their causes."""
+
+    names: list[str]
+    """Of the modes (form_modes.py)."""
+    slopes: list[NDArray]
+    """Per run, (values, n) [noise deviations/standard deviation]."""
+    owners: NDArray
+    """Number of the cause of each mode, among those of the hypothesis, (n,)."""
+    sizes: NDArray
+    """Size of that cause at which they hold, (n,) [1]."""
+
+    def at(self, estimate: "Estimate", run: int) -> tuple[NDArray, NDArray]:
+        """The derivatives (values, n) at an estimate's sizes, and what they add to its own slopes.
+
+        Returns the latter (values, k) for the modes' shares of the estimate.
+        """
+        sizes, directions = cause_sizes(estimate)
+        slopes = self.slopes[run] * (sizes[self.owners] / self.sizes)
+        added = np.zeros((len(slopes), len(estimate.vector)))
+        if estimate.shares is not None and len(estimate.shares) == len(self.owners):
+            for cause, direction in enumerate(directions):
+                own = self.owners == cause
+                change = self.slopes[run][:, own] @ (estimate.shares[own] / self.sizes[own])
+                added += change[:, None] * direction
+        return slopes, added
+
+
+def cause_sizes(estimate: "Estimate") -> tuple[NDArray, NDArray]:
+    """Length of the scaled vector of each cause (causes,), and its gradient (causes, k) [1]."""
+    places = cause_places(estimate)
+    sizes, directions = np.zeros(len(places)), np.zeros((len(places), len(estimate.vector)))
+    for i, (cause, place, _) in enumerate(places):
+        apart = estimate.vector[place] - nominal_vector(cause)
+        sizes[i] = max(float(np.linalg.norm(apart)), np.finfo(float).eps)
+        directions[i, place] = apart / sizes[i]
+    return sizes, directions
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,6 +113,8 @@ class Estimate:
     """Run parameters of the causes less their centres, (runs, l) [SI]."""
     slopes: NuisanceSlopes | None = None
     """Nuisance slopes taken at this estimate; None: those of the fitting problem."""
+    shares: NDArray | None = None
+    """Shares of the form modes, (modes,) [standard deviations]; None before a fit."""
     chi_square: float = np.inf
     """Weighted sum of squares on the fitted runs, infinite before a fit [1]."""
     converged: bool = False
@@ -145,6 +195,7 @@ class FitCache:
             run_values=np.array(entry["local"]).reshape(runs, -1),
             chi_square=entry["chi_square"],
             converged=entry["converged"],
+            shares=np.array(entry["shares"]),
         )
 
 
@@ -156,6 +207,7 @@ def _entry(estimate: Estimate) -> dict[str, Any]:
         "local": estimate.run_values.tolist(),
         "chi_square": estimate.chi_square,
         "converged": estimate.converged,
+        "shares": [] if estimate.shares is None else estimate.shares.tolist(),
     }
 
 
@@ -249,10 +301,11 @@ class FittingProblem:
     def outputs(self, estimates: Sequence[Estimate], runs: Sequence[int]) -> list[NDArray]:
         """Weighted outputs of n estimates, per run (values, n) [noise deviations]."""
         outputs = self.plant.outputs(self.candidates(estimates), runs)
-        return [
+        weighted = [
             noise_weighted(self.plant, r, output).reshape(-1, len(estimates))
             for r, output in zip(runs, outputs, strict=True)
         ]
+        return [np.where(np.abs(y) < UNSTABLE, y, np.nan) for y in weighted]
 
     def residuals(self, estimates: Sequence[Estimate], runs: Sequence[int]) -> list[NDArray]:
         """Weighted measured - model of n estimates, per run (values, n) [noise deviations]."""

@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 
 from identification.gap.fitting_problem import Estimate, FittingProblem
 from identification.gap.gauss_newton import linearise
-from identification.gap.plant import GreyBox, StateEquation, StateTrace, noise_weighted
+from identification.gap.plant import (
+    GreyBox,
+    StateEquation,
+    StateTrace,
+    noise_weighted,
+    window_forcing,
+)
 from identification.gap.sensor_faults import physical_forms, reading_faults
 from identification.gap.variable_projection import LinearisedRun
 
@@ -98,7 +104,7 @@ class NuisanceElimination:
         runs: one estimate, linearised in each run. counted: per run, readings that count, (values,).
         """
         k = runs[0].slopes.shape[1]
-        shared = k + runs[0].tolerance_slopes.shape[1]
+        shared = k + runs[0].shared_slopes.shape[1]
         own = runs[0].run_slopes.shape[1]
         total = shared + own * len(runs)
         self._counted = counted
@@ -106,7 +112,7 @@ class NuisanceElimination:
         self._places = [np.r_[0:shared, first : first + own] for first in firsts]
         """Per run, indices of the numbers that act in it, (k + m + l,)."""
         self._columns = [
-            np.hstack([run.slopes, run.tolerance_slopes, run.run_slopes]) * each[:, None]
+            np.hstack([run.slopes, run.shared_slopes, run.run_slopes]) * each[:, None]
             for run, each in zip(runs, counted, strict=True)
         ]
         # Neither forcings nor numbers explain a reading that does not count: it has no residual.
@@ -220,10 +226,10 @@ def _forced_changes(
 ) -> list[NDArray]:
     """Changes of the outputs by a forcing of each window, per run (values, windows)."""
     plant = problem.plant
-    blocks = [
-        np.nan_to_num(noise_weighted(plant, r, plant.forced(values, equation, r, ends)))
-        for r, ends in zip(runs, edges, strict=True)
-    ]
+    blocks = []
+    for r, ends in zip(runs, edges, strict=True):
+        forcing = window_forcing(equation, len(plant.runs[r].time), ends)
+        blocks.append(np.nan_to_num(noise_weighted(plant, r, plant.forced(values, r, forcing))))
     return [block.reshape(-1, block.shape[-1]) for block in blocks]
 
 

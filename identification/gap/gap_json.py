@@ -1,6 +1,6 @@
 """The files of a diagnosis for programs: gap.json and, where one was found, the missing term.
 
-Format epv-gap/2, described in docs/reference/gap-json.md.
+Format epv-gap/3, described in docs/reference/gap-json.md.
 """
 
 import re
@@ -17,6 +17,7 @@ from epv_env.common.files import write_json
 from identification.block_bootstrap import LEVEL, Interval
 from identification.gap.diagnosis import Diagnosis, hypothesis_label
 from identification.gap.evidence import EvaluatedHypothesis
+from identification.gap.form_modes import law_in_words
 from identification.gap.gaps import FLOOR
 from identification.gap.held_out import NOMINAL, RECALIBRATED
 from identification.gap.localisation import Localisation, MissingTerm
@@ -72,7 +73,7 @@ def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = 
     unexplained = diagnosis.reduction.unexplained
     with_cause = diagnosis.best.hypothesis if diagnosis.best else ranking.recalibrated
     return {
-        "format": "epv-gap/2",
+        "format": "epv-gap/3",
         "verdict": conclusion.verdict,
         "where": _where(diagnosis),
         "causes": [_cause(diagnosis, cause) for cause in conclusion.causes[:LISTED_CAUSES]],
@@ -85,6 +86,11 @@ def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = 
             "location": remaining_location(diagnosis),
         },
         "inclusion": inclusion(diagnosis),
+        "levels": {
+            "component": conclusion.component_probabilities,
+            "mechanism": inclusion(diagnosis),
+            "form": _forms(diagnosis),
+        },
         "remainder": {
             "fraction": left.share.value,
             "low": left.share.low,
@@ -114,6 +120,15 @@ def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = 
         "absorbed": list(separability.absorbed),
         "warnings": diagnosis.warnings,
     }
+
+
+def _forms(diagnosis: Diagnosis) -> dict[str, float]:
+    """Probability that each form of an effect is part of the gap, of forms with a noticeable one."""
+    ranking, total = diagnosis.ranking, dict[str, float]()
+    for hypothesis, probability in zip(ranking.hypotheses, ranking.probabilities, strict=True):
+        for label in hypothesis.labels:
+            total[label] = total.get(label, 0.0) + probability
+    return {label: min(share, 1.0) for label, share in total.items() if share >= LISTED_INCLUSION}
 
 
 def inclusion(diagnosis: Diagnosis) -> dict[str, float]:
@@ -186,6 +201,7 @@ def _cause(diagnosis: Diagnosis, cause: RankedCause) -> dict[str, Any]:
         "effects": list(cause.effects),
         "probability": cause.probability,
         "magnitude": {name: list(values) for name, values in magnitudes(diagnosis, cause).items()},
+        "form": law_in_words(cause.hypothesis.estimate),
         "converged": cause.hypothesis.converged,
     }
     label = hypothesis_label(cause.hypothesis)

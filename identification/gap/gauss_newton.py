@@ -79,9 +79,12 @@ def linearise(
 
 
 def _changed(problem: FittingProblem, estimate: Estimate) -> list[Estimate]:
-    """The estimate, then a copy for each parameter and run parameter, changed by its step."""
+    """The estimate, then a copy for each parameter and run parameter, changed by its step.
+
+    Calibrated parameters whose derivatives are kept are left out.
+    """
     candidates = [estimate]
-    for i, step in enumerate(_steps(problem, estimate)):
+    for i, step in list(enumerate(_steps(problem, estimate)))[_kept(problem, estimate) :]:
         vector = estimate.vector.copy()
         vector[i] += step
         candidates.append(replace(estimate, vector=vector))
@@ -90,6 +93,11 @@ def _changed(problem: FittingProblem, estimate: Estimate) -> list[Estimate]:
         run_values[:, j] += nuisance.step
         candidates.append(replace(estimate, run_values=run_values))
     return candidates
+
+
+def _kept(problem: FittingProblem, estimate: Estimate) -> int:
+    """Number of calibrated parameters whose derivatives are kept."""
+    return 0 if problem.slopes_of(estimate).calibrated is None else len(problem.plant.parameters)
 
 
 def _steps(problem: FittingProblem, estimate: Estimate) -> NDArray:
@@ -103,14 +111,16 @@ def _linearised(
     problem: FittingProblem, estimate: Estimate, run: int, outputs: NDArray
 ) -> LinearisedRun:
     """One run from the weighted outputs (values, 1 + k + l) of the changed estimates."""
-    k = len(estimate.vector)
+    kept, steps = _kept(problem, estimate), _steps(problem, estimate)
+    calibrated, k = problem.slopes_of(estimate).calibrated, len(steps) - kept
     changes = np.nan_to_num(outputs[:, 1:] - outputs[:, :1])
+    slopes = changes[:, :k] / steps[kept:]
     return linearised_run(
         problem,
         estimate,
         run,
         outputs[:, 0],
-        slopes=changes[:, :k] / _steps(problem, estimate),
+        slopes=slopes if calibrated is None else np.column_stack([calibrated[run], slopes]),
         run_slopes=changes[:, k:] / [n.step for n in estimate.hypothesis.run_parameters],
         run_values=estimate.run_values[run],
     )
@@ -138,26 +148,30 @@ def linearised_run(
         run_values: the run parameters less their centres, (l,) [SI].
     """
     nuisances = problem.slopes_of(estimate)
-    offset_slopes, tolerance_slopes = nuisances.offset_slopes[run], nuisances.tolerance_slopes[run]
+    offset_slopes, shared_slopes = nuisances.offset_slopes[run], nuisances.tolerance_slopes[run]
     offsets = offset_slopes.shape[1]
     run_parameters = estimate.hypothesis.run_parameters
     known = (*run_parameters, *problem.plant.run_offsets[:offsets])
     # The slopes describe tolerances from their centres: their part in the simulation is undone.
-    undone = tolerance_slopes @ nuisances.deviations
+    undone = shared_slopes @ nuisances.deviations
+    if nuisances.forms:
+        modes, added = nuisances.forms.at(estimate, run)
+        shared_slopes = np.column_stack([shared_slopes, modes])
+        slopes = slopes + added if slopes.size else slopes
     return LinearisedRun(
         residual=problem.residual(run, outputs[:, None])[:, 0] + undone,
         slopes=slopes,
         run_slopes=np.column_stack([run_slopes, offset_slopes]),
         run_values=np.concatenate([run_values, np.zeros(offsets)]),
         run_sd=np.array([nuisance.sd for nuisance in known]),
-        tolerance_slopes=tolerance_slopes,
+        shared_slopes=shared_slopes,
     )
 
 
 def nuisance_slopes(
     problem: FittingProblem, estimates: Sequence[Estimate], deviations: Sequence[NDArray]
 ) -> list[NuisanceSlopes]:
-    """Derivatives by run offsets and tolerances at each estimate, over all runs.
+    """Derivatives by nuisances and calibrated parameters at each estimate, over all runs.
 
     Args:
         problem: the plant.
@@ -183,11 +197,19 @@ def nuisance_slopes(
         for each, own in zip(all_slopes, slopes.transpose(1, 0, 2), strict=True):
             each.offset_slopes.append(own[:, :offsets])
             each.tolerance_slopes.append(own[:, offsets:] * sd)
-    return all_slopes
+    count = len(plant.parameters)
+    calibrated = [
+        None if problem.thorough else [run.slopes[:, :count] for run in runs]
+        for runs in linearise(problem, placed, problem.all_runs)
+    ]
+    return [replace(each, calibrated=own) for each, own in zip(all_slopes, calibrated, strict=True)]
 
 
 def fit(
-    problem: FittingProblem, starts: Sequence[Estimate], rival_chi_square: float = np.inf
+    problem: FittingProblem,
+    starts: Sequence[Estimate],
+    rival_chi_square: float = np.inf,
+    iterations: int = ITERATIONS,
 ) -> list[Estimate]:
     """Fit every start to the fitted runs, until each fit has converged or is given up.
 
@@ -195,12 +217,13 @@ def fit(
         problem: readings and settings.
         starts: where the fits begin.
         rival_chi_square: least chi-square of earlier fits against which these compete [1].
+        iterations: most of them, for fits that need not be thorough.
     """
     if not starts:
         return []
     searches = [_Search(problem, start) for start in starts]
     active = searches
-    for _ in range((THOROUGH_ITERATIONS if problem.thorough else ITERATIONS) + 1):
+    for _ in range((THOROUGH_ITERATIONS if problem.thorough else iterations) + 1):
         linearised = linearise(problem, [search.trial for search in active], problem.fitted_runs)
         for search, runs in zip(active, linearised, strict=True):
             search.advance(runs, rival_chi_square)
@@ -227,6 +250,9 @@ class _Search:
         if self.equations is None or equations.chi_square < self.best.chi_square:
             self._accept(runs, equations)
             current = equations
+        elif self.problem.slopes_of(self.best).calibrated is not None:
+            self._take_anew()
+            return
         else:
             self._tighten()
             current = self.equations
@@ -240,7 +266,14 @@ class _Search:
             self.trial,
             chi_square=equations.chi_square,
             run_values=self._stepped_run_values(runs, equations),
+            shares=equations.shared[len(self.problem.plant.tolerances) :],
         )
+
+    def _take_anew(self) -> None:
+        """Return to the best estimate, from now on with derivatives of all parameters."""
+        slopes = replace(self.problem.slopes_of(self.best), calibrated=None)
+        self.best = replace(self.best, slopes=slopes)
+        self.trial, self.equations = self.best, None
 
     def _tighten(self) -> None:
         raised = DAMPING_INCREASE * self.damping + 1e-6  # leaves zero as well
@@ -252,7 +285,7 @@ class _Search:
         count = run_values.shape[1]
         if count:
             for r, run in zip(self.problem.fitted_runs, runs, strict=True):
-                step = without_run_nuisances(run, equations.tolerances)[1]
+                step = without_run_nuisances(run, equations.shared)[1]
                 run_values[r] += step[:count]
         return run_values
 

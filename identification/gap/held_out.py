@@ -33,7 +33,7 @@ the larger of both holds."""
 
 @dataclass(frozen=True, kw_only=True)
 class Unexplained:
-    """What the best cause leaves."""
+    """What a model leaves."""
 
     fraction: float
     """Share of the explainable gap [1]; 0 where the recalibrated model may be at the floor."""
@@ -59,8 +59,15 @@ class DiscrepancyReduction:
     """False where the recalibrated model comes nearer to the held-out runs without the black box."""
     unexplained: Unexplained
     """By the best cause; by the recalibrated model where there is none."""
+    recalibration_leaves: Unexplained
+    """By the recalibrated model."""
     noise_ratios: Mapping[str, float]
     """By channel: noise deviation of the gaps relative to `Channel.noise` [1]."""
+
+    @property
+    def left(self) -> Gap:
+        """Gap of the best cause, of the recalibrated model where there is none."""
+        return self.gaps[next(iter(self.shares_closed), RECALIBRATED)]
 
 
 def measure_discrepancy_reduction(
@@ -93,7 +100,10 @@ def measure_discrepancy_reduction(
     }
     boxes = {label: _helpful(predictions[label].residuals, box, plant) for label, box in boxes.items()}
     draws = GapDraws(plant, _all_residuals(predictions, boxes), seed, scale)
-    significance = p_value(plant, predictions[best].residuals, boxes[best], seed, scale)
+    unexplained = {
+        label: _unexplained(draws, label, p_value(plant, predictions[label].residuals, box, seed, scale))
+        for label, box in boxes.items()
+    }
     ratios = zip(plant.channels, draws.noise[0], strict=True)
     return DiscrepancyReduction(
         gaps={
@@ -108,7 +118,8 @@ def measure_discrepancy_reduction(
         },
         black_box=draws.gap(_boxed(RECALIBRATED)),
         black_box_helps=any(np.any(block) for block in boxes[RECALIBRATED]),
-        unexplained=_unexplained(draws, best, significance),
+        unexplained=unexplained[best],
+        recalibration_leaves=unexplained[RECALIBRATED],
         noise_ratios={channel.name: float(ratio) for channel, ratio in ratios},
     )
 

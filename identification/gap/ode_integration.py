@@ -128,10 +128,9 @@ class Job:
     """Sampling period [s]."""
     steps: int
     """Sub-steps in a sampling period."""
-    acting: NDArray
-    """First sample with the forcing, and the first one without it again, (2, n)."""
     push: NDArray
-    """Forcing of the states' rates while it acts, (states, n) [SI/s]."""
+    """Forcing of the states' rates, held until the next sample, (samples, states, n) [SI/s]; (0, states,
+    n) for none."""
 
 
 def alone(advance: Callable, read: Callable, channels: int, wrap: Callable) -> Simulation:
@@ -153,12 +152,12 @@ def alone(advance: Callable, read: Callable, channels: int, wrap: Callable) -> S
         return np.isfinite(total)
 
     @wrap
-    def loop(x, inputs, total, delays, p, period, substeps, acting, push, work, states, readings):
-        u, none = np.empty(inputs.shape[1]), np.zeros_like(push)
+    def loop(x, inputs, total, delays, p, period, substeps, push, work, states, readings):
+        u, none = np.empty(inputs.shape[1]), np.zeros(len(x))
         for k in range(len(inputs)):
             if not finite(x):
                 break
-            pushed = push if acting[0] <= k < acting[1] else none
+            pushed = push[k] if k < len(push) else none
             for s in range(substeps):
                 begin = k + s / substeps
                 for i in range(len(u)):
@@ -176,15 +175,15 @@ def alone(advance: Callable, read: Callable, channels: int, wrap: Callable) -> S
         states = np.full((n, len(job.start), len(job.inputs)), np.nan)
         readings = np.full((n, channels, len(job.inputs)), np.nan)
         total = totals(job.inputs)
-        starts, delays, parameters, acting, pushes = (
-            np.ascontiguousarray(own.T)
-            for own in (job.start, job.delays, job.parameters, job.acting, job.push)
+        starts, delays, parameters = (
+            np.ascontiguousarray(own.T) for own in (job.start, job.delays, job.parameters)
         )
+        pushes = np.ascontiguousarray(np.moveaxis(job.push, -1, 0))
         for c in range(n):
             given = starts[c], job.inputs, total, delays[c], parameters[c], job.period, job.steps
             # Functions such as math.exp refuse what numpy calls inf: the candidate ends there.
             with contextlib.suppress(ArithmeticError):
-                loop(*given, acting[c], pushes[c], work, states[c], readings[c])
+                loop(*given, pushes[c], work, states[c], readings[c])
         return np.moveaxis(readings, 0, -1), np.moveaxis(states, 0, -1)
 
     return lambda jobs: [simulate(job) for job in jobs]
@@ -222,7 +221,7 @@ def together(
         x, p, size = bundle.start, bundle.parameters, bundle.period / bundle.steps
         states, readings = (np.empty((bundle.samples, rows, x.shape[1])) for rows in (len(x), channels))
         for k in range(bundle.samples):
-            push = bundle.push * ((bundle.acting[0] <= k) & (k < bundle.acting[1]))
+            push = bundle.push[k] if k < len(bundle.push) else 0.0 * x
             for s in range(bundle.steps):
                 begin = k + s / bundle.steps
                 u = bundle.inputs(k, begin)
@@ -250,9 +249,13 @@ class _Bundle:
 
     def __init__(self, jobs: Sequence[Job]):
         self.jobs, self.period, self.steps = jobs, jobs[0].period, jobs[0].steps
-        self.start, self.parameters, self.delays, self.acting, self.push = (
+        self.start, self.parameters, self.delays = (
             np.concatenate([getattr(job, name) for job in jobs], axis=1)
-            for name in ("start", "parameters", "delays", "acting", "push")
+            for name in ("start", "parameters", "delays")
+        )
+        longest = max(len(job.push) for job in jobs)
+        self.push = np.concatenate(
+            [np.pad(j.push, ((0, longest - len(j.push)), (0, 0), (0, 0))) for j in jobs], axis=-1
         )
         self.samples = max(len(job.inputs) for job in jobs)
         self.signals = np.stack(
@@ -303,17 +306,23 @@ def simulator(records: Records, functions: Sequence[tuple[Callable, int]], mode:
     channels, count = functions[1][1], functions[2][1]
     advance = advancing(rate, thresholds, count, own)
     if mode == "numpy":
-        return together(rate, read, thresholds, (channels, count), advance)
-    simulation = alone(advance, read, channels, own)
-    return _explained(simulation) if mode == "compiled" else simulation
+        return _explained(together(rate, read, thresholds, (channels, count), advance))
+    return _explained(alone(advance, read, channels, own))
 
 
 def _explained(simulation: Simulation) -> Simulation:
-    """The simulation, whose refusal by numba becomes one sentence."""
+    """The simulation; where functions do not suit the mode, the error says what to do."""
 
     def simulate(jobs: Sequence[Job]):
         try:
             return simulation(jobs)
+        except ValueError as error:
+            if "truth value" not in str(error):
+                raise
+            raise ValueError(
+                "rate, readings or thresholds branch on a value, which is an array of all candidates "
+                "here: use np.where, or choose mode='compiled'"
+            ) from error
         except NumbaError as error:
             lines = [line for line in str(error).splitlines() if "File" not in line and line.strip()]
             reason = next((line for line in lines if "Failed in" not in line), lines[0])
@@ -332,12 +341,15 @@ def _as_it_is(function: Callable) -> Callable:
 def settled_steps(read: Callable[[int], Sequence[NDArray]]) -> int:
     """Sub-steps whose halving changes no reading noticeably, or the most that are tried.
 
+    The first candidate must be finite; others may have values with which nothing can be simulated.
+
     read: readings with so many sub-steps, per run (channels, samples, n) [noise deviations].
     """
     steps, coarse = 1, read(1)
     while 2 * steps <= MOST_STEPS:
         fine = read(2 * steps)
-        if _largest_change(coarse, fine) <= STEP_ERROR:
+        finite = all(np.all(np.isfinite(reading[..., 0])) for reading in fine)
+        if finite and _largest_change(coarse, fine) <= STEP_ERROR:
             return steps
         steps, coarse = 2 * steps, fine
     return steps

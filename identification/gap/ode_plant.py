@@ -1,6 +1,6 @@
 """A plant for the diagnosis from plain differential equations: x' = rate(x, u, p)."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from typing import Any
@@ -12,12 +12,14 @@ from identification.gap.ode_integration import TIME, Job, Records, settled_steps
 from identification.gap.plant import (
     Cause,
     Channel,
+    Contribution,
     FreeParameter,
     NuisanceParameter,
     Run,
     StateEquation,
     StateTrace,
 )
+from identification.gap.reading_noise import channel_noise
 
 
 class OdePlant:
@@ -77,7 +79,8 @@ class OdePlant:
                 takes numbers; it is the fastest, after some seconds.
 
         Raises:
-            ValueError: for names, numbers of results or a mode that do not fit.
+            ValueError: for names, numbers of results, inputs or a mode that do not fit, and for a model
+                that cannot be simulated at its nominal values.
         """
         self.runs, self.channels = tuple(runs), tuple(channels)
         inputs = _shared_inputs(self.runs)
@@ -86,6 +89,7 @@ class OdePlant:
         self.nominal = _nominal_values(parameters, causes, (*run_offsets, *tolerances))
         self._records = Records(states, inputs, tuple(self.nominal))
         self._start, self._regimes, self._mode = start, regimes, mode
+        self._rate, self._read = rate, readings
         self._delays = dict(delays or {})
         self._units = dict.fromkeys((*states, *inputs), ("", 1.0)) | dict(units or {})
         self.equations = self._state_equations(components or {}, forcing_steps or {})
@@ -124,19 +128,50 @@ class OdePlant:
         p = self._records.p(*self._parameters(_first(values), run)[:, 0])
         return self._regimes(self._records.x(*x), self._records.u(own.time, *own.inputs.values()), p)
 
-    def forced(
-        self, values: Mapping[str, NDArray], equation: StateEquation, run: int, edges: NDArray
-    ) -> NDArray:
-        """`GreyBox.forced`: change (channels, samples, windows) [SI]; edges: samples (windows + 1,)."""
-        windows = len(edges) - 1
-        push = np.zeros((len(self._records.states), windows + 1))
-        push[self._records.states.index(equation.state), 1:] = equation.step
-        acting = np.array([[0, *edges[:-1]], [0, *edges[1:]]])
-        copies = {symbol: np.repeat(v[:1], windows + 1, axis=0) for symbol, v in values.items()}
-        copies = copies or {symbol: np.full(windows + 1, v) for symbol, v in self.nominal.items()}
-        job = replace(self._job(copies, run), push=push, acting=acting)
-        read = self._simulated([job])[0][0]
+    def forced(self, values: Mapping[str, NDArray], run: int, forcing: Mapping[str, NDArray]) -> NDArray:
+        """`GreyBox.forced`: changes (channels, samples, m) [SI]."""
+        samples, m = next(iter(forcing.values())).shape
+        push = np.zeros((samples, len(self._records.states), m + 1))
+        for i, equation in enumerate(self.equations):
+            if equation.name in forcing:
+                push[:, i, 1:] = forcing[equation.name]
+        copies = {symbol: np.repeat(v[:1], m + 1, axis=0) for symbol, v in values.items()}
+        copies = copies or {symbol: np.full(m + 1, v) for symbol, v in self.nominal.items()}
+        read = self._simulated([replace(self._job(copies, run), push=push)])[0][0]
         return read[..., 1:] - read[..., :1]
+
+    def contribution(
+        self, values: Mapping[str, NDArray], symbols: Collection[str], run: int
+    ) -> Contribution:
+        """`GreyBox.contribution`: forcings of the states, and readings (channels, samples) [SI]."""
+        job = self._job(_first(values), run)
+        x = self._simulated([job])[0][1][..., 0]
+        without = job.parameters.copy()
+        for symbol in symbols:
+            without[self._records.symbols.index(symbol)] = self.nominal[symbol]
+        rates, readings = (
+            with_them - without_them
+            for with_them, without_them in zip(
+                self._along(x, run, job.parameters), self._along(x, run, without), strict=True
+            )
+        )
+        return Contribution(
+            equations={
+                equation.name: rate
+                for equation, rate in zip(self.equations, rates, strict=True)
+                if equation.step
+            },
+            readings=readings,
+        )
+
+    def _along(self, x: NDArray, run: int, p: NDArray) -> tuple[NDArray, NDArray]:
+        """Rates (states, samples) and readings (channels, samples) at states x (states, samples)."""
+        names, own = self._records, self.runs[run]
+        parameters = names.p(*p[:, 0])
+        inputs = np.array([own.time - own.time[0], *own.inputs.values()], dtype=float)
+        given = [(names.x(*a), names.u(*b), parameters) for a, b in zip(x.T, inputs.T, strict=True)]
+        rates, readings = ([f(*each) for each in given] for f in (self._rate, self._read))
+        return np.array(rates, dtype=float).T, np.array(readings, dtype=float).T
 
     def _simulated(self, jobs: Sequence[Job]) -> list[tuple[NDArray, NDArray]]:
         """Readings (channels, samples, n) and states (states, samples, n) of each job [SI]."""
@@ -157,8 +192,7 @@ class OdePlant:
             parameters=p,
             period=float(own.time[1] - own.time[0]),
             steps=steps or self.steps_per_sample,
-            acting=np.zeros((2, n), dtype=int),
-            push=np.zeros((len(names.states), n)),
+            push=np.zeros((0, len(names.states), n)),
         )
 
     def _parameters(self, values: Mapping[str, NDArray], run: int) -> NDArray:
@@ -212,11 +246,17 @@ class OdePlant:
         names, run = self._records, self.runs[0]
         p = names.p(*self.nominal.values())
         u = names.u(0.0, *(float(signal[0]) for signal in run.inputs.values()))
-        begun = _counted("start", self._start(run, p), len(names.states), "state")
-        x = names.x(*(float(value) for value in begun))
-        _counted("rate", rate(x, u, p), len(names.states), "state")
-        _counted("readings", readings(x, u, p), len(self.channels), "channel")
-        return len(thresholds(x, u, p)) if thresholds else 0
+        try:
+            begun = _counted("start", self._start(run, p), len(names.states), "state")
+            x = names.x(*(float(value) for value in begun))
+            _counted("rate", rate(x, u, p), len(names.states), "state")
+            _counted("readings", readings(x, u, p), len(self.channels), "channel")
+            return len(thresholds(x, u, p)) if thresholds else 0
+        except AttributeError as error:
+            raise ValueError(
+                f"OdePlant: a function asks for what is not there ({error}): x has the states "
+                f"{names.states}, u the inputs {(TIME, *names.inputs)}, p the symbols {names.symbols}"
+            ) from error
 
     def _settled(self) -> int:
         """Sub-steps whose halving changes no reading noticeably, nominal or at a trial of a cause."""
@@ -228,13 +268,25 @@ class OdePlant:
         ]
         candidates = [self.nominal | changed for changed in [{}, *trials]]
         values = {symbol: np.array([own[symbol] for own in candidates]) for symbol in self.nominal}
-        noise = np.array([channel.noise for channel in self.channels])[:, None, None]
+        noise = np.array(
+            [
+                channel_noise(channel, [run.measured[c][run.trusted[c]] for run in self.runs])[0]
+                for c, channel in enumerate(self.channels)
+            ]
+        )[:, None, None]
 
         def read(steps: int) -> list[NDArray]:
             jobs = [self._job(values, r, steps) for r in range(len(self.runs))]
             return [reading / noise for reading, _ in self._simulated(jobs)]
 
-        return settled_steps(read)
+        steps = settled_steps(read)
+        if not all(np.all(np.isfinite(reading[..., 0])) for reading in read(steps)):
+            raise ValueError(
+                f"OdePlant: at the nominal values readings are not finite, with {steps} steps in a "
+                "sampling period too: the model is stiff, or a value is wrong. Correct it, or wrap a "
+                "stiff solver in a BlackBoxPlant"
+            )
+        return steps
 
 
 def _first(values: Mapping[str, NDArray]) -> dict[str, NDArray]:
@@ -252,6 +304,12 @@ def _shared_inputs(runs: Sequence[Run]) -> tuple[str, ...]:
                 f"run '{run.name}' has the inputs {tuple(run.inputs)}, '{runs[0].name}' has {wanted}: "
                 "give every run the same inputs in the same order"
             )
+        for name, signal in run.inputs.items():
+            if np.shape(signal) != np.shape(run.time):
+                raise ValueError(
+                    f"run '{run.name}': input '{name}' has the shape {np.shape(signal)}, time has "
+                    f"{np.shape(run.time)}: give one value per sample"
+                )
     if TIME in wanted:
         raise ValueError(f"input '{TIME}' has the name of the time in seconds: rename the input")
     return wanted

@@ -5,7 +5,7 @@ nuisance parameters, state equations, and a simulator of several candidates side
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -184,6 +184,16 @@ class StateTrace:
     """Time course, (samples,) [SI]."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Contribution:
+    """What a cause adds to the equations and readings of the nominal model."""
+
+    equations: Mapping[str, NDArray]
+    """Forcing that it amounts to, (samples,) [SI] by name of the equation."""
+    readings: NDArray
+    """Added to the readings themselves, (channels, samples) [SI]."""
+
+
 class GreyBox(Protocol):
     """A plant with recordings. Values are SI; n candidates are simulated side by side.
 
@@ -256,21 +266,43 @@ class GreyBox(Protocol):
         """
         ...
 
-    def forced(
-        self, values: Mapping[str, NDArray], equation: StateEquation, run: int, edges: NDArray
-    ) -> NDArray:
-        """Change of the outputs under a forcing of the equation's step, window by window.
+    def forced(self, values: Mapping[str, NDArray], run: int, forcing: Mapping[str, NDArray]) -> NDArray:
+        """Changes of the outputs under m forcings side by side.
 
         Args:
             values: values of one candidate by symbol, (1,) or (1, runs) [SI].
-            equation: the equation to which the forcing is added.
             run: index into `self.runs`.
-            edges: first sample of each window, and the end of the last one, (windows + 1,).
+            forcing: what is added to the equations, (samples, m) [SI] by name of the equation; a value
+                holds until the next sample.
 
         Returns:
-            Change of the outputs, (channels, samples, windows) [SI].
+            Changes of the outputs, (channels, samples, m) [SI].
         """
         ...
+
+    def contribution(
+        self, values: Mapping[str, NDArray], symbols: Collection[str], run: int
+    ) -> "Contribution | None":
+        """What some symbols add to the equations and readings along the candidate's course.
+
+        Args:
+            values: values of one candidate by symbol, (1,) or (1, runs) [SI].
+            symbols: which otherwise have their nominal values.
+            run: index into `self.runs`.
+
+        Returns:
+            None where the plant cannot tell.
+        """
+        ...
+
+
+def window_forcing(equation: StateEquation, samples: int, edges: NDArray) -> dict[str, NDArray]:
+    """A forcing of the equation's step in each window, (samples, windows) by the equation's name.
+
+    edges: first sample of each window, and the end of the last one, (windows + 1,).
+    """
+    window = np.searchsorted(edges, np.arange(samples), side="right")[:, None] - 1
+    return {equation.name: equation.step * (window == np.arange(len(edges) - 1))}
 
 
 def noise_weighted(plant: GreyBox, run: int, values: NDArray) -> NDArray:

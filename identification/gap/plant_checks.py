@@ -14,6 +14,7 @@ from identification.gap.plant import (
     GreyBox,
     PlantError,
     Run,
+    window_forcing,
 )
 from identification.gap.prepared_plant import prepared
 from identification.gap.screened import sentences
@@ -83,8 +84,14 @@ def _recording_faults(plant: GreyBox) -> Iterator[str]:
         yield "channels: there is none, but a gap is seen in measured outputs: give one or more"
     for name in _repeated(channel.name for channel in plant.channels):
         yield f"channels: two are named {name}, but results are listed by name: rename one"
-    if not plant.runs:
-        yield "runs: there is none: give two or more, one of them with held_out=True"
+    if len(plant.runs) < 2:
+        yield (
+            f"runs: there {'is one' if plant.runs else 'is none'}: give two or more, one of them with "
+            "held_out=True; a single recording is cut in two"
+        )
+        return
+    for name in _repeated(run.name for run in plant.runs):
+        yield f"runs: two are named {name}, but results are listed by name: rename one"
     for held_out, word, use in ((True, "held out", "a gap is judged"), (False, "fitted", "a fit rests")):
         own = [run for run in plant.runs if run.held_out == held_out]
         if plant.runs and not own:
@@ -292,8 +299,9 @@ def _shape_faults(plant: GreyBox) -> Iterator[str]:
             yield f"regimes: {regime} of run {name} is not boolean (samples,) = {(samples,)}"
     edges = np.array([0, (samples - 1) // 2, samples - 1])
     expected = len(plant.channels), samples, len(edges) - 1
-    for equation in plant.equations:
-        shape = np.shape(plant.forced(values, equation, run, edges)) if equation.step else expected
+    for equation in (equation for equation in plant.equations if equation.step):
+        forcing = window_forcing(equation, samples, edges)
+        shape = np.shape(plant.forced(values, run, forcing))
         if shape != expected:
             yield f"forced: equation {equation.name} has the shape {shape}, not {expected}"
 

@@ -35,16 +35,16 @@ def predict(problem: FittingProblem, estimate: Estimate) -> Prediction:
     """Simulate all runs; a held-out run determines its own nuisance parameters and nothing else."""
     estimate = with_settled_runs(problem, estimate)
     outputs, runs = _in_run_parameters(problem, estimate)
-    tolerances = _tolerances(problem, runs)
+    shared = _shared(problem, runs)
     shapes = [run.measured.shape for run in problem.plant.runs]
     return Prediction(
         outputs=outputs,
         residuals=[
-            without_run_nuisances(run, tolerances)[0].reshape(shape)
+            without_run_nuisances(run, shared)[0].reshape(shape)
             for run, shape in zip(runs, shapes, strict=True)
         ],
         residuals_nominal_offsets=[
-            (run.residual - run.tolerance_slopes @ tolerances).reshape(shape)
+            (run.residual - run.shared_slopes @ shared).reshape(shape)
             for run, shape in zip(runs, shapes, strict=True)
         ],
     )
@@ -58,16 +58,16 @@ def with_settled_runs(problem: FittingProblem, estimate: Estimate) -> Estimate:
     count = len(estimate.hypothesis.run_parameters)
     for _ in range(SETTLING_STEPS if count else 0):
         runs = _in_run_parameters(problem, estimate)[1]
-        tolerances = _tolerances(problem, runs)
-        steps = [without_run_nuisances(run, tolerances)[1][:count] for run in runs]
+        shared = _shared(problem, runs)
+        steps = [without_run_nuisances(run, shared)[1][:count] for run in runs]
         estimate = replace(estimate, run_values=estimate.run_values + np.array(steps))
     return estimate
 
 
-def _tolerances(problem: FittingProblem, runs: Sequence[LinearisedRun]) -> NDArray:
-    """Tolerances (m,) [standard deviations] as the fitted runs determine them."""
+def _shared(problem: FittingProblem, runs: Sequence[LinearisedRun]) -> NDArray:
+    """Shared nuisances (m,) [standard deviations] as the fitted runs determine them."""
     fitted = [runs[r] for r in problem.fitted_runs]
-    return normal_equations(fitted).tolerances
+    return normal_equations(fitted).shared
 
 
 def _in_run_parameters(

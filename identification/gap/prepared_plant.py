@@ -1,19 +1,15 @@
 """A plant as the stages of the diagnosis need it: screened, noise known, every reading a number."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.plant import Channel, GreyBox, PlantError, Run, StateEquation, StateTrace
-from identification.gap.reading_noise import STEP_TO_SD, quantisation_step, white_noise
+from identification.gap.plant import Channel, Contribution, GreyBox, PlantError, Run, StateTrace
+from identification.gap.reading_noise import NoiseSource, channel_noise
 from identification.gap.screened import Finding, bridged, screen
-
-NoiseSource = Literal["given", "estimated", "resolution"]
-"""Where a channel's noise comes from: the user, the readings, or the step between possible readings."""
 
 
 class PreparedPlant:
@@ -36,7 +32,7 @@ class PreparedPlant:
         self.tolerances, self.run_offsets = tuple(plant.tolerances), tuple(plant.run_offsets)
         self.equations = tuple(plant.equations)
         noise = [
-            _noise(channel, [run.measured[c][run.trusted[c]] for run in runs])
+            channel_noise(channel, [run.measured[c][run.trusted[c]] for run in runs])
             for c, channel in enumerate(plant.channels)
         ]
         self.channels: tuple[Channel, ...] = tuple(
@@ -76,11 +72,15 @@ class PreparedPlant:
         """`GreyBox.regimes`: boolean (samples,) by name."""
         return self.plant.regimes(values, run)
 
-    def forced(
-        self, values: Mapping[str, NDArray], equation: StateEquation, run: int, edges: NDArray
-    ) -> NDArray:
-        """`GreyBox.forced`: changes (channels, samples, windows) [SI]."""
-        return self.plant.forced(values, equation, run, edges)
+    def forced(self, values: Mapping[str, NDArray], run: int, forcing: Mapping[str, NDArray]) -> NDArray:
+        """`GreyBox.forced`: changes (channels, samples, m) [SI]."""
+        return self.plant.forced(values, run, forcing)
+
+    def contribution(
+        self, values: Mapping[str, NDArray], symbols: Collection[str], run: int
+    ) -> Contribution | None:
+        """`GreyBox.contribution` of the symbols."""
+        return self.plant.contribution(values, symbols, run)
 
 
 def prepared(plant: GreyBox) -> PreparedPlant:
@@ -122,23 +122,6 @@ def _with_inputs(plant: GreyBox, runs: Sequence[Run], found: Sequence[Finding]) 
             "plant a method with_runs(runs) that takes corrected ones"
         )
     return plant
-
-
-def _noise(channel: Channel, series: Sequence[NDArray]) -> tuple[float, NoiseSource]:
-    """Noise of a channel [SI] and where it comes from; series: trusted readings of each run."""
-    if channel.noise is not None:
-        floor = STEP_TO_SD * channel.resolution
-        return (channel.noise, "given") if channel.noise >= floor else (floor, "resolution")
-    floor = STEP_TO_SD * (channel.resolution or quantisation_step(series))
-    level = white_noise(series)
-    if level > floor:
-        return level, "estimated"
-    if not floor > 0:
-        raise PlantError(
-            f"channel {channel.name}: its noise is None, but its trusted readings do not show any "
-            "(too few, or most neighbours are equal): give `noise` or `resolution`"
-        )
-    return floor, "resolution"
 
 
 def _prepared_run(run: Run) -> Run:

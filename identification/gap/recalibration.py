@@ -11,13 +11,18 @@ from functools import partial
 import numpy as np
 
 from identification.gap.discrepancy import LAGS, ChannelDiscrepancy, noise_ratios, squared_differences
-from identification.gap.evidence import EvaluatedHypothesis, evaluate
+from identification.gap.evidence import EvaluatedHypothesis, evaluate, misfit
 from identification.gap.fitting_problem import Estimate, FitCache, FittingProblem, Hypothesis
+from identification.gap.form_modes import form_modes
 from identification.gap.gauss_newton import fit, nuisance_slopes
 from identification.gap.plant import GreyBox
 from identification.gap.prediction import predict
 from identification.gap.prepared_plant import PreparedPlant, prepared
 from identification.gap.screening import Start
+
+ROUNDS, ITERATIONS_OF_A_ROUND = 2, 4
+"""Rounds in which the modes of form are taken anew, as they change with the estimate, and most steps
+in between."""
 
 WRONG_NOISE_RATIO = 1.25
 """Ratio of the noise that the residuals show to the stated noise, or its inverse, above which the stated
@@ -62,15 +67,27 @@ def with_own_nuisances(
     """Hypotheses fitted further, with nuisance slopes taken at each estimate; name: in the journal."""
     if not evaluated:
         return []
-    estimates = [each.estimate for each in evaluated]
-    slopes = nuisance_slopes(problem, estimates, [each.tolerances for each in evaluated])
-    starts = [
-        replace(restarted(estimate), slopes=own) for estimate, own in zip(estimates, slopes, strict=True)
-    ]
-    fitted = cache(name, partial(fit, problem, starts))
-    # A journal keeps no slopes.
-    refined = [replace(e, slopes=own) for e, own in zip(fitted, slopes, strict=True)]
-    return evaluate(problem, refined)
+    best = list(evaluated)
+    slopes = nuisance_slopes(
+        problem, [each.estimate for each in evaluated], [each.tolerances for each in evaluated]
+    )
+    for round_ in range(ROUNDS):
+        slopes = [
+            replace(own, forms=form_modes(problem, replace(each.estimate, slopes=own)))
+            for own, each in zip(slopes, evaluated, strict=True)
+        ]
+        starts = [
+            replace(restarted(each.estimate), slopes=own)
+            for each, own in zip(evaluated, slopes, strict=True)
+        ]
+        another = partial(fit, problem, starts, iterations=ITERATIONS_OF_A_ROUND)
+        fitted = cache(f"{name}, round {round_ + 1}", another)
+        # A journal keeps no slopes.
+        refined = [replace(e, slopes=own) for e, own in zip(fitted, slopes, strict=True)]
+        evaluated = evaluate(problem, refined)
+        pairs = zip(best, evaluated, strict=True)
+        best = [new if round_ == 0 or misfit(new) < misfit(old) else old for old, new in pairs]
+    return best
 
 
 def with_seen_noise(problem: FittingProblem, base: Estimate) -> PreparedPlant:

@@ -12,6 +12,7 @@ from scipy.stats import norm
 
 from identification.block_bootstrap import LEVEL, Interval
 from identification.gap.diagnosis import Diagnosis, hypothesis_title
+from identification.gap.form_modes import Law
 from identification.gap.gaps import FLOOR, RegimeGap
 from identification.gap.held_out import DiscrepancyReduction
 from identification.gap.localisation import ForcingEstimate, MissingTerm
@@ -181,6 +182,28 @@ def residual_figure(plant: GreyBox, run: int, residual: NDArray, masks: Mapping[
     rows[-1].set_xlabel("time [s]")
     figure.suptitle(f"measured - model: {plant.runs[run].name}")
     figure.align_ylabels()
+    return figure
+
+
+def law_figure(laws: Sequence[Law], units: Mapping[str, tuple[str, float]]) -> Figure:
+    """What causes add to equations and readings: as the recordings want it over what the catalogue has.
+
+    units: unit and its size [SI], by name of the equation or channel.
+    """
+    columns = min(len(laws), 3)
+    rows = -(-len(laws) // columns)
+    figure = Figure(figsize=(3.4 * columns + 0.4, 3.1 * rows + 0.4), layout="constrained")
+    for place, law in enumerate(laws):
+        axes, (unit, size) = figure.add_subplot(rows, columns, place + 1), units[law.term]
+        assumed, wanted = law.assumed / size, law.wanted / size
+        ends = [np.min(assumed), np.max(assumed)]
+        axes.plot(assumed, wanted, ".", color="tab:blue", markersize=2, label="as recorded")
+        axes.plot(ends, ends, color="0.4", linewidth=1.0, label="as assumed")
+        axes.set_title(f"{law.cause}, in {law.term}", fontsize="small")
+        axes.set_xlabel(f"assumed [{unit}]", fontsize=8)
+        axes.set_ylabel(f"wanted [{unit}]", fontsize=8)
+        axes.grid(alpha=0.3)
+    figure.axes[0].legend(fontsize="small")
     return figure
 
 

@@ -7,6 +7,8 @@ import numpy as np
 from identification.block_bootstrap import LEVEL
 from identification.gap.diagnosis import MENTIONED_PROBABILITY, Diagnosis, hypothesis_title
 from identification.gap.evidence import EvaluatedHypothesis
+from identification.gap.fitting_problem import Estimate
+from identification.gap.form_modes import law_in_words, laws
 from identification.gap.gap_json import discrepancy, drawn_term, inclusion, parameter_covariance
 from identification.gap.gaps import FLOOR, Gap, regimes_of
 from identification.gap.localisation import Localisation
@@ -23,6 +25,7 @@ from identification.gap.report_figures import (
     forcing_figure,
     gap_figure,
     heat_map,
+    law_figure,
     location_figure,
     missing_term_figure,
     ranking_figure,
@@ -121,6 +124,8 @@ def _ranking(diagnosis: Diagnosis) -> Section:
     ]
     if diagnosis.judged:
         blocks += [inclusion_table(diagnosis), ranking_table(diagnosis)]
+    if diagnosis.named:
+        blocks += drawn_laws(diagnosis, diagnosis.named.hypothesis.estimate)
     return Section(title="Which cause it is", verdicts=verdicts, blocks=blocks)
 
 
@@ -193,6 +198,21 @@ def ranking_table(diagnosis: Diagnosis) -> Table:
         caption="'Looks like': causes that these recordings hardly tell apart from this one, with the "
         "correlation of both effects; from the model's sensitivities alone, whatever the residual.",
     )
+
+
+def drawn_laws(diagnosis: Diagnosis, estimate: Estimate) -> list[Block]:
+    """The law that the recordings want of each named cause beside the one assumed."""
+    problem = diagnosis.ranking.problem
+    found = laws(problem, estimate)
+    if not found:
+        return []
+    terms = (*problem.plant.equations, *problem.plant.channels)
+    units = {term.name: (term.unit, term.scale) for term in terms}
+    caption = (
+        "What the cause adds, sample by sample, by the law that the recordings want, over the law of "
+        f"the catalogue: {law_in_words(estimate)}."
+    )
+    return [Picture(figure=law_figure(found, units), caption=caption)]
 
 
 def inclusion_table(diagnosis: Diagnosis) -> Table:

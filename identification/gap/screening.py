@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -276,36 +275,10 @@ def _bounded_last_step(equations: NormalEquations, low: float, high: float) -> t
     curvature = hessian[k, k] - hessian[k, :k] @ solved[:, 1]
     slope = gradient[k] - hessian[k, :k] @ solved[:, 0]
     step = float(np.clip(slope / max(curvature, 1e-12), low, high))
-    left = equations.least - gradient[:k] @ solved[:, 0] - 2 * step * slope + step * step * curvature
+    left = (
+        equations.chi_square - gradient[:k] @ solved[:, 0] - 2 * step * slope + step * step * curvature
+    )
     return step, float(left)
-
-
-def promising_pairs(
-    base_runs: Sequence[LinearisedRun], signatures: Sequence[CauseSignature]
-) -> list[frozenset[str]]:
-    """Pairs of labels by falling decrease of chi-square, both changes taken as linear in their sizes.
-
-    A negative size is none where the range begins at off.
-
-    base_runs: the base estimate linearised in the fitted runs. signatures: beside the same base.
-    """
-    first, equations, k = _with_signatures(base_runs, signatures)
-    labels, causes = list(first), [signature.cause for signature in first.values()]
-    least = np.array([signature.shares[0] for signature in first.values()])
-    hessian, gradient = equations.hessian, equations.gradient
-    own = hessian[:k, :k] + 1e-9 * np.eye(k)
-    solved = np.linalg.solve(own, np.column_stack([gradient[:k], hessian[:k, k:]]))
-    moment = gradient[k:] - hessian[k:, :k] @ solved[:, 0]
-    gram = hessian[k:, k:] - hessian[k:, :k] @ solved[:, 1:]
-    gains: dict[frozenset[str], float] = {}
-    for i, j in combinations(range(len(labels)), 2):
-        pair = [i, j]
-        matrix = gram[np.ix_(pair, pair)] + 1e-9 * np.eye(2)
-        sizes = np.linalg.solve(matrix, moment[pair])
-        possible = np.all((sizes > 0) | (least[pair] < 0))
-        if causes[i].name != causes[j].name and possible:
-            gains[frozenset((labels[i], labels[j]))] = float(sizes @ moment[pair])
-    return sorted(gains, key=lambda pair: -gains[pair])
 
 
 def assess_separability(

@@ -8,6 +8,7 @@ from identification.gap.diagnosis import (
     hypothesis_label,
     hypothesis_title,
 )
+from identification.gap.form_modes import AS_ASSUMED, law_in_words
 from identification.gap.gap_json import Remainder, discrepancy, parameter_intervals, remainder
 from identification.gap.gaps import FLOOR
 from identification.gap.held_out import LEAST_GAP_CLOSED, NOMINAL, RECALIBRATED
@@ -21,7 +22,14 @@ from identification.gap.quantities import (
     quantity_with_interval,
     share_text,
 )
-from identification.gap.verdict import AMBIGUOUS, KNOWN, NO_GAP, PARTIAL, RankedCause
+from identification.gap.verdict import (
+    AMBIGUOUS,
+    FAR_ABOVE_NOISE,
+    KNOWN,
+    NO_GAP,
+    PARTIAL,
+    RankedCause,
+)
 
 LIKELY_PROBABILITY = 0.5
 """Probability above which the report states no gap without reservation."""
@@ -42,11 +50,12 @@ def verdict_sentence(diagnosis: Diagnosis, next_experiment: str) -> tuple[str, s
     conclusion, no_warning = diagnosis.conclusion, not diagnosis.warnings
     if conclusion.verdict == NO_GAP:
         likely = diagnosis.ranking.no_cause > LIKELY_PROBABILITY
-        return ("good" if likely and no_warning else "doubt"), _no_gap(diagnosis)
+        good = likely and no_warning and not _far_above_noise(diagnosis)
+        return ("good" if good else "doubt"), _no_gap(diagnosis)
     if conclusion.verdict == KNOWN:
-        complete = not diagnosis.reduction.unexplained.still_predictable
         helps = diagnosis.surely_helps(diagnosis.judged[0])
-        return ("good" if complete and helps and no_warning else "doubt"), _known(diagnosis)
+        good = helps and no_warning and diagnosis.reduction.left.overall.value <= FAR_ABOVE_NOISE
+        return ("good" if good else "doubt"), _known(diagnosis)
     if conclusion.verdict == AMBIGUOUS:
         return "doubt", f"{_ambiguous(diagnosis)} {_with_full_stop(next_experiment)}".strip()
     if conclusion.verdict == PARTIAL:
@@ -65,18 +74,15 @@ def _known(diagnosis: Diagnosis) -> str:
     )
     if not diagnosis.surely_helps(best):
         return f"{text}: {add_or_not(diagnosis, best)}."
-    return f"{text}; {_rest(diagnosis)}."
-
-
-def _rest(diagnosis: Diagnosis) -> str:
-    """What a known cause leaves."""
-    if not diagnosis.reduction.unexplained.still_predictable:
-        return "nothing predictable is left"
-    left = remainder(diagnosis)
-    return (
-        f"{share_text(left.share)} of the gap is left and still predictable{remainder_place(left)}, so "
-        "something smaller is missing too"
+    law = law_in_words(best.hypothesis.estimate)
+    other = "" if law == AS_ASSUMED else f" Its law differs from the one assumed: it {law}."
+    left = diagnosis.reduction.left.overall.value
+    rest = (
+        f"{gap_text(left)} noise deviations are left, which nothing predicts from the inputs"
+        if left > FAR_ABOVE_NOISE
+        else "nothing predictable is left"
     )
+    return f"{text}; {rest}.{other}"
 
 
 def _partial(diagnosis: Diagnosis) -> str:
@@ -135,7 +141,14 @@ def _no_gap(diagnosis: Diagnosis) -> str:
     gaps = diagnosis.reduction.gaps
     recalibrated = gaps[RECALIBRATED].overall
     disturbance = disturbance_sentence(diagnosis)
-    if disturbance:
+    if _far_above_noise(diagnosis):
+        text = (
+            "Nothing in what recalibration leaves can be predicted from the inputs, so no cause is named"
+        )
+        disturbance += (
+            "A cause that acts at random, or one that only repeated recordings show, is not ruled out. "
+        )
+    elif disturbance:
         text = "There is no gap beyond noise and disturbances after recalibration"
     elif recalibrated.low <= FLOOR + LEAST_GAP_CLOSED:
         text = "There is no gap beyond noise after recalibration"
@@ -148,6 +161,13 @@ def _no_gap(diagnosis: Diagnosis) -> str:
     )
     likely = diagnosis.ranking.no_cause > LIKELY_PROBABILITY
     return text if likely else f"{text} {_possible_cause(diagnosis)}"
+
+
+def _far_above_noise(diagnosis: Diagnosis) -> bool:
+    """Whether the gap stands far above the stated noise, so that no word may reassure."""
+    gap = diagnosis.reduction.gaps[RECALIBRATED].overall
+    seen = max(diagnosis.reduction.noise_ratios.values())
+    return gap.value * max(seen, 1.0) > FAR_ABOVE_NOISE
 
 
 def _possible_cause(diagnosis: Diagnosis) -> str:
@@ -197,6 +217,14 @@ def nearest_cause(diagnosis: Diagnosis, cause: RankedCause) -> str:
     Whether it helps is one question, whether it is true another.
     """
     name, share = hypothesis_title(cause.hypothesis), share_closed(diagnosis, cause)
+    advised = diagnosis.advised
+    if advised:
+        title = hypothesis_title(advised.hypothesis)
+        return (
+            f"Add {title} all the same: it closes {share_closed(diagnosis, advised)} of the gap on "
+            f"recordings never fitted to, though its name is doubtful "
+            f"({probability_text(advised.probability)})."
+        )
     if diagnosis.surely_helps(cause):
         true = "it is the true cause" if len(cause.effects) == 1 else "they are the true causes"
         return (

@@ -1,4 +1,4 @@
-"""Variable projection: nuisance parameters are minimised over, each run's own first, then tolerances.
+"""Variable projection: nuisance parameters are minimised over, each run's own first, then shared ones.
 
 The residuals are linear in the nuisance parameters, whose Gaussian priors add rows to the least-squares
 problem. Eliminating them from the normal equations leaves equations in the parameters of interest alone
@@ -8,67 +8,75 @@ problem. Eliminating them from the normal equations leaves equations in the para
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import lsq_linear
 
-PIVOTS = 10
-"""Most exchanges of the numbers at their bounds; few problems need more than five, and another method
-solves those."""
+PIVOTS = 100
+"""Most exchanges of the numbers at their bounds; few problems need more than five."""
 
-ROUNDING = 1e-10
-"""Relative excess of a bound, and slope at a bound, that is rounding."""
+TRIES = 3
+"""Exchanges of all numbers at once that need not help before they are exchanged one by one."""
+
+RIDGE, ROUNDING = 1e-12, 1e-10
+"""Added to the diagonal of a scaled matrix [1], as columns may be equal; and the relative excess of a
+bound, and slope at a bound, that is rounding."""
 
 
 def bounded_minimiser(matrix: NDArray, moment: NDArray, low: NDArray, high: NDArray) -> NDArray:
     """Minimiser (n,) of 0.5 x' matrix x - moment x between low and high (bounded least squares).
 
-    By block pivoting (Portugal, Judice and Vicente 1994), which needs a definite matrix and may run in a
-    circle; else by the slower method of Stark and Parker (1995).
+    By block pivoting (Portugal, Judice and Vicente 1994; Kim and Park 2011).
     """
     if not len(moment):
         return np.zeros(0)
     scale = 1.0 / np.sqrt(np.diag(matrix))
-    scaled, target = matrix * np.outer(scale, scale), moment * scale
-    try:
-        found = _pivoted(scaled, target, low / scale, high / scale)
-    except np.linalg.LinAlgError:  # columns that are equal but for rounding
-        found = None
-    if found is None:
-        found = _by_factors(scaled, target, low / scale, high / scale)
-    return np.clip(found * scale, low, high)
+    scaled = matrix * np.outer(scale, scale) + RIDGE * np.eye(len(scale))
+    return np.clip(_pivoted(scaled, moment * scale, low / scale, high / scale) * scale, low, high)
 
 
-def _pivoted(matrix: NDArray, moment: NDArray, low: NDArray, high: NDArray) -> NDArray | None:
+@numba.njit(cache=True)
+def _pivoted(matrix, moment, low, high):
     """The minimiser (n,): numbers beyond a bound go there, those that push inwards leave it.
 
-    None where this does not end.
+    Where exchanging all of them together does not help, the last one alone is exchanged, which ends.
     """
-    fixed = high <= low
-    below, above = fixed.copy(), np.zeros(len(moment), dtype=bool)
+    place = np.where(high <= low, -1, 0)  # -1: at the lower bound, 1: at the upper one, 0: between
+    x, fewest, tries = np.zeros(len(moment)), len(moment) + 1, TRIES
     for _ in range(PIVOTS):
-        free = ~(below | above)
-        x = np.where(below, low, np.where(above, high, 0.0))
-        if np.any(free):
-            own = matrix[np.ix_(free, free)]
-            x[free] = np.linalg.solve(own, moment[free] - matrix[free] @ x)
-        slope = matrix @ x - moment
-        tolerance = ROUNDING * (1.0 + np.abs(x))
-        leaves = ~fixed & ((below & (slope < -ROUNDING)) | (above & (slope > ROUNDING)))
-        too_low, too_high = free & (x < low - tolerance), free & (x > high + tolerance)
-        if not np.any(leaves | too_low | too_high):
-            return x
-        below, above = (below & ~leaves) | too_low, (above & ~leaves) | too_high
-    return None
+        free = np.flatnonzero(place == 0)
+        x = np.where(place < 0, low, np.where(place > 0, high, 0.0))
+        if len(free):
+            own = matrix[free]
+            x[free] = np.linalg.solve(own[:, free], moment[free] - own @ x)
+        target = _wanted(matrix, moment, low, high, place, x)
+        wrong = np.flatnonzero(target != place)
+        if not len(wrong):
+            break
+        tries = TRIES if len(wrong) < fewest else tries - 1
+        fewest = min(fewest, len(wrong))
+        if tries < 0:
+            wrong = wrong[-1:]
+        place[wrong] = target[wrong]
+    return x
 
 
-def _by_factors(matrix: NDArray, moment: NDArray, low: NDArray, high: NDArray) -> NDArray:
-    """The minimiser (n,) by bounded-variable least squares in a factor of the matrix."""
-    eigenvalues, vectors = np.linalg.eigh(matrix)
-    root = np.sqrt(np.maximum(eigenvalues, 1e-14))[:, None] * vectors.T
-    target = np.linalg.solve(root.T, moment)
-    widest = np.maximum(high - low, np.finfo(float).tiny)
-    return lsq_linear(root, target, (low, low + widest), method="bvls").x
+@numba.njit(cache=True)
+def _wanted(matrix, moment, low, high, place, x):
+    """Where each number wants to be: -1 at its lower bound, 1 at the upper one, 0 between, (n,)."""
+    slope = matrix @ x - moment
+    target = place.copy()
+    for i in range(len(x)):
+        if high[i] <= low[i]:
+            continue
+        tolerance = ROUNDING * (1.0 + abs(x[i]))
+        if place[i] == 0 and x[i] < low[i] - tolerance:
+            target[i] = -1
+        elif place[i] == 0 and x[i] > high[i] + tolerance:
+            target[i] = 1
+        elif place[i] * slope[i] > ROUNDING:
+            target[i] = 0
+    return target
 
 
 LARGEST_DEVIATION = 3.0
@@ -84,7 +92,7 @@ that sets do not follow each other in a circle."""
 class LinearisedRun:
     """A hypothesis linearised in one run; values are weighted readings, 0 where they do not count.
 
-    k parameters, l nuisance parameters of the run, m tolerances.
+    k parameters, l nuisance parameters of the run, m shared ones: tolerances, then modes of form.
     """
 
     residual: NDArray
@@ -98,13 +106,13 @@ class LinearisedRun:
     """Present values of these, less their centres, (l,) [SI]."""
     run_sd: NDArray
     """Standard deviations of these, (l,) [SI]."""
-    tolerance_slopes: NDArray
-    """Derivatives by the tolerances, (values, m) [noise deviations/standard deviation]."""
+    shared_slopes: NDArray
+    """Derivatives by the shared nuisances, (values, m) [noise deviations/standard deviation]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RunProducts:
-    """Products of the columns of one run: residual, slopes, tolerance slopes, run nuisances."""
+    """Products of the columns of one run: residual, slopes, shared slopes, run nuisances."""
 
     gram: NDArray
     """Gram matrix with the priors of the run nuisances, which count from their centres,
@@ -115,7 +123,7 @@ class RunProducts:
     def held(self, numbers: NDArray) -> NDArray:
         """Values of the run nuisances that end at a bound (l,) [SI]; NaN for those between.
 
-        numbers: of slopes and tolerances, (k + m,) [1].
+        numbers: of slopes and shared nuisances, (k + m,) [1].
         """
         count = len(self.gram) - len(self.bound)
         moment = self.gram[count:, 0] - self.gram[count:, 1:count] @ numbers
@@ -159,8 +167,8 @@ class NormalEquations:
     """Sum of squares at no step, with unbounded nuisances [1]."""
     chi_square: float
     """Sum of squares at no step, with bounded nuisances [1]."""
-    tolerances: NDArray
-    """The tolerances that minimise `chi_square`, (m,) [standard deviations]."""
+    shared: NDArray
+    """The shared nuisances that minimise `chi_square`, (m,) [standard deviations]."""
 
     def step(self, low: NDArray, high: NDArray, damping: float) -> tuple[NDArray, float]:
         """Best bounded step and the decrease of chi-square that it promises.
@@ -173,7 +181,7 @@ class NormalEquations:
         Returns:
             The step (k,) [1], with nuisances within their bounds, and the predicted decrease [1].
         """
-        m = len(self.tolerances)
+        m = len(self.shared)
         bound = np.full(m, LARGEST_DEVIATION)
         ends = np.concatenate([low, -bound]), np.concatenate([high, bound])
         best, squares = _bounded_solution(self.runs, self.steps, ends, damping)
@@ -202,7 +210,7 @@ def _equations(products: Sequence[RunProducts], k: int) -> NormalEquations:
         gradient=free[1:, 0],
         least=float(free[0, 0]),
         chi_square=chi_square,
-        tolerances=best[k:],
+        shared=best[k:],
     )
 
 
@@ -234,29 +242,29 @@ def _bounded_solution(
 
 
 def _together(runs: Sequence[RunProducts], k: int, held: Sequence[NDArray]) -> NDArray:
-    """Gram matrix of residual, slopes and tolerance slopes of all runs, with the tolerances' priors.
+    """Gram matrix of residual, slopes and shared slopes of all runs, with the priors of the latter.
 
     held: of each run, as `RunProducts.reduced` takes it. Returns (1 + k + m, 1 + k + m) [1].
     """
     gram = np.sum([run.reduced(own) for run, own in zip(runs, held, strict=True)], axis=0)
-    tolerances = np.arange(1 + k, len(gram))
-    gram[tolerances, tolerances] += 1.0
+    shared = np.arange(1 + k, len(gram))
+    gram[shared, shared] += 1.0
     return gram
 
 
-def without_run_nuisances(run: LinearisedRun, tolerances: NDArray) -> tuple[NDArray, NDArray]:
+def without_run_nuisances(run: LinearisedRun, shared: NDArray) -> tuple[NDArray, NDArray]:
     """Residual of a run less what its nuisance parameters explain, and the step to their best values.
 
     A deviation beyond the bound is no nuisance: it stays in the residual.
 
     Args:
         run: the linearised run.
-        tolerances: given tolerances, (m,) [standard deviations].
+        shared: given shared nuisances, (m,) [standard deviations].
 
     Returns:
         Residual (values,) [noise deviations] and step of the nuisance parameters (l,) [SI].
     """
-    residual = run.residual - run.tolerance_slopes @ tolerances
+    residual = run.residual - run.shared_slopes @ shared
     if not run.run_slopes.size:
         return residual, np.zeros(0)
     gram = run.run_slopes.T @ run.run_slopes
@@ -267,15 +275,15 @@ def without_run_nuisances(run: LinearisedRun, tolerances: NDArray) -> tuple[NDAr
     return residual - run.run_slopes @ step, step
 
 
-def tolerances_as_slopes(run: LinearisedRun) -> LinearisedRun:
-    """The run with its tolerances appended to the parameters, (values, k + m), and none left."""
+def shared_as_slopes(run: LinearisedRun) -> LinearisedRun:
+    """The run with its shared nuisances appended to the parameters, (values, k + m), and none left."""
     return LinearisedRun(
         residual=run.residual,
-        slopes=np.column_stack([run.slopes, run.tolerance_slopes]),
+        slopes=np.column_stack([run.slopes, run.shared_slopes]),
         run_slopes=run.run_slopes,
         run_values=run.run_values,
         run_sd=run.run_sd,
-        tolerance_slopes=np.zeros((len(run.residual), 0)),
+        shared_slopes=np.zeros((len(run.residual), 0)),
     )
 
 
@@ -300,8 +308,8 @@ def _eliminated(gram: NDArray, columns: NDArray, kept: NDArray) -> NDArray:
 
 
 def _columns(run: LinearisedRun) -> NDArray:
-    """Residual, slopes, tolerance slopes and slopes of run nuisances (values, 1 + k + m + l)."""
-    return np.column_stack([run.residual, run.slopes, run.tolerance_slopes, run.run_slopes])
+    """Residual, slopes, shared slopes and slopes of run nuisances (values, 1 + k + m + l)."""
+    return np.column_stack([run.residual, run.slopes, run.shared_slopes, run.run_slopes])
 
 
 def _with_priors(gram: NDArray, run: LinearisedRun) -> RunProducts:

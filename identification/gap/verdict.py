@@ -3,11 +3,14 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from numpy.typing import NDArray
+
 from identification.gap.discrepancy import ChannelDiscrepancy
 from identification.gap.evidence import EvaluatedHypothesis
 from identification.gap.fitting_problem import FittingProblem
+from identification.gap.held_out import DiscrepancyReduction
 from identification.gap.localisation import Localisation
-from identification.gap.posterior import NO_CAUSE_DOUBT, variance_inflation
+from identification.gap.posterior import variance_inflation
 from identification.gap.screening import Separability
 
 NO_GAP, KNOWN, AMBIGUOUS = "no_gap", "known", "ambiguous"
@@ -17,6 +20,14 @@ PARTIAL, UNKNOWN = "partial", "unknown"
 NOTICED_REMAINDER = 0.04
 """Share of the misfit [1] beyond which a named cause leaves a part of the gap that is missing still: a
 fifth of the gap. Less is an error of the cause's form."""
+
+LEFT_ON_HELD_OUT, FAR_ABOVE_NOISE = 0.1, 1.5
+"""Share of the gap on held-out recordings [1], and gap [noise deviations], twice the noise's variance:
+a cause that leaves more of both does not explain the whole gap."""
+
+NO_CAUSE_DOUBT = 0.01
+"""Probability of no cause above which no cause is named: a false alarm costs more than missing a faint
+cause."""
 
 AMBIGUITY_SHARE = 0.9
 """Share of the probability of all causes that the ambiguity set holds."""
@@ -46,6 +57,9 @@ class Ranking:
     """Noise and discrepancy of each channel under the best hypothesis."""
     separability: Separability
     """What the recordings could tell apart, whatever the residual."""
+    figures: NDArray
+    """Figures of posterior.py behind the probabilities: of `hypotheses`, of no cause, of an unknown one,
+    (n + 2, figures)."""
 
     @property
     def inclusion(self) -> Mapping[str, float]:
@@ -92,10 +106,15 @@ class Conclusion:
     """Probability that a component is at fault, by component; a set may have several components."""
 
 
-def conclude(ranking: Ranking, localisation: Localisation) -> Conclusion:
-    """The verdict on the probabilities, and the components that they point at."""
+def conclude(
+    ranking: Ranking, localisation: Localisation, reduction: DiscrepancyReduction
+) -> Conclusion:
+    """The verdict on the probabilities and on what held-out recordings show.
+
+    Where held-out residuals can be predicted, neither is there no gap nor is its cause fully known.
+    """
     causes = causes_by_name(ranking)
-    verdict = _verdict(ranking)
+    verdict = _verdict(ranking, reduction)
     named = verdict in (KNOWN, PARTIAL)
     ambiguity_set = smallest_set(causes, AMBIGUITY_SHARE) if named else []
     if verdict == KNOWN and len(ambiguity_set) > 1:
@@ -161,15 +180,19 @@ def component_probabilities(ranking: Ranking, localisation: Localisation) -> dic
     return dict(sorted(total.items(), key=lambda pair: -pair[1]))
 
 
-def _verdict(ranking: Ranking) -> str:
-    """NO_GAP, UNKNOWN, PARTIAL or KNOWN by the probabilities."""
-    if ranking.no_cause > NO_CAUSE_DOUBT:
-        return NO_GAP
-    if ranking.unknown > sum(ranking.probabilities):
-        return UNKNOWN
-    if ranking.shares_left[0] <= NOTICED_REMAINDER:
+def _verdict(ranking: Ranking, reduction: DiscrepancyReduction) -> str:
+    """NO_GAP, UNKNOWN, PARTIAL or KNOWN."""
+    if ranking.no_cause > NO_CAUSE_DOUBT or ranking.unknown > sum(ranking.probabilities):
+        something = ranking.unknown > ranking.no_cause
+        return UNKNOWN if something or reduction.recalibration_leaves.still_predictable else NO_GAP
+    held_out, rest = reduction.unexplained, reduction.left.overall.value
+    left = ranking.shares_left[0] > NOTICED_REMAINDER or (
+        held_out.fraction > LEFT_ON_HELD_OUT and rest > FAR_ABOVE_NOISE
+    )
+    if not left and not held_out.still_predictable:
         return KNOWN
     if _held(ranking):
         return PARTIAL
     # Look-alikes share the probability; less than that names nothing while much is left.
-    return KNOWN if sum(ranking.probabilities) >= SURE_INCLUSION else UNKNOWN
+    sure = sum(ranking.probabilities) >= SURE_INCLUSION
+    return KNOWN if sure and not held_out.still_predictable else UNKNOWN

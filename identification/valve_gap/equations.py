@@ -1,16 +1,21 @@
 """The valve's state equations f1 to f7 (report eqs 5 to 12), forcings on them, and its regimes."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.common.units import BAR, GRAM, MILLIGRAM, MILLIMETRE
 from epv_env.plant.channels import readings
-from epv_env.plant.equations import Inputs
+from epv_env.plant.coefficients import coefficients
+from epv_env.plant.effects.registry import effect_constants
+from epv_env.plant.equations import Inputs, State, derivative
+from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at, store_state
+from epv_env.plant.primitives import FLAGS, source_digest
 from epv_env.plant.simulate import Trajectory, energised, simulate
 from epv_env.plant.valves import Valves
-from identification.gap.plant import StateEquation, StateTrace
+from identification.gap.plant import Contribution, StateEquation, StateTrace
 from identification.recordings.recording import OUTPUTS
 from identification.replay.model_inputs import ModelInputs
 
@@ -47,14 +52,17 @@ EQUATIONS = (
 """f3 and f5 say x' = v: nothing can be missing there, and their step is 0."""
 
 FORCINGS = {
-    "f1": ("sigma_S", -1.0),
-    "f2": ("air_3", 1.0),
-    "f4": ("force_PV", 1.0),
-    "f6": ("force_MV", 1.0),
-    "f7": ("U", 1.0),
+    "f1": ("sigma_S", "p2", -1.0),
+    "f2": ("air_3", "p3", 1.0),
+    "f4": ("force_PV", "vPV", 1.0),
+    "f6": ("force_MV", "vMV", 1.0),
+    "f7": ("U", "I", 1.0),
 }
-"""Input of the simulator by which each equation is forced, and its sign: drawn air lacks in p2."""
+"""Input of the simulator by which each equation is forced, the state whose rate it changes, and its
+sign: drawn air lacks in p2."""
 
+OF_EFFECTS = State._fields[State._fields.index("I_coil") + 1 :]
+"""States that effects add; they rest at 0 without them."""
 
 SETTLED_CURRENT = 0.02
 """Distance from the end value, relative to the greatest current, where a transient is over [-]."""
@@ -78,26 +86,84 @@ def modelled(drive: ModelInputs, p: Mapping[str, float]) -> Trajectory:
 
 
 def forced_changes(
-    drive: ModelInputs, p: Mapping[str, float], equation: StateEquation, edges: NDArray
+    drive: ModelInputs, p: Mapping[str, float], forcing: Mapping[str, NDArray]
 ) -> NDArray:
-    """`GreyBox.forced` on one recording: changes (3, samples, windows) of OUTPUTS [Pa, Pa, A].
+    """`GreyBox.forced` on one recording: changes (3, samples, m) of OUTPUTS [Pa, Pa, A].
 
-    p: every parameter by symbol [SI]. edges: samples (windows + 1,) between which the forcing acts.
+    p: every parameter by symbol [SI]. forcing: by equation, (samples, m) [kg/s, N, V].
     """
-    m, steps = len(edges) - 1, len(drive.U) - 1
-    name, sign = FORCINGS[equation.name]
-    window = np.searchsorted(edges, np.arange(steps), side="right")[:, None] - 1
+    m = next(iter(forcing.values())).shape[1]
     base = {
         "U": drive.U[:-1, None],
         "sigma_S": drive.sigma_S[:-1, None],
         "p1_slope": np.diff(drive.p1)[:, None] / drive.period,
         "refill": np.zeros((1, 1)),
     }
-    acting = sign * equation.step * (window == np.arange(m))
-    forced = _simulated(drive, p, m, {**base, name: base.get(name, 0.0) + acting})
-    changes = np.zeros((len(OUTPUTS), steps + 1, m))
-    changes[:, 1:] = forced - _simulated(drive, p, 1, base)
+    acting = dict(base)
+    for equation, values in forcing.items():
+        name, _, sign = FORCINGS[equation]
+        none = np.zeros((len(values) - 1, 1))
+        acting[name] = base.get(name, 0.0) + sign * np.hstack([none, values[:-1]])
+    changes = np.zeros((len(OUTPUTS), len(drive.U), m))
+    outputs = _simulated(drive, p, m + 1, acting)
+    changes[:, 1:] = outputs[..., 1:] - outputs[..., :1]
     return changes
+
+
+def contribution(
+    drive: ModelInputs, p: Mapping[str, float], without: Mapping[str, float]
+) -> Contribution:
+    """Forcings and readings that the model with the parameters `p` has beyond that with `without`.
+
+    Both along the course of the model with p; parameters by symbol [SI].
+    """
+    answer = modelled(drive, p)
+    course = np.array([np.broadcast_to(field, answer.time.shape) for field in answer.state])
+    bare = course.copy()
+    bare[State._fields.index(OF_EFFECTS[0]) :] = 0.0
+    inputs = np.zeros((len(Inputs._fields), len(drive.U)))
+    inputs[Inputs._fields.index("U")] = drive.U
+    inputs[Inputs._fields.index("sigma_S")] = drive.sigma_S
+    nominal = _rates(bare, inputs, without)
+    added = _rates(course, inputs, p) - nominal
+    equations = {}
+    for equation, (name, state, sign) in FORCINGS.items():
+        row, pushed = State._fields.index(state), inputs.copy()
+        pushed[Inputs._fields.index(name)] += sign * _STEPS[equation]
+        gain = (_rates(bare, pushed, without) - nominal)[row] / _STEPS[equation]
+        # Where a diode holds the voltage of the coil, none acts from outside.
+        equations[equation] = np.divide(added[row], gain, out=np.zeros_like(gain), where=gain != 0.0)
+    with_p, bared = readings(answer.state, p), readings(answer.state, {**p, **without})
+    return Contribution(
+        equations=equations,
+        readings=np.stack([(with_p[o] - bared[o]) + np.zeros(len(drive.U)) for o in OUTPUTS]),
+    )
+
+
+_STEPS = {equation.name: equation.step for equation in EQUATIONS}
+
+
+def _compiled_rates(digest: str) -> Callable[..., None]:
+    @numba.njit(cache=True, **FLAGS)
+    def rates_along(states, inputs, c, e, out):
+        if digest == "":
+            return
+        valve, effects = coefficients_at(c, 0, 0), effects_at(e, 0, 0)
+        for k in range(states.shape[1]):
+            q, u = state_at(states, 0, k), inputs_at(inputs, 0, k)
+            store_state(out, 0, k, derivative(q, u, valve, effects, 1.0, 1.0, True)[0])
+
+    return rates_along
+
+
+_rates_along = _compiled_rates(source_digest())
+
+
+def _rates(states: NDArray, inputs: NDArray, p: Mapping[str, float]) -> NDArray:
+    """Rates of free movers at states (states, samples) under inputs (inputs, samples), likewise [SI]."""
+    out = np.empty_like(states)
+    _rates_along(states, inputs, coefficients(p), effect_constants(p), out)
+    return out
 
 
 def _simulated(

@@ -1,6 +1,6 @@
 """The valve behind the grey-box protocol: replayed recordings, and what may be wrong with the model."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +10,7 @@ from epv_env.plant.free_parameters import FREE_PARAMETERS
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from identification.calibration.problem import calibration_problem
-from identification.gap.plant import Channel, NuisanceParameter, Run, StateEquation, StateTrace
+from identification.gap.plant import Channel, Contribution, NuisanceParameter, Run, StateTrace
 from identification.gap.reading_noise import noise_of_blocks
 from identification.gap.screened import Finding, screen
 from identification.recordings.noise import coarse_step_warnings, reliable_step, rounding_error
@@ -18,7 +18,14 @@ from identification.recordings.recording import OUTPUTS, UNITS, Campaign, Record
 from identification.replay.model_inputs import model_inputs
 from identification.replay.replay import Replay, measured_outputs
 from identification.valve_gap import causes
-from identification.valve_gap.equations import EQUATIONS, forced_changes, modelled, regimes, traces
+from identification.valve_gap.equations import (
+    EQUATIONS,
+    contribution,
+    forced_changes,
+    modelled,
+    regimes,
+    traces,
+)
 
 
 def noise_of(recordings: Sequence[Recording], channel: str) -> float:
@@ -154,11 +161,17 @@ class Valve:
         energised = self.recordings[run].energised
         return regimes(modelled(self.replay.drives[run], p), p, energised)
 
-    def forced(
-        self, values: Mapping[str, NDArray], equation: StateEquation, run: int, edges: NDArray
-    ) -> NDArray:
-        """`GreyBox.forced`: changes (3, samples, windows) of OUTPUTS [Pa, Pa, A]; edges: samples."""
-        return forced_changes(self.replay.drives[run], self._one(values, run), equation, edges)
+    def forced(self, values: Mapping[str, NDArray], run: int, forcing: Mapping[str, NDArray]) -> NDArray:
+        """`GreyBox.forced`: changes (3, samples, m) of OUTPUTS [Pa, Pa, A]."""
+        return forced_changes(self.replay.drives[run], self._one(values, run), forcing)
+
+    def contribution(
+        self, values: Mapping[str, NDArray], symbols: Collection[str], run: int
+    ) -> Contribution:
+        """`GreyBox.contribution`: f1 to f7, and readings (3, samples) [Pa, Pa, A]."""
+        p = self._one(values, run)
+        nominal = {symbol: self.base[symbol] for symbol in symbols}
+        return contribution(self.replay.drives[run], p, {**p, **nominal})
 
     def _one(self, values: Mapping[str, NDArray], run: int) -> dict[str, float]:
         """Plant parameters of the first candidate in a run."""

@@ -6,7 +6,7 @@ from pathlib import Path
 from epv_env.common.files import write_text
 
 NO_GAP = {
-    "format": "epv-gap/2", "verdict": "no_gap", "where": {"component": {}}, "causes": [],
+    "format": "epv-gap/3", "verdict": "no_gap", "where": {"component": {}}, "causes": [],
     "ambiguity_set": [], "inclusion": {}, "seconds": 0.5,
 }  # fmt: skip
 

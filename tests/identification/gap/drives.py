@@ -69,9 +69,12 @@ class Drive:
         """`GreyBox.regimes`."""
         return {}
 
-    def forced(self, values, equation, run, edges):
+    def forced(self, values, run, forcing):
         """`GreyBox.forced`: never, without equations."""
         raise NotImplementedError
+
+    def contribution(self, values, symbols, run):
+        """`GreyBox.contribution`: left to the change of the readings."""
 
 
 def _cause(name: str) -> Cause:

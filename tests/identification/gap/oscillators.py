@@ -1,6 +1,6 @@
 """A lightly damped, driven oscillator whose nominal model knows viscous drag alone, as a `GreyBox`."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,14 +60,13 @@ class Oscillator:
         """`GreyBox.regimes`: a swing has none."""
         return {}
 
-    def forced(
-        self, values: Mapping[str, NDArray], equation: StateEquation, run: int, edges: NDArray
-    ) -> NDArray:
+    def forced(self, values: Mapping[str, NDArray], run: int, forcing: Mapping[str, NDArray]) -> NDArray:
         """`GreyBox.forced`."""
-        samples = np.arange(len(self.runs[run].time))
-        window = np.searchsorted(edges, samples, side="right")[:, None] - 1
-        acting = equation.step * (window == np.arange(len(edges) - 1))
+        (acting,) = forcing.values()
         return (self._swing(values, run, acting)[0] - self._swing(values, run)[0])[None]
+
+    def contribution(self, values: Mapping[str, NDArray], symbols: Collection[str], run: int) -> None:
+        """`GreyBox.contribution`: left to the change of the angle."""
 
     def _swing(
         self, values: Mapping[str, NDArray], run: int, forcing: NDArray | None = None

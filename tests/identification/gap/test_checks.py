@@ -98,6 +98,11 @@ MISTAKES: dict[str, tuple[Callable[[], Tank], str]] = {
         r"channels, h: noise 0 is not positive.*leave it out",
     ),
     "resolution": (lambda: with_channel(resolution=-1.0), "channels, h: resolution -1 is no step"),
+    "names of runs": (
+        lambda: Described(runs=(*runs(True), *runs(False))),
+        "runs: two are named test_1.*rename",
+    ),
+    "one run": (lambda: Described(runs=runs(True)[:1]), "runs: there is one.*cut in two"),
     "none held out": (lambda: Described(runs=runs(False)), "runs: no run is held out.*held_out=True"),
     "all held out": (lambda: Described(runs=runs(True)), "runs: no run is fitted.*held_out=False"),
     "time falls": (
@@ -248,7 +253,7 @@ def test_what_the_localisation_needs_has_its_shape(member, sentence):
     wrong = {
         "states": lambda values, run: {"h": StateTrace(unit="m", scale=1.0, values=np.zeros(3))},
         "regimes": lambda values, run: {"late": np.ones(240)},
-        "forced": lambda values, equation, run, edges: np.zeros((1, 240)),
+        "forced": lambda values, run, forcing: np.zeros((1, 240)),
     }
     with pytest.raises(PlantError, match=sentence):
         check(Described(**{member: wrong[member]}))

@@ -30,9 +30,12 @@ class ClosedTank(Tank):
         """None are told apart."""
         return {}
 
-    def forced(self, values, equation, run, edges):
+    def forced(self, values, run, forcing):
         """There is no equation to force."""
         raise AssertionError
+
+    def contribution(self, values, symbols, run):
+        """Left to the change of the readings."""
 
 
 @cache

@@ -73,9 +73,12 @@ class Gauge:
         """`GreyBox.regimes`."""
         return {}
 
-    def forced(self, values, equation, run, edges):
+    def forced(self, values, run, forcing):
         """`GreyBox.forced`: never, without equations."""
         raise NotImplementedError
+
+    def contribution(self, values, symbols, run):
+        """`GreyBox.contribution`: left to the change of the readings."""
 
 
 def _parameter(name: str) -> FreeParameter:
@@ -122,7 +125,7 @@ def test_predictions_are_those_of_the_whole_covariances():
         LinearisedRun(
             residual=rng.normal(size=n), slopes=rng.normal(size=(n, 2)),
             run_slopes=rng.normal(size=(n, 3)), run_values=np.zeros(3),
-            run_sd=np.array([0.3, 2.0, 1.0]), tolerance_slopes=rng.normal(size=(n, 4)),
+            run_sd=np.array([0.3, 2.0, 1.0]), shared_slopes=rng.normal(size=(n, 4)),
         )
         for _ in range(3)
     ]  # fmt: skip
@@ -135,7 +138,7 @@ def test_predictions_are_those_of_the_whole_covariances():
     whole = []
     means = []
     for line, own in zip(runs, known, strict=True):
-        numbers = np.column_stack([line.slopes, line.tolerance_slopes])
+        numbers = np.column_stack([line.slopes, line.shared_slopes])
         means.append(numbers @ own.mean - line.residual)
         columns = numbers @ own.factor
         local = line.run_slopes * line.run_sd

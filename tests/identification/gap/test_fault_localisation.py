@@ -11,7 +11,7 @@ from identification.gap.fitting_problem import Estimate, FittingProblem
 from identification.gap.forcing import quadratic_forms, window_edges
 from identification.gap.gaps import RegimeGap, regime_gaps
 from identification.gap.localisation import Localisation, fit_processes, locate
-from identification.gap.plant import noise_weighted
+from identification.gap.plant import noise_weighted, window_forcing
 from identification.gap.recalibration import recalibrate
 
 LEAK = 2e-3
@@ -70,7 +70,8 @@ def test_a_forcing_is_recovered_but_for_noise_and_what_calibration_absorbs():
     equation = plant.equations[0]
     edges = window_edges(plant.runs[0].time, plant.states(values, 0), 80)
     truth = 20.0 * np.sin(np.linspace(0, 6, len(edges) - 1))
-    change = plant.forced(values, equation, 0, edges) @ truth
+    forcing = window_forcing(equation, len(plant.runs[0].time), edges)
+    change = plant.forced(values, 0, forcing) @ truth
     altered = FittingProblem(plant, problem.slopes)
     shift = noise_weighted(plant, 0, change).ravel()
     altered.measured = [problem.measured[0] + shift, *problem.measured[1:]]

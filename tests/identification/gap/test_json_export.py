@@ -25,7 +25,7 @@ MODELS = {"nominal", "recalibrated", "with_cause"}
 def test_every_verdict_has_all_fields_of_the_format(verdict):
     content = json.loads(json.dumps(as_json(diagnosed(verdict), "Wait."), allow_nan=False))
     assert set(content) >= KEYS
-    assert content["format"] == "epv-gap/2"
+    assert content["format"] == "epv-gap/3"
     assert content["verdict"] == verdict
     assert content["next_experiment"] == "Wait."
     assert set(content["where"]) >= {"component", "equation", "channel", "regimes"}

@@ -3,6 +3,7 @@
 A block with Coulomb friction turns and sticks as events in scipy make it.
 """
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -12,7 +13,7 @@ from scipy.integrate import solve_ivp
 from docs.examples.tank import AREA, PERIOD, START, levels
 from identification.gap.diagnosis import diagnose
 from identification.gap.gaps import WHOLE
-from identification.gap.plant import Cause, GreyBox, Run
+from identification.gap.plant import Cause, Channel, GreyBox, Run, window_forcing
 from tests.identification.gap.ode_plants import block, decay, decay_rate, free, quiet_run
 
 
@@ -62,7 +63,8 @@ def test_a_forcing_is_a_change_of_the_rate():
     q = np.sin(np.arange(21.0))
     plant = decay([quiet_run(0.5, 21, q=q)], steps_per_sample=2)
     edges = np.array([0, 5, 11, 20])
-    found = plant.forced({"k": np.array([0.7])}, plant.equations[0], 0, edges)
+    forcing = window_forcing(plant.equations[0], 21, edges)
+    found = plant.forced({"k": np.array([0.7])}, 0, forcing)
     for w in range(3):
         pushed = q + 1e-3 * ((np.arange(21) >= edges[w]) & (np.arange(21) < edges[w + 1]))
         other = decay([quiet_run(0.5, 21, q=pushed)], steps_per_sample=2)
@@ -116,7 +118,8 @@ def noisy_runs() -> list[Run]:
         run = quiet_run(0.2, len(q), q=q)
         y = decay([run], steps_per_sample=1).outputs({"gain": np.array([1.4])}, [0])[0][..., 0]
         measured = y + 1e-3 * rng.standard_normal(y.shape)
-        runs.append(Run(**{**vars(run), "measured": measured, "held_out": held_out}))
+        name = "held out" if held_out else "fitted"
+        runs.append(replace(run, name=name, measured=measured, held_out=held_out))
     return runs
 
 
@@ -148,11 +151,25 @@ def test_the_diagnosis_takes_the_plant():
         ({"runs": []}, "runs is empty"),
         ({"states": ("y", "y")}, "given twice"),
         ({"forcing_steps": {"z": 1.0}}, "forcing_steps has 'z'"),
+        ({"runs": [quiet_run(0.5, 21, q=np.zeros(20))]}, r"input 'q' has the shape \(20,\)"),
+        ({"rate": lambda x, u, p: (u.pump,)}, "'pump'.*u the inputs .*'t', 'q'"),
+        (
+            {"rate": lambda x, u, p: (u.q if x.y > 0 else 0.0,)},
+            "use np.where, or choose mode='compiled'",
+        ),
+        ({"rate": lambda x, u, p: (-1e6 * x.y,)}, "the model is stiff"),
     ],
 )
 def test_a_wrong_description_is_refused_in_a_sentence(changes, sentence):
     with pytest.raises(ValueError, match=sentence):
         decay(**changes)
+
+
+def test_without_a_stated_noise_the_readings_show_how_fine_the_steps_must_be():
+    rng = np.random.default_rng(0)
+    noisy = replace(quiet_run(0.5, 21, q=np.zeros(21)), measured=1e-3 * rng.standard_normal((1, 21)))
+    unknown = [Channel(name="y", unit="m", scale=1.0)]
+    assert decay([noisy], channels=unknown).steps_per_sample == decay([noisy]).steps_per_sample
 
 
 def test_a_function_that_numba_refuses_is_named():

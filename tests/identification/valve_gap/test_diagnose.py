@@ -47,7 +47,7 @@ def diagnosed(tmp_path_factory) -> Path:
 
 def test_the_command_names_the_effect_and_writes_its_files(diagnosed):
     found = json.loads((diagnosed / "out" / "gap.json").read_text())
-    assert found["format"] == "epv-gap/2"
+    assert found["format"] == "epv-gap/3"
     assert found["verdict"] == "known"
     assert found["ambiguity_set"] == [["eddy_current"]]
     value, low, high = found["causes"][0]["magnitude"]["G_eddy_S"]
@@ -107,7 +107,7 @@ def test_finished_fits_are_taken_up_again(diagnosed, monkeypatch, tmp_path):
     def never(*args, **options):
         raise AssertionError("a kept fit was run again")
 
-    monkeypatch.setattr("identification.gap.gauss_newton.linearise", never)
+    monkeypatch.setattr("identification.gap.gauss_newton._Search", never)
     diagnose_campaign(diagnosed / "campaign", diagnosed / "out", report=False)
     again = json.loads((diagnosed / "out" / "gap.json").read_text())
     for volatile in ("seconds", "next_experiment"):

@@ -9,8 +9,7 @@ from epv_env.plant.parameters import Parameters
 from identification.bench.programmes import DIAGNOSIS_SUITE
 from identification.bench.session import measured_campaign, run_programme
 from identification.gap.diagnosis import rank_hypotheses
-from identification.gap.posterior import NO_CAUSE_DOUBT
-from identification.gap.verdict import Ranking
+from identification.gap.verdict import NO_CAUSE_DOUBT, Ranking
 from identification.recordings.recording import Campaign
 from identification.valve_gap.valve import Valve
 from tests.identification.disturbances import add_ripple, round_pressures

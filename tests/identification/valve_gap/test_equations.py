@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from epv_env.plant.equations import Inputs, State
-from epv_env.plant.parameters import Parameters
+from epv_env.plant.parameters import Parameters, table
 from identification.bench.programmes import DIAGNOSIS_SUITE
 from identification.bench.session import measured_campaign, run_programme
+from identification.gap.plant import StateEquation, window_forcing
 from identification.valve_gap.equations import EQUATIONS, FORCINGS
 from identification.valve_gap.valve import Valve
 
@@ -26,17 +27,38 @@ def values() -> dict[str, np.ndarray]:
     return {"R": np.array([valve().base["R"]])}
 
 
+def forced(equation: StateEquation, edges: np.ndarray) -> np.ndarray:
+    """Changes (3, samples, windows) in the first run."""
+    samples = len(valve().runs[0].time)
+    return valve().forced(values(), 0, window_forcing(equation, samples, edges))
+
+
+@pytest.mark.parametrize(
+    ("symbols", "equations"),
+    [(("A_PV",), {"f1"}), (("F_PV",), {"f4"}), (("U_drop",), {"f7"}), (("g_I",), set())],
+)
+def test_an_effect_adds_to_its_own_equation_or_to_a_reading(symbols, equations):
+    highest = {s: np.array(table()[s].domain)[1] for s in symbols}
+    size = {s: np.array([high / 10]) for s, high in highest.items()}
+    found = valve().contribution(size, symbols, 0)
+    assert found is not None
+    steps = {equation.name: equation.step for equation in EQUATIONS}
+    acting = {name for name, forcing in found.equations.items() if np.max(np.abs(forcing)) > steps[name]}
+    assert acting == equations
+    assert bool(np.any(found.readings)) != bool(equations)
+
+
 def test_the_seven_equations_are_those_of_the_report_s_states():
     assert [equation.state for equation in EQUATIONS] == list(State._fields[:7])
     assert {equation.name for equation in EQUATIONS if equation.step} == set(FORCINGS)
-    assert all(name in Inputs._fields for name, _ in FORCINGS.values())
+    assert all(name in Inputs._fields for name, _, _ in FORCINGS.values())
     assert [e.name for e in EQUATIONS if not e.step] == ["f3", "f5"]  # x' = v lacks nothing
 
 
 def test_air_forced_into_the_shut_circuit_stays_there():
     """Isothermal chamber: its pressure rises by R T m / V2, and nothing else moves."""
     p, equation = valve().base, BY_NAME["f1"]
-    change = valve().forced(values(), equation, 0, np.array([10, 30]))[:, :, 0]
+    change = forced(equation, np.array([10, 30]))[:, :, 0]
     mass = equation.step * 20 * valve().runs[0].time[1]
     rise = p["R_gas"] * p["T_env"] * mass / p["V2"]
     np.testing.assert_allclose(change[0, 30:60], rise, rtol=1e-6)
@@ -46,13 +68,13 @@ def test_air_forced_into_the_shut_circuit_stays_there():
 
 def test_a_voltage_raises_the_current_of_a_held_coil_by_ohm_s_law():
     equation = BY_NAME["f7"]
-    change = valve().forced(values(), equation, 0, np.array([0, 75]))[:, :, 0]
+    change = forced(equation, np.array([0, 75]))[:, :, 0]
     assert change[2, 75] == pytest.approx(equation.step / valve().base["R"], rel=0.02)
 
 
 @pytest.mark.parametrize("name", ["f4", "f6"])
 def test_a_small_force_moves_nothing_that_a_stop_holds(name):
-    change = valve().forced(values(), BY_NAME[name], 0, np.array([0, 50]))
+    change = forced(BY_NAME[name], np.array([0, 50]))
     noise = [[[channel.noise]] for channel in valve().channels]
     assert np.max(np.abs(change / noise)) < 1e-3
 
@@ -60,8 +82,8 @@ def test_a_small_force_moves_nothing_that_a_stop_holds(name):
 @pytest.mark.parametrize("name", FORCINGS)
 def test_responses_to_windows_add_up_to_that_to_their_union(name):
     edges = np.array([0, 200, 230, 300, 400])
-    each = valve().forced(values(), BY_NAME[name], 0, edges)
-    whole = valve().forced(values(), BY_NAME[name], 0, edges[[0, -1]])[:, :, 0]
+    each = forced(BY_NAME[name], edges)
+    whole = forced(BY_NAME[name], edges[[0, -1]])[:, :, 0]
     size = np.max(np.abs(whole), axis=1, keepdims=True)
     noise = np.array([[channel.noise] for channel in valve().channels])
     assert np.all(np.abs(np.sum(each, axis=2) - whole) < 0.05 * size + 0.02 * noise)

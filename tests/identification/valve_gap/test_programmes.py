@@ -90,7 +90,8 @@ def test_what_nothing_explains_asks_for_no_programme():
 
 def test_what_is_named_but_for_a_remainder_asks_for_no_programme():
     """Programmes tell hypotheses apart; what remains has no hypothesis."""
-    sure = replace(diagnosed(), probabilities=[1.0, *[0.0] * (len(diagnosed().probabilities) - 1)])
+    others = [0.0] * (len(diagnosed().probabilities) - 1)
+    sure = replace(diagnosed(), probabilities=[1.0, *others], no_cause=0.0, unknown=0.0)
     found = next_experiment(sure, valve(), PARTIAL, CANDIDATES[:1])
     assert found.programme is None
     assert "what remains beside it has no name" in found.text
