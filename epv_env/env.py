@@ -28,7 +28,8 @@ class _ValveEnv(gymnasium.Env[NDArray, Any]):
         plant: path of a plant file (docs/reference/files.md), a Plant, or None for the report's
             calibration.
         parameters: "exact" (the plant's own), the name of a region ("confidence", "ten_percent",
-            "sensitive_ten_percent", "domain"), or {symbol: value or (low, high)} in SI units.
+            "sensitive_ten_percent", "domain"), "diagnosis" (the alternatives of the plant file), or
+            {symbol: value or (low, high)} in SI units.
         supply: None for two reservoirs that sag, a constant pressure [bar absolute], or a Supply.
         scenario: name of a consumption scenario (`epv_env.plant.consumption.SCENARIOS`) or "mixed".
         effects: sizes of effects by name, values or (low, high) in SI units.

@@ -64,6 +64,7 @@ class Start:
         """Draw an episode; rng gives one seed, from which the three streams of the episode come."""
         seed = int(rng.integers(2**63))
         plant, disturbance, noise = (np.random.default_rng((seed, stream)) for stream in range(3))
+        region = settings.plants.chosen(plant)
         p1 = settings.supply.draw(disturbance)
         target = disturbance.uniform(*settings.first_target)
         drop = disturbance.uniform(*settings.drop_bar)
@@ -76,7 +77,7 @@ class Start:
         p2 = target - drop if settings.p2_bar is None else disturbance.uniform(*settings.p2_bar)
         p3 = p1 if settings.p3_bar is None else disturbance.uniform(*settings.p3_bar) * BAR
         return cls(
-            parameters=settings.plants.draw(plant), region=settings.plants,
+            parameters=region.draw(plant), region=region,
             p1=p1, p2=p2 * BAR, p3=p3, target=target,
             consumption=consumption,
             noise=noise,

@@ -14,7 +14,7 @@ from epv_env.plant.consumption import MIXED, Scenario, check_scenario
 from epv_env.plant.effects.registry import effect
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant, load_plant
-from epv_env.plant.region import Region
+from epv_env.plant.region import DIAGNOSIS, Mixture, Region
 from epv_env.plant.supply import Supply
 from epv_env.reward import EMPTY_CIRCUIT_BAR, WIDEST_BAND_BAR, RewardWeights
 from epv_env.signals import (
@@ -48,9 +48,9 @@ def _choices(values: Mapping[str, Any]) -> dict[str, Any]:
     return {symbol: _plain(value) for symbol, value in values.items()}
 
 
-def as_region(value: Any, plant: Plant) -> Region:
-    """A region from its name, from values and ranges by symbol, from Parameters or a Region."""
-    if isinstance(value, Region):
+def as_region(value: Any, plant: Plant) -> Region | Mixture:
+    """A region from its name, from values and ranges by symbol, from Parameters, or as it is."""
+    if isinstance(value, (Region, Mixture)):
         return value
     if isinstance(value, Parameters):
         return Region(centre=value)
@@ -59,7 +59,7 @@ def as_region(value: Any, plant: Plant) -> Region:
     if not isinstance(value, str):
         raise OptionError(
             f"parameters is {shown(value)}: give the name of a region, a mapping of values and "
-            "(low, high) by symbol, Parameters, or a Region"
+            "(low, high) by symbol, Parameters, a Region, or a Mixture"
         )
     if value == "confidence":
         if not plant.region.varies:
@@ -68,6 +68,13 @@ def as_region(value: Any, plant: Plant) -> Region:
                 "file from identification"
             )
         return plant.region
+    if value == DIAGNOSIS:
+        if plant.diagnosis is None:
+            raise OptionError(
+                f"plant {plant.name!r} has no alternatives to draw from: give the plant file of a "
+                "diagnosis (`epv gap`), or another region"
+            )
+        return plant.diagnosis
     return Region.named(value, plant.parameters)
 
 
@@ -154,8 +161,8 @@ OPTIONS = ("parameters", "effects", "scenario", "supply", "target_bar", "p2_bar"
 class Settings:
     """Everything that defines the task; units in the names, ranges drawn uniformly per episode."""
 
-    region: Region
-    """Region from which the plant's parameters are drawn, but the sizes of `effects`."""
+    region: Region | Mixture
+    """From which the plant's parameters are drawn, but the sizes of `effects`."""
     effects: Mapping[str, Any] = field(default_factory=dict)
     """Sizes of effects by symbol, a number or (low, high) [SI]; the others are the region's."""
     control_period: float
@@ -184,10 +191,9 @@ class Settings:
     """What an episode may meet beyond the ordinary."""
 
     @cached_property
-    def plants(self) -> Region:
+    def plants(self) -> Region | Mixture:
         """The region with the effects: what the plant of an episode is drawn from."""
-        own = Region.from_choices(self.effects, self.region.centre)
-        return replace(self.region, centre=own.centre, boxes={**self.region.boxes, **own.boxes})
+        return self.region.changed(self.effects)
 
     @property
     def first_target(self) -> Range:

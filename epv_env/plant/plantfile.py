@@ -15,7 +15,7 @@ from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.force_balance import check_valve
 from epv_env.plant.free_parameters import FREE_PARAMETERS, Freedom, check_free
 from epv_env.plant.parameters import ParameterError, Parameters
-from epv_env.plant.region import Region
+from epv_env.plant.region import Alternative, Mixture, Region
 
 FORMAT = "epv-plant/1"
 """Version of the file, in its field `format`."""
@@ -40,6 +40,8 @@ class Plant:
     """Best parameters [SI]."""
     region: Region
     """What the calibration leaves uncertain; Table 14's intervals where nothing better is known."""
+    diagnosis: Mixture | None = None
+    """What a diagnosis holds possible; None where there was none."""
     name: str = "calibrated"
     """Name in reports and plots."""
     provenance: dict[str, Any] = field(default_factory=dict)
@@ -85,17 +87,29 @@ class _RegionFields(msgspec.Struct):
     joint: _JointFields | None = None
 
 
-class _PlantFile(msgspec.Struct):
-    """A plant file; values of parameters are checked by `Parameters`, which names their domains."""
+class _Values(msgspec.Struct, kw_only=True):
+    """Parameters and their region; values are checked by `Parameters`, which names their domains."""
 
     parameters: Any
+    effects: dict[str, dict[str, Any]] = {}
+    region: _RegionFields = msgspec.field(default_factory=_RegionFields)
+    name: str = "unnamed"
+
+
+class _AlternativeFields(_Values):
+    """An entry of field `alternatives`."""
+
+    probability: float
+
+
+class _PlantFile(_Values):
+    """A plant file."""
+
     domains: dict[str, tuple[float, float]] = {}
     voltage_V: float = VOLTAGE
     sensors: dict[str, dict[str, float]] = {}
     free: dict[str, _FreeFields] | None = None
-    effects: dict[str, dict[str, Any]] = {}
-    region: _RegionFields = msgspec.field(default_factory=_RegionFields)
-    name: str = "unnamed"
+    alternatives: list[_AlternativeFields] = []
     provenance: dict[str, Any] = {}
 
 
@@ -135,43 +149,56 @@ def _content(path: Path) -> _PlantFile:
 
 def save_plant(plant: Plant, path: str | PathLike[str]) -> None:
     """Write a plant file, whole or not at all."""
-    effects = {
-        name: {symbol: plant.parameters[symbol] for symbol in symbols}
-        for name, symbols in CATALOGUE.items()
-    }
-    sizing = {symbol for symbols in CATALOGUE.values() for symbol in symbols}
     content: dict[str, Any] = {
         "format": FORMAT,
         "name": plant.name,
-        "parameters": {s: value for s, value in plant.parameters.items() if s not in sizing},
+        **_written(plant.parameters, plant.region),
         "domains": {symbol: list(ends) for symbol, ends in plant.parameters.own_domains.items()},
         "voltage_V": plant.voltage,
         "sensors": changed_fields(plant.sensors),
         "free": {symbol: _given(freedom) for symbol, freedom in plant.free.items()},
-        "effects": {name: sizes for name, sizes in effects.items() if any(sizes.values())},
-        "region": {"boxes": {symbol: list(ends) for symbol, ends in plant.region.boxes.items()}},
         "provenance": plant.provenance,
     }
-    if plant.region.covariance is not None:
-        content["region"]["joint"] = {
-            "symbols": list(plant.region.symbols),
-            "covariance": plant.region.covariance.tolist(),
-            "chi_square": plant.region.chi_square,
-        }
+    if plant.diagnosis is not None:
+        content["alternatives"] = [
+            {"name": each.name, "probability": each.probability}
+            | _written(each.region.centre, each.region)
+            for each in plant.diagnosis.alternatives
+        ]
     write_json(path, content)
+
+
+def _written(parameters: Parameters, region: Region) -> dict[str, Any]:
+    """Fields `parameters`, `effects` and `region`."""
+    effects = {
+        name: {symbol: parameters[symbol] for symbol in symbols} for name, symbols in CATALOGUE.items()
+    }
+    sizing = {symbol for symbols in CATALOGUE.values() for symbol in symbols}
+    uncertain: dict[str, Any] = {"boxes": {symbol: list(ends) for symbol, ends in region.boxes.items()}}
+    if region.covariance is not None:
+        uncertain["joint"] = {
+            "symbols": list(region.symbols),
+            "covariance": region.covariance.tolist(),
+            "chi_square": region.chi_square,
+        }
+    return {
+        "parameters": {s: value for s, value in parameters.items() if s not in sizing},
+        "effects": {name: sizes for name, sizes in effects.items() if any(sizes.values())},
+        "region": uncertain,
+    }
 
 
 def _plant(content: _PlantFile, place: str) -> Plant:
     """The plant that a file describes; place: how messages begin. Raises PlantFileError."""
     try:
-        values = {**Parameters.calibrated(), **_values(content)}
-        parameters = Parameters(values, content.domains)
+        parameters = _parameters(content, content.domains)
         sensors = own_sensors(content.sensors)
         if content.domains or content.sensors or content.voltage_V != VOLTAGE:
             check_valve(parameters, content.voltage_V, sensors)
         return Plant(
             parameters=parameters,
             region=_region(content.region, parameters),
+            diagnosis=_diagnosis(content),
             name=content.name,
             provenance=content.provenance,
             voltage=content.voltage_V,
@@ -198,8 +225,27 @@ def _given(freedom: Freedom) -> dict[str, Any]:
     return {name: value for name, value in asdict(freedom).items() if value is not None}
 
 
-def _values(content: _PlantFile) -> dict[str, Any]:
-    """Values by symbol, those of effects included. Raises ParameterError."""
+def _diagnosis(content: _PlantFile) -> Mixture | None:
+    """The alternatives. Raises ParameterError and ValueError."""
+    if not content.alternatives:
+        return None
+    return Mixture(alternatives=tuple(_alternative(each, content) for each in content.alternatives))
+
+
+def _alternative(given: _AlternativeFields, content: _PlantFile) -> Alternative:
+    """One of the alternatives. Raises ParameterError and ValueError."""
+    try:
+        region = _region(given.region, _parameters(given, content.domains))
+    except ValueError as error:
+        raise type(error)(f"alternative {given.name!r}: {error}") from None
+    return Alternative(name=given.name, probability=given.probability, region=region)
+
+
+def _parameters(content: _Values, domains: Mapping[str, tuple[float, float]]) -> Parameters:
+    """All parameters, those of effects included; the report's where none are given.
+
+    Raises ParameterError.
+    """
     if not isinstance(content.parameters, dict):
         raise ParameterError("parameters must be an object of values by symbol")
     values = dict(content.parameters)
@@ -209,7 +255,7 @@ def _values(content: _PlantFile) -> dict[str, Any]:
         if not set(sizes) <= set(CATALOGUE[name]):
             raise ParameterError(f"effect {name} is sized by {', '.join(CATALOGUE[name])} only")
         values |= sizes
-    return values
+    return Parameters({**Parameters.calibrated(), **values}, domains)
 
 
 def _region(region: _RegionFields, centre: Parameters) -> Region:

@@ -1,7 +1,7 @@
-"""Regions of parameter space from which plants are drawn: fixed, a box, or a joint confidence region."""
+"""Regions of parameter space from which plants are drawn: fixed, boxes, ellipsoids, and mixtures."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -22,6 +22,11 @@ CALIBRATED_SYMBOLS = ("alphaMV", "alphaPV", "RML", "R")
 
 REGIONS = ("exact", "confidence", "ten_percent", "sensitive_ten_percent", "domain")
 """Named regions around a plant (`Region.named`)."""
+DIAGNOSIS = "diagnosis"
+"""Name of the mixture that a plant file may hold beside its region."""
+
+PROBABILITY_SLACK = 1e-6
+"""How far the sum of a mixture's probabilities may lie from 1: they were written in decimals."""
 
 TOWARDS_ENDS = 0.4
 """Both parameters of the beta distribution of `Region.towards_ends` [1]."""
@@ -97,15 +102,19 @@ class Region:
             boxes = {s: centre.domain(s) for s in CALIBRATED_SYMBOLS}
         else:
             raise ParameterError(
-                f"unknown parameter region {name!r}: choose one of {', '.join(REGIONS)}, or give "
-                "values and (low, high) ranges by symbol"
+                f"unknown parameter region {name!r}: choose one of {', '.join((*REGIONS, DIAGNOSIS))}, "
+                "or give values and (low, high) ranges by symbol"
             )
         return cls(centre=centre, boxes=boxes)
 
     @classmethod
     def from_choices(cls, choices: Mapping[str, Any], centre: Parameters) -> "Region":
         """Exact values and (low, high) ranges by symbol; what is not named stays at the centre."""
-        own = centre.own_domains
+        return cls(centre=centre).changed(choices)
+
+    def changed(self, choices: Mapping[str, Any]) -> "Region":
+        """The region with exact values and (low, high) ranges by symbol instead of its own."""
+        own = self.centre.own_domains
         exact: dict[str, float] = {}
         boxes: dict[str, tuple[float, float]] = {}
         for symbol, choice in choices.items():
@@ -116,7 +125,22 @@ class Region:
                 boxes[symbol] = (low, high)
             else:
                 exact[symbol] = written_value(symbol, choice, own)
-        return cls(centre=centre.replace(**exact), boxes=boxes)
+        left = {symbol: ends for symbol, ends in self.boxes.items() if symbol not in choices}
+        joint = [i for i, symbol in enumerate(self.symbols) if symbol not in choices]
+        covariance = (
+            self.covariance[np.ix_(joint, joint)] if self.covariance is not None and joint else None
+        )
+        return Region(
+            centre=self.centre.replace(**exact),
+            boxes={**left, **boxes},
+            symbols=tuple(self.symbols[i] for i in joint),
+            covariance=covariance,
+            chi_square=self.chi_square,
+        )
+
+    def chosen(self, rng: np.random.Generator) -> "Region":
+        """The region itself, as `Mixture.chosen` gives one of several; nothing is drawn."""
+        return self
 
     def draw(self, rng: np.random.Generator) -> Parameters:
         """One plant of the region."""
@@ -161,6 +185,59 @@ class Region:
         offset *= np.sqrt(self.chi_square * np.diag(self.covariance))
         low, high = np.transpose([self.centre.domain(s) for s in self.symbols])
         return np.clip([self.centre[s] for s in self.symbols] + offset, low, high)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Alternative:
+    """One of the plants that a valve may be."""
+
+    name: str
+    """What it says about the valve, such as the effects that act."""
+    probability: float
+    """That it is the right one [1]."""
+    region: Region
+    """Its plants."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mixture:
+    """Plants of which nobody knows what acts in them: alternatives, each with its probability."""
+
+    alternatives: tuple[Alternative, ...]
+
+    def __post_init__(self) -> None:
+        for each in self.alternatives:
+            if not 0 < each.probability <= 1:
+                raise ParameterError(
+                    f"alternative {each.name!r} has probability {each.probability:g}: give one above 0 "
+                    "and at most 1"
+                )
+        whole = sum(each.probability for each in self.alternatives)
+        if abs(whole - 1) > PROBABILITY_SLACK:
+            raise ParameterError(f"the alternatives' probabilities have the sum {whole:g}: make it 1")
+
+    @cached_property
+    def _ends(self) -> NDArray:
+        """Probability of each alternative and those before it (alternatives,) [1]."""
+        return np.cumsum([each.probability for each in self.alternatives])
+
+    @property
+    def centre(self) -> Parameters:
+        """Centre of the first alternative [SI]."""
+        return self.alternatives[0].region.centre
+
+    def changed(self, choices: Mapping[str, Any]) -> "Mixture":
+        """`Region.changed` in every alternative."""
+        return Mixture(
+            alternatives=tuple(
+                replace(each, region=each.region.changed(choices)) for each in self.alternatives
+            )
+        )
+
+    def chosen(self, rng: np.random.Generator) -> Region:
+        """The region of an alternative, drawn by the probabilities."""
+        last = len(self.alternatives) - 1  # the sum may be below 1 by rounding
+        return self.alternatives[min(int(np.searchsorted(self._ends, rng.random())), last)].region
 
 
 def _correlation(covariance: NDArray) -> NDArray:

@@ -73,7 +73,9 @@ def _suite(options: argparse.Namespace, plant: Plant) -> Sequence[Programme]:
 def _save_truth(truth: Parameters, options: argparse.Namespace) -> None:
     """Write the true parameters as a plant file whose region is that one point."""
     plant = load_plant(options.plant)
-    truthful = replace(plant, parameters=truth, region=Region(centre=truth), name="truth", provenance={})
+    truthful = replace(
+        plant, parameters=truth, region=Region(centre=truth), diagnosis=None, name="truth", provenance={}
+    )
     save_plant(truthful, options.truth)
 
 

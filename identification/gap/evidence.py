@@ -126,7 +126,8 @@ def _covariance(equations: NormalEquations) -> NDArray:
     """Covariance of the scaled vector (k, k) [1]; wide, but finite, where the recordings say nothing."""
     size = np.sqrt(np.diag(equations.hessian) + 1e-9)  # a parameter may have no effect at all
     values, vectors = np.linalg.eigh(equations.hessian / np.outer(size, size))
-    return (vectors / np.maximum(values, SMALLEST_EIGENVALUE)) @ vectors.T / np.outer(size, size)
+    root = vectors / np.sqrt(np.maximum(values, SMALLEST_EIGENVALUE)) / size[:, None]
+    return root @ root.T  # symmetric to the last digit, which the product with the eigenvalues is not
 
 
 def _at_bound(estimate: Estimate) -> bool:

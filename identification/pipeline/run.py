@@ -181,6 +181,7 @@ def calibrated_plant(identification: Identification) -> Plant:
         identification.plant or Plant.calibrated(),
         parameters=identification.parameters,
         region=identification.confidence.region,
+        diagnosis=None,
         name=identification.campaign.name,
         provenance={
             "method": ESTIMATOR,

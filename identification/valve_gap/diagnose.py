@@ -9,16 +9,19 @@ from os import PathLike
 from pathlib import Path
 from time import perf_counter
 
+import numpy as np
 from scipy.stats import chi2
 
 from epv_env.common.command_line import NextStep, beside, plant_option
 from epv_env.common.files import Journal
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
-from epv_env.plant.region import Region
+from epv_env.plant.region import Alternative, Mixture, Region
 from identification.bench.programmes import at_voltage, save_programmes
 from identification.gap.diagnosis import Diagnosis, diagnose, hypothesis_label
+from identification.gap.evidence import EvaluatedHypothesis
 from identification.gap.fitting_problem import FitCache
 from identification.gap.gap_json import fitted_values, parameter_covariance, write_results
+from identification.gap.held_out import RECALIBRATED
 from identification.gap.report_page import sections
 from identification.gap.verdict import AMBIGUOUS, UNKNOWN
 from identification.recordings.campaign_files import read_campaign
@@ -33,6 +36,8 @@ REPORT, PLANT, JOURNAL = "report.html", "plant.json", "fits.jsonl"
 
 REGION_PROBABILITY = 0.95
 """Probability that the plant file's region holds the parameters [-]."""
+KEPT_PROBABILITY = 0.99
+"""Probability that the plant file's alternatives hold together [-]."""
 
 
 def diagnose_campaign(
@@ -116,22 +121,16 @@ def refitted_plant(found: Diagnosis, valve: Valve, name: str) -> Plant:
     gap on held-out recordings.
 
     Its region is where the recordings leave the calibrated parameters and the sizes, jointly;
-    autocorrelated residuals widen it.
+    autocorrelated residuals widen it. Its `diagnosis` holds every plant that is still possible.
     """
     best = found.kept
     named = bool(best.labels)
-    parameters = valve.base.replace(**fitted_values(found, best))
-    problem = found.ranking.problem
-    symbols = tuple(p.symbol for p in problem.parameters(best.estimate))
+    region = _region(found, best, valve)
     return replace(
         valve.plant,
-        parameters=parameters,
-        region=Region(
-            centre=parameters,
-            symbols=symbols,
-            covariance=parameter_covariance(found, best),
-            chi_square=float(chi2.ppf(REGION_PROBABILITY, len(symbols))),
-        ),
+        parameters=region.centre,
+        region=region,
+        diagnosis=possible_plants(found, valve),
         name=f"{name} with {hypothesis_label(best)}" if named else f"{name}, recalibrated",
         provenance={
             "method": "joint refit with the cause of the gap" if named else "recalibration",
@@ -140,6 +139,43 @@ def refitted_plant(found: Diagnosis, valve: Valve, name: str) -> Plant:
             "recordings_sha256": {r.name: r.sha256 for r in valve.recordings},
             "warnings": found.warnings,
         },
+    )
+
+
+def possible_plants(found: Diagnosis, valve: Valve) -> Mixture:
+    """The likeliest plants that hold nearly all of the probability, each with its region.
+
+    No cause and an unknown one are both the recalibrated plant: nothing better can be simulated.
+    """
+    ranking = found.ranking
+    unnamed = (ranking.no_cause + ranking.unknown, ranking.recalibrated)
+    pairs = [*zip(ranking.probabilities, ranking.hypotheses, strict=True), unnamed]
+    pairs.sort(key=lambda pair: -pair[0])
+    before = np.cumsum([0.0, *(probability for probability, _ in pairs)])
+    kept = [pair for pair, held in zip(pairs, before, strict=False) if held < KEPT_PROBABILITY]
+    whole = sum(probability for probability, _ in kept)
+    return Mixture(
+        alternatives=tuple(
+            Alternative(
+                name=hypothesis_label(hypothesis) or RECALIBRATED,
+                probability=float(probability / whole),
+                region=_region(found, hypothesis, valve),
+            )
+            for probability, hypothesis in kept
+        )
+    )
+
+
+def _region(found: Diagnosis, hypothesis: EvaluatedHypothesis, valve: Valve) -> Region:
+    """Where the recordings leave the calibrated parameters and the sizes of a hypothesis, jointly."""
+    fitted = fitted_values(found, hypothesis)
+    inside = {s: float(np.clip(value, *valve.base.domain(s))) for s, value in fitted.items()}
+    symbols = tuple(p.symbol for p in found.ranking.problem.parameters(hypothesis.estimate))
+    return Region(
+        centre=valve.base.replace(**inside),
+        symbols=symbols,
+        covariance=parameter_covariance(found, hypothesis),
+        chi_square=float(chi2.ppf(REGION_PROBABILITY, len(symbols))),
     )
 
 

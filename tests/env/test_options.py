@@ -8,12 +8,20 @@ import pytest
 
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant, save_plant
-from epv_env.plant.region import Region
+from epv_env.plant.region import Alternative, Mixture, Region
 from epv_env.plant.supply import Supply
 from tests.env.rollouts import IDS, actions, assert_same, native, run
 
+CENTRE = Parameters.calibrated()
 RECORDED = Supply.recorded(np.array([0.0, 0.1, 0.3]), np.array([9.0, 9.5, 8.0]))
+MIXTURE = Mixture(
+    alternatives=tuple(
+        Alternative(name=str(sizes), probability=0.5, region=Region.from_choices(sizes, CENTRE))
+        for sizes in ({"t_delay": (0.002, 0.01)}, {"G_eddy": 0.004, "R": (40.0, 41.0)})
+    )
+)
 CHOICES = [
+    {"parameters": MIXTURE},
     {"parameters": {"alphaMV": 0.6}},
     {"parameters": {"alphaMV": (0.6, 0.7), "R": 41.0}},
     {"parameters": "ten_percent"},
@@ -90,6 +98,18 @@ def test_a_plant_file_is_the_centre_and_its_region_is_confidence(tmp_path):
     assert exact["alphaMV"] == 0.8
     drawn = list(episodes(valve(plant=str(tmp_path / "plant.json"), parameters="confidence"), 20))
     assert all(40.0 <= p["R"] <= 41.0 and p["alphaMV"] == 0.8 for p in drawn)
+
+
+def test_diagnosis_draws_the_alternatives_of_the_plant_file_effects_included(tmp_path):
+    region = MIXTURE.alternatives[0].region
+    plant = Plant(parameters=CENTRE, region=region, diagnosis=MIXTURE)
+    save_plant(plant, tmp_path / "plant.json")
+    drawn = list(episodes(valve(plant=tmp_path / "plant.json", parameters="diagnosis")))
+    late, eddy = ([p for p in drawn if p[symbol] > 0] for symbol in ("t_delay", "G_eddy"))
+    assert 70 < len(late) < 130
+    assert len(late) + len(eddy) == len(drawn)
+    assert len({p["t_delay"] for p in late}) == len(late)
+    assert all(p["G_eddy"] == 0.004 and 40.0 <= p["R"] <= 41.0 for p in eddy)
 
 
 def test_a_recorded_supply_is_followed():

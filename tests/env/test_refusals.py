@@ -16,6 +16,7 @@ EITHER_WAY = [
     ({"scenario": "rain"}, ValueError, "unknown consumption scenario 'rain': choose one of mixed"),
     ({"scenario": 7}, OptionError, "scenario is 7: give the name of one"),
     ({"parameters": "hell"}, ParameterError, "unknown parameter region 'hell': choose one of"),
+    ({"parameters": "diagnosis"}, OptionError, "'calibrated' has no alternatives to draw from: give"),
     ({"parameters": {"R": 60.0}}, ParameterError, r"R = 60 Ohm is outside its domain \[35, 50\]"),
     ({"parameters": {"R": (42.0, 41.0)}}, ParameterError, r"range of R is \[42, 41\]: give low <= h"),
     ({"parameters": {"R": "much"}}, ParameterError, "parameter R is 'much': give one number"),

@@ -16,6 +16,7 @@ from tests.env.rollouts import (
     run,
     side_by_side,
 )
+from tests.env.test_options import MIXTURE
 
 PERIODS = 60
 LIMIT = 12
@@ -30,6 +31,13 @@ def test_trajectories_are_those_of_sync_vector_env(identifier, n):
     commands = actions(identifier, n, PERIODS)
     found = run(native(identifier, n, **EVERYTHING), commands, seed=n)
     assert_same(found, run(side_by_side(identifier, n, **EVERYTHING), commands, seed=n))
+
+
+def test_plants_of_a_mixture_are_drawn_alike(identifier):
+    options = {"parameters": MIXTURE, "privileged": True}
+    commands = actions(identifier, 5, PERIODS)
+    found = run(native(identifier, 5, **options), commands)
+    assert_same(found, run(side_by_side(identifier, 5, **options), commands))
 
 
 def test_signals_and_effects_are_followed_alike(identifier):

@@ -1,13 +1,14 @@
 """A plant file gives back what was written, is written whole or not at all, and refuses the rest."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import FORMAT, Plant, PlantFileError, load_plant, save_plant
-from epv_env.plant.region import Region
+from epv_env.plant.region import Alternative, Mixture, Region
 
 CENTRE = Parameters.calibrated().replace(alphaMV=0.75, R=41.123456789012345)
 JOINT = Plant(
@@ -22,6 +23,16 @@ JOINT = Plant(
     name="bench 7",
     provenance={"recordings": ["a.csv"], "residual_mbar": 1 / 3},
 )
+SHIFTED = replace(JOINT.region, centre=CENTRE.replace(eMV=0.5, R=42.0))
+MIXED = replace(
+    JOINT,
+    diagnosis=Mixture(
+        alternatives=(
+            Alternative(name="armature_bounce", probability=2 / 3, region=SHIFTED),
+            Alternative(name="recalibrated", probability=1 / 3, region=JOINT.region),
+        )
+    ),
+)
 
 
 def written(path, **content):
@@ -33,14 +44,29 @@ def written(path, **content):
 def assert_equal(found, expected):
     assert dict(found.parameters) == dict(expected.parameters)
     assert (found.name, found.provenance) == (expected.name, expected.provenance)
-    assert dict(found.region.centre) == dict(expected.parameters)
-    assert found.region.boxes == dict(expected.region.boxes)
-    assert found.region.symbols == expected.region.symbols
-    assert found.region.chi_square == expected.region.chi_square
-    np.testing.assert_array_equal(found.region.covariance, expected.region.covariance)
+    assert [(each.name, each.probability) for each in alternatives(found)] == [
+        (each.name, each.probability) for each in alternatives(expected)
+    ]
+    assert_equal_regions(found.region, expected.region)
+    for own, other in zip(alternatives(found), alternatives(expected), strict=True):
+        assert_equal_regions(own.region, other.region)
 
 
-@pytest.mark.parametrize("plant", [Plant.calibrated(), JOINT], ids=["calibrated", "joint"])
+def alternatives(plant):
+    return plant.diagnosis.alternatives if plant.diagnosis else ()
+
+
+def assert_equal_regions(found, expected):
+    assert dict(found.centre) == dict(expected.centre)
+    assert found.boxes == dict(expected.boxes)
+    assert found.symbols == expected.symbols
+    assert found.chi_square == expected.chi_square
+    np.testing.assert_array_equal(found.covariance, expected.covariance)
+
+
+@pytest.mark.parametrize(
+    "plant", [Plant.calibrated(), JOINT, MIXED], ids=["calibrated", "joint", "alternatives"]
+)
 def test_reading_gives_back_what_was_written_to_the_bit(tmp_path, plant):
     save_plant(plant, tmp_path / "plant.json")
     assert_equal(load_plant(tmp_path / "plant.json"), plant)
@@ -75,6 +101,12 @@ def test_what_json_cannot_hold_leaves_the_old_file(tmp_path):
         (
             {"region": {"joint": {"symbols": ["R"], "covariance": [[-1]], "chi_square": 1}}},
             "positive semi-definite 1 x 1",
+        ),
+        ({"alternatives": [{"parameters": {}}]}, r"alternatives\[0\]: field 'probability' is missing"),
+        ({"alternatives": [{"parameters": {}, "probability": 0.5}]}, "have the sum 0.5: make it 1"),
+        (
+            {"alternatives": [{"name": "a", "parameters": {"R": 99}, "probability": 1}]},
+            "alternative 'a': parameter R = 99 Ohm is outside its domain",
         ),
     ],
     ids=str,

@@ -13,7 +13,7 @@ from epv_env.plant.parameters import (
     sensitive_symbols,
     table,
 )
-from epv_env.plant.region import CALIBRATED_SYMBOLS, REGIONS, Region
+from epv_env.plant.region import CALIBRATED_SYMBOLS, REGIONS, Alternative, Mixture, Region
 
 CENTRE = Parameters.calibrated()
 CHI_SQUARE = 9.49
@@ -109,6 +109,52 @@ def test_joint_draws_stay_inside_the_domains():
         for symbol in SYMBOLS:
             low, high = domain(symbol)
             assert low <= p[symbol] <= high
+
+
+def mixture(*probabilities):
+    """As many alternatives; that number k has an eddy current of (k + 1) mS and the joint region."""
+    regions = [
+        Region(
+            centre=CENTRE.replace(G_eddy=1e-3 * (k + 1)), symbols=SYMBOLS, covariance=COVARIANCE,
+            chi_square=CHI_SQUARE,
+        )
+        for k in range(len(probabilities))
+    ]  # fmt: skip
+    return Mixture(
+        alternatives=tuple(
+            Alternative(name=str(k), probability=p, region=region)
+            for k, (p, region) in enumerate(zip(probabilities, regions, strict=True))
+        )
+    )
+
+
+def test_a_mixture_draws_its_alternatives_as_often_as_they_are_probable_each_in_its_region():
+    rng, n = np.random.default_rng(0), 6000
+    chosen = mixture(0.6, 0.3, 0.1)
+    drawn = [chosen.chosen(rng).draw(rng) for _ in range(n)]
+    which = np.array([round(plant["G_eddy"] / 1e-3) - 1 for plant in drawn])
+    shares = np.array([0.6, 0.3, 0.1])
+    assert np.all(np.abs(np.bincount(which) / n - shares) < 4 * np.sqrt(shares * (1 - shares) / n))
+    offset = np.array([[plant[s] - CENTRE[s] for s in SYMBOLS] for plant in drawn])[which == 1]
+    # A uniform 4-ball of radius r has the variance r^2 / 6 along each axis.
+    found = np.cov(offset.T) / np.outer(DEVIATIONS, DEVIATIONS) * 6 / CHI_SQUARE
+    np.testing.assert_allclose(found, CORRELATIONS, atol=0.1)
+
+
+def test_what_is_chosen_for_a_symbol_replaces_every_way_in_which_it_varied():
+    for region in (joint(), mixture(0.5, 0.5)):
+        rng = np.random.default_rng(0)
+        changed = region.changed({"R": 41.0, "kPV": (10.0, 10.5), "G_eddy": 0.0})
+        drawn = [changed.chosen(rng).draw(rng) for _ in range(50)]
+        assert {(plant["R"], plant["G_eddy"]) for plant in drawn} == {(41.0, 0.0)}
+        assert all(10.0 <= plant["kPV"] <= 10.5 for plant in drawn)
+        assert len({plant["alphaMV"] for plant in drawn}) == 50
+
+
+@pytest.mark.parametrize("wrong", [(), (0.5, 0.4), (1.0, 0.0), (np.nan,), (1.5, -0.5)])
+def test_probabilities_that_are_none_are_refused(wrong):
+    with pytest.raises(ParameterError, match=r"sum|above 0"):
+        mixture(*wrong)
 
 
 @pytest.mark.parametrize(

@@ -79,6 +79,7 @@ def test_a_finished_run_is_not_overwritten_unasked(finished):
     [
         (["--scenario", "flood"], "unknown consumption scenario 'flood'"),
         (["--plant", "nowhere.json"], "cannot read plant file nowhere.json"),
+        (["--parameters", "diagnosis"], "has no alternatives to draw from"),
         (["--timesteps", "0"], "--timesteps"),
         (["--switching-price", "-1"], "must be a number from 0 to 1000"),
         (["--resume"], "nothing to resume"),

@@ -34,8 +34,9 @@ from epv_env.common.files import write_text
 from epv_env.common.results_folder import CONFIG, check_same, read_config, write_options
 from epv_env.plant.consumption import check_scenario
 from epv_env.plant.plantfile import Plant, load_plant
-from epv_env.plant.region import REGIONS
+from epv_env.plant.region import DIAGNOSIS, REGIONS
 from epv_env.reward import RewardWeights
+from epv_env.settings import as_region
 from training.evaluation.plots import plt, save_figure
 from training.evaluation.scenarios import EvaluationScenario
 from training.studies.comparison import as_text, compare, differences, figure, rows
@@ -72,7 +73,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_seed(parser, help="of the training")
     add_plant(parser)
     parser.add_argument("--scenario", default="mixed", help="consumption scenario of the training")
-    parser.add_argument("--parameters", choices=REGIONS, default=REGION, help="plants to train on")
+    parser.add_argument(
+        "--parameters", choices=(*REGIONS, DIAGNOSIS), default=REGION, help="plants to train on"
+    )
     parser.add_argument(
         "--switching-price", type=Number(float, 0.0, 1000.0), default=RewardWeights().switching,
         help="reward's price of one switching of the coil: trades wear against breakdown",
@@ -90,6 +93,7 @@ def run(options: argparse.Namespace) -> None:
     Raises ValueError for a folder that holds another training, and for options that do not fit.
     """
     plant = load_plant(options.plant)
+    as_region(options.parameters, plant)  # refuses one that the plant does not have
     check_scenario(options.scenario)
     weights = RewardWeights(switching=options.switching_price)
     begin_folder(options)

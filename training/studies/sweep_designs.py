@@ -13,7 +13,6 @@ from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import table
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
-from epv_env.settings import as_region
 from identification.sensitivity.one_at_a_time import changed_values
 from training.evaluation.scenarios import effect_levels
 
@@ -103,7 +102,7 @@ def conditions(plant: Plant) -> Iterator[Point]:
 
 def hypercube(plant: Plant, points: int, seed: int) -> Point:
     """A Latin hypercube over SAMPLED, one plant for each episode."""
-    plants = latin_hypercube(as_region(SAMPLED, plant), points, seed)
+    plants = latin_hypercube(Region.named(SAMPLED, plant.parameters), points, seed)
     return Point(design="hypercube", factor=SAMPLED, level="Latin hypercube", parameters=plants)
 
 

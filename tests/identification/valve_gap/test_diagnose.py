@@ -15,9 +15,10 @@ from epv_env.plant.plantfile import load_plant
 from identification.__main__ import main
 from identification.bench.programmes import DIAGNOSIS_SUITE
 from identification.bench.session import measured_campaign, run_programme
-from identification.recordings.campaign_files import write_campaign
+from identification.recordings.campaign_files import read_campaign, write_campaign
 from identification.recordings.recording import Campaign, CampaignError, Recording
-from identification.valve_gap.diagnose import diagnose_campaign
+from identification.valve_gap.diagnose import diagnose_campaign, possible_plants
+from identification.valve_gap.valve import Valve
 from tests.identification.browser import check_layout
 
 NAMES = ("test1", "low_supply", "validation")
@@ -83,6 +84,29 @@ def test_the_plant_file_knows_how_sure_it_is(diagnosed):
     spread = np.std([plant["G_eddy"] for plant in drawn]) / 4e-3
     assert 0.02 < spread < 0.2
     gymnasium.make("EPValve-v0", plant=str(diagnosed / "out" / "plant.json"), parameters="confidence")
+
+
+def test_the_plant_file_holds_what_is_possible_beside_the_first_answer(diagnosed):
+    """Here little is: the alternatives together hold the eddy current nearly surely, at its size."""
+    plant = load_plant(diagnosed / "out" / "plant.json")
+    assert plant.diagnosis is not None
+    first, *others = plant.diagnosis.alternatives
+    assert "eddy_current" in first.name
+    assert dict(first.region.centre) == dict(plant.parameters)
+    assert first.probability > 0.9 > 0.1 > max((each.probability for each in others), default=0.0)
+
+
+def test_possible_plants_hold_nearly_all_probability_no_cause_included(diagnosed):
+    valve = Valve(read_campaign(diagnosed / "campaign"))
+    found = diagnose_campaign(diagnosed / "campaign", diagnosed / "out", report=False)
+    shares = [0.5, *[0.0] * (len(found.ranking.hypotheses) - 1)]
+    doubtful = replace(
+        found, ranking=replace(found.ranking, probabilities=shares, no_cause=0.3, unknown=0.2)
+    )
+    likely, unnamed = possible_plants(doubtful, valve).alternatives
+    assert (likely.probability, unnamed.probability) == (0.5, 0.5)
+    assert unnamed.name == "recalibrated"
+    assert unnamed.region.centre["G_eddy"] == 0.0 < likely.region.centre["G_eddy"]
 
 
 def assert_alike(found, expected) -> None:
