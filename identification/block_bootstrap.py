@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from scipy import stats
 
 DRAWS = 2000
-"""Number of draws: the ends of a 90 % interval then vary by about one percent of its width."""
+"""Number of draws: the ends of a 95 % interval then vary by about 1.5 percent of its width."""
 
-LEVEL = 0.9
+LEVEL = 0.95
 """Share of the draws within an interval, where the caller asks for no other."""
 
 LEAST_CONCENTRATION = 0.05

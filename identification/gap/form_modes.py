@@ -184,13 +184,17 @@ def _response(
     return change + plant.forced(values, run, forcing) / MODE_STEP if forcing else change
 
 
-def law_in_words(estimate: Estimate) -> str:
-    """How the law that the recordings want differs from the one assumed, mode by mode."""
+def law_in_words(estimate: Estimate, plant: GreyBox | None = None) -> str:
+    """How the law that the recordings want differs from the one assumed, mode by mode.
+
+    plant: says the equations in words; without it they are names, as in files.
+    """
+    titles = {equation.name: equation.title for equation in plant.equations} if plant else {}
     forms = estimate.slopes.forms if estimate.slopes else None
     if forms is None or estimate.shares is None:
         return AS_ASSUMED
     used = [
-        f"{_words(name, share < 0)} ({abs(share) * FORM_SD:.0%})"
+        f"{_words(titles.get(name, name), share < 0)} ({abs(share) * FORM_SD:.0%})"
         for name, share in zip(forms.names, estimate.shares, strict=True)
         if abs(share) * FORM_SD >= USED
     ]

@@ -145,8 +145,9 @@ class Cause:
 
     @property
     def title(self) -> str:
-        """The cause for people."""
-        return self.words or self.label
+        """The cause for people: its words, and its name in brackets."""
+        words = f"{self.words}, {self.variant}" if self.variant else self.words
+        return f"{words} ({self.name})" if self.words else self.label
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -84,7 +84,7 @@ def _bars(axes: Axes, probabilities: Mapping[str, float], colours: Sequence[str]
 
 
 def gap_figure(reduction: DiscrepancyReduction, words: Callable[[str], str] = str) -> Figure:
-    """Gap of every model on held-out runs, overall and by channel, with 90 % intervals.
+    """Gap of every model on held-out runs, overall and by channel, with their intervals.
 
     words: what people read instead of a cause's name.
     """
@@ -185,21 +185,21 @@ def residual_figure(plant: GreyBox, run: int, residual: NDArray, masks: Mapping[
     return figure
 
 
-def law_figure(laws: Sequence[Law], units: Mapping[str, tuple[str, float]]) -> Figure:
+def law_figure(laws: Sequence[Law], terms: Mapping[str, tuple[str, str, float]]) -> Figure:
     """What causes add to equations and readings: as the recordings want it over what the catalogue has.
 
-    units: unit and its size [SI], by name of the equation or channel.
+    terms: title, unit and its size [SI], by name of the equation or channel.
     """
     columns = min(len(laws), 3)
     rows = -(-len(laws) // columns)
     figure = Figure(figsize=(3.4 * columns + 0.4, 3.1 * rows + 0.4), layout="constrained")
     for place, law in enumerate(laws):
-        axes, (unit, size) = figure.add_subplot(rows, columns, place + 1), units[law.term]
+        axes, (title, unit, size) = figure.add_subplot(rows, columns, place + 1), terms[law.term]
         assumed, wanted = law.assumed / size, law.wanted / size
         ends = [np.min(assumed), np.max(assumed)]
         axes.plot(assumed, wanted, ".", color="tab:blue", markersize=2, label="as recorded")
         axes.plot(ends, ends, color="0.4", linewidth=1.0, label="as assumed")
-        axes.set_title(f"{law.cause}, in {law.term}", fontsize="small")
+        axes.set_title(f"{law.cause},\nin {title}", fontsize="small")
         axes.set_xlabel(f"assumed [{unit}]", fontsize=8)
         axes.set_ylabel(f"wanted [{unit}]", fontsize=8)
         axes.grid(alpha=0.3)
@@ -239,18 +239,18 @@ def forcing_figure(plant: GreyBox, forcing: ForcingEstimate) -> Figure:
         axes.stairs(value, edges, baseline=None, color="tab:blue")
         axes.axhline(0.0, color="black", linewidth=0.6)
         axes.set_title(plant.runs[run].name, fontsize=9)
-        axes.set_ylabel(f"{forcing.equation.name} [{forcing.equation.unit}]", fontsize=8)
+        axes.set_ylabel(f"missing [{forcing.equation.unit}]", fontsize=8)
         axes.grid(alpha=0.3)
     rows[-1].set_xlabel("time [s]")
     return figure
 
 
 def wrapped(label: str) -> str:
-    """The label of a set of causes with a line for each."""
-    return label.replace(" + ", "\n+ ")
+    """The label of a set of causes with a line for each, and for each name in brackets."""
+    return label.replace(" + ", "\n+ ").replace(" (", "\n(")
 
 
 def row_height(labels: Iterable[str]) -> float:
     """Height of a row that has room for each of these labels, relative to that of one cause [1]."""
-    lines = max((1 + label.count(" + ") for label in labels), default=1)
+    lines = max((1 + wrapped(label).count("\n") for label in labels), default=1)
     return max(1.0, 0.5 * lines)

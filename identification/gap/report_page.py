@@ -178,7 +178,7 @@ def _warnings(diagnosis: Diagnosis) -> Section:
 def ranking_table(diagnosis: Diagnosis) -> Table:
     """Judged causes with their sizes, the share that each closes, and look-alikes."""
     return Table(
-        columns=["Cause", "component", "probability", "size (90 %)", "closes", "looks like"],
+        columns=["Cause", "component", "probability", f"size ({LEVEL_TEXT})", "closes", "looks like"],
         rows=[
             [
                 hypothesis_title(cause.hypothesis),
@@ -206,13 +206,14 @@ def drawn_laws(diagnosis: Diagnosis, estimate: Estimate) -> list[Block]:
     found = laws(problem, estimate)
     if not found:
         return []
-    terms = (*problem.plant.equations, *problem.plant.channels)
-    units = {term.name: (term.unit, term.scale) for term in terms}
+    plant = problem.plant
+    terms = {e.name: (e.title, e.unit, e.scale) for e in plant.equations}
+    terms |= {c.name: (c.name, c.unit, c.scale) for c in plant.channels}
     caption = (
         "What the cause adds, sample by sample, by the law that the recordings want, over the law of "
-        f"the catalogue: {law_in_words(estimate)}."
+        f"the catalogue: {law_in_words(estimate, plant)}."
     )
-    return [Picture(figure=law_figure(found, units), caption=caption)]
+    return [Picture(figure=law_figure(found, terms), caption=caption)]
 
 
 def inclusion_table(diagnosis: Diagnosis) -> Table:

@@ -1,6 +1,7 @@
 """The diagnosis in sentences that a project leader can act on."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from identification.gap.diagnosis import (
     MENTIONED_PROBABILITY,
@@ -74,7 +75,7 @@ def _known(diagnosis: Diagnosis) -> str:
     )
     if not diagnosis.surely_helps(best):
         return f"{text}: {add_or_not(diagnosis, best)}."
-    law = law_in_words(best.hypothesis.estimate)
+    law = law_in_words(best.hypothesis.estimate, diagnosis.ranking.problem.plant)
     other = "" if law == AS_ASSUMED else f" Its law differs from the one assumed: it {law}."
     left = diagnosis.reduction.left.overall.value
     rest = (
@@ -294,8 +295,8 @@ def component_at_fault(diagnosis: Diagnosis) -> str:
     localisation = diagnosis.localisation
     own = [f.equation for f in localisation.forcings if f.equation.component == component]
     own.sort(key=lambda equation: -localisation.equation_probabilities[equation.name])
-    named = "".join(f"{part}, " for e in own[:1] for part in (e.meaning, e.name) if part)
-    return f"{component.replace('_', ' ')} ({named}{probability_text(probability)})"
+    named = "".join(f", {equation.title}" for equation in own[:1])
+    return f"{component.replace('_', ' ')}{named} ({probability_text(probability)})"
 
 
 def location_sentence(diagnosis: Diagnosis) -> str:
@@ -363,7 +364,7 @@ def parameters_at_bounds(diagnosis: Diagnosis) -> list[str]:
         for cause in mentioned_causes(diagnosis)
     }
     return [
-        f"{name}: {p.symbol} is at an end of its physical range ({quantity(value, p.unit)})"
+        f"{name}: {p.title} is at an end of its physical range ({quantity(value, p.unit)})"
         for name, estimate in estimates.items()
         for p in problem.parameters(estimate)
         for value in [problem.values(estimate)[p.symbol]]
@@ -392,7 +393,7 @@ def sizes_with_intervals(diagnosis: Diagnosis, cause: RankedCause) -> list[str]:
     parameters = cause.hypothesis.estimate.hypothesis.parameters
     intervals = parameter_intervals(diagnosis, cause.hypothesis)
     return [
-        f"{p.symbol} = {quantity_with_interval(*interval, p.unit)}"
+        f"{p.title} = {quantity_with_interval(*interval, p.unit)}"
         for p, interval in zip(parameters, intervals, strict=True)
     ]
 
@@ -401,17 +402,14 @@ def sizes_text(diagnosis: Diagnosis, cause: RankedCause) -> str:
     """Each fitted parameter of a cause, without its interval."""
     values = diagnosis.ranking.problem.values(cause.hypothesis.estimate)
     return " and ".join(
-        f"{p.symbol} = {quantity(values[p.symbol], p.unit)}"
+        f"{p.title} = {quantity(values[p.symbol], p.unit)}"
         for p in cause.hypothesis.estimate.hypothesis.parameters
     )
 
 
 def in_words(diagnosis: Diagnosis, label: str) -> str:
     """A cause's name or label, or several joined by ' + ', for people; any other text unchanged."""
-    words = {
-        name: cause.words
-        for cause in diagnosis.ranking.problem.plant.causes
-        if cause.words
-        for name in (cause.name, cause.label)
-    }
+    words = {}
+    for cause in diagnosis.ranking.problem.plant.causes:
+        words |= {cause.name: replace(cause, variant="").title, cause.label: cause.title}
     return " + ".join(words.get(part, part) for part in label.split(" + "))

@@ -28,6 +28,38 @@ PARAMETER_COMPONENTS = {
 """Component of each parameter outside the four, all of Tables 6 and 7 but the cone model's."""
 
 
+WORDS = {
+    "coil_heating": "heating of the coil",
+    "eddy_current": "eddy current in the solenoid's iron",
+    "flyback_voltage": "diode or clamp at the coil",
+    "driver_voltage_drop": "voltage drop in the coil's driver",
+    "magnetic_saturation": "saturation of the solenoid's iron",
+    "magnetic_remanence": "residual magnetism of the solenoid's iron",
+    "armature_friction": "friction of the armature",
+    "armature_bounce": "bouncing of the armature",
+    "armature_pressure_force": "pressure force on the armature",
+    "inlet_seat_leak": "leak of the solenoid valve's inlet seat",
+    "exhaust_seat_leak": "leak of the solenoid valve's exhaust seat",
+    "control_chamber_heat": "heat exchange in the control chamber",
+    "moving_control_volume": "piston's sweep of the control chamber",
+    "pressure_dependent_discharge": "discharge coefficient that depends on pressure",
+    "critical_pressure_ratio": "lower critical pressure ratio of the orifices",
+    "piston_friction": "friction of the piston's seals",
+    "flow_force": "flow force on the piston",
+    "local_gas_speed": "jet angle that depends on the gas speed",
+    "seat_leak": "leak of the protection valve's seat",
+    "circuit_leak": "leak of the circuit to ambient",
+    "output_chamber_heat": "heat exchange in the output chamber",
+    "output_pipe": "pipe in the output circuit",
+    "supply_restriction": "restriction in the supply line",
+    "pressure_sensor_lag": "lag of a pressure sensor",
+    "pressure_sensor_bias": "offset of a pressure sensor",
+    "current_sensor_gain": "scale error of the current sensor",
+    "command_delay": "delay of the command",
+}
+"""What people read beside an effect's name; an effect that is not here is called by its name alone."""
+
+
 def catalogue(
     nominal: Parameters,
     without: Sequence[str] = (),
@@ -51,6 +83,7 @@ def effects() -> list[Cause]:
     return [
         Cause(
             name=effect.name,
+            words=WORDS.get(effect.name, ""),
             variant=variant,
             component=effect.component,
             parameters=tuple(effect_size(size) for size in sizes),
@@ -67,7 +100,7 @@ def parameters(nominal: Parameters) -> list[Cause]:
     return [
         Cause(
             name=f"parameter:{symbol}",
-            words=f"another {symbol} ({table()[symbol].meaning})",
+            words=f"different {table()[symbol].meaning}",
             component=component,
             parameters=(parameter_size(symbol, nominal),),
             prior=PARAMETER_PRIOR,
@@ -83,6 +116,7 @@ def effect_size(size: Size) -> FreeParameter:
     low, high = row.domain or (0.0, 0.0)
     return FreeParameter(
         symbol=size.symbol,
+        meaning=row.meaning,
         unit=row.unit,
         low=max(low, low if size.least_fitted is None else size.least_fitted),
         high=high,
@@ -101,6 +135,7 @@ def parameter_size(symbol: str, nominal: Parameters) -> FreeParameter:
     value, (low, high) = nominal[symbol], nominal.domain(symbol)
     return FreeParameter(
         symbol=symbol,
+        meaning=table()[symbol].meaning,
         unit=table()[symbol].unit,
         low=max(low, value * (1 - PARAMETER_RANGE)),
         high=min(high, value * (1 + PARAMETER_RANGE)),

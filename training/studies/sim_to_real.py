@@ -130,7 +130,7 @@ def diagnosis_text(diagnosis: Mapping[str, Any], withheld: str) -> str:
         )
     first = diagnosis["causes"][0]
     sizes = ", ".join(
-        f"{name} {value:.4g} (90 %: {low:.4g} to {high:.4g})"
+        f"{name} {value:.4g} (95 %: {low:.4g} to {high:.4g})"
         for name, (value, low, high) in first["magnitude"].items()
     )
     return (
