@@ -16,7 +16,7 @@ from controllers.knowledge import ValveKnowledge
 from controllers.p3_check import P3Check
 from controllers.policy_files import Network, read_policy
 from controllers.tuned import tuned
-from epv_env.plant.plantfile import Plant
+from epv_env.plant.plantfile import Plant, load_plant
 
 TRAINED = Path(__file__).parent / "trained"
 """The policy that comes with the package."""
@@ -56,15 +56,17 @@ def p3_checked(controller: Policy, plant: Plant) -> P3Check:
     return P3Check(main=controller, fallback=tuned(FALLBACK, plant), name=controller.name)
 
 
-def load_policy(folder: str | PathLike[str] = TRAINED, plant: Plant | None = None) -> P3Check:
+def load_policy(
+    folder: str | PathLike[str] = TRAINED, plant: Plant | str | PathLike[str] | None = None
+) -> P3Check:
     """The whole controller from a policy's folder: network, learner, rules, and the check of p3.
 
     Args:
         folder: with policy.json and policy.safetensors; default: the package's own policy.
-        plant: nominal plant; None: the report's calibration.
+        plant: nominal plant or its file; None: the report's calibration.
 
-    Raises PolicyError if a file cannot be used.
+    Raises PolicyError or PlantFileError if a file cannot be used.
     """
     contract, network = read_policy(folder)
-    chosen = plant or Plant.calibrated()
+    chosen = load_plant(plant)
     return p3_checked(Policy(network=network, plant=chosen, name=contract.name), chosen)

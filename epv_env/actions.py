@@ -9,8 +9,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.common.field_types import shown
 from epv_env.plant.primitives import ROUNDING, exact
-from epv_env.signals import shown
 
 
 class ActionError(ValueError):

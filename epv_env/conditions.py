@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
-from epv_env.signals import PRESSURE_LIMITS_BAR, OptionError, Range, as_range, check_count, shown
+from epv_env.common.field_types import shown
+from epv_env.signals import PRESSURE_LIMITS_BAR, OptionError, Range, as_number, as_range, check_count
 
 PROBABILITIES = (
     "starved", "far", "vented", "coil_off", "rest", "target_steps", "noisy", "frozen_p3", "worn",
@@ -89,8 +90,8 @@ class Conditions:
 
     def __post_init__(self) -> None:
         for name in PROBABILITIES:
-            as_range(f"conditions: {name}", getattr(self, name), (0.0, 1.0))
-        as_range("conditions: least_p2_bar", self.least_p2_bar, (1.51, PRESSURE_LIMITS_BAR[1]))
+            as_number(f"conditions: {name}", getattr(self, name), (0.0, 1.0))
+        as_number("conditions: least_p2_bar", self.least_p2_bar, (1.51, PRESSURE_LIMITS_BAR[1]))
         for name, limits in _LIMITS.items():
             ends = as_range(f"conditions: {name}", getattr(self, name), limits)
             object.__setattr__(self, name, ends)  # a number stands for a range of that value

@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.actions import PWM, OnOff
+from epv_env.common.field_types import shown
 from epv_env.common.units import BAR, GRAM
 from epv_env.observation import observation_space
 from epv_env.render import Renderer, Snapshot
 from epv_env.result import step_info, truth
 from epv_env.settings import as_plant, checked_options, make_settings, with_options
-from epv_env.signals import OptionError, as_seed, checked_flag, shown
+from epv_env.signals import OptionError, as_seed, checked_flag
 from epv_env.task import LimitingTask
 
 

@@ -6,6 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.common.field_types import check_fields
+
 BAND_BAR = 0.5
 """Tolerance of control aim C1 (section 2.3)."""
 
@@ -39,6 +41,7 @@ class RewardWeights:
     """An empty circuit, which ends the episode."""
 
     def __post_init__(self) -> None:
+        check_fields(self)
         for entry in fields(self):
             value = getattr(self, entry.name)
             if not (np.isfinite(value) and value >= 0):

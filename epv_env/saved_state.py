@@ -14,13 +14,14 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.common.field_types import shown
 from epv_env.env import _ValveEnv
 from epv_env.period import rules_of
 from epv_env.plant.consumption import APPLICATIONS
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import ParameterError, Parameters
 from epv_env.plant.supply import Supply
-from epv_env.signals import Range, shown
+from epv_env.signals import Range
 from epv_env.vector_env import _ValveVectorEnv
 
 ValveEnv = _ValveEnv | _ValveVectorEnv

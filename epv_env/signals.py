@@ -1,15 +1,13 @@
 """What may stand for a number: a range, a target that moves, a recorded consumption."""
 
-import math
-import reprlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from numbers import Real
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from epv_env.common.field_types import check_fields, real, shown
 from epv_env.common.units import GRAM
 from epv_env.plant.supply import Supply
 
@@ -24,14 +22,6 @@ PRESSURE_LIMITS_BAR = (1.0, 16.0)
 
 class OptionError(ValueError):
     """An environment option is unknown or out of range: the message says which and the remedy."""
-
-
-def shown(value: Any) -> str:
-    """A value as one short line of a message."""
-    try:
-        return " ".join(reprlib.repr(value).split())
-    except ValueError:  # a whole number of thousands of digits
-        return f"a {type(value).__name__} too long to print"
 
 
 def check_count(name: str, value: Any, least: int = 1, most: int = 10**9) -> None:
@@ -56,22 +46,11 @@ def checked_flag(name: str, value: Any) -> bool:
     return bool(value)
 
 
-def _real(value: Any) -> float:
-    """A real number as a float, infinite beyond its range. Raises TypeError."""
-    value = value.item() if isinstance(value, np.ndarray) and value.ndim == 0 else value
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real):
-        raise TypeError
-    try:
-        return float(value)
-    except OverflowError:
-        return math.inf
-
-
 def as_number(name: str, value: Any, limits: Range) -> float:
     """A number inside the limits. Raises OptionError."""
     low, high = limits
     try:
-        number = _real(value)
+        number = real(value)
     except TypeError:
         raise OptionError(f"{name} is {shown(value)}: give a number from {low:g} to {high:g}") from None
     if not low <= number <= high:
@@ -82,7 +61,7 @@ def as_number(name: str, value: Any, limits: Range) -> float:
 def as_range(name: str, value: Any, limits: Range = PRESSURE_LIMITS_BAR) -> Range:
     """A number or (low, high) as a range inside the limits. Raises OptionError."""
     try:
-        low, high = (_real(end) for end in (value if np.ndim(value) else (value, value)))
+        low, high = (real(end) for end in (value if np.ndim(value) else (value, value)))
     except (TypeError, ValueError):
         raise OptionError(f"{name} is {shown(value)}: give a number or (low, high)") from None
     if not limits[0] <= low <= high <= limits[1]:
@@ -107,6 +86,9 @@ class MovingTarget:
     at: Callable[[float], float]
     """Target [bar absolute] at a time since the episode's start [s]."""
 
+    def __post_init__(self) -> None:
+        check_fields(self, SignalError)
+
     @classmethod
     def recorded(cls, time_s: ArrayLike, target_bar: ArrayLike) -> "MovingTarget":
         """Linear between samples, and constant beyond their ends.
@@ -122,7 +104,7 @@ class MovingTarget:
         Raises SignalError for one outside the limits [bar absolute], or that is no number.
         """
         try:
-            found = np.array([_real(self.at(seconds)) for seconds in time.tolist()])
+            found = np.array([real(self.at(seconds)) for seconds in time.tolist()])
         except TypeError as error:
             raise SignalError(
                 f"the target at {time[0]:g} s is no number ({error}): give a function of the time [s] "
@@ -154,14 +136,14 @@ class RecordedConsumption:
         return cls(time=time, flow=flow * GRAM)
 
     def __post_init__(self) -> None:
-        _samples("a recorded consumption", self.time, self.flow)
-        if np.any(self.flow < 0):
-            k = int(np.argmax(self.flow < 0))
+        time, flow = _samples("a recorded consumption", self.time, self.flow)
+        if np.any(flow < 0):
+            k = int(np.argmax(flow < 0))
             raise SignalError(
-                f"a recorded consumption is {self.flow[k] / GRAM:g} g/s at {self.time[k]:g} s: give "
-                "flows of at least 0, since consumers draw air"
+                f"a recorded consumption is {flow[k] / GRAM:g} g/s at {time[k]:g} s: give flows of at "
+                "least 0, since consumers draw air"
             )
-        object.__setattr__(self, "_taken", _integral(self.time, self.flow))
+        vars(self).update(time=time, flow=flow, _taken=_integral(time, flow))
 
     def mean_flow(self, time: NDArray, period: float) -> NDArray:
         """Mean flow (n,) [kg/s] over the period [s] that starts at each time (n,) [s]."""

@@ -2,7 +2,8 @@
 
 from typing import Any
 
-from epv_env.signals import OptionError, shown
+from epv_env.common.field_types import shown
+from epv_env.signals import OptionError
 from epv_env.vector_env import EPValvePWMVectorEnv, EPValveVectorEnv
 
 

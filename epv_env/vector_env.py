@@ -10,10 +10,11 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from epv_env.actions import PWM, OnOff
+from epv_env.common.field_types import shown
 from epv_env.observation import observation_space
 from epv_env.result import KEYS, step_info, truth
 from epv_env.settings import as_plant, checked_options, make_settings, with_options
-from epv_env.signals import OptionError, as_seed, check_count, checked_flag, shown
+from epv_env.signals import OptionError, as_seed, check_count, checked_flag
 from epv_env.task import LimitingTask
 
 MOST_ENVS = 1_000_000

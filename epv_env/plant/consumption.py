@@ -12,6 +12,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.common.field_types import check_fields
 from epv_env.common.units import GRAM
 from epv_env.plant.primitives import exact
 
@@ -43,6 +44,7 @@ class Scenario:
     """Start of the first application [s]."""
 
     def __post_init__(self) -> None:
+        check_fields(self)
         for entry in fields(self)[1:]:
             low, high = getattr(self, entry.name)
             if not 0 <= low <= high < np.inf:

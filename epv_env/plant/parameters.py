@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from epv_env.common.field_types import check_type
 from epv_env.common.units import BAR
 from epv_env.plant.effects.record import Effect, Size
 from epv_env.plant.effects.registry import EFFECTS
@@ -125,6 +126,7 @@ def _remedy(row: Parameter, own: bool) -> str:
 
 def checked_domain(symbol: str, ends: tuple[float, float]) -> tuple[float, float]:
     """A plant's own domain [SI], if a valve of this kind may have it; else ParameterError."""
+    check_type(f"the domain of {symbol}", ends, tuple[float, float], ParameterError)
     row, (low, high) = _row(symbol), ends
     if row.possible is None:
         raise ParameterError(f"{symbol} is a constant and has no domain: leave it out")
@@ -171,6 +173,8 @@ class Parameters(Mapping[str, float]):
         Raises:
             ParameterError: a symbol is missing, unknown, or has a value or domain that cannot be.
         """
+        for name, given in (("values", values), ("own_domains", own_domains)):
+            check_type(f"Parameters: {name}", given, Mapping, ParameterError)
         missing = [symbol for symbol in table() if symbol not in values]
         if missing:
             raise ParameterError(f"missing parameters: {', '.join(missing)}: give every symbol")

@@ -9,6 +9,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from epv_env.common.field_types import check_type
 from epv_env.common.files import JSONFileError, checked, decoded, write_json
 from epv_env.plant.channels import SENSORS, Sensor, changed_fields, own_sensors
 from epv_env.plant.effects.registry import CATALOGUE
@@ -123,6 +124,8 @@ def load_plant(source: "Plant | str | PathLike[str] | None") -> Plant:
         return source
     if source is None:
         return Plant.calibrated()
+    given = "a Plant, the path of a plant.json, or None"
+    check_type("the plant", source, str | PathLike, PlantFileError, given)
     path = Path(source)
     return _plant(_content(path), f"plant file {path}")
 

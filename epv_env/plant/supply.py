@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.common.field_types import check_fields
 from epv_env.common.units import BAR
 
 
@@ -46,6 +47,7 @@ class Supply:
     """Recorded time [s] and p1 [Pa absolute], held constant beyond its ends."""
 
     def __post_init__(self) -> None:
+        check_fields(self)
         low, high = self.pressure
         if not 0 < low <= high:
             raise ValueError(

@@ -18,8 +18,8 @@ from controllers.policy_files import CONTRACT_FILE, WEIGHTS_FILE
 from controllers.registry import REGISTRY
 from controllers.tuned import build, load_tunings
 from epv_env import MAX_EPISODE_STEPS
+from epv_env.common.field_types import shown
 from epv_env.plant.plantfile import Plant
-from epv_env.signals import shown
 
 HELP = (
     "kinds of controllers/tuned.json, folders of policies, LABEL=FOLDER, or MODULE:CLASS of your own, "
