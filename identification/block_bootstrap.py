@@ -17,7 +17,7 @@ DRAWS = 2000
 """Number of draws: the ends of a 95 % interval then vary by about 1.5 percent of its width."""
 
 LEVEL = 0.95
-"""Share of the draws within an interval, where the caller asks for no other."""
+"""Share of the draws within an interval [1]."""
 
 LEAST_CONCENTRATION = 0.05
 """Lower bound of the Dirichlet parameter [1]; below it one block has all weight."""
@@ -60,7 +60,7 @@ def block_sums(series: NDArray, length: int) -> NDArray:
     return np.moveaxis(np.add.reduceat(series, starts, axis=-1), -1, 0)
 
 
-def block_weights(blocks: Sequence[int], seed: int, level: float = LEVEL) -> NDArray:
+def block_weights(blocks: Sequence[int], seed: int) -> NDArray:
     """Weights of all runs' blocks, one run after the other, (1 + DRAWS, blocks) [1].
 
     The first row takes each block once: the estimate. The variance of a weight is 1, that of drawing
@@ -70,10 +70,9 @@ def block_weights(blocks: Sequence[int], seed: int, level: float = LEVEL) -> NDA
     Args:
         blocks: number of blocks in each run, 2 or more.
         seed: of the draws.
-        level: of the intervals for which Student's quantile is taken [1].
     """
     rng = np.random.default_rng(seed)
-    tail = 0.5 + level / 2
+    tail = 0.5 + LEVEL / 2
     student = float(stats.t.ppf(tail, sum(blocks) - len(blocks)) / stats.norm.ppf(tail))
     drawn = []
     for n in blocks:
@@ -82,10 +81,7 @@ def block_weights(blocks: Sequence[int], seed: int, level: float = LEVEL) -> NDA
     return np.vstack([np.ones(sum(blocks)), np.hstack(drawn)])
 
 
-def interval(values: NDArray, level: float = LEVEL) -> Interval:
-    """Percentile interval from values (1 + draws,): the estimate, then its draws.
-
-    level: share of the draws within the interval [1].
-    """
-    low, high = np.quantile(values[1:], [0.5 - level / 2, 0.5 + level / 2])
+def interval(values: NDArray) -> Interval:
+    """Percentile interval from values (1 + draws,): the estimate, then its draws."""
+    low, high = np.quantile(values[1:], [0.5 - LEVEL / 2, 0.5 + LEVEL / 2])
     return Interval(value=float(values[0]), low=float(low), high=float(high))

@@ -16,10 +16,10 @@ from scipy.stats import chi2, f
 from statsmodels.tools.numdiff import approx_fprime, approx_hess
 
 from epv_env.plant.region import Region
+from identification.block_bootstrap import LEVEL
 from identification.calibration.calibrate import Calibration
 from identification.calibration.problem import CalibrationProblem
 from identification.confidence.covariance import (
-    PROBABILITY,
     EstimateCovariance,
     bootstrap_moves,
     estimate_covariance,
@@ -67,7 +67,7 @@ class ReportInterval:
 def limit_ratio(values: int, parameters: int) -> float:
     """eps_p / eps_opt for a number of measured values and of parameters."""
     degrees = values - parameters
-    return 1.0 + parameters / degrees * float(f.ppf(PROBABILITY, parameters, degrees))
+    return 1.0 + parameters / degrees * float(f.ppf(LEVEL, parameters, degrees))
 
 
 def report_interval(problem: CalibrationProblem, z: NDArray, error: float) -> ReportInterval:
@@ -113,12 +113,12 @@ class Confidence:
     @property
     def chi_square(self) -> float:
         """Squared Mahalanobis radius of the joint region."""
-        return float(chi2.ppf(PROBABILITY, len(self.estimate)))
+        return float(chi2.ppf(LEVEL, len(self.estimate)))
 
     @property
     def half_widths(self) -> NDArray:
         """Of the intervals of each parameter on its own, scaled (k,), without unit."""
-        return np.sqrt(chi2.ppf(PROBABILITY, 1) * np.diag(self.covariance.total))
+        return np.sqrt(chi2.ppf(LEVEL, 1) * np.diag(self.covariance.total))
 
     @cached_property
     def disagreement(self) -> float:

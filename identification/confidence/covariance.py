@@ -25,9 +25,6 @@ from identification.recordings.recording import OUTPUTS, Recording
 from identification.replay.model_inputs import ModelInputs, model_inputs
 from identification.replay.replay import Replay
 
-PROBABILITY = 0.95
-"""Of every interval and of the joint region."""
-
 INPUT_DRAWS = 8
 """Times that the noise of the inputs is drawn anew for each recording."""
 
@@ -106,7 +103,7 @@ def bootstrap_moves(
     known = 0.0 if prior is None else prior.T @ prior
     H = np.linalg.inv(sum(J.T @ J for J in jacobians) + known)
     sums = [block_sums(scores.T, block) for scores in score_series(residuals, jacobians)]
-    weights = block_weights([len(blocks) for blocks in sums], seed, PROBABILITY)[1:]
+    weights = block_weights([len(blocks) for blocks in sums], seed)[1:]
     return (weights - 1.0) @ np.vstack(sums) @ H
 
 

@@ -15,6 +15,7 @@ from identification.gap.experiment_design import (
     odds_text,
     select_rivals,
 )
+from identification.gap.quantities import listed
 from identification.gap.verdict import PARTIAL, UNKNOWN, Ranking
 from identification.recordings.recording import CHANNELS, Recording
 from identification.replay.model_inputs import ModelInputs
@@ -146,7 +147,7 @@ def planned(valve: Valve, programmes: Sequence[Programme]) -> Valve:
 
 def sentence(option: Option, rivals: Rivals) -> str:
     """What to record, and the expected odds."""
-    names = _listed(rivals.titles)
+    names = listed(rivals.titles)
     before = ":".join(f"{100 * p:.0f}" for p in rivals.probability)
     after = odds_text(option.information.expected_best)
     record = described(option.programme)
@@ -168,7 +169,7 @@ def described(programme: Programme) -> str:
     """A programme in words."""
     case = programme.case
     lengths = [round(1e3 * opening) for opening in case.openings]
-    openings = f"{len(lengths)} openings of {_listed([str(x) for x in lengths])} ms"
+    openings = f"{len(lengths)} openings of {listed([str(x) for x in lengths])} ms"
     if len(lengths) == 1:
         openings = f"one opening of {lengths[0]} ms"
     pauses = f" {1e3 * case.pause:.0f} ms apart" if len(lengths) > 1 else ""
@@ -176,11 +177,6 @@ def described(programme: Programme) -> str:
         f"{openings}{pauses} from {programme.p1 / BAR:g} bar supply into {programme.p2 / BAR:g} bar at "
         f"{programme.U_on:g} V, {case.duration:g} s in all"
     )
-
-
-def _listed(words: Sequence[str]) -> str:
-    """a, b and c."""
-    return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0]
 
 
 def _expected(programme: Programme, period: float) -> Recording:
