@@ -18,6 +18,7 @@ from identification.importing.source_file import (
     needed_package,
     points_in_time,
     seconds,
+    unread,
 )
 from identification.importing.units import parsed_unit
 
@@ -25,19 +26,30 @@ from identification.importing.units import parsed_unit
 def read_mdf(path: Path) -> tuple[str, list[SourceChannel]]:
     """Every numeric channel with the times of its master channel; readings marked invalid are NaN."""
     asammdf = needed_package("asammdf", "MDF files")
+    with path.open("rb") as stream:
+        if stream.read(3) not in MDF_SIGNATURES:  # asammdf would print a traceback beside its error
+            raise ValueError("it does not begin as MDF does")
     with asammdf.MDF(path) as mdf:
-        channels = (
-            SourceChannel(
-                name=signal.name,
-                unit=signal.unit or "",
-                values=_valid(mdf, signal),
-                time=np.asarray(signal.timestamps, dtype=float),
-                table=f"group {signal.group_index}",
-            )
-            for signal in mdf.iter_channels(skip_master=True)
-            if np.ndim(signal.samples) == 1 and np.asarray(signal.samples).dtype.kind in "iufb"
-        )
+        channels = (_mdf_channel(mdf, signal) for signal in mdf.iter_channels(skip_master=True))
         return f"MDF {mdf.version}", limited(path, channels)
+
+
+MDF_SIGNATURES = (b"MDF", b"UnF")
+"""First bytes of MDF, and of MDF that its writer did not finish."""
+
+
+def _mdf_channel(mdf: Any, signal: Any) -> SourceChannel:
+    """A channel with its own times."""
+    table = f"group {signal.group_index}"
+    if np.ndim(signal.samples) != 1 or np.asarray(signal.samples).dtype.kind not in "iufb":
+        return unread(signal.name, table)
+    return SourceChannel(
+        name=signal.name,
+        unit=signal.unit or "",
+        values=_valid(mdf, signal),
+        time=np.asarray(signal.timestamps, dtype=float),
+        table=table,
+    )
 
 
 ALL_INVALID = 1
@@ -64,7 +76,7 @@ def read_tdms(path: Path) -> tuple[str, list[SourceChannel]]:
             _tdms_channel(group.name, channel)
             for group in file.groups()
             for channel in group.channels()
-            if channel.dtype.kind in "iufM" and len(channel) > 1
+            if len(channel) > 1
         )
         return "TDMS", limited(path, channels)
 
@@ -75,6 +87,8 @@ def _tdms_unit(properties: dict[str, Any]) -> str:
 
 def _tdms_channel(group: str, channel: Any) -> SourceChannel:
     """A waveform with its times and their begin, or a channel whose times are another channel."""
+    if channel.dtype.kind not in "iufM":
+        return unread(channel.name, group)
     values, begin = seconds(np.asarray(channel[:]))
     time = _waveform_times(channel.properties, len(values))
     return SourceChannel(
@@ -92,8 +106,8 @@ def _waveform_times(properties: Mapping[str, Any], count: int) -> NDArray | None
     unit = parsed_unit(str(properties.get("wf_xunit_string") or "s"))
     if not properties.get("wf_increment") or unit is None or unit.quantity != "time":
         return None
-    start = properties.get("wf_start_offset", 0.0)
-    return unit.size * (start + properties["wf_increment"] * np.arange(count))
+    start, step = (float(properties.get(f"wf_{name}", 0.0)) for name in ("start_offset", "increment"))
+    return unit.size * (start + step * np.arange(count))
 
 
 def read_parquet(path: Path) -> tuple[str, list[SourceChannel]]:
@@ -107,7 +121,9 @@ def read_parquet(path: Path) -> tuple[str, list[SourceChannel]]:
 def _parquet_channels(path: Path, table: Any) -> Iterator[SourceChannel]:
     for field in table.schema:
         values = _numbers_or_times(f"{path}, {field.name}", table.column(field.name))
-        if values.dtype.kind in "iufMm":
+        if values.dtype.kind not in "iufMm":
+            yield unread(field.name)
+        else:
             unit = (field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace")
             timed = values.dtype.kind in "Mm"
             numbers, begin = seconds(values)
@@ -179,12 +195,17 @@ def _matlab_field(path: str, full: str, value: Any, unit: Any) -> Iterator[Sourc
         yield from _single(path, full, value)
     elif isinstance(value, Mapping):
         yield from _matlab_channels(full, value)
-    elif isinstance(value, list):
+    elif isinstance(value, list) or _is_cell(value):
         for number, one in enumerate(value, start=1):
             named = isinstance(one, Mapping) and _first(one, NAME_FIELDS)
             yield from _matlab_field(path, str(named or f"{full}({number})"), one, "")
     elif isinstance(value, np.ndarray):
         yield from _matlab_columns(full, value, unit, path)
+
+
+def _is_cell(value: Any) -> bool:
+    """Whether a value is a cell array, whose cells are read one by one."""
+    return type(value) is np.ndarray and value.dtype == object and value.ndim == 1
 
 
 def _struct_array(name: str, struct: Mapping[str, Any]) -> Any:
@@ -199,9 +220,10 @@ def _matlab_columns(name: str, value: NDArray, unit: Any, path: str) -> Iterator
     """The vectors of a numeric array: its columns, or its rows where these are longer."""
     unit = unit if isinstance(unit, str) else ""
     if type(value).__name__ in OBJECTS:
-        name = f"{name} (a MATLAB object such as a timeseries: save its numbers as vectors)"
-        yield SourceChannel(name=name, unit=unit, values=np.empty(0), table=path)
+        yield unread(name, path, "a MATLAB object such as a timeseries: save its numbers as vectors")
     value = np.squeeze(value)
+    if value.dtype.kind == "c":
+        yield unread(name, path, "complex numbers: save their real part")
     if value.dtype.kind not in "iufb" or value.ndim not in (1, 2) or value.shape[0] < 2:
         return
     rows = np.atleast_2d(value if value.ndim == 1 or value.shape[0] < value.shape[1] else value.T)

@@ -47,6 +47,11 @@ class SourceChannel:
         return f"{self.table}/{self.name}" if self.table else self.name
 
 
+def unread(name: str, table: str = "", why: str = "no numbers") -> SourceChannel:
+    """A series that cannot be used: it stands in the list of channels with the reason."""
+    return SourceChannel(name=f"{name} ({why})", unit="", values=np.empty(0), table=table)
+
+
 @dataclass(frozen=True, kw_only=True)
 class SourceFile:
     """A measurement file that was read."""

@@ -31,9 +31,13 @@ REFERENCED = re.compile(rf"(.+?)[\s_.,(\[{{-]*({'|'.join(REFERENCES)})[.)\]}}]*"
 SPELLINGS = {
     "BAR": "bar", "mBar": "mbar", "MBAR": "mbar", "PSI": "psi", "KPa": "kPa", "kpa": "kPa", "KPA": "kPa",
     "pa": "Pa", "PA": "Pa", "hpa": "hPa", "μs": "us", "μA": "uA", "Sek": "s", "Sekunden": "s",
-    "v": "V", "amps": "A", "Amps": "A", "kg/cm^2": "kgf/cm^2", "kp/cm^2": "kgf/cm^2",
+    "v": "V", "mv": "mV", "amps": "A", "Amps": "A", "Mpa": "MPa", "MPA": "MPa",
+    "kg/cm^2": "kgf/cm^2", "kp/cm^2": "kgf/cm^2",
 }  # fmt: skip
 """Spellings that pint reads differently or not at all; for one such as Volts it looks in lower case."""
+
+DIRECT = re.compile(r"(V|A|Volts?|Amps?)[\s_]?DC", re.IGNORECASE)
+"""A unit of voltage or current of which a data logger says that it is direct."""
 
 LONGEST = 24
 """Longest text that is taken for a unit."""
@@ -91,7 +95,7 @@ def is_unit(text: str) -> bool:
 def _plain(text: str, unit: str, reference: str) -> PhysicalUnit | None:
     """A unit without words of reference; None if pint does not know it."""
     registry = _registry()
-    unit = plain_powers(unit)
+    unit = DIRECT.sub(r"\1", plain_powers(unit))
     unit = SPELLINGS.get(unit, unit)
     try:
         known = registry.parse_units(unit.lower() if unit.istitle() and unit not in registry else unit)

@@ -88,6 +88,11 @@ def interval(true: Recording) -> dict[str, Any]:
     return {"Tstart": -0.02, "Tinterval": true.period, "Length": float(len(true)), **named}
 
 
+def written(at: Path, content: str) -> Path:
+    at.write_text(content)
+    return at
+
+
 def simulink(true: Recording) -> dict[str, Any]:
     kind = [("values", "O"), ("label", "O"), ("dimensions", "O")]
     signals = [(values, f"{name}_{unit}", 1.0) for name, (values, unit) in channels_of(true).items()]
@@ -110,6 +115,7 @@ READ: dict[str, Callable[[Path, Recording], Path]] = {
     "TDMS in ms": lambda at, r: waveforms(
         at, r, wf_increment=1e3 * r.period, wf_start_offset=0.0, wf_xunit_string="ms"
     ),
+    "TDMS whose increment is a text": lambda at, r: waveforms(at, r, wf_increment=str(r.period)),
     "Parquet with decimals": decimals,
     "MATLAB, array of structs": lambda at, r: mat5(at, struct_array(r)),
     "MATLAB, start and interval": lambda at, r: mat5(at, interval(r)),
@@ -145,6 +151,12 @@ def nulls(at: Path, true: Recording) -> Path:
     table.loc[100:130, "p2 [bar]"] = None
     table["p2 [bar]"] = (1000 * table["p2 [bar]"]).round().astype("Int64")
     table.rename(columns={"p2 [bar]": "p2 [mbar]"}).to_parquet(at.with_suffix(".parquet"))
+    return at.with_suffix(".parquet")
+
+
+def texts(at: Path, true: Recording) -> Path:
+    """Parquet whose p2 is a column of texts."""
+    frame(true, true.time).astype({"p2 [bar]": str}).to_parquet(at.with_suffix(".parquet"))
     return at.with_suffix(".parquet")
 
 
@@ -187,6 +199,10 @@ REFUSED: dict[str, tuple[Callable[[Path, Recording], Path], str]] = {
         r"line \d+ has not the 6 numbers of the lines above: delete it",
     ),
     "times of too few digits": (coarse, "time does not increase after .*: print it with more digits"),
+    "a text called MDF": (
+        lambda at, r: written(at.with_suffix(".mf4"), "a text"),
+        "it does not begin as MDF does",
+    ),
     "a folder": (lambda at, r: folder(at), "is a folder: give the path of a measurement file"),
     "a file above the limit": (lambda at, r: huge(at), "is larger than .* bytes"),
     "very many columns": (

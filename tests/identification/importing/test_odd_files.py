@@ -1,6 +1,7 @@
 """Files as tools and people leave them: read right, or refused with the remedy."""
 
 import json
+import re
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from tests.identification.importing.odd_files import (
     mdf_groups,
     nan,
     nulls,
+    texts,
 )
 from tests.identification.importing.timed_files import mat5
 
@@ -42,8 +44,12 @@ def test_the_files_of_many_tools_give_the_recording(true, kind, tmp_path):
     assert made.period == true.period
 
 
-def test_a_matrix_of_signals_times_samples_has_a_channel_per_signal(true, tmp_path):
-    path = mat5(tmp_path / "run", {"ans": [values for values, _ in columns_of(true).values()]})
+@pytest.mark.parametrize("kind", ["matrix", "cells"])
+def test_a_matrix_of_signals_times_samples_has_a_channel_per_signal(true, kind, tmp_path):
+    signals = [values for values, _ in columns_of(true).values()]
+    cells = np.empty(len(signals), dtype=object)
+    cells[:] = signals
+    path = mat5(tmp_path / "run", {"ans": signals if kind == "matrix" else cells})
     pairs = enumerate(zip(NAMES, UNITS, strict=True), start=1)
     channels = {n: ChannelEntry(source=f"ans({i})", unit=unit) for i, (n, unit) in pairs}
     made = read_files([path], mapping=MappingFile(channels=channels), ambient_bar=1.0).campaign
@@ -117,6 +123,16 @@ def test_a_whole_bench_can_be_gauge(true, tmp_path):
 def test_only_a_name_of_validation_holds_a_file_out(true, name, role, tmp_path):
     path = text(tmp_path / f"{name}.csv", columns_of(true))
     assert read_files([path], ambient_bar=1.0).campaign.recordings[0].role == role
+
+
+@pytest.mark.parametrize(
+    ("write", "name"),
+    [(texts, "p2 [bar] (no numbers)"),
+     (lambda at, r: mat5(at, {**interval(r), "p2_bar": 1j * r.p2}), "p2_bar (complex numbers")],
+)  # fmt: skip
+def test_a_series_without_numbers_is_listed(true, write, name, tmp_path):
+    with pytest.raises(ImportingError, match=re.escape(f"not used are {name}")):
+        read_files([write(tmp_path / "run", true)], ambient_bar=1.0)
 
 
 @pytest.mark.parametrize("kind", REFUSED)
