@@ -2,12 +2,13 @@
 
 import ast
 import importlib
+import json
 import os
 import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,10 @@ from markdown.extensions.toc import slugify_unicode  # noqa: E402
 from docs.scripts import notebook  # noqa: E402
 from docs.scripts.effects_table import effects_table  # noqa: E402
 from epv_env.common.commands import commands, parse  # noqa: E402
+from epv_env.plant.plantfile import load_plant  # noqa: E402
+from identification.bench.programmes import load_programmes  # noqa: E402
+from identification.importing.mapping_file import read_mapping  # noqa: E402
+from tests.test_extras import blocker  # noqa: E402
 from training.epv import PACKAGES as COMMAND_PACKAGES  # noqa: E402
 
 ROOT = Path(__file__).parents[1]
@@ -55,13 +60,36 @@ def run(*command, cwd: Path) -> subprocess.CompletedProcess:
     )
 
 
+def extras(page: str) -> set[str]:
+    """The extras that a page tells its readers to install."""
+    named = r"pip install '\.\[([\w,-]+)\]'|extra\s`([\w-]+)`|`([\w-]+)`\sextra"
+    found = {name for names in re.findall(named, text(page)) for name in "".join(names).split(",")}
+    return found | ({"all"} if "make venv" in text(page) else set())
+
+
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "python")])
 def test_the_examples_of_a_page_run(page, tmp_path):
-    """One after another, as a reader would paste them."""
+    """One after another, as a reader would paste them, with only the extras that the page names."""
     script = tmp_path / "examples.py"
-    script.write_text("\n\n".join(blocks(page, "python")), encoding="utf-8")
+    script.write_text("\n\n".join([blocker(*extras(page)), *blocks(page, "python")]), encoding="utf-8")
     done = run(sys.executable, script, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
+
+
+READERS: dict[str, Callable[[Path], object]] = {
+    "epv-plant/1": load_plant,
+    "epv-mapping/1": read_mapping,
+    "epv-programme/1": load_programmes,
+}
+"""What reads a file of a format, where the file stands for itself."""
+
+
+def test_the_files_shown_can_be_read(tmp_path):
+    shown = [block for page in PAGES for block in blocks(page, "json")]
+    for number, block in enumerate(shown):
+        (path := tmp_path / f"{number}.json").write_text(block, encoding="utf-8")
+        READERS.get(json.loads(block)["format"], Path.read_text)(path)
+    assert READERS.keys() <= {json.loads(block)["format"] for block in shown}
 
 
 def shell_commands(shell: str) -> Iterator[list[str]]:
