@@ -1,6 +1,7 @@
 """`gap CAMPAIGN`: its files, what it does with damaged recordings, and taking up an interrupted run."""
 
 import json
+import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -63,7 +64,8 @@ def test_its_report_has_words_for_equations_and_parameters(diagnosed, tmp_path):
     page = path.read_text()
     assert "voltage balance of the coil" in page
     assert "resistance of the solenoid (R)" in page
-    assert "parameter:" not in page
+    assert "eddy current in the solenoid&#39;s iron (eddy_current)" in page
+    assert not re.search(r"(?<![(\w])(eddy_current|parameter:)", page)
     check_layout(path, tmp_path)
 
 
