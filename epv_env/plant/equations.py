@@ -20,6 +20,7 @@ from epv_env.plant.effects.friction import (
     stop_friction,
     stribeck,
 )
+from epv_env.plant.effects.learnt import learnt_value
 from epv_env.plant.effects.magnet import saturated_force, saturation_level
 from epv_env.plant.effects.measurement import lag_rate
 from epv_env.plant.effects.seats import opened
@@ -165,6 +166,18 @@ class Coefficients(NamedTuple):
 
 
 _with_supply = replacing(State, "p1")
+_forced = replacing(Inputs, "U", "sigma_S", "air_3", "force_PV", "force_MV")
+
+
+@inlined
+def with_learnt(u, q, effects):
+    """The inputs with what a learnt term adds to the equations."""
+    term = learnt_value(q, u.U, effects)
+    return _forced(
+        u, u.U + effects.learnt_f7 * term, u.sigma_S - effects.learnt_f1 * term,
+        u.air_3 + effects.learnt_f2 * term, u.force_PV + effects.learnt_f4 * term,
+        u.force_MV + effects.learnt_f6 * term,
+    )  # fmt: skip
 
 
 @inlined
@@ -332,8 +345,10 @@ def derivative(q, u, c, effects, free_PV, free_MV, extended):
     free_PV, free_MV: 1.0 where the mover may move, 0.0 where a stop holds it. extended: a literal
     bool; False compiles the effects away. Returns (State of rates, piston force, armature force).
     """
+    supplied = u.U
     if extended:
         q = _with_supply(q, q.p1 - q.supply_drop)
+        u = with_learnt(u, q, effects)
     force_PV = piston_force(q, c, effects, extended)
     inverse_Rm = reluctance_inverse(q, c)
     force_MV = armature_force(q, c, inverse_Rm, effects, extended)
@@ -369,7 +384,7 @@ def derivative(q, u, c, effects, free_PV, free_MV, extended):
         air_in_PV=through_PV,
         air_in_MV=inlet,
         air_vented=exhaust + leak,
-        coil_energy=u.U * current,
+        coil_energy=supplied * current,
         I_coil=0.0,
         coil_heat=coil_heat_rate,
         heat_3=heat_3_rate,

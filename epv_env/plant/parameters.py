@@ -12,7 +12,8 @@ import numpy as np
 
 from epv_env.common.field_types import check_type
 from epv_env.common.units import BAR
-from epv_env.plant.effects.record import Effect, Size
+from epv_env.plant.effects import learnt
+from epv_env.plant.effects.record import Size
 from epv_env.plant.effects.registry import EFFECTS
 
 
@@ -62,20 +63,26 @@ def _data() -> dict[str, Any]:
 
 @cache
 def table() -> Mapping[str, Parameter]:
-    """Every parameter by its symbol: those of the report in its order, then the sizes of effects."""
+    """Every parameter by its symbol: the report's in order, then sizes of effects and learnt terms."""
     rows = [
         Parameter(**{**row, **{name: tuple(row[name]) if row[name] else None for name in _RANGES}})
         for row in _data()["parameters"]
     ]
-    rows += [_size_row(effect, size) for effect in EFFECTS for size in effect.sizes if size.domain]
+    rows += [
+        _size_row(f"effect {effect.name}", size)
+        for effect in EFFECTS
+        for size in effect.sizes
+        if size.domain
+    ]
+    rows += [_size_row("learnt term", size) for size in learnt.SIZES]
     return MappingProxyType({row.symbol: row for row in rows})
 
 
-def _size_row(effect: Effect, size: Size) -> Parameter:
-    """The row of a number that sizes an effect; 0, which is off, is its value."""
+def _size_row(source: str, size: Size) -> Parameter:
+    """The row of a number that sizes an effect or a learnt term; 0, which is off, is its value."""
     return Parameter(
         symbol=size.symbol, unit=size.unit, value=0.0, domain=size.domain,
-        possible=size.domain, group="unmodelled", sensitive=False, source=f"effect {effect.name}",
+        possible=size.domain, group="unmodelled", sensitive=False, source=source,
         meaning=size.meaning,
     )  # fmt: skip
 

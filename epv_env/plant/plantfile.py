@@ -12,6 +12,7 @@ import numpy as np
 from epv_env.common.field_types import check_type
 from epv_env.common.files import JSONFileError, checked, decoded, write_json
 from epv_env.plant.channels import SENSORS, Sensor, changed_fields, own_sensors
+from epv_env.plant.effects.learnt import SYMBOLS, LearntTerm
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.force_balance import check_valve
 from epv_env.plant.free_parameters import FREE_PARAMETERS, Freedom, check_free
@@ -53,6 +54,8 @@ class Plant:
     """The bench's sensor of each channel [bar absolute, A or V]."""
     free: Mapping[str, Freedom] = field(default_factory=lambda: FREE_PARAMETERS)
     """What a calibration may move, by symbol."""
+    learnt_term: LearntTerm | None = None
+    """What no effect explains, learnt from recordings; `parameters` holds it, too."""
 
     @classmethod
     def calibrated(cls) -> "Plant":
@@ -111,6 +114,7 @@ class _PlantFile(_Values):
     sensors: dict[str, dict[str, float]] = {}
     free: dict[str, _FreeFields] | None = None
     alternatives: list[_AlternativeFields] = []
+    learnt_term: LearntTerm | None = None
     provenance: dict[str, Any] = {}
 
 
@@ -168,6 +172,9 @@ def save_plant(plant: Plant, path: str | PathLike[str]) -> None:
             | _written(each.region.centre, each.region)
             for each in plant.diagnosis.alternatives
         ]
+    if plant.learnt_term:
+        content["learnt_term"] = asdict(plant.learnt_term)
+        content["parameters"] = {s: v for s, v in content["parameters"].items() if s not in SYMBOLS}
     write_json(path, content)
 
 
@@ -177,6 +184,7 @@ def _written(parameters: Parameters, region: Region) -> dict[str, Any]:
         name: {symbol: parameters[symbol] for symbol in symbols} for name, symbols in CATALOGUE.items()
     }
     sizing = {symbol for symbols in CATALOGUE.values() for symbol in symbols}
+    sizing |= {symbol for symbol in SYMBOLS if not parameters[symbol]}
     uncertain: dict[str, Any] = {"boxes": {symbol: list(ends) for symbol, ends in region.boxes.items()}}
     if region.covariance is not None:
         uncertain["joint"] = {
@@ -195,6 +203,8 @@ def _plant(content: _PlantFile, place: str) -> Plant:
     """The plant that a file describes; place: how messages begin. Raises PlantFileError."""
     try:
         parameters = _parameters(content, content.domains)
+        if content.learnt_term:
+            parameters = parameters.replace(**content.learnt_term.parameters)
         sensors = own_sensors(content.sensors)
         if content.domains or content.sensors or content.voltage_V != VOLTAGE:
             check_valve(parameters, content.voltage_V, sensors)
@@ -207,6 +217,7 @@ def _plant(content: _PlantFile, place: str) -> Plant:
             voltage=content.voltage_V,
             sensors=sensors,
             free=_free(content, parameters),
+            learnt_term=content.learnt_term,
         )
     except ParameterError as error:
         raise PlantFileError(f"{place}: {error}") from None

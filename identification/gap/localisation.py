@@ -267,13 +267,13 @@ def fit_processes(forms: Sequence[QuadraticForm], design: LocalisationDesign) ->
     """
     subspaces = [IdentifiableSubspace(form) for form in forms]
     fits = [
-        [_fit(own, design, kind) for kind in ((FREE, SLOW) if own.form.windows else (FREE,))]
+        [fit_process(own, design, kind) for kind in ((FREE, SLOW) if own.form.windows else (FREE,))]
         for own in subspaces
     ]
     enough = RIVAL_SHARE * max(own_fits[0].explained for own_fits in fits)
     for subspace, own_fits in zip(subspaces, fits, strict=True):
         if subspace.form.windows and own_fits[0].explained >= enough:
-            own_fits += [_fit(subspace, design, state) for state in design.units]
+            own_fits += [fit_process(subspace, design, state) for state in design.units]
         own_fits.sort(key=lambda fit: -fit.log_evidence)
     return fits
 
@@ -304,7 +304,7 @@ def _slow_covariance(windows: Sequence[Window]) -> NDArray:
     return np.where(run[:, None] == run, np.exp(-np.abs(time[:, None] - time) / memory), 0.0)
 
 
-def _fit(subspace: IdentifiableSubspace, design: LocalisationDesign, kind: str) -> ProcessFit:
+def fit_process(subspace: IdentifiableSubspace, design: LocalisationDesign, kind: str) -> ProcessFit:
     """Evidence averaged over the amplitudes, and the forcing at the most likely amplitude."""
     smooth, own = _covariance(subspace.form, kind)
     smooth_root = smooth @ subspace.root

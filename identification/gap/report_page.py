@@ -52,17 +52,17 @@ LEVEL_TEXT = f"{100 * LEVEL:g} %"
 """Probability within the intervals."""
 
 
-def sections(diagnosis: Diagnosis, next_experiment: str = "") -> list[Section]:
+def sections(diagnosis: Diagnosis, next_experiment: str = "", learnt: str = "") -> list[Section]:
     """The whole report: verdict, localisation, ranking, reduction, remainder, next experiment, warnings.
 
-    next_experiment: a sentence or two; empty where none was sought.
+    next_experiment: a sentence or two; empty where none was sought. learnt: of what has no name.
     """
     parts = [
         _verdict(diagnosis, next_experiment),
         _localisation(diagnosis),
         _ranking(diagnosis),
         _reduction(diagnosis),
-        _remainder(diagnosis),
+        _remainder(diagnosis, learnt),
     ]
     if next_experiment:
         plan = Verdict(status="note", text=next_experiment)
@@ -149,7 +149,7 @@ def _reduction(diagnosis: Diagnosis) -> Section:
     )
 
 
-def _remainder(diagnosis: Diagnosis) -> Section:
+def _remainder(diagnosis: Diagnosis, learnt: str) -> Section:
     """What no named cause explains: how much, where, of which shape, and what is only disturbance."""
     blocks: list[Block] = []
     if diagnosis.remaining and diagnosis.best:
@@ -159,6 +159,7 @@ def _remainder(diagnosis: Diagnosis) -> Section:
     text = remainder_sentence(diagnosis)
     if not diagnosis.remaining:
         text = f"{text} {disturbance_sentence(diagnosis)}".strip()
+    text = f"{text} {learnt}".strip()
     return Section(
         title="What remains",
         verdicts=[Verdict(status="note", text=text)],

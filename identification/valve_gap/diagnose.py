@@ -28,6 +28,7 @@ from identification.recordings.campaign_files import read_campaign
 from identification.recordings.recording import Campaign, campaign_facts
 from identification.recordings.rules import RULES, rules_of
 from identification.report.page import write_page
+from identification.valve_gap.learnt_term import LearntModel, learn
 from identification.valve_gap.programmes import CANDIDATES, next_experiment
 from identification.valve_gap.programmes import FILE_NAME as PROGRAMME
 from identification.valve_gap.valve import Valve
@@ -68,8 +69,11 @@ def diagnose_campaign(
     found = diagnose(valve, seed=seed, cache=FitCache(valve, journal, steps))
     found = replace(found, warnings=[*valve.warnings, *found.warnings])
     step = next_step(found.conclusion.verdict, campaign, out, Path(plant) if plant else None)
-    text = _report(found, valve, recorded, out, steps, step) if report else ""
-    write_results(found, out, text, seconds=perf_counter() - began)
+    steps("what has no name")
+    learnt = learn(found, valve, seed) if report else None
+    text = _report(found, learnt, valve, recorded, out, steps, step) if report else ""
+    entry = learnt.entry if learnt else None
+    write_results(found, out, text, learnt_term=entry, seconds=perf_counter() - began)
     return found
 
 
@@ -90,6 +94,7 @@ def next_step(verdict: str, campaign: Path, out: Path, plant: Path | None) -> Ne
 
 def _report(
     found: Diagnosis,
+    learnt: LearntModel | None,
     valve: Valve,
     campaign: Campaign,
     out: Path,
@@ -103,19 +108,21 @@ def _report(
     (out / PROGRAMME).unlink(missing_ok=True)
     if experiment.programme:
         save_programmes([experiment.programme], out / PROGRAMME, valve.plant.sensors)
-    save_plant(refitted_plant(found, valve, campaign.name), out / PLANT)
+    save_plant(refitted_plant(found, valve, campaign.name, learnt), out / PLANT)
     steps("report")
     title = f"Gap between model and recordings: {campaign.name}"
     guide = "docs/explanation/diagnosis.md"
     footer = f"Written by epv-valve {version('epv-valve')}. Figures and fields: {guide}."
-    pages = sections(found, experiment.text)
+    pages = sections(found, experiment.text, learnt.sentence(found) if learnt else "")
     facts = campaign_facts(campaign)
     write_page(out / REPORT, title=title, sections=pages, facts=facts, footer=footer, next_step=step)
     return experiment.text
 
 
-def refitted_plant(found: Diagnosis, valve: Valve, name: str) -> Plant:
-    """The plant refitted together with the cause to add, else recalibrated.
+def refitted_plant(
+    found: Diagnosis, valve: Valve, name: str, learnt: LearntModel | None = None
+) -> Plant:
+    """The plant refitted together with the cause to add, else recalibrated, and with a learnt term.
 
     To be added is what the verdict names, whether it explains all or a part, and what surely reduces the
     gap on held-out recordings.
@@ -126,11 +133,14 @@ def refitted_plant(found: Diagnosis, valve: Valve, name: str) -> Plant:
     best = found.kept
     named = bool(best.labels)
     region = _region(found, best, valve)
+    if learnt:
+        region = learnt.region(region)
     return replace(
         valve.plant,
         parameters=region.centre,
         region=region,
-        diagnosis=possible_plants(found, valve),
+        diagnosis=possible_plants(found, valve, learnt),
+        learnt_term=learnt.term if learnt else valve.plant.learnt_term,
         name=f"{name} with {hypothesis_label(best)}" if named else f"{name}, recalibrated",
         provenance={
             "method": "joint refit with the cause of the gap" if named else "recalibration",
@@ -142,10 +152,10 @@ def refitted_plant(found: Diagnosis, valve: Valve, name: str) -> Plant:
     )
 
 
-def possible_plants(found: Diagnosis, valve: Valve) -> Mixture:
+def possible_plants(found: Diagnosis, valve: Valve, learnt: LearntModel | None = None) -> Mixture:
     """The likeliest plants that hold nearly all of the probability, each with its region.
 
-    No cause and an unknown one are both the recalibrated plant: nothing better can be simulated.
+    No cause and an unknown one are both the recalibrated plant, with a learnt term where it has one.
     """
     ranking = found.ranking
     unnamed = (ranking.no_cause + ranking.unknown, ranking.recalibrated)
@@ -159,7 +169,9 @@ def possible_plants(found: Diagnosis, valve: Valve) -> Mixture:
             Alternative(
                 name=hypothesis_label(hypothesis) or RECALIBRATED,
                 probability=float(probability / whole),
-                region=_region(found, hypothesis, valve),
+                region=learnt.region(_region(found, hypothesis, valve))
+                if learnt and hypothesis is found.kept
+                else _region(found, hypothesis, valve),
             )
             for probability, hypothesis in kept
         )

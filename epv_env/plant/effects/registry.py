@@ -6,7 +6,17 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from epv_env.plant.effects import armature, chambers, coil, flows, friction, magnet, measurement, seats
+from epv_env.plant.effects import (
+    armature,
+    chambers,
+    coil,
+    flows,
+    friction,
+    learnt,
+    magnet,
+    measurement,
+    seats,
+)
 from epv_env.plant.effects.record import Effect, EffectError
 from epv_env.plant.effects.step_limits import step_limits
 
@@ -44,7 +54,11 @@ EFFECTS: tuple[Effect, ...] = (
 CATALOGUE: dict[str, tuple[str, ...]] = {effect.name: effect.symbols for effect in EFFECTS}
 """Symbols that size each effect, by its name; all 0 is off."""
 
-CONSTANTS = (*(row for effect in EFFECTS for row in effect.constants), *step_limits(EFFECTS))
+CONSTANTS = (
+    *(row for effect in EFFECTS for row in effect.constants),
+    *learnt.CONSTANTS,
+    *step_limits(EFFECTS),
+)
 """Rows of the kernel's table of effects."""
 
 Effects = namedtuple("Effects", [row.name for row in CONSTANTS])
