@@ -18,7 +18,7 @@ from identification.blind.truth import NOMINAL, UNIT_SCATTER, UNIT_SCATTER_LIMIT
 from identification.calibration.problem import ParameterVector
 from identification.recordings.recording import OUTPUTS, UNITS
 from identification.replay.model_inputs import ModelInputs
-from identification.replay.replay import Replay
+from identification.replay.replay import P2_SHIFT, Replay
 from identification.valve_gap.causes import PARAMETER_COMPONENTS
 
 DIFFERENCE_STEP = 1e-4
@@ -121,7 +121,8 @@ class _Comparison:
 
     def residuals(self, values: Mapping[str, NDArray]) -> list[NDArray]:
         """(model - truth)/noise of n candidates per recording [-], (3 samples, n)."""
-        outputs = self.replay.outputs(values, p2_shift=-self.bias)
+        n = len(next(iter(values.values())))
+        outputs = self.replay.outputs({**values, P2_SHIFT: np.full(n, -self.bias)})
         return [
             np.nan_to_num((model - true[:, :, None]) * weights[:, :, None], nan=LOST_RESIDUAL).reshape(
                 true.size, -1

@@ -19,7 +19,7 @@ from identification.quality.assessment import SensorOffset, assess_recording, se
 from identification.recordings.noise import campaign_steps, pooled_noise
 from identification.recordings.recording import OUTPUTS, Campaign, CampaignError, Recording
 from identification.replay.model_inputs import model_inputs, without_offsets
-from identification.replay.replay import Replay, measured_outputs
+from identification.replay.replay import P2_SHIFT, Replay, measured_outputs
 
 PRESSURE_STEP = 1e3
 """Change of the start's circuit pressure by which its influence is measured [Pa]."""
@@ -136,7 +136,7 @@ class WeightedResiduals:
         candidates = np.vstack([z, z, z + steps])
         shift = np.zeros(len(candidates))
         shift[1] = PRESSURE_STEP
-        outputs = self.replay.outputs(self.vector.values(candidates), shift)
+        outputs = self.replay.outputs({**self.vector.values(candidates), P2_SHIFT: shift})
         return [
             _without_nuisances(model, measured, weights)
             for model, measured, weights in zip(outputs, self.measured, self.weights, strict=True)

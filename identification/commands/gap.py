@@ -13,12 +13,16 @@ from identification.gap.screened import sentences
 from identification.gap.sentences import verdict_sentence
 from identification.valve_gap import diagnose
 from identification.valve_gap.diagnose import diagnose_campaign
+from identification.valve_gap.operation import diagnose_log
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add what is diagnosed, the nominal model, the catalogue, and where the results go."""
     parser.add_argument(
-        "campaign", type=Path, help="folder with campaign.json (docs/reference/files.md)"
+        "campaign", type=Path, help="folder with campaign.json or log.json (docs/reference/files.md)"
+    )
+    parser.add_argument(
+        "--logs", action="store_true", help="the folder holds the log of a control unit, not a campaign"
     )
     add_out(parser)
     add_seed(parser, help="of resampling")
@@ -30,7 +34,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Diagnose the campaign, and say what the verdict means. Raises ValueError."""
-    diagnosis = diagnose_campaign(
+    read = diagnose_log if options.logs else diagnose_campaign
+    diagnosis = read(
         options.campaign, options.out, plant=options.plant, without=options.without, seed=options.seed
     )
     content = decoded(options.out / GAP_FILE, remedy="diagnose again")

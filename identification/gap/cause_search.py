@@ -124,6 +124,7 @@ def search_causes(
     base: Estimate,
     base_runs: Sequence[LinearisedRun],
     signatures: Sequence[CauseSignature],
+    most_causes: int = MOST_CAUSES,
 ) -> None:
     """Refit the promising sets of causes into the pool.
 
@@ -132,12 +133,13 @@ def search_causes(
         base: the recalibrated model.
         base_runs: the same linearised in the fitted runs.
         signatures: of all causes beside it.
+        most_causes: largest number of causes of a set.
     """
     screened = screen_causes(pool.problem, base, base_runs, signatures, every_start=True)
     starts = screened if pool.small else _promising_starts(screened)
     pool.add(pool.cache("single causes", lambda: refit(pool.problem, base, starts)))
     pool.refine(1)
-    for number in range(2, MOST_CAUSES + 1):
+    for number in range(2, most_causes + 1):
         if not _another_cause_may_act(pool, number):
             break
         for smaller, _ in pool.ranked(number - 1)[:BASES]:

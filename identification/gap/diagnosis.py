@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from identification.block_bootstrap import Interval
-from identification.gap.cause_search import HypothesisPool, is_small, search_causes
+from identification.gap.cause_search import MOST_CAUSES, HypothesisPool, is_small, search_causes
 from identification.gap.evidence import EvaluatedHypothesis, evaluate_linearised
 from identification.gap.fitting_problem import Estimate, FitCache, FittingProblem, Hypothesis
 from identification.gap.gauss_newton import linearise
@@ -72,6 +72,9 @@ class Diagnosis:
     """Causes whose discrepancy reduction was measured, the most probable first."""
     screened: tuple[Finding, ...]
     """Faulty readings that no fit uses."""
+    onset: tuple[str, float] | None = None
+    """Drive of an operation log from which the causes act, and the probability that they begin there;
+    None where they act from the first one."""
     warnings: list[str]
     """Faulty readings, doubts about the plant's description, and fits that did not converge, in
     sentences."""
@@ -166,12 +169,15 @@ def diagnose(plant: GreyBox, *, seed: int = 0, cache: FitCache | None = None) ->
     )
 
 
-def rank_hypotheses(plant: GreyBox, cache: FitCache | None = None) -> Ranking:
+def rank_hypotheses(
+    plant: GreyBox, cache: FitCache | None = None, most_causes: int = MOST_CAUSES
+) -> Ranking:
     """Refit the promising hypotheses and weigh them; a fit that does not converge is weighed as it is.
 
     Args:
         plant: the model, its recordings and its catalogue of causes.
         cache: runs the fits; None keeps nothing.
+        most_causes: largest number of causes that are taken to act together.
     """
     cache, plant = cache or FitCache(plant), prepared(plant)
     thorough = is_small(plant)
@@ -179,15 +185,15 @@ def rank_hypotheses(plant: GreyBox, cache: FitCache | None = None) -> Ranking:
     corrected = with_seen_noise(problem, base)
     if corrected is not plant:
         problem, base = recalibrate(corrected, cache, thorough=thorough, prefix="with the noise seen: ")
-    ranking = _searched(problem, base, cache)
+    ranking = _searched(problem, base, cache, most_causes)
     weighted = with_disturbance(corrected, ranking.discrepancies)
     if weighted is corrected:
         return ranking
     cache = cache.named("with the disturbance: ")
-    return _searched(*recalibrate(weighted, cache, thorough=thorough), cache)
+    return _searched(*recalibrate(weighted, cache, thorough=thorough), cache, most_causes)
 
 
-def _searched(problem: FittingProblem, base: Estimate, cache: FitCache) -> Ranking:
+def _searched(problem: FittingProblem, base: Estimate, cache: FitCache, most_causes: int) -> Ranking:
     """The search for causes beside the recalibrated model `base`; the most probable hypotheses first."""
     runs = linearise(problem, [base], problem.all_runs)[0]
     base_runs = [runs[r] for r in problem.fitted_runs]
@@ -196,7 +202,7 @@ def _searched(problem: FittingProblem, base: Estimate, cache: FitCache) -> Ranki
     evaluated = evaluate_linearised(problem, base, runs)
     recalibrated = with_own_nuisances(problem, [evaluated], "recalibration: own nuisances", cache)[0]
     pool = HypothesisPool(problem, recalibrated, cache)
-    search_causes(pool, base, base_runs, signatures)
+    search_causes(pool, base, base_runs, signatures, most_causes)
     hypotheses, found = pool.posterior()
     keys = list(zip(found.probabilities, found.scores, strict=True))
     order = sorted(range(len(keys)), key=keys.__getitem__, reverse=True)

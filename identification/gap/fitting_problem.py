@@ -172,8 +172,8 @@ class FitCache:
         self.prefix = prefix
 
     def named(self, prefix: str) -> "FitCache":
-        """The same cache for a second search: all names of steps begin with the prefix."""
-        return FitCache(self.plant, self.journal, self.announce, prefix)
+        """The same cache for a second search: all names of its steps begin with the prefix, too."""
+        return FitCache(self.plant, self.journal, self.announce, self.prefix + prefix)
 
     def __call__(self, step: str, fit: Callable[[], list[Estimate]]) -> list[Estimate]:
         """The estimates that `fit` returns, or returned in an earlier run under this step's name."""

@@ -273,7 +273,7 @@ def most_misfitting_runs(problem: FittingProblem, residuals: Sequence[NDArray]) 
     first, *others = [run for run in np.argsort(-misfit, kind="stable").tolist() if misfit[run] >= 0]
     chosen, left = [first], SAMPLES - lengths[first]
     for run in others:
-        if lengths[run] <= left:
+        if lengths[run] <= left and len(chosen) < WINDOWS_TOGETHER // WINDOWS:
             chosen.append(run)
             left -= lengths[run]
     return sorted(chosen)

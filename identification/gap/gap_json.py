@@ -70,7 +70,7 @@ def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = 
     """
     conclusion, ranking = diagnosis.conclusion, diagnosis.ranking
     separability, left = ranking.separability, remainder(diagnosis)
-    unexplained = diagnosis.reduction.unexplained
+    unexplained, onset = diagnosis.reduction.unexplained, diagnosis.onset
     with_cause = diagnosis.best.hypothesis if diagnosis.best else ranking.recalibrated
     return {
         "format": "epv-gap/3",
@@ -118,6 +118,7 @@ def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = 
             if (twins := separability.twins(label))
         },
         "absorbed": list(separability.absorbed),
+        "onset": {"drive": onset[0], "probability": onset[1]} if onset else None,
         "warnings": diagnosis.warnings,
     }
 

@@ -48,6 +48,15 @@ def verdict_sentence(diagnosis: Diagnosis, next_experiment: str) -> tuple[str, s
 
     next_experiment: a sentence for an ambiguous verdict; empty where none was sought.
     """
+    status, text = _status_and_text(diagnosis, next_experiment)
+    if diagnosis.onset is None:
+        return status, text
+    drive, probability = diagnosis.onset
+    return status, f"{text} It begins with {drive} ({probability_text(probability)})."
+
+
+def _status_and_text(diagnosis: Diagnosis, next_experiment: str) -> tuple[str, str]:
+    """`verdict_sentence` but for the onset."""
     conclusion, no_warning = diagnosis.conclusion, not diagnosis.warnings
     if conclusion.verdict == NO_GAP:
         likely = diagnosis.ranking.no_cause > LIKELY_PROBABILITY

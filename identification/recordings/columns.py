@@ -61,6 +61,19 @@ def read_columns(file: str, content: bytes) -> dict[str, NDArray]:
     }
 
 
+def read_named_columns(file: str, content: bytes, wanted: Sequence[str]) -> dict[str, NDArray]:
+    """Columns of a CSV file by name, each (samples,); others are ignored. Raises CampaignError."""
+    cells = _cells(file, content)
+    names = [name.strip() for name in cells.iloc[0].fillna("")] if len(cells) else []
+    missing = [name for name in wanted if names.count(name) != 1]
+    if missing:
+        raise CampaignError(
+            f"{file}, line 1: {missing[0]} stands {names.count(missing[0])} times in the header: give "
+            f"the columns {','.join(wanted)} once each"
+        )
+    return {name: _numbers(file, name, cells.iloc[1:, names.index(name)].to_numpy()) for name in wanted}
+
+
 def _cells(file: str, content: bytes) -> pd.DataFrame:
     """Every cell as text, the header in the first row; NaN where a line ends early."""
     try:

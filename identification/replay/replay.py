@@ -19,6 +19,10 @@ from identification.report_2003 import partial_error, relative_error, total_erro
 LARGEST_BATCH = 1_500_000
 """Samples times valves that are simulated at once: about 40 MB of outputs."""
 
+P2_SHIFT, FLOW_SHIFT, FLOW_RAMP = SHIFTS = "p2_start", "consumption", "consumption_ramp"
+"""What a candidate may change of a recording: p2 at the start [Pa], the air consumed [kg/s], and its
+change from the first sample to the last [kg/s], about the middle."""
+
 RECORDED_PERIODS = 100
 """Sampling periods whose states are kept at a time: few enough to stay in the processor's cache."""
 
@@ -34,14 +38,13 @@ class Replay:
     def outputs(
         self,
         candidates: Mapping[str, NDArray],
-        p2_shift: ArrayLike = 0.0,
         which: Sequence[int] | None = None,
     ) -> list[NDArray]:
         """Model outputs of n candidates for each recording.
 
         Args:
-            candidates: values by symbol [SI], (n,), or (n, recordings) where recordings differ.
-            p2_shift: added to the recordings' p2 at the start [Pa], (), (n,) or (n, recordings).
+            candidates: values by symbol [SI], (n,), or (n, recordings) where recordings differ;
+                SHIFTS are added to what the recordings have.
             which: indices of the recordings, None for all.
 
         Returns per recording an array (3, samples, n) of OUTPUTS [Pa, Pa, A]; NaN where a candidate
@@ -49,8 +52,7 @@ class Replay:
         """
         chosen = range(len(self.drives)) if which is None else which
         n = max(np.shape(value)[0] for value in candidates.values())
-        shift = np.asarray(p2_shift, dtype=float)
-        each = {"": np.broadcast_to(shift[:, None] if shift.ndim == 1 else shift, (n, len(self.drives)))}
+        each = {shift: np.zeros(n) for shift in SHIFTS}
         each |= {s: np.asarray(value) for s, value in candidates.items()}
         with_effects = self._with_effects(each, n)
         if np.all(with_effects) or not np.any(with_effects):
@@ -67,17 +69,16 @@ class Replay:
 
     def _with_effects(self, each: Mapping[str, NDArray], n: int) -> NDArray:
         """Which candidates have an effect in any recording, boolean (n,)."""
-        largest = {s: v if v.ndim == 1 else np.max(np.abs(v), axis=1) for s, v in each.items() if s}
+        largest = {s: v if v.ndim == 1 else np.max(np.abs(v), axis=1) for s, v in each.items()}
         return np.broadcast_to(has_effects(effect_constants({**self.base, **largest})), n)
 
     def _outputs(self, each: Mapping[str, NDArray], n: int, chosen: Sequence[int]) -> list[NDArray]:
-        """`outputs` of candidates that one kernel can simulate; '' holds the shifts of p2."""
+        """`outputs` of candidates that one kernel can simulate."""
         answers: list[NDArray] = []
         for group in self._groups(n, chosen):
             lanes = {s: _lanes(value, group) for s, value in each.items()}
-            shifts = lanes.pop("")
             drives, p = [self.drives[r] for r in group], {**self.base, **lanes}
-            answers += _simulate(drives, p, shifts, n)
+            answers += _simulate(drives, p, n)
         return answers
 
     def _groups(self, n: int, chosen: Sequence[int]) -> list[list[int]]:
@@ -143,20 +144,19 @@ def _lanes(value: NDArray, recordings: Sequence[int]) -> NDArray:
     return value[:, list(recordings)].T.ravel()
 
 
-def _simulate(
-    drives: list[ModelInputs], tiled: Mapping[str, ArrayLike], shift: NDArray, n: int
-) -> list[NDArray]:
+def _simulate(drives: list[ModelInputs], tiled: dict[str, ArrayLike], n: int) -> list[NDArray]:
     """One batch: lane r n + j is candidate j on recording r.
 
-    tiled, shift: by lane.
+    tiled: parameters and shifts by lane.
     """
+    p2_shift, flow_shift, flow_ramp = (np.asarray(tiled.pop(shift)) for shift in SHIFTS)
     valves = Valves(n * len(drives))
     valves.set_parameters(np.arange(valves.n), tiled)
     p1, U, p2 = (
         np.repeat([getattr(drive, name) for drive in drives], n, axis=0)
         for name in ("p1_start", "U_start", "p2_start")
     )
-    initial = energised(tiled, p1=p1, p2=p2 + shift, U=U)
+    initial = energised(tiled, p1=p1, p2=p2 + p2_shift, U=U)
     for field, value in zip(valves.state, initial, strict=True):
         field[:] = value
     inputs, duration = _inputs(drives)
@@ -167,7 +167,9 @@ def _simulate(
     together = steps if np.any(tiled["t_delay"]) else RECORDED_PERIODS
     for first in range(0, steps, max(together, 1)):
         part = slice(first, first + together)
-        every = Inputs(**{name: np.repeat(field[part], n, axis=1) for name, field in inputs.items()})
+        own = {name: np.repeat(field[part], n, axis=1) for name, field in inputs.items()}
+        own["sigma_S"] = own["sigma_S"] + flow_shift + flow_ramp * own.pop("course")
+        every = Inputs(**own)
         states = valves.record(every, np.repeat(duration[part], n, axis=1))
         outputs[:, 1 + first : 1 + first + together] = _read(states, tiled)
     return [outputs[:, : len(drive.U), r * n : (r + 1) * n] for r, drive in enumerate(drives)]
@@ -180,14 +182,24 @@ def _read(state: State, p: Mapping[str, ArrayLike]) -> NDArray:
 
 
 def _inputs(drives: list[ModelInputs]) -> tuple[dict[str, NDArray], NDArray]:
-    """Inputs by name, and length of each period; (longest - 1, recordings), 0 past a recording's end."""
+    """Inputs, course from -1/2 to 1/2, and length of each period, (longest - 1, recordings) each.
+
+    They are 0 past a recording's end.
+    """
     steps = max(len(drive.U) for drive in drives) - 1
-    table = np.zeros((4, steps, len(drives)))
+    table = np.zeros((5, steps, len(drives)))
     for r, drive in enumerate(drives):
         own = slice(0, len(drive.U) - 1)
         table[0, own, r] = drive.U[:-1]
         table[1, own, r] = drive.sigma_S[:-1]
         table[2, own, r] = np.diff(drive.p1) / drive.period
-        table[3, own, r] = drive.period
-    U, sigma_S, p1_slope, period = table
-    return {"U": U, "sigma_S": sigma_S, "p1_slope": p1_slope, "refill": 0.0 * U}, period
+        table[3, own, r] = np.linspace(-0.5, 0.5, len(drive.U))[:-1]
+        table[4, own, r] = drive.period
+    U, sigma_S, p1_slope, course, period = table
+    return {
+        "U": U,
+        "sigma_S": sigma_S,
+        "p1_slope": p1_slope,
+        "refill": 0.0 * U,
+        "course": course,
+    }, period

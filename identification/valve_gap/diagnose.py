@@ -25,13 +25,15 @@ from identification.gap.held_out import RECALIBRATED
 from identification.gap.report_page import sections
 from identification.gap.verdict import AMBIGUOUS, UNKNOWN
 from identification.recordings.campaign_files import read_campaign
-from identification.recordings.recording import Campaign, campaign_facts
+from identification.recordings.recording import campaign_facts
 from identification.recordings.rules import RULES, rules_of
 from identification.report.page import write_page
 from identification.valve_gap.learnt_term import LearntModel, learn
 from identification.valve_gap.programmes import CANDIDATES, next_experiment
 from identification.valve_gap.programmes import FILE_NAME as PROGRAMME
 from identification.valve_gap.valve import Valve
+
+GUIDE = "docs/explanation/diagnosis.md"
 
 REPORT, PLANT, JOURNAL = "report.html", "plant.json", "fits.jsonl"
 
@@ -64,14 +66,19 @@ def diagnose_campaign(
     described = load_plant(plant) if plant else None
     recorded = read_campaign(campaign, rules_of(described) if described else RULES)
     valve = Valve(recorded, described, without=without, noise=noise)
-    journal = Journal(out / JOURNAL, _subject(valve, without, noise or {}))
-    steps = _steps(began) if report else lambda step: None
+    journal = Journal(out / JOURNAL, subject(valve, without, noise or {}))
+    steps = steps_on_stderr(began) if report else lambda step: None
     found = diagnose(valve, seed=seed, cache=FitCache(valve, journal, steps))
     found = replace(found, warnings=[*valve.warnings, *found.warnings])
     step = next_step(found.conclusion.verdict, campaign, out, Path(plant) if plant else None)
-    steps("what has no name")
-    learnt = learn(found, valve, seed) if report else None
-    text = _report(found, learnt, valve, recorded, out, steps, step) if report else ""
+    learnt, text = None, ""
+    if report:
+        steps("what has no name")
+        learnt = learn(found, valve, seed)
+        steps("next experiment")
+        text = _plan(found, valve, out)
+        steps("report")
+        write_report(found, valve, out, recorded.name, campaign_facts(recorded), step, text, learnt)
     entry = learnt.entry if learnt else None
     write_results(found, out, text, learnt_term=entry, seconds=perf_counter() - began)
     return found
@@ -92,31 +99,36 @@ def next_step(verdict: str, campaign: Path, out: Path, plant: Path | None) -> Ne
     )
 
 
-def _report(
-    found: Diagnosis,
-    learnt: LearntModel | None,
-    valve: Valve,
-    campaign: Campaign,
-    out: Path,
-    steps: Callable[[str], None],
-    step: NextStep,
-) -> str:
-    """Write what people use of it; returns what to record next."""
-    steps("next experiment")
+def _plan(found: Diagnosis, valve: Valve, out: Path) -> str:
+    """Write what to record next; the same in a sentence."""
     programmes = at_voltage(CANDIDATES, valve.plant.voltage)
     experiment = next_experiment(found.ranking, valve, found.conclusion.verdict, programmes)
     (out / PROGRAMME).unlink(missing_ok=True)
     if experiment.programme:
         save_programmes([experiment.programme], out / PROGRAMME, valve.plant.sensors)
-    save_plant(refitted_plant(found, valve, campaign.name, learnt), out / PLANT)
-    steps("report")
-    title = f"Gap between model and recordings: {campaign.name}"
-    guide = "docs/explanation/diagnosis.md"
-    footer = f"Written by epv-valve {version('epv-valve')}. Figures and fields: {guide}."
-    pages = sections(found, experiment.text, learnt.sentence(found) if learnt else "")
-    facts = campaign_facts(campaign)
-    write_page(out / REPORT, title=title, sections=pages, facts=facts, footer=footer, next_step=step)
     return experiment.text
+
+
+def write_report(
+    found: Diagnosis,
+    valve: Valve,
+    out: Path,
+    name: str,
+    facts: Mapping[str, str],
+    step: NextStep,
+    next_experiment: str = "",
+    learnt: LearntModel | None = None,
+) -> None:
+    """Write the report and the plant file. name: of the recordings; facts: what the page rests on."""
+    save_plant(refitted_plant(found, valve, name, learnt), out / PLANT)
+    write_page(
+        out / REPORT,
+        title=f"Gap between model and recordings: {name}",
+        sections=sections(found, next_experiment, learnt.sentence(found) if learnt else ""),
+        facts=facts,
+        footer=f"Written by epv-valve {version('epv-valve')}. Figures and fields: {GUIDE}.",
+        next_step=step,
+    )
 
 
 def refitted_plant(
@@ -191,7 +203,7 @@ def _region(found: Diagnosis, hypothesis: EvaluatedHypothesis, valve: Valve) -> 
     )
 
 
-def _steps(began: float) -> Callable[[str], None]:
+def steps_on_stderr(began: float) -> Callable[[str], None]:
     """Says on stderr which step has begun; began: start of the diagnosis, of `perf_counter` [s]."""
     numbers = count(1)
     return lambda step: print(
@@ -199,7 +211,7 @@ def _steps(began: float) -> Callable[[str], None]:
     )
 
 
-def _subject(valve: Valve, without: Sequence[str], noise: Mapping[str, float]) -> dict:
+def subject(valve: Valve, without: Sequence[str], noise: Mapping[str, float]) -> dict:
     """What the fits depend on."""
     return {
         "software": version("epv-valve"),

@@ -16,7 +16,7 @@ from identification.gap.screened import Finding, screen
 from identification.recordings.noise import coarse_step_warnings, reliable_step, rounding_error
 from identification.recordings.recording import OUTPUTS, UNITS, Campaign, Recording
 from identification.replay.model_inputs import model_inputs
-from identification.replay.replay import Replay, measured_outputs
+from identification.replay.replay import P2_SHIFT, SHIFTS, Replay, measured_outputs
 from identification.valve_gap import causes
 from identification.valve_gap.equations import (
     EQUATIONS,
@@ -65,13 +65,16 @@ TIME_SCALE = 5e-3
 NOISE_BLOCK = 0.02
 """Length of the stretches of which each has its own estimate of the noise [s]: 40 samples."""
 
+CURRENT_TRANSIENT = 2e-3
+"""Time between samples [s] in which the current has risen or fallen as good as whole."""
+
 SWITCHING_TRANSIENT = 0.02
 """Time after a switching that the noise estimate leaves out [s]: the coil and p3 move."""
 
 PARAMETER_SCATTER = 3e-3
 """Relative standard deviation, between units, of the parameters that are not calibrated [-]."""
 
-P2_START = NuisanceParameter(symbol="p2_start", sd=500.0, step=1e3)
+P2_START = NuisanceParameter(symbol=P2_SHIFT, sd=500.0, step=1e3)
 """Circuit pressure at the start of a recording, less the mean of the hold [Pa]."""
 P3_ZERO = NuisanceParameter(symbol="p3_zero", sd=500.0, step=1e3)
 """Zero of the sensor of p3 on the day of a recording [Pa]."""
@@ -88,6 +91,7 @@ class Valve:
         plant: Plant | None = None,
         without: Sequence[str] = (),
         noise: Mapping[str, float] | None = None,
+        offsets: Sequence[NuisanceParameter] = (),
     ):
         """Prepare a campaign for the diagnosis.
 
@@ -97,6 +101,7 @@ class Valve:
             without: names of causes to leave out.
             noise: standard deviation of the readings by channel [Pa, A], where it is known better than
                 from the recordings; the others are estimated from them.
+            offsets: what else has a value of its own in each recording.
 
         Raises:
             ValueError: the catalogue does not have a cause of `without`, or `noise` has another channel
@@ -129,7 +134,7 @@ class Valve:
             if symbol not in free
         )
         self.warnings = coarse_step_warnings(problem.steps)
-        self.run_offsets = (_rounded(P2_START, problem.steps.get("p2", 0.0)), P3_ZERO, I_ZERO)
+        self.run_offsets = (_rounded(P2_START, problem.steps.get("p2", 0.0)), P3_ZERO, I_ZERO, *offsets)
         self.equations = EQUATIONS
         self.replay = Replay([model_inputs(r, self.base) for r in self.recordings], self.base)
 
@@ -144,8 +149,10 @@ class Valve:
                 start[symbol] = start[symbol] + (given[:, None] if given.ndim == 1 else given)
         if "b_p2" in plant:
             # The recorded start is what the biased sensor read.
-            start["p2_start"] = start["p2_start"] - np.asarray(plant["b_p2"])[:, None]
-        found = self.replay.outputs(plant, start["p2_start"], runs)
+            bias = np.asarray(plant["b_p2"])
+            start[P2_SHIFT] = start[P2_SHIFT] - (bias[:, None] if bias.ndim == 1 else bias)
+        shifts = {s: start[s] for s in SHIFTS if s in start}
+        found = self.replay.outputs({**plant, **shifts}, runs)
         for run, output in zip(runs, found, strict=True):
             for channel, symbol in (("p3", "p3_zero"), ("I", "I_zero")):
                 output[OUTPUTS.index(channel)] += start[symbol][:, run]
@@ -182,7 +189,11 @@ class Valve:
 def _screened(campaign: Campaign) -> tuple[Campaign, tuple[Finding, ...]]:
     """The campaign with straight lines across its faulty readings, and these."""
     channels = [Channel(name=name, unit=UNITS[name][0], scale=UNITS[name][1]) for name in OUTPUTS]
-    runs, found = screen([as_run(recording) for recording in campaign.recordings], channels)
+    raw = [as_run(recording) for recording in campaign.recordings]
+    for run, recording in zip(raw, campaign.recordings, strict=True):
+        if recording.period > CURRENT_TRANSIENT:  # a switching looks like a wild reading
+            run.trusted[OUTPUTS.index("I")] = False
+    runs, found = screen(raw, channels)
     recordings = tuple(
         replace(recording, **dict(zip(OUTPUTS, run.measured, strict=True)), **run.inputs)
         for recording, run in zip(campaign.recordings, runs, strict=True)

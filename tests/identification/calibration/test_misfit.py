@@ -11,6 +11,7 @@ from identification.calibration.problem import (
     noise_weights,
     report_weights,
 )
+from identification.replay.replay import P2_SHIFT
 from identification.report_2003 import partial_error, relative_error, total_error
 from tests.identification.twins import TRUE, problem
 
@@ -52,7 +53,7 @@ def test_it_is_eq_21_where_nuisances_explain_nothing():
     """Measured is the model and a deviation of p2 that is orthogonal to a changed start."""
     misfit, z = problem().total_error(), true_vector()
     values = misfit.vector.values(np.stack([z, z]))
-    models = misfit.replay.outputs(values, np.array([0.0, 100.0]))
+    models = misfit.replay.outputs({**values, P2_SHIFT: np.array([0.0, 100.0])})
     rng = np.random.default_rng(0)
     misfit.measured, misfit.weights = [], []
     for recording, model in zip(problem().calibration, models, strict=True):

@@ -73,7 +73,6 @@ def test_a_catalogue_without_the_true_causes_names_none():
 
 
 @pytest.mark.parametrize("most", [2])
-def test_no_set_is_larger_than_the_search_allows(most, monkeypatch):
-    monkeypatch.setattr(cause_search, "MOST_CAUSES", most)
-    found = rank_hypotheses(Drive(THREE))
+def test_no_set_is_larger_than_the_search_allows(most):
+    found = rank_hypotheses(Drive(THREE), most_causes=most)
     assert max(len(each.labels) for each in found.hypotheses) == most

@@ -10,7 +10,7 @@ from identification.calibration.problem import ParameterVector, WeightedResidual
 from identification.recordings.recording import OUTPUTS
 from identification.replay import replay
 from identification.replay.model_inputs import model_inputs
-from identification.replay.replay import Replay, responses, total_response_error
+from identification.replay.replay import SHIFTS, Replay, responses, total_response_error
 from tests.identification.twins import TRUE, exact_recording, problem, truth
 
 CANDIDATES = {
@@ -27,10 +27,12 @@ def mixed():
 
 
 def test_many_candidates_are_each_alone_to_the_bit():
-    together = Replay(mixed()[:1], TRUE).outputs(CANDIDATES, np.array([0.0, 500.0, -500.0]))[0]
-    for i, shift in enumerate([0.0, 500.0, -500.0]):
-        one = {symbol: values[i : i + 1] for symbol, values in CANDIDATES.items()}
-        alone = Replay(mixed()[:1], TRUE).outputs(one, shift)[0]
+    shifts = [[0.0, 500.0, -500.0], [0.0, 2e-4, -1e-4], [1e-4, 0.0, 3e-4]]
+    candidates = {**CANDIDATES, **dict(zip(SHIFTS, np.array(shifts), strict=True))}
+    together = Replay(mixed()[:1], TRUE).outputs(candidates)[0]
+    for i in range(3):
+        one = {symbol: values[i : i + 1] for symbol, values in candidates.items()}
+        alone = Replay(mixed()[:1], TRUE).outputs(one)[0]
         np.testing.assert_array_equal(alone[:, :, 0], together[:, :, i])
 
 

@@ -1,0 +1,207 @@
+"""Operation logs for the diagnosis: openings at steady consumption, and the drive where a cause begins.
+
+A log does not hold the consumption: each opening has a nuisance for the error of its estimate.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import softmax
+
+from epv_env.common.files import Journal
+from epv_env.plant.plantfile import Plant, load_plant
+from identification.gap.diagnosis import Diagnosis, diagnose, rank_hypotheses
+from identification.gap.fitting_problem import FitCache
+from identification.gap.gap_json import write_results
+from identification.gap.plant import NuisanceParameter
+from identification.gap.posterior import CHANCE_MISFIT, FIGURES, WEIGHTS
+from identification.gap.screened import Finding
+from identification.gap.verdict import NO_GAP, Ranking
+from identification.recordings.log_files import Log, read_log
+from identification.recordings.openings import drive_of, evenly, openings, start_of
+from identification.recordings.recording import OUTPUTS, Campaign, campaign_facts
+from identification.replay.replay import FLOW_RAMP, FLOW_SHIFT
+from identification.valve_gap.diagnose import (
+    JOURNAL,
+    next_step,
+    steps_on_stderr,
+    subject,
+    write_report,
+)
+from identification.valve_gap.valve import Valve
+
+FIT_WEIGHT = WEIGHTS[FIGURES.index("fit")]
+
+CONSUMPTION = (
+    NuisanceParameter(symbol=FLOW_SHIFT, sd=3e-4, step=1e-4),
+    NuisanceParameter(symbol=FLOW_RAMP, sd=6e-4, step=1e-4),
+)
+"""Error of a consumption that was read off p2, and its change during an opening [kg/s]."""
+
+CHANGED_CONSUMPTION = 1.5
+"""Misfit of p2 relative to that of the better openings of a drive (their lower quartile) beyond which
+consumption jumped in an opening [1]. A cause acts in every opening of a drive, a consumer in a few."""
+
+
+def diagnose_log(
+    folder: Path,
+    out: Path,
+    *,
+    plant: str | PathLike[str] | None = None,
+    without: Sequence[str] = (),
+    seed: int = 0,
+    report: bool = True,
+) -> Diagnosis:
+    """Diagnose an operation log; write gap.json, and unless `report` is False report and plant file.
+
+    A cause may act from a later drive on: the search is done for each first drive.
+
+    plant: plant file with the nominal parameters, None for the report's calibration. without: causes to
+    leave out. Finished fits are kept in `out` and taken up again. Raises CampaignError for a log that
+    cannot be used, ValueError for an unknown cause or a plant file that is none.
+    """
+    began = perf_counter()
+    described = load_plant(plant) if plant else Plant.calibrated()
+    log = read_log(folder)
+    campaign, steady = steady_openings(log, described)
+    valve = LoggedValve(campaign, described, steady, without)
+    journal = Journal(out / JOURNAL, subject(valve, without, {}))
+    steps = steps_on_stderr(began) if report else lambda step: None
+    cache = FitCache(valve, journal, steps)
+    found = _from_its_drive(valve, seed, cache)
+    found = replace(found, warnings=[*valve.warnings, *found.warnings])
+    if report:
+        step = next_step(found.conclusion.verdict, folder, out, Path(plant) if plant else None)
+        write_report(found, valve, out, log.name, _facts(log, campaign), step)
+    write_results(found, out, "", seconds=perf_counter() - began)
+    return found
+
+
+def _from_its_drive(valve: "LoggedValve", seed: int, cache: FitCache) -> Diagnosis:
+    """The diagnosis with the causes acting from the most probable drive on."""
+    valves = [valve.since(onset) for onset in range(len(valve.drives))]
+    caches = [cache, *(cache.named(f"from {drive}: ") for drive in valve.drives[1:])]
+    singles = [rank_hypotheses(v, c, most_causes=1) for v, c in zip(valves, caches, strict=True)]
+    chances = onset_probabilities(singles)
+    onset = int(np.argmax(chances))
+    found = diagnose(valves[onset], seed=seed, cache=caches[onset])
+    if onset == 0 or found.conclusion.verdict == NO_GAP:
+        return found
+    return replace(found, onset=(valve.drives[onset], float(chances[onset])))
+
+
+def onset_probabilities(rankings: Sequence[Ranking]) -> NDArray:
+    """Probability of each first drive, (drives,), by the misfit that its best single cause leaves.
+
+    The misfit counts in the variance that the best of all leaves, as in `posterior`.
+    """
+    best = [
+        next((each for each in ranking.hypotheses if len(each.labels) == 1), ranking.recalibrated)
+        for ranking in rankings
+    ]
+    noise = [[c.known_noise for c in ranking.problem.plant.channels] for ranking in rankings]
+    squares = np.array([each.squares for each in best]) * np.array(noise) ** 2
+    readings = np.array([d.readings for d in rankings[0].discrepancies])
+    least = squares[np.argmin(np.sum(np.log(squares), axis=1))]
+    misfits = (squares / least - 1.0) @ readings / 2.0 + [each.nuisance_penalty for each in best]
+    return softmax(-FIT_WEIGHT * np.log(misfits - np.min(misfits) + CHANCE_MISFIT))
+
+
+def _facts(log: Log, campaign: Campaign) -> dict[str, str]:
+    """What the report rests on, by name."""
+    return {
+        "Log": log.name,
+        "Openings": f"{len(campaign.recordings)} of {len(log.drives)} drives",
+        "Environment": campaign_facts(campaign)["Environment"],
+    }
+
+
+class LoggedValve(Valve):
+    """`GreyBox` for an operation log: causes act from a drive on, parameters from the first one."""
+
+    def __init__(
+        self,
+        campaign: Campaign,
+        plant: Plant,
+        steady: Collection[str],
+        without: Sequence[str] = (),
+        onset: int = 0,
+    ):
+        """campaign, steady: of `steady_openings`. onset: drives before causes act. See `Valve`."""
+        super().__init__(campaign, plant, without=without, offsets=CONSUMPTION)
+        self.campaign, self.steady, self.without = campaign, steady, without
+        for run in self.runs:
+            if run.name not in steady:  # p2 then follows from a consumption that nobody knows
+                run.trusted[OUTPUTS.index("p2")] = False
+        self.screened = tuple(_in_drive(finding, campaign) for finding in self.screened)
+        drives = list(dict.fromkeys(drive_of(r.name) for r in campaign.recordings))
+        self.drives = drives
+        self.acting = np.array([drives.index(drive_of(r.name)) >= onset for r in self.recordings])
+        kept = {p.symbol for p in self.parameters} | {t.symbol for t in self.tolerances}
+        self.late = {p.symbol for cause in self.causes for p in cause.parameters} - kept
+
+    def since(self, onset: int) -> "LoggedValve":
+        """The same with causes that act from drive number `onset` on, counted from 0."""
+        return LoggedValve(self.campaign, self.plant, self.steady, self.without, onset)
+
+    def outputs(self, values: Mapping[str, NDArray], runs: Sequence[int]) -> list[NDArray]:
+        """`GreyBox.outputs`: per run an array (3, samples, n) of OUTPUTS [Pa, Pa, A]."""
+        return super().outputs(self._since_onset(values), runs)
+
+    def _one(self, values: Mapping[str, NDArray], run: int) -> dict[str, float]:
+        return super()._one(self._since_onset(values), run)
+
+    def _since_onset(self, values: Mapping[str, NDArray]) -> dict[str, NDArray]:
+        """Values by symbol with those of causes (n, runs), nominal in drives before the onset."""
+        if np.all(self.acting):
+            return dict(values)
+        return {
+            s: np.where(self.acting, v[:, None] if np.ndim(v) == 1 else v, self.base[s])
+            if s in self.late
+            else v
+            for s, v in values.items()
+        }
+
+
+def _in_drive(finding: Finding, campaign: Campaign) -> Finding:
+    """The finding with the drive's file and samples instead of the opening's."""
+    opening = finding.file.removesuffix(".csv")
+    first = round(start_of(opening) / campaign.recordings[0].period)
+    samples = tuple(first + sample for sample in finding.samples)
+    return replace(finding, file=drive_of(opening), samples=samples)
+
+
+def steady_openings(log: Log, plant: Plant) -> tuple[Campaign, set[str]]:
+    """Openings of a log, and the names of those in which consumption is steady.
+
+    Raises CampaignError where there are too few openings.
+    """
+    campaign, steady = openings(log, plant.parameters)
+    valve = Valve(campaign, plant, offsets=CONSUMPTION)
+    misfits = dict(zip((run.name for run in valve.runs), _misfits(valve), strict=True))
+    for drive in log.drives:
+        own = {name for name in steady if drive_of(name) == drive.file}
+        usual = np.quantile([misfits[name] for name in own] or [0.0], 0.25)
+        steady -= {name for name in own if misfits[name] > CHANGED_CONSUMPTION * usual}
+    return evenly(campaign, steady), steady
+
+
+def _misfits(valve: Valve) -> NDArray:
+    """Misfit of p2 in each run beyond its start and consumption, root mean square [SI], (runs,)."""
+    n = len(valve.runs)
+    shifts = {each.symbol: np.zeros((3, n)) for each in CONSUMPTION}
+    for row, each in enumerate(CONSUMPTION, start=1):
+        shifts[each.symbol][row] = each.step
+    found = valve.outputs(shifts, range(n))
+    row, rest = OUTPUTS.index("p2"), np.zeros(n)
+    for run, output in enumerate(found):
+        model = output[row, :, 0]
+        basis = np.column_stack([output[row, :, 1:] - model[:, None], np.ones(len(model))])
+        error = valve.runs[run].measured[row] - model
+        rest[run] = np.std(error - basis @ np.linalg.lstsq(basis, error, rcond=None)[0])
+    return rest

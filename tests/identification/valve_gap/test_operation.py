@@ -1,0 +1,124 @@
+"""Operation logs: written by the environment, cut into openings, diagnosed with their onset."""
+
+import json
+import re
+from dataclasses import replace
+
+import gymnasium
+import numpy as np
+import pytest
+
+import epv_env  # noqa: F401 - registers the environments
+from controllers.policy import load_policy
+from epv_env.common.units import GRAM
+from epv_env.operation_log import OperationLog
+from epv_env.plant.plantfile import Plant
+from epv_env.signals import OptionError
+from identification.__main__ import main
+from identification.recordings.log_files import read_log
+from identification.recordings.openings import drive_of, openings, start_of
+from identification.recordings.recording import CampaignError
+from identification.valve_gap.operation import LoggedValve, steady_openings
+
+PLANT = Plant.calibrated()
+
+
+def drive(folder, effects=(), drives=2, seconds=6, scenario="service"):
+    """A log under the package's policy; effects: of each drive."""
+    make = {"scenario": scenario, "max_episode_steps": round(seconds / 0.005)}
+    env = OperationLog(gymnasium.make("EPValve-v0", **make), folder)
+    policy = load_policy()
+    for number in range(drives):
+        own = effects[number] if effects else {}
+        observation, _ = env.reset(seed=number, options={"effects": own})
+        policy.reset(1)
+        ended = False
+        while not ended:
+            action = policy.act(observation[None])[0]
+            observation, _, terminated, truncated, _ = env.step(int(action))
+            ended = terminated or truncated
+    env.close()
+    return folder
+
+
+@pytest.fixture(scope="module")
+def healthy(tmp_path_factory):
+    return drive(tmp_path_factory.mktemp("logs") / "valve", seconds=10)
+
+
+def test_a_log_holds_what_the_controller_read(healthy):
+    log = read_log(healthy)
+    assert [d.file for d in log.drives] == ["drive-1.csv", "drive-2.csv"]
+    first = log.drives[0]
+    assert len(first.coil) == 2000
+    assert set(np.unique(first.U)) == {0.0, 24.0}
+    # The readings at a switching are still those of the coil before it.
+    off = np.flatnonzero(np.diff(first.coil) < 0) + 1
+    assert np.all(first.I[off] > 0.3)
+    assert np.all(first.I[off[off + 2 < len(first.I)] + 2] < 0.1)
+
+
+def test_openings_begin_steady_and_know_the_leak(tmp_path):
+    env = OperationLog(gymnasium.make("EPValve-v0", scenario="none", p2_bar=8.0), tmp_path / "log")
+    env.reset(seed=1)
+    for k in range(1000):  # the piston hardly opens in 40 ms, and the circuit leaks nothing
+        env.step(int(k % 100 >= 8))
+    env.close()
+    campaign, steady = openings(read_log(tmp_path / "log"), PLANT.parameters)
+    assert steady == {recording.name for recording in campaign.recordings}
+    for recording in campaign.recordings:
+        assert np.ptp(recording.p3[:8]) < 1e4
+        assert recording.energised[0]
+        assert abs(recording.sigma_S[0]) < 0.2 * GRAM  # p2's noise over 0.1 s allows 0.05
+        assert drive_of(recording.name) == "drive-1.csv"
+        assert start_of(recording.name) > 0.0
+
+
+def test_a_cause_acts_from_its_drive_on(healthy):
+    log = read_log(healthy)
+    campaign, steady = steady_openings(log, PLANT)
+    whole = LoggedValve(campaign, PLANT, steady)
+    late = whole.since(1)
+    runs = range(len(whole.runs))
+    acting = {"G_eddy": np.array([0.004])}
+    none, every, second = (
+        plant.outputs(values, runs)
+        for plant, values in ((whole, {"G_eddy": np.zeros(1)}), (whole, acting), (late, acting))
+    )
+    for run, without, both, one in zip(whole.runs, none, every, second, strict=True):
+        np.testing.assert_array_equal(one, both if run.name.startswith("drive-2") else without)
+        assert np.any(both != without)
+
+
+@pytest.mark.slow
+def test_cause_and_onset_are_found(tmp_path):
+    eddy = {"eddy_current": {"G_eddy": 0.004}}
+    folder = drive(tmp_path / "log", [{}, eddy, eddy], drives=3, seconds=20, scenario="steps")
+    assert main(["gap", str(folder), "--logs", "--out", str(tmp_path / "out")]) == 0
+    content = json.loads((tmp_path / "out" / "gap.json").read_text())
+    assert content["causes"][0]["effects"] == ["eddy_current"]
+    assert content["onset"]["drive"] == "drive-2.csv"
+    assert content["onset"]["probability"] > 0.9
+
+
+def test_a_log_is_refused_in_a_sentence(healthy, tmp_path):
+    log = read_log(healthy)
+    few = replace(log, drives=(replace(log.drives[0], coil=np.ones(2000)),))
+    with pytest.raises(CampaignError, match="openings can be compared, too few"):
+        openings(few, PLANT.parameters)
+    with pytest.raises(OptionError, match="needs EPValve-v0"):
+        OperationLog(gymnasium.make("EPValvePWM-v0"), tmp_path / "pwm")
+    with pytest.raises(OptionError, match="holds files already"):
+        OperationLog(gymnasium.make("EPValve-v0"), healthy)
+    for change, told in [
+        (lambda text: text.replace(",target_bar", ",goal"), "target_bar stands 0 times"),
+        (lambda text: text.replace("0.005000,", "0.004000,", 1), "time"),
+        (lambda text: re.sub(r"\n0.000000,\d,", "\n0.000000,2,", text), "coil is 2"),
+    ]:
+        copy = tmp_path / "copy"
+        copy.mkdir(exist_ok=True)
+        for file in healthy.iterdir():
+            (copy / file.name).write_text(file.read_text())
+        (copy / "drive-1.csv").write_text(change((healthy / "drive-1.csv").read_text()))
+        with pytest.raises(CampaignError, match=told):
+            read_log(copy)
