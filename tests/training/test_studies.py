@@ -1,14 +1,21 @@
 """The studies of controllers in their short form: result files, pictures, and the page's tables."""
 
+from argparse import Namespace
+
 import pandas as pd
 import pytest
 
 pytest.importorskip("stable_baselines3")
 
+from controllers.tuned import tuned
 from docs.studies.common import PAGE
 from docs.studies.comparison import study as comparison
 from docs.studies.robustness import study as robustness
 from docs.studies.sim_to_real import study as sim_to_real
+from epv_env.plant.effects.registry import CATALOGUE
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.plantfile import Plant
+from epv_env.plant.region import Region
 
 pytestmark = [pytest.mark.training, pytest.mark.slow]
 
@@ -33,5 +40,29 @@ def test_the_sweep(tmp_path, monkeypatch):
 def test_the_loop(tmp_path):
     assert sim_to_real.main(["--quick", "--out", str(tmp_path)]) == 0
     text = (tmp_path / PAGE).read_text(encoding="utf-8")
-    assert "Withheld: pressure_sensor_lag" in text
-    assert "| PPO | after |" in text
+    assert "| piston friction | known: piston friction 1.00 | " in text
+    assert len(pd.read_csv(tmp_path / "results.csv")) == len(sim_to_real.ARMS)
+    assert sim_to_real.main(["--quick", "--out", str(tmp_path)]) == 0  # from the journal alone
+
+
+def test_an_uneven_lag_without_unevenness_is_the_environment_s_own():
+    case = sim_to_real.Case(name="even", sizes={"tau_p2": 0.02})
+    options = Namespace(episodes=4, duration=1.0)
+    valve = Parameters.calibrated().replace(**case.sizes)
+    true = Plant(parameters=valve, region=Region(centre=valve))
+    policy = tuned("pulse, adaptive")
+    alone = sim_to_real.measured(policy, case, true, options)
+    even, uneven = (sim_to_real.UnevenLag(policy, share) for share in (0.0, 0.5))
+    assert sim_to_real.measured(even, case, true, options) == alone
+    assert sim_to_real.measured(uneven, case, true, options) != alone
+
+
+def test_plain_randomisation_draws_one_or_two_effects_of_the_whole_catalogue():
+    nominal = Parameters.calibrated()
+    changed = [
+        {symbol for symbol, value in each.region.centre.items() if value != nominal[symbol]}
+        for each in sim_to_real.whole_catalogue().alternatives
+    ]
+    counts = [sum(bool(symbols & set(own)) for own in CATALOGUE.values()) for symbols in changed]
+    assert set(counts) == {1, 2}
+    assert all(set().union(*changed) & set(own) for own in CATALOGUE.values())

@@ -11,6 +11,7 @@ import epv_env  # noqa: F401 - registers the ids
 from controllers.knowledge import LearntObservation
 from epv_env.conditions import Conditions
 from epv_env.plant.plantfile import Plant
+from epv_env.plant.region import Mixture, Region
 from epv_env.reward import RewardWeights
 from epv_env.sb3 import SB3VectorEnv
 
@@ -57,7 +58,7 @@ def make_training_env(
     plant: Plant,
     num_envs: int = NUM_ENVS,
     scenario: str = "mixed",
-    parameters: str = "sensitive_ten_percent",
+    parameters: str | Region | Mixture = "sensitive_ten_percent",
     weights: RewardWeights,
 ) -> VecEnv:
     """Episodes on drawn plants, the learnt quantities among the observations, the rules in front.
@@ -66,7 +67,7 @@ def make_training_env(
         plant: centre of the region.
         num_envs: episodes side by side.
         scenario: of the consumption.
-        parameters: region that plants are drawn from.
+        parameters: region that plants are drawn from, or its name.
         weights: prices of the reward.
     """
     lengths = range(SHORTEST, LONGEST + 1, ROLLOUT)

@@ -21,6 +21,7 @@ from epv_env.actions import OnOff
 from epv_env.common.files import write_text
 from epv_env.conditions import Conditions
 from epv_env.plant.plantfile import Plant
+from epv_env.plant.region import Mixture, Region
 from epv_env.reward import RewardWeights
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.rollout import run_episodes
@@ -95,8 +96,8 @@ class Task:
     """Centre of the region."""
     scenario: str = "mixed"
     """Of the consumption."""
-    parameters: str = "sensitive_ten_percent"
-    """Region that plants are drawn from."""
+    parameters: str | Region | Mixture = "sensitive_ten_percent"
+    """Region that plants are drawn from, or its name."""
     weights: RewardWeights = field(default_factory=RewardWeights)
     """Prices of the reward; some are raised for the training."""
 
