@@ -201,14 +201,15 @@ def trained(
     }[arm]
     if arm == DISTRIBUTION and is_certain(corrected):
         where = folder / SINGLE  # the same plants: the same training
-    if not holds_policy(where / f"seed {seed}"):
+    where /= f"seed {seed}, {options.timesteps} steps"
+    if not holds_policy(where):
         weights = RewardWeights(switching=SWITCHING_PRICE)
         task = Task(plant=plant, scenario=SCENARIO, parameters=parameters, weights=weights)
         train(
-            task, where / f"seed {seed}", seed=seed, timesteps=options.timesteps, resume=True,
+            task, where, seed=seed, timesteps=options.timesteps, resume=True,
             validation_episodes=VALIDATION_EPISODES, validation_duration=options.duration,
         )  # fmt: skip
-    return load_policy(where / f"seed {seed}", plant)
+    return load_policy(where, plant)
 
 
 def is_certain(plant: Plant) -> bool:
