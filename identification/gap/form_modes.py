@@ -148,7 +148,8 @@ def _modulated(
         every = [course[term] for course in courses]
         sizes = _standard_sizes(every)
         rates = [np.gradient(e, period) for e, period in zip(every, periods, strict=True)]
-        time = np.sqrt(_mean_square(every) / max(_mean_square(rates), np.finfo(float).tiny))
+        whole = _mean_square(every)
+        time = np.sqrt(whole / max(_mean_square(rates), np.finfo(float).tiny * whole))  # finite: rates 0
         for own, e, size, rate in zip(found, every, sizes, rates, strict=True):
             alone = [e if term == name else np.zeros_like(e) for name in several]
             own[term] = FORM_SD * np.stack([size * e, -time * rate, *alone], axis=1)
