@@ -62,7 +62,6 @@ def test_a_restart_makes_the_controller_forget_once_at_its_time():
 def test_batches_hold_the_episodes_of_one_run(monkeypatch):
     monkeypatch.setattr(batches, "BATCH_EPISODES", 2)
     options = {"plant": PLANT, "scenario": "steps"}
-    plants = [{"V2": v} for v in (8e-4, 9e-4, 1e-3, 1.1e-3, 1.2e-3)]
     whole = Batch(
         name="w",
         controller="good",
@@ -70,14 +69,13 @@ def test_batches_hold_the_episodes_of_one_run(monkeypatch):
         episodes=5,
         duration=0.8,
         options=options,
-        plants=plants,
     )
     parts = in_batches(5, whole)
     assert [part.episodes for part in parts] == [2, 2, 1]
     found = run_batches([*parts, whole], {"good": GOOD}, what="test")
     joined = np.concatenate([found[part.name].excursion_bar for part in parts])
     np.testing.assert_array_equal(joined, found["w"].excursion_bar)
-    alone, _ = run_episodes(GOOD, seeds=[7], duration=0.8, options={**options, "parameters": plants[2]})
+    alone, _ = run_episodes(GOOD, seeds=[7], duration=0.8, options=options)
     assert joined[2] == alone.excursion_bar[0]
 
 

@@ -8,22 +8,18 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
 
 pytest.importorskip("joblib")
 from epv_env.common.commands import main_of
 from epv_env.plant.effects.registry import CATALOGUE
-from epv_env.plant.parameters import Parameters, sensitive_symbols, table
+from epv_env.plant.parameters import table
 from epv_env.plant.plantfile import Plant
-from epv_env.plant.region import CALIBRATED_SYMBOLS, Region
 from epv_env.settings import make_settings
 from training.studies.sweep_designs import (
     ONE_AT_A_TIME,
     chosen_points,
-    hypercube,
-    latin_hypercube,
     parameters,
     regions,
 )
@@ -34,35 +30,13 @@ pytestmark = pytest.mark.training
 PLANT = Plant.calibrated()
 ROOT = Path(__file__).parents[2]
 SHORT = (
-    "--designs", "conditions", "hypercube", "--factors", "sensor noise", "control period",
-    "--episodes", 3, "--joint-episodes", 8, "--duration", 0.55,
+    "--designs", "conditions", "--factors", "sensor noise", "control period",
+    "--episodes", 3, "--duration", 0.55,
     "--controllers", "hysteresis, extrapolating",
 )  # fmt: skip
 """A sweep of a few seconds."""
-BATCHES = 4 + 4 + 1
-"""Levels of both factors, and the hypercube of SHORT."""
-
-
-def test_a_latin_hypercube_has_one_plant_in_every_slice_of_every_range():
-    plants = hypercube(PLANT, 64, seed=3).parameters or []
-    boxes = Region.named("sensitive_ten_percent", PLANT.parameters).boxes
-    assert set(boxes) == set(sensitive_symbols()) == set(plants[0])
-    for symbol, (low, high) in boxes.items():
-        place = (np.array([plant[symbol] for plant in plants]) - low) / (high - low) * 64
-        assert sorted(np.floor(place).astype(int)) == list(range(64))
-
-
-def test_an_ellipsoid_is_filled_and_not_left():
-    """Thin, as identification leaves it."""
-    p = Parameters.calibrated()
-    deviation = 0.01 * np.array([p[s] for s in CALIBRATED_SYMBOLS])
-    covariance = (np.full((4, 4), 0.95) + 0.05 * np.eye(4)) * np.outer(deviation, deviation)
-    region = Region(centre=p, symbols=CALIBRATED_SYMBOLS, covariance=covariance, chi_square=9.49)
-    points = np.array([list(plant.values()) for plant in latin_hypercube(region, 500, 1)])
-    offset = points - [p[s] for s in CALIBRATED_SYMBOLS]
-    distance = np.sum(offset @ np.linalg.inv(covariance) * offset, axis=1)
-    assert 0.9 * 9.49 < distance.max() <= 9.49 * (1 + 1e-9)
-    assert distance.min() < 0.1 * 9.49
+BATCHES = 4 + 4
+"""Levels of both factors of SHORT."""
 
 
 def test_every_point_is_one_that_the_environment_takes():
@@ -79,7 +53,7 @@ def test_the_parameters_are_those_of_tables_6_and_7_and_the_environment():
 
 
 def test_only_named_factors_are_changed_and_regions_stay():
-    points = chosen_points(PLANT, ["regions", "parameters"], ["R"], 8, seed=0)
+    points = chosen_points(PLANT, ["regions", "parameters"], ["R"])
     assert {point.factor for point in points} == {"region", "R"}
     assert len(points) == len(list(regions(PLANT))) + 4
 
@@ -137,7 +111,7 @@ def test_two_workers_and_a_killed_sweep_give_the_same_to_the_bit(tmp_path):
     after = finished(out)
     assert after[: len(before)] == before  # nothing was lost
     assert len(after) == len(set(after)) == BATCHES  # nor done twice
-    for name in ("results.json", "points.csv", "hypercube.csv"):
+    for name in ("results.json", "points.csv"):
         assert (out / name).read_bytes() == (tmp_path / "alone" / name).read_bytes()
     assert (out / "robustness-conditions.png").exists()
 

@@ -29,10 +29,8 @@ from training.studies.sweep_designs import DESIGNS, Point, chosen_points
 from training.studies.sweep_report import (
     harmful_changes,
     point_table,
-    rank_table,
     region_table,
     share_figure,
-    strongest_parameters,
 )
 
 DEFAULT = ("hysteresis, extrapolating", "pulse, adaptive", "PWM")
@@ -62,9 +60,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--episodes", type=COUNT, default=128, help="at each point that changes one thing"
     )
-    parser.add_argument(
-        "--joint-episodes", type=COUNT, default=4096, help="at each region, and in the hypercube"
-    )
+    parser.add_argument("--joint-episodes", type=COUNT, default=4096, help="at each region")
     parser.add_argument("--scenario", default="mixed", help="consumption, where it is not what changes")
     add_episodes(parser)
 
@@ -78,7 +74,7 @@ def run(options: argparse.Namespace) -> None:
     check_scenario(options.scenario)
     plant = load_plant(options.plant)
     controllers, digests = named_controllers(options.controllers, plant)
-    points = chosen_points(plant, options.designs, options.factors, options.joint_episodes, options.seed)
+    points = chosen_points(plant, options.designs, options.factors)
     cells = [(point, label) for point in points for label in controllers]
     batches = [_batches(point, label, digests[label], plant, options) for point, label in cells]
     subject = {
@@ -86,7 +82,6 @@ def run(options: argparse.Namespace) -> None:
         "plant": {"parameters": dict(plant.parameters), "region": repr(plant.region)},
         "scenario": options.scenario,
         "duration": options.duration,
-        "hypercube": [options.joint_episodes, options.seed],
     }
     found = run_batches(
         [batch for each in batches for batch in each], controllers,
@@ -95,7 +90,7 @@ def run(options: argparse.Namespace) -> None:
     )  # fmt: skip
     metrics = [EpisodeMetrics.joined([found[batch.name] for batch in each]) for each in batches]
     table = point_table(cells, metrics, SWEEP_SEED + options.seed)
-    write_results(options, table, rank_table(cells, metrics), {**subject, "controllers": digests})
+    write_results(options, table, {**subject, "controllers": digests})
     print(f"\nresults in {options.out}")
 
 
@@ -114,9 +109,8 @@ def _batches(
     point: Point, label: str, digest: str, plant: Plant, options: argparse.Namespace
 ) -> list[Batch]:
     """A point's episodes under one controller."""
-    joint = point.design in ("regions", "hypercube")
     return in_batches(
-        options.joint_episodes if joint else options.episodes,
+        options.joint_episodes if point.design == "regions" else options.episodes,
         Batch(
             name=f"{point.design}, {point.factor}, {point.level}, {label} {digest}",
             controller=label,
@@ -124,22 +118,17 @@ def _batches(
             episodes=0,
             duration=options.duration,
             options={"plant": plant, "scenario": options.scenario, **point.options},
-            plants=point.parameters,
         ),
     )
 
 
-def write_results(
-    options: argparse.Namespace, points: pd.DataFrame, ranks: pd.DataFrame, settings: dict[str, Any]
-) -> None:
-    """Write points.csv, hypercube.csv, results.json and the pictures; print the tables."""
-    for name, table in {"points": points, "hypercube": ranks}.items():
-        if len(table):
-            write_text(options.out / f"{name}.csv", table.to_csv(index=False))
-    content = {"points": points.to_dict("records"), "hypercube": ranks.to_dict("records")}
-    write_json(options.out / "results.json", {"format": "epv-sweep/2", "settings": settings, **content})
+def write_results(options: argparse.Namespace, points: pd.DataFrame, settings: dict[str, Any]) -> None:
+    """Write points.csv, results.json and the pictures; print the tables."""
+    write_text(options.out / "points.csv", points.to_csv(index=False))
+    content = {"format": "epv-sweep/3", "settings": settings, "points": points.to_dict("records")}
+    write_json(options.out / "results.json", content)
     for name, designs in FIGURES.items():
         if set(designs) & set(points["design"]):
             save_figure(share_figure(points, designs), options.out / f"{name}.png")
-    texts = (region_table(points), harmful_changes(points), strongest_parameters(ranks))
+    texts = (region_table(points), harmful_changes(points))
     print("\n\n".join(text.to_string(index=False) for text in texts if len(text)))

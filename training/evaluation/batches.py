@@ -39,8 +39,6 @@ class Batch:
     """Of an episode [s]."""
     options: Mapping[str, Any] = field(default_factory=dict)
     """Of the environment."""
-    plants: Sequence[dict[str, float]] | None = None
-    """Parameters of each episode's plant [SI]; None: as the options say."""
     restart_s: float | None = None
     """When the control unit restarts [s]; None: never."""
 
@@ -50,10 +48,9 @@ def in_batches(episodes: int, whole: Batch) -> list[Batch]:
     parts = []
     for begin in range(0, episodes, BATCH_EPISODES):
         count = min(BATCH_EPISODES, episodes - begin)
-        plants = None if whole.plants is None else whole.plants[begin : begin + count]
         first = whole.first_seed + begin
         name = f"{whole.name}, seeds {first} to {first + count - 1}"
-        parts.append(replace(whole, name=name, first_seed=first, episodes=count, plants=plants))
+        parts.append(replace(whole, name=name, first_seed=first, episodes=count))
     return parts
 
 
@@ -108,7 +105,6 @@ def _run(batch: Batch, controller: Controller) -> tuple[str, dict[str, list[Any]
             seeds=seeds,
             duration=batch.duration,
             options={"threads": 1, **batch.options},
-            each=None if batch.plants is None else {"parameters": list(batch.plants)},
             restart_s=batch.restart_s,
         )
     return batch.name, {name: np.asarray(v).tolist() for name, v in asdict(metrics).items()}

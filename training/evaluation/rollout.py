@@ -56,7 +56,6 @@ def begin_episodes(
     env: EPValveVectorEnv | EPValvePWMVectorEnv,
     controller: Controller,
     seeds: list[int],
-    each: dict[str, list[Any]] | None = None,
 ) -> NDArray:
     """Start an episode for each seed under the controller; returns the first observations (n, entries).
 
@@ -66,9 +65,8 @@ def begin_episodes(
         env: of n valves.
         controller: is reset.
         seeds: n of them.
-        each: options of the reset, lists with one value for each episode.
     """
-    observation, _ = env.reset(seed=list(seeds), options=each)
+    observation, _ = env.reset(seed=list(seeds))
     controller.reset(len(seeds))
     if isinstance(controller, Privileged):
         controller.watch(env.task)
@@ -81,7 +79,6 @@ def run_episodes(
     seeds: list[int],
     duration: float,
     options: dict[str, Any],
-    each: dict[str, list[Any]] | None = None,
     restart_s: float | None = None,
     trace_of: int | None = None,
     progress: Callable[[float], None] = lambda share: None,
@@ -96,14 +93,13 @@ def run_episodes(
         seeds: of the episodes.
         duration: of each episode [s].
         options: of the environment.
-        each: options of its reset, lists with one value for each episode.
         restart_s: when the control unit restarts, so that the controller forgets everything, and the
             plant goes on [s]; a privileged controller remembers. None: never.
         trace_of: index of an episode to record; None: none.
         progress: called with the share done [1].
     """
     env = make_env(controller, len(seeds), **options)
-    observation = begin_episodes(env, controller, seeds, each)
+    observation = begin_episodes(env, controller, seeds)
     energy_before = env.task.valves.state.coil_energy.copy()
     energy = energy_before.copy()
     period = env.settings.control_period

@@ -1,26 +1,18 @@
-"""The conditions of a sweep: one thing changed at a time, regions, and a Latin hypercube."""
+"""The conditions of a sweep: one thing changed at a time, and regions."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-from scipy.stats import qmc
-
 from epv_env.plant.consumption import SCENARIOS
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import table
 from epv_env.plant.plantfile import Plant
-from epv_env.plant.region import Region
 from identification.sensitivity.one_at_a_time import changed_values
 from training.evaluation.scenarios import effect_levels
 
 JOINT = ("exact", "confidence", "ten_percent", "sensitive_ten_percent")
 """Regions from which every episode draws a plant of its own."""
-
-SAMPLED = "sensitive_ten_percent"
-"""Region of the Latin hypercube."""
 
 MS = 1e-3
 
@@ -47,8 +39,6 @@ class Point:
     """How far, in words."""
     options: dict[str, Any] = field(default_factory=dict)
     """Of the environment."""
-    parameters: list[dict[str, float]] | None = None
-    """A plant for each episode, where the options do not say which."""
 
 
 def regions(plant: Plant) -> Iterator[Point]:
@@ -100,35 +90,6 @@ def conditions(plant: Plant) -> Iterator[Point]:
         )  # fmt: skip
 
 
-def hypercube(plant: Plant, points: int, seed: int) -> Point:
-    """A Latin hypercube over SAMPLED, one plant for each episode."""
-    plants = latin_hypercube(Region.named(SAMPLED, plant.parameters), points, seed)
-    return Point(design="hypercube", factor=SAMPLED, level="Latin hypercube", parameters=plants)
-
-
-def latin_hypercube(region: Region, points: int, seed: int) -> list[dict[str, float]]:
-    """Plants of a region by symbol [SI]: each symbol's range is cut into slices of one plant each.
-
-    The coordinates of the region's ellipsoid are a cube that is drawn in to the ball along its rays.
-    """
-    symbols = (*region.boxes, *region.symbols)
-    coordinates = qmc.LatinHypercube(len(symbols), rng=seed).random(points)
-    boxes = len(region.boxes)
-    ends = np.array(list(region.boxes.values())).reshape(-1, 2)
-    boxed = ends[:, 0] + coordinates[:, :boxes] * np.ptp(ends, axis=1)
-    values = np.hstack([boxed, region.joint(_ball(2 * coordinates[:, boxes:] - 1))])
-    domains = [region.centre.domain(symbol) for symbol in symbols]
-    inside = np.clip(values, *np.array(domains).T)  # rounding may step over an end
-    return [dict(zip(symbols, row, strict=True)) for row in inside.tolist()]
-
-
-def _ball(cube: NDArray) -> NDArray:
-    """Points of the unit ball (points, k): those of the cube from -1 to 1, drawn in along their rays."""
-    length = np.linalg.norm(cube, axis=1, keepdims=True)
-    furthest = np.max(np.abs(cube), axis=1, keepdims=True, initial=0.0)
-    return cube * furthest / np.where(length > 0, length, 1.0)
-
-
 def _changed_plant(design: str, factor: str, level: str, values: dict[str, float]) -> Point:
     """The plant with some values changed."""
     return Point(design=design, factor=factor, level=level, options={"parameters": values})
@@ -141,21 +102,17 @@ ONE_AT_A_TIME: dict[str, Callable[[Plant], Iterator[Point]]] = {
 }
 """Designs that change one thing at a time, by name."""
 
-DESIGNS = ("regions", *ONE_AT_A_TIME, "hypercube")
+DESIGNS = ("regions", *ONE_AT_A_TIME)
 """All designs."""
 
 
-def chosen_points(
-    plant: Plant, designs: Sequence[str], factors: Sequence[str], joint_episodes: int, seed: int
-) -> list[Point]:
+def chosen_points(plant: Plant, designs: Sequence[str], factors: Sequence[str]) -> list[Point]:
     """The points of some designs.
 
     Args:
         plant: that is changed.
         designs: some of DESIGNS.
         factors: only these, where a design changes one thing; none: all.
-        joint_episodes: plants of the Latin hypercube.
-        seed: of the hypercube.
 
     Raises:
         ValueError: none of the designs changes a factor.
@@ -169,7 +126,4 @@ def chosen_points(
             f"among {', '.join(known) or 'none'}"
         )
     points = list(regions(plant)) if "regions" in designs else []
-    points += [point for point in single if not factors or point.factor in factors]
-    if "hypercube" in designs:
-        points.append(hypercube(plant, joint_episodes, seed))
-    return points
+    return points + [point for point in single if not factors or point.factor in factors]

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from scipy.stats import spearmanr
 
 from training.evaluation.metrics import EpisodeMetrics, summary, violation_interval
 from training.evaluation.plots import COLOURS, in_words, plt
@@ -14,9 +13,6 @@ from training.studies.sweep_designs import ONE_AT_A_TIME, Point
 
 NAMED_LEVELS = 3
 """Changes that are named for each controller and design: more would not fit a table's cell."""
-
-NAMED_PARAMETERS = 4
-"""Parameters of the Latin hypercube that are named for each controller."""
 
 RANGE_ENDS = ("least", "greatest", "top")
 """Levels at the ends of a range, beyond what a sound valve has; they are counted apart."""
@@ -61,27 +57,6 @@ def point_table(
     return pd.DataFrame(table)
 
 
-def rank_table(cells: Sequence[Cell], metrics: Sequence[EpisodeMetrics]) -> pd.DataFrame:
-    """Spearman's rank correlation of each parameter with the excursion, over a Latin hypercube.
-
-    Columns: controller, symbol, rank_correlation, p_value (of no association).
-    """
-    table = []
-    for (point, controller), each in zip(cells, metrics, strict=True):
-        if point.parameters is None:
-            continue
-        plants = pd.DataFrame(point.parameters)
-        for symbol in plants:
-            found: Any = spearmanr(plants[symbol], each.excursion_bar)
-            table.append(
-                {
-                    "controller": controller, "symbol": symbol,
-                    "rank_correlation": float(found.statistic), "p_value": float(found.pvalue),
-                }
-            )  # fmt: skip
-    return pd.DataFrame(table)
-
-
 def share_text(row: Mapping[str, Any]) -> str:
     """Share that leaves with its exact interval, in %; row: of `point_table`."""
     low, value, high = (100 * row[name] for name in ("left_low", "left", "left_high"))
@@ -89,8 +64,8 @@ def share_text(row: Mapping[str, Any]) -> str:
 
 
 def region_table(points: pd.DataFrame) -> pd.DataFrame:
-    """The regions and the Latin hypercube under each controller, with headings."""
-    some: Any = points[points["design"].isin(["regions", "hypercube"])]
+    """The regions under each controller, with headings."""
+    some: Any = points[points["design"] == "regions"]
     shown = some.assign(
         left_text=[share_text(row) for row in some.to_dict("records")], level=some["level"].map(in_words)
     )
@@ -126,19 +101,6 @@ def harmful_changes(points: pd.DataFrame) -> pd.DataFrame:
                         "tried": len(some), "hurt": len(hurt), "most [% leave]": "; ".join(named) or "–",
                     }
                 )  # fmt: skip
-    return pd.DataFrame(table)
-
-
-def strongest_parameters(ranks: pd.DataFrame) -> pd.DataFrame:
-    """The parameters that the excursion goes with most, for each controller."""
-    table = []
-    for controller, mine in ranks.groupby("controller", sort=False) if len(ranks) else ():
-        order = mine.sort_values("rank_correlation", key=abs, ascending=False)
-        named = [
-            f"{row['symbol']} {row['rank_correlation']:+.2f}"
-            for row in order.head(NAMED_PARAMETERS).to_dict("records")
-        ]
-        table.append({"controller": controller, "excursion goes with": ", ".join(named)})
     return pd.DataFrame(table)
 
 
