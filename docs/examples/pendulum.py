@@ -66,7 +66,6 @@ def pendulum(folder: Path) -> OdePlant:
     """The plant with the recording in a folder: two thirds are fitted, the last third is held out."""
     runs, angle, speed = recordings(folder)
     return OdePlant(
-        mode="compiled",
         runs=runs,
         channels=[Channel(name="angle", unit="rad", scale=1.0, noise=NOISE)],
         states=("angle", "speed", "read"),

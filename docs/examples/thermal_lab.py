@@ -76,7 +76,6 @@ def thermal_lab(folder: Path) -> OdePlant:
     runs = recordings(folder)
     ambient = float(np.mean(runs[0].measured[:, :REST]))
     return OdePlant(
-        mode="compiled",
         runs=runs,
         channels=[Channel(name=name, unit="°C", scale=1.0, noise=0.12) for name in ("T1", "T2")],
         states=("T1", "T2", "C1", "C2"),

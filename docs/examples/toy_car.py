@@ -61,7 +61,6 @@ def start(run: Run, p: Any) -> Sequence[Any]:
 def toy_car(folder: Path) -> OdePlant:
     """The plant with the recordings in a folder; every other one is held out."""
     return OdePlant(
-        mode="compiled",
         runs=recordings(folder),
         channels=[Channel(name="v", unit="m/s", scale=1.0, noise=QUANTUM / 12**0.5)],
         states=("v", "drive"),

@@ -177,7 +177,6 @@ def _model(plant: str) -> OdePlant:
         forcing_steps={state: step for state, (_, step) in system.states.items() if step},
         delays={"command": "delay"},
         steps_per_sample=system.steps,
-        mode="compiled",
     )
 
 

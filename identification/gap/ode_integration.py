@@ -17,7 +17,7 @@ import numpy as np
 from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
-from identification.gap.runge_kutta import advancing, together_step, workspace
+from identification.gap.runge_kutta import advancing, workspace
 
 STEP_ERROR = 0.05
 """Largest change of a reading by halving the sub-steps [noise deviations]: far below what the readings
@@ -57,8 +57,8 @@ class Records:
     def flat(self, function: Callable, count: int) -> Callable:
         """A function (x, t, u, p, out) of arrays that writes `count` results into `out`.
 
-        The arrays' first axes are states, inputs, symbols and results; a second axis of candidates may
-        follow. The text is generated, as numba needs every field written out.
+        The arrays' axes are states, inputs, symbols and results. The text is generated, as numba needs
+        every field written out.
         """
         x = ", ".join(f"x[{i}]" for i in range(len(self.states)))
         u = ", ".join(["t", *(f"u[{i}]" for i in range(len(self.inputs)))])
@@ -94,16 +94,6 @@ def delayed_mean(total: NDArray, since: float, length: float) -> float:
     for i in range(2):
         k = min(max(int(np.floor(ends[i])), 0), len(total) - 2)
         values[i] = total[k] + (ends[i] - k) * (total[k + 1] - total[k])
-    return (values[1] - values[0]) / length
-
-
-def delayed_means(total: NDArray, since: NDArray, length: float) -> NDArray:
-    """The same for n inputs at once, (n,); total: (samples + 1, n). since: (n,)."""
-    lanes = np.arange(total.shape[1])
-    values = []
-    for end in (since, since + length):
-        k = np.clip(np.floor(end).astype(int), 0, len(total) - 2)
-        values.append(total[k, lanes] + (end - k) * (total[k + 1, lanes] - total[k, lanes]))
     return (values[1] - values[0]) / length
 
 
@@ -189,103 +179,7 @@ def alone(advance: Callable, read: Callable, channels: int, wrap: Callable) -> S
     return lambda jobs: [simulate(job) for job in jobs]
 
 
-def together(
-    rate: Callable, read: Callable, thresholds: Callable, counts: tuple[int, int], advance: Callable
-) -> Simulation:
-    """A simulation of all candidates at once; one that is near a threshold advances by itself.
-
-    Args:
-        rate: of the states, as `Records.flat` makes it.
-        read: readings, as `Records.flat` makes them.
-        thresholds: as `Records.flat` makes them.
-        counts: numbers of readings and of thresholds.
-        advance: of `advancing`, not compiled.
-    """
-    channels, count = counts
-
-    def stepped(x: NDArray, t: float, h: float, u: NDArray, p: NDArray, push: NDArray) -> NDArray:
-        end, stages = together_step(rate, x, t, h, u, p, push)
-        if count:
-            before, *after = (
-                thresholds(y, t, u, p, np.empty((count, x.shape[1]))) for y in (x, *stages, end)
-            )
-            near = np.any(before == 0.0, axis=0) | np.any(before * np.array(after) < 0.0, axis=(0, 1))
-            for c in np.flatnonzero(near):
-                own = x[:, c].copy()
-                advance(own, t, h, u[:, c], p[:, c], push[:, c], workspace(len(own)))
-                end[:, c] = own
-        return end
-
-    def simulate(jobs: Sequence[Job]) -> list[tuple[NDArray, NDArray]]:
-        bundle = _Bundle(jobs)
-        x, p, size = bundle.start, bundle.parameters, bundle.period / bundle.steps
-        states, readings = (np.empty((bundle.samples, rows, x.shape[1])) for rows in (len(x), channels))
-        for k in range(bundle.samples):
-            push = bundle.push[k] if k < len(bundle.push) else 0.0 * x
-            for s in range(bundle.steps):
-                begin = k + s / bundle.steps
-                u = bundle.inputs(k, begin)
-                if s == 0:
-                    states[k] = x
-                    read(x, k * bundle.period, u, p, readings[k])
-                x = stepped(x, begin * bundle.period, size, u, p, push)
-        readings[~np.isfinite(readings)] = np.nan
-        return bundle.taken_apart(readings, states)
-
-    def simulate_all(jobs: Sequence[Job]) -> list[tuple[NDArray, NDArray]]:
-        alike: dict[tuple[float, int], list[int]] = {}
-        for i, job in enumerate(jobs):
-            alike.setdefault((job.period, job.steps), []).append(i)
-        done = {}
-        for members in alike.values():
-            done |= dict(zip(members, simulate([jobs[i] for i in members]), strict=True))
-        return [done[i] for i in range(len(jobs))]
-
-    return simulate_all
-
-
-class _Bundle:
-    """Runs with the same sampling period as one simulation; the shorter ones are continued."""
-
-    def __init__(self, jobs: Sequence[Job]):
-        self.jobs, self.period, self.steps = jobs, jobs[0].period, jobs[0].steps
-        self.start, self.parameters, self.delays = (
-            np.concatenate([getattr(job, name) for job in jobs], axis=1)
-            for name in ("start", "parameters", "delays")
-        )
-        longest = max(len(job.push) for job in jobs)
-        self.push = np.concatenate(
-            [np.pad(j.push, ((0, longest - len(j.push)), (0, 0), (0, 0))) for j in jobs], axis=-1
-        )
-        self.samples = max(len(job.inputs) for job in jobs)
-        self.signals = np.stack(
-            [np.pad(j.inputs, ((0, self.samples - len(j.inputs)), (0, 0)), mode="edge") for j in jobs],
-            axis=-1,
-        )
-        self.totals = totals(self.signals)
-        self.run = np.repeat(np.arange(len(jobs)), [job.start.shape[1] for job in jobs])
-        self.delayed = np.flatnonzero(np.any(self.delays, axis=1))
-
-    def inputs(self, k: int, begin: float) -> NDArray:
-        """Inputs of a sub-step that begins in the period k, at `begin` periods, (inputs, n)."""
-        held = self.signals[k][:, self.run]
-        for i in self.delayed:
-            since = begin - self.delays[i] / self.period
-            own = self.totals[:, i, self.run]
-            held[i] = np.where(self.delays[i], delayed_means(own, since, 1.0 / self.steps), held[i])
-        return held
-
-    def taken_apart(self, readings: NDArray, states: NDArray) -> list[tuple[NDArray, NDArray]]:
-        """Readings and states of each run, from (samples, channels or states, all candidates)."""
-        parts = []
-        for i, job in enumerate(self.jobs):
-            own = (y[: len(job.inputs)][..., self.run == i] for y in (readings, states))
-            read, passed = (np.swapaxes(y, 0, 1) for y in own)
-            parts.append((read, passed))
-        return parts
-
-
-MODES = ("numpy", "python", "compiled")
+MODES = ("compiled", "python")
 
 
 def simulator(records: Records, functions: Sequence[tuple[Callable, int]], mode: str) -> Simulation:
@@ -305,30 +199,21 @@ def simulator(records: Records, functions: Sequence[tuple[Callable, int]], mode:
     rate, read, thresholds = (own(records.flat(own(f), results)) for f, results in functions)
     channels, count = functions[1][1], functions[2][1]
     advance = advancing(rate, thresholds, count, own)
-    if mode == "numpy":
-        return _explained(together(rate, read, thresholds, (channels, count), advance))
     return _explained(alone(advance, read, channels, own))
 
 
 def _explained(simulation: Simulation) -> Simulation:
-    """The simulation; where functions do not suit the mode, the error says what to do."""
+    """The simulation; where numba refuses a function, the error says what to do."""
 
     def simulate(jobs: Sequence[Job]):
         try:
             return simulation(jobs)
-        except ValueError as error:
-            if "truth value" not in str(error):
-                raise
-            raise ValueError(
-                "rate, readings or thresholds branch on a value, which is an array of all candidates "
-                "here: use np.where, or choose mode='compiled'"
-            ) from error
         except NumbaError as error:
             lines = [line for line in str(error).splitlines() if "File" not in line and line.strip()]
             reason = next((line for line in lines if "Failed in" not in line), lines[0])
             raise ValueError(
                 f"rate, readings or thresholds cannot be compiled by numba ({reason}): let them use "
-                "numbers, numpy and functions under numba.njit only, or choose mode='numpy'"
+                "numbers, numpy and functions under numba.njit only, or choose mode='python'"
             ) from error
 
     return simulate

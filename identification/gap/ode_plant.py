@@ -49,7 +49,7 @@ class OdePlant:
         thresholds: Callable[[Any, Any, Any], Sequence[Any]] | None = None,
         delays: Mapping[str, str] | None = None,
         steps_per_sample: int | None = None,
-        mode: str = "numpy",
+        mode: str = "compiled",
     ):
         """Describe the plant.
 
@@ -74,9 +74,8 @@ class OdePlant:
             delays: by input the symbol [s] by which it acts late.
             steps_per_sample: Runge-Kutta steps in a sampling period; None: halved until readings at
                 the nominal values and at all trials settle.
-            mode: "numpy": rate, readings, start and thresholds take arrays, one value per candidate.
-                "python": they take numbers, slowly. "compiled": numba compiles all but `start`, which
-                takes numbers; it is the fastest, after some seconds.
+            mode: "compiled": numba compiles all functions but `start` and `regimes`, in some seconds.
+                "python": they run as they are, slowly.
 
         Raises:
             ValueError: for names, numbers of results, inputs or a mode that do not fit, and for a model
@@ -88,7 +87,7 @@ class OdePlant:
         self.run_offsets, self.tolerances = tuple(run_offsets), tuple(tolerances)
         self.nominal = _nominal_values(parameters, causes, (*run_offsets, *tolerances))
         self._records = Records(states, inputs, tuple(self.nominal))
-        self._start, self._regimes, self._mode = start, regimes, mode
+        self._start, self._regimes = start, regimes
         self._rate, self._read = rate, readings
         self._delays = dict(delays or {})
         self._units = dict.fromkeys((*states, *inputs), ("", 1.0)) | dict(units or {})
@@ -207,9 +206,6 @@ class OdePlant:
 
     def _starts(self, run: Run, p: NDArray) -> NDArray:
         """States at the first sample, (states, n) [SI]."""
-        if self._mode == "numpy":
-            begun = self._start(run, self._records.p(*p))
-            return np.array([np.broadcast_to(b, p.shape[1:]) for b in begun], dtype=float)
         return np.array([self._start(run, self._records.p(*own)) for own in p.T], dtype=float).T.copy()
 
     def _state_equations(

@@ -1,4 +1,4 @@
-"""Steps of the classical Runge-Kutta method, for one candidate with stops at thresholds, or for many.
+"""Steps of the classical Runge-Kutta method, with stops at thresholds.
 
 A step counts only where no stage of it lies beyond a threshold, so that its order is kept. Otherwise it
 is shortened until the threshold is near enough to be passed in one tiny step. A state that both sides of
@@ -124,23 +124,3 @@ def advancing(rate: Callable, thresholds: Callable, count: int, wrap: Callable) 
 def workspace(states: int) -> NDArray:
     """Scratch of a step: four slopes, a stage and the end, (6, states)."""
     return np.empty((6, states))
-
-
-def together_step(
-    rate: Callable, x: NDArray, t: float, h: float, u: NDArray, p: NDArray, push: NDArray
-) -> tuple[NDArray, list[NDArray]]:
-    """A step of many candidates: the states after h [s], (states, n), and its three stages likewise.
-
-    The arguments are those of `advancing`, with an axis of candidates.
-    """
-
-    def slope(y: NDArray, time: float) -> NDArray:
-        return rate(y, time, u, p, np.empty_like(y)) + push
-
-    k1 = slope(x, t)
-    x2 = x + 0.5 * h * k1
-    k2 = slope(x2, t + 0.5 * h)
-    x3 = x + 0.5 * h * k2
-    k3 = slope(x3, t + 0.5 * h)
-    x4 = x + h * k3
-    return x + (h / 6.0) * (k1 + 2.0 * (k2 + k3) + slope(x4, t + h)), [x2, x3, x4]

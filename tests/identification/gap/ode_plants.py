@@ -40,6 +40,7 @@ def decay(runs=None, **changes) -> OdePlant:
             "run_offsets": [NuisanceParameter(symbol="zero", sd=0.1, step=0.01)],
             "tolerances": [NuisanceParameter(symbol="late", sd=0.1, step=0.01)],
             "forcing_steps": {"y": 1e-3},
+            "mode": "python",
         }
         | changes
     )

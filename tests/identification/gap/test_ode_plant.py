@@ -1,4 +1,4 @@
-"""A plant of plain differential equations obeys closed forms, in every mode, and the protocol.
+"""A plant of plain differential equations obeys closed forms, compiled or not, and the protocol.
 
 A block with Coulomb friction turns and sticks as events in scipy make it.
 """
@@ -28,8 +28,7 @@ def test_a_decay_is_exponential_to_fourth_order():
     assert errors[1] / errors[2] == pytest.approx(16, rel=0.1)
 
 
-@pytest.mark.parametrize("mode", ["numpy", "compiled"])
-def test_all_modes_give_the_same_for_candidates_runs_and_delays(mode):
+def test_compiled_or_not_candidates_runs_and_delays_give_the_same():
     rng = np.random.default_rng(1)
     runs = [quiet_run(h, n, q=rng.standard_normal(n)) for h, n in ((0.5, 21), (0.5, 30), (0.2, 12))]
     given = {"delays": {"q": "late"}, "steps_per_sample": 3}
@@ -38,7 +37,7 @@ def test_all_modes_give_the_same_for_candidates_runs_and_delays(mode):
         "late": np.array([0.0, 0.3, 1.1, 0.0]),
         "zero": rng.standard_normal((4, 3)),
     }
-    plant, reference = decay(runs, mode=mode, **given), decay(runs, mode="python", **given)
+    plant, reference = decay(runs, mode="compiled", **given), decay(runs, **given)
     for own, other in zip(
         plant.outputs(values, [2, 0, 1]), reference.outputs(values, [2, 0, 1]), strict=True
     ):
@@ -133,7 +132,7 @@ def test_the_diagnosis_takes_the_plant():
     def rate(x, u, p):
         return (-p.k * x.y + p.gain * u.q - p.leak,)
 
-    found = diagnose(decay(noisy_runs(), rate=rate, causes=causes, tolerances=()))
+    found = diagnose(decay(noisy_runs(), mode="compiled", rate=rate, causes=causes, tolerances=()))
     assert found.conclusion.causes[0].effects == ("gain",)
     assert {gap.regime for gap in found.localisation.regime_gaps} == {WHOLE}
 
@@ -153,10 +152,6 @@ def test_the_diagnosis_takes_the_plant():
         ({"forcing_steps": {"z": 1.0}}, "forcing_steps has 'z'"),
         ({"runs": [quiet_run(0.5, 21, q=np.zeros(20))]}, r"input 'q' has the shape \(20,\)"),
         ({"rate": lambda x, u, p: (u.pump,)}, "'pump'.*u the inputs .*'t', 'q'"),
-        (
-            {"rate": lambda x, u, p: (u.q if x.y > 0 else 0.0,)},
-            "use np.where, or choose mode='compiled'",
-        ),
         ({"rate": lambda x, u, p: (-1e6 * x.y,)}, "the model is stiff"),
     ],
 )
@@ -221,9 +216,8 @@ def test_turns_and_sticking_converge_to_those_of_scipy():
     assert errors(1, False) > 100 * coarse
 
 
-@pytest.mark.parametrize("mode", ["numpy", "compiled"])
-def test_every_mode_locates_thresholds(mode):
-    assert errors(1, True, mode) == pytest.approx(errors(1, True), rel=1e-3, abs=1e-9)
+def test_compiled_functions_locate_the_same_thresholds():
+    assert errors(1, True, "compiled") == pytest.approx(errors(1, True), rel=1e-3, abs=1e-9)
 
 
 def test_a_pulled_block_sticks_and_slips():
