@@ -99,10 +99,9 @@ def validation_section(validation: Validation) -> Section:
     """The 10 % rule, the residuals, the responses."""
     return Section(
         title="Validation on held-out recordings",
-        printed="section 7",
         verdicts=[_error_verdict(validation), _residual_verdict(validation)],
         blocks=[
-            error_table(validation.answers, "Result of the model validation.", "Table 15"),
+            error_table(validation.answers, "Result of the model validation."),
             _residual_table(validation),
             *(
                 Picture(figure=response_figure(answer), caption="Validation: " + answer.recording.name)

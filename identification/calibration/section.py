@@ -15,17 +15,13 @@ def calibration_section(calibration: Calibration) -> Section:
     """Estimates of both methods, errors before and after, and what speaks against them."""
     return Section(
         title="Calibration",
-        printed="section 6.2",
         verdicts=[_verdict(calibration), *_doubts(calibration)],
         blocks=[
             _estimates(calibration),
             Text(text=_offsets(calibration)),
             _starts(calibration),
-            error_table(calibration.before, "Errors at the start's parameters.", "Table 11"),
-            *(
-                error_table(calibration.after[method], f"Errors after {method}.", "Table 13")
-                for method in METHODS
-            ),
+            error_table(calibration.before, "Errors at the start's parameters."),
+            *(error_table(calibration.after[method], f"Errors after {method}.") for method in METHODS),
             *(
                 Picture(
                     figure=response_figure(response), caption="Calibration: " + response.recording.name
@@ -89,7 +85,7 @@ def _estimates(calibration: Calibration) -> Table:
             ]
         )
     columns = ["Parameter", "start", *METHODS, "domain"]
-    return Table(columns=columns, rows=rows, caption="Estimates.", printed="Tables 10 and 12")
+    return Table(columns=columns, rows=rows, caption="Estimates.")
 
 
 def _offsets(calibration: Calibration) -> str:

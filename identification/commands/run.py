@@ -46,9 +46,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_plant(parser, help="plant file of another valve than the report's, as its data sheet has it")
     add_seed(parser, help="of starts, draws and resampling")
     parser.add_argument("--starts", type=COUNT, default=STARTS, help="searches of each method")
-    parser.add_argument(
-        "--report-2003", action="store_true", help="show the figures of the report SCL-001/2003 beside"
-    )
 
 
 def run(options: argparse.Namespace) -> None:
@@ -82,7 +79,6 @@ def _identification(options: argparse.Namespace) -> Identification:
         seed=options.seed,
         plant=plant,
         starts=options.starts,
-        report_2003=options.report_2003,
     )
 
 
@@ -96,7 +92,6 @@ def _run_stage(options: argparse.Namespace, identification: Identification) -> N
         sections=result.sections,
         content=result.content,
         facts=campaign_facts(identification.campaign),
-        report_2003=options.report_2003,
         next_step=next_step(options),
     )
     print(as_text(result.sections))

@@ -20,20 +20,18 @@ FLAT = 1e-3
 zero."""
 
 
-def confidence_section(confidence: Confidence, *, report_2003: bool = False) -> Section:
-    """Intervals, the joint region, and the check of the minimum; report_2003: with eq. 23's."""
+def confidence_section(confidence: Confidence) -> Section:
+    """Intervals, the joint region, and the check of the minimum."""
     return Section(
         title="Confidence",
-        printed="section 6.3",
         verdicts=[_precision(confidence), _agreement(confidence), _minimum(confidence)],
         blocks=[
-            _intervals(confidence, report_2003),
+            _intervals(confidence),
             _deviations(confidence),
             _correlations(confidence),
             Picture(
-                figure=profiles(confidence, report_2003=report_2003),
+                figure=profiles(confidence),
                 caption="Model error over one parameter at a time.",
-                printed="Figures 16 and 17",
             ),
             Picture(
                 figure=region(confidence),
@@ -102,7 +100,7 @@ def _decrease(confidence: Confidence) -> float:
     return 0.5 * steepest / (float(np.min(np.abs(minimum.eigenvalues))) * confidence.report.error)
 
 
-def _intervals(confidence: Confidence, report_2003: bool) -> Table:
+def _intervals(confidence: Confidence) -> Table:
     symbols = confidence.problem.vector.symbols
     estimates = confidence.estimate * confidence.problem.vector.scale
     rows = [
@@ -110,16 +108,14 @@ def _intervals(confidence: Confidence, report_2003: bool) -> Table:
             f"{symbol} [{table()[symbol].unit}]",
             f"{estimate:.7g}",
             *(f"{end:.7g}" for end in confidence.intervals()[symbol]),
-            *(f"{end:.7g}" for end in confidence.report_intervals()[symbol] if report_2003),
         ]
         for symbol, estimate in zip(symbols, estimates, strict=True)
     ]
-    columns = ["Parameter", "estimate", "low", "high"]
-    caption = "95 % intervals of the least-squares estimate (sandwich covariance, noise of the inputs)"
-    if report_2003:
-        columns += ["eq. 23 low", "eq. 23 high"]
-        caption += ", and eq. 23 as printed around the Nelder-Mead estimate"
-    return Table(columns=columns, rows=rows, caption=f"{caption}.", printed="Table 14")
+    return Table(
+        columns=["Parameter", "estimate", "low", "high"],
+        rows=rows,
+        caption="95 % intervals of the least-squares estimate (sandwich covariance, inputs' noise).",
+    )
 
 
 def _deviations(confidence: Confidence) -> Table:
@@ -154,11 +150,8 @@ def _correlations(confidence: Confidence) -> Table:
     return Table(columns=["", *symbols], rows=rows, caption="Correlation of the estimates.")
 
 
-def profiles(confidence: Confidence, *, report_2003: bool = False) -> Figure:
-    """Total error over one parameter at a time, the others held (Figures 16 and 17).
-
-    report_2003: with the intervals of eq. 23, too.
-    """
+def profiles(confidence: Confidence) -> Figure:
+    """Total error over one parameter at a time, the others held (Figures 16 and 17)."""
     vector = confidence.problem.vector
     figure = Figure(figsize=(9, 5.5), layout="constrained")
     panels = _panels(figure, len(vector.symbols))
@@ -166,9 +159,6 @@ def profiles(confidence: Confidence, *, report_2003: bool = False) -> Figure:
     rows = zip(panels, vector.symbols, centre, confidence.minimum.profiles, strict=True)
     for axes, symbol, value, profile in rows:
         axes.plot(value * (1 + confidence.minimum.offsets), 100 * profile, color="tab:blue")
-        if report_2003:
-            low, high = confidence.report_intervals()[symbol]
-            axes.axvspan(low, high, color="tab:red", alpha=0.4, label="eq. 23")
         low, high = confidence.intervals()[symbol]
         axes.axvspan(low, high, color="tab:green", alpha=0.3, label="95 % interval")
         axes.axvline(value, color="black", linewidth=0.6)

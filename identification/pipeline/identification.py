@@ -30,8 +30,6 @@ class Identification:
     """The valve as its data sheet describes it; None: the report's, from Table 10."""
     starts: int = STARTS
     """Searches of each calibration method."""
-    report_2003: bool = False
-    """Whether the pages show, beside the results, what the report SCL-001/2003 prints."""
 
     @property
     def hashes(self) -> dict[str, str]:

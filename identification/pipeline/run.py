@@ -73,10 +73,7 @@ def quality(identification: Identification) -> Result:
         for recording in recordings
     ]
     return Result(
-        sections=[
-            quality_section(assessment, report_2003=identification.report_2003)
-            for assessment in assessments
-        ],
+        sections=[quality_section(assessment) for assessment in assessments],
         content={"quality": [quality_json(assessment) for assessment in assessments]},
     )
 
@@ -88,7 +85,7 @@ def sensitivity(identification: Identification) -> Result:
     outputs = sensitivities_on_recordings(replay, studied_symbols(), problem.noise)
     study = run_sensitivity_study(outputs=outputs, seed=identification.seed)
     return Result(
-        sections=[sensitivity_section(study, report_2003=identification.report_2003)],
+        sections=[sensitivity_section(study)],
         content={"sensitivity": sensitivity_json(study)},
     )
 
@@ -106,7 +103,7 @@ def confidence(identification: Identification) -> Result:
     """Section 6.3."""
     intervals = identification.confidence
     return Result(
-        sections=[confidence_section(intervals, report_2003=identification.report_2003)],
+        sections=[confidence_section(intervals)],
         content={"confidence": confidence_json(intervals)},
     )
 
@@ -215,7 +212,6 @@ def _write_report(
         sections=sections,
         content=content,
         facts=campaign_facts(identification.campaign),
-        report_2003=identification.report_2003,
         next_step=next_step,
     )
 

@@ -105,30 +105,26 @@ def spectra(quality: QualityAssessment) -> Figure:
     return figure
 
 
-CAPTIONS: Mapping[Callable[[QualityAssessment], Figure], tuple[str, str]] = {
-    signals: ("Acquired data with its trend.", "Figure 4"),
+CAPTIONS: Mapping[Callable[[QualityAssessment], Figure], str] = {
+    signals: "Acquired data with its trend.",
     probability_plots: (
         "Normal probability plots: normal noise lies on the line. Each column of points is one step of "
-        "the converter.",
-        "Figure 5",
+        "the converter."
     ),
-    histograms: ("Histograms, a bar per step of the converter, and normal densities.", "Figure 6"),
+    histograms: "Histograms, a bar per step of the converter, and normal densities.",
     autocorrelations: (
         "Two-sided autocorrelations without their value of 1 at lag 0; 95 % of the values of white "
-        "noise lie in the band.",
-        "Figure 7",
+        "noise lie in the band."
     ),
     crosscorrelations: (
         "Two-sided cross-correlations; 95 % of the values of independent signals lie in the band. At a "
-        "positive lag the first signal follows the second.",
-        "Figure 8",
+        "positive lag the first signal follows the second."
     ),
     spectra: (
-        "Power spectral densities by Welch's method; 95 % of the values of white noise lie in the band.",
-        "Figure 9",
+        "Power spectral densities by Welch's method; 95 % of the values of white noise lie in the band."
     ),
 }
-"""What draws each figure, its caption, and the report's figure of the like."""
+"""What draws each figure, and its caption."""
 
 
 def _grid(

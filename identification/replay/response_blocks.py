@@ -17,15 +17,15 @@ MEANING = "Mean distance of model and recording, in percent of the recording's m
 """What an error is."""
 
 
-def error_table(responses: Sequence[Response], caption: str, printed: str) -> Table:
-    """Eqs 19 and 20 by recording, and eq. 21 over all; printed: the report's table of the like."""
+def error_table(responses: Sequence[Response], caption: str) -> Table:
+    """Eqs 19 and 20 by recording, and eq. 21 over all."""
     rows = [
         [response.recording.name, *map(percent, response.errors.values()), percent(response.partial)]
         for response in responses
     ]
     if len(responses) > 1:
         rows.append(["all (eps_total)", "", "", "", percent(total_response_error(responses))])
-    return Table(columns=COLUMNS, rows=rows, caption=f"{caption} {MEANING}", printed=printed)
+    return Table(columns=COLUMNS, rows=rows, caption=f"{caption} {MEANING}")
 
 
 def errors_as_json(responses: Sequence[Response]) -> Mapping[str, Any]:

@@ -70,8 +70,6 @@ class Table:
     caption: str = ""
     statuses: Sequence[str] = ()
     """Status of each row, which colours its last cell; empty for a table that judges nothing."""
-    printed: str = ""
-    """Where the report of 2003 prints the like, as in 'Table 12'; shown only where asked for."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,8 +78,6 @@ class Picture:
 
     figure: "Figure"
     caption: str = ""
-    printed: str = ""
-    """Where the report of 2003 prints the like, as in 'Figure 4'; shown only where asked for."""
 
     @property
     def link(self) -> str:
@@ -104,8 +100,6 @@ class Section:
     blocks: Sequence[Block]
     summary: bool = False
     """True for the section that answers the reader's question: it stands right under the title."""
-    printed: str = ""
-    """The section of the report of 2003 with the like; shown only where asked for."""
 
 
 def write_page(
@@ -115,7 +109,6 @@ def write_page(
     sections: Sequence[Section],
     facts: Mapping[str, str] | None = None,
     footer: str = "",
-    report_2003: bool = False,
     next_step: NextStep | None = None,
     written: datetime | None = None,
 ) -> None:
@@ -130,7 +123,6 @@ def write_page(
         sections: in the order of the page.
         facts: what the page rests on, by name: campaign, recordings.
         footer: a sentence at the end.
-        report_2003: whether to say where the report SCL-001/2003 prints the like.
         next_step: the command that ends the page; None where the reader's plant has none.
         written: date on the page; None for now.
 
@@ -144,7 +136,6 @@ def write_page(
         summaries=[section for section in sections if section.summary],
         sections=[section for section in sections if not section.summary],
         footer=footer,
-        report_2003=report_2003,
         next_step=next_step,
     )
     write_text(path, page + "\n")
@@ -177,13 +168,11 @@ def write_results(
     sections: Sequence[Section],
     content: Mapping[str, Any],
     facts: Mapping[str, str] | None = None,
-    report_2003: bool = False,
     next_step: NextStep | None = None,
 ) -> None:
     """Write `out/name.json` and the self-contained `out/name.html`, each whole or not at all.
 
-    facts: what the page rests on, by name. report_2003: whether the page says where the report prints
-    the like. next_step: the command that ends the page.
+    facts: what the page rests on, by name. next_step: the command that ends the page.
     """
     write_json(out / f"{name}.json", content, allow_nan=False)
     write_page(
@@ -192,7 +181,6 @@ def write_results(
         sections=sections,
         facts=facts,
         footer=f"Written by epv-valve {version('epv-valve')}.",
-        report_2003=report_2003,
         next_step=next_step,
     )
 

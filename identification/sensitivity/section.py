@@ -11,7 +11,6 @@ from identification.report_2003 import (
     CIRCUIT_PRESSURE,
     ENERGISED_VOLTAGE,
     SUPPLY_PRESSURE,
-    printed_sensitivities,
 )
 from identification.sensitivity import figures
 from identification.sensitivity.collinearity import (
@@ -71,14 +70,13 @@ def run_sensitivity_study(
     )
 
 
-def sensitivity_section(study: SensitivityStudy, *, report_2003: bool = False) -> Section:
-    """Everything that section 5 shows; report_2003: beside the report's values."""
+def sensitivity_section(study: SensitivityStudy) -> Section:
+    """Everything that is shown of the study."""
     return Section(
         title="Parametric sensitivity",
-        printed="section 5",
         verdicts=[*_separability(study.outputs), _dominant(study.indices)],
         blocks=[
-            _errors(study.one_at_a_time, report_2003),
+            _errors(study.one_at_a_time),
             _pairs(study.outputs),
             Picture(
                 figure=figures.collinearity_map(study.outputs),
@@ -138,24 +136,15 @@ def _dominant(indices: SobolIndices) -> Verdict:
     return Verdict(status="note", text=f"Greatest total Sobol indices of the total error: {names}.")
 
 
-def _errors(rows: Mapping[str, ErrorSensitivity], report_2003: bool) -> Table:
+def _errors(rows: Mapping[str, ErrorSensitivity]) -> Table:
     """How far the responses move with each parameter, the most sensitive first."""
     errors = {symbol: row.percentages for symbol, row in rows.items()}
     order = sorted(errors, key=lambda symbol: max(errors[symbol]), reverse=True)
-    columns = ["Parameter", "total error for −10 % / +10 % [%]"]
-    values = [errors]
-    if report_2003:
-        columns.append("the report [%]")
-        values.append(printed_sensitivities())
     return Table(
-        columns=columns,
-        rows=[
-            [f"{table()[s].meaning} ({s})", *(pair_of_percentages(column[s]) for column in values)]
-            for s in order
-        ],
+        columns=["Parameter", "total error for −10 % / +10 % [%]"],
+        rows=[[f"{table()[s].meaning} ({s})", pair_of_percentages(errors[s])] for s in order],
         caption="How far the responses move when one parameter changes. a1 is zero and goes to the ends "
         "of its domain, ±0.1 rad.",
-        printed="Tables 8 and 9",
     )
 
 

@@ -99,18 +99,12 @@ def test_the_terminal_shows_values_with_unit_interval_and_trust(finished, campai
     assert lines[-1].split()[1:3] == ["gap", str(campaign)]
 
 
-def test_the_report_of_a_bench_says_nothing_of_2003_unless_asked(finished, campaign, tmp_path):
+def test_the_report_of_a_bench_says_nothing_of_2003(finished):
     printed = r"SCL-001|2003|[Tt]he report|Tables? \d|Figures? \d|[Ee]qs?\. ?\d|section \d"
     page = re.sub(
         r'<style>.*?</style>|src="[^"]*"', "", (finished / "report.html").read_text(), flags=re.S
     )
     assert re.findall(printed, page) == []
-    assert (
-        main(["run", str(campaign), "--stage", "quality", "--out", str(tmp_path), "--report-2003"]) == 0
-    )
-    asked = (tmp_path / "quality.html").read_text()
-    assert "(Table 3 of SCL-001/2003)" in asked
-    assert "the report&#39;s" in asked
 
 
 def test_the_report_in_a_browser(finished, tmp_path):

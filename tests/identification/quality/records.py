@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from docs.studies.reproduction.noise_errata import TREND_OFFSETS
 from epv_env.plant.channels import SENSORS
-from identification.quality.section import TREND_OFFSETS
 from identification.recordings.recording import CHANNELS, UNITS, Recording
 
 PERIOD = 1 / 2000

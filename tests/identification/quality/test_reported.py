@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from epv_env.plant.channels import SENSORS
-from identification.quality.noise_tests import white_noise_band
-from identification.quality.section import (
+from docs.studies.reproduction.noise_errata import (
     CORRELATIONS,
     SAMPLES,
     STATISTICS,
     TREND_OFFSETS,
     TREND_SLOPES,
 )
+from epv_env.plant.channels import SENSORS
+from identification.quality.noise_tests import white_noise_band
 from identification.recordings.recording import CHANNELS
 
 

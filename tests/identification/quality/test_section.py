@@ -8,15 +8,9 @@ import pytest
 
 from identification.quality import figures as figures
 from identification.quality.assessment import assess_recording
-from identification.quality.section import (
-    CORRELATIONS,
-    STATISTICS,
-    TREND_SLOPES,
-    as_json,
-    quality_section,
-)
+from identification.quality.section import as_json, quality_section
 from identification.recordings.recording import CHANNELS
-from identification.report.page import Picture, Section, Table
+from identification.report.page import Picture, Table
 from tests.identification.quality.records import AMBIENT, rest_record, with_channel
 
 
@@ -27,28 +21,13 @@ def qualities():
     return assess_recording(rest_record(0, 2000), AMBIENT), assess_recording(stuck, AMBIENT)
 
 
-@pytest.mark.parametrize(("which", "report_2003"), [(0, True), (1, False)])
-def test_a_section_is_complete(which, report_2003):
-    section = quality_section(qualities()[which], report_2003=report_2003)
+@pytest.mark.parametrize("which", [0, 1])
+def test_a_section_is_complete(which):
+    section = quality_section(qualities()[which])
     assert [verdict.status for verdict in section.verdicts].count("good") == 5 - which
     assert sum(isinstance(block, Picture) for block in section.blocks) == 6
     for table in (block for block in section.blocks if isinstance(block, Table)):
         assert {len(row) for row in table.rows} == {len(table.columns)}
-
-
-def cells_of(section: Section) -> set[str]:
-    tables = (block for block in section.blocks if isinstance(block, Table))
-    return {cell for table in tables for row in table.rows for cell in row}
-
-
-def test_tables_show_the_report_s_figures_beside_their_own_if_asked():
-    assert "  the report's" not in cells_of(quality_section(qualities()[0]))
-    cells = cells_of(quality_section(qualities()[0], report_2003=True))
-    for name in CHANNELS:
-        assert f"{TREND_SLOPES[name]:.6f}" in cells
-        assert f"{STATISTICS[name].kurtosis:.4f}" in cells
-    for value in CORRELATIONS.values():
-        assert f"{value:.4f}" in cells
 
 
 @pytest.mark.parametrize("draw", figures.CAPTIONS)

@@ -6,9 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 
+from docs.studies.reproduction.noise_errata import STATISTICS, TREND_OFFSETS
 from epv_env.plant.channels import SENSORS
 from identification.quality.assessment import assess_recording, sensor_offsets
-from identification.quality.section import STATISTICS, TREND_OFFSETS
 from identification.quality.verdicts import CHECKS, channel_verdict, check_results, worst_status
 from identification.recordings.recording import CHANNELS, UNITS, CampaignError
 from tests.identification.quality.records import (

@@ -65,16 +65,6 @@ def test_the_page_says_what_it_rests_on_and_when_it_was_written(tmp_path):
     assert "<dt>Written</dt><dd>3 November 2026, 14:05</dd>" in text
 
 
-@pytest.mark.parametrize("asked", [False, True])
-def test_the_report_of_2003_is_named_only_where_asked_for(tmp_path, asked):
-    table = Table(columns=["x"], rows=[["1"]], caption="Numbers.", printed="Table 12")
-    section = Section(title="Stage", verdicts=[], blocks=[table], printed="section 6")
-    write_page(tmp_path / "page.html", title="Page", sections=[section], report_2003=asked)
-    text = (tmp_path / "page.html").read_text(encoding="utf-8")
-    assert ("Numbers. (Table 12 of SCL-001/2003)" in text) is asked
-    assert ("Stage (section 6 of SCL-001/2003)" in text) is asked
-
-
 def test_a_cloud_of_points_costs_no_more_than_its_pixels():
     """As shapes 20,000 points take more than a megabyte."""
     figure = Figure(figsize=(2, 2))

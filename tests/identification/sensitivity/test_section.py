@@ -3,7 +3,7 @@
 import json
 
 from epv_env.plant.parameters import Parameters
-from identification.report.page import Picture, Table, write_page
+from identification.report.page import Picture, write_page
 from identification.sensitivity.global_indices import (
     morris_effects,
     ranges,
@@ -31,9 +31,6 @@ def test_section_and_data(tmp_path):
     section = sensitivity_section(study)
     assert [verdict.status for verdict in section.verdicts] == ["good", "note", "note"]
     assert sum(isinstance(block, Picture) for block in section.blocks) == 2
-    beside = sensitivity_section(study, report_2003=True).blocks[0]
-    assert isinstance(beside, Table)
-    assert beside.columns[-1] == "the report [%]"
     write_page(tmp_path / "page.html", title="Sensitivity", sections=[section])
     data = json.loads(json.dumps(sensitivity_json(study), allow_nan=False))
     assert data["collinearity"]["all_sensitive"] is None
