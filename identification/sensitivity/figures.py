@@ -1,10 +1,6 @@
 """Pictures of the sensitivity study: collinearity of pairs, and global indices."""
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -14,10 +10,7 @@ from identification.sensitivity.collinearity import (
     OutputSensitivities,
     collinearity_index,
 )
-from identification.sensitivity.global_indices import MorrisEffects, SobolIndices
-
-BAR: Mapping[str, Any] = {"color": "tab:blue", "alpha": 0.55, "height": 0.7}
-"""Bar of a computed figure."""
+from identification.sensitivity.global_indices import SobolIndices
 
 GREATEST_SHOWN = 100.0
 """Collinearity indices above this share a colour."""
@@ -55,22 +48,11 @@ def pairwise_indices(outputs: OutputSensitivities) -> NDArray:
     return index
 
 
-def global_bars(indices: SobolIndices, screening: MorrisEffects) -> Figure:
-    """Sobol's indices and Morris's mean absolute effects with 95 % intervals, in one order."""
+def global_bars(indices: SobolIndices) -> Figure:
+    """Sobol's indices with 95 % intervals, by falling total."""
     order = np.argsort(indices.total)
     figure = Figure(figsize=(9, 7.5), layout="constrained")
-    left, right = figure.subplots(1, 2, sharey=True)
-    _sobol_bars(left, indices, order)
-    effects, width = screening.mean_absolute[order], screening.half_width[order]
-    right.barh(range(len(order)), effects, xerr=width, error_kw={"elinewidth": 1}, **BAR)
-    right.set_xlabel("Morris μ*: mean change of total error [% points]")
-    for axes in (left, right):
-        axes.set_ylim(-0.6, len(order) - 0.4)
-        axes.grid(axis="x", alpha=0.3)
-    return figure
-
-
-def _sobol_bars(axes: Axes, indices: SobolIndices, order: NDArray) -> None:
+    axes = figure.subplots()
     rows = np.arange(len(order))
     bars = (
         ("total", indices.total, indices.total_half_width, 0.2, "tab:blue"),
@@ -90,3 +72,6 @@ def _sobol_bars(axes: Axes, indices: SobolIndices, order: NDArray) -> None:
     axes.set_yticks(rows, [indices.symbols[at] for at in order])
     axes.set_xlabel("Sobol index: share of the variance")
     axes.legend(loc="lower right")
+    axes.set_ylim(-0.6, len(order) - 0.4)
+    axes.grid(axis="x", alpha=0.3)
+    return figure

@@ -1,10 +1,9 @@
-"""Global sensitivity of the total error: all parameters change at once (Morris, Sobol).
+"""Global sensitivity of the total error: all parameters change at once (Sobol).
 
 Each parameter is uniform over half the change of Tables 8 and 9: +-5 %, a1 over half its domain. With
 +-10 % of all parameters at once, 1 % of the valves no longer pull their armature in at the study's
 18.9 V, and those few, 90 % off, would dominate the variance; over the domains it is far more of them.
-Samples and estimators are SALib's (Iwanaga, Usher and Herman, 2022; Saltelli et al. 2010 for Sobol,
-Morris 1991 with Campolongo's mu*).
+Samples and estimators are SALib's (Iwanaga, Usher and Herman, 2022; Saltelli et al. 2010).
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -13,15 +12,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from SALib.analyze import morris as morris_analysis
 from SALib.analyze import sobol as sobol_analysis
-from SALib.sample import morris as morris_sample
 from SALib.sample import sobol as sobol_sample
 
 from identification.sensitivity.one_at_a_time import changed_values, total_errors
-
-GRID_LEVELS = 4
-"""Levels of Morris's grid."""
 
 RESAMPLES = 1000
 """Draws of the bootstrap intervals."""
@@ -34,19 +28,6 @@ BATCH = 512
 
 Model = Callable[[NDArray], NDArray]
 """Parameter sets (samples, parameters) [SI] -> outputs (samples,)."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class MorrisEffects:
-    """Morris's elementary effects: change of the output over the whole range of one parameter."""
-
-    symbols: tuple[str, ...]
-    mean_absolute: NDArray
-    """mu*, (parameters,), in the unit of the output."""
-    half_width: NDArray
-    """Of the bootstrap 95 % interval of mu*, (parameters,)."""
-    spread: NDArray
-    """sigma, (parameters,): beyond mu*, the effect depends on other parameters or changes its sign."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,33 +67,6 @@ def _errors(nominal: Mapping[str, float], symbols: Sequence[str], samples: NDArr
     for symbol, column in zip(symbols, samples.T, strict=True):
         p[symbol][1:] = column
     return 100 * total_errors(p)
-
-
-def morris_effects(
-    model: Model,
-    symbols: Sequence[str],
-    bounds: NDArray,
-    *,
-    trajectories: int,
-    seed: int,
-) -> MorrisEffects:
-    """Morris's screening: trajectories x (parameters + 1) evaluations; bounds: (parameters, 2) [SI]."""
-    problem = _problem(symbols, bounds)
-    samples = morris_sample.sample(problem, trajectories, num_levels=GRID_LEVELS, seed=seed)
-    effects = morris_analysis.analyze(
-        problem,
-        samples,
-        model(samples),
-        num_levels=GRID_LEVELS,
-        num_resamples=RESAMPLES,
-        seed=seed,
-    )
-    return MorrisEffects(
-        symbols=tuple(symbols),
-        mean_absolute=np.asarray(effects["mu_star"]),
-        half_width=np.asarray(effects["mu_star_conf"]),
-        spread=np.asarray(effects["sigma"]),
-    )
 
 
 def sobol_indices(

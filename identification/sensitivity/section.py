@@ -19,23 +19,18 @@ from identification.sensitivity.collinearity import (
     sensitivities_of_outputs,
 )
 from identification.sensitivity.global_indices import (
-    MorrisEffects,
     SobolIndices,
-    morris_effects,
     ranges,
     sobol_indices,
     total_error_model,
 )
 from identification.sensitivity.one_at_a_time import ErrorSensitivity, sensitivities, studied_symbols
 
-TRAJECTORIES = 40
-"""Of Morris's design: 1000 valves."""
-
 SAMPLES = 256
 """Of Sobol's design, a power of two: 6656 valves."""
 
 SEED = 1
-"""Of Morris's and Sobol's designs where the caller gives none."""
+"""Of Sobol's design where the caller gives none."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +40,6 @@ class SensitivityStudy:
     one_at_a_time: Mapping[str, ErrorSensitivity]
     """Tables 8 and 9, by symbol."""
     outputs: OutputSensitivities
-    screening: MorrisEffects
     indices: SobolIndices
 
 
@@ -56,7 +50,7 @@ def run_sensitivity_study(
 
     Args:
         outputs: how the outputs respond on recordings; None: in the report's test cases.
-        seed: of Morris's and Sobol's designs.
+        seed: of Sobol's design.
 
     Raises SimulationError.
     """
@@ -65,7 +59,6 @@ def run_sensitivity_study(
     return SensitivityStudy(
         one_at_a_time=sensitivities(p, symbols),
         outputs=outputs or sensitivities_of_outputs(p, symbols),
-        screening=morris_effects(model, symbols, bounds, trajectories=TRAJECTORIES, seed=seed),
         indices=sobol_indices(model, symbols, bounds, samples=SAMPLES, seed=seed),
     )
 
@@ -84,7 +77,7 @@ def sensitivity_section(study: SensitivityStudy) -> Section:
                 "weighted by the sensors' noise (Brun et al. 2001).",
             ),
             Picture(
-                figure=figures.global_bars(study.indices, study.screening),
+                figure=figures.global_bars(study.indices),
                 caption="Global sensitivity of the total error, all parameters within ±5 % at once "
                 "(a1 within ±0.05 rad), with bootstrap 95 % intervals.",
             ),
@@ -102,7 +95,6 @@ def sensitivity_json(study: SensitivityStudy) -> dict[str, Any]:
         },
         "exact": {symbol: row.as_json() for symbol, row in study.one_at_a_time.items()},
         "collinearity": _collinearity(study.outputs),
-        "morris": _screening(study.screening),
         "sobol": _indices(study.indices),
     }
 
@@ -173,19 +165,6 @@ def _collinearity(outputs: OutputSensitivities) -> dict[str, Any]:
 
 def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
-
-
-def _screening(screening: MorrisEffects) -> dict[str, Any]:
-    columns = zip(
-        screening.mean_absolute.tolist(),
-        screening.half_width.tolist(),
-        screening.spread.tolist(),
-        strict=True,
-    )
-    return {
-        symbol: {"mu_star": effect, "half_width95": width, "sigma": spread}
-        for symbol, (effect, width, spread) in zip(screening.symbols, columns, strict=True)
-    }
 
 
 def _indices(indices: SobolIndices) -> dict[str, Any]:

@@ -5,7 +5,6 @@ import json
 from epv_env.plant.parameters import Parameters
 from identification.report.page import Picture, write_page
 from identification.sensitivity.global_indices import (
-    morris_effects,
     ranges,
     sobol_indices,
     total_error_model,
@@ -21,7 +20,6 @@ def short_study() -> SensitivityStudy:
     return SensitivityStudy(
         one_at_a_time=exact(),
         outputs=nominal_sensitivities(),
-        screening=morris_effects(model, symbols, bounds, trajectories=4, seed=1),
         indices=sobol_indices(model, symbols, bounds, samples=8, seed=1),
     )
 
