@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, signal, special, stats
-from statsmodels.stats.diagnostic import acorr_ljungbox, normal_ad
-from statsmodels.stats.stattools import jarque_bera
+from statsmodels.stats.diagnostic import acorr_ljungbox
 from statsmodels.tsa.stattools import acf, ccf
 
 SIGNIFICANCE = 1e-4
@@ -50,10 +49,6 @@ class Normality:
     """Of a statistic at least as great for normal noise; NaN if the test cannot be made."""
     effect: float
     """Cohen's w, sqrt((statistic - degrees)/n): departure from normal, whatever the sample size."""
-    naive_anderson_darling: float
-    """p-value of the Anderson-Darling test, which takes the readings for continuous."""
-    naive_jarque_bera: float
-    """p-value of the Jarque-Bera test of skewness and kurtosis."""
 
 
 UNTESTED = Normality(
@@ -62,8 +57,6 @@ UNTESTED = Normality(
     degrees=0,
     probability=np.nan,
     effect=np.nan,
-    naive_anderson_darling=np.nan,
-    naive_jarque_bera=np.nan,
 )
 """Of a signal that never changes."""
 
@@ -79,14 +72,8 @@ def assess_normality(readings: NDArray, line: NDArray, step: float) -> Normality
     positions = _positions(line, sigma)
     shift, deviation = _fit(edges, counts, positions, sigma)
     expected = len(readings) * _probabilities(edges, positions + shift, deviation)
-    with np.errstate(
-        divide="ignore"
-    ):  # a reading so far out that its probability is 0 in double precision
-        anderson_darling = float(normal_ad(readings - line)[1])
     return Normality(
         standard_deviation=deviation,
-        naive_anderson_darling=anderson_darling,
-        naive_jarque_bera=float(jarque_bera(readings - line)[1]),
         **_chi_square(*_merged(counts, expected, LEAST_EXPECTED)),
     )
 
