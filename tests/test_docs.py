@@ -219,7 +219,7 @@ def test_the_page_of_the_architecture_says_who_imports_whom():
 
 @pytest.mark.slow
 def test_the_site_builds_without_a_warning(tmp_path):
-    """A warning fails: a broken link, a page outside the navigation, a public name without docstring."""
+    """A warning fails: a broken link, a page outside the navigation."""
     done = run(sys.executable, "-m", "mkdocs", "build", "--strict", "-d", tmp_path / "site", cwd=ROOT)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "site/reference/api/epv_env.plant.html").is_file()

@@ -1,17 +1,13 @@
 """What mkdocs runs while it builds the site: generated pages join those that are written by hand.
 
-The API reference has one page for each folder of modules. Public names without a docstring are warned
-of, and a warning fails a strict build.
+The API reference has one page for each folder of modules.
 """
 
-import logging
 import re
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import griffe
 from mkdocs.structure.files import File, Files
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
@@ -29,23 +25,17 @@ FOLDER_OPTIONS = """    options:
       show_root_heading: false
       show_root_toc_entry: false"""
 """Show a folder's docstring only; its modules follow."""
-OWN = (*PACKAGES, "typing", "abc", "object")
-"""First words of base classes that do not document the methods of this project's classes."""
 GENERATED = {
     "<!-- generated: command lines -->": command_lines.page,
     "<!-- generated: notebook -->": notebook.page,
 }
 """Lines of pages, and what writes the text that replaces them."""
-LOG = logging.getLogger("mkdocs.hooks.public_names")
-"""Its warnings fail a strict build."""
 API = "API"
 """The entry of the navigation that holds the generated API pages."""
 
 
 def on_config(config: Any) -> Any:
-    """Put the API pages into the navigation; warn of public names without a docstring."""
-    for name in undocumented_names():
-        LOG.warning("%s has no docstring: give it one", name)
+    """Put the API pages into the navigation."""
     for entry in config.nav:
         for part in entry.get("Reference", []):
             if API in part:
@@ -114,36 +104,3 @@ def api_navigation() -> list[dict[str, object]]:
         {package: [{_dotted(folder): f"{FOLDER}/{_dotted(folder)}.md"} for folder in _folders(package)]}
         for package in PACKAGES
     ]
-
-
-def undocumented_names() -> list[str]:
-    """Public modules, classes, functions and methods of the packages without a docstring."""
-    loaded = [griffe.load(package, search_paths=[ROOT]) for package in PACKAGES]
-    return [path for module in loaded for path in undocumented(module)]
-
-
-def undocumented(owner: griffe.Object | griffe.Alias) -> Iterator[str]:
-    """Paths of the names below a module or class.
-
-    A method is documented elsewhere if its class overrides one of another project's classes. A class
-    may also set its `__doc__`.
-    """
-    for name, member in owner.members.items():
-        if name.startswith("_") or member.is_alias:
-            continue
-        if _needs_docstring(member) and not member.has_docstring and "__doc__" not in member.members:
-            yield member.path
-        if member.is_module or member.is_class:
-            yield from undocumented(member)
-
-
-def _needs_docstring(member: griffe.Object | griffe.Alias) -> bool:
-    if member.is_function and isinstance(member.parent, griffe.Class):
-        return not _overrides_another_project(member.parent)
-    return member.is_module or member.is_class or member.is_function
-
-
-def _overrides_another_project(owner: griffe.Class) -> bool:
-    """Whether a class has a base outside this project."""
-    names = (base if isinstance(base, str) else base.canonical_path for base in owner.bases)
-    return any(name.split(".")[0] not in OWN for name in names)
