@@ -50,11 +50,6 @@ class ReferenceRun:
     steps: int
     """Of the solver."""
 
-    def away_from_events(self, margin: float, name_part: str = "") -> NDArray:
-        """Whether each sample is farther than margin [s] from the named events, boolean (samples,)."""
-        at = np.array([event.time for event in self.events if name_part in event.name])
-        return np.all(np.abs(self.time[:, None] - at) > margin, axis=1)
-
 
 def simulate_reference(
     schedule: Schedule,

@@ -20,7 +20,6 @@ from identification.importing.common_grid import GriddedSignals, on_common_grid,
 from identification.importing.mapping_file import MappingFile, RecordingEntry, meaning, read_mapping
 from identification.importing.source_file import ImportingError, SourceFile
 from identification.importing.text_files import read_text
-from identification.recordings.campaign_files import write_campaign
 from identification.recordings.plausibility import switches
 from identification.recordings.recording import CHANNELS, Campaign, Recording
 from identification.recordings.rules import RULES, RecordingRules
@@ -118,19 +117,6 @@ def read_files(
     )
     assumptions = _assumptions(imported, content, pressure, temperature)
     return ImportedCampaign(campaign=campaign, files=imported, assumptions=assumptions)
-
-
-def import_campaign(
-    files: Sequence[str | PathLike[str]], out: str | PathLike[str], **options: Any
-) -> ImportedCampaign:
-    """`read_files`, written as a campaign into the folder `out`; its provenance is in campaign.json.
-
-    options: those of `read_files`. Raises, besides what `read_files` does, CampaignError if physics or a
-    rule of docs/reference/files.md contradicts a recording; then nothing is written.
-    """
-    imported = read_files(files, **options)
-    write_campaign(imported.campaign, out, provenance=imported.provenance())
-    return imported
 
 
 def _check_mapped_files(content: MappingFile, sources: Sequence[SourceFile]) -> None:

@@ -25,7 +25,7 @@ from epv_env.plant.parameters import Parameters, table
 from epv_env.plant.primitives import CRITICAL_RATIO, KAPPA, mass_flux
 from epv_env.plant.simulate import energised, simulate
 from epv_env.plant.valves import Valves
-from tests.reference.schedule import largest_difference, pulses
+from tests.reference.schedule import away_from_events, largest_difference, pulses
 
 CALIBRATED = Parameters.calibrated()
 RT = CALIBRATED["R_gas"] * CALIBRATED["T_env"]
@@ -82,7 +82,7 @@ def test_the_kernel_agrees_with_scipy_on_every_effect(name):
     run = simulate(p, initial=schedule.initial, U=U, period=1 / RATE)
     expected, simulated = readings(reference.state, p), readings(run.state, p)
     # Eddy currents make the coil's current jump where U does: at that sample it has two values.
-    keep = reference.away_from_events(1e-3) & (np.diff(U, prepend=24.0, append=24.0)[:-1] == 0)
+    keep = away_from_events(reference, 1e-3) & (np.diff(U, prepend=24.0, append=24.0)[:-1] == 0)
     for output, allowed in {"p2": 20.0, "p3": 50.0, "I": 1e-4}.items():
         found = largest_difference(simulated[output], expected[output], keep)
         assert found < allowed, output

@@ -16,6 +16,7 @@ from identification.bench.reference_simulation import ReferenceRun, simulate_ref
 from tests.reference.closed_loop import random_schedules
 from tests.reference.schedule import (
     Schedule,
+    away_from_events,
     largest_difference,
     piecewise_schedule,
     plant_states,
@@ -42,7 +43,7 @@ def assert_agrees(schedule: Schedule, run: ReferenceRun, within: float = 1.0) ->
     """The plant at its default step meets the bars, in units of `within`."""
     found = plant_states(schedule, run.time)
     everywhere = np.full(run.time.shape, True)
-    calm = run.away_from_events(NEAR_STOP, "lands")
+    calm = away_from_events(run, NEAR_STOP, "lands")
     assert largest_difference(found.p2, run.state.p2, everywhere) < within * MILLIBAR
     assert largest_difference(found.p3, run.state.p3, everywhere) < within * MILLIBAR
     assert largest_difference(found.I, run.state.I, calm) < within * 0.5 * MILLIAMPERE

@@ -13,6 +13,7 @@ from epv_env.plant.runge_kutta import DEFAULT_STEP
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
 from identification.bench.hybrid_automaton import Schedule, piecewise_schedule
+from identification.bench.reference_simulation import ReferenceRun
 
 MOST_STEPS = 5000
 """Steps that one `advance` is asked for; well below integrate.MAX_STEPS."""
@@ -80,6 +81,12 @@ def sample_times(schedule: Schedule, period: float) -> NDArray:
     """0, period, 2 period .. up to the end of the schedule [s]."""
     count = math.floor(schedule.duration / period + 1e-6)
     return np.minimum(np.arange(count + 1) * period, schedule.duration)
+
+
+def away_from_events(run: ReferenceRun, margin: float, name_part: str = "") -> NDArray:
+    """Whether each sample is farther than margin [s] from the named events, boolean (samples,)."""
+    at = np.array([event.time for event in run.events if name_part in event.name])
+    return np.all(np.abs(run.time[:, None] - at) > margin, axis=1)
 
 
 def largest_difference(one: NDArray, other: NDArray, keep: NDArray | Sequence[bool]) -> float:

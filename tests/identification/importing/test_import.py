@@ -11,13 +11,12 @@ from identification.__main__ import main
 from identification.bench.programmes import REPORT_SUITE
 from identification.bench.session import run_bench
 from identification.importing.common_grid import resampled
-from identification.importing.import_campaign import import_campaign
 from identification.importing.source_file import ImportingError
 from identification.importing.units import parsed_unit
 from identification.recordings.campaign_files import read_campaign
 from identification.recordings.recording import CampaignError
 from tests.identification.importing.dialects import DIALECTS, columns_of, text
-from tests.identification.importing.round_trip import assert_same_recordings
+from tests.identification.importing.round_trip import assert_same_recordings, import_campaign
 
 SUITE = (REPORT_SUITE[0], REPORT_SUITE[-2], REPORT_SUITE[-1])
 

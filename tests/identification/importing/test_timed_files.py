@@ -8,12 +8,12 @@ import pytest
 from epv_env.plant.parameters import Parameters
 from identification.bench.programmes import REPORT_SUITE
 from identification.bench.session import run_bench
-from identification.importing.import_campaign import import_campaign, read_files
+from identification.importing.import_campaign import read_files
 from identification.importing.source_file import ImportingError, points_in_time, seconds
 from identification.recordings.campaign_files import read_campaign
 from identification.recordings.recording import CHANNELS
 from tests.identification.importing.dialects import text
-from tests.identification.importing.round_trip import assert_same_recordings
+from tests.identification.importing.round_trip import assert_same_recordings, import_campaign
 from tests.identification.importing.timed_files import (
     LEAD,
     SAME_RATE,
