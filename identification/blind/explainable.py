@@ -35,27 +35,18 @@ TEMPERATURE_TOLERANCE = 0.01
 """Tolerance of the fitted winding temperature [K]."""
 
 
-def explainable_gap(trial: Trial, truths: Sequence[TrueSignals]) -> dict[str, float]:
-    """Noise-free gaps after recalibration [-], by name.
+def explainable_gap(trial: Trial, truths: Sequence[TrueSignals]) -> float:
+    """Noise-free gap with all parameters fitted within their scatter [-].
 
-    `recalibrated`: with the four parameters fitted. `explainable`: with all parameters fitted within
-    their scatter. The trial's causes leave this gap, and no unit of the nominal design explains it; the
-    gap is 1 without a cause.
+    The trial's causes leave this gap, and no unit of the nominal design explains it; the gap is 1
+    without a cause.
     """
-    recalibrated = held_out_gap(truths, recalibrated_parameters(truths, with_scatter=False))
-    if trial.kind == NOMINAL:
-        return {"recalibrated": recalibrated, "explainable": 1.0}
-    fitted = recalibrated_parameters(truths, with_scatter=True)
-    return {"recalibrated": recalibrated, "explainable": held_out_gap(truths, fitted)}
+    return 1.0 if trial.kind == NOMINAL else held_out_gap(truths, recalibrated_parameters(truths))
 
 
-def recalibrated_parameters(truths: Sequence[TrueSignals], *, with_scatter: bool) -> Parameters:
-    """The four parameters, fitted to the calibration recordings' truth.
-
-    with_scatter: fit the other parameters too, within their scatter from unit to unit.
-    """
-    others = tuple(PARAMETER_COMPONENTS) if with_scatter else ()
-    vector = ParameterVector(CALIBRATED_SYMBOLS + others, Parameters.calibrated())
+def recalibrated_parameters(truths: Sequence[TrueSignals]) -> Parameters:
+    """All parameters, fitted to the calibration recordings' truth; most within their scatter."""
+    vector = ParameterVector(CALIBRATED_SYMBOLS + tuple(PARAMETER_COMPONENTS), Parameters.calibrated())
     comparison = _Comparison([true for true in truths if not is_held_out(true)], vector.reference)
     scatters = np.array([symbol in PARAMETER_COMPONENTS for symbol in vector.symbols])
     prior = np.where(scatters, 1.0 / UNIT_SCATTER, 0.0)

@@ -23,7 +23,6 @@ from identification.blind.score import (
     means,
     share,
     shares,
-    verdict_counts,
 )
 
 FIRST, INCLUSION = "first cause", "inclusion of an effect"
@@ -127,7 +126,6 @@ def results(trials: Sequence[TrialScore], *, seed: int, forms: str) -> dict[str,
         },
         "shares": counted,
         "means": average,
-        "verdicts": verdict_counts(trials),
         "calibration": calibration,
         "each": [{**asdict(trial), "well_judged": is_well_judged(trial)} for trial in trials],
     }

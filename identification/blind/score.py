@@ -19,9 +19,6 @@ from identification.blind.truth import (
 )
 from identification.valve_gap.causes import PARAMETER_COMPONENTS
 
-VERDICTS = ("no_gap", "known", "ambiguous", "partial", "unknown", "failed")
-"""Verdicts of gap.json, and `failed` for a diagnosis that gave none."""
-
 NAMING_VERDICTS = ("known", "ambiguous", "partial")
 """Verdicts that name a cause."""
 
@@ -60,7 +57,7 @@ class TrialScore:
     explainable: float
     """Noise-free gap that no unit of the nominal design explains [-]."""
     verdict: str
-    """One of VERDICTS."""
+    """Of gap.json; `failed` for a diagnosis that gave none."""
     named: tuple[str, ...]
     """Effects that the verdict names (`named_cause`); () where none is named."""
     named_right: bool
@@ -263,11 +260,3 @@ def means(trials: Sequence[TrialScore]) -> dict[str, float | None]:
         "seconds per diagnosis": [t.seconds for t in trials if t.seconds is not None],
     }
     return {name: float(np.mean(values)) if values else None for name, values in numbers.items()}
-
-
-def verdict_counts(trials: Sequence[TrialScore]) -> dict[str, dict[str, int]]:
-    """Number of trials by kind, as KIND_TITLES, and verdict, as VERDICTS."""
-    return {
-        kind: {verdict: sum(t.verdict == verdict for t in of_kind(trials, kind)) for verdict in VERDICTS}
-        for kind in KIND_TITLES
-    }

@@ -28,7 +28,7 @@ def trial_folder(out: Path, number: int) -> Path:
 
 
 def truth_label(
-    trial: Trial, gap: Mapping[str, float], single_gaps: Mapping[str, float], *, seed: int
+    trial: Trial, gap: float, single_gaps: Mapping[str, float], *, seed: int
 ) -> dict[str, Any]:
     """The content of sealed.json, JSON-ready.
 
@@ -51,7 +51,7 @@ def truth_label(
         "other_forms": list(trial.other_forms),
         "warmest_K": trial.winding_temperature_rise,
         "parameters": dict(trial.parameters),
-        "gap": dict(gap),
+        "gap": {"explainable": gap},
         "gap_alone": dict(single_gaps),
         "salt": salt,
     }
@@ -106,11 +106,9 @@ def _hash(folder: Path) -> str:
     return hashlib.sha256((folder / LABEL_FILE).read_bytes()).hexdigest()
 
 
-def _visible_causes(
-    trial: Trial, gap: Mapping[str, float], single_gaps: Mapping[str, float]
-) -> list[str]:
+def _visible_causes(trial: Trial, gap: float, single_gaps: Mapping[str, float]) -> list[str]:
     """Causes that leave a gap above the threshold; both of a pair that only together leave one."""
-    if gap["explainable"] < EXPLAINABLE_THRESHOLD:
+    if gap < EXPLAINABLE_THRESHOLD:
         return []
     causes = list(trial.causes)
     if trial.kind != TWO_EFFECTS:

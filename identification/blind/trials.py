@@ -146,7 +146,7 @@ def _single_gaps(trial: Trial, seed: int) -> dict[str, float]:
         return {}
     singles = {effect: trial.with_only(effect) for effect in trial.causes}
     return {
-        effect: explainable_gap(single, true_recordings(single, seed))["explainable"]
+        effect: explainable_gap(single, true_recordings(single, seed))
         for effect, single in singles.items()
     }
 

@@ -6,7 +6,7 @@ def label(kind="one", effects=("eddy_current",), visible=None, explainable=2.0, 
     return {
         "trial": trial, "kind": kind, "effects": list(effects),
         "visible": list(effects if visible is None else visible),
-        "gap": {"explainable": explainable, "recalibrated": explainable},
+        "gap": {"explainable": explainable},
     }  # fmt: skip
 
 

@@ -91,7 +91,7 @@ def test_some_trials_have_the_other_form_and_their_label_says_so(effect):
     assert 0.4 < np.mean([bool(forms) for forms in having]) < 0.6
     label = truth_label(
         next(trial for trial in drawn(effect) if trial.other_forms),
-        {"recalibrated": 2.0, "explainable": 2.0}, {}, seed=0,
+        2.0, {}, seed=0,
     )  # fmt: skip
     assert label["other_forms"] == [effect]
 
