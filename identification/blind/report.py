@@ -12,6 +12,7 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -65,9 +66,11 @@ def answers_by_trial(trials: Sequence[TrialScore]) -> dict[str, list[list[Answer
     return {name: [answers for answers in groups if answers] for name, groups in found.items()}
 
 
-def reliability(groups: Sequence[Sequence[Answer]]) -> list[dict[str, Any]]:
-    """Bins of equal width that hold an answer: mean `probability`, and `right` as `share` gives it."""
-    probability, right = _arrays(groups)
+def reliability(probability: NDArray, right: NDArray) -> list[dict[str, Any]]:
+    """Bins of equal width that hold an answer: mean `probability`, and `right` as `share` gives it.
+
+    probability, right: of each answer, (answers,).
+    """
     number = _bin(probability)
     return [
         {"probability": float(np.mean(probability[number == k])), "right": share(right[number == k])}
@@ -107,7 +110,7 @@ def results(trials: Sequence[TrialScore], *, seed: int, forms: str) -> dict[str,
         name: {
             "answers": sum(map(len, groups)),
             "error": calibration_error(groups),
-            "bins": reliability(groups) if groups else [],
+            "bins": reliability(*_arrays(groups)),
         }
         for name, groups in answers_by_trial(trials).items()
     }
@@ -157,16 +160,23 @@ def reliability_figure(calibration: dict[str, Any]) -> Figure:
     """Share that came true over the stated probability: of first causes, and of each effect."""
     figure = Figure(figsize=(8, 4), layout="constrained")
     for axes, name in zip(figure.subplots(1, 2, sharey=True), (FIRST, INCLUSION), strict=True):
-        axes.plot([0, 1], [0, 1], color="black", linestyle=":", label="calibrated")
-        for bin_ in calibration[name]["bins"]:
-            right, x = bin_["right"], bin_["probability"]
-            axes.plot([x, x], [right["low"], right["high"]], color="C0", marker="_")
-            axes.plot(x, right["value"], "C0o")
-            axes.annotate(str(right["of"]), (x, right["value"]), (5, 3), textcoords="offset points")
-        axes.set(title=name, xlabel="stated probability", xlim=(-0.03, 1.06), ylim=(-0.03, 1.06))
-        axes.grid(alpha=0.3)
-    figure.axes[0].set_ylabel("share that is true")
+        draw_reliability(axes, calibration[name]["bins"])
+        axes.set_title(name)
+    figure.axes[1].set_ylabel("")
     return figure
+
+
+def draw_reliability(axes: Axes, bins: Sequence[dict[str, Any]]) -> None:
+    """Draw the share that is true in each bin of `reliability`, with its interval and its answers."""
+    axes.plot([0, 1], [0, 1], color="black", linestyle=":")
+    for bin_ in bins:
+        right, x = bin_["right"], bin_["probability"]
+        axes.plot([x, x], [right["low"], right["high"]], color="C0", marker="_")
+        axes.plot(x, right["value"], "C0o")
+        axes.annotate(str(right["of"]), (x, right["value"]), (5, 3), textcoords="offset points")
+    axes.set(xlabel="stated probability", xlim=(-0.03, 1.06), ylim=(-0.03, 1.06))
+    axes.set_ylabel("share that is true")
+    axes.grid(alpha=0.3)
 
 
 def _bin(probability: NDArray) -> NDArray:

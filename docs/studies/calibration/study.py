@@ -14,19 +14,18 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from joblib import Parallel, delayed
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import log_softmax
-from scipy.stats import binomtest
 
 from docs.studies.common import PAGE, ROOT, fill, study_options, study_parser, table
 from epv_env.common.command_line import fail_clearly
 from epv_env.common.files import Journal, write_json
 from epv_env.common.results_folder import progress
+from identification.blind.report import draw_reliability, expected_calibration_error, reliability
 from identification.blind.sealing import LABEL_FILE
 from identification.blind.trials import REQUEST_FILE, generate_trial
 from identification.blind.truth import trial_plan
@@ -139,35 +138,6 @@ def left_out(trials: Mapping[str, dict[str, Any]]) -> dict[str, tuple[NDArray, N
     return found
 
 
-Bin = tuple[float, float, float, float, int]
-"""Mean probability, share that is right, ends of its interval, and number of statements."""
-
-
-def reliability(probabilities: NDArray, right: NDArray) -> list[Bin]:
-    """Of each tenth of the probabilities in which a statement lies."""
-    bins = np.minimum((10 * probabilities).astype(int), 9)
-    found = []
-    for own in np.unique(bins):
-        here = bins == own
-        k, n = int(np.sum(right[here])), int(np.sum(here))
-        interval = binomtest(k, n).proportion_ci(0.95)
-        found.append((float(np.mean(probabilities[here])), k / n, interval.low, interval.high, n))
-    return found
-
-
-def drawn(bins: Sequence[Bin]) -> Figure:
-    """Share of statements that are right over their probability."""
-    figure, axes = plt.subplots(figsize=(4.5, 4), layout="constrained")
-    stated, share, low, high, count = np.array(bins).T
-    axes.plot([0, 1], [0, 1], color="0.7")
-    axes.errorbar(stated, share, (share - low, high - share), fmt="o", capsize=3)
-    for x, y, n in zip(stated, share, count, strict=True):
-        axes.annotate(f"{n:.0f}", (x, y), xytext=(5, -10), textcoords="offset points", fontsize=8)
-    axes.set_xlabel("probability stated")
-    axes.set_ylabel("share that is true (95 % interval)")
-    return figure
-
-
 def rows(judged: Mapping[str, tuple[NDArray, NDArray]]) -> list[list[str]]:
     """Of each plant and strength, and of all: number of trials, share that is right, and error."""
     groups = {
@@ -177,7 +147,7 @@ def rows(judged: Mapping[str, tuple[NDArray, NDArray]]) -> list[list[str]]:
     for title, prefix in (groups | {"all": ""}).items():
         own = [each for name, each in judged.items() if name.startswith(prefix)]
         right = np.mean([true[np.argmax(p)] for p, true in own])
-        error = calibration_error(reliability(*together(own)))
+        error = expected_calibration_error(*together(own))
         found.append([title, f"{len(own)}", f"{100 * right:.0f} %", f"{error:.3f}"])
     return found
 
@@ -189,11 +159,6 @@ def together(judged: Iterable[tuple[NDArray, NDArray]]) -> tuple[NDArray, NDArra
     return np.array(probabilities), np.array(right)
 
 
-def calibration_error(bins: Sequence[Bin]) -> float:
-    """Mean distance of stated probability and share that is right, over the statements."""
-    return sum(n * abs(stated - share) for stated, share, *_, n in bins) / sum(n for *_, n in bins)
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study; returns the exit status."""
     options = study_options(study_parser(__doc__ or "", FOLDER), arguments)
@@ -202,7 +167,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     weights = dict(zip(FIGURES, fitted([*trials.values()]).round(2).tolist(), strict=True))
     write_json(options.out / "weights.json" if options.quick else WEIGHTS, {"weights": weights})
     judged = left_out(trials)
-    drawn(reliability(*together(judged.values()))).savefig(options.out / "reliability.png", dpi=120)
+    figure = Figure(figsize=(4.5, 4), layout="constrained")
+    draw_reliability(figure.subplots(), reliability(*together(judged.values())))
+    figure.savefig(options.out / "reliability.png", dpi=120)
     fill(
         options.out / PAGE,
         {

@@ -62,10 +62,12 @@ def test_the_interval_holds_the_error_and_draws_whole_trials():
 
 
 def test_a_reliability_bin_has_its_mean_and_its_share():
-    (bin_,) = reliability(groups([0.82, 0.88, 0.86], [1, 1, 0]))
+    (bin_,) = reliability(np.array([0.82, 0.88, 0.86]), np.array([1, 1, 0]))
     assert bin_["probability"] == pytest.approx(0.8533, abs=1e-4)
     assert (bin_["right"]["hits"], bin_["right"]["of"]) == (2, 3)
-    assert [b["right"]["of"] for b in reliability(groups([0.0, 0.1, 0.99, 1.0], [0] * 4))] == [1, 1, 2]
+    bins = reliability(np.array([0.0, 0.1, 0.99, 1.0]), np.zeros(4))
+    assert [b["right"]["of"] for b in bins] == [1, 1, 2]
+    assert reliability(np.zeros(0), np.zeros(0)) == []
 
 
 def test_a_named_cause_is_wrong_where_none_is_right_and_faint_inclusions_are_left_out():
