@@ -6,8 +6,9 @@ The guide is docs/how-to/use-your-recordings.md.
 import argparse
 from pathlib import Path
 
-from epv_env.common.command_line import NextStep, Number, add_out, add_plant, beside, plant_option
+from epv_env.common.command_line import NextStep, Number, add_out, add_plant
 from epv_env.plant.plantfile import load_plant
+from identification.commands import bench
 from identification.importing.import_campaign import (
     import_text,
     read_files,
@@ -76,8 +77,5 @@ def run(options: argparse.Namespace) -> None:
 
 
 def next_step(options: argparse.Namespace) -> NextStep | None:
-    """Calibrate the model on the campaign; None after a dry run, which says what to leave out."""
-    if options.dry_run:
-        return None
-    words = ("run", options.out, "--out", beside(options.out, "results"), *plant_option(options.plant))
-    return NextStep("to calibrate the model on these recordings", words)
+    """As after a bench; None after a dry run, which says what to leave out."""
+    return None if options.dry_run else bench.next_step(options)

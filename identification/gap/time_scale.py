@@ -12,9 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import correlate
-from scipy.stats import norm
 
 from identification.gap.plant import GreyBox
+from identification.gap.reading_noise import white_noise
 
 WIDENING = 1.25
 """Ratio of successive widths over which readings are averaged before their changes are taken [1]: fine
@@ -72,20 +72,9 @@ def _channel_scale(plant: GreyBox, channel: int) -> float | None:
             period = max(period, float(run.time[1] - run.time[0]))
     if not series:
         return None
-    noise = min(plant.channels[channel].known_noise, _apparent_noise(series))
+    noise = min(plant.channels[channel].known_noise, white_noise(series))
     lag = _correlation_lag(series, noise)
     return None if lag is None else lag * period * float(np.median(np.concatenate(spacings)))
-
-
-def _apparent_noise(series: Sequence[NDArray]) -> float:
-    """Standard deviation of white noise [SI] from third differences, which hardly see a smooth motion.
-
-    series: per run (readings,) [SI]. The median is not moved by the few that see a jump.
-    """
-    third = np.concatenate([np.diff(y, n=3) for y in series])
-    median = float(np.median(np.abs(third)))
-    weights = np.array([1.0, -3.0, 3.0, -1.0])
-    return median / float(norm.ppf(0.75)) / float(np.sqrt(weights @ weights))
 
 
 def _correlation_lag(series: Sequence[NDArray], noise: float) -> float | None:
