@@ -21,12 +21,8 @@ from identification.calibration.calibrate import Calibration
 from identification.calibration.problem import CalibrationProblem
 from identification.confidence.covariance import (
     EstimateCovariance,
-    bootstrap_moves,
     estimate_covariance,
 )
-
-BLOCKS_PER_LAG = 2
-"""Length of the bootstrap's blocks, relative to the lags over which residuals are correlated."""
 
 GRADIENT_STEP, HESSIAN_STEP = 1e-5, 1e-3
 """Changes of a scaled parameter for the gradient and the Hessian of the total error."""
@@ -103,8 +99,6 @@ class Confidence:
     estimate: NDArray
     """Least-squares estimate, scaled (k,)."""
     covariance: EstimateCovariance
-    bootstrap: NDArray
-    """Movements of the estimate under the block bootstrap (draws, k)."""
     nelder_mead: NDArray
     """The report's estimate, scaled (k,)."""
     report: ReportInterval
@@ -154,25 +148,17 @@ class Confidence:
 def assess_confidence(calibration: Calibration, *, seed: int = 0) -> Confidence:
     """Intervals of both estimates, the joint region, and the check of gradient and Hessian.
 
-    seed: of the noise drawn for the inputs and of the bootstrap.
+    seed: of the noise drawn for the inputs.
     """
     problem = calibration.problem
     misfit = problem.least_squares()
     z = calibration.best("least squares").z
     covariance = estimate_covariance(problem, misfit, z, seed=seed)
-    residuals, jacobians = misfit.linearised(z)
     simplex = calibration.best("Nelder-Mead")
     return Confidence(
         problem=problem,
         estimate=z,
         covariance=covariance,
-        bootstrap=bootstrap_moves(
-            residuals,
-            jacobians,
-            block=BLOCKS_PER_LAG * covariance.lags,
-            prior=problem.vector.prior(z)[1],
-            seed=seed,
-        ),
         nelder_mead=simplex.z,
         report=report_interval(problem, simplex.z, simplex.error),
         minimum=_minimum(problem, simplex.z),

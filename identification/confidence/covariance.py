@@ -6,9 +6,6 @@ of the sandwich H M H sums what neighbouring samples have in common (Newey & Wes
 that the model takes as known (U, p1) carry noise too, of which the residuals show nothing: its share is
 found by drawing that noise anew. What is known of the parameters before adds its
 information to J'W'WJ and, as one more reading each, to M.
-
-A block bootstrap checks the sandwich without its normality: the estimate is moved by one Gauss-Newton
-step under each draw's weights (Davidson & MacKinnon 1999), which needs no simulation.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,7 +16,6 @@ from numpy.typing import NDArray
 from statsmodels.stats.sandwich_covariance import S_hac_simple
 from statsmodels.tsa.stattools import acf
 
-from identification.block_bootstrap import block_sums, block_weights
 from identification.calibration.problem import CalibrationProblem, WeightedResiduals
 from identification.recordings.recording import OUTPUTS, Recording
 from identification.replay.model_inputs import ModelInputs, model_inputs
@@ -81,30 +77,6 @@ def estimate_covariance(
         inputs=inputs + _offset_share(problem, misfit, z, influence),
         lags=lags,
     )
-
-
-def bootstrap_moves(
-    residuals: Sequence[NDArray],
-    jacobians: Sequence[NDArray],
-    *,
-    block: int,
-    prior: NDArray | None = None,
-    seed: int = 0,
-) -> NDArray:
-    """Movements of the scaled estimate (draws, k), without unit, under random weights of blocks.
-
-    Args:
-        residuals: weighted, per recording (3 samples,).
-        jacobians: by the scaled parameters, per recording (3 samples, k).
-        block: length of the blocks [samples].
-        prior: derivatives (p, k) of what is known before, which no draw changes; None: nothing is.
-        seed: of the draws.
-    """
-    known = 0.0 if prior is None else prior.T @ prior
-    H = np.linalg.inv(sum(J.T @ J for J in jacobians) + known)
-    sums = [block_sums(scores.T, block) for scores in score_series(residuals, jacobians)]
-    weights = block_weights([len(blocks) for blocks in sums], seed)[1:]
-    return (weights - 1.0) @ np.vstack(sums) @ H
 
 
 def score_series(residuals: Sequence[NDArray], jacobians: Sequence[NDArray]) -> list[NDArray]:

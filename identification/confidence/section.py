@@ -123,7 +123,6 @@ def _deviations(confidence: Confidence) -> Table:
     parts = [
         np.sqrt(np.diag(covariance.independent)),
         np.sqrt(np.diag(covariance.residual)),
-        np.std(confidence.bootstrap, axis=0),
         np.sqrt(np.diag(covariance.inputs)),
         np.sqrt(np.diag(covariance.total)),
     ]
@@ -131,11 +130,11 @@ def _deviations(confidence: Confidence) -> Table:
         [symbol, *(f"{100 * part[i] / confidence.estimate[i]:.4f}" for part in parts)]
         for i, symbol in enumerate(confidence.problem.vector.symbols)
     ]
-    columns = ["Parameter", "independent", "sandwich", "block bootstrap", "inputs", "total"]
+    columns = ["Parameter", "independent", "sandwich", "inputs", "total"]
     caption = (
         f"Standard deviations [% of the estimate]: as if residuals were independent; from the residuals "
-        f"as they are, over {covariance.lags} samples; by block bootstrap; from the noise of U and p1 "
-        "and of the offsets; sandwich and inputs together."
+        f"as they are, over {covariance.lags} samples; from the noise of U and p1 and of the offsets; "
+        "sandwich and inputs together."
     )
     return Table(columns=columns, rows=rows, caption=caption)
 
@@ -170,7 +169,7 @@ def profiles(confidence: Confidence) -> Figure:
 
 
 def region(confidence: Confidence) -> Figure:
-    """The joint region seen along pairs of parameters, with the bootstrap and both estimates."""
+    """The joint region seen along pairs of parameters, with both estimates."""
     symbols = confidence.problem.vector.symbols
     pairs = list(combinations(range(len(symbols)), 2))
     figure = Figure(figsize=(9, 6), layout="constrained")
@@ -187,8 +186,6 @@ def _pair(axes: Axes, confidence: Confidence, pair: tuple[int, int]) -> None:
     covariance = confidence.covariance
     centre = confidence.estimate
     relative = 1e3 / centre[list(pair)]
-    cloud = confidence.bootstrap[::4, [i, j]] * relative
-    axes.plot(*cloud.T, ".", color="tab:gray", markersize=1.5, label="block bootstrap")
     for matrix, style, label in (
         (covariance.independent, "--", "independent residuals, exact inputs"),
         (covariance.total, "-", "joint 95 % region"),

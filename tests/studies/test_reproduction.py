@@ -35,7 +35,7 @@ def test_the_short_form_gives_the_published_tables(tmp_path):
     assert found["slips"] == PUBLISHED["slips"]
     for method, values in PUBLISHED["virtual_bench"]["table12"].items():
         assert found["virtual_bench"]["table12"][method] == pytest.approx(values, rel=1e-4)
-    assert {path.name for path in tmp_path.glob("*.png")} == {"calibration.png", "region.png"}
+    assert {path.name for path in tmp_path.glob("*.png")} == {"calibration.png"}
 
 
 def test_the_page_shows_the_published_results():

@@ -2,7 +2,7 @@
 
     python -m docs.studies.reproduction.study
 
-writes reproduce.json, two pictures and the tables of README.md. The report is SCL-001/2003. Its
+writes reproduce.json, a picture and the tables of README.md. The report is SCL-001/2003. Its
 recordings were never published: Tables 2 to 4 and 10 to 15 come from a virtual bench whose truth is
 Table 12.
 """
@@ -26,7 +26,6 @@ from identification.bench.programmes import REPORT_SUITE
 from identification.bench.session import run_bench
 from identification.calibration.calibrate import STARTS
 from identification.calibration.search import METHODS
-from identification.confidence.section import region
 from identification.pipeline.identification import Identification
 from identification.quality.assessment import assess_recording
 from identification.quality.section import as_json as quality_json
@@ -141,12 +140,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     results = reproduce(identification)
     write_json(options.out / "reproduce.json", results)
     fill(options.out / PAGE, page_parts(results))
-    pictures = {
-        "calibration.png": response_figure(identification.calibration.after[METHODS[0]][0]),
-        "region.png": region(identification.confidence),
-    }
-    for name, picture in pictures.items():
-        picture.savefig(options.out / name, dpi=100, bbox_inches="tight")
+    picture = response_figure(identification.calibration.after[METHODS[0]][0])
+    picture.savefig(options.out / "calibration.png", dpi=100, bbox_inches="tight")
     return 0
 
 

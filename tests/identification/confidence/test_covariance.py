@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from identification.calibration.search import weighted_least_squares
 from identification.confidence import covariance as stage
-from identification.confidence.covariance import bootstrap_moves, estimate_covariance
+from identification.confidence.covariance import estimate_covariance
 from tests.identification.confidence.results import twin_confidence
 from tests.identification.twins import TRUE, problem
 
@@ -67,21 +67,11 @@ def test_the_sandwich_knows_what_neighbours_have_in_common(covariance_of, phi):
     np.testing.assert_allclose(independent, (1 - phi) / (1 + phi), rtol=0.1)
 
 
-@pytest.mark.parametrize("phi", [0.8])
-def test_so_does_the_bootstrap_moves(covariance_of, phi):
-    misfit = coloured(phi)
-    lags = covariance_of(misfit).lags
-    moved = bootstrap_moves(*misfit.linearised(None), block=2 * lags, seed=1)
-    assert np.all(np.abs(np.mean(moved, axis=0)) < 0.1 * np.std(moved, axis=0))
-    np.testing.assert_allclose(np.var(moved, axis=0) / np.diag(known(misfit, phi)), 1.0, atol=0.25)
-
-
-def test_on_the_bench_all_three_agree():
+def test_on_the_bench_both_agree():
     """Its noise is white."""
     parts = twin_confidence().covariance
     sandwich = np.diag(parts.residual)
     np.testing.assert_allclose(np.diag(parts.independent), sandwich, rtol=0.3)
-    np.testing.assert_allclose(np.var(twin_confidence().bootstrap, axis=0), sandwich, rtol=0.3)
 
 
 def test_the_noise_of_the_inputs_adds_with_its_square(monkeypatch):
