@@ -50,7 +50,7 @@ def reproduce(identification: Identification) -> dict[str, Any]:
 
 
 def figure_checks() -> list[FigureCheck]:
-    """All checks in the order of the report's sections, those that hold included."""
+    """All checks in the order of the report's sections."""
     return [*noise_checks(), *parameter_checks(), *error_table_checks()]
 
 
