@@ -15,9 +15,7 @@ from identification.gap.gap_json import GAP as GAP_FILE
 from identification.gap.screened import sentences
 from identification.gap.sentences import verdict_sentence
 from identification.gap.verdict import AMBIGUOUS
-from identification.valve_gap import diagnose
-from identification.valve_gap.diagnose import diagnose_campaign
-from identification.valve_gap.operation import diagnose_log
+from identification.valve_gap import diagnose, operation
 from identification.valve_gap.rounds import Bench, extended_campaign, recorded, rounds
 
 ROUNDS = Number(int, 1, 100)
@@ -55,12 +53,12 @@ def run(options: argparse.Namespace) -> None:
     given = {"plant": options.plant, "without": options.without, "seed": options.seed}
     if options.rounds:
         bench = Bench(truth=load_plant(options.bench), seed=options.seed)
-        diagnose_all = partial(diagnose_campaign, **given)
+        diagnose_all = partial(diagnose.diagnose_campaign, **given)
         for each in rounds(options.campaign, options.out, options.rounds, bench, diagnose_all):
             print(f"{each.added} recordings added: ", end="")
             _say(each.found, options.out)
     else:
-        read = diagnose_log if options.logs else diagnose_campaign
+        read = operation.diagnose_log if options.logs else diagnose.diagnose_campaign
         _say(read(options.campaign, options.out, **given), options.out)
     written = (diagnose.REPORT, GAP_FILE, diagnose.PLANT)
     print(f"written: {', '.join(str(options.out / name) for name in written)}")
@@ -69,6 +67,8 @@ def run(options: argparse.Namespace) -> None:
 def next_step(options: argparse.Namespace) -> NextStep:
     """What the verdict in the folder of results asks for."""
     verdict = decoded(options.out / GAP_FILE, remedy="diagnose again")["verdict"]
+    if options.logs:
+        return operation.next_step(verdict, options.campaign, options.out, options.plant)
     if options.rounds and verdict == AMBIGUOUS:
         more = ("--rounds", options.rounds + 1, "--bench", options.bench, *plant_option(options.plant))
         return NextStep("for a further round", ("gap", options.campaign, "--out", options.out, *more))

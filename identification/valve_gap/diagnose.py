@@ -93,7 +93,7 @@ def next_step(verdict: str, campaign: Path, out: Path, plant: Path | None) -> Ne
     if verdict == UNKNOWN:
         purpose = "once the missing effect is in the catalogue (docs/extending.md)"
         return NextStep(purpose, ("gap", campaign, "--out", out, *given))
-    region = ("--plant", out / PLANT, "--parameters", "confidence")
+    region = ("--plant", out / PLANT, "--parameters", "diagnosis")
     return NextStep(
         "to train a policy for this plant", ("train", *region, "--out", beside(out, "policy"))
     )

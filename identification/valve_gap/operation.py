@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import softmax
 
+from epv_env.common.command_line import NextStep, plant_option
 from epv_env.common.files import Journal
 from epv_env.plant.plantfile import Plant, load_plant
 from identification.gap.diagnosis import Diagnosis, diagnose, rank_hypotheses
@@ -21,18 +22,18 @@ from identification.gap.gap_json import write_results
 from identification.gap.plant import NuisanceParameter
 from identification.gap.posterior import CHANCE_MISFIT, FIGURES, WEIGHTS
 from identification.gap.screened import Finding
-from identification.gap.verdict import NO_GAP, Ranking
+from identification.gap.verdict import AMBIGUOUS, NO_GAP, UNKNOWN, Ranking
 from identification.recordings.log_files import Log, read_log
 from identification.recordings.openings import drive_of, evenly, openings, start_of
 from identification.recordings.recording import OUTPUTS, Campaign, campaign_facts
 from identification.replay.replay import FLOW_RAMP, FLOW_SHIFT
 from identification.valve_gap.diagnose import (
     JOURNAL,
-    next_step,
     steps_on_stderr,
     subject,
     write_report,
 )
+from identification.valve_gap.diagnose import next_step as after_diagnosis
 from identification.valve_gap.valve import Valve
 
 FIT_WEIGHT = WEIGHTS[FIGURES.index("fit")]
@@ -80,6 +81,14 @@ def diagnose_log(
         write_report(found, valve, out, log.name, _facts(log, campaign), step)
     write_results(found, out, "", seconds=perf_counter() - began)
     return found
+
+
+def next_step(verdict: str, folder: Path, out: Path, plant: Path | None) -> NextStep:
+    """What to run after the diagnosis of a log; see `diagnose.next_step`."""
+    if verdict in (AMBIGUOUS, UNKNOWN):
+        again = ("gap", folder, "--logs", "--out", out, *plant_option(plant))
+        return NextStep("once more drives are logged", again)
+    return after_diagnosis(verdict, folder, out, plant)
 
 
 def _from_its_drive(valve: "LoggedValve", seed: int, cache: FitCache) -> Diagnosis:
