@@ -36,7 +36,7 @@ number of standard deviations [1] together."""
 STRAIGHT = 1.5
 """Scatter of p2 about a straight line, relative to its noise, up to which consumption is steady [1]."""
 
-OPENINGS_PER_DRIVE = 8
+OPENINGS_PER_DRIVE = 20
 """Openings of a drive that are compared, evenly over the drive."""
 
 HELD_OUT_EVERY = 3
