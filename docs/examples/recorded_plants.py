@@ -150,7 +150,6 @@ def cause(
     trials: tuple[float, ...],
     ends: tuple[float, float],
     nominal: float = 0.0,
-    prior: float = 1.0,
 ) -> Cause:
     """A cause with one size of the same name, which is `nominal` where the cause does not act."""
     low, high = ends
@@ -163,7 +162,7 @@ def cause(
         trials=trials,
         scale=abs(trials[0] - nominal),
     )
-    return Cause(name=name, component=component, parameters=(size,), prior=prior)
+    return Cause(name=name, component=component, parameters=(size,))
 
 
 def command(title: str, name: str, plant_of: Callable[[Path], OdePlant]) -> int:

@@ -61,11 +61,6 @@ def _silent(_: threading.ExceptHookArgs) -> None:
     """For threads that serve a pool and find its workers ended."""
 
 
-def ignore_interrupts() -> None:
-    """For worker processes: a Ctrl-C in the terminal reaches them too, and their parent ends them."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
 def fail_clearly(main: Callable[[], int]) -> int:
     """Run a command; a ValueError or OSError becomes one sentence on stderr and exit status 2.
 

@@ -15,7 +15,6 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from joblib import Parallel, delayed
 from epv_env.common.command_line import fail_clearly
-from epv_env.common.command_line import ignore_interrupts
 
 def work(path):
     open(os.path.join(path, str(os.getpid())), "w").close()
@@ -26,7 +25,7 @@ def with_joblib():
     return len(list(pool(delayed(work)(sys.argv[2]) for _ in range(4))))
 
 def with_futures():
-    with ProcessPoolExecutor(2, get_context("spawn"), initializer=ignore_interrupts) as pool:
+    with ProcessPoolExecutor(2, get_context("spawn")) as pool:
         return len(list(pool.map(work, [sys.argv[2]] * 4)))
 
 if __name__ == "__main__":

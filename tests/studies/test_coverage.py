@@ -26,7 +26,7 @@ def test_shares_are_those_of_known_distances():
 
 @pytest.mark.slow
 def test_the_short_form_writes_results_and_page(tmp_path):
-    assert main(["--quick", "--campaigns", "1", "--out", str(tmp_path)]) == 0
+    assert main(["--quick", "--out", str(tmp_path)]) == 0
     found = json.loads((tmp_path / "coverage.json").read_text(encoding="utf-8"))
     assert set(found) >= {"joint region", "interval of alphaMV"}
     assert "| joint region |" in (tmp_path / "README.md").read_text(encoding="utf-8")

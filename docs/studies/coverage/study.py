@@ -40,21 +40,17 @@ PROBABILITY = 0.95
 """Of the intervals and regions [-]."""
 
 
-def calibrated_campaigns(
-    journal: Path, *, campaigns: int, seed: int = 0, workers: int | None = None
-) -> list[dict[str, Any]]:
+def calibrated_campaigns(journal: Path, *, campaigns: int, seed: int) -> list[dict[str, Any]]:
     """Where the truth lies relative to the estimates of each campaign; see `calibrated`.
 
-    Campaign i has the same noise whatever the number of campaigns or workers.
+    Campaign i has the same noise whatever the number of campaigns.
     """
     subject = {"study": "coverage", "truth": dict(Parameters.calibrated()), "seed": seed}
     results = Journal(journal, subject)
     # One seed per campaign, not seed + index: neighbouring studies must not share campaigns.
     seeds = [int(np.random.SeedSequence([seed, i]).generate_state(1)[0]) for i in range(campaigns)]
     missing = [i for i in range(campaigns) if str(i) not in results]
-    with ProcessPoolExecutor(
-        workers or available_cores(), get_context("spawn"), threadpool_limits, (1,)
-    ) as pool:
+    with ProcessPoolExecutor(available_cores(), get_context("spawn"), threadpool_limits, (1,)) as pool:
         found = zip(missing, pool.map(calibrated, [seeds[i] for i in missing]), strict=True)
         for index, result in progress(found, what="coverage: campaigns", total=len(missing)):
             results.add(str(index), result)
@@ -142,10 +138,9 @@ def _squared_distance(deviation: NDArray, covariance: NDArray) -> float:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study; returns the exit status."""
     parser = study_parser(__doc__ or "", FOLDER)
-    parser.add_argument("--campaigns", type=int, help=f"default: {CAMPAIGNS}; {QUICK} with --quick")
     parser.add_argument("--seed", type=int, default=0, help="of the campaigns' noise")
     options = study_options(parser, arguments)
-    count = options.campaigns or (QUICK if options.quick else CAMPAIGNS)
+    count = QUICK if options.quick else CAMPAIGNS
     found = calibrated_campaigns(options.work / "coverage.jsonl", campaigns=count, seed=options.seed)
     shares = coverage(found)
     write_json(options.out / "coverage.json", shares)

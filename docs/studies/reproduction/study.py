@@ -129,14 +129,10 @@ def _errata(checks: Sequence[Mapping[str, str]]) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study; returns the exit status."""
-    parser = study_parser(__doc__ or "", FOLDER)
-    parser.add_argument("--seed", type=int, default=0, help="of the virtual bench's noise")
-    options = study_options(parser, arguments)
-    campaign = run_bench(REPORT_SUITE, Parameters.calibrated(), seed=options.seed)
+    options = study_options(study_parser(__doc__ or "", FOLDER), arguments)
+    campaign = run_bench(REPORT_SUITE, Parameters.calibrated(), seed=0)
     starts = 1 if options.quick else STARTS
-    identification = Identification(
-        campaign, options.work / "reproduce.jsonl", seed=options.seed, starts=starts
-    )
+    identification = Identification(campaign, options.work / "reproduce.jsonl", starts=starts)
     results = reproduce(identification)
     write_json(options.out / "reproduce.json", results)
     fill(options.out / PAGE, page_parts(results))
