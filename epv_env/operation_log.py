@@ -58,13 +58,13 @@ class OperationLog(gymnasium.Wrapper[NDArray, Any, NDArray, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray, dict[str, Any]]:
-        """Begin a drive; one that was going on is written."""
+        """Begin a drive; one that was going on is written. Returns the observation (entries,) [-]."""
         self._write()
         self._observation, info = self.env.reset(seed=seed, options=options)
         return self._observation, info
 
     def step(self, action: Any) -> tuple[NDArray, SupportsFloat, bool, bool, dict[str, Any]]:
-        """Record the readings and the command; write the drive where it ends."""
+        """Record readings and command; write the drive where it ends. Observation (entries,) [-]."""
         row = self._row(action)
         self._observation, reward, terminated, truncated, info = self.env.step(action)
         self._rows.append(row)

@@ -218,7 +218,7 @@ def _place(
 def fit_term(plant: WithTerm, estimate: Estimate, start: NDArray) -> Fitted:
     """A term fitted to the fitted runs by Gauss-Newton steps, each as long as it helps.
 
-    estimate: without the term. start: its tolerances and zeros [standard deviations].
+    estimate: without the term. start: its tolerances and zeros, (m,) [standard deviations].
     """
     problem = FittingProblem(plant)
     best = as_simulated(estimate, start)
@@ -255,7 +255,7 @@ def _slopes(problem: FittingProblem, estimate: Estimate) -> NuisanceSlopes:
 
 
 def as_simulated(estimate: Estimate, deviations: NDArray) -> Estimate:
-    """The estimate at these tolerances, which nothing moves: what a plant file holds."""
+    """The estimate at these tolerances (m,), which nothing moves: what a plant file holds."""
     assert estimate.slopes
     still = [np.zeros((len(own), len(deviations))) for own in estimate.slopes.offset_slopes]
     slopes = replace(estimate.slopes, deviations=deviations, tolerance_slopes=still)

@@ -38,7 +38,6 @@ def finished(campaign, tmp_path_factory):
     """A folder in which `run` has worked on it; with few valves, on which only the indices depend."""
     out = tmp_path_factory.mktemp("run")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sensitivity, "TRAJECTORIES", 4)
         patch.setattr(sensitivity, "SAMPLES", 16)
         said = StringIO()
         with redirect_stdout(said):

@@ -41,7 +41,9 @@ def ranked(disturbed: Campaign) -> Ranking:
 
 
 def test_pressures_in_steps_of_50_mbar_show_no_gap():
-    assert ranked(round_pressures(campaign(), 0.05)).no_cause > 0.9
+    found = ranked(round_pressures(campaign(), 0.05))
+    assert found.no_cause > found.unknown
+    assert max(found.inclusion.values()) < 0.05
 
 
 def test_a_slow_ripple_on_the_pressures_is_no_gap():
@@ -52,6 +54,5 @@ def test_a_true_effect_is_found_under_a_slow_ripple():
     assert ranked(rippled(campaign(G_eddy=4e-3))).inclusion["eddy_current"] > 0.9
 
 
-@pytest.mark.xfail(strict=True, reason="three recordings have too few blocks of ten correlations")
 def test_a_slow_ripple_on_three_recordings_is_no_gap():
     assert ranked(rippled(short_campaign())).no_cause > NO_CAUSE_DOUBT
