@@ -17,13 +17,14 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from controllers.monitor import MonitorModel
 from controllers.policy import TRAINED, load_policy
 from controllers.policy_files import WEIGHTS_FILE, read_contract
 from epv_env.common.command_line import COUNT, SECONDS, NextStep, beside, plant_option, writable_folder
 from epv_env.common.files import write_bytes
 from epv_env.plant.plantfile import Plant, load_plant
 from training.deploy import agreement as verdict
-from training.deploy import compiled
+from training.deploy import compiled, monitor_c
 from training.deploy.c_code import CODE, Export, checks, deployment_contract, sources
 from training.deploy.controller_c import ExportError
 from training.deploy.fmu.archive import fmu
@@ -34,7 +35,7 @@ PLANT = "plant"
 """What is exported in place of a policy's folder."""
 FILES = {
     *CODE, "policy.onnx", "contract.json", "states.csv", "states.h", "parity.c", "bench.c",
-    "report.json", "epv_policy.fmu",
+    "report.json", "epv_policy.fmu", *monitor_c.FILES,
 }  # fmt: skip
 """What the export of a policy consists of."""
 BUILT = {"parity", "bench"}
@@ -47,6 +48,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", dest="folder", type=writable_folder, required=True, help="folder to write"
     )
+    parser.add_argument("--monitor", type=Path, help="monitor.json of `epv monitor`: its C code, too")
     parser.add_argument("--fmu", action="store_true", help="an FMU of the policy, too")
     parser.add_argument(
         "--plant",
@@ -78,6 +80,8 @@ def run(options: argparse.Namespace) -> None:
     compiler = compiled.find_compiler(options.compiler)
     export = prepared(Path(options.what), load_plant(options.plant))
     files, report = verified(export, compiler, options.episodes, options.duration)
+    if options.monitor is not None:
+        files |= monitor_c.sources(MonitorModel.load(options.monitor), export.period)
     contract = deployment_contract(export)
     files["contract.json"] = json.dumps(contract, indent=1) + "\n"
     files["report.json"] = json.dumps(report, indent=1) + "\n"

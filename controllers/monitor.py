@@ -1,0 +1,318 @@
+"""A monitor beside any controller: the probability that the valve has changed, when, and what.
+
+It reads what a control unit reads. Every opening of the valve gives a few features. Their departure from
+what the identified plant shows, less the valve's own offset, is tested against the effects of the
+catalogue by a Shiryaev-Roberts statistic (docs/how-to/monitor-a-valve.md). Memory is bounded.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+from os import PathLike
+from typing import Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from epv_env.common.files import JSONFileError, read_json, write_json
+
+FORMAT = "epv-monitor/1"
+REMEDY = "make the monitor anew with `epv monitor`"
+
+BEFORE, AFTER = 8, 5
+"""Control periods with the coil on that an opening needs before and after."""
+SHORTEST, LONGEST = 9, 40
+"""Control periods with the coil off that it may have."""
+REST, FLAT = 0.3, 0.04
+"""Distance of p3 from p1, and range of p3 over five periods, below which the chamber rests [bar]."""
+RISE = 0.06
+"""Rise of p2 over its trend that tells that the valve is open [bar]: six times the noise."""
+SHUT = 5
+"""Control periods after the command in which the valve cannot be open yet."""
+CLIPPED = 4.0
+"""Standard deviations beyond which a departure counts no more: consumption may change in an opening."""
+MEMORY = 400
+"""Openings over which the valve's own offset is averaged: slow wear is followed."""
+BEFORE_START = 1.0
+"""Operation before the monitor starts in which a change may have happened [h]."""
+UNKNOWN = "unknown"
+"""Name of a change that no effect of the catalogue explains."""
+UNKNOWN_SHARE, UNKNOWN_SHIFT = 0.2, 4.0
+"""Its prior probability [-], and its size in each whitened feature [standard deviations]."""
+LEAST = 1e-300
+"""Shortest time [h]: its logarithm must stay a number."""
+STRENGTHS = (0.5, 1.0)
+"""Sizes of every effect that are tested, as shares of the model's."""
+
+FEATURES = (
+    "I_on", "I_off_1", "I_off_2", "I_on_1", "I_on_2", "I_on_3", "p3_rest", "p3_off_1", "p3_off_2",
+    "p3_vents_early", "p3_vents_late", "p3_opens", "time_opens", "p2_rise", "p2_rise_1", "p2_rise_2",
+    "p2_rise_whole", "p3_fills_1", "p3_fills_2", "p3_fills_late",
+)  # fmt: skip
+"""What `features` returns, in this order."""
+CONDITIONS = ("p1", "p2", "open", "U", "slope")
+"""Conditions of an opening: pressures [bar], periods open, voltage [V], slope of p2 [bar/period]."""
+QUADRATIC = 4
+"""Conditions from the first on, whose products count, too."""
+OPEN, KINKS = CONDITIONS.index("open"), (-0.5, 0.5, 1.5, 2.5)
+"""Times open at which the dependence on it changes: readings are few in a short opening [periods]."""
+TERMS = 1 + len(CONDITIONS) + QUADRATIC * (QUADRATIC + 1) // 2 + len(KINKS)
+LINEAR = 1 + QUADRATIC
+"""Terms on which the nominal plant's features depend, and the first of them: those of a shift."""
+
+
+@dataclass(frozen=True)
+class MonitorModel:
+    """What the monitor knows of the nominal plant and the catalogue, in whitened features."""
+
+    centre: NDArray
+    """Typical conditions (conditions,)."""
+    scale: NDArray
+    """Their spread (conditions,)."""
+    whiten: NDArray
+    """From features to whitened ones (features, features)."""
+    expected: NDArray
+    """Whitened features of the nominal plant by terms of the conditions (features, terms)."""
+    offset: NDArray
+    """Variance of a valve's own offset, in variances of one opening (features,)."""
+    effects: tuple[str, ...]
+    """Effect of each shift."""
+    components: tuple[str, ...]
+    """Component of each shift."""
+    shifts: NDArray
+    """Shift of the whitened features (shifts, features, LINEAR)."""
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write a JSON file."""
+        fields = {n: v.tolist() if isinstance(v, np.ndarray) else v for n, v in vars(self).items()}
+        write_json(path, {"format": FORMAT, **fields})
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> "MonitorModel":
+        """Read it. Raises JSONFileError."""
+        found = read_json(path, _File, version=FORMAT, remedy=REMEDY)
+        lists = msgspec.structs.asdict(found).items()
+        values: dict[str, Any] = {name: np.array(value) for name, value in lists}
+        values |= {"effects": tuple(found.effects), "components": tuple(found.components)}
+        try:
+            return cls(**values)
+        except ValueError as error:
+            raise JSONFileError(f"{path}: {error}: {REMEDY}") from None
+
+    def __post_init__(self) -> None:
+        """Raises ValueError for arrays that do not fit together."""
+        n, effects = len(FEATURES), len(self.effects)
+        shapes = {
+            "centre": (len(CONDITIONS),), "scale": (len(CONDITIONS),), "whiten": (n, n),
+            "expected": (n, TERMS), "offset": (n,), "shifts": (effects, n, LINEAR),
+        }  # fmt: skip
+        for name, shape in shapes.items():
+            if getattr(self, name).shape != shape:
+                raise ValueError(f"{name} has the shape {getattr(self, name).shape}, not {shape}")
+        if len(self.components) != effects:
+            raise ValueError(f"{len(self.components)} components for {effects} effects")
+
+
+class _File(msgspec.Struct):
+    centre: list[float]
+    scale: list[float]
+    whiten: list[list[float]]
+    expected: list[list[float]]
+    offset: list[float]
+    effects: list[str]
+    components: list[str]
+    shifts: list[list[list[float]]]
+
+
+def terms(model: MonitorModel, conditions: NDArray) -> NDArray:
+    """Terms of the conditions (..., conditions) on which features depend, (..., TERMS)."""
+    return polynomial(conditions, model.centre, model.scale)
+
+
+def polynomial(conditions: NDArray, centre: NDArray, scale: NDArray) -> NDArray:
+    """1, scaled conditions, products of the first QUADRATIC, and what `open` exceeds the KINKS by."""
+    x = (conditions - centre) / scale
+    rows, columns = np.triu_indices(QUADRATIC)
+    kinks = np.maximum(conditions[..., OPEN, None] - np.array(KINKS), 0.0)
+    return np.concatenate([np.ones_like(x[..., :1]), x, x[..., rows] * x[..., columns], kinks], axis=-1)
+
+
+def features(rows: NDArray) -> tuple[NDArray, NDArray] | None:
+    """Conditions and features of one opening; None where it does not open or was not at rest.
+
+    rows: (BEFORE + periods off + AFTER, 6) with coil, U [V], p1, p2, p3 [bar] and I [A].
+    """
+    U, p1, p2, p3, I = rows[:, 1:].T  # noqa: E741
+    i, j = BEFORE, len(rows) - AFTER
+    voltage, supply = U[i - 1], p1[:i].sum() / i
+    rest = p3[i - 4 : i + 1].sum() / 5
+    if abs(rest - supply) > REST or np.ptp(p3[i - 4 : i + 1]) > FLAT or p3[i + 1 : j].min() <= 0.0:
+        return None
+    n = i + SHUT
+    t = np.arange(len(rows)) - (n - 1) / 2
+    slope = t[:n] @ p2[:n] / (n * (n * n - 1) / 12)
+    trend = p2[:n].sum() / n + slope * t
+    rise = p2 - trend
+    above = rise > RISE
+    at = n + int(np.argmax(above[n : j + 3] & above[n + 1 : j + 4]))
+    if not (above[at] and above[at + 1]) or above[at - 1]:
+        return None
+    part = (RISE - rise[at - 1]) / (rise[at] - rise[at - 1])
+    opens = at - 1 + part
+    current = I / voltage
+    log = np.log(p3[[i + 1, i + 2, i + 5, i + 9]])
+    z = np.array(
+        [
+            current[i - 2 : i + 1].sum() / 3, *current[i + 1 : i + 3], *current[j + 1 : j + 4],
+            rest - supply, log[0] - np.log(rest), log[1] - np.log(rest), log[2] - log[1],
+            log[3] - log[2], p3[at - 1] + part * (p3[at] - p3[at - 1]), opens - i,
+            *rise[j : j + 3], rise[j + 3 : j + 5].sum() / 2, p3[j + 1] - p3[j], p3[j + 2] - p3[j + 1],
+            p3[j + 4] - p3[j + 2],
+        ]
+    )  # fmt: skip
+    return np.array([supply, trend[i], j - opens, voltage, slope]), z
+
+
+class Monitor:
+    """Follows one valve: `update` once a control period, beside whatever controller.
+
+    Attributes:
+        time: since the start [s].
+        probability: that something has changed, if changes are as frequent as the stated false alarms.
+        history: the latest (time [s], log odds [-]), for a plot.
+    """
+
+    def __init__(
+        self, model: MonitorModel, *, false_alarms_per_hour: float = 0.01, control_period: float = 5e-3
+    ):
+        """control_period: [s]. Raises ValueError for a rate that is not positive."""
+        if not false_alarms_per_hour > 0.0:
+            raise ValueError(f"false_alarms_per_hour = {false_alarms_per_hour:g}: give more than 0")
+        self.model, self.period, self.threshold = model, control_period, 1.0 / false_alarms_per_hour
+        self.history: deque[tuple[float, float]] = deque(maxlen=10_000)
+        self._rows: deque[tuple[float, ...]] = deque(maxlen=BEFORE + LONGEST + AFTER)
+        self._periods = self._on = self._off = 0
+        width = len(model.offset)
+        unknown = UNKNOWN_SHIFT * np.concatenate([np.eye(width), -np.eye(width)])
+        alone = np.zeros((2 * width, width, LINEAR))
+        alone[:, :, 0] = unknown
+        shifts = np.concatenate([share * model.shifts for share in STRENGTHS] + [alone])
+        self._names = [*model.effects * len(STRENGTHS), *(UNKNOWN,) * 2 * width]
+        self._parts = [*model.components * len(STRENGTHS), *(UNKNOWN,) * 2 * width]
+        # Every shift twice: it came before the start, where the offset hides it, or it comes later.
+        self._shifts = np.concatenate([shifts, shifts])
+        self._weights = np.tile(_weights(self._names), 2)
+        self._later = np.repeat([0.0, 1.0], len(shifts))
+        self.restart()
+
+    def restart(self) -> None:
+        """Believe that nothing has changed, and learn the valve's offset anew."""
+        self._mean, self._variance = np.zeros(len(self.model.offset)), self.model.offset.copy()
+        self._learnt = np.zeros(self._shifts.shape[:2])  # of each shift, by the mean
+        # logarithm of the Shiryaev-Roberts statistic of each shift [h]
+        self._log = np.log(np.maximum(BEFORE_START * (1.0 - self._later), LEAST))
+        self._since = np.zeros(len(self._later))
+        self._last = self.time
+
+    def pause(self) -> None:
+        """The control unit restarts or skips periods: openings do not reach across."""
+        self._rows.clear()
+        self._on = self._off = 0
+
+    @property
+    def time(self) -> float:
+        """Since the start [s]."""
+        return self._periods * self.period
+
+    @property
+    def log_odds(self) -> float:
+        """Natural logarithm of the odds that something has changed [-]."""
+        return float(np.logaddexp.reduce(self._log + np.log(self._weights)) - np.log(self.threshold))
+
+    @property
+    def probability(self) -> float:
+        """That something has changed [-]."""
+        return float(np.exp(-np.logaddexp(0.0, -self.log_odds)))
+
+    @property
+    def alarm(self) -> bool:
+        """Whether the statistic has passed the threshold of the stated rate."""
+        return self.log_odds > 0.0
+
+    @property
+    def onset(self) -> float:
+        """When it changed, if it did [s]; 0: before the start."""
+        return float(self._shares() @ self._since)
+
+    def hypotheses(self) -> tuple[NDArray, NDArray, NDArray, list[str]]:
+        """Of each hypothesis: shift, prior, 1 if it comes after the start, and its effect."""
+        return self._shifts, self._weights, self._later, self._names * 2
+
+    def causes(self) -> dict[str, float]:
+        """Probability of each effect, if something has changed, the likeliest first."""
+        return self._summed(self._names)
+
+    def components(self) -> dict[str, float]:
+        """The same by component."""
+        return self._summed(self._parts)
+
+    def update(self, coil: float, U: float, p1: float, p2: float, p3: float, I: float) -> None:  # noqa: E741
+        """Take in one control period: readings at its beginning, and the coil's command for it.
+
+        U: voltage of the energised coil [V]; pressures [bar absolute]; I [A].
+        """
+        self._periods += 1
+        self._rows.append((coil, U, p1, p2, p3, I))
+        if coil < 0.5:
+            if self._on:  # the command goes off: what came before decides whether the opening counts
+                self._off = 0 if self._on >= BEFORE else -LONGEST - 1
+            self._on = 0
+            self._off += 1
+            return
+        self._on += 1
+        if self._on == AFTER and SHORTEST <= self._off <= LONGEST:
+            last = BEFORE + self._off + AFTER
+            found = features(np.array(self._rows)[-last:])
+            if found is not None:
+                self.observe(*found)
+
+    def observe(self, conditions: NDArray, z: NDArray) -> None:
+        """Take in one opening: conditions (conditions,) and features (features,)."""
+        model, spread = self.model, 1.0 + self._variance
+        x = terms(model, conditions)
+        limit = CLIPPED * np.sqrt(spread)
+        found = model.whiten @ z - model.expected @ x - self._mean
+        shift = self._shifts @ x[:LINEAR] - self._learnt
+        far = [np.minimum(each**2, limit**2) for each in (found, found - shift)]
+        hours = self._later * (self.time - self._last) / 3600.0
+        prior = np.logaddexp(self._log, np.log(np.maximum(hours, LEAST)))
+        begun = hours * np.exp(-prior)
+        self._since += begun * (self.time - self._since)
+        self._log = prior + np.sum((far[0] - far[1]) / spread, axis=1) / 2
+        gain = self._variance / spread
+        self._learnt *= (1.0 - begun)[:, None]
+        self._learnt += gain * np.clip(shift, -limit, limit)
+        self._mean += gain * np.clip(found, -limit, limit)
+        self._variance = np.maximum(gain, 1.0 / MEMORY)
+        self._last = self.time
+        self.history.append((self.time, self.log_odds))
+
+    def _shares(self) -> NDArray:
+        """Probability of each shift, if something has changed."""
+        logs = self._log + np.log(self._weights)
+        return np.exp(logs - np.logaddexp.reduce(logs))
+
+    def _summed(self, names: list[str]) -> dict[str, float]:
+        sums = dict.fromkeys(names, 0.0)
+        for name, share in zip(names * 2, self._shares(), strict=True):
+            sums[name] += float(share)
+        return dict(sorted(sums.items(), key=lambda item: -item[1]))
+
+
+def _weights(names: list[str]) -> NDArray:
+    """Prior of each shift: UNKNOWN_SHARE for the unknown, the rest evenly over the effects."""
+    count = {name: names.count(name) for name in names}
+    known = len(count) - 1
+    return np.array(
+        [(UNKNOWN_SHARE if n == UNKNOWN else (1.0 - UNKNOWN_SHARE) / known) / count[n] for n in names]
+    )

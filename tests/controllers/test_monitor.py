@@ -1,0 +1,124 @@
+"""The monitor on white features, where its promises are closed forms; and on openings of the plant."""
+
+import ctypes
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controllers.hysteresis import Hysteresis
+from controllers.monitor import CONDITIONS, FEATURES, LINEAR, TERMS, Monitor, MonitorModel
+from epv_env.plant.plantfile import Plant
+from training.deploy.monitor_c import sources
+from training.monitoring import drives, openings
+
+N = len(FEATURES)
+PERIODS = 200
+"""Between openings."""
+
+
+def white_model() -> MonitorModel:
+    """Features that are white already; one effect shifts the first, another the second."""
+    shifts = np.zeros((2, N, LINEAR))
+    shifts[0, 0, 0] = shifts[1, 1, 0] = 2.0
+    return MonitorModel(
+        centre=np.zeros(len(CONDITIONS)), scale=np.ones(len(CONDITIONS)), whiten=np.eye(N),
+        expected=np.zeros((N, TERMS)), offset=np.ones(N), effects=("first", "second"),
+        components=("solenoid", "flow"), shifts=shifts,
+    )  # fmt: skip
+
+
+def observe(monitor: Monitor, z: np.ndarray) -> None:
+    """One opening after PERIODS."""
+    for _ in range(PERIODS):
+        monitor.update(1.0, 24.0, 11.0, 8.0, 11.0, 0.5)
+    monitor.observe(np.zeros(len(CONDITIONS)), z)
+
+
+def test_false_alarms_are_at_most_as_frequent_as_stated() -> None:
+    """On white features a Shiryaev-Roberts statistic with threshold A exceeds A once in A at most."""
+    rng, alarms, hours, rate = np.random.default_rng(0), 0, 0.0, 1.0
+    for _ in range(20):
+        monitor = Monitor(white_model(), false_alarms_per_hour=rate)
+        monitor._log[:] = -600.0  # nothing before the start
+        offset = rng.standard_normal(N)
+        monitor.period = 1.0
+        for _ in range(360):
+            monitor._periods += 36
+            monitor.observe(np.zeros(len(CONDITIONS)), offset + rng.standard_normal(N))
+            if monitor.alarm:
+                alarms += 1
+                monitor.restart()
+                monitor._log[:] = -600.0  # nothing before the start
+        hours += 3.6
+    assert alarms <= rate * hours + 3 * np.sqrt(rate * hours)
+
+
+def test_a_known_shift_is_found_dated_and_named() -> None:
+    rng, monitor = np.random.default_rng(1), Monitor(white_model())
+    for k in range(80):
+        shift = 2.0 * np.eye(N)[1] if k >= 50 else 0.0
+        observe(monitor, rng.standard_normal(N) + shift)
+        assert k >= 50 or not monitor.alarm
+    assert monitor.alarm
+    assert next(iter(monitor.causes())) == "second"
+    assert next(iter(monitor.components())) == "flow"
+    assert monitor.onset == pytest.approx(
+        50 * PERIODS * monitor.period, abs=3 * PERIODS * monitor.period
+    )
+
+
+def test_saved_and_loaded_is_the_same(tmp_path: Path) -> None:
+    model = white_model()
+    model.save(tmp_path / "monitor.json")
+    loaded = MonitorModel.load(tmp_path / "monitor.json")
+    for name, value in vars(model).items():
+        np.testing.assert_array_equal(getattr(loaded, name), value)
+
+
+def test_period_by_period_finds_the_openings_of_the_whole_drive() -> None:
+    plant = Plant.calibrated()
+    controller = Hysteresis(open_below=-0.3, shut_above=0.0)
+    drive = drives(plant, controller, [3], [plant.parameters], duration=10.0)[0]
+    seen: list[tuple[int, np.ndarray, np.ndarray]] = []
+
+    class Recorder(Monitor):
+        def observe(self, conditions: np.ndarray, z: np.ndarray) -> None:
+            seen.append((self._periods, conditions, z))
+
+    monitor = Recorder(white_model())
+    for row in drive.tolist():
+        monitor.update(*row)
+    whole = list(openings(drive))
+    assert len(whole) >= 3
+    for mine, theirs in zip(seen, whole, strict=True):
+        assert mine[0] == theirs[0]
+        np.testing.assert_array_equal(mine[1], theirs[1])
+        np.testing.assert_array_equal(mine[2], theirs[2])
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
+def test_c_code_says_what_python_says(tmp_path: Path) -> None:
+    plant = Plant.calibrated()
+    controller = Hysteresis(open_below=-0.3, shut_above=0.0)
+    drive = drives(plant, controller, [3], [plant.parameters], duration=10.0)[0]
+    model, monitor = white_model(), Monitor(white_model())
+    for name, text in sources(model, monitor.period).items():
+        (tmp_path / name).write_text(text)
+    build = ["cc", "-std=c99", "-Wall", "-Werror", "-O2", "-shared", "-fPIC", "-o", "m.so"]
+    subprocess.run([*build, "epv_monitor.c", "-lm"], cwd=tmp_path, check=True)
+    code = ctypes.CDLL(str(tmp_path / "m.so"))
+    code.epv_monitor_probability.restype = code.epv_monitor_causes.restype = ctypes.c_double
+    memory = ctypes.create_string_buffer(2**20)
+    code.epv_monitor_reset(memory)
+    for coil, *readings in drive.tolist():
+        monitor.update(coil, *readings)
+        code.epv_monitor_update(memory, int(coil), *map(ctypes.c_double, readings))
+    assert monitor.history
+    found = code.epv_monitor_probability(memory, ctypes.c_double(0.01))
+    assert found == pytest.approx(monitor.probability, rel=1e-9)
+    shares = (ctypes.c_double * 3)()
+    assert code.epv_monitor_causes(memory, shares) == pytest.approx(monitor.onset, rel=1e-9)
+    assert max(shares) == pytest.approx(max(monitor.causes().values()), rel=1e-9)

@@ -1,0 +1,103 @@
+"""Follow the operation log of a valve with a monitor: has it changed, when, and what.
+
+    epv monitor logs/valve-01 --plant runs/plant.json --out runs/monitor
+    epv monitor logs/valve-02 --model runs/monitor/monitor.json
+
+Without --model the plant is simulated first, with every effect of the catalogue, which takes minutes.
+"""
+
+import argparse
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+
+from controllers.monitor import Monitor, MonitorModel
+from epv_env.common.command_line import NextStep, add_out, add_plant, add_seed
+from epv_env.common.units import BAR
+from epv_env.plant.plantfile import load_plant
+from identification.recordings.log_files import Log, read_log
+from training.evaluation.plots import save_figure
+from training.monitoring import made
+
+MODEL, FIGURE = "monitor.json", "monitor.png"
+"""What is written."""
+LIKELY = 0.05
+"""Probability from which a cause is named."""
+QUICK = {"valves": 8}
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the log, the plant or its monitor, and where the results go."""
+    parser.add_argument("log", type=Path, help="folder with log.json (docs/reference/files.md)")
+    parser.add_argument("--model", type=Path, help=f"{MODEL} of an earlier call; default: made anew")
+    parser.add_argument(
+        "--false-alarms", type=float, default=0.01, help="per hour of operation (default: 0.01)"
+    )
+    parser.add_argument(
+        "--valves", type=int, default=48, help="simulated valves of the plant (default: 48)"
+    )
+    add_out(parser, "runs/monitor")
+    add_plant(parser, help="plant file of the identified valve; default: the report's calibration")
+    add_seed(parser, help="of the simulation")
+
+
+def run(options: argparse.Namespace) -> None:
+    """Write the monitor and its picture, and say what it found. Raises ValueError."""
+    log = read_log(options.log)
+    if options.model is None:
+        model = made(load_plant(options.plant), valves=options.valves, seed=options.seed)
+        model.save(options.out / MODEL)
+    else:
+        model = MonitorModel.load(options.model)
+    monitor = Monitor(model, false_alarms_per_hour=options.false_alarms, control_period=log.period)
+    ends = follow(monitor, log)
+    save_figure(picture(monitor, ends), options.out / FIGURE)
+    print(sentence(monitor))
+    print(f"written: {options.out / FIGURE}")
+
+
+def next_step(options: argparse.Namespace) -> NextStep:
+    """Diagnose the log."""
+    return NextStep("to find the cause and its size", ("gap", options.log, "--logs"))
+
+
+def follow(monitor: Monitor, log: Log) -> list[float]:
+    """Feed the drives in order; returns the time at each one's end [s]."""
+    ends = []
+    for drive in log.drives:
+        monitor.pause()
+        pressures = [each / BAR for each in (drive.p1, drive.p2, drive.p3)]
+        for row in np.column_stack([drive.coil, drive.U, *pressures, drive.I]).tolist():
+            monitor.update(*row)
+        ends.append(monitor.time)
+    return ends
+
+
+def sentence(monitor: Monitor) -> str:
+    """What the monitor says at the end."""
+    if not monitor.history:
+        return "No opening of the log can be used: the coil must have been on before, and p3 at p1."
+    if not monitor.alarm:
+        return f"Nothing has changed: probability {monitor.probability:.2g} that something has."
+    causes = [f"{name} {p:.2f}" for name, p in monitor.causes().items() if p >= LIKELY]
+    parts = [f"{name} {p:.2f}" for name, p in monitor.components().items() if p >= LIKELY]
+    return (
+        f"Something has changed (probability {monitor.probability:.4g}), at {monitor.onset:.0f} s. "
+        f"Effects: {', '.join(causes)}. Components: {', '.join(parts)}."
+    )
+
+
+def picture(monitor: Monitor, ends: list[float]) -> Figure:
+    """The statistic over time; lines where drives end."""
+    figure, axes = plt.subplots(figsize=(8, 3.5))
+    if monitor.history:
+        time, log_odds = np.array(monitor.history).T
+        axes.plot(time, log_odds / np.log(10.0), ".-")
+    axes.axhline(0.0, color="tab:red", label="alarm")
+    for end in ends:
+        axes.axvline(end, color="0.8")
+    axes.set(xlabel="time of operation [s]", ylabel="log10 of the odds of a change [-]")
+    axes.legend()
+    return figure

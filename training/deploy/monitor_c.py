@@ -1,0 +1,48 @@
+"""The C files of a monitor: the same decisions as controllers.monitor, in double precision."""
+
+from string import Template
+from typing import Any
+
+import numpy as np
+
+from controllers import monitor
+from controllers.monitor import CONDITIONS, FEATURES, Monitor, MonitorModel
+from training.deploy.c_code import TEMPLATES
+
+FILES = ("epv_monitor.h", "epv_monitor.c")
+"""What an export consists of."""
+CONSTANTS = {
+    name.lower(): getattr(monitor, name)
+    for name in (
+        "BEFORE", "AFTER", "SHORTEST", "LONGEST", "REST", "FLAT", "RISE", "SHUT", "CLIPPED", "MEMORY",
+        "BEFORE_START", "QUADRATIC", "LINEAR", "LEAST",
+    )
+}  # fmt: skip
+
+
+def sources(model: MonitorModel, control_period: float) -> dict[str, str]:
+    """The files by name; control_period: [s]."""
+    shifts, weights, later, names = Monitor(model).hypotheses()
+    effects = list(dict.fromkeys(names))
+    arrays = {
+        "centre": model.centre, "scale": model.scale, "whiten": model.whiten,
+        "expected": model.expected, "offset": model.offset, "shifts": shifts, "weights": weights,
+        "later": later, "kinks": np.array(monitor.KINKS),
+        "effect": np.array([effects.index(name) for name in names]),
+    }  # fmt: skip
+    numbers = {
+        "conditions": len(CONDITIONS), "kink_count": len(monitor.KINKS),
+        "terms": model.expected.shape[1], "features": len(FEATURES),
+        "count": len(shifts), "causes": len(effects), "period": control_period,
+        "rows": monitor.BEFORE + monitor.LONGEST + monitor.AFTER,
+    }  # fmt: skip
+    values = {name: braced(array.tolist()) for name, array in arrays.items()}
+    values["names"] = "{" + ", ".join(f'"{name}"' for name in effects) + "}"
+    texts = {name: repr(value) for name, value in (CONSTANTS | numbers).items()}
+    template = {name: Template((TEMPLATES / name).read_text(encoding="utf-8")) for name in FILES}
+    return {name: each.substitute(texts | values) for name, each in template.items()}
+
+
+def braced(value: Any) -> str:
+    """A nested list as a C initialiser."""
+    return "{" + ", ".join(map(braced, value)) + "}" if isinstance(value, list) else repr(value)

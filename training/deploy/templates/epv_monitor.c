@@ -1,0 +1,143 @@
+/* Monitor of an electro-pneumatic protection valve: see controllers/monitor.py. C99, no heap.
+ * Call epv_monitor_reset once, then epv_monitor_update once a control period. */
+#include "epv_monitor.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { N = EPV_FEATURES, H = EPV_SHIFTS, I0 = $before, LENGTH = EPV_ROWS };
+
+static const double CENTRE[$conditions] = $centre, SCALE[$conditions] = $scale;
+static const double WHITEN[N][N] = $whiten;
+static const double EXPECTED[N][$terms] = $expected;
+static const double KINKS[$kink_count] = $kinks;
+static const double OFFSET[N] = $offset;
+static const double SHIFT[H][N][$linear] = $shifts;
+static const double WEIGHT[H] = $weights, LATER[H] = $later;
+static const int EFFECT[H] = $effect;
+const char *const epv_monitor_effects[EPV_EFFECTS] = $names;
+
+static double least(double a, double b) { return a < b ? a : b; }
+static double most(double a, double b) { return a > b ? a : b; }
+
+/* log(exp(a) + exp(b)) */
+static double sum_log(double a, double b) { return most(a, b) + log1p(exp(-fabs(a - b))); }
+
+void epv_monitor_pause(epv_monitor *m) { m->on = m->off = 0; }
+
+void epv_monitor_reset(epv_monitor *m) {
+    memset(m, 0, sizeof *m);
+    for (int k = 0; k < N; k++) m->variance[k] = OFFSET[k];
+    for (int h = 0; h < H; h++) m->log[h] = log(most($before_start * (1.0 - LATER[h]), $least));
+}
+
+/* Conditions and features of the opening whose command went off at row i and on at row j of r. */
+static int features(const double (*r)[6], int rows, double *x, double *z) {
+    const int i = I0, j = rows - $after, n = i + $shut;
+    double supply = 0, rest = 0, slope = 0, mean = 0, level = 0, low = r[i][4], high = low, rise[LENGTH];
+    int at;
+    for (int k = 0; k < i; k++) supply += r[k][2] / i;
+    for (int k = i - 4; k <= i; k++) rest += r[k][4] / 5;
+    for (int k = i - 4; k <= i; k++) low = least(low, r[k][4]), high = most(high, r[k][4]);
+    for (int k = i - 2; k <= i; k++) level += r[k][5] / 3;
+    for (int k = i + 1; k < j; k++) if (r[k][4] <= 0.0) return 0;
+    if (fabs(rest - supply) > $rest || high - low > $flat) return 0;
+    for (int k = 0; k < n; k++) {
+        slope += (k - (n - 1) / 2.0) * r[k][3] / (n * (n * n - 1) / 12.0);
+        mean += r[k][3] / n;
+    }
+    for (int k = 0; k < rows; k++) rise[k] = r[k][3] - mean - slope * (k - (n - 1) / 2.0);
+    for (at = n; at <= j + 2; at++) if (rise[at] > $rise && rise[at + 1] > $rise) break;
+    if (at > j + 2) at = n;
+    if (!(rise[at] > $rise && rise[at + 1] > $rise) || rise[at - 1] > $rise) return 0;
+    const double part = ($rise - rise[at - 1]) / (rise[at] - rise[at - 1]), opens = at - 1 + part;
+    const double U = r[i - 1][1];
+    const double all[N] = {
+        level / U, r[i + 1][5] / U, r[i + 2][5] / U, r[j + 1][5] / U, r[j + 2][5] / U,
+        r[j + 3][5] / U, rest - supply, log(r[i + 1][4] / rest), log(r[i + 2][4] / rest),
+        log(r[i + 5][4] / r[i + 2][4]), log(r[i + 9][4] / r[i + 5][4]),
+        r[at - 1][4] + part * (r[at][4] - r[at - 1][4]), opens - i, rise[j], rise[j + 1], rise[j + 2],
+        (rise[j + 3] + rise[j + 4]) / 2, r[j + 1][4] - r[j][4], r[j + 2][4] - r[j + 1][4],
+        r[j + 4][4] - r[j + 2][4]};
+    const double c[$conditions] = {supply, mean + slope * (i - (n - 1) / 2.0), j - opens, U, slope};
+    memcpy(z, all, sizeof all);
+    x[0] = 1.0;
+    int next = 1 + $conditions;
+    for (int k = 0; k < $conditions; k++) x[1 + k] = (c[k] - CENTRE[k]) / SCALE[k];
+    for (int a = 1; a <= $quadratic; a++) for (int b = a; b <= $quadratic; b++) x[next++] = x[a] * x[b];
+    for (int k = 0; k < $kink_count; k++) x[next++] = most(j - opens - KINKS[k], 0.0);
+    return 1;
+}
+
+static void observe(epv_monitor *m, const double *x, const double *z) {
+    const double time = m->periods * $period, elapsed = (time - m->last) / 3600.0;
+    double found[N], spread[N];
+    for (int k = 0; k < N; k++) {
+        spread[k] = 1.0 + m->variance[k];
+        found[k] = -m->mean[k];
+        for (int l = 0; l < N; l++) found[k] += WHITEN[k][l] * z[l];
+        for (int l = 0; l < $terms; l++) found[k] -= EXPECTED[k][l] * x[l];
+    }
+    for (int h = 0; h < H; h++) {
+        const double hours = LATER[h] * elapsed, prior = sum_log(m->log[h], log(most(hours, $least)));
+        const double begun = hours * exp(-prior);
+        double ratio = 0.0;
+        for (int k = 0; k < N; k++) {
+            double shift = -m->learnt[h][k];
+            for (int l = 0; l < $linear; l++) shift += SHIFT[h][k][l] * x[l];
+            const double limit = $clipped * sqrt(spread[k]), far = found[k] - shift;
+            ratio += (least(found[k] * found[k], limit * limit) - least(far * far, limit * limit)) / spread[k];
+            m->learnt[h][k] = m->learnt[h][k] * (1.0 - begun)
+                            + m->variance[k] / spread[k] * most(-limit, least(limit, shift));
+        }
+        m->since[h] += begun * (time - m->since[h]);
+        m->log[h] = prior + ratio / 2;
+    }
+    for (int k = 0; k < N; k++) {
+        const double limit = $clipped * sqrt(spread[k]);
+        m->mean[k] += m->variance[k] / spread[k] * most(-limit, least(limit, found[k]));
+        m->variance[k] = most(m->variance[k] / spread[k], 1.0 / $memory);
+    }
+    m->last = time;
+}
+
+void epv_monitor_update(epv_monitor *m, int coil, double U, double p1, double p2, double p3, double I) {
+    const double row[6] = {coil, U, p1, p2, p3, I};
+    m->periods += 1;
+    memmove(m->rows[0], m->rows[1], sizeof m->rows - sizeof m->rows[0]);
+    memcpy(m->rows[LENGTH - 1], row, sizeof row);
+    if (!coil) {
+        if (m->on) m->off = m->on >= I0 ? 0 : -$longest - 1;
+        m->on = 0;
+        m->off += 1;
+        return;
+    }
+    m->on += 1;
+    if (m->on == $after && m->off >= $shortest && m->off <= $longest) {
+        double x[$terms], z[N];
+        const int rows = I0 + m->off + $after;
+        if (features((const double (*)[6])m->rows + LENGTH - rows, rows, x, z)) observe(m, x, z);
+    }
+}
+
+static double total(const epv_monitor *m) {
+    double sum = m->log[0] + log(WEIGHT[0]);
+    for (int h = 1; h < H; h++) sum = sum_log(sum, m->log[h] + log(WEIGHT[h]));
+    return sum;
+}
+
+double epv_monitor_probability(const epv_monitor *m, double false_alarms_per_hour) {
+    return 1.0 / (1.0 + exp(-log(false_alarms_per_hour) - total(m)));
+}
+
+double epv_monitor_causes(const epv_monitor *m, double *share) {
+    const double sum = total(m);
+    double onset = 0.0;
+    for (int e = 0; e < EPV_EFFECTS; e++) share[e] = 0.0;
+    for (int h = 0; h < H; h++) {
+        const double own = WEIGHT[h] * exp(m->log[h] - sum);
+        onset += own * m->since[h];
+        share[EFFECT[h]] += own;
+    }
+    return onset;
+}
