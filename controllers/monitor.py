@@ -125,12 +125,15 @@ class _File(msgspec.Struct):
 
 
 def terms(model: MonitorModel, conditions: NDArray) -> NDArray:
-    """Terms of the conditions (..., conditions) on which features depend, (..., TERMS)."""
+    """Terms (openings, TERMS) on which features depend, or (TERMS,): of conditions, as `polynomial`."""
     return polynomial(conditions, model.centre, model.scale)
 
 
 def polynomial(conditions: NDArray, centre: NDArray, scale: NDArray) -> NDArray:
-    """1, scaled conditions, products of the first QUADRATIC, and what `open` exceeds the KINKS by."""
+    """1, scaled conditions, products of the first QUADRATIC, and what `open` exceeds the KINKS by.
+
+    conditions: (openings, conditions) or (conditions,). Returns (openings, TERMS) or (TERMS,) [-].
+    """
     x = (conditions - centre) / scale
     rows, columns = np.triu_indices(QUADRATIC)
     kinks = np.maximum(conditions[..., OPEN, None] - np.array(KINKS), 0.0)
@@ -245,7 +248,7 @@ class Monitor:
         return float(self._shares() @ self._since)
 
     def hypotheses(self) -> tuple[NDArray, NDArray, NDArray, list[str]]:
-        """Of each hypothesis: shift, prior, 1 if it comes after the start, and its effect."""
+        """Of each: shift (hypotheses, features, LINEAR), prior, 1 if it comes later, and effect."""
         return self._shifts, self._weights, self._later, self._names * 2
 
     def causes(self) -> dict[str, float]:

@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 pytest.importorskip("torch")
 pytest.importorskip("statsmodels")
 
+from controllers.monitor import MonitorModel
 from controllers.policy import TRAINED
 from controllers.policy_files import CONTRACT_FILE, WEIGHTS_FILE, read_policy
 from epv_env.common.command_line import Number
@@ -28,6 +29,7 @@ from identification.bench.programmes import REPORT_SUITE, load_programmes, save_
 from identification.importing.mapping_file import read_mapping
 from identification.recordings.campaign_files import FILE_NAME, read_campaign, write_campaign
 from identification.recordings.columns import REQUIRED_COLUMNS, read_columns
+from tests.controllers.test_monitor import white_model
 from tests.identification.recordings.good_campaign import campaign_of, switching
 
 pytestmark = pytest.mark.training
@@ -123,6 +125,10 @@ FORMATS: dict[str, tuple[Callable[[Path], object], Callable[[Path], object]]] = 
     "recording.csv": (
         _table,
         lambda folder: read_columns("recording.csv", (folder / "recording.csv").read_bytes()),
+    ),
+    "monitor.json": (
+        lambda folder: white_model().save(folder / "monitor.json"),
+        lambda folder: MonitorModel.load(folder / "monitor.json"),
     ),
     "finished.jsonl": (_journal, lambda folder: Journal(folder / "finished.jsonl", {"seed": 0})),
 }

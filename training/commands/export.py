@@ -35,7 +35,7 @@ PLANT = "plant"
 """What is exported in place of a policy's folder."""
 FILES = {
     *CODE, "policy.onnx", "contract.json", "states.csv", "states.h", "parity.c", "bench.c",
-    "report.json", "epv_policy.fmu", *monitor_c.FILES,
+    "report.json", "epv_policy.fmu",
 }  # fmt: skip
 """What the export of a policy consists of."""
 BUILT = {"parity", "bench"}
@@ -155,7 +155,7 @@ def _write(folder: Path, files: dict[str, str]) -> None:
 def check_free(folder: Path) -> None:
     """Raises ExportError if the folder holds anything but the files of an earlier export."""
     there = {path.name for path in folder.iterdir()} if folder.exists() else set()
-    if foreign := sorted(there - FILES - BUILT):
+    if foreign := sorted(there - FILES - BUILT - {*monitor_c.FILES}):
         raise ExportError(
             f"{folder} holds {foreign[0]!r}, which no export writes: give --out a new or empty folder"
         )

@@ -14,7 +14,15 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from controllers.monitor import Monitor, MonitorModel
-from epv_env.common.command_line import NextStep, add_out, add_plant, add_seed
+from epv_env.common.command_line import (
+    NextStep,
+    Number,
+    add_out,
+    add_plant,
+    add_seed,
+    beside,
+    plant_option,
+)
 from epv_env.common.units import BAR
 from epv_env.plant.plantfile import load_plant
 from identification.recordings.log_files import Log, read_log
@@ -23,6 +31,7 @@ from training.monitoring import made
 
 MODEL, FIGURE = "monitor.json", "monitor.png"
 """What is written."""
+RATE, VALVES = Number(float, 1e-6, 100.0), Number(int, 2, 10_000)
 LIKELY = 0.05
 """Probability from which a cause is named."""
 QUICK = {"valves": 8}
@@ -33,10 +42,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("log", type=Path, help="folder with log.json (docs/reference/files.md)")
     parser.add_argument("--model", type=Path, help=f"{MODEL} of an earlier call; default: made anew")
     parser.add_argument(
-        "--false-alarms", type=float, default=0.01, help="per hour of operation (default: 0.01)"
+        "--false-alarms", type=RATE, default=0.01, help="per hour of operation (default: 0.01)"
     )
     parser.add_argument(
-        "--valves", type=int, default=48, help="simulated valves of the plant (default: 48)"
+        "--valves", type=VALVES, default=48, help="simulated valves of the plant (default: 48)"
     )
     add_out(parser, "runs/monitor")
     add_plant(parser, help="plant file of the identified valve; default: the report's calibration")
@@ -60,7 +69,15 @@ def run(options: argparse.Namespace) -> None:
 
 def next_step(options: argparse.Namespace) -> NextStep:
     """Diagnose the log."""
-    return NextStep("to find the cause and its size", ("gap", options.log, "--logs"))
+    words = (
+        "gap",
+        options.log,
+        "--logs",
+        "--out",
+        beside(options.out, "gap"),
+        *plant_option(options.plant),
+    )
+    return NextStep("to find the cause and its size", words)
 
 
 def follow(monitor: Monitor, log: Log) -> list[float]:
