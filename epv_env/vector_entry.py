@@ -11,26 +11,30 @@ def make_vector(
     environment: type[EPValveVectorEnv] | type[EPValvePWMVectorEnv],
     *,
     device: str = "cpu",
+    to_host: bool = False,
     **arguments: Any,
 ) -> Any:
     """The vector environment on the processor ("cpu") or on an NVIDIA accelerator ("cuda").
 
-    environment: EPValveVectorEnv or EPValvePWMVectorEnv. Raises OptionError.
+    environment: EPValveVectorEnv or EPValvePWMVectorEnv. to_host: whether results of an accelerator are
+    copied to NumPy's arrays, with infos as on the processor. Raises OptionError.
     """
     if device == "cpu":
         return environment(**arguments)
     if device != "cuda":
         raise OptionError(f"device = {shown(device)}: give 'cpu' or 'cuda'")
     from epv_env.device import vector_env  # compiles for an accelerator: of no use elsewhere
+    from epv_env.device.on_host import OnHost
 
-    return vector_env.ON_DEVICE[environment](**arguments)
+    made = vector_env.ON_DEVICE[environment](**arguments)
+    return OnHost(made) if to_host else made
 
 
 def make_on_off(**arguments: Any) -> Any:
-    """EPValve-v0 for `gymnasium.make_vec`; arguments as of EPValveVectorEnv, and `device`."""
+    """EPValve-v0 for `gymnasium.make_vec`; arguments as of EPValveVectorEnv, and `make_vector`."""
     return make_vector(EPValveVectorEnv, **arguments)
 
 
 def make_pwm(**arguments: Any) -> Any:
-    """EPValvePWM-v0 for `gymnasium.make_vec`; arguments as of EPValvePWMVectorEnv, and `device`."""
+    """EPValvePWM-v0 for `gymnasium.make_vec`; arguments as of EPValvePWMVectorEnv, and `make_vector`."""
     return make_vector(EPValvePWMVectorEnv, **arguments)

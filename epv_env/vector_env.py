@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from epv_env.actions import PWM, OnOff
 from epv_env.common.field_types import shown
 from epv_env.observation import observation_space
-from epv_env.result import KEYS, step_info, truth
+from epv_env.result import KEYS, StepResult, step_info, truth
 from epv_env.settings import as_plant, checked_options, make_settings, with_options
 from epv_env.signals import OptionError, as_seed, check_count, checked_flag
 from epv_env.task import LimitingTask
@@ -20,6 +20,29 @@ from epv_env.task import LimitingTask
 MOST_ENVS = 1_000_000
 """Valves of a batch: more are a slip, and would fill the memory."""
 _MASKS = tuple(f"_{key}" for key in KEYS)
+
+
+def masked_info(result: StepResult, valid: NDArray) -> dict[str, Any]:
+    """`step_info` with Gymnasium's masks; zeros where not valid (n,), in steps that begin an episode."""
+    infos = step_info(result)
+    if not valid.all():
+        infos = {key: np.where(valid, value, 0).astype(value.dtype) for key, value in infos.items()}
+    return infos | dict.fromkeys(_MASKS, valid)
+
+
+def keep_final(infos: dict[str, Any], observation: NDArray, ended: NDArray) -> None:
+    """Move what a step shows of the episodes that ended (n,) to "final_info" and "final_obs"."""
+    final = {key: value for key, value in infos.items() if not key.startswith("_")}
+    infos["final_obs"] = np.full(len(ended), None, dtype=object)
+    for i in np.flatnonzero(ended):
+        infos["final_obs"][i] = observation[i]
+    infos["final_info"] = {}
+    for key, value in final.items():
+        infos["final_info"][key] = np.where(ended, value, 0).astype(value.dtype)
+        infos["final_info"][f"_{key}"] = ended
+        infos[key] = np.where(ended, 0, value).astype(value.dtype)
+        infos[f"_{key}"] = ~ended
+    infos["_final_obs"] = infos["_final_info"] = ended
 
 
 class _ValveVectorEnv(gymnasium.vector.VectorEnv):
@@ -110,7 +133,6 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         observation, reward, terminated = result.observation, result.reward, result.failed
         limit = np.inf if self.max_episode_steps is None else self.max_episode_steps
         truncated = self.task.steps >= limit
-        infos: dict[str, Any] = step_info(result)
         valid = self._every.copy()
         if self.autoreset_mode is AutoresetMode.NEXT_STEP and self._some_done:
             observation = self._begin(np.flatnonzero(stale), {})
@@ -119,8 +141,7 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
                 for value in (reward, terminated, truncated)
             )
             valid = ~stale
-            infos = {key: np.where(stale, 0, value).astype(value.dtype) for key, value in infos.items()}
-        infos |= dict.fromkeys(_MASKS, valid)
+        infos = masked_info(result, valid)
         self._done = terminated | truncated
         self._some_done = bool(self._done.any())
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._some_done:
@@ -137,21 +158,10 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
     def _restart(self, observation: NDArray, infos: dict[str, Any]) -> NDArray:
         """Begin the ended episodes anew within the step that ended them."""
         ended = self._done
-        final = {key: value for key, value in infos.items() if not key.startswith("_")}
-        infos["final_obs"] = np.full(self.num_envs, None, dtype=object)
-        for i in np.flatnonzero(ended):
-            infos["final_obs"][i] = observation[i]
-        infos["final_info"] = {}
-        for key, value in final.items():
-            infos["final_info"][key] = np.where(ended, value, 0).astype(value.dtype)
-            infos["final_info"][f"_{key}"] = ended
-            infos[key] = np.where(ended, 0, value).astype(value.dtype)
-            infos[f"_{key}"] = ~ended
+        keep_final(infos, observation, ended)
         for key, value in self._truth().items():
             infos["final_info"][key] = ended if key.startswith("_") else value
-        infos["_final_obs"] = infos["_final_info"] = ended
-        observation = self._begin(np.flatnonzero(ended), {})
-        return observation
+        return self._begin(np.flatnonzero(ended), {})
 
     def _begin(self, where: NDArray, options: dict[str, Any]) -> NDArray:
         """Start the episodes at `where` and return all observations."""

@@ -150,7 +150,7 @@ def step_kernel(rule: Callable[..., Any], extended: bool) -> Any:
     """
 
     @cuda.jit
-    def step(b, r, rules, actions, slots, key, limit, longest):
+    def step(b, r, rules, actions, slots, key, limits, longest):
         i = cuda.grid(1)  # type: ignore[call-arg]
         if i >= len(b.episodes) or b.with_effects[i] != extended or r.begun[i]:
             return
@@ -176,7 +176,7 @@ def step_kernel(rule: Callable[..., Any], extended: bool) -> Any:
         end_period(b.episodes, rules, r.noise, b.state, r.before, r.lowest, r.highest, b.sensors,
                    r.figures, r.observation, i, i + 1)  # fmt: skip
         r.reward[i] = r.figures[REWARD, i] if valid else math.nan
-        r.terminated[i], r.truncated[i] = r.figures[FAILED, i] != 0.0, e.steps >= limit
+        r.terminated[i], r.truncated[i] = r.figures[FAILED, i] != 0.0, e.steps >= limits[i]
         r.ended[i] = r.terminated[i] or r.truncated[i]
 
     return step

@@ -25,14 +25,24 @@ UNLIMITED = 2**62
 """Steps of an episode that nothing truncates."""
 
 
+def check_available() -> None:
+    """Raises OptionError unless there is an accelerator, and the packages that use it."""
+    if not cuda.is_available():
+        raise OptionError(
+            'device "cuda" needs an NVIDIA accelerator with its driver, and numba-cuda: '
+            f"{how_to_install('gpu')}"
+        )
+
+
 class _DeviceVectorEnv(_ValveVectorEnv):
     """n valves on an accelerator, by the functions of the CPU's environment.
 
     Actions may be arrays of the device (anything with `__cuda_array_interface__`, such as torch's
     tensors) or of the host. Observations (n, entries), rewards, terminated and truncated (n,) are arrays
     of the device. torch reads them without a copy: `torch.as_tensor(observation, device="cuda")`. The
-    next step overwrites them. The only info is "figures", (N_FIGURE, n), whose rows epv_env/result.py
-    names. SAME_STEP adds "final_obs" (n, entries), valid where an episode ended ("_final_obs").
+    next step overwrites them. Infos are "figures", (N_FIGURE, n), whose rows epv_env/result.py names,
+    and "begun" (n,): an episode began instead of the step. SAME_STEP adds "final_obs" (n, entries),
+    valid where an episode ended ("_final_obs").
 
     In reset the host draws the starts of episodes: those of the CPU's sub-environments with the same
     seeds. Valve i begins with start i, modulo their number; later episodes begin with any of them, drawn
@@ -48,11 +58,7 @@ class _DeviceVectorEnv(_ValveVectorEnv):
     """By whether effects are compiled in."""
 
     def __init__(self, num_envs: int = 1, *, starts: int = 4096, **arguments: Any):
-        if not cuda.is_available():
-            raise OptionError(
-                'device="cuda" needs an NVIDIA accelerator with its driver, and numba-cuda: '
-                f"{how_to_install('gpu')}"
-            )
+        check_available()
         check_count("starts", starts)
         self._most_starts = starts
         super().__init__(num_envs, **arguments)
@@ -60,9 +66,8 @@ class _DeviceVectorEnv(_ValveVectorEnv):
             raise OptionError(
                 "on a device, autoreset_mode is NextStep or SameStep, and privileged False"
             )
-        if self.max_episode_steps is not None:
-            check_count("max_episode_steps", self.max_episode_steps)
-        self._limit = self.max_episode_steps or UNLIMITED
+        limit = UNLIMITED if self.max_episode_steps is None else self.max_episode_steps
+        self._limits = cuda.to_device(np.full(num_envs, limit, dtype=np.int64))
         self._rules = cuda.to_device(rules_of(self.settings))
         self._key = np.uint64(0)
         self._results = _on_device(blank_results(num_envs))
@@ -101,8 +106,8 @@ class _DeviceVectorEnv(_ValveVectorEnv):
             self._begin_ended(instead=True)
         for extended in (False, True)[: 1 + self._with_effects]:
             self._launch(self.step_kernels[extended], self._batch, r, self._rules, asked,
-                         self.action.slots, self._key, self._limit, self.task.valves.step)  # fmt: skip
-        infos = {"figures": r.figures}
+                         self.action.slots, self._key, self._limits, self.task.valves.step)  # fmt: skip
+        infos = {"figures": r.figures, "begun": r.begun}
         if same:
             self._begin_ended(instead=False)
             infos |= {"final_obs": r.final_observation, "_final_obs": r.ended}

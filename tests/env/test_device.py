@@ -24,37 +24,48 @@ from epv_env.period import rules_of
 from epv_env.signals import OptionError
 
 N, PERIODS = 4, 12
+LIMITS = [PERIODS] * (N - 1) + [2 * PERIODS]  # the last valve goes on
 WITHIN = 1e-4  # Pa, that is 1e-6 mbar
 WORN = {"worn": 1.0, "delayed": 1.0, "vented": 0.5, "target_steps": 1.0}
 CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "ordinary": ("EPValve-v0", {}),
-    "effects, delay and duty": ("EPValvePWM-v0", {"conditions": WORN}),
+    "effects, delay and duty": ("EPValvePWM-v0", {"conditions": WORN, "autoreset_mode": "SameStep"}),
 }
+
+
+NAMES = ("p2", "observation", "reward", "terminated", "truncated", "deviation", "shown")
 
 
 def made(case: str, device: str) -> Any:
     identifier, options = CASES[case]
-    options = {"sensor_noise": 0.0, "max_episode_steps": PERIODS, **options}
-    return gymnasium.make_vec(identifier, num_envs=N, device=device, **options)
+    options = {"sensor_noise": 0.0, "max_episode_steps": LIMITS, **options}
+    return gymnasium.make_vec(identifier, num_envs=N, device=device, to_host=True, **options)
 
 
-def on_host(array: Any) -> np.ndarray:
-    return np.array(array.copy_to_host() if hasattr(array, "copy_to_host") else array)
+def state_of(envs: Any) -> np.ndarray:
+    """The true state, (N_STATE, n) [SI]."""
+    batch = getattr(envs.unwrapped, "_batch", None)
+    return batch.state.copy_to_host() if batch else np.array(envs.task.valves.tables.state)
+
+
+def final_of(infos: dict[str, Any]) -> np.ndarray:
+    """The figures and the last observation of the episodes that ended, (n - 1, all)."""
+    figures = np.array([value for _, value in sorted(infos["final_info"].items())], dtype=float)
+    return np.column_stack([figures[:, :-1].T, np.stack(infos["final_obs"][:-1])])
 
 
 def rollout(case: str, device: str) -> dict[str, np.ndarray]:
-    """p2 [Pa], observations and rewards of N random episodes and of the first step after them."""
-    envs, rng, found = made(case, device), np.random.default_rng(0), []
-    observation, _ = envs.reset(seed=3)
-    first = on_host(observation)
+    """p2 [Pa] and what steps give, N random episodes and a step more; "final" in SAME_STEP."""
+    envs, rng, found, more = made(case, device), np.random.default_rng(0), [], {}
+    more["first"], _ = envs.reset(seed=3)
     for period in range(PERIODS + 1):
         random = rng.random(N) * (period > 3)  # off until the valves open
-        actions = random > 0.5 if envs.action_form is OnOff else 2.0 * random[:, None] - 1.0
-        observation, reward, *ends, _ = envs.step(actions)
-        state = on_host(envs._batch.state) if device == "cuda" else envs.task.valves.tables.state
-        found.append((state[0, :N].copy(), on_host(observation), on_host(reward), *map(on_host, ends)))
-    names = ("p2", "observation", "reward", "terminated", "truncated")
-    return dict(zip(names, map(np.array, zip(*found, strict=True)), strict=True)) | {"first": first}
+        actions = random > 0.5 if envs.unwrapped.action_form is OnOff else 2.0 * random[:, None] - 1.0
+        *given, infos = envs.step(actions)
+        found.append((state_of(envs)[0, :N], *given, infos["deviation_bar"], infos["_deviation_bar"]))
+        if "final_info" in infos:
+            more["final"] = final_of(infos)
+    return dict(zip(NAMES, map(np.array, zip(*found, strict=True)), strict=True)) | more
 
 
 def simulated(folder: Any, case: str) -> dict[str, np.ndarray]:
@@ -69,14 +80,21 @@ def simulated(folder: Any, case: str) -> dict[str, np.ndarray]:
 def test_a_simulated_device_agrees_with_the_cpu(case, tmp_path):
     device, cpu = simulated(tmp_path, case), rollout(case, "cpu")
     assert np.ptp(cpu["p2"], axis=0).max() > 2e4  # a valve opened
-    np.testing.assert_allclose(device["p2"][:PERIODS], cpu["p2"][:PERIODS], rtol=0, atol=WITHIN)
+    same_step = "final" in cpu
+    anew = PERIODS - same_step  # the step that shows new episodes
+    np.testing.assert_allclose(device["p2"][:anew], cpu["p2"][:anew], rtol=0, atol=WITHIN)
+    np.testing.assert_allclose(
+        device["observation"][:anew], cpu["observation"][:anew], rtol=0, atol=1e-6
+    )
     np.testing.assert_array_equal(device["first"], cpu["first"])
-    for name in ("observation", "reward", "terminated", "truncated"):
-        np.testing.assert_allclose(device[name][:PERIODS], cpu[name][:PERIODS], rtol=0, atol=1e-6)
-    assert np.all(device["truncated"][PERIODS - 1])
-    assert not np.any(device["truncated"][PERIODS] | (device["reward"][PERIODS] != 0))
-    anew = device["observation"][PERIODS]  # every one is the beginning of a start
-    assert all(np.any(np.all(each == device["first"], axis=1)) for each in anew)
+    for name in ("reward", "terminated", "truncated", "deviation", "shown"):
+        until = PERIODS if same_step else PERIODS + 1
+        np.testing.assert_allclose(device[name][:until], cpu[name][:until], rtol=0, atol=1e-6)
+    np.testing.assert_array_equal(device["truncated"][PERIODS - 1], [True] * (N - 1) + [False])
+    if same_step:
+        np.testing.assert_allclose(device["final"], cpu["final"], rtol=0, atol=1e-6)
+    for each in device["observation"][anew][:-1]:  # the beginning of a start
+        assert np.any(np.all(each == device["first"], axis=1))
 
 
 def test_random_numbers_are_those_of_the_published_generator():
@@ -100,9 +118,18 @@ def test_the_kernels_compile_for_an_accelerator(extended, monkeypatch):
     monkeypatch.setattr(dispatcher, "get_current_device", lambda: h100)  # needs no driver then
     task = made("ordinary", "cpu").task
     b, r = Batch(*(task.memory[name] for name in Batch._fields)), blank_results(task.n)
-    key, actions = np.uint64(1), np.zeros(task.n)
+    key, actions, limits = np.uint64(1), np.zeros(task.n), np.zeros(task.n, dtype=np.int64)
     arguments = {
-        step_kernel(OnOff.rule, extended): (b, r, rules_of(task.settings), actions, 1, key, 1, 2e-4),
+        step_kernel(OnOff.rule, extended): (
+            b,
+            r,
+            rules_of(task.settings),
+            actions,
+            1,
+            key,
+            limits,
+            2e-4,
+        ),
         restart: (b, b, r, key, True),
     }
     for kernel, values in arguments.items():

@@ -54,7 +54,7 @@ LEFT_OUT = "hysteresis"
 """Not in the verdict's table, which has six rows: it is far worse than the others."""
 RIVAL = "pulse, adaptive"
 """Whom the verdict sets the policy against: the best classic controller."""
-SAME_WHEN_RESUMED = ("seed", "plant", "scenario", "parameters", "switching_price")
+SAME_WHEN_RESUMED = ("seed", "plant", "scenario", "parameters", "switching_price", "device")
 """Options that a resumed training must share with its beginning."""
 OWN = (
     CONTRACT_FILE, WEIGHTS_FILE, CONFIG, "validation.csv", "comparison.csv", "comparison.png",
@@ -80,6 +80,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--switching-price", type=Number(float, 0.0, 1000.0), default=RewardWeights().switching,
         help="reward's price of one switching of the coil: trades wear against breakdown",
     )  # fmt: skip
+    parser.add_argument(
+        "--device", choices=("cpu", "cuda"), default="cpu",
+        help="of rollout and update: the processor, or an NVIDIA accelerator (extra gpu)",
+    )  # fmt: skip
     again = parser.add_mutually_exclusive_group()
     again.add_argument("--resume", action="store_true", help="go on from the folder's checkpoint")
     again.add_argument(
@@ -96,6 +100,10 @@ def run(options: argparse.Namespace) -> None:
     as_region(options.parameters, plant)  # refuses one that the plant does not have
     check_scenario(options.scenario)
     weights = RewardWeights(switching=options.switching_price)
+    if options.device == "cuda":
+        from training.learners.ppo import check_accelerator
+
+        check_accelerator()
     begin_folder(options)
     write_options(options.out, configuration(options, plant))
 
@@ -106,7 +114,7 @@ def run(options: argparse.Namespace) -> None:
     provenance = {"plant": plant.name, "switching_price": options.switching_price}
     validations = train(
         task, options.out, seed=options.seed, timesteps=options.timesteps, resume=options.resume,
-        provenance=provenance, **shorter,
+        provenance=provenance, device=options.device, **shorter,
     )  # fmt: skip
     save_figure(learning_curve(validations), options.out / "learning_curve.png")
     print(verdict(options, plant, weights))
