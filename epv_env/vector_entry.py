@@ -7,6 +7,17 @@ from epv_env.signals import OptionError
 from epv_env.vector_env import EPValvePWMVectorEnv, EPValveVectorEnv
 
 
+def check_device(device: str) -> None:
+    """Raises OptionError unless the device is "cpu", or "cuda" and there is an accelerator."""
+    if device == "cpu":
+        return
+    if device != "cuda":
+        raise OptionError(f"device = {shown(device)}: give 'cpu' or 'cuda'")
+    from epv_env.device.vector_env import check_available
+
+    check_available()
+
+
 def make_vector(
     environment: type[EPValveVectorEnv] | type[EPValvePWMVectorEnv],
     *,
@@ -21,8 +32,7 @@ def make_vector(
     """
     if device == "cpu":
         return environment(**arguments)
-    if device != "cuda":
-        raise OptionError(f"device = {shown(device)}: give 'cpu' or 'cuda'")
+    check_device(device)
     from epv_env.device import vector_env  # compiles for an accelerator: of no use elsewhere
     from epv_env.device.on_host import OnHost
 

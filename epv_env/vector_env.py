@@ -129,7 +129,7 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
                 f"sub-environment {np.flatnonzero(stale)[0]} has ended: reset it with "
                 "options={'reset_mask': mask} before the next step"
             )
-        result = self.task.step(*self.action.decode(actions))
+        result = self.advance(actions)
         observation, reward, terminated = result.observation, result.reward, result.failed
         limit = np.inf if self.max_episode_steps is None else self.max_episode_steps
         truncated = self.task.steps >= limit
@@ -147,6 +147,15 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._some_done:
             observation = self._restart(observation, infos)
         return observation, reward, terminated, truncated, infos | self._truth()
+
+    def advance(self, actions: NDArray) -> StepResult:
+        """One control period of every valve (n,), whether its episode has ended or not."""
+        return self.task.step(*self.action.decode(actions))
+
+    @property
+    def coil_energy(self) -> NDArray:
+        """Electrical energy of each coil so far, (n,) [J]."""
+        return self.task.valves.state.coil_energy
 
     def _truth(self) -> dict[str, Any]:
         """The privileged entries of info, if they are shown; they belong to the observations shown."""

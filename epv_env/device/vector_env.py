@@ -12,6 +12,7 @@ from epv_env.common.extras import how_to_install
 from epv_env.device.kernels import THREADS, Batch, Results, restart, step_kernel
 from epv_env.observation import LAYOUT
 from epv_env.period import rules_of
+from epv_env.plant.equations import State
 from epv_env.plant.lanes import N_INPUT, N_STATE
 from epv_env.result import N_FIGURE
 from epv_env.settings import checked_options
@@ -23,6 +24,8 @@ SIMULATED = bool(getattr(config, "ENABLE_CUDASIM", False))
 
 UNLIMITED = 2**62
 """Steps of an episode that nothing truncates."""
+
+_COIL_ENERGY = State._fields.index("coil_energy")
 
 
 def check_available() -> None:
@@ -50,7 +53,8 @@ class _DeviceVectorEnv(_ValveVectorEnv):
     on the same device.
 
     An action outside the action space makes the reward NaN. Arguments as for the CPU's environment,
-    without `privileged`, AutoresetMode.DISABLED, recorded signals and moving targets; and:
+    without `privileged`, recorded signals and moving targets; DISABLED resets all episodes at once, and
+    lets ended ones run on. And:
         starts: number of different starts, at most num_envs.
     """
 
@@ -62,10 +66,8 @@ class _DeviceVectorEnv(_ValveVectorEnv):
         check_count("starts", starts)
         self._most_starts = starts
         super().__init__(num_envs, **arguments)
-        if self.autoreset_mode is AutoresetMode.DISABLED or self.privileged:
-            raise OptionError(
-                "on a device, autoreset_mode is NextStep or SameStep, and privileged False"
-            )
+        if self.privileged:
+            raise OptionError("on a device, privileged is False: its truths stay there")
         limit = UNLIMITED if self.max_episode_steps is None else self.max_episode_steps
         self._limits = cuda.to_device(np.full(num_envs, limit, dtype=np.int64))
         self._rules = cuda.to_device(rules_of(self.settings))
@@ -100,18 +102,22 @@ class _DeviceVectorEnv(_ValveVectorEnv):
         return self._results.observation, {}
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
-        r, same = self._results, self.autoreset_mode is AutoresetMode.SAME_STEP
-        asked = _flat(actions, self.num_envs)
-        if not same:
+        r, asked = self._results, _flat(actions, self.num_envs)
+        if self.autoreset_mode is AutoresetMode.NEXT_STEP:
             self._begin_ended(instead=True)
         for extended in (False, True)[: 1 + self._with_effects]:
             self._launch(self.step_kernels[extended], self._batch, r, self._rules, asked,
                          self.action.slots, self._key, self._limits, self.task.valves.step)  # fmt: skip
         infos = {"figures": r.figures, "begun": r.begun}
-        if same:
+        if self.autoreset_mode is AutoresetMode.SAME_STEP:
             self._begin_ended(instead=False)
             infos |= {"final_obs": r.final_observation, "_final_obs": r.ended}
         return r.observation, r.reward, r.terminated, r.truncated, infos
+
+    @property
+    def coil_energy(self) -> Any:
+        """Electrical energy of each coil so far, an array of the device (n,) [J]."""
+        return self._batch.state[_COIL_ENERGY]
 
     def _begin_ended(self, *, instead: bool) -> None:
         self._launch(restart, self._batch, self._starts, self._results, self._key, instead)

@@ -180,6 +180,7 @@ def test_a_stopped_comparison_goes_on_where_it_stopped(finished):
         (["--against", "nobody"], "--against 'nobody' takes no part"),
         (["--plant", "nowhere.json"], "cannot read plant file nowhere.json"),
         (["--seed", "999999"], "give one up to 999992"),
+        (["--device", "cuda"], "needs an NVIDIA accelerator"),
     ],
 )
 def test_wrong_input_gets_one_sentence_and_leaves_nothing(arguments, words, tmp_path, capsys):

@@ -1,9 +1,5 @@
 """Training: the net is what stable-baselines3 trains, the best is kept, a stopped run goes on."""
 
-import os
-import pickle
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +14,6 @@ from stable_baselines3.common.callbacks import BaseCallback
 from controllers.knowledge import LEARNT, READINGS
 from controllers.policy import load_policy
 from controllers.policy_files import read_policy
-from controllers.pulse_table import nominal_table
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from training.commands.train import sentence_of
@@ -125,45 +120,6 @@ def test_a_stopped_training_ends_with_the_same_policy(tmp_path: Path, monkeypatc
     policy = load_policy(whole)
     policy.reset(2)
     assert set(policy.act(np.zeros((2, READINGS)))) <= {0, 1}
-
-
-ON_A_SIMULATED_DEVICE = """
-import pickle, sys
-import numpy as np
-from controllers import knowledge, valve_learner
-from tests.training.test_learners import TASK, make_model, make_training_env, ppo
-
-table, file = pickle.load(open(sys.argv[1], "rb")), sys.argv[2]
-# The simulator wants plain Python: tables are made by compiled code, and records need attributes.
-knowledge.nominal_table = lambda plant: table
-valve_learner.VALVE = np.dtype((np.record, valve_learner.VALVE))
-env = make_training_env(num_envs=2, device="cuda", **vars(TASK))
-ppo.PPO_SETTINGS["n_steps"] = 2
-model = make_model(env, seed=0, device="cuda")
-env.seed(7)
-model.learn(4)
-assert model.num_timesteps == 4
-buffer = model.rollout_buffer
-env.seed(7)
-np.savez(file, first=env.reset(), later=buffer.observations, rewards=buffer.rewards)
-"""
-
-
-@pytest.mark.slow
-def test_ppo_trains_on_a_simulated_device(tmp_path: Path):
-    """Episodes begin as on the CPU; torch itself is on the host where there is no accelerator."""
-    (tmp_path / "table").write_bytes(pickle.dumps(nominal_table(TASK.plant)))
-    environment = {**os.environ, "NUMBA_ENABLE_CUDASIM": "1", "NUMBA_DISABLE_JIT": "1"}
-    paths = [str(tmp_path / "table"), str(tmp_path / "found.npz")]
-    command = [sys.executable, "-c", ON_A_SIMULATED_DEVICE, *paths]
-    subprocess.run(command, env=environment, check=True, timeout=600)
-    found = np.load(paths[1])
-    env = make_training_env(num_envs=2, **vars(TASK))
-    env.seed(7)
-    first: Any = env.reset()
-    np.testing.assert_allclose(found["first"], first, atol=1e-5)
-    assert np.ptp(found["later"], axis=0).max() > 0.0
-    assert np.all(found["rewards"] < 0.0)
 
 
 @pytest.mark.parametrize(

@@ -122,6 +122,7 @@ def test_two_workers_and_a_killed_sweep_give_the_same_to_the_bit(tmp_path):
         (["--controllers", "nobody"], "no controller 'nobody': give a folder that training wrote"),
         (["--factors", "luck"], "no factor 'luck' in the designs"),
         (["--scenario", "flood"], "unknown consumption scenario 'flood'"),
+        (["--device", "cuda"], "needs an NVIDIA accelerator"),
     ],
 )
 def test_wrong_input_gets_one_sentence_and_leaves_nothing(arguments, words, tmp_path, capsys):

@@ -19,6 +19,7 @@ from epv_env.common.command_line import COUNT, NextStep, add_out, beside, plant_
 from epv_env.common.files import Journal, write_json, write_text
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.valves import available_cores
+from epv_env.vector_entry import check_device
 from training.commands.options import add_episodes
 from training.evaluation.named import HELP, is_own, named_controllers
 from training.evaluation.plots import episode_overlay, save_figure
@@ -66,6 +67,7 @@ def run(options: argparse.Namespace) -> None:
     Raises ValueError for an unknown controller or scenario.
     """
     check_first_seed(options.seed, options.episodes)
+    check_device(options.device)
     plant = load_plant(options.plant)
     controllers, digests = named_controllers(options.controllers, plant)
     against = options.against or next(iter(controllers))
@@ -76,7 +78,7 @@ def run(options: argparse.Namespace) -> None:
     results = compare(
         controllers, plant=plant, scenarios=scenarios, episodes=options.episodes,
         duration=options.duration, plant_sets=options.plants, first_seed=first_seed,
-        workers=options.workers or available_cores(), digests=digests,
+        workers=options.workers or available_cores(), digests=digests, device=options.device,
         journal=Journal(options.out / "finished.jsonl", subject(plant, scenarios, options.duration)),
     )  # fmt: skip
     times = {

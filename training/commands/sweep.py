@@ -19,6 +19,7 @@ from epv_env.common.files import Journal, write_json, write_text
 from epv_env.plant.consumption import check_scenario
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.valves import available_cores
+from epv_env.vector_entry import check_device
 from training.commands.options import add_episodes
 from training.evaluation.batches import Batch, in_batches, run_batches
 from training.evaluation.metrics import EpisodeMetrics
@@ -72,6 +73,7 @@ def run(options: argparse.Namespace) -> None:
     """
     check_first_seed(options.seed, max(options.episodes, options.joint_episodes))
     check_scenario(options.scenario)
+    check_device(options.device)
     plant = load_plant(options.plant)
     controllers, digests = named_controllers(options.controllers, plant)
     points = chosen_points(plant, options.designs, options.factors)
@@ -117,6 +119,7 @@ def _batches(
             first_seed=SWEEP_SEED + options.seed,
             episodes=0,
             duration=options.duration,
+            device=options.device,
             options={"plant": plant, "scenario": options.scenario, **point.options},
         ),
     )

@@ -37,6 +37,7 @@ from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.region import DIAGNOSIS, REGIONS
 from epv_env.reward import RewardWeights
 from epv_env.settings import as_region
+from training.commands.options import add_device
 from training.evaluation.plots import plt, save_figure
 from training.evaluation.scenarios import EvaluationScenario
 from training.studies.comparison import as_text, compare, differences, figure, rows
@@ -80,10 +81,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--switching-price", type=Number(float, 0.0, 1000.0), default=RewardWeights().switching,
         help="reward's price of one switching of the coil: trades wear against breakdown",
     )  # fmt: skip
-    parser.add_argument(
-        "--device", choices=("cpu", "cuda"), default="cpu",
-        help="of rollout and update: the processor, or an NVIDIA accelerator (extra gpu)",
-    )  # fmt: skip
+    add_device(parser, help="of rollout and update")
     again = parser.add_mutually_exclusive_group()
     again.add_argument("--resume", action="store_true", help="go on from the folder's checkpoint")
     again.add_argument(

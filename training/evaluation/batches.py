@@ -25,6 +25,10 @@ BATCH_EPISODES = 512
 ones."""
 
 
+DEVICE_EPISODES = 8192
+"""The same on an accelerator, which wants many."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Batch:
     """Episodes of one controller under one set of conditions, run side by side."""
@@ -41,15 +45,20 @@ class Batch:
     """Of the environment."""
     restart_s: float | None = None
     """When the control unit restarts [s]; None: never."""
+    device: str = "cpu"
+    """Of the plants: "cpu", or "cuda" for an accelerator, whose noise is another."""
 
 
 def in_batches(episodes: int, whole: Batch) -> list[Batch]:
     """Batches of at most BATCH_EPISODES that together have so many episodes, from `whole`'s first on."""
+    most, where = BATCH_EPISODES, ""
+    if whole.device != "cpu":
+        most, where = DEVICE_EPISODES, f", {whole.device}"
     parts = []
-    for begin in range(0, episodes, BATCH_EPISODES):
-        count = min(BATCH_EPISODES, episodes - begin)
+    for begin in range(0, episodes, most):
+        count = min(most, episodes - begin)
         first = whole.first_seed + begin
-        name = f"{whole.name}, seeds {first} to {first + count - 1}"
+        name = f"{whole.name}{where}, seeds {first} to {first + count - 1}"
         parts.append(replace(whole, name=name, first_seed=first, episodes=count))
     return parts
 
@@ -99,12 +108,15 @@ def _run(batch: Batch, controller: Controller) -> tuple[str, dict[str, list[Any]
     settings = {"threads": 1, "control_period": batch.options.get("control_period")}
     known = {name: v for name, v in settings.items() if v is not None and hasattr(own, name)}
     seeds = list(range(batch.first_seed, batch.first_seed + batch.episodes))
+    device: dict[str, Any] = {}
+    if batch.device != "cpu":  # each episode begins with its own seed
+        device = {"device": batch.device, "to_host": True, "starts": batch.episodes}
     with threadpool_limits(1):  # the figures must not depend on the threads of the linear algebra
         metrics, _ = run_episodes(
             replace(own, **known) if known else own,
             seeds=seeds,
             duration=batch.duration,
-            options={"threads": 1, **batch.options},
+            options={"threads": 1, **device, **batch.options},
             restart_s=batch.restart_s,
         )
     return batch.name, {name: np.asarray(v).tolist() for name, v in asdict(metrics).items()}

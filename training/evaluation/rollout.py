@@ -69,7 +69,8 @@ def begin_episodes(
     observation, _ = env.reset(seed=list(seeds))
     controller.reset(len(seeds))
     if isinstance(controller, Privileged):
-        controller.watch(env.task)
+        own: Any = env.unwrapped
+        controller.watch(own.task)
     return observation
 
 
@@ -100,20 +101,21 @@ def run_episodes(
     """
     env = make_env(controller, len(seeds), **options)
     observation = begin_episodes(env, controller, seeds)
-    energy_before = env.task.valves.state.coil_energy.copy()
+    energy_before = env.coil_energy.copy()
     energy = energy_before.copy()
-    period = env.settings.control_period
+    own: Any = env.unwrapped
+    period = own.settings.control_period
     steps = round(duration / period)
-    meter = Meter(len(seeds), period, env.settings.settling_time)
+    meter = Meter(len(seeds), period, own.settings.settling_time)
     restart = None if restart_s is None else round(restart_s / period)
     rows = []
     for step in range(steps):
         if step == restart and not isinstance(controller, Privileged):
             controller.reset(len(seeds))
         action = controller.act(observation)
-        result = env.task.step(*env.action.decode(action))
+        result = env.advance(action)
         observation = result.observation
-        np.copyto(energy, env.task.valves.state.coil_energy, where=meter.running)
+        np.copyto(energy, env.coil_energy, where=meter.running)
         meter.update(result.reward, result.failed, step_info(result))
         if trace_of is not None:
             state = env.task.valves.state
@@ -164,7 +166,7 @@ def decision_times(
             begin = time.process_time()
             action = controller.act(observation)
             seconds[k] = time.process_time() - begin
-            observation = env.task.step(*env.action.decode(action)).observation
+            observation = env.advance(action).observation
     finally:
         if collects:
             gc.enable()

@@ -24,6 +24,7 @@ from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Mixture, Region
 from epv_env.reward import RewardWeights
 from epv_env.signals import OptionError
+from epv_env.vector_entry import check_device
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.rollout import run_episodes
 from training.evaluation.seeds import VALIDATION_SEED, first_training_seed
@@ -77,9 +78,9 @@ def linear(first: float, last: float, remaining: float) -> float:
 
 def check_accelerator() -> None:
     """Raises OptionError unless numba and torch both reach an accelerator."""
-    from epv_env.device.vector_env import SIMULATED, check_available
+    check_device("cuda")
+    from epv_env.device.vector_env import SIMULATED
 
-    check_available()
     if not (SIMULATED or torch.cuda.is_available()):
         raise OptionError(
             "this build of torch reaches no NVIDIA accelerator: install one for CUDA "

@@ -74,6 +74,7 @@ def compare(
     workers: int = 1,
     journal: Journal | None = None,
     digests: Mapping[str, str] = {},
+    device: str = "cpu",
 ) -> Results:
     """Run every controller in every scenario on every plant set, with common random numbers.
 
@@ -88,6 +89,7 @@ def compare(
         workers: processes.
         journal: finished batches; new ones are added.
         digests: of the controllers by label: part of the batches' names in the journal.
+        device: of the plants: "cpu", or "cuda" for an accelerator.
     """
     cells: dict[tuple[str, str, str], list[Batch]] = {}
     for plants in plant_sets:
@@ -105,6 +107,7 @@ def compare(
                         **scenario.options,
                     },
                     restart_s=scenario.restart_s,
+                    device=device,
                 )
                 cells[plants, name, label] = in_batches(episodes, whole)
     found = run_batches(
