@@ -176,6 +176,37 @@ def features(rows: NDArray) -> tuple[NDArray, NDArray] | None:
     return np.array([supply, trend[i], j - opens, voltage, slope]), z
 
 
+class OpeningReader:
+    """Finds the openings in what the control unit reads: `update` once a control period."""
+
+    def __init__(self) -> None:
+        """Nothing has been read."""
+        self._rows: deque[tuple[float, ...]] = deque(maxlen=BEFORE + LONGEST + AFTER)
+        self.pause()
+
+    def pause(self) -> None:
+        """Periods are missing: openings do not reach across."""
+        self._rows.clear()
+        self._on, self._off = 0, -1  # -1: what came before the command is not known
+
+    def update(self, row: tuple[float, ...]) -> tuple[NDArray, NDArray] | None:
+        """Conditions (conditions,) and features (features,) of an opening that this period completes.
+
+        row: coil, U [V], p1, p2, p3 [bar] and I [A].
+        """
+        self._rows.append(row)
+        if row[0] < 0.5:
+            if self._on:
+                self._off = 0 if self._on >= BEFORE else -1
+            self._on = 0
+            self._off += self._off >= 0
+            return None
+        self._on += 1
+        if self._on == AFTER and SHORTEST <= self._off <= LONGEST:
+            return features(np.array(self._rows)[-(BEFORE + self._off + AFTER) :])
+        return None
+
+
 class Monitor:
     """Follows one valve: `update` once a control period, beside whatever controller.
 
@@ -193,8 +224,7 @@ class Monitor:
             raise ValueError(f"false_alarms_per_hour = {false_alarms_per_hour:g}: give more than 0")
         self.model, self.period, self.threshold = model, control_period, 1.0 / false_alarms_per_hour
         self.history: deque[tuple[float, float]] = deque(maxlen=10_000)
-        self._rows: deque[tuple[float, ...]] = deque(maxlen=BEFORE + LONGEST + AFTER)
-        self._periods = self._on = self._off = 0
+        self._reader, self._periods = OpeningReader(), 0
         width = len(model.offset)
         unknown = UNKNOWN_SHIFT * np.concatenate([np.eye(width), -np.eye(width)])
         alone = np.zeros((2 * width, width, LINEAR))
@@ -219,8 +249,7 @@ class Monitor:
 
     def pause(self) -> None:
         """The control unit restarts or skips periods: openings do not reach across."""
-        self._rows.clear()
-        self._on = self._off = 0
+        self._reader.pause()
 
     @property
     def time(self) -> float:
@@ -265,19 +294,9 @@ class Monitor:
         U: voltage of the energised coil [V]; pressures [bar absolute]; I [A].
         """
         self._periods += 1
-        self._rows.append((coil, U, p1, p2, p3, I))
-        if coil < 0.5:
-            if self._on:  # the command goes off: what came before decides whether the opening counts
-                self._off = 0 if self._on >= BEFORE else -LONGEST - 1
-            self._on = 0
-            self._off += 1
-            return
-        self._on += 1
-        if self._on == AFTER and SHORTEST <= self._off <= LONGEST:
-            last = BEFORE + self._off + AFTER
-            found = features(np.array(self._rows)[-last:])
-            if found is not None:
-                self.observe(*found)
+        found = self._reader.update((coil, U, p1, p2, p3, I))
+        if found is not None:
+            self.observe(*found)
 
     def observe(self, conditions: NDArray, z: NDArray) -> None:
         """Take in one opening: conditions (conditions,) and features (features,)."""

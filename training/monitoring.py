@@ -9,13 +9,9 @@ from numpy.typing import NDArray
 
 from controllers.base import Controller
 from controllers.monitor import (
-    AFTER,
-    BEFORE,
     LINEAR,
-    LONGEST,
-    SHORTEST,
     MonitorModel,
-    features,
+    OpeningReader,
     polynomial,
     terms,
 )
@@ -91,20 +87,13 @@ def drives(
     return found
 
 
-def openings(drive: NDArray) -> Iterator[tuple[int, NDArray, NDArray]]:
-    """Period of its end, conditions and features of each opening of a drive (periods, 6)."""
-    off, on = (np.flatnonzero(np.diff(drive[:, 0]) == step) + 1 for step in (-1.0, 1.0))
-    ends = np.searchsorted(on, off)
-    for number, i in enumerate(off):
-        if ends[number] == len(on):
-            return
-        j, shut = on[ends[number]], on[ends[number] - 1] if ends[number] else 0
-        later = off[number + 1] if number + 1 < len(off) else len(drive)
-        whole = i - shut >= BEFORE and later - j >= AFTER
-        if whole and SHORTEST <= j - i <= LONGEST:
-            found = features(drive[i - BEFORE : j + AFTER])
-            if found is not None:
-                yield int(j + AFTER), *found
+def openings(drive: NDArray) -> Iterator[tuple[NDArray, NDArray]]:
+    """Conditions and features of each opening of a drive (periods, 6)."""
+    reader = OpeningReader()
+    for row in drive.tolist():
+        found = reader.update(row)
+        if found is not None:
+            yield found
 
 
 def made(plant: Plant, *, valves: int = 64, seed: int = 0, progress: Callable = print) -> MonitorModel:
@@ -168,7 +157,7 @@ def _simulated(
     for number, (kind, voltage) in enumerate(product(CONTROLLERS, voltages)):
         seeds = [(seed * 100 + number) * 1000 + episode for episode in episodes]
         for valve, drive in enumerate(drives(plant, tuned(kind, plant), seeds, plants, voltage=voltage)):
-            rows += [(x, z, valve, number * len(plants) + valve) for _, x, z in openings(drive)]
+            rows += [(x, z, valve, number * len(plants) + valve) for x, z in openings(drive)]
     return Openings(*(np.array(column) for column in zip(*rows, strict=True)))
 
 

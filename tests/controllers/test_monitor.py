@@ -9,10 +9,19 @@ import numpy as np
 import pytest
 
 from controllers.hysteresis import Hysteresis
-from controllers.monitor import CONDITIONS, FEATURES, LINEAR, TERMS, Monitor, MonitorModel
+from controllers.monitor import (
+    CONDITIONS,
+    FEATURES,
+    LINEAR,
+    RISE,
+    TERMS,
+    Monitor,
+    MonitorModel,
+    OpeningReader,
+)
 from epv_env.plant.plantfile import Plant
 from training.deploy.monitor_c import sources
-from training.monitoring import drives, openings
+from training.monitoring import drives
 
 N = len(FEATURES)
 PERIODS = 200
@@ -78,25 +87,35 @@ def test_saved_and_loaded_is_the_same(tmp_path: Path) -> None:
         np.testing.assert_array_equal(getattr(loaded, name), value)
 
 
-def test_period_by_period_finds_the_openings_of_the_whole_drive() -> None:
-    plant = Plant.calibrated()
-    controller = Hysteresis(open_below=-0.3, shut_above=0.0)
-    drive = drives(plant, controller, [3], [plant.parameters], duration=10.0)[0]
-    seen: list[tuple[int, np.ndarray, np.ndarray]] = []
+def test_an_opening_is_read_as_it_was() -> None:
+    """Hand-made readings: the coil off for 20 periods, p3 falls by a factor a period, p2 rises late."""
+    off, on, last = 20, 20, 10
+    coil = np.repeat([1.0, 0.0, 1.0], [on, off, last])
+    p3 = np.repeat(11.0, len(coil))
+    p3[on + 1 : on + off + 1] = 11.0 * 0.9 ** np.arange(1, off + 1)
+    p2 = 8.0 + 0.1 * np.maximum(np.arange(len(coil)) - on - 10.0, 0.0)
+    reader, found = OpeningReader(), []
+    for row in zip(coil, *np.broadcast_arrays(24.0, 11.0, p2, p3, 0.48), strict=True):
+        found += [opening for opening in [reader.update(row)] if opening is not None]
+    ((conditions, z),) = found
+    values = dict(zip(FEATURES, z, strict=True)) | dict(zip(CONDITIONS, conditions, strict=True))
+    opens = 10.0 + RISE / 0.1  # periods after the command
+    expected = {
+        "I_on": 0.02, "p3_rest": 0.0, "p3_off_1": np.log(0.9), "p3_vents_late": 4 * np.log(0.9),
+        "time_opens": opens, "open": off - opens, "p1": 11.0, "p2": 8.0, "U": 24.0, "slope": 0.0,
+        "p2_rise": 0.1 * (off - 10),
+    }  # fmt: skip
+    assert {name: values[name] for name in expected} == pytest.approx(expected)
 
-    class Recorder(Monitor):
-        def observe(self, conditions: np.ndarray, z: np.ndarray) -> None:
-            seen.append((self._periods, conditions, z))
 
-    monitor = Recorder(white_model())
-    for row in drive.tolist():
-        monitor.update(*row)
-    whole = list(openings(drive))
-    assert len(whole) >= 3
-    for mine, theirs in zip(seen, whole, strict=True):
-        assert mine[0] == theirs[0]
-        np.testing.assert_array_equal(mine[1], theirs[1])
-        np.testing.assert_array_equal(mine[2], theirs[2])
+@pytest.mark.parametrize(("lengths", "pause"), [((20, 20, 10), 30), ((20, 5, 3, 60, 10), None)])
+def test_an_opening_without_a_known_beginning_does_not_count(lengths, pause) -> None:
+    """Readings are missing, or the coil was on for too short a time before."""
+    reader = OpeningReader()
+    for number, coil in enumerate(np.repeat([1.0, 0.0, 1.0, 0.0, 1.0][: len(lengths)], lengths)):
+        if number == pause:
+            reader.pause()
+        assert reader.update((coil, 24.0, 11.0, 8.0 + 0.1 * number, 11.0, 0.5)) is None
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")

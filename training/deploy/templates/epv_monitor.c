@@ -23,10 +23,12 @@ static double most(double a, double b) { return a > b ? a : b; }
 /* log(exp(a) + exp(b)) */
 static double sum_log(double a, double b) { return most(a, b) + log1p(exp(-fabs(a - b))); }
 
-void epv_monitor_pause(epv_monitor *m) { m->on = m->off = 0; }
+/* off = -1: what came before the command is not known. */
+void epv_monitor_pause(epv_monitor *m) { m->on = 0, m->off = -1; }
 
 void epv_monitor_reset(epv_monitor *m) {
     memset(m, 0, sizeof *m);
+    epv_monitor_pause(m);
     for (int k = 0; k < N; k++) m->variance[k] = OFFSET[k];
     for (int h = 0; h < H; h++) m->log[h] = log(most($before_start * (1.0 - LATER[h]), $least));
 }
@@ -107,9 +109,9 @@ void epv_monitor_update(epv_monitor *m, int coil, double U, double p1, double p2
     memmove(m->rows[0], m->rows[1], sizeof m->rows - sizeof m->rows[0]);
     memcpy(m->rows[LENGTH - 1], row, sizeof row);
     if (!coil) {
-        if (m->on) m->off = m->on >= I0 ? 0 : -$longest - 1;
+        if (m->on) m->off = m->on >= I0 ? 0 : -1;
         m->on = 0;
-        m->off += 1;
+        m->off += m->off >= 0;
         return;
     }
     m->on += 1;

@@ -1,0 +1,184 @@
+"""How soon the monitor finds a change, how often it is right, and how often it is wrong.
+
+    python -m docs.studies.monitor.study
+
+drives valves of the report's plant with two controllers: unchanged ones for hours, and ones in which an
+effect begins. results.jsonl keeps each run, README.md the tables.
+"""
+
+import sys
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from controllers.base import Controller
+from controllers.monitor import Monitor, MonitorModel
+from controllers.policy import load_policy
+from controllers.tuned import tuned
+from docs.studies.common import PAGE, fill, study_options, study_parser, table
+from epv_env.common.command_line import fail_clearly
+from epv_env.common.files import Journal
+from epv_env.common.results_folder import progress
+from epv_env.plant.effects.registry import EFFECTS
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.plantfile import load_plant
+from training.monitoring import DRIVE, drives, made
+
+FOLDER = Path(__file__).parent
+SEED = 4977
+"""Of valves, effects, consumption and voltage; the monitor is made with another."""
+KINDS = HYSTERESIS, POLICY = "hysteresis", "policy"
+"""Of controllers."""
+VALVES, BEFORE, AFTER = 6, 4, 4
+"""Valves with each effect, and their drives without and with it."""
+UNCHANGED, DRIVES, RUNS = 32, 20, 12
+"""Unchanged valves of a run, drives of each, and runs with each controller: 64 hours."""
+LEAST, MOST = 1.0, 2.0
+"""Sizes of an effect, as multiples of the catalogue's trial size."""
+VOLTAGES = (0.92, 1.08)
+"""Range of the supply voltage in each drive, as shares of the plant's."""
+
+
+class Fleet:
+    """Valves that a controller drives, each with its monitor."""
+
+    def __init__(self, model: MonitorModel, kind: str, valves: int, seed: Sequence[int]):
+        """kind: of the controller. seed: of parameters, consumption and voltage."""
+        self.plant, self.rng = load_plant(None), np.random.default_rng(seed)
+        self.controller: Controller = (
+            load_policy(plant=self.plant) if kind == POLICY else tuned(kind, self.plant)
+        )
+        self.parameters = [self.plant.region.draw(self.rng) for _ in range(valves)]
+        self.monitors = [Monitor(model) for _ in range(valves)]
+
+    def drive(self, parameters: Sequence[Parameters]) -> list[bool]:
+        """One drive of every valve with these parameters; which monitors have given an alarm in it."""
+        seeds = self.rng.integers(2**32, size=len(self.monitors)).tolist()
+        voltage = self.rng.uniform(*VOLTAGES)
+        readings = drives(self.plant, self.controller, seeds, parameters, voltage=voltage)
+        return [alarm_in(monitor, drive) for monitor, drive in zip(self.monitors, readings, strict=True)]
+
+
+def alarm_in(monitor: Monitor, drive: np.ndarray) -> bool:
+    """Whether the monitor gives an alarm in a drive (periods, 6)."""
+    monitor.pause()
+    begun = monitor.time
+    for row in drive.tolist():
+        monitor.update(*row)
+    return any(log_odds > 0.0 for time, log_odds in monitor.history if time > begun)
+
+
+def false_alarms(model: MonitorModel, kind: str, number: int, count: int) -> dict[str, Any]:
+    """Alarms of unchanged valves in `count` drives of each."""
+    fleet = Fleet(model, kind, UNCHANGED, [SEED, number, 0])
+    alarms = 0
+    for _ in range(count):
+        for monitor, alarm in zip(fleet.monitors, fleet.drive(fleet.parameters), strict=True):
+            alarms += alarm
+            if alarm:
+                monitor.restart()
+    return {"hours": count * UNCHANGED * DRIVE / 3600.0, "alarms": alarms}
+
+
+def detection(model: MonitorModel, kind: str, effect: Any, number: int) -> dict[str, Any]:
+    """Each valve's answer after an effect of random size has begun."""
+    fleet = Fleet(model, kind, VALVES, [SEED, number, 1])
+    for _ in range(BEFORE):
+        fleet.drive(fleet.parameters)
+    early = [monitor.alarm for monitor in fleet.monitors]
+    changed = [parameters.replace(**sizes(effect, fleet.rng)) for parameters in fleet.parameters]
+    for _ in range(AFTER):
+        fleet.drive(changed)
+    return {
+        "found": [m.alarm and not was for m, was in zip(fleet.monitors, early, strict=True)],
+        "right": [next(iter(m.causes())) == effect.name for m in fleet.monitors],
+        "late_s": [round(m.onset - BEFORE * DRIVE, 2) for m in fleet.monitors],
+    }
+
+
+def sizes(effect: Any, rng: np.random.Generator) -> dict[str, float]:
+    """A variant of the effect, its first trial times a random factor."""
+    variants = list(effect.fitted.values())
+    factor = rng.uniform(LEAST, MOST)
+    return {
+        size.symbol: min(size.trials[0] * factor, (size.domain or (0.0, np.inf))[1])
+        for size in variants[int(rng.integers(len(variants)))]
+    }
+
+
+def effect_rows(journal: Journal) -> list[list[str]]:
+    """Of each effect and controller: valves found; cause and onset of these."""
+    rows, every = [], {kind: [] for kind in KINDS}
+    for effect in EFFECTS:
+        row = [effect.name.replace("_", " ")]
+        for kind in KINDS:
+            result = journal[f"{effect.name}, {kind}"]
+            every[kind].append(result)
+            row += cells([result])
+        rows.append(row)
+    return [*rows, ["**all**", *(cell for kind in KINDS for cell in cells(every[kind]))]]
+
+
+def cells(results: Sequence[dict[str, Any]]) -> list[str]:
+    """Found; right cause of the found; median distance of the onset."""
+    found, right, late = (
+        np.concatenate([result[key] for result in results]) for key in ("found", "right", "late_s")
+    )
+    found = found.astype(bool)
+    if not found.any():
+        return [f"0 of {len(found)}", "", ""]
+    error = np.median(np.abs(late[found]))
+    return [f"{found.sum()} of {len(found)}", f"{right[found].sum()} of {found.sum()}", f"{error:.1f} s"]
+
+
+def alarm_rows(journal: Journal, runs: int) -> list[list[str]]:
+    """Of each controller: hours, false alarms, and the exact 95 % bound of their rate."""
+    rows = []
+    for kind in KINDS:
+        own = [journal[f"unchanged {number}, {kind}"] for number in range(runs)]
+        hours, alarms = (sum(each[key] for each in own) for key in ("hours", "alarms"))
+        rows.append(
+            [kind, f"{hours:.1f}", str(alarms), f"{chi2.ppf(0.95, 2 * alarms + 2) / 2 / hours:.3f}"]
+        )
+    return rows
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the study; returns the exit status."""
+    options = study_options(study_parser(__doc__ or "", FOLDER), arguments)
+    runs, valves = (1, 4) if options.quick else (RUNS, 48)
+    path = options.work / "monitor.json"
+    if not path.exists():
+        options.work.mkdir(parents=True, exist_ok=True)
+        made(load_plant(None), valves=valves).save(path)
+    model = MonitorModel.load(path)
+    journal = Journal(
+        options.out / "results.jsonl", {"seed": SEED, "valves": VALVES, "quick": options.quick}
+    )
+    tasks: dict[str, Any] = {}
+    for kind in KINDS:
+        for number in range(runs):
+            tasks[f"unchanged {number}, {kind}"] = partial(
+                false_alarms, model, kind, number, 1 if options.quick else DRIVES
+            )
+        for number, effect in enumerate(EFFECTS):
+            tasks[f"{effect.name}, {kind}"] = partial(detection, model, kind, effect, number)
+    for name in progress([name for name in tasks if name not in journal], what="monitor"):
+        journal.add(name, tasks[name]())
+    kinds = [f"{kind}: {what}" for kind in KINDS for what in ("found", "right cause", "onset off by")]
+    parts = {
+        "effects": table(["effect", *kinds], effect_rows(journal)),
+        "alarms": table(
+            ["controller", "hours", "false alarms", "95 % bound [1/h]"], alarm_rows(journal, runs)
+        ),
+    }
+    fill(options.out / PAGE, parts)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(fail_clearly(main))
