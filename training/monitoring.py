@@ -96,7 +96,7 @@ def openings(drive: NDArray) -> Iterator[tuple[NDArray, NDArray]]:
             yield found
 
 
-def made(plant: Plant, *, valves: int = 64, seed: int = 0, progress: Callable = print) -> MonitorModel:
+def made(plant: Plant, *, valves: int = 48, seed: int = 0, progress: Callable = print) -> MonitorModel:
     """The model of a monitor for a plant, from simulated drives of valves of its region."""
     rng = np.random.default_rng(seed)
     drawn = [plant.region.draw(rng) if plant.region.varies else plant.parameters for _ in range(valves)]

@@ -7,7 +7,7 @@ effect begins. results.jsonl keeps each run, README.md the tables.
 """
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -147,37 +147,46 @@ def alarm_rows(journal: Journal, runs: int) -> list[list[str]]:
     return rows
 
 
+def tasks(model: MonitorModel, runs: int, count: int) -> dict[str, Callable[[], dict[str, Any]]]:
+    """What to measure, by name in the journal."""
+    found: dict[str, Callable[[], dict[str, Any]]] = {}
+    for kind in KINDS:
+        for number in range(runs):
+            found[f"unchanged {number}, {kind}"] = partial(false_alarms, model, kind, number, count)
+        for number, effect in enumerate(EFFECTS):
+            found[f"{effect.name}, {kind}"] = partial(detection, model, kind, effect, number)
+    return found
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study; returns the exit status."""
     options = study_options(study_parser(__doc__ or "", FOLDER), arguments)
-    runs, valves = (1, 4) if options.quick else (RUNS, 48)
+    runs, count = (1, 1) if options.quick else (RUNS, DRIVES)
     path = options.work / "monitor.json"
     if not path.exists():
-        options.work.mkdir(parents=True, exist_ok=True)
-        made(load_plant(None), valves=valves).save(path)
-    model = MonitorModel.load(path)
-    journal = Journal(
-        options.out / "results.jsonl", {"seed": SEED, "valves": VALVES, "quick": options.quick}
-    )
-    tasks: dict[str, Any] = {}
-    for kind in KINDS:
-        for number in range(runs):
-            tasks[f"unchanged {number}, {kind}"] = partial(
-                false_alarms, model, kind, number, 1 if options.quick else DRIVES
-            )
-        for number, effect in enumerate(EFFECTS):
-            tasks[f"{effect.name}, {kind}"] = partial(detection, model, kind, effect, number)
-    for name in progress([name for name in tasks if name not in journal], what="monitor"):
-        journal.add(name, tasks[name]())
+        made(load_plant(None)).save(path)
+    subject = {"seed": SEED, "valves": VALVES, "quick": options.quick}
+    journal = Journal(options.out / "results.jsonl", subject)
+    missing = {
+        name: task
+        for name, task in tasks(MonitorModel.load(path), runs, count).items()
+        if name not in journal
+    }
+    for name in progress(missing, what="monitor"):
+        journal.add(name, missing[name]())
+    report(journal, runs, options.out / PAGE)
+    return 0
+
+
+def report(journal: Journal, runs: int, page: Path) -> None:
+    """Write the page's tables."""
     kinds = [f"{kind}: {what}" for kind in KINDS for what in ("found", "right cause", "onset off by")]
+    alarms = ["controller", "hours", "false alarms", "95 % bound [1/h]"]
     parts = {
         "effects": table(["effect", *kinds], effect_rows(journal)),
-        "alarms": table(
-            ["controller", "hours", "false alarms", "95 % bound [1/h]"], alarm_rows(journal, runs)
-        ),
+        "alarms": table(alarms, alarm_rows(journal, runs)),
     }
-    fill(options.out / PAGE, parts)
-    return 0
+    fill(page, parts)
 
 
 if __name__ == "__main__":
