@@ -144,9 +144,7 @@ def refitted_plant(
     """
     best = found.kept
     named = bool(best.labels)
-    region = _region(found, best, valve)
-    if learnt:
-        region = learnt.region(region)
+    region = _region(found, best, valve, learnt)
     return replace(
         valve.plant,
         parameters=region.centre,
@@ -181,17 +179,22 @@ def possible_plants(found: Diagnosis, valve: Valve, learnt: LearntModel | None =
             Alternative(
                 name=hypothesis_label(hypothesis) or RECALIBRATED,
                 probability=float(probability / whole),
-                region=learnt.region(_region(found, hypothesis, valve))
-                if learnt and hypothesis is found.kept
-                else _region(found, hypothesis, valve),
+                region=_region(found, hypothesis, valve, learnt),
             )
             for probability, hypothesis in kept
         )
     )
 
 
-def _region(found: Diagnosis, hypothesis: EvaluatedHypothesis, valve: Valve) -> Region:
-    """Where the recordings leave the calibrated parameters and the sizes of a hypothesis, jointly."""
+def _region(
+    found: Diagnosis, hypothesis: EvaluatedHypothesis, valve: Valve, learnt: LearntModel | None
+) -> Region:
+    """Where the recordings leave the calibrated parameters and the sizes of a hypothesis, jointly.
+
+    learnt: the term that the kept hypothesis has.
+    """
+    if learnt and hypothesis is found.kept:
+        return learnt.region(valve.base, REGION_PROBABILITY)
     fitted = fitted_values(found, hypothesis)
     inside = {s: float(np.clip(value, *valve.base.domain(s))) for s, value in fitted.items()}
     symbols = tuple(p.symbol for p in found.ranking.problem.parameters(hypothesis.estimate))

@@ -11,8 +11,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
+from scipy.stats import chi2
 
 from epv_env.plant.effects.learnt import EQUATIONS, KNOT_SYMBOLS, KNOTS, STATES, LearntTerm, placed
+from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import Region
 from identification.block_bootstrap import Interval
 from identification.gap.diagnosis import Diagnosis
@@ -119,6 +122,10 @@ class LearntModel:
     term: LearntTerm
     parameters: dict[str, float]
     """All that was fitted, the term's own parameters included, by symbol [SI]."""
+    symbols: tuple[str, ...]
+    """Calibrated parameters, those of causes, and the knots."""
+    covariance: NDArray
+    """Of these as fitted together (symbols, symbols) [SI]."""
     gap: Interval
     """With the term [noise deviations]."""
     closed: Interval
@@ -147,16 +154,15 @@ class LearntModel:
             "holds it."
         )
 
-    def region(self, region: Region) -> Region:
-        """A plant's region with the term at its centre and its knots in boxes of their uncertainty."""
-        domain = region.centre.domain
-        inside = {s: float(np.clip(value, *domain(s))) for s, value in self.parameters.items()}
-        margins = zip(KNOT_SYMBOLS, np.sqrt(3.0) * np.array(self.term.sd), strict=True)
-        boxes = {
-            s: tuple(np.clip([inside[s] - m, inside[s] + m], *domain(s)).tolist()) for s, m in margins
-        }
-        centre = region.centre.replace(**inside)
-        return replace(region, centre=centre, boxes={**region.boxes, **boxes})
+    def region(self, centre: Parameters, probability: float) -> Region:
+        """Where the recordings leave parameters and knots, jointly; centre: what was not fitted."""
+        inside = {s: float(np.clip(v, *centre.domain(s))) for s, v in self.parameters.items()}
+        return Region(
+            centre=centre.replace(**inside),
+            symbols=self.symbols,
+            covariance=self.covariance,
+            chi_square=float(chi2.ppf(probability, len(self.symbols))),
+        )
 
 
 def learn(found: Diagnosis, valve: Valve, seed: int = 0) -> LearntModel | None:
@@ -282,32 +288,45 @@ def _judged(found: Diagnosis, best: Fitted, seed: int) -> LearntModel | None:
     closed = draws.share_closed(KEPT, LEARNT)
     if closed.low <= 0.0:
         return None
-    term = term_of(best, closed)
+    covariance = covariance_of(best)
+    term = term_of(best, covariance, closed)
     values = best.problem.candidates([simulated])
+    fitted = best.problem.parameters(best.estimate)
     return LearntModel(
         term=term,
+        symbols=(*(p.symbol for p in fitted), *KNOT_SYMBOLS),
+        covariance=covariance,
         parameters={s: float(v[0]) for s, v in values.items() if v.ndim == 1} | term.parameters,
         gap=draws.gap(LEARNT).overall,
         closed=draws.share_closed(RECALIBRATED, LEARNT),
     )
 
 
-def term_of(best: Fitted, closed: Interval) -> LearntTerm:
-    """The term as plant files hold it; its uncertainty is that of all that was fitted together.
+def covariance_of(best: Fitted) -> NDArray:
+    """Covariance of parameters and knots, of all that was fitted together (symbols, symbols) [SI].
 
     The misfit that is left widens it.
     """
-    place, count = best.place, len(best.problem.plant.tolerances)
-    runs = linearise(best.problem, [best.estimate], best.problem.fitted_runs)[0]
+    problem, count = best.problem, len(best.problem.plant.tolerances)
+    runs = linearise(problem, [best.estimate], problem.fitted_runs)[0]
     hessian = normal_equations([shared_as_slopes(run) for run in runs]).hessian
     hessian[-count:, -count:] += np.eye(count)
-    inflation = max(1.0, best.misfit / best.problem.readings)
-    numbers = inflation * np.linalg.pinv(hessian)[-KNOTS:, -KNOTS:]
+    scales = [p.scale for p in problem.parameters(best.estimate)]
+    own = np.r_[: len(scales), len(hessian) - KNOTS : len(hessian)]
+    to_SI = np.asarray(block_diag(np.diag(scales), best.place.size * SMOOTH))
+    inflation = max(1.0, best.misfit / problem.readings)
+    covariance = inflation * to_SI @ np.linalg.pinv(hessian)[np.ix_(own, own)] @ to_SI.T
+    return (covariance + covariance.T) / 2  # symmetric to the last digit
+
+
+def term_of(best: Fitted, covariance: NDArray, closed: Interval) -> LearntTerm:
+    """The term as plant files hold it. covariance: of `covariance_of` (symbols, symbols)."""
+    place = best.place
     unit, state_unit = LearntTerm.units(place.equation, place.state)
     return LearntTerm(
         equation=place.equation, unit=unit, state=place.state, state_unit=state_unit, low=place.low,
         high=place.high,
         values=tuple((place.size * SMOOTH @ _deviations(best.estimate)[-KNOTS:]).tolist()),
-        sd=tuple((place.size * np.sqrt(np.diag(SMOOTH @ numbers @ SMOOTH.T))).tolist()),
+        sd=tuple(np.sqrt(np.diag(covariance)[-KNOTS:]).tolist()),
         share_closed=(closed.value, closed.low, closed.high),
     )  # fmt: skip

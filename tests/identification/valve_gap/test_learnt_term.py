@@ -4,16 +4,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from epv_env.plant.effects.learnt import KNOT_SYMBOLS, LearntTerm
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.region import Region
 from identification.bench.programmes import DIAGNOSIS_SUITE
 from identification.bench.session import measured_campaign, run_programme
 from identification.block_bootstrap import Interval
 from identification.gap.evidence import evaluate
 from identification.gap.recalibration import recalibrate
-from identification.valve_gap.learnt_term import LearntModel, WithTerm, find_places, fit_term, term_of
+from identification.valve_gap.learnt_term import (
+    LearntModel,
+    WithTerm,
+    covariance_of,
+    find_places,
+    fit_term,
+    term_of,
+)
 from identification.valve_gap.valve import Valve
 
 TRUTH = LearntTerm(
@@ -37,7 +44,7 @@ def fitted():
     place = find_places(problem, base, evaluated.residuals)[0]
     start = np.concatenate([evaluated.tolerances, np.zeros(9)])
     best = fit_term(WithTerm(problem.plant, valve, place), base, start)
-    return best, term_of(best, Interval(value=0.9, low=0.8, high=1.0))
+    return best, term_of(best, covariance_of(best), Interval(value=0.9, low=0.8, high=1.0))
 
 
 def test_the_equation_that_lacks_a_term_is_found(fitted):
@@ -55,14 +62,22 @@ def test_the_fitted_term_is_the_true_one_where_recordings_tell_of_it(fitted):
     assert np.all(np.abs(np.array(term.values) - true)[told] < 0.05)
 
 
-def test_its_uncertainty_is_drawn_with_the_plant():
+def test_its_uncertainty_is_drawn_with_the_plant(fitted):
+    """Draws scatter as the covariance says, and the plant that made the recordings is one of them."""
+    best, term = fitted
+    covariance = covariance_of(best)
+    symbols = (*(p.symbol for p in best.problem.parameters(best.estimate)), *KNOT_SYMBOLS)
+    values = {**best.problem.values(best.estimate), **term.parameters}
+    closed = Interval(value=0.9, low=0.8, high=1.0)
     model = LearntModel(
-        term=TRUTH, parameters={"R": 41.0, **TRUTH.parameters},
-        gap=Interval(value=1.0, low=1.0, high=1.1), closed=Interval(value=0.9, low=0.8, high=1.0),
+        term=term, parameters=values, symbols=symbols, covariance=covariance, gap=closed, closed=closed,
     )  # fmt: skip
-    region = model.region(Region(centre=CALIBRATED))
-    drawn = np.array(
-        [[region.draw(rng)[s] for s in KNOT_SYMBOLS] for rng in map(np.random.default_rng, range(300))]
-    )
-    np.testing.assert_allclose(np.mean(drawn, axis=0), TRUTH.values, atol=0.005)
-    np.testing.assert_allclose(np.std(drawn, axis=0), TRUTH.sd, rtol=0.15)
+    region = model.region(CALIBRATED, 0.95)
+    rng = np.random.default_rng(0)
+    drawn = np.array([[region.draw(rng)[s] for s in symbols] for _ in range(2000)])
+    sd = np.sqrt(np.diag(covariance) * region.chi_square / (len(symbols) + 2))  # uniform in a ball
+    np.testing.assert_allclose(np.std(drawn, axis=0), sd, rtol=0.15)
+    calibrated = len(symbols) - len(KNOT_SYMBOLS)
+    off = [values[s] - CALIBRATED[s] for s in symbols[:calibrated]]
+    own = covariance[:calibrated, :calibrated]
+    assert off @ np.linalg.solve(own, off) < chi2.ppf(0.99, calibrated)
