@@ -1,6 +1,6 @@
 """EPValve-v0 and EPValvePWM-v0 as vector environments whose arrays stay on an NVIDIA accelerator."""
 
-from typing import Any, ClassVar, cast
+from typing import Any, cast
 
 import numpy as np
 from gymnasium.utils.seeding import np_random
@@ -9,7 +9,8 @@ from numba import cuda
 from numba.core import config
 
 from epv_env.common.extras import how_to_install
-from epv_env.device.kernels import THREADS, Batch, Results, restart, step_kernel
+from epv_env.common.field_types import shown
+from epv_env.device.kernels import THREADS, TRY_STEP, Batch, Results, restart, step_kernel
 from epv_env.observation import LAYOUT
 from epv_env.period import rules_of
 from epv_env.plant.equations import State
@@ -56,15 +57,17 @@ class _DeviceVectorEnv(_ValveVectorEnv):
     without `privileged`, recorded signals and moving targets; DISABLED resets all episodes at once, and
     lets ended ones run on. And:
         starts: number of different starts, at most num_envs.
+        precision: of the rates of change, "double" or "single"; states are double in either.
     """
 
-    step_kernels: ClassVar[dict[bool, Any]]
-    """By whether effects are compiled in."""
-
-    def __init__(self, num_envs: int = 1, *, starts: int = 4096, **arguments: Any):
+    def __init__(
+        self, num_envs: int = 1, *, starts: int = 4096, precision: str = "double", **arguments: Any
+    ):
         check_available()
         check_count("starts", starts)
-        self._most_starts = starts
+        if precision not in TRY_STEP:
+            raise OptionError(f"precision = {shown(precision)}: give 'double' or 'single'")
+        self._most_starts, self._precision = starts, precision
         super().__init__(num_envs, **arguments)
         if self.privileged:
             raise OptionError("on a device, privileged is False: its truths stay there")
@@ -106,8 +109,9 @@ class _DeviceVectorEnv(_ValveVectorEnv):
         if self.autoreset_mode is AutoresetMode.NEXT_STEP:
             self._begin_ended(instead=True)
         for extended in (False, True)[: 1 + self._with_effects]:
-            self._launch(self.step_kernels[extended], self._batch, r, self._rules, asked,
-                         self.action.slots, self._key, self._limits, self.task.valves.step)  # fmt: skip
+            kernel = step_kernel(self.action_form.rule, extended, self._precision)
+            self._launch(kernel, self._batch, r, self._rules, asked, self.action.slots, self._key,
+                         self._limits, self.task.valves.step)  # fmt: skip
         infos = {"figures": r.figures, "begun": r.begun}
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
             self._begin_ended(instead=False)
@@ -162,18 +166,12 @@ def _flat(actions: Any, n: int) -> Any:
     return array.reshape(n)
 
 
-def _kernels(environment: type[_ValveVectorEnv]) -> dict[bool, Any]:
-    return {extended: step_kernel(environment.action_form.rule, extended) for extended in (False, True)}
-
-
 class EPValveDeviceVectorEnv(_DeviceVectorEnv, EPValveVectorEnv):
     __doc__ = (_DeviceVectorEnv.__doc__ or "") + "Actions: MultiDiscrete, 0 = coil off, 1 = on."
-    step_kernels = _kernels(EPValveVectorEnv)
 
 
 class EPValvePWMDeviceVectorEnv(_DeviceVectorEnv, EPValvePWMVectorEnv):
     __doc__ = (_DeviceVectorEnv.__doc__ or "") + "Actions: Box [-1, 1], (n, 1), see EPValvePWMEnv."
-    step_kernels = _kernels(EPValvePWMVectorEnv)
 
 
 ON_DEVICE = {EPValveVectorEnv: EPValveDeviceVectorEnv, EPValvePWMVectorEnv: EPValvePWMDeviceVectorEnv}
