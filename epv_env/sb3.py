@@ -114,6 +114,7 @@ def make_sb3_env(identifier: str = "EPValve-v0", num_envs: int = 256, **options:
         num_envs=num_envs,
         vectorization_mode="vector_entry_point",
         autoreset_mode=AutoresetMode.SAME_STEP,
+        to_host=True,
         **options,
     )
     return SB3VectorEnv(env)
