@@ -180,17 +180,23 @@ def rank_hypotheses(
         most_causes: largest number of causes that are taken to act together.
     """
     cache, plant = cache or FitCache(plant), prepared(plant)
+    problem, base = recalibrated_by_seen_noise(plant, cache)
+    ranking = _searched(problem, base, cache, most_causes)
+    weighted = with_disturbance(prepared(problem.plant), ranking.discrepancies)
+    if weighted is problem.plant:
+        return ranking
+    cache, thorough = cache.named("with the disturbance: "), is_small(plant)
+    return _searched(*recalibrate(weighted, cache, thorough=thorough), cache, most_causes)
+
+
+def recalibrated_by_seen_noise(plant: GreyBox, cache: FitCache) -> tuple[FittingProblem, Estimate]:
+    """The recalibrated model; readings are weighed by the noise that its residuals show."""
     thorough = is_small(plant)
     problem, base = recalibrate(plant, cache, thorough=thorough)
     corrected = with_seen_noise(problem, base)
-    if corrected is not plant:
-        problem, base = recalibrate(corrected, cache, thorough=thorough, prefix="with the noise seen: ")
-    ranking = _searched(problem, base, cache, most_causes)
-    weighted = with_disturbance(corrected, ranking.discrepancies)
-    if weighted is corrected:
-        return ranking
-    cache = cache.named("with the disturbance: ")
-    return _searched(*recalibrate(weighted, cache, thorough=thorough), cache, most_causes)
+    if corrected is problem.plant:
+        return problem, base
+    return recalibrate(corrected, cache, thorough=thorough, prefix="with the noise seen: ")
 
 
 def _searched(problem: FittingProblem, base: Estimate, cache: FitCache, most_causes: int) -> Ranking:

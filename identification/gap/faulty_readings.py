@@ -143,12 +143,15 @@ def _flat(series: Sequence[NDArray], equal: float, far: float) -> Iterator[tuple
     """
     everything = np.concatenate(series)
     lively = everything[everything != 0]
+    rows = [(own[a], b - a) for own in series for a, b in _rows(own)]
+    rows_values, rows_lengths = np.array(rows).reshape(-1, 2).T
     never_0 = far > 0 and len(lively) > MOST_FAULTY * len(everything) and np.all(np.abs(lively) > far)
     for r, own in enumerate(series):
         found: dict[Kind, set[int]] = {}
         for a, b in (row for row in _rows(own) if row[1] - row[0] > LONGEST_WILD):
             extreme = own[a] in (np.min(own), np.max(own))
-            stays = max(equal, 0.0 if extreme else _stays(series, own[a], b - a))
+            alike = rows_lengths[rows_values == own[a]]
+            stays = max(equal, 0.0 if extreme else _stays(alike, b - a))
             if (equal < 1 and _is_notch(own, a, b, far)) or (never_0 and own[a] == 0):
                 found.setdefault("dropout", set()).update(range(a, b))
             elif own[a] == 0 or stays ** (b - a - 1) > norm.sf(FAR):
@@ -184,10 +187,12 @@ def _equal_by_noise(series: Sequence[NDArray], seen: float, noise: float) -> flo
     return float(max(2 * norm.cdf(step / (2 * seen)) - 1, np.mean(lengths > 1)))
 
 
-def _stays(series: Sequence[NDArray], value: float, length: int) -> float:
-    """How often a reading of this value is followed by an equal one [1], but for one row of them."""
-    rows = [b - a for own in series for a, b in _rows(own) if own[a] == value]
-    others = sum(rows) - length
+def _stays(rows: NDArray, length: int) -> float:
+    """How often a reading of a value is followed by an equal one [1], but for one row of this length.
+
+    rows: lengths of all rows of the value, (rows,).
+    """
+    others = np.sum(rows) - length
     return 1.0 - (len(rows) - 1) / others if others else 0.0
 
 

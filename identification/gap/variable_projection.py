@@ -5,7 +5,7 @@ problem. Eliminating them from the normal equations leaves equations in the para
 (Golub and Pereyra 1973; Schur complement).
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numba
@@ -112,40 +112,48 @@ class LinearisedRun:
 
 @dataclass(frozen=True, kw_only=True)
 class RunProducts:
-    """Products of the columns of one run: residual, slopes, shared slopes, run nuisances."""
+    """Products of the columns of each run: residual, slopes, shared slopes, run nuisances."""
 
-    gram: NDArray
-    """Gram matrix with the priors of the run nuisances, which count from their centres,
-    (1 + k + m + l, 1 + k + m + l) [1]."""
-    bound: NDArray
-    """Bounds of the run nuisances, (l,) [SI]."""
+    grams: NDArray
+    """Gram matrices with the priors of the run nuisances, which count from their centres,
+    (runs, 1 + k + m + l, 1 + k + m + l) [1]."""
+    bounds: NDArray
+    """Bounds of the run nuisances, (runs, l) [SI]."""
+
+    @property
+    def count(self) -> int:
+        """Number 1 + k + m of columns before those of the run nuisances."""
+        return self.grams.shape[1] - self.bounds.shape[1]
 
     def held(self, numbers: NDArray) -> NDArray:
-        """Values of the run nuisances that end at a bound (l,) [SI]; NaN for those between.
+        """Values of the run nuisances that end at a bound (runs, l) [SI]; NaN for those between.
 
         numbers: of slopes and shared nuisances, (k + m,) [1].
         """
-        count = len(self.gram) - len(self.bound)
-        moment = self.gram[count:, 0] - self.gram[count:, 1:count] @ numbers
-        own = self.gram[count:, count:]
-        value = np.linalg.solve(own, moment)
-        if np.any(np.abs(value) > self.bound):
-            value = bounded_minimiser(own, moment, -self.bound, self.bound)
-        ended = np.abs(value) >= (1.0 - 1e-9) * self.bound  # but for rounding
-        return np.where(ended, np.sign(value) * self.bound, np.nan)
+        rows = self.grams[:, self.count :]
+        own, moment = rows[:, :, self.count :], rows[:, :, 0] - rows[:, :, 1 : self.count] @ numbers
+        value = np.linalg.solve(own, moment[..., None])[..., 0]
+        for r in np.flatnonzero(np.any(np.abs(value) > self.bounds, axis=1)):
+            value[r] = bounded_minimiser(own[r], moment[r], -self.bounds[r], self.bounds[r])
+        ended = np.abs(value) >= (1.0 - 1e-9) * self.bounds  # but for rounding
+        return np.where(ended, np.sign(value) * self.bounds, np.nan)
 
     def reduced(self, held: NDArray) -> NDArray:
-        """Gram matrix of the other columns, (1 + k + m, 1 + k + m) [1].
+        """Gram matrices of the other columns, (runs, 1 + k + m, 1 + k + m) [1].
 
-        held: values of run nuisances that stay there, (l,) [SI]; NaN: minimised over.
+        held: values of run nuisances that stay there, (runs, l) [SI]; NaN: minimised over.
         """
-        count = len(self.gram) - len(self.bound)
-        if not len(self.bound):
-            return self.gram
-        nuisances = np.arange(count, len(self.gram))
-        fixed = np.isfinite(held)
-        gram = _shifted(self.gram, nuisances[fixed], held[fixed]) if np.any(fixed) else self.gram
-        return _eliminated(gram, nuisances[~fixed], np.arange(count))
+        free = np.isnan(held)
+        gram = _shifted(self.grams, self.count, np.where(free, 0.0, held))
+        cross = gram[:, self.count :, : self.count] * free[..., None]
+        own = gram[:, self.count :, self.count :] * (free[..., None] & free[:, None])
+        own = own + np.eye(free.shape[1]) * ~free[:, None]
+        rest = gram[:, : self.count, : self.count]
+        return rest - cross.transpose(0, 2, 1) @ np.linalg.solve(own, cross)
+
+    def free(self) -> NDArray:
+        """`reduced` with all run nuisances minimised over."""
+        return self.reduced(np.full(self.bounds.shape, np.nan))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,8 +163,7 @@ class NormalEquations:
     For unbounded nuisances the sum of squares is d' hessian d - 2 gradient d + least.
     """
 
-    runs: list[RunProducts]
-    """Of each run."""
+    runs: RunProducts
     steps: int
     """Number k of parameters."""
     hessian: NDArray
@@ -191,20 +198,20 @@ class NormalEquations:
 def normal_equations(runs: Sequence[LinearisedRun]) -> NormalEquations:
     """Normal equations of several runs together: the same hypothesis linearised in each of them."""
     columns = [_columns(run) for run in runs]
-    products = [_with_priors(own.T @ own, run) for own, run in zip(columns, runs, strict=True)]
+    products = _with_priors(np.array([own.T @ own for own in columns]), runs)
     return _equations(products, runs[0].slopes.shape[1])
 
 
-def _equations(products: Sequence[RunProducts], k: int) -> NormalEquations:
+def _equations(products: RunProducts, k: int) -> NormalEquations:
     """Normal equations in k slopes from the products of several runs."""
-    m = products[0].gram.shape[0] - len(products[0].bound) - 1 - k
-    gram = _together(products, k, [np.full(len(run.bound), np.nan) for run in products])
-    free = _eliminated(gram, np.arange(1 + k, 1 + k + m), np.arange(1 + k))
+    m = products.count - 1 - k
+    gram = _together(products.free(), k)
+    free = eliminated(gram, np.arange(1 + k, 1 + k + m), np.arange(1 + k))
     none, bound = np.zeros(k), np.full(m, LARGEST_DEVIATION)
     ends = np.concatenate([none, -bound]), np.concatenate([none, bound])
     best, chi_square = _bounded_solution(products, k, ends, 0.0)
     return NormalEquations(
-        runs=list(products),
+        runs=products,
         steps=k,
         hessian=free[1:, 1:],
         gradient=free[1:, 0],
@@ -215,38 +222,38 @@ def _equations(products: Sequence[RunProducts], k: int) -> NormalEquations:
 
 
 def _bounded_solution(
-    runs: Sequence[RunProducts], k: int, ends: tuple[NDArray, NDArray], damping: float
+    runs: RunProducts, k: int, ends: tuple[NDArray, NDArray], damping: float
 ) -> tuple[NDArray, float]:
     """Numbers (k + m,) within their ends that minimise the sum of squares, and that sum [1].
 
     Run nuisances beyond their bounds are held there, and the rest is solved again (active sets).
     """
-    held = [np.full(len(run.bound), np.nan) for run in runs]
+    held = np.full(runs.bounds.shape, np.nan)
     free = ends[1] > ends[0]
     best, gram = np.zeros(len(free)), np.zeros((1 + len(free), 1 + len(free)))
     for iteration in range(ACTIVE_SET_ITERATIONS):
-        gram = _together(runs, k, held)
+        gram = _together(runs.reduced(held), k)
         matrix = gram[1:, 1:].copy()
         damped = np.arange(k)
         matrix[damped, damped] *= 1.0 + damping
         matrix[damped, damped] += 1e-9
         own = np.ix_(free, free)
         best[free] = bounded_minimiser(matrix[own], gram[1:, 0][free], ends[0][free], ends[1][free])
-        beyond = [run.held(best) for run in runs]
+        beyond = runs.held(best)
         if iteration >= ACTIVE_SET_ITERATIONS // 2:
-            beyond = [np.where(np.isfinite(a), a, b) for a, b in zip(held, beyond, strict=True)]
-        if all(np.array_equal(a, b, equal_nan=True) for a, b in zip(held, beyond, strict=True)):
+            beyond = np.where(np.isfinite(held), held, beyond)
+        if np.array_equal(held, beyond, equal_nan=True):
             break
         held = beyond
     return best, _sum_of_squares(gram, best)
 
 
-def _together(runs: Sequence[RunProducts], k: int, held: Sequence[NDArray]) -> NDArray:
+def _together(reduced: NDArray, k: int) -> NDArray:
     """Gram matrix of residual, slopes and shared slopes of all runs, with the priors of the latter.
 
-    held: of each run, as `RunProducts.reduced` takes it. Returns (1 + k + m, 1 + k + m) [1].
+    reduced: of each run, (runs, 1 + k + m, 1 + k + m) [1].
     """
-    gram = np.sum([run.reduced(own) for run, own in zip(runs, held, strict=True)], axis=0)
+    gram = np.sum(reduced, axis=0)
     shared = np.arange(1 + k, len(gram))
     gram[shared, shared] += 1.0
     return gram
@@ -292,15 +299,18 @@ def _sum_of_squares(gram: NDArray, numbers: NDArray) -> float:
     return float(gram[0, 0] - 2 * numbers @ gram[1:, 0] + numbers @ gram[1:, 1:] @ numbers)
 
 
-def _shifted(gram: NDArray, columns: NDArray, amounts: NDArray) -> NDArray:
-    """Gram matrix after these columns times `amounts` are subtracted from the residual in row 0."""
-    shifted = gram.copy()
-    shifted[0] -= amounts @ gram[columns]
-    shifted[:, 0] -= shifted[:, columns] @ amounts
+def _shifted(grams: NDArray, first: int, amounts: NDArray) -> NDArray:
+    """Gram matrices after the columns from `first` on times `amounts` leave the residual in row 0.
+
+    grams: (runs, columns, columns). amounts: (runs, l).
+    """
+    shifted = grams.copy()
+    shifted[:, 0] -= (amounts[:, None] @ grams[:, first:])[:, 0]
+    shifted[:, :, 0] -= (shifted[:, :, first:] @ amounts[..., None])[..., 0]
     return shifted
 
 
-def _eliminated(gram: NDArray, columns: NDArray, kept: NDArray) -> NDArray:
+def eliminated(gram: NDArray, columns: NDArray, kept: NDArray) -> NDArray:
     """Gram matrix of the kept columns after minimising over the others (Schur complement)."""
     cross = gram[np.ix_(columns, kept)]
     own = gram[np.ix_(columns, columns)]
@@ -312,15 +322,15 @@ def _columns(run: LinearisedRun) -> NDArray:
     return np.column_stack([run.residual, run.slopes, run.shared_slopes, run.run_slopes])
 
 
-def _with_priors(gram: NDArray, run: LinearisedRun) -> RunProducts:
-    """Products of a run's columns, those of the run nuisances last, with these nuisances' priors."""
-    own = len(run.run_sd)
-    if own:
-        nuisances = np.arange(len(gram) - own, len(gram))
-        # Unknowns become the nuisances' distances from their centres, not steps from present values.
-        gram = _shifted(gram, nuisances, -run.run_values)
-        gram[nuisances, nuisances] += 1.0 / run.run_sd**2
-    return RunProducts(gram=gram, bound=LARGEST_DEVIATION * run.run_sd)
+def _with_priors(grams: NDArray, runs: Sequence[LinearisedRun]) -> RunProducts:
+    """Products of each run's columns, those of the run nuisances last, with these nuisances' priors."""
+    sd, values = (np.array([getattr(run, name) for run in runs]) for name in ("run_sd", "run_values"))
+    first = grams.shape[1] - sd.shape[1]
+    # Unknowns become the nuisances' distances from their centres, not steps from present values.
+    grams = _shifted(grams, first, -values)
+    nuisances = np.arange(first, grams.shape[1])
+    grams[:, nuisances, nuisances] += 1.0 / sd**2
+    return RunProducts(grams=grams, bounds=LARGEST_DEVIATION * sd)
 
 
 class ChangedRuns:
@@ -337,31 +347,22 @@ class ChangedRuns:
         self._slopes = runs[0].slopes.shape[1]
         tables = [np.array([change[r] for change in changes]) for r in range(len(self._runs))]
         columns = [_columns(run) for run in runs]
-        self._grams = [own.T @ own for own in columns]
-        self._crosses = [table @ own for table, own in zip(tables, columns, strict=True)]
-        self._squares = [np.einsum("ij,ij->i", table, table) for table in tables]
+        self._grams = np.array([own.T @ own for own in columns])
+        self._crosses = np.array([table @ own for table, own in zip(tables, columns, strict=True)])
+        self._squares = np.array([np.einsum("ij,ij->i", table, table) for table in tables])
 
     def explained(self, change: int) -> NormalEquations:
         """Normal equations after one change has been added to the model's outputs."""
-        products = []
-        for run, own, crosses, squares in self._parts():
-            gram, cross = own.copy(), crosses[change]
-            gram[0] -= cross
-            gram[:, 0] -= cross
-            gram[0, 0] += squares[change]
-            products.append(_with_priors(gram, run))
-        return _equations(products, self._slopes)
+        grams, cross = self._grams.copy(), self._crosses[:, change]
+        grams[:, 0] -= cross
+        grams[:, :, 0] -= cross
+        grams[:, 0, 0] += self._squares[:, change]
+        return _equations(_with_priors(grams, self._runs), self._slopes)
 
     def with_slope(self, change: int) -> NormalEquations:
         """Normal equations with one change as a further slope, after the others."""
-        place, products = 1 + self._slopes, []
-        for run, own, crosses, squares in self._parts():
-            row = np.insert(crosses[change], place, squares[change])
-            gram = np.insert(np.insert(own, place, 0.0, axis=0), place, 0.0, axis=1)
-            gram[place], gram[:, place] = row, row
-            products.append(_with_priors(gram, run))
-        return _equations(products, self._slopes + 1)
-
-    def _parts(self) -> Iterable[tuple[LinearisedRun, NDArray, NDArray, NDArray]]:
-        """Each run with its products of columns, of changes by columns, and squares of changes."""
-        return zip(self._runs, self._grams, self._crosses, self._squares, strict=True)
+        place = 1 + self._slopes
+        row = np.insert(self._crosses[:, change], place, self._squares[:, change], axis=1)
+        grams = np.insert(np.insert(self._grams, place, 0.0, axis=1), place, 0.0, axis=2)
+        grams[:, place], grams[:, :, place] = row, row
+        return _equations(_with_priors(grams, self._runs), self._slopes + 1)

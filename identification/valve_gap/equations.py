@@ -124,13 +124,14 @@ def contribution(
     inputs = np.zeros((len(Inputs._fields), len(drive.U)))
     inputs[Inputs._fields.index("U")] = drive.U
     inputs[Inputs._fields.index("sigma_S")] = drive.sigma_S
-    nominal = _rates(bare, inputs, without)
-    added = _rates(course, inputs, p) - nominal
+    valve = coefficients(without), effect_constants(without)
+    nominal = _rates(bare, inputs, *valve)
+    added = _rates(course, inputs, coefficients(p), effect_constants(p)) - nominal
     equations = {}
     for equation, (name, state, sign) in FORCINGS.items():
         row, pushed = State._fields.index(state), inputs.copy()
         pushed[Inputs._fields.index(name)] += sign * _STEPS[equation]
-        gain = (_rates(bare, pushed, without) - nominal)[row] / _STEPS[equation]
+        gain = (_rates(bare, pushed, *valve) - nominal)[row] / _STEPS[equation]
         # Where a diode holds the voltage of the coil, none acts from outside.
         equations[equation] = np.divide(added[row], gain, out=np.zeros_like(gain), where=gain != 0.0)
     with_p, bared = readings(answer.state, p), readings(answer.state, {**p, **without})
@@ -159,10 +160,13 @@ def _compiled_rates(digest: str) -> Callable[..., None]:
 _rates_along = _compiled_rates(source_digest())
 
 
-def _rates(states: NDArray, inputs: NDArray, p: Mapping[str, float]) -> NDArray:
-    """Rates of free movers at states (states, samples) under inputs (inputs, samples), likewise [SI]."""
+def _rates(states: NDArray, inputs: NDArray, valve: NDArray, effects: NDArray) -> NDArray:
+    """Rates of free movers at states (states, samples) under inputs (inputs, samples), likewise [SI].
+
+    valve, effects: `coefficients` and `effect_constants` of one valve.
+    """
     out = np.empty_like(states)
-    _rates_along(states, inputs, coefficients(p), effect_constants(p), out)
+    _rates_along(states, inputs, valve, effects, out)
     return out
 
 

@@ -4,6 +4,7 @@ A log does not hold the consumption: each opening has a nuisance for the error o
 """
 
 from collections.abc import Collection, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -16,13 +17,17 @@ from scipy.special import softmax
 from epv_env.common.command_line import NextStep, plant_option
 from epv_env.common.files import Journal
 from epv_env.plant.plantfile import Plant, load_plant
-from identification.gap.diagnosis import Diagnosis, diagnose, rank_hypotheses
+from identification.gap.diagnosis import Diagnosis, diagnose, recalibrated_by_seen_noise
 from identification.gap.fitting_problem import FitCache
 from identification.gap.gap_json import write_results
+from identification.gap.gauss_newton import linearise
+from identification.gap.onset import least_squares_by_onset
 from identification.gap.plant import NuisanceParameter
 from identification.gap.posterior import CHANCE_MISFIT, FIGURES, WEIGHTS
+from identification.gap.prepared_plant import prepared
 from identification.gap.screened import Finding
-from identification.gap.verdict import AMBIGUOUS, NO_GAP, UNKNOWN, Ranking
+from identification.gap.screening import simulate_signatures
+from identification.gap.verdict import AMBIGUOUS, NO_GAP, UNKNOWN
 from identification.recordings.log_files import Log, read_log
 from identification.recordings.openings import drive_of, evenly, openings, start_of
 from identification.recordings.recording import OUTPUTS, Campaign, campaign_facts
@@ -93,32 +98,29 @@ def next_step(verdict: str, folder: Path, out: Path, plant: Path | None) -> Next
 
 def _from_its_drive(valve: "LoggedValve", seed: int, cache: FitCache) -> Diagnosis:
     """The diagnosis with the causes acting from the most probable drive on."""
-    valves = [valve.since(onset) for onset in range(len(valve.drives))]
-    caches = [cache, *(cache.named(f"from {drive}: ") for drive in valve.drives[1:])]
-    singles = [rank_hypotheses(v, c, most_causes=1) for v, c in zip(valves, caches, strict=True)]
-    chances = onset_probabilities(singles)
+    chances = onset_probabilities(valve, cache)
     onset = int(np.argmax(chances))
-    found = diagnose(valves[onset], seed=seed, cache=caches[onset])
+    found = diagnose(valve.since(onset), seed=seed, cache=cache)
     if onset == 0 or found.conclusion.verdict == NO_GAP:
         return found
     return replace(found, onset=(valve.drives[onset], float(chances[onset])))
 
 
-def onset_probabilities(rankings: Sequence[Ranking]) -> NDArray:
-    """Probability of each first drive, (drives,), by the misfit that its best single cause leaves.
+def onset_probabilities(valve: "LoggedValve", cache: FitCache) -> NDArray:
+    """Probability of each first drive, (drives,), by the misfit that the best single cause leaves.
 
-    The misfit counts in the variance that the best of all leaves, as in `posterior`.
+    That it acts from the first drive on is as probable before the data as all later drives together.
     """
-    best = [
-        next((each for each in ranking.hypotheses if len(each.labels) == 1), ranking.recalibrated)
-        for ranking in rankings
-    ]
-    noise = [[c.known_noise for c in ranking.problem.plant.channels] for ranking in rankings]
-    squares = np.array([each.squares for each in best]) * np.array(noise) ** 2
-    readings = np.array([d.readings for d in rankings[0].discrepancies])
-    least = squares[np.argmin(np.sum(np.log(squares), axis=1))]
-    misfits = (squares / least - 1.0) @ readings / 2.0 + [each.nuisance_penalty for each in best]
-    return softmax(-FIT_WEIGHT * np.log(misfits - np.min(misfits) + CHANCE_MISFIT))
+    problem, base = recalibrated_by_seen_noise(prepared(valve), cache)
+    runs = linearise(problem, [base], problem.fitted_runs)[0]
+    signatures = simulate_signatures(problem, base, problem.plant.causes)
+    names = [drive_of(problem.plant.runs[r].name) for r in problem.fitted_runs]
+    drives = np.array([valve.drives.index(name) for name in names])
+    squares = least_squares_by_onset(runs, signatures, drives)
+    misfits = (squares / np.min(squares) - 1.0) * problem.readings / 2.0
+    scores = -FIT_WEIGHT * np.log(misfits + CHANCE_MISFIT)
+    scores[1:] -= np.log(max(len(squares) - 1, 1))
+    return softmax(scores)
 
 
 def _facts(log: Log, campaign: Campaign) -> dict[str, str]:
@@ -139,24 +141,23 @@ class LoggedValve(Valve):
         plant: Plant,
         steady: Collection[str],
         without: Sequence[str] = (),
-        onset: int = 0,
     ):
-        """campaign, steady: of `steady_openings`. onset: drives before causes act. See `Valve`."""
+        """campaign, steady: of `steady_openings`. See `Valve`."""
         super().__init__(campaign, plant, without=without, offsets=CONSUMPTION)
-        self.campaign, self.steady, self.without = campaign, steady, without
         for run in self.runs:
             if run.name not in steady:  # p2 then follows from a consumption that nobody knows
                 run.trusted[OUTPUTS.index("p2")] = False
         self.screened = tuple(_in_drive(finding, campaign) for finding in self.screened)
-        drives = list(dict.fromkeys(drive_of(r.name) for r in campaign.recordings))
-        self.drives = drives
-        self.acting = np.array([drives.index(drive_of(r.name)) >= onset for r in self.recordings])
+        self.drives = list(dict.fromkeys(drive_of(r.name) for r in campaign.recordings))
+        self.acting = np.ones(len(self.recordings), dtype=bool)
         kept = {p.symbol for p in self.parameters} | {t.symbol for t in self.tolerances}
         self.late = {p.symbol for cause in self.causes for p in cause.parameters} - kept
 
     def since(self, onset: int) -> "LoggedValve":
         """The same with causes that act from drive number `onset` on, counted from 0."""
-        return LoggedValve(self.campaign, self.plant, self.steady, self.without, onset)
+        late = copy(self)
+        late.acting = np.array([self.drives.index(drive_of(r.name)) >= onset for r in self.recordings])
+        return late
 
     def outputs(self, values: Mapping[str, NDArray], runs: Sequence[int]) -> list[NDArray]:
         """`GreyBox.outputs`: per run an array (3, samples, n) of OUTPUTS [Pa, Pa, A]."""
