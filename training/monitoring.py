@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,18 +64,18 @@ def drives(
     plant: Plant,
     controller: Controller,
     seeds: Sequence[int],
-    plants: Sequence[Parameters],
+    chosen: dict[str, Any],
     *,
     voltage: float = 1.0,
     duration: float = DRIVE,
 ) -> NDArray:
     """What the control unit reads, (drives, periods, 6): coil, U [V], p1, p2, p3 [bar], I [A].
 
-    plants: parameters of each drive's plant. voltage: share of the plant's.
+    chosen: options of the reset, lists with an entry for each drive. voltage: share of the plant's.
     """
     options = {"plant": plant, "threads": 1, "supply_voltage": voltage * plant.voltage}
     env = make_env(controller, len(seeds), **options)
-    observation, _ = env.reset(seed=list(seeds), options={"parameters": list(plants)})
+    observation, _ = env.reset(seed=list(seeds), options=chosen)
     controller.reset(len(seeds))
     found = np.empty((len(seeds), round(duration / env.settings.control_period), 6))
     found[:, :, 1] = env.settings.supply_voltage
@@ -156,7 +157,8 @@ def _simulated(
     rows: list[tuple[NDArray, NDArray, int, int]] = []
     for number, (kind, voltage) in enumerate(product(CONTROLLERS, voltages)):
         seeds = [(seed * 100 + number) * 1000 + episode for episode in episodes]
-        for valve, drive in enumerate(drives(plant, tuned(kind, plant), seeds, plants, voltage=voltage)):
+        chosen = {"parameters": list(plants)}
+        for valve, drive in enumerate(drives(plant, tuned(kind, plant), seeds, chosen, voltage=voltage)):
             rows += [(x, z, valve, number * len(plants) + valve) for x, z in openings(drive)]
     return Openings(*(np.array(column) for column in zip(*rows, strict=True)))
 

@@ -56,10 +56,10 @@ def run(options: argparse.Namespace) -> None:
         diagnose_all = partial(diagnose.diagnose_campaign, **given)
         for each in rounds(options.campaign, options.out, options.rounds, bench, diagnose_all):
             print(f"{each.added} recordings added: ", end="")
-            _say(each.found, options.out)
+            say(each.found, options.out)
     else:
         read = operation.diagnose_log if options.logs else diagnose.diagnose_campaign
-        _say(read(options.campaign, options.out, **given), options.out)
+        say(read(options.campaign, options.out, **given), options.out)
     written = (diagnose.REPORT, GAP_FILE, diagnose.PLANT)
     print(f"written: {', '.join(str(options.out / name) for name in written)}")
 
@@ -88,7 +88,7 @@ def _check(options: argparse.Namespace) -> None:
         raise ValueError("--rounds records for campaigns, not for logs: leave out --logs or --rounds")
 
 
-def _say(found: Diagnosis, out: Path) -> None:
+def say(found: Diagnosis, out: Path) -> None:
     """Print what the verdict means, and which readings were left out."""
     content = decoded(out / GAP_FILE, remedy="diagnose again")
     print(verdict_sentence(found, content["next_experiment"])[1])

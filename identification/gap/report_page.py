@@ -1,5 +1,6 @@
 """The report of a diagnosis as sections of the HTML page: sentences, tables and figures."""
 
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -52,10 +53,13 @@ LEVEL_TEXT = f"{100 * LEVEL:g} %"
 """Probability within the intervals."""
 
 
-def sections(diagnosis: Diagnosis, next_experiment: str = "", learnt: str = "") -> list[Section]:
+def sections(
+    diagnosis: Diagnosis, next_experiment: str = "", learnt: str = "", more: Sequence[Section] = ()
+) -> list[Section]:
     """The whole report: verdict, localisation, ranking, reduction, remainder, next experiment, warnings.
 
-    next_experiment: a sentence or two; empty where none was sought. learnt: of what has no name.
+    next_experiment: a sentence or two; empty where none was sought. learnt: of what has no name. more:
+    sections that follow the remainder.
     """
     parts = [
         _verdict(diagnosis, next_experiment),
@@ -63,6 +67,7 @@ def sections(diagnosis: Diagnosis, next_experiment: str = "", learnt: str = "") 
         _ranking(diagnosis),
         _reduction(diagnosis),
         _remainder(diagnosis, learnt),
+        *more,
     ]
     if next_experiment:
         plan = Verdict(status="note", text=next_experiment)

@@ -27,7 +27,7 @@ from identification.gap.verdict import AMBIGUOUS, UNKNOWN
 from identification.recordings.campaign_files import read_campaign
 from identification.recordings.recording import campaign_facts
 from identification.recordings.rules import RULES, rules_of
-from identification.report.page import write_page
+from identification.report.page import Section, write_page
 from identification.valve_gap.learnt_term import LearntModel, learn
 from identification.valve_gap.programmes import CANDIDATES, next_experiment
 from identification.valve_gap.programmes import FILE_NAME as PROGRAMME
@@ -36,6 +36,9 @@ from identification.valve_gap.valve import Valve
 GUIDE = "docs/explanation/diagnosis.md"
 
 REPORT, PLANT, JOURNAL = "report.html", "plant.json", "fits.jsonl"
+
+More = Callable[[Diagnosis, Plant], Sequence[Section]]
+"""Makes further sections of the report from the diagnosis and the corrected plant."""
 
 REGION_PROBABILITY = 0.95
 """Probability that the plant file's region holds the parameters [-]."""
@@ -118,13 +121,20 @@ def write_report(
     step: NextStep,
     next_experiment: str = "",
     learnt: LearntModel | None = None,
+    more: More | None = None,
 ) -> None:
     """Write the report and the plant file. name: of the recordings; facts: what the page rests on."""
-    save_plant(refitted_plant(found, valve, name, learnt), out / PLANT)
+    corrected = refitted_plant(found, valve, name, learnt)
+    save_plant(corrected, out / PLANT)
     write_page(
         out / REPORT,
         title=f"Gap between model and recordings: {name}",
-        sections=sections(found, next_experiment, learnt.sentence(found) if learnt else ""),
+        sections=sections(
+            found,
+            next_experiment,
+            learnt.sentence(found) if learnt else "",
+            more(found, corrected) if more else (),
+        ),
         facts=facts,
         footer=f"Written by epv-valve {version('epv-valve')}. Figures and fields: {GUIDE}.",
         next_step=step,

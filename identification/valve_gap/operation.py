@@ -34,6 +34,7 @@ from identification.recordings.recording import OUTPUTS, Campaign, campaign_fact
 from identification.replay.replay import FLOW_RAMP, FLOW_SHIFT
 from identification.valve_gap.diagnose import (
     JOURNAL,
+    More,
     steps_on_stderr,
     subject,
     write_report,
@@ -62,14 +63,16 @@ def diagnose_log(
     without: Sequence[str] = (),
     seed: int = 0,
     report: bool = True,
+    more: More | None = None,
 ) -> Diagnosis:
     """Diagnose an operation log; write gap.json, and unless `report` is False report and plant file.
 
     A cause may act from a later drive on: the search is done for each first drive.
 
     plant: plant file with the nominal parameters, None for the report's calibration. without: causes to
-    leave out. Finished fits are kept in `out` and taken up again. Raises CampaignError for a log that
-    cannot be used, ValueError for an unknown cause or a plant file that is none.
+    leave out. more: makes further sections of the report. Finished fits are kept in `out` and taken up
+    again. Raises CampaignError for a log that cannot be used, ValueError for an unknown cause or a plant
+    file that is none.
     """
     began = perf_counter()
     described = load_plant(plant) if plant else Plant.calibrated()
@@ -83,7 +86,7 @@ def diagnose_log(
     found = replace(found, warnings=[*valve.warnings, *found.warnings])
     if report:
         step = next_step(found.conclusion.verdict, folder, out, Path(plant) if plant else None)
-        write_report(found, valve, out, log.name, _facts(log, campaign), step)
+        write_report(found, valve, out, log.name, _facts(log, campaign), step, more=more)
     write_results(found, out, "", seconds=perf_counter() - began)
     return found
 

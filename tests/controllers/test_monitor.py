@@ -122,7 +122,7 @@ def test_an_opening_without_a_known_beginning_does_not_count(lengths, pause) -> 
 def test_c_code_says_what_python_says(tmp_path: Path) -> None:
     plant = Plant.calibrated()
     controller = Hysteresis(open_below=-0.3, shut_above=0.0)
-    drive = drives(plant, controller, [3], [plant.parameters], duration=10.0)[0]
+    drive = drives(plant, controller, [3], {}, duration=10.0)[0]
     model, monitor = white_model(), Monitor(white_model())
     for name, text in sources(model, monitor.period).items():
         (tmp_path / name).write_text(text)
