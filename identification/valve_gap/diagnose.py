@@ -41,9 +41,7 @@ More = Callable[[Diagnosis, Plant], Sequence[Section]]
 """Makes further sections of the report from the diagnosis and the corrected plant."""
 
 REGION_PROBABILITY = 0.95
-"""Probability that the plant file's region holds the parameters [-]."""
-KEPT_PROBABILITY = 0.99
-"""Probability that the plant file's alternatives hold together [-]."""
+"""Probability that the plant file's region holds the parameters, and its alternatives the truth [-]."""
 
 
 def diagnose_campaign(
@@ -182,7 +180,7 @@ def possible_plants(found: Diagnosis, valve: Valve, learnt: LearntModel | None =
     pairs = [*zip(ranking.probabilities, ranking.hypotheses, strict=True), unnamed]
     pairs.sort(key=lambda pair: -pair[0])
     before = np.cumsum([0.0, *(probability for probability, _ in pairs)])
-    kept = [pair for pair, held in zip(pairs, before, strict=False) if held < KEPT_PROBABILITY]
+    kept = [pair for pair, held in zip(pairs, before, strict=False) if held < REGION_PROBABILITY]
     whole = sum(probability for probability, _ in kept)
     return Mixture(
         alternatives=tuple(
