@@ -174,9 +174,13 @@ def residual_figure(plant: GreyBox, run: int, residual: NDArray, masks: Mapping[
         )
     rows[0].set_yticks(range(len(masks)), [name.replace("_", " ") for name in masks], fontsize=7)
     rows[0].invert_yaxis()
-    for axes, channel, values in zip(rows[1:], plant.channels, residual, strict=True):
+    compared = plant.runs[run].trusted
+    shown = np.where(compared, residual, np.nan)
+    for axes, channel, values in zip(rows[1:], plant.channels, shown, strict=True):
         axes.axhspan(-QUANTILE, QUANTILE, color="0.85")
         axes.plot(time, values, color="black", linewidth=0.6)
+        if np.all(np.isnan(values)):
+            axes.text(0.5, 0.5, "not compared", transform=axes.transAxes, ha="center", va="center")
         axes.set_ylabel(f"{channel.name}\n[noise deviations]", fontsize=8)
         axes.grid(alpha=0.3)
     rows[-1].set_xlabel("time [s]")

@@ -9,6 +9,7 @@ more. The guide is docs/how-to/diagnose-a-gap.md.
 import argparse
 from pathlib import Path
 
+from controllers.policy import TRAINED
 from epv_env.common.command_line import NextStep, add_out, add_plant, add_seed
 from epv_env.common.files import decoded
 from epv_env.plant.plantfile import load_plant
@@ -24,7 +25,10 @@ from training.evaluation.named import HELP, named_controllers
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the log, its controller, the nominal model, the catalogue, and where the results go."""
     parser.add_argument("log", type=Path, help="folder with log.json (docs/reference/files.md)")
-    parser.add_argument("--controller", required=True, help=f"that wrote the log; one of {HELP}")
+    parser.add_argument(
+        "--controller", default=str(TRAINED),
+        help=f"that wrote the log: one of {HELP} (default: the package's policy)",
+    )  # fmt: skip
     add_out(parser)
     add_seed(parser, help="of resampling")
     add_plant(parser, help="plant file of the nominal model; default: the report's calibration")
