@@ -26,10 +26,10 @@ from epv_env.plant.plantfile import Plant, load_plant
 from training.deploy import agreement as verdict
 from training.deploy import compiled, monitor_c
 from training.deploy.c_code import CODE, Export, checks, deployment_contract, sources
-from training.deploy.controller_c import ExportError
 from training.deploy.fmu.archive import fmu
 from training.deploy.fmu.models import plant_model, policy_model
 from training.deploy.onnx_model import onnx_model
+from training.deploy.translation import ExportError
 
 PLANT = "plant"
 """What is exported in place of a policy's folder."""

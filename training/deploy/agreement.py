@@ -14,7 +14,7 @@ from controllers.knowledge import LEARNT, ValveKnowledge
 from epv_env.observation import LAYOUT
 from training.deploy.c_code import LEAST_AGREEMENT, Export
 from training.deploy.compiled import READINGS, CompiledPolicy, logits_of, readings_of
-from training.deploy.controller_c import ExportError
+from training.deploy.translation import ExportError
 from training.evaluation.metrics import summary
 from training.evaluation.rollout import begin_episodes, make_env, run_episodes
 from training.evaluation.seeds import CLOSED_LOOP_SEED, STATES_SEED

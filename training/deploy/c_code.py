@@ -26,11 +26,10 @@ from training.deploy.controller_c import (
     REAL,
     VALVE,
     ControllerC,
-    ExportError,
-    Known,
     listed,
     literal,
 )
+from training.deploy.translation import ExportError
 
 TEMPLATES = Path(__file__).parent / "templates"
 TITLE = "Pressure limiting by an electro-pneumatic protection valve: a trained policy."
@@ -121,9 +120,7 @@ def learner_c(export: Export) -> ControllerC:
         "p": pulse.PLAN._asdict(),
     }
     shapes = {4: table["gain"].shape[1:]}
-    c = ControllerC(
-        known=Known(constants=constants, shapes=shapes, indices=("t",), record=valve_learner.VALVE)
-    )
+    c = ControllerC(constants=constants, shapes=shapes, indices=("t",), record=valve_learner.VALVE)
     c.function(valve_learner.begin, (VALVE,))
     c.function(valve_learner.observe, (VALVE, PLANT, PLANT, ARRAY, REAL, REAL, REAL))
     c.function(pulse.plan, (VALVE, PLANT, PLANT, PLANT, REAL))

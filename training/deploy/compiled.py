@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from epv_env.observation import decode
 from training.deploy.c_code import MEMORY
-from training.deploy.controller_c import ExportError
+from training.deploy.translation import ExportError
 
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
 """What the exported code is compiled with here."""

@@ -3,8 +3,9 @@
 import pytest
 
 from epv_env.plant.primitives import inlined
-from training.deploy.fmu.c_expressions import NUMBER, Symbol, TranslationError, written
-from training.deploy.fmu.c_functions import Translation
+from training.deploy.fmu.c_functions import NUMBER, PlantC
+from training.deploy.fmu.formulas import Symbol, written
+from training.deploy.translation import ExportError
 
 LIMIT = 0.1
 
@@ -43,11 +44,11 @@ def reordered(x):
     """Assigns values that depend on each other."""
     a, b = x, 1.0
     a, b = b, a
-    return a + b
+    return a - b
 
 
 def test_a_function_and_those_it_calls_become_c():
-    translation = Translation()
+    translation = PlantC()
     assert translation.function(summed, (NUMBER,)).result == "double"
     text = "\n".join(translation.texts)
     assert text.index("double limited(") < text.index("both(") < text.index("double summed(")
@@ -55,10 +56,15 @@ def test_a_function_and_those_it_calls_become_c():
     assert "pow(x, 2.0)" in text
 
 
-@pytest.mark.parametrize(("function", "named"), [(unknown, r"\[x\]"), (reordered, r"\(b, a\)")])
-def test_what_has_no_form_in_c_is_named(function, named):
-    with pytest.raises(TranslationError, match=named):
-        Translation().function(function, (NUMBER,))
+def test_values_are_taken_before_the_first_is_assigned():
+    translation = PlantC()
+    translation.function(reordered, (NUMBER,))
+    assert "taken = {b, a};\n        a = taken.part0;\n        b = taken.part1;" in translation.texts[-1]
+
+
+def test_what_has_no_form_in_c_is_named():
+    with pytest.raises(ExportError, match=r"\[x\]"):
+        PlantC().function(unknown, (NUMBER,))
 
 
 def test_a_formula_is_written_down():
@@ -70,5 +76,5 @@ def test_a_formula_is_written_down():
 
 def test_an_operation_without_a_form_in_c_is_named():
     np = pytest.importorskip("numpy")
-    with pytest.raises(TranslationError, match=r"np\.sin"):
+    with pytest.raises(ExportError, match=r"np\.sin"):
         np.sin(Symbol("x"))

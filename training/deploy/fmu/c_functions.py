@@ -1,144 +1,19 @@
-"""C from the plant's compiled functions: one C function for each Python function, by its syntax tree.
-
-So the equations of an FMU are those of epv_env/plant by construction. Only what such functions consist
-of is known here: numbers, named tuples of numbers, arithmetic, comparisons, branches and fixed loops.
-"""
+"""C from the plant's compiled functions, so that the equations of an FMU are those of epv_env/plant."""
 
 import ast
 import inspect
+import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from textwrap import dedent
 from typing import Any
 
-from training.deploy.fmu.c_expressions import (
-    NUMBER,
-    TRUTH,
-    CFunction,
-    Declarations,
-    Expressions,
-    Symbol,
-    TranslationError,
-    written,
-)
-from training.deploy.syntax import OPERATORS, syntax_tree
+from training.deploy.fmu.formulas import Symbol, written
+from training.deploy.translation import Body, CFunction, Translation, Typed
 
-
-def definition(done: CFunction, arguments: dict[str, str], body: str) -> str:
-    """A function's text; structures are passed by their address."""
-    listed = ", ".join(
-        f"{kind} {name}" if kind in (NUMBER, TRUTH) else f"const {kind} *{name}"
-        for name, kind in arguments.items()
-    )
-    return f"static inline {done.result} {done.name}({listed})\n{{\n{body}}}\n"
-
-
-class Body(Expressions):
-    """One function on its way to C."""
-
-    def __init__(self, known: Declarations, python: Callable[..., Any], types: tuple[str, ...]):
-        tree = syntax_tree(python)
-        self.tree = tree
-        self.given = dict(zip((argument.arg for argument in tree.args.args), types, strict=True))
-        names = [node for node in ast.walk(tree) if isinstance(node, ast.Name)]
-        self.used = {node.id for node in names}
-        assigned = {node.id for node in names if isinstance(node.ctx, ast.Store)}
-        self.copied = {n: k for n, k in self.given.items() if n in assigned and k not in (NUMBER, TRUTH)}
-        """Structures that the function changes: it does so to a copy."""
-        super().__init__(known, python, {n: k for n, k in self.given.items() if n not in self.copied})
-        self.locals = dict(self.copied)
-        self.result: str | None = None
-
-    def translated(self) -> tuple[str, CFunction]:
-        """The function's text, and how to call it."""
-        body = self.statements(self.tree.body, "    ")
-        done = CFunction(name=self.python.__name__, result=self.result or "void")
-        variables = "".join(
-            f"    {kind} {name}{f' = *given_{name}' if name in self.copied else ''};\n"
-            for name, kind in self.locals.items()
-        )
-        unused = "".join(f"    (void){name};\n" for name in self.arguments if name not in self.used)
-        listed = {f"given_{n}" if n in self.copied else n: kind for n, kind in self.given.items()}
-        return definition(done, listed, f"{variables}{unused}{body}"), done
-
-    def statements(self, nodes: list[ast.stmt], margin: str) -> str:
-        """C of statements, one or more lines for each."""
-        return "".join(self.statement(node, margin) for node in nodes)
-
-    def statement(self, node: ast.stmt, margin: str) -> str:
-        """C of a statement."""
-        match node:
-            case ast.Expr(value=ast.Constant(value=str())):
-                return ""  # the docstring
-            case ast.Return(value=ast.expr() as value):
-                return f"{margin}return {self.returned(value)};\n"
-            case ast.Assign(targets=targets, value=value):
-                return "".join(self.assigned(target, value, margin) for target in targets)
-            case ast.AugAssign(target=ast.Name(id=name), op=op, value=value) if type(op) in OPERATORS:
-                return f"{margin}{name} {OPERATORS[type(op)]}= {self.value(value)[0]};\n"
-            case ast.If(test=test, body=body, orelse=other):
-                text = f"{margin}if ({self.value(test)[0]}) {{\n{self.statements(body, margin + '    ')}"
-                if other:
-                    text += f"{margin}}} else {{\n{self.statements(other, margin + '    ')}"
-                return f"{text}{margin}}}\n"
-            case ast.For(
-                target=ast.Name(id=name),
-                iter=ast.Call(func=ast.Name(id="range"), args=[count]),
-                body=body,
-                orelse=[],
-            ):
-                until = float(self.value(count)[0])
-                head = f"{margin}for (int {name} = 0; {name} < {until:.0f}; {name}++) {{\n"
-                return f"{head}{self.statements(body, margin + '    ')}{margin}}}\n"
-        self.refuse(node)
-
-    def returned(self, value: ast.expr) -> str:
-        """C of what is returned; remembers the type."""
-        if isinstance(value, ast.Tuple):
-            parts = [self.value(each) for each in value.elts]
-            kind = self.translation.result(tuple(kind for _, kind in parts))
-            text = f"({kind}){{{', '.join(text for text, _ in parts)}}}"
-        else:
-            text, kind = self.value(value)
-        if self.result not in (None, kind):
-            self.refuse(value)
-        self.result = kind
-        return text
-
-    def assigned(self, target: ast.expr, value: ast.expr, margin: str) -> str:
-        """C of an assignment to one name, or to several from a tuple or a function's values."""
-        match target, value:
-            case ast.Name(id=name), _:
-                text, kind = self.value(value)
-                return f"{margin}{self.variable(name, kind)} = {text};\n"
-            case ast.Tuple(elts=targets), ast.Tuple(elts=values):
-                names = {each.id for each in targets if isinstance(each, ast.Name)}
-                if names & {node.id for node in ast.walk(value) if isinstance(node, ast.Name)}:
-                    self.refuse(value)  # the values would have to be taken all at once
-                pairs = zip(targets, values, strict=True)
-                return "".join(self.assigned(each, one, margin) for each, one in pairs)
-            case ast.Tuple(elts=targets), ast.Call():
-                text, kind = self.value(value)
-                inner = margin + "    "
-                lines = [f"{inner}const {kind} parts = {text};\n"]
-                for k, part in enumerate(self.translation.parts(kind)):
-                    each = targets[k]
-                    if not isinstance(each, ast.Name):
-                        self.refuse(target)
-                    lines.append(f"{inner}{self.variable(each.id, part)} = parts.part{k};\n")
-                return f"{margin}{{\n{''.join(lines)}{margin}}}\n"
-        self.refuse(target)
-
-    def variable(self, name: str, kind: str) -> str:
-        """A name that is assigned to, declared with its type at the top of the function."""
-        known = self.arguments.get(name) or self.locals.setdefault(name, kind)
-        if known != kind:
-            raise TranslationError(
-                f"{self.python.__name__} gives {name} values of two types: use two names"
-            )
-        return name
-
+NUMBER, TRUTH = "double", "int"
+"""C types of numbers and of truth values; the other types are structures, passed by their address."""
 
 HELPERS = """\
 static inline double lesser(double a, double b) { return a < b ? a : b; }
@@ -148,14 +23,11 @@ static inline double greater(double a, double b) { return a > b ? a : b; }
 
 
 @dataclass(kw_only=True)
-class Translation:
-    """C of functions and of all that they call, each once, in an order in which C can read them."""
+class PlantC(Translation):
+    """C of functions of numbers and named tuples of numbers."""
 
     structures: dict[type, str] = field(default_factory=dict)
-    """C types by named tuple; a result of several values becomes a structure of its own."""
-    texts: list[str] = field(default_factory=list)
-    _functions: dict[tuple[Any, tuple[str, ...]], CFunction] = field(default_factory=dict)
-    _results: dict[tuple[str, ...], str] = field(default_factory=dict)
+    """C types by named tuple."""
 
     def structure(self, kind: type) -> str:
         """The C type of a named tuple of numbers, declared when it is first needed."""
@@ -166,35 +38,11 @@ class Translation:
             self.structures[kind] = name
         return self.structures[kind]
 
-    def result(self, types: tuple[str, ...]) -> str:
-        """The C type of several values that a function returns together, `part0` and so on."""
-        if types not in self._results:
-            name = f"parts_{len(self._results)}"
-            fields = "".join(f"    {each} part{k};\n" for k, each in enumerate(types))
-            self.texts.append(f"typedef struct {{\n{fields}}} {name};\n")
-            self._results[types] = name
-        return self._results[types]
-
-    def parts(self, name: str) -> tuple[str, ...]:
-        """Types of the values in a structure that `result` named. Raises KeyError for another one."""
-        return {name: types for types, name in self._results.items()}[name]
-
-    def function(self, function: Callable[..., Any], types: tuple[str, ...]) -> CFunction:
-        """Translate a function whose arguments have these C types. Raises TranslationError."""
-        python = getattr(function, "py_func", function)
-        key = (python, types)
-        if key not in self._functions:
-            found = [done for (other, _), done in self._functions.items() if other is python]
-            if found:
-                raise TranslationError(
-                    f"{python.__name__} is called with arguments of different types: C needs one"
-                )
-            from_text = python.__code__.co_filename == "<string>"
-            text, self._functions[key] = (
-                self._traced(python, types) if from_text else Body(self, python, types).translated()
-            )
-            self.texts.append(text)
-        return self._functions[key]
+    def translated(self, python: Callable[..., Any], types: tuple[str, ...]) -> tuple[str, CFunction]:
+        """The text of a function, and how to call it."""
+        if python.__code__.co_filename == "<string>":
+            return self._traced(python, types)
+        return _PlantBody(self, python, types).translated()
 
     def _traced(self, python: Callable[..., Any], types: tuple[str, ...]) -> tuple[str, CFunction]:
         """C of a function that `primitives.generated` made from text: one expression, traced."""
@@ -209,12 +57,83 @@ class Translation:
         result = python(*arguments)
         kind = self.structures[type(result)]
         members = ",\n        ".join(f".{each} = {written(v)}" for each, v in result._asdict().items())
-        taken = {known.name for known in self._functions.values()}
+        taken = {known.name for _, known in self.functions.values()}
         name = python.__name__ if python.__name__ not in taken else f"{python.__name__}_{len(taken)}"
+        passed = ", ".join(map(_declared, names, types))
+        body = f"    return ({kind}){{\n        {members}}};\n"
         done = CFunction(name=name, result=kind)
-        return definition(
-            done, dict(zip(names, types, strict=True)), f"    return ({kind}){{\n        {members}}};\n"
-        ), done
+        return f"static inline {kind} {name}({passed})\n{{\n{body}}}\n", done
+
+
+def _declared(name: str, kind: str) -> str:
+    """An argument of a function."""
+    return f"{kind} {name}" if kind in (NUMBER, TRUTH) else f"const {kind} *{name}"
+
+
+class _PlantBody(Body):
+    """One function on its way to C."""
+
+    c: PlantC
+    NUMBER, TRUTH = NUMBER, TRUTH
+    MATHEMATICS = {  # noqa: RUF012
+        min: "lesser", max: "greater", abs: "fabs",
+        **{getattr(math, name): name for name in ("sqrt", "exp", "log", "log1p", "sin", "cos", "pow")},
+    }  # fmt: skip
+
+    def __init__(self, c: PlantC, python: Callable[..., Any], types: tuple[str, ...]):
+        super().__init__(c, python, types)
+        assigned = {
+            node.id
+            for node in ast.walk(self.tree)
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
+        }
+        self.copied = {n: k for n, k in self.given.items() if n in assigned and k not in (NUMBER, TRUTH)}
+        """Structures that the function changes: it does so to a copy."""
+        self.locals = dict(self.copied)
+
+    def declared(self, name: str) -> list[str]:
+        """How an argument stands in the list of arguments."""
+        return [_declared(f"given_{name}" if name in self.copied else name, self.given[name])]
+
+    def begun(self, name: str) -> str:
+        """How a variable is declared; a copy of an argument at its value."""
+        return f"{name} = *given_{name}" if name in self.copied else name
+
+    def literal(self, value: float) -> str:
+        """A double in C."""
+        return repr(float(value))
+
+    def passed_by_address(self, name: str) -> bool:
+        """Whether a name is a structure that the function was given."""
+        return name in self.given and name not in self.copied
+
+    def member(self, node: ast.Attribute, holder: str, attr: str) -> Typed:
+        """C of a field of a structure."""
+        return f"{holder}{'->' if self.passed_by_address(holder) else '.'}{attr}", NUMBER
+
+    def called(self, node: ast.Call, callee: Any) -> Typed:
+        """C of a call of a named tuple, or of another function of the plant."""
+        values = [self.value(each) for each in node.args]
+        keywords = {each.arg: self.value(each.value) for each in node.keywords}
+        if isinstance(callee, type) and hasattr(callee, "_fields"):
+            kind = self.c.structure(callee)
+            items = dict(zip(callee._fields, values, strict=False)) | keywords  # type: ignore[attr-defined]
+            members = ", ".join(f".{name} = {text}" for name, (text, _) in items.items())
+            return f"({kind}){{{members}}}", kind
+        if not hasattr(callee, "py_func"):
+            self.refuse(node)
+        parameters = list(inspect.signature(callee.py_func).parameters.values())
+        for parameter in parameters[len(values) :]:
+            default = 0.0 if parameter.default is parameter.empty else parameter.default
+            values.append(keywords.get(parameter.name) or (self.literal(default), NUMBER))
+        if any(kind not in (NUMBER, TRUTH) and not text.isidentifier() for text, kind in values):
+            self.refuse(node)  # C passes structures by their address, which only variables have
+        done = self.c.function(callee, tuple(kind for _, kind in values))
+        passed = [
+            text if kind in (NUMBER, TRUTH) or self.passed_by_address(text) else f"&{text}"
+            for text, kind in values
+        ]
+        return f"{done.name}({', '.join(passed)})", done.result
 
 
 def field_texts(kind: type) -> dict[str, tuple[str, str]]:

@@ -31,8 +31,8 @@ from epv_env.plant.stepping import (
 )
 from training.deploy.c_code import CODE, TITLE, filled
 from training.deploy.fmu.archive import TEMPLATES, Model, Variable
-from training.deploy.fmu.c_expressions import NUMBER, TRUTH, Symbol, written
-from training.deploy.fmu.c_functions import HELPERS, Translation, field_texts
+from training.deploy.fmu.c_functions import HELPERS, NUMBER, TRUTH, PlantC, field_texts
+from training.deploy.fmu.formulas import Symbol, written
 
 LONGEST_STEP = 250e-6
 """Start of the parameter longest_step [s]: the integration step while a mover moves, the kernel's;
@@ -60,7 +60,7 @@ NOT_NEGATIVE = ("sigma_S", "refill")
 def plant_model(plant: Plant) -> Model:
     """The model of a plant, its parameters as start values.
 
-    Raises TranslationError where the plant's code holds what has no form in C here.
+    Raises ExportError where the plant's code holds what has no form in C here.
     """
     variables = _variables(plant)
     return Model(
@@ -134,7 +134,7 @@ def _settings(plant: Plant) -> list[Variable]:
 
 def _sources() -> dict[str, str]:
     """The equations and the file that solves them."""
-    translation = Translation()
+    translation = PlantC()
     state, inputs, coefficients, effects = map(
         translation.structure, (State, Inputs, Coefficients, Effects)
     )
