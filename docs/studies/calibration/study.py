@@ -21,6 +21,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import log_softmax
 
+from docs.studies.calibration.virtual_plants import draw_trial
+from docs.studies.calibration.virtual_systems import SYSTEMS
 from docs.studies.common import PAGE, ROOT, fill, study_options, study_parser, table
 from epv_env.common.command_line import fail_clearly
 from epv_env.common.files import Journal, write_json
@@ -29,8 +31,6 @@ from identification.blind.report import draw_reliability, expected_calibration_e
 from identification.blind.sealing import LABEL_FILE
 from identification.blind.trials import REQUEST_FILE, generate_trial
 from identification.blind.truth import trial_plan
-from identification.blind.virtual_plants import draw_trial
-from identification.blind.virtual_systems import SYSTEMS
 from identification.gap.diagnosis import rank_hypotheses
 from identification.gap.posterior import FIGURES, log_sets
 from identification.gap.verdict import Ranking

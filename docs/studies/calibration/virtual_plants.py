@@ -15,7 +15,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from identification.blind.virtual_systems import HIDDEN, SYSTEMS, System, law
+from docs.studies.calibration.virtual_systems import HIDDEN, SYSTEMS, System, law
 from identification.gap.ode_integration import Records
 from identification.gap.ode_plant import OdePlant
 from identification.gap.plant import Channel, Run

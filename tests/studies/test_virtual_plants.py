@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from identification.blind.virtual_plants import command, draw_trial, true_readings, with_recordings
-from identification.blind.virtual_systems import SYSTEMS
+from docs.studies.calibration.virtual_plants import command, draw_trial, true_readings, with_recordings
+from docs.studies.calibration.virtual_systems import SYSTEMS
 
 plants = pytest.mark.parametrize("plant", SYSTEMS)
 
