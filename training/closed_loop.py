@@ -22,7 +22,7 @@ from epv_env.plant.primitives import mass_flux
 from epv_env.plant.supply import Supply
 from epv_env.reward import BAND_BAR
 from epv_env.signals import MovingTarget, RecordedConsumption
-from identification.gap.diagnosis import Diagnosis, hypothesis_title
+from identification.gap.diagnosis import Diagnosis
 from identification.recordings.log_files import PERIOD_TOLERANCE, Drive, Log
 from identification.report.page import Section, Table, Verdict
 from training.monitoring import drives
@@ -224,7 +224,7 @@ class ClosedLoop:
         files = [drive.file for drive in self.log.drives]
         first = files.index(found.onset[0]) if found.onset else 0
         result = self.compared(corrected, first)
-        name = f"with {hypothesis_title(found.kept)}" if found.kept.labels else "recalibrated"
+        name = f"with {found.kept.title}" if found.kept.labels else "recalibrated"
         caption = (
             f"Mean over {', '.join(files[first:])}, after {SETTLING:g} s. Simulated: {REPEATS} runs of "
             f"{self.controller.name} in closed loop. Consumption is read off p2 while the valve is "

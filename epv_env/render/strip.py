@@ -1,7 +1,7 @@
 """The strip chart: pressures with the target's band, coil command and consumption over time."""
 
 from collections import deque
-from itertools import pairwise
+from itertools import count, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -27,9 +27,11 @@ from epv_env.render.canvas import (
     mix,
 )
 from epv_env.render.geometry import Snapshot
+from epv_env.reward import BAND_BAR
 
 SPACING = 19.0  # least distance between two labels at the ends of lines [px]
-MOST_TICKS = 7  # largest number of numbered grid lines
+WINDOW_S = 3.0  # time shown [s]
+TICK_S = 0.5  # distance of numbered grid lines [s]
 
 Array = NDArray[np.float64]  # an array of floats
 
@@ -105,25 +107,18 @@ def spread(labels: list[Label], top: float, bottom: float) -> list[Label]:
     return placed
 
 
-def time_step(window_s: float) -> float:
-    """Distance of the ticks [s]: the least of .. 0.1, 0.2, 0.5, 1 .. that gives at most 7."""
-    return _next_of((1, 2, 5, 10), window_s / MOST_TICKS)
-
-
 def round_up(value: float) -> float:
     """The next of 1, 2, 4, 6, 10, 20, ... at or above the value."""
-    return _next_of((1, 2, 4, 6, 10), max(value, 1.0))
-
-
-def _next_of(multiples: tuple[int, ...], value: float) -> float:
-    decade = 10.0 ** np.floor(np.log10(value))
-    return next(float(m * decade) for m in multiples if m * decade >= value * (1 - 1e-9))
+    least = max(value, 1.0)
+    decade = 10.0 ** np.floor(np.log10(least))
+    return next(float(m * decade) for m in (1, 2, 4, 6, 10) if m * decade >= least * (1 - 1e-9))
 
 
 LEFT, RIGHT = 730.0, 1150.0  # ends of the time axis [px]
 PRESSURES: Box = (LEFT, 112, RIGHT, 428)  # panel of the pressures [px]
 COMMAND: Box = (LEFT, 474, RIGHT, 512)  # panel of the coil's command [px]
 CONSUMED: Box = (LEFT, 558, RIGHT, 650)  # panel of the consumption [px]
+PER_SECOND = (RIGHT - LEFT) / WINDOW_S  # length of a second on the time axis [px]
 
 
 class Samples(NamedTuple):
@@ -146,12 +141,10 @@ class Samples(NamedTuple):
 
 
 class Strip:
-    """The last `window_s` of snapshots, and their drawing."""
+    """The last WINDOW_S of snapshots, and their drawing."""
 
-    def __init__(self, *, tolerance_bar: float, window_s: float):
-        """tolerance_bar: half width of the band [bar]. window_s: time shown [s]."""
-        self.tolerance_bar = tolerance_bar
-        self.window_s = window_s
+    def __init__(self):
+        """Begin without a history."""
         self._history: deque[tuple[float, ...]] = deque()
 
     def reset(self) -> None:
@@ -169,7 +162,7 @@ class Strip:
             (s.time_s, s.p1_bar, s.p2_bar, s.p3_bar, s.target_bar, s.coil_on, s.sigma_S_g_per_s)
         )
         # One sample before the window stays, so that the lines begin at the panel's edge.
-        while len(history) > 1 and history[1][0] < s.time_s - self.window_s:
+        while len(history) > 1 and history[1][0] < s.time_s - WINDOW_S:
             history.popleft()
 
     def draw_background(self, canvas: Canvas) -> None:
@@ -180,7 +173,7 @@ class Strip:
         canvas.text("off", (LEFT - 8, COMMAND[3] - 5), 16, MUTED, align=1.0)
         canvas.text("Consumption [g/s]", (LEFT, CONSUMED[1] - 16), 18, INK)
         canvas.text("time [s]", ((LEFT + RIGHT) / 2, 691), 18, INK, align=0.5)
-        words = f"target ±{1000 * self.tolerance_bar:.0f} mbar"
+        words = f"target ±{1000 * BAND_BAR:.0f} mbar"
         width = canvas.text(words, (RIGHT, 90), 18, TARGET, align=1.0)
         canvas.rectangle((RIGHT - width - 32, 83, RIGHT - width - 8, 97), BAND)
         canvas.rectangle((RIGHT - width - 32, 89, RIGHT - width - 8, 91), TARGET)
@@ -188,31 +181,25 @@ class Strip:
     def draw(self, canvas: Canvas) -> None:
         """Draw the history."""
         samples = Samples(*np.array(self._history, dtype=float).T)
-        begin = max(0.0, float(samples.time[-1]) - self.window_s)
+        begin = max(0.0, float(samples.time[-1]) - WINDOW_S)
         self._draw_time_axis(canvas, begin)
-        place = LEFT + self._per_second * (samples.time - begin)
+        place = LEFT + PER_SECOND * (samples.time - begin)
         samples = samples._replace(time=place)
         for draw in (self._draw_pressures, _draw_command, _draw_consumption):
             draw(canvas, samples)
         for panel in (PRESSURES, COMMAND, CONSUMED):
             canvas.rectangle(panel, EDGE, outline=1)
 
-    @property
-    def _per_second(self) -> float:
-        """Length of a second on the time axis [px]."""
-        return (RIGHT - LEFT) / self.window_s
-
     def _draw_time_axis(self, canvas: Canvas, begin: float) -> None:
         """Grid lines through all panels, and their times."""
-        step = time_step(self.window_s)
-        first = int(np.ceil(begin / step - 1e-9))
-        for k in range(first, first + MOST_TICKS + 1):
-            x = LEFT + self._per_second * (k * step - begin)
+        first = int(np.ceil(begin / TICK_S - 1e-9))
+        for k in count(first):
+            x = LEFT + PER_SECOND * (k * TICK_S - begin)
             if x > RIGHT + 0.5:
                 break
             for _, top, _, bottom in (PRESSURES, COMMAND, CONSUMED):
                 canvas.rectangle((x - 0.5, top, x + 0.5, bottom), GRID)
-            canvas.text(f"{k * step:.10g}", (x, CONSUMED[3] + 14), 16, MUTED, align=0.5)
+            canvas.text(f"{k * TICK_S:.10g}", (x, CONSUMED[3] + 14), 16, MUTED, align=0.5)
 
     def _draw_pressures(self, canvas: Canvas, s: Samples) -> None:
         highest = max(s.p1.max(), s.p2.max(), s.p3.max())
@@ -243,8 +230,8 @@ class Strip:
         ends = run_ends(s.target)
         time = np.concatenate([[LEFT], s.time[ends], [RIGHT]])
         target = np.concatenate([s.target[:1], s.target[ends], s.target[-1:]])
-        upper = axis.points(time, target + self.tolerance_bar)
-        lower = axis.points(time, target - self.tolerance_bar)
+        upper = axis.points(time, target + BAND_BAR)
+        lower = axis.points(time, target - BAND_BAR)
         canvas.polygon(np.concatenate([upper, lower[::-1]]).tolist(), BAND)
 
 

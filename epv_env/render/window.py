@@ -9,6 +9,7 @@ from epv_env.render.canvas import BAD, CARD, EDGE, GOOD, INK, MUTED, PAGE, Box, 
 from epv_env.render.geometry import Snapshot
 from epv_env.render.section import draw_section, draw_section_background
 from epv_env.render.strip import Strip
+from epv_env.reward import BAND_BAR
 
 if TYPE_CHECKING:
     import pygame
@@ -49,25 +50,14 @@ class Renderer:
     `is_open` turns False when the user shuts the window (mode 'human'); `draw` then does nothing.
     """
 
-    def __init__(
-        self,
-        mode: Literal["rgb_array", "human"],
-        fps: int,
-        *,
-        tolerance_bar: float = 0.5,
-        window_s: float = 3.0,
-    ):
-        """fps: frames per second of the window. tolerance_bar: half width of the shaded band [bar].
-
-        window_s: time that the strip chart shows [s]. Without pygame, `draw` raises
-        DependencyNotInstalled.
-        """
+    def __init__(self, mode: Literal["rgb_array", "human"], fps: int):
+        """fps: frames per second of the window. Without pygame, `draw` raises DependencyNotInstalled."""
         if mode not in ("rgb_array", "human"):
             raise ValueError(f"render mode {mode!r} is unknown: use 'rgb_array' or 'human'")
         self.mode = mode
         self.fps = fps
         self.is_open = True
-        self._strip = Strip(tolerance_bar=tolerance_bar, window_s=window_s)
+        self._strip = Strip()
         self._canvas: Canvas | None = None
         self._window: pygame.Surface | None = None
         self._clock: pygame.time.Clock | None = None
@@ -128,7 +118,7 @@ class Renderer:
         canvas.text(name, (72, 34), 22, CARD, align=0.5)
         canvas.text(sentence, (138, 34), 20, INK)
         deviation = snapshot.p2_bar - snapshot.target_bar
-        inside = abs(deviation) <= self._strip.tolerance_bar
+        inside = abs(deviation) <= BAND_BAR
         canvas.rectangle((900, 18, 1122, 50), GOOD if inside else BAD, radius=8)
         # The font has no minus sign; its dash is as wide as the plus, the hyphen is not.
         words = f"p_2 – target  {deviation:+.2f} bar".replace("-", "–")

@@ -76,13 +76,10 @@ def predict_residuals(
     fitted = [r for r, run in enumerate(plant.runs) if not run.held_out]
     samples = sum(len(features[r]) for r in fitted)
     longest = max(1, samples // FEWEST_LEARNING_SAMPLES)
+    strides = {r: min(longest, history_stride(plant, r, scale)) for r in fitted}
     learning = [
-        _thinned(
-            features[r],
-            model.residuals[r],
-            min(longest, history_stride(plant, r, scale)),
-        )
-        for r in fitted
+        LearningRun(features=features[r][::stride], target=model.residuals[r][:, ::stride])
+        for r, stride in strides.items()
     ]
     held_out = [features[r] for r, run in enumerate(plant.runs) if run.held_out]
     predictions = iter(learner(learning, held_out, seed))
@@ -90,11 +87,6 @@ def predict_residuals(
         next(predictions) * run.trusted if run.held_out else np.zeros(run.measured.shape)
         for run in plant.runs
     ]
-
-
-def _thinned(features: NDArray, target: NDArray, stride: int) -> LearningRun:
-    """Every `stride`-th sample: denser ones tell nothing more."""
-    return LearningRun(features=features[::stride], target=target[:, ::stride])
 
 
 def ridge_on_random_features(
@@ -113,15 +105,14 @@ def ridge_on_random_features(
     """
     waves = random_fourier_features(np.concatenate([run.features for run in learning]), seed)
     folds = [(waves(run.features), run.target.T) for run in _folds(learning)]
-    penalties = PENALTIES
     linear = learning[0].features.shape[1]
     grams = np.array([z.T @ z for z, _ in folds])
     moments = np.array([z.T @ y for z, y in folds])
     left = 0.0
     for (z, y), gram, moment in zip(folds, grams, moments, strict=True):
-        others = _solutions(grams.sum(axis=0) - gram, moments.sum(axis=0) - moment, linear, penalties)
+        others = _solutions(grams.sum(axis=0) - gram, moments.sum(axis=0) - moment, linear)
         left = left + np.sum((y[:, None] - np.tensordot(z, others, (1, 0))) ** 2, axis=0)
-    solutions = _solutions(grams.sum(axis=0), moments.sum(axis=0), linear, penalties)
+    solutions = _solutions(grams.sum(axis=0), moments.sum(axis=0), linear)
     best = np.argmin(left, axis=0)
     weights = np.take_along_axis(solutions, best[None, None], axis=1)[:, 0]
     return [(waves(values) @ weights).T for values in features]
@@ -138,18 +129,18 @@ def _folds(learning: Sequence[LearningRun]) -> list[LearningRun]:
     ]
 
 
-def _solutions(gram: NDArray, moment: NDArray, linear: int, penalties: NDArray) -> NDArray:
+def _solutions(gram: NDArray, moment: NDArray, linear: int) -> NDArray:
     """Weights by choice of the model, (features, 1 + 2 penalties, channels).
 
     The choices are: no prediction; by penalty, the linear features alone; by penalty, all features.
 
     gram, moment: products of the features, and with the targets. linear: features that come first.
     """
-    weights = np.zeros((len(gram), 1 + 2 * len(penalties), moment.shape[1]))
-    for first, size in ((1, linear), (1 + len(penalties), len(gram))):
+    weights = np.zeros((len(gram), 1 + 2 * len(PENALTIES), moment.shape[1]))
+    for first, size in ((1, linear), (1 + len(PENALTIES), len(gram))):
         values, vectors = np.linalg.eigh(gram[:size, :size])
         turned = vectors.T @ moment[:size]
-        for p, penalty in enumerate(penalties):
+        for p, penalty in enumerate(PENALTIES):
             damped = turned / (np.maximum(values, 0)[:, None] + penalty)
             weights[:size, first + p] = vectors @ damped
     return weights

@@ -95,7 +95,7 @@ class Diagnosis:
 
         Raises KeyError for a cause whose reduction was not measured.
         """
-        return self.reduction.shares_closed[hypothesis_label(cause.hypothesis)]
+        return self.reduction.shares_closed[cause.hypothesis.label]
 
     @property
     def advised(self) -> RankedCause | None:
@@ -113,16 +113,6 @@ class Diagnosis:
     def surely_helps(self, cause: RankedCause) -> bool:
         """Whether adding a judged cause surely reduces the gap on held-out recordings."""
         return self.share_closed(cause).low > 0.0
-
-
-def hypothesis_label(hypothesis: EvaluatedHypothesis) -> str:
-    """A hypothesis in one line, as in files."""
-    return " + ".join(hypothesis.labels)
-
-
-def hypothesis_title(hypothesis: EvaluatedHypothesis) -> str:
-    """A hypothesis in one line, for people."""
-    return " + ".join(hypothesis.titles)
 
 
 def diagnose(plant: GreyBox, *, seed: int = 0, cache: FitCache | None = None) -> Diagnosis:
@@ -147,7 +137,7 @@ def diagnose(plant: GreyBox, *, seed: int = 0, cache: FitCache | None = None) ->
     judged = _judged_causes(ranking)
     nominal = ranking.problem.start(Hypothesis(causes=()), {})
     estimates = {NOMINAL: nominal, RECALIBRATED: ranking.recalibrated.estimate}
-    estimates |= {hypothesis_label(c.hypothesis): c.hypothesis.estimate for c in judged}
+    estimates |= {c.hypothesis.label: c.hypothesis.estimate for c in judged}
     reduction = measure_discrepancy_reduction(ranking.problem, estimates, seed=seed)
     conclusion = conclude(ranking, localisation, reduction)
     left = conclusion.verdict in (PARTIAL, UNKNOWN)
@@ -268,7 +258,7 @@ def _unconverged(recalibrated: EvaluatedHypothesis, judged: list[RankedCause]) -
     if not recalibrated.converged:
         warnings.append("the recalibration did not converge: its gap may be too large")
     return warnings + [
-        f"the fit of {hypothesis_title(cause.hypothesis)} did not converge: its size and its "
+        f"the fit of {cause.hypothesis.title} did not converge: its size and its "
         "probability are in doubt"
         for cause in judged
         if not cause.hypothesis.converged and cause.probability > MENTIONED_PROBABILITY

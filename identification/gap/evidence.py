@@ -65,6 +65,16 @@ class EvaluatedHypothesis:
         """The causes for people."""
         return self.estimate.hypothesis.titles
 
+    @property
+    def label(self) -> str:
+        """All causes in one line, as in files."""
+        return " + ".join(self.labels)
+
+    @property
+    def title(self) -> str:
+        """All causes in one line, for people."""
+        return " + ".join(self.titles)
+
 
 def misfit(evaluated: EvaluatedHypothesis) -> float:
     """Sum of squares of all channels and nuisance parameters [1]."""

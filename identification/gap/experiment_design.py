@@ -56,11 +56,6 @@ class Rivals:
     """Before the experiment, (rivals,); sums to 1."""
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Names for files."""
-        return tuple(" + ".join(each.hypothesis.labels) or "no cause" for each in self.estimates)
-
-    @property
     def titles(self) -> tuple[str, ...]:
         """Names for people."""
         return tuple(" + ".join(each.hypothesis.titles) or "no cause" for each in self.estimates)

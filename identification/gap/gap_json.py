@@ -15,7 +15,7 @@ from scipy.stats import norm
 
 from epv_env.common.files import write_json
 from identification.block_bootstrap import LEVEL, Interval
-from identification.gap.diagnosis import Diagnosis, hypothesis_label
+from identification.gap.diagnosis import Diagnosis
 from identification.gap.evidence import EvaluatedHypothesis
 from identification.gap.form_modes import law_in_words
 from identification.gap.gaps import FLOOR
@@ -156,11 +156,10 @@ def discrepancy(diagnosis: Diagnosis) -> dict[str, dict[str, float]]:
 
 def magnitudes(diagnosis: Diagnosis, cause: RankedCause) -> dict[str, tuple[float, float, float]]:
     """Value and ends of the interval of each parameter of a cause, by symbol_unit [SI]."""
-    parameters = cause.hypothesis.estimate.hypothesis.parameters
     intervals = parameter_intervals(diagnosis, cause.hypothesis)
     return {
-        f"{p.symbol}_{unit_name(p.unit)}": interval
-        for p, interval in zip(parameters, intervals, strict=True)
+        f"{p.symbol}_{unit_name(p.unit)}": intervals[p.symbol]
+        for p in cause.hypothesis.estimate.hypothesis.parameters
     }
 
 
@@ -205,7 +204,7 @@ def _cause(diagnosis: Diagnosis, cause: RankedCause) -> dict[str, Any]:
         "form": law_in_words(cause.hypothesis.estimate),
         "converged": cause.hypothesis.converged,
     }
-    label = hypothesis_label(cause.hypothesis)
+    label = cause.hypothesis.label
     if label in diagnosis.reduction.shares_closed:
         share = diagnosis.reduction.shares_closed[label]
         entry["shrink"] = {"fraction": share.value, "low": share.low, "high": share.high}
@@ -215,7 +214,7 @@ def _cause(diagnosis: Diagnosis, cause: RankedCause) -> dict[str, Any]:
 
 def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
     gaps = diagnosis.reduction.gaps
-    best = hypothesis_label(diagnosis.best.hypothesis) if diagnosis.best else RECALIBRATED
+    best = diagnosis.best.hypothesis.label if diagnosis.best else RECALIBRATED
     labels = {"nominal": NOMINAL, "recalibrated": RECALIBRATED, "with_cause": best}
     overall = {name: gaps[label].overall for name, label in labels.items()}
     overall["black_box_floor"] = diagnosis.reduction.black_box.overall
@@ -327,22 +326,16 @@ def fitted_values(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis) -> dict
 
 def parameter_intervals(
     diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis
-) -> list[tuple[float, float, float]]:
-    """Value and ends of the interval of each parameter of the hypothesis' causes [SI].
-
-    No interval leaves the parameter's physical range.
-    """
+) -> dict[str, tuple[float, float, float]]:
+    """Value and ends of the interval of each fitted parameter, within its range, by symbol [SI]."""
+    problem, estimate = diagnosis.ranking.problem, hypothesis.estimate
     quantile = norm.ppf(0.5 + LEVEL / 2)
-    estimate = hypothesis.estimate
-    covariance = parameter_covariance(diagnosis, hypothesis)
-    deviations = np.sqrt(np.diag(covariance))[estimate.cause_start :]
-    intervals = []
-    for p, scaled, sd in zip(
-        estimate.hypothesis.parameters, estimate.cause_vector, deviations, strict=True
-    ):
-        value, margin = float(scaled * p.scale), float(quantile * sd)
+    margins = quantile * np.sqrt(np.diag(parameter_covariance(diagnosis, hypothesis)))
+    values, intervals = problem.values(estimate), {}
+    for p, margin in zip(problem.parameters(estimate), margins.tolist(), strict=True):
+        value = values[p.symbol]
         low, high = sorted((p.low, p.high))
-        intervals.append((value, max(value - margin, low), min(value + margin, high)))
+        intervals[p.symbol] = value, max(value - margin, low), min(value + margin, high)
     return intervals
 
 

@@ -37,8 +37,6 @@ class Unexplained:
 
     fraction: float
     """Share of the explainable gap [1]; 0 where the recalibrated model may be at the floor."""
-    predictable: float
-    """Share of the mean square above the floor that the black box predicts on held-out runs [1]."""
     p_value: float
     """Of that prediction, against blocks of the residual in random order."""
     still_predictable: bool
@@ -172,11 +170,9 @@ def _unexplained(draws: GapDraws, best: str, significance: float) -> Unexplained
     recalibrated = draws.gap(RECALIBRATED).overall
     left, boxed = draws.overall(best)[0], draws.overall(_boxed(best))[0]
     explainable = max(recalibrated.value - FLOOR, 0.0)
-    above, predicted = left**2 - FLOOR**2, left**2 - boxed**2
     matters = max(LEAST_GAP_CLOSED, LEAST_SHARE_CLOSED * explainable)
     return Unexplained(
         fraction=_share(left - FLOOR, explainable) if recalibrated.low > FLOOR else 0.0,
-        predictable=_share(predicted, above),
         p_value=significance,
         still_predictable=bool(significance < SIGNIFICANCE and left - boxed > matters),
     )

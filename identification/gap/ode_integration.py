@@ -97,9 +97,9 @@ def delayed_mean(total: NDArray, since: float, length: float) -> float:
     return (values[1] - values[0]) / length
 
 
-Simulation = Callable[[Sequence["Job"]], list[tuple[NDArray, NDArray]]]
-"""Gives of each job readings (channels, samples, n) and states (states, samples, n) [SI]; NaN from where
-a candidate fails."""
+Simulation = Callable[["Job"], tuple[NDArray, NDArray]]
+"""Gives readings (channels, samples, n) and states (states, samples, n) [SI]; NaN from where a candidate
+fails."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -176,7 +176,7 @@ def alone(advance: Callable, read: Callable, channels: int, wrap: Callable) -> S
                 loop(*given, pushes[c], work, states[c], readings[c])
         return np.moveaxis(readings, 0, -1), np.moveaxis(states, 0, -1)
 
-    return lambda jobs: [simulate(job) for job in jobs]
+    return simulate
 
 
 MODES = ("compiled", "python")
@@ -205,9 +205,9 @@ def simulator(records: Records, functions: Sequence[tuple[Callable, int]], mode:
 def _explained(simulation: Simulation) -> Simulation:
     """The simulation; where numba refuses a function, the error says what to do."""
 
-    def simulate(jobs: Sequence[Job]):
+    def simulate(job: Job) -> tuple[NDArray, NDArray]:
         try:
-            return simulation(jobs)
+            return simulation(job)
         except NumbaError as error:
             lines = [line for line in str(error).splitlines() if "File" not in line and line.strip()]
             reason = next((line for line in lines if "Failed in" not in line), lines[0])

@@ -107,11 +107,11 @@ class OdePlant:
 
     def outputs(self, values: Mapping[str, NDArray], runs: Sequence[int]) -> list[NDArray]:
         """`GreyBox.outputs`: per run (channels, samples, n) [SI]."""
-        return [read for read, _ in self._simulated([self._job(values, r) for r in runs])]
+        return [self._simulated(self._job(values, r))[0] for r in runs]
 
     def states(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, StateTrace]:
         """`GreyBox.states`: states and inputs, values (samples,) [SI]."""
-        x = self._simulated([self._job(_first(values), run)])[0][1][..., 0]
+        x = self._simulated(self._job(_first(values), run))[1][..., 0]
         traces = dict(zip(self._records.states, x, strict=True)) | dict(self.runs[run].inputs)
         return {
             name: StateTrace(unit=self._units[name][0], scale=self._units[name][1], values=trace)
@@ -122,7 +122,7 @@ class OdePlant:
         """`GreyBox.regimes`: boolean (samples,) by name; values: (n,) or (n, runs) by symbol [SI]."""
         if self._regimes is None:
             return {}
-        x = self._simulated([self._job(_first(values), run)])[0][1][..., 0]
+        x = self._simulated(self._job(_first(values), run))[1][..., 0]
         own = self.runs[run]
         p = self._records.p(*self._parameters(_first(values), run)[:, 0])
         return self._regimes(self._records.x(*x), self._records.u(own.time, *own.inputs.values()), p)
@@ -136,7 +136,7 @@ class OdePlant:
                 push[:, i, 1:] = forcing[equation.name]
         copies = {symbol: np.repeat(v[:1], m + 1, axis=0) for symbol, v in values.items()}
         copies = copies or {symbol: np.full(m + 1, v) for symbol, v in self.nominal.items()}
-        read = self._simulated([replace(self._job(copies, run), push=push)])[0][0]
+        read = self._simulated(replace(self._job(copies, run), push=push))[0]
         return read[..., 1:] - read[..., :1]
 
     def contribution(
@@ -144,7 +144,7 @@ class OdePlant:
     ) -> Contribution:
         """`GreyBox.contribution`: forcings of the states, and readings (channels, samples) [SI]."""
         job = self._job(_first(values), run)
-        x = self._simulated([job])[0][1][..., 0]
+        x = self._simulated(job)[1][..., 0]
         without = job.parameters.copy()
         for symbol in symbols:
             without[self._records.symbols.index(symbol)] = self.nominal[symbol]
@@ -172,10 +172,10 @@ class OdePlant:
         rates, readings = ([f(*each) for each in given] for f in (self._rate, self._read))
         return np.array(rates, dtype=float).T, np.array(readings, dtype=float).T
 
-    def _simulated(self, jobs: Sequence[Job]) -> list[tuple[NDArray, NDArray]]:
-        """Readings (channels, samples, n) and states (states, samples, n) of each job [SI]."""
+    def _simulated(self, job: Job) -> tuple[NDArray, NDArray]:
+        """Readings (channels, samples, n) and states (states, samples, n) [SI]."""
         with np.errstate(all="ignore"):
-            return self._simulate(jobs)
+            return self._simulate(job)
 
     def _job(self, values: Mapping[str, NDArray], run: int, steps: int | None = None) -> Job:
         """A run to be simulated, without forcing."""
@@ -266,14 +266,14 @@ class OdePlant:
         values = {symbol: np.array([own[symbol] for own in candidates]) for symbol in self.nominal}
         noise = np.array(
             [
-                channel_noise(channel, [run.measured[c][run.trusted[c]] for run in self.runs])[0]
+                channel_noise(channel, [run.measured[c][run.trusted[c]] for run in self.runs])
                 for c, channel in enumerate(self.channels)
             ]
         )[:, None, None]
 
         def read(steps: int) -> list[NDArray]:
             jobs = [self._job(values, r, steps) for r in range(len(self.runs))]
-            return [reading / noise for reading, _ in self._simulated(jobs)]
+            return [self._simulated(job)[0] / noise for job in jobs]
 
         steps = settled_steps(read)
         if not all(np.all(np.isfinite(reading[..., 0])) for reading in read(steps)):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.gap.plant import Channel, Contribution, GreyBox, PlantError, Run, StateTrace
-from identification.gap.reading_noise import NoiseSource, channel_noise
+from identification.gap.reading_noise import channel_noise
 from identification.gap.screened import Finding, bridged, screen
 
 
@@ -31,18 +31,12 @@ class PreparedPlant:
         self.parameters, self.causes = tuple(plant.parameters), tuple(plant.causes)
         self.tolerances, self.run_offsets = tuple(plant.tolerances), tuple(plant.run_offsets)
         self.equations = tuple(plant.equations)
-        noise = [
-            channel_noise(channel, [run.measured[c][run.trusted[c]] for run in runs])
-            for c, channel in enumerate(plant.channels)
-        ]
         self.channels: tuple[Channel, ...] = tuple(
-            replace(channel, noise=level)
-            for channel, (level, _) in zip(plant.channels, noise, strict=True)
+            replace(
+                channel, noise=channel_noise(channel, [run.measured[c][run.trusted[c]] for run in runs])
+            )
+            for c, channel in enumerate(plant.channels)
         )
-        self.noise_source: Mapping[str, NoiseSource] = {
-            channel.name: source for channel, (_, source) in zip(plant.channels, noise, strict=True)
-        }
-        """Where the noise of each channel comes from."""
         self.time_scale: float | None = getattr(plant, "time_scale", None)
         """Of the plant [s]; None: its readings show it."""
         self.runs: tuple[Run, ...] = tuple(_prepared_run(run) for run in runs)
@@ -54,10 +48,6 @@ class PreparedPlant:
             replace(channel, noise=ratio * channel.known_noise)
             for channel, ratio in zip(self.channels, ratios, strict=True)
         )
-        corrected.noise_source = {
-            channel.name: self.noise_source[channel.name] if ratio == 1 else "estimated"
-            for channel, ratio in zip(self.channels, ratios, strict=True)
-        }
         return corrected
 
     def outputs(self, values: Mapping[str, NDArray], runs: Sequence[int]) -> list[NDArray]:
@@ -79,7 +69,7 @@ class PreparedPlant:
     def contribution(
         self, values: Mapping[str, NDArray], symbols: Collection[str], run: int
     ) -> Contribution | None:
-        """`GreyBox.contribution` of the symbols."""
+        """`GreyBox.contribution` of the symbols: readings (channels, samples) [SI]."""
         return self.plant.contribution(values, symbols, run)
 
 

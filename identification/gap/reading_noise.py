@@ -7,7 +7,6 @@ fast. Readings in coarse steps may not differ at all: then the step tells how fa
 
 from collections.abc import Sequence
 from math import comb
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,28 +43,24 @@ STEP_TO_SD = float(np.sqrt(1.0 / 12.0))
 """Standard deviation of rounding to a step, in steps."""
 
 
-NoiseSource = Literal["given", "estimated", "resolution"]
-"""Where a channel's noise comes from: the user, the readings, or the step between possible readings."""
+def channel_noise(channel: Channel, series: Sequence[NDArray]) -> float:
+    """Noise of a channel [SI]: as given or as its readings show it, at least the error of rounding.
 
-
-def channel_noise(channel: Channel, series: Sequence[NDArray]) -> tuple[float, NoiseSource]:
-    """Noise of a channel [SI] and where it comes from.
-
-    series: trusted readings of each run. Raises PlantError where noise is neither given nor seen.
+    series: trusted readings of each run, (readings,) [SI]. Raises PlantError where noise is neither
+    given nor seen.
     """
     if channel.noise is not None:
-        floor = STEP_TO_SD * channel.resolution
-        return (channel.noise, "given") if channel.noise >= floor else (floor, "resolution")
+        return max(channel.noise, STEP_TO_SD * channel.resolution)
     floor = STEP_TO_SD * (channel.resolution or quantisation_step(series))
     level = white_noise(series)
     if level > floor:
-        return level, "estimated"
+        return level
     if not floor > 0:
         raise PlantError(
             f"channel {channel.name}: its noise is None, but its trusted readings do not show any "
             "(too few, or most neighbours are equal): give `noise` or `resolution`"
         )
-    return floor, "resolution"
+    return floor
 
 
 def white_noise(series: Sequence[NDArray]) -> float:

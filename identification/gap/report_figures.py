@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from identification.block_bootstrap import LEVEL, Interval
-from identification.gap.diagnosis import Diagnosis, hypothesis_title
+from identification.gap.diagnosis import Diagnosis
 from identification.gap.form_modes import Law
 from identification.gap.gaps import FLOOR, RegimeGap
 from identification.gap.held_out import DiscrepancyReduction
 from identification.gap.localisation import ForcingEstimate, MissingTerm
 from identification.gap.plant import GreyBox
-from identification.gap.quantities import (
-    probability_text,
-)
+from identification.gap.quantities import probability_text
 
 NAMED, OTHER, NO_NAME = "tab:blue", "0.7", "tab:orange"
 """Colours: causes that the verdict names, other causes, hypotheses without a named cause."""
@@ -40,8 +38,8 @@ BAND = "lightskyblue"
 
 def ranking_figure(diagnosis: Diagnosis) -> Figure:
     """Probability of each cause, of none and of an unknown one."""
-    causes = {hypothesis_title(c.hypothesis): c.probability for c in diagnosis.judged}
-    named = [hypothesis_title(c.hypothesis) for c in diagnosis.conclusion.ambiguity_set]
+    causes = {c.hypothesis.title: c.probability for c in diagnosis.judged}
+    named = [c.hypothesis.title for c in diagnosis.conclusion.ambiguity_set]
     rest = {NO_CAUSE: diagnosis.ranking.no_cause, UNKNOWN_CAUSE: diagnosis.ranking.unknown}
     colours = [NAMED if name in named else OTHER for name in (*causes, OTHERS)] + [NO_NAME] * len(rest)
     causes[OTHERS] = sum(diagnosis.ranking.probabilities) - sum(causes.values())
@@ -132,9 +130,11 @@ def heat_map(gaps: Sequence[RegimeGap]) -> Figure:
     colours = LogNorm(FLOOR, max(HEAT_MAP_RANGE, float(np.nanmax(table))), clip=True)
     image = axes.imshow(table, norm=colours, cmap="YlOrRd", aspect="auto")
     for gap in gaps:
+        ends = f"{_two_digits(gap.low)} - {_two_digits(gap.high)}"
         axes.text(
             regimes.index(gap.regime), channels.index(gap.channel),
-            f"{_two_digits(gap.gap)}{'' if gap.held_out else '*'}\n{_interval(gap)}",
+            f"{_two_digits(gap.gap)}{'' if gap.held_out else '*'}\n"
+            f"{ends if np.isfinite(gap.high) else 'too rare'}",
             ha="center", va="center", fontsize=8, color="white" if colours(gap.gap) > 0.7 else "black",
         )  # fmt: skip
     axes.set_xticks(range(len(regimes)), [name.replace("_", "\n") for name in regimes], fontsize=9)
@@ -143,10 +143,6 @@ def heat_map(gaps: Sequence[RegimeGap]) -> Figure:
     if not all(gap.held_out for gap in gaps):
         axes.set_xlabel("* too rare on held-out runs: all runs", fontsize=8)
     return figure
-
-
-def _interval(gap: RegimeGap) -> str:
-    return f"{_two_digits(gap.low)} - {_two_digits(gap.high)}" if np.isfinite(gap.high) else "too rare"
 
 
 def _two_digits(gap: float) -> str:

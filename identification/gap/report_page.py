@@ -6,11 +6,11 @@ from functools import partial
 import numpy as np
 
 from identification.block_bootstrap import LEVEL
-from identification.gap.diagnosis import MENTIONED_PROBABILITY, Diagnosis, hypothesis_title
+from identification.gap.diagnosis import MENTIONED_PROBABILITY, Diagnosis
 from identification.gap.evidence import EvaluatedHypothesis
 from identification.gap.fitting_problem import Estimate
 from identification.gap.form_modes import law_in_words, laws
-from identification.gap.gap_json import discrepancy, drawn_term, inclusion, parameter_covariance
+from identification.gap.gap_json import discrepancy, drawn_term, inclusion, parameter_intervals
 from identification.gap.gaps import FLOOR, Gap, regimes_of
 from identification.gap.localisation import Localisation
 from identification.gap.plant import GreyBox
@@ -22,7 +22,6 @@ from identification.gap.quantities import (
     quantity_with_interval,
 )
 from identification.gap.report_figures import (
-    QUANTILE,
     forcing_figure,
     gap_figure,
     heat_map,
@@ -116,7 +115,7 @@ def _ranking(diagnosis: Diagnosis) -> Section:
     ambiguity_set = diagnosis.conclusion.ambiguity_set
     verdicts = [Verdict(status="note", text=hidden_causes_sentence(diagnosis))]
     if ambiguity_set:
-        names = ", ".join(hypothesis_title(cause.hypothesis) for cause in ambiguity_set)
+        names = ", ".join(cause.hypothesis.title for cause in ambiguity_set)
         share = f"{100 * AMBIGUITY_SHARE:g} %"
         text = f"The fewest causes that hold {share} of the probability of all causes: {names}."
         status = "good" if len(ambiguity_set) == 1 else "doubt"
@@ -146,7 +145,7 @@ def _reduction(diagnosis: Diagnosis) -> Section:
     ]
     if diagnosis.best and diagnosis.conclusion.verdict in (KNOWN, AMBIGUOUS):
         best = diagnosis.best.hypothesis
-        blocks.append(residual(diagnosis, best, f"Residual with {hypothesis_title(best)}"))
+        blocks.append(residual(diagnosis, best, f"Residual with {best.title}"))
     return Section(
         title="How far the gap shrinks",
         verdicts=[Verdict(status="note", text=reduction_sentence(diagnosis))],
@@ -158,7 +157,7 @@ def _remainder(diagnosis: Diagnosis, learnt: str) -> Section:
     """What no named cause explains: how much, where, of which shape, and what is only disturbance."""
     blocks: list[Block] = []
     if diagnosis.remaining and diagnosis.best:
-        name, plant = hypothesis_title(diagnosis.best.hypothesis), diagnosis.ranking.problem.plant
+        name, plant = diagnosis.best.hypothesis.title, diagnosis.ranking.problem.plant
         blocks += missing_term(plant, diagnosis.remaining, f"The model with {name}")
         blocks.append(residual(diagnosis, diagnosis.best.hypothesis, f"Residual with {name}"))
     text = remainder_sentence(diagnosis)
@@ -187,7 +186,7 @@ def ranking_table(diagnosis: Diagnosis) -> Table:
         columns=["Cause", "component", "probability", f"size ({LEVEL_TEXT})", "closes", "looks like"],
         rows=[
             [
-                hypothesis_title(cause.hypothesis),
+                cause.hypothesis.title,
                 ", ".join(
                     dict.fromkeys(
                         c.component.replace("_", " ")
@@ -298,26 +297,23 @@ def _percent(model: Gap, columns: list[str]) -> list[str]:
 
 def calibrated_values(diagnosis: Diagnosis, status: str) -> Table:
     """Calibrated parameters of the model to use, with intervals; status: of the verdict."""
-    problem, kept = diagnosis.ranking.problem, diagnosis.kept
-    fitted = problem.values(kept.estimate)
-    margins = QUANTILE * np.sqrt(np.diag(parameter_covariance(diagnosis, kept)))
+    kept = diagnosis.kept
+    intervals = parameter_intervals(diagnosis, kept)
     rows, statuses = [], []
-    for parameter, margin in zip(problem.plant.parameters, margins, strict=False):
-        value = fitted[parameter.symbol]
-        low, high = sorted((parameter.low, parameter.high))
-        ends = max(value - margin, low), min(value + margin, high)
-        own = "bad" if at_an_end(parameter, value) else status
+    for parameter in diagnosis.ranking.problem.plant.parameters:
+        interval = intervals[parameter.symbol]
+        own = "bad" if at_an_end(parameter, interval[0]) else status
         why = ": at an end of its range" if own != status else ""
         rows.append(
             [
                 parameter.title,
                 quantity(parameter.nominal, parameter.unit),
-                quantity_with_interval(value, *ends, parameter.unit),
+                quantity_with_interval(*interval, parameter.unit),
                 ANSWERS[own] + why,
             ]
         )
         statuses.append(own)
-    model = f"with {hypothesis_title(kept)}" if kept.labels else "recalibrated, without a cause"
+    model = f"with {kept.title}" if kept.labels else "recalibrated, without a cause"
     return Table(
         columns=["Parameter", "nominal", f"fitted ({LEVEL_TEXT} interval)", "trust it"],
         rows=rows,

@@ -81,21 +81,15 @@ class Separability:
     """Length of each signature at the cause's first trial value, (n,) [noise deviations]."""
     correlation: NDArray
     """Correlations of the signatures, (n, n) [1]: near 1 or -1 for causes that look alike."""
-    """Thresholds of detection and of likeness."""
 
     @property
     def absorbed(self) -> tuple[str, ...]:
         """Causes that recalibration hides."""
-        least = DETECTABLE_SIGNATURE
         pairs = zip(self.labels, self.signature_norms, strict=True)
-        return tuple(label for label, norm in pairs if norm < least)
+        return tuple(label for label, norm in pairs if norm < DETECTABLE_SIGNATURE)
 
     def twins(self, label: str) -> tuple[str, ...]:
-        """Causes that the campaign hardly tells from one cause, the most alike first."""
-        return self.alike(label, TWIN_CORRELATION)
-
-    def alike(self, label: str, least_correlation: float) -> tuple[str, ...]:
-        """Detectable causes with a higher absolute correlation with one cause, the most alike first."""
+        """Detectable causes that the campaign hardly tells from one cause, the most alike first."""
         if label not in self.labels:
             return ()
         row = np.abs(self.correlation[self.labels.index(label)])
@@ -103,7 +97,7 @@ class Separability:
         return tuple(
             self.labels[i]
             for i in order
-            if row[i] > least_correlation
+            if row[i] > TWIN_CORRELATION
             and self.labels[i] != label
             and self.signature_norms[i] >= DETECTABLE_SIGNATURE
         )

@@ -6,8 +6,6 @@ from dataclasses import replace
 from identification.gap.diagnosis import (
     MENTIONED_PROBABILITY,
     Diagnosis,
-    hypothesis_label,
-    hypothesis_title,
 )
 from identification.gap.form_modes import AS_ASSUMED, law_in_words
 from identification.gap.gap_json import Remainder, discrepancy, parameter_intervals, remainder
@@ -67,7 +65,8 @@ def _status_and_text(diagnosis: Diagnosis, next_experiment: str) -> tuple[str, s
         good = helps and no_warning and diagnosis.reduction.left.overall.value <= FAR_ABOVE_NOISE
         return ("good" if good else "doubt"), _known(diagnosis)
     if conclusion.verdict == AMBIGUOUS:
-        return "doubt", f"{_ambiguous(diagnosis)} {_with_full_stop(next_experiment)}".strip()
+        stop = "." if next_experiment and not next_experiment.endswith(".") else ""
+        return "doubt", f"{_ambiguous(diagnosis)} {next_experiment}{stop}".strip()
     if conclusion.verdict == PARTIAL:
         return "doubt", _partial(diagnosis)
     return "bad", _unknown(diagnosis)
@@ -183,9 +182,7 @@ def _far_above_noise(diagnosis: Diagnosis) -> bool:
 def _possible_cause(diagnosis: Diagnosis) -> str:
     """The cause that may act all the same, and why the verdict does not name it."""
     ranking = diagnosis.ranking
-    probabilities = {
-        hypothesis_title(cause.hypothesis): cause.probability for cause in diagnosis.conclusion.causes
-    }
+    probabilities = {cause.hypothesis.title: cause.probability for cause in diagnosis.conclusion.causes}
     probabilities["something outside the catalogue"] = ranking.unknown
     name = max(probabilities, key=probabilities.__getitem__)
     return (
@@ -209,10 +206,6 @@ def _unknown(diagnosis: Diagnosis) -> str:
     return f"{text} {nearest_cause(diagnosis, diagnosis.best)}" if diagnosis.best else text
 
 
-def _with_full_stop(text: str) -> str:
-    return text if not text or text.endswith(".") else f"{text}."
-
-
 def add_or_not(diagnosis: Diagnosis, cause: RankedCause) -> str:
     """The advice on a cause that the verdict names."""
     if diagnosis.surely_helps(cause):
@@ -226,10 +219,10 @@ def nearest_cause(diagnosis: Diagnosis, cause: RankedCause) -> str:
 
     Whether it helps is one question, whether it is true another.
     """
-    name, share = hypothesis_title(cause.hypothesis), share_closed(diagnosis, cause)
+    name, share = cause.hypothesis.title, share_closed(diagnosis, cause)
     advised = diagnosis.advised
     if advised:
-        title = hypothesis_title(advised.hypothesis)
+        title = advised.hypothesis.title
         return (
             f"Add {title} all the same: it closes {share_closed(diagnosis, advised)} of the gap on "
             f"recordings never fitted to, though its name is doubtful "
@@ -243,7 +236,7 @@ def nearest_cause(diagnosis: Diagnosis, cause: RankedCause) -> str:
         )
     gaps = diagnosis.reduction.gaps
     before = gaps[RECALIBRATED].overall.value
-    after = gaps[hypothesis_label(cause.hypothesis)].overall.value
+    after = gaps[cause.hypothesis.label].overall.value
     if after > before:
         return (
             f"The nearest cause, {name}, makes recordings never fitted to worse (from "
@@ -277,7 +270,7 @@ def remainder_sentence(diagnosis: Diagnosis) -> str:
     if not diagnosis.named:
         return f"No cause is named, so the whole gap remains{remainder_place(left)}."
     return (
-        f"{hypothesis_title(diagnosis.named.hypothesis)} leaves {share_text(left.share)} of the gap on "
+        f"{diagnosis.named.hypothesis.title} leaves {share_text(left.share)} of the gap on "
         f"recordings never fitted to{remainder_place(left)}."
     )
 
@@ -326,8 +319,8 @@ def reduction_sentence(diagnosis: Diagnosis) -> str:
     gaps = diagnosis.reduction.gaps
     models = {"nominal": gaps[NOMINAL], "recalibrated": gaps[RECALIBRATED]}
     if diagnosis.best:
-        name = hypothesis_label(diagnosis.best.hypothesis)
-        models[f"with {hypothesis_title(diagnosis.best.hypothesis)}"] = gaps[name]
+        name = diagnosis.best.hypothesis.label
+        models[f"with {diagnosis.best.hypothesis.title}"] = gaps[name]
     models["with a black box on top of recalibration"] = diagnosis.reduction.black_box
     listed = "; ".join(f"{name} {gap_with_interval(gap.overall)}" for name, gap in models.items())
     text = (
@@ -369,8 +362,9 @@ def parameters_at_bounds(diagnosis: Diagnosis) -> list[str]:
     problem = diagnosis.ranking.problem
     estimates = {RECALIBRATED: diagnosis.ranking.recalibrated.estimate}
     estimates |= {
-        hypothesis_title(cause.hypothesis): cause.hypothesis.estimate
-        for cause in mentioned_causes(diagnosis)
+        cause.hypothesis.title: cause.hypothesis.estimate
+        for cause in diagnosis.judged
+        if cause.probability >= MENTIONED_PROBABILITY
     }
     return [
         f"{name}: {p.title} is at an end of its physical range ({quantity(value, p.unit)})"
@@ -387,11 +381,6 @@ def at_an_end(parameter: FreeParameter, value: float) -> bool:
     return apart <= BOUND_TOLERANCE * abs(parameter.high - parameter.low)
 
 
-def mentioned_causes(diagnosis: Diagnosis) -> Sequence[RankedCause]:
-    """Judged causes with a noticeable probability."""
-    return [cause for cause in diagnosis.judged if cause.probability >= MENTIONED_PROBABILITY]
-
-
 def share_closed(diagnosis: Diagnosis, cause: RankedCause) -> str:
     """The share of the gap that a cause closes, with its interval."""
     return share_text(diagnosis.share_closed(cause))
@@ -399,11 +388,10 @@ def share_closed(diagnosis: Diagnosis, cause: RankedCause) -> str:
 
 def sizes_with_intervals(diagnosis: Diagnosis, cause: RankedCause) -> list[str]:
     """Each fitted parameter of a cause with its interval."""
-    parameters = cause.hypothesis.estimate.hypothesis.parameters
     intervals = parameter_intervals(diagnosis, cause.hypothesis)
     return [
-        f"{p.title} = {quantity_with_interval(*interval, p.unit)}"
-        for p, interval in zip(parameters, intervals, strict=True)
+        f"{p.title} = {quantity_with_interval(*intervals[p.symbol], p.unit)}"
+        for p in cause.hypothesis.estimate.hypothesis.parameters
     ]
 
 

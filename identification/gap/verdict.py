@@ -10,7 +10,6 @@ from identification.gap.evidence import EvaluatedHypothesis
 from identification.gap.fitting_problem import FittingProblem
 from identification.gap.held_out import DiscrepancyReduction
 from identification.gap.localisation import Localisation
-from identification.gap.posterior import variance_inflation
 from identification.gap.screening import Separability
 
 NO_GAP, KNOWN, AMBIGUOUS = "no_gap", "known", "ambiguous"
@@ -69,12 +68,6 @@ class Ranking:
             for name in set(hypothesis.names):
                 total[name] = total.get(name, 0.0) + probability
         return dict(sorted(total.items(), key=lambda pair: -pair[1]))
-
-    @property
-    def inflation(self) -> float:
-        """`variance_inflation` of the best hypothesis [1]."""
-        best = self.hypotheses[0] if self.hypotheses else self.recalibrated
-        return variance_inflation(best, self.discrepancies)
 
 
 @dataclass(frozen=True, kw_only=True)

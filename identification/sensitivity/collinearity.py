@@ -13,11 +13,9 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.plant.channels import SENSORS
 from epv_env.plant.parameters import table
-from identification.recordings.recording import OUTPUTS, UNITS
+from identification.recordings.recording import OUTPUTS
 from identification.replay.replay import Replay
-from identification.sensitivity.one_at_a_time import output_samples, run_cases
 
 DIFFERENCE_STEP = 2e-3
 """Step of the central differences: in the logarithm of a value; in half widths of the domain where the
@@ -35,13 +33,11 @@ ZERO_EIGENVALUE = 1e-12
 
 @dataclass(frozen=True, kw_only=True)
 class OutputSensitivities:
-    """How all outputs of all test cases respond to each parameter, in standard deviations of noise."""
+    """How the outputs of all recordings respond to each parameter, in standard deviations of noise."""
 
     symbols: tuple[str, ...]
     columns: NDArray
     """Change of each output for the stated change, (samples, parameters) [deviations of noise]."""
-    where: str = "the outputs"
-    """What the samples are of, for a sentence."""
 
     def columns_of(self, symbols: Sequence[str]) -> NDArray:
         """The columns of some parameters, (samples, symbols) [deviations of noise]."""
@@ -90,25 +86,20 @@ def stepped(symbol: str, value: float) -> NDArray:
     return value * np.exp(DIFFERENCE_STEP * np.array([-1.0, 1.0]))
 
 
-def sensitivities_of_outputs(
-    nominal: Mapping[str, float], symbols: Sequence[str]
-) -> OutputSensitivities:
-    """How p2, p3 and I respond in the report's test cases, in units of Table 3's noise.
-
-    Raises SimulationError.
-    """
-    runs = run_cases(_both_ways(nominal, symbols))
-    noise = {name: SENSORS[name].noise * UNITS[name][1] for name in OUTPUTS}
-    samples = [np.stack(output_samples(run)) for run in runs]
-    return _central_differences(symbols, samples, noise, "the report's test cases")
-
-
 def sensitivities_on_recordings(
     replay: Replay, symbols: Sequence[str], noise: Mapping[str, float]
 ) -> OutputSensitivities:
-    """How the outputs respond on recorded inputs, in units of the measured noise by output [SI]."""
-    samples = replay.outputs(_both_ways(replay.base, symbols))
-    return _central_differences(symbols, samples, noise, "the calibration recordings")
+    """How the outputs respond on recorded inputs, in units of the measured noise by output [SI].
+
+    By central differences.
+    """
+    deviation = np.array([noise[name] for name in OUTPUTS])[:, None, None]
+    width = 2 * DIFFERENCE_STEP * deviation
+    columns = [
+        ((y[..., 1::2] - y[..., ::2]) * STATED_CHANGE / width).reshape(-1, len(symbols))
+        for y in replay.outputs(_both_ways(replay.base, symbols))
+    ]
+    return OutputSensitivities(symbols=tuple(symbols), columns=np.concatenate(columns))
 
 
 def _both_ways(nominal: Mapping[str, float], symbols: Sequence[str]) -> dict[str, NDArray]:
@@ -117,18 +108,3 @@ def _both_ways(nominal: Mapping[str, float], symbols: Sequence[str]) -> dict[str
     for row, symbol in enumerate(symbols):
         p[symbol][2 * row : 2 * row + 2] = stepped(symbol, nominal[symbol])
     return p
-
-
-def _central_differences(
-    symbols: Sequence[str],
-    samples: Sequence[NDArray],
-    noise: Mapping[str, float],
-    where: str,
-) -> OutputSensitivities:
-    """Sensitivities from the outputs (3, samples, 2 symbols) of `_both_ways` in each test case."""
-    deviation = np.array([noise[name] for name in OUTPUTS])[:, None, None]
-    width = 2 * DIFFERENCE_STEP * deviation
-    columns = [
-        ((y[..., 1::2] - y[..., ::2]) * STATED_CHANGE / width).reshape(-1, len(symbols)) for y in samples
-    ]
-    return OutputSensitivities(symbols=tuple(symbols), columns=np.concatenate(columns), where=where)

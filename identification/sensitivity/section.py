@@ -13,11 +13,7 @@ from identification.report_2003 import (
     SUPPLY_PRESSURE,
 )
 from identification.sensitivity import figures
-from identification.sensitivity.collinearity import (
-    CRITICAL_INDEX,
-    OutputSensitivities,
-    sensitivities_of_outputs,
-)
+from identification.sensitivity.collinearity import CRITICAL_INDEX, OutputSensitivities
 from identification.sensitivity.global_indices import (
     SobolIndices,
     ranges,
@@ -28,9 +24,6 @@ from identification.sensitivity.one_at_a_time import ErrorSensitivity, sensitivi
 
 SAMPLES = 256
 """Of Sobol's design, a power of two: 6656 valves."""
-
-SEED = 1
-"""Of Sobol's design where the caller gives none."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,22 +36,16 @@ class SensitivityStudy:
     indices: SobolIndices
 
 
-def run_sensitivity_study(
-    *, outputs: OutputSensitivities | None = None, seed: int = SEED
-) -> SensitivityStudy:
+def run_sensitivity_study(*, outputs: OutputSensitivities, seed: int) -> SensitivityStudy:
     """All studies of the nominal valve (Tables 5 to 7).
 
-    Args:
-        outputs: how the outputs respond on recordings; None: in the report's test cases.
-        seed: of Sobol's design.
-
-    Raises SimulationError.
+    outputs: how the outputs respond on recordings. seed: of Sobol's design. Raises SimulationError.
     """
     p, symbols = Parameters.nominal(), studied_symbols()
     model, bounds = total_error_model(p, symbols), ranges(p, symbols)
     return SensitivityStudy(
         one_at_a_time=sensitivities(p, symbols),
-        outputs=outputs or sensitivities_of_outputs(p, symbols),
+        outputs=outputs,
         indices=sobol_indices(model, symbols, bounds, samples=SAMPLES, seed=seed),
     )
 
@@ -73,8 +60,8 @@ def sensitivity_section(study: SensitivityStudy) -> Section:
             _pairs(study.outputs),
             Picture(
                 figure=figures.collinearity_map(study.outputs),
-                caption=f"Collinearity of pairs of parameters in p2, p3 and I of {study.outputs.where}, "
-                "weighted by the sensors' noise (Brun et al. 2001).",
+                caption="Collinearity of pairs of parameters in p2, p3 and I of the calibration "
+                "recordings, weighted by the sensors' noise (Brun et al. 2001).",
             ),
             Picture(
                 figure=figures.global_bars(study.indices),
@@ -154,7 +141,7 @@ def _index(value: float) -> str:
 
 def _collinearity(outputs: OutputSensitivities) -> dict[str, Any]:
     return {
-        "of": outputs.where,
+        "of": "the calibration recordings",
         "effect_noise_sd": dict(zip(outputs.symbols, outputs.effect.tolist(), strict=True)),
         "critical_index": CRITICAL_INDEX,
         "inseparable_pairs": [[a, b, _finite(index)] for a, b, index in outputs.inseparable_pairs()],

@@ -17,7 +17,7 @@ from epv_env.common.files import Journal
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from epv_env.plant.region import Alternative, Mixture, Region
 from identification.bench.programmes import at_voltage, save_programmes
-from identification.gap.diagnosis import Diagnosis, diagnose, hypothesis_label
+from identification.gap.diagnosis import Diagnosis, diagnose
 from identification.gap.evidence import EvaluatedHypothesis
 from identification.gap.fitting_problem import FitCache
 from identification.gap.gap_json import fitted_values, parameter_covariance, write_results
@@ -159,7 +159,7 @@ def refitted_plant(
         region=region,
         diagnosis=possible_plants(found, valve, learnt),
         learnt_term=learnt.term if learnt else valve.plant.learnt_term,
-        name=f"{name} with {hypothesis_label(best)}" if named else f"{name}, recalibrated",
+        name=f"{name} with {best.label}" if named else f"{name}, recalibrated",
         provenance={
             "method": "joint refit with the cause of the gap" if named else "recalibration",
             "software": f"epv-valve {version('epv-valve')}",
@@ -185,7 +185,7 @@ def possible_plants(found: Diagnosis, valve: Valve, learnt: LearntModel | None =
     return Mixture(
         alternatives=tuple(
             Alternative(
-                name=hypothesis_label(hypothesis) or RECALIBRATED,
+                name=hypothesis.label or RECALIBRATED,
                 probability=float(probability / whole),
                 region=_region(found, hypothesis, valve, learnt),
             )

@@ -98,7 +98,7 @@ class WithTerm(PreparedPlant):
         self.tolerances = (*plant.tolerances, *numbers)
 
     def outputs(self, values: Mapping[str, NDArray], runs: Sequence[int]) -> list[NDArray]:
-        """`GreyBox.outputs`."""
+        """`GreyBox.outputs`: per run (channels, samples, n) [SI]."""
         knots = self.place.size * SMOOTH @ np.array([values[symbol] for symbol in KNOT_SYMBOLS])
         return super().outputs({**values, **dict(zip(KNOT_SYMBOLS, knots, strict=True))}, runs)
 

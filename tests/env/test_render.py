@@ -35,10 +35,10 @@ def no_screen(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
 
 
-def frame(*snapshots: Snapshot, **options: float) -> NDArray[np.uint8]:
+def frame(*snapshots: Snapshot) -> NDArray[np.uint8]:
     """The last frame of a fresh renderer that was shown these snapshots."""
     pytest.importorskip("pygame")
-    renderer = Renderer("rgb_array", fps=60, **options)
+    renderer = Renderer("rgb_array", fps=60)
     images = [renderer.draw(snapshot) for snapshot in snapshots]
     renderer.close()
     assert images[-1] is not None

@@ -16,7 +16,7 @@ from training.evaluation import batches
 from training.evaluation.batches import Batch, in_batches, run_batches
 from training.evaluation.rollout import decision_times, run_episodes
 from training.evaluation.scenarios import EVALUATION, EvaluationScenario
-from training.studies.comparison import PLANTS, as_text, compare, differences, pooled, rows
+from training.studies.comparison import PLANTS, as_text, compare, differences, rows
 
 pytestmark = pytest.mark.training
 
@@ -106,12 +106,6 @@ def test_differences_are_paired_and_have_a_sign(results):
     assert row["difference"] == pytest.approx(1e3 * np.mean(both[0] - both[1]))
     assert row["low"] < row["difference"] < row["high"] < 0
     assert table.loc[("calibrated", "share that leaves [%]"), "difference"] < 0
-
-
-def test_seeds_of_a_training_are_pooled(results):
-    both = pooled(results, "both", ["good", "late"])
-    assert {label for _, _, label in both} == {"both"}
-    assert len(both["calibrated", "steps", "both"]) == 48
 
 
 def test_a_scenario_may_have_its_own_length():

@@ -102,7 +102,7 @@ def agreement(
         export: the controller.
         code: compiled.
         states: visited by the controller.
-        inputs: of the network along them (`inputs_along`).
+        inputs: of the network along them (`inputs_along`), (states, all).
 
     Raises:
         ExportError: they differ on more than 1 - LEAST_AGREEMENT of the states.

@@ -32,20 +32,6 @@ AFTERMATH = 1.0
 """Time after the end of its consumption for which a shortfall is still the event's [s]."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class EventFigures:
-    """Figures of every episode's events, arrays (n,); 0 for an episode without any."""
-
-    count: NDArray
-    """Number of events."""
-    mean_breakdown: NDArray
-    """Mean over the events of the largest shortfall [bar]."""
-    mean_recovery: NDArray
-    """Mean over the events of the recovery time [s]."""
-    longest_recovery: NDArray
-    """Longest recovery time [s]."""
-
-
 class ConsumptionEvents:
     """Accumulates the events of n episodes, period by period, in constant memory.
 
@@ -100,16 +86,16 @@ class ConsumptionEvents:
             figure[where] = 0.0
         self._recovered[where] = False
 
-    def result(self) -> EventFigures:
-        """The figures so far; events under way end here."""
+    def result(self) -> dict[str, NDArray]:
+        """The figures of events in EpisodeMetrics, (n,), so far; events under way end here."""
         count = np.maximum(self._count, 1)
         under_way = self._open
-        return EventFigures(
-            count=self._count.copy(),
-            mean_breakdown=(self._depths + under_way * self._depth) / count,
-            mean_recovery=(self._recoveries + under_way * self._recovery) / count,
-            longest_recovery=np.maximum(self._longest, under_way * self._recovery),
-        )
+        return {
+            "events": self._count.copy(),
+            "event_breakdown_bar": (self._depths + under_way * self._depth) / count,
+            "event_recovery_s": (self._recoveries + under_way * self._recovery) / count,
+            "longest_event_recovery_s": np.maximum(self._longest, under_way * self._recovery),
+        }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -227,16 +213,12 @@ class Meter:
         """
         excursion = np.maximum(self._highest, -self._lowest)
         time = self._periods * self._period
-        events = self._events.result()
         return EpisodeMetrics(
             stayed=(excursion <= BAND_BAR) & ~self._failed,
             excursion_bar=excursion,
             breakdown_bar=np.maximum(-self._lowest, 0.0),
             recovery_s=self._longest_low,
-            events=events.count,
-            event_breakdown_bar=events.mean_breakdown,
-            event_recovery_s=events.mean_recovery,
-            longest_event_recovery_s=events.longest_recovery,
+            **self._events.result(),
             rms_bar=np.sqrt(self._squares / np.maximum(self._counted, 1)),
             switchings_per_s=self._switchings / time,
             vented_g_per_s=self._vented / time,

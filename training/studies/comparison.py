@@ -1,6 +1,6 @@
 """Controllers on the same unseen episodes: figures, differences paired by episode, and a picture."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 
 import numpy as np
 import pandas as pd
@@ -209,13 +209,3 @@ def figure(table: pd.DataFrame) -> Figure:
     panels[0].set_yticks(places, names)
     panels[0].set_ylim(len(names) - 0.5, -0.7)
     return drawn
-
-
-def pooled(results: Results, label: str, members: Sequence[str]) -> Results:
-    """The same results with the episodes of several controllers, seeds of a training, under one
-    label."""
-    cells = dict.fromkeys((plants, scenario) for plants, scenario, _ in results)
-    return {
-        (*cell, label): EpisodeMetrics.joined([results[(*cell, member)] for member in members])
-        for cell in cells
-    }

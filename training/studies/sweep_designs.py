@@ -69,25 +69,16 @@ def effects(plant: Plant) -> Iterator[Point]:
 
 def conditions(plant: Plant) -> Iterator[Point]:
     """Consumption, sensor noise, control period, latency and supply voltage, one at a time."""
-    for name in SCENARIOS:
-        yield Point(design="conditions", factor="scenario", level=name, options={"scenario": name})
-    for factor in SENSOR_NOISE:
-        yield Point(
-            design="conditions", factor="sensor noise", level=f"{factor:g} x",
-            options={"sensor_noise": factor},
-        )  # fmt: skip
-    for ms in CONTROL_PERIODS_MS:
-        yield Point(
-            design="conditions", factor="control period", level=f"{ms} ms",
-            options={"control_period": ms * MS},
-        )  # fmt: skip
-    for ms in LATENCIES_MS:
-        yield _changed_plant("conditions", "latency", f"{ms} ms", {"t_delay": ms * MS})
-    for volts in SUPPLY_VOLTAGES:
-        yield Point(
-            design="conditions", factor="supply voltage", level=f"{volts:g} V",
-            options={"supply_voltage": volts},
-        )  # fmt: skip
+    changes: dict[str, dict[str, dict[str, Any]]] = {
+        "scenario": {name: {"scenario": name} for name in SCENARIOS},
+        "sensor noise": {f"{factor:g} x": {"sensor_noise": factor} for factor in SENSOR_NOISE},
+        "control period": {f"{ms} ms": {"control_period": ms * MS} for ms in CONTROL_PERIODS_MS},
+        "latency": {f"{ms} ms": {"parameters": {"t_delay": ms * MS}} for ms in LATENCIES_MS},
+        "supply voltage": {f"{volts:g} V": {"supply_voltage": volts} for volts in SUPPLY_VOLTAGES},
+    }
+    for factor, levels in changes.items():
+        for level, options in levels.items():
+            yield Point(design="conditions", factor=factor, level=level, options=options)
 
 
 def _changed_plant(design: str, factor: str, level: str, values: dict[str, float]) -> Point:

@@ -65,7 +65,6 @@ def test_a_black_box_that_does_harm_is_left_out():
     judged = measure_discrepancy_reduction(problem, found, lambda *_: [-model.residuals[2]])
     assert not judged.black_box_helps
     assert judged.black_box.overall == judged.gaps["recalibrated"].overall
-    assert judged.unexplained.predictable == 0
     assert judged.unexplained.p_value == 1
     assert not judged.unexplained.still_predictable
 

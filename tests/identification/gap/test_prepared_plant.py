@@ -51,7 +51,6 @@ def noisy(samples: int, period: float, seed: int = 0) -> NDArray:
 def test_noise_is_seen_beside_motion(samples, period, accuracy):
     plant = recorded(*(noisy(samples, period, seed) for seed in range(3)))
     assert plant.channels[0].noise == pytest.approx(SIGMA, rel=accuracy)
-    assert plant.noise_source == {"y": "estimated"}
 
 
 def test_jumps_do_not_count_as_noise():
@@ -73,7 +72,6 @@ def test_coarse_steps_leave_at_least_the_error_of_rounding():
     coarse = 0.05 * np.round(np.sin(np.arange(20_000) / 900.0) / 0.05)
     plant = recorded(coarse)
     assert plant.channels[0].noise == pytest.approx(0.05 / np.sqrt(12), rel=1e-6)
-    assert plant.noise_source == {"y": "resolution"}
 
 
 def test_constant_readings_ask_for_the_noise():
@@ -82,18 +80,17 @@ def test_constant_readings_ask_for_the_noise():
 
 
 @pytest.mark.parametrize(
-    ("noise", "resolution", "expected", "source"),
+    ("noise", "resolution", "expected"),
     [
-        (3e-3, 0.0, 3e-3, "given"),
-        (3e-3, 1e-3, 3e-3, "given"),
-        (1e-4, 1e-2, 1e-2 / np.sqrt(12), "resolution"),
-        (None, 1e-1, 1e-1 / np.sqrt(12), "resolution"),
+        (3e-3, 0.0, 3e-3),
+        (3e-3, 1e-3, 3e-3),
+        (1e-4, 1e-2, 1e-2 / np.sqrt(12)),
+        (None, 1e-1, 1e-1 / np.sqrt(12)),
     ],
 )
-def test_given_noise_is_kept_unless_readings_are_coarser(noise, resolution, expected, source):
+def test_given_noise_is_kept_unless_readings_are_coarser(noise, resolution, expected):
     plant = prepared(tank(noise=noise, resolution=resolution))
     assert plant.channels[0].noise == pytest.approx(expected)
-    assert plant.noise_source == {"h": source}
 
 
 def test_runs_begin_at_0_and_the_plant_keeps_its_own_time():

@@ -9,7 +9,7 @@ import pytest
 
 from docs.examples.tank import Tank, virtual_recordings
 from identification.block_bootstrap import Interval
-from identification.gap.diagnosis import Diagnosis, diagnose, hypothesis_label
+from identification.gap.diagnosis import Diagnosis, diagnose
 from identification.gap.gap_json import (
     GAP,
     SYSTEMATIC_FORM_ERROR,
@@ -51,7 +51,7 @@ def unknown() -> Diagnosis:
 
 def closing(found: Diagnosis, low: float, value: float, high: float) -> Diagnosis:
     """The diagnosis with another share closed by its first cause."""
-    label = hypothesis_label(found.judged[0].hypothesis)
+    label = found.judged[0].hypothesis.label
     shares = {**found.reduction.shares_closed, label: Interval(value=value, low=low, high=high)}
     left = replace(found.reduction.unexplained, fraction=1.0 - value)
     return replace(found, reduction=replace(found.reduction, shares_closed=shares, unexplained=left))
