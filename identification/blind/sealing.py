@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from epv_env.common.files import write_json, write_text
+from epv_env.common.files import write_text
 from identification.blind.truth import TWO_EFFECTS, Trial
 
 FORMAT = "epv-blind/3"
@@ -55,11 +55,6 @@ def truth_label(
         "gap_alone": dict(single_gaps),
         "salt": salt,
     }
-
-
-def write_label(folder: Path, label: Mapping[str, Any]) -> None:
-    """Write the label of one trial."""
-    write_json(folder / LABEL_FILE, label, allow_nan=False)
 
 
 def commit(out: Path, trials: int) -> dict[int, str]:

@@ -18,18 +18,18 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from epv_env.common.files import write_text
+from epv_env.common.files import write_json, write_text
 from epv_env.common.results_folder import progress
 from identification.bench.session import TrueSignals
 from identification.blind.bench import blind_campaign, true_recordings
 from identification.blind.explainable import explainable_gap
 from identification.blind.score import TrialScore, score_trial
 from identification.blind.sealing import (
+    LABEL_FILE,
     commit,
     open_label,
     trial_folder,
     truth_label,
-    write_label,
 )
 from identification.blind.truth import TWO_EFFECTS, Trial, draw_trial, trial_plan
 from identification.recordings.campaign_files import FILE_NAME, write_campaign
@@ -111,7 +111,8 @@ def generate_trial(
         RuntimeError: no solver follows any of the valves drawn with these causes.
     """
     trial, truths, single_gaps = _drawn_and_recorded(seed, number, kind, causes, forms)
-    write_label(folder, truth_label(trial, explainable_gap(trial, truths), single_gaps, seed=seed))
+    label = truth_label(trial, explainable_gap(trial, truths), single_gaps, seed=seed)
+    write_json(folder / LABEL_FILE, label, allow_nan=False)
     write_text(folder / REQUEST_FILE, json.dumps({"without": list(trial.excluded)}) + "\n")
     write_campaign(blind_campaign(truths, trial, seed), folder / "campaign")
 

@@ -1,7 +1,7 @@
 """The truth of a trial: the valve as built, the causes of its gap, and how their forms deviate."""
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from typing import TypeVar
 
@@ -112,13 +112,11 @@ class Trial:
     def with_only(self, effect: str) -> "Trial":
         """The same valve with one of its two effects."""
         sizes = {symbol: self.sizes[symbol] for symbol in CATALOGUE[effect] if symbol in self.sizes}
-        return Trial(
-            number=self.number,
+        return replace(
+            self,
             kind=ONE_CAUSE,
             causes=(effect,),
             sizes=sizes,
-            unit=self.unit,
-            form_deviation=self.form_deviation,
             winding_temperature_rise=self.winding_temperature_rise if "h_coil" in sizes else 0.0,
             other_forms=tuple(name for name in self.other_forms if name == effect),
         )
@@ -194,12 +192,8 @@ def draw_trial(
 
 def draw_unit(rng: np.random.Generator) -> Parameters:
     """A valve as built: the four calibrated parameters and all others scatter."""
-    centre, spread, limit = (
-        Parameters.calibrated(),
-        CALIBRATED_SPREAD,
-        UNIT_SCATTER_LIMIT,
-    )
-    four = 1.0 + rng.uniform(-spread, spread, len(CALIBRATED_SYMBOLS))
+    centre, limit = Parameters.calibrated(), UNIT_SCATTER_LIMIT
+    four = 1.0 + rng.uniform(-CALIBRATED_SPREAD, CALIBRATED_SPREAD, len(CALIBRATED_SYMBOLS))
     others = truncnorm.rvs(-limit, limit, size=len(PARAMETER_COMPONENTS), random_state=rng)
     factors = dict(zip(CALIBRATED_SYMBOLS, four, strict=True))
     scattered = 1.0 + UNIT_SCATTER * np.asarray(others)

@@ -15,7 +15,10 @@ def calibration_section(calibration: Calibration) -> Section:
     """Estimates of both methods, errors before and after, and what speaks against them."""
     return Section(
         title="Calibration",
-        verdicts=[_verdict(calibration), *_doubts(calibration)],
+        verdicts=[
+            _verdict(calibration),
+            *(Verdict(status="doubt", text=warning) for warning in calibration.warnings),
+        ],
         blocks=[
             _estimates(calibration),
             Text(text=_offsets(calibration)),
@@ -64,10 +67,6 @@ def _verdict(calibration: Calibration) -> Verdict:
         f"{'below' if good else 'not below'} the limit of {100 * ACCEPTED_ERROR:.0f} %; the "
         f"residual of the least-squares fit is {rms:.3g} times the noise (1 is the floor).",
     )
-
-
-def _doubts(calibration: Calibration) -> list[Verdict]:
-    return [Verdict(status="doubt", text=warning) for warning in calibration.warnings]
 
 
 def _estimates(calibration: Calibration) -> Table:

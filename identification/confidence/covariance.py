@@ -165,10 +165,14 @@ def _shifted(drive: ModelInputs, channel: str, error: float) -> ModelInputs:
 def _redrawn(
     problem: CalibrationProblem, drives: Sequence[ModelInputs], rng: np.random.Generator
 ) -> list[ModelInputs]:
-    """INPUT_DRAWS inputs per recording, as they would follow from other noise on the same inputs."""
+    """INPUT_DRAWS inputs per recording, as they would follow from other noise on the same inputs.
+
+    The circuit pressure at the start, which is a nuisance, stays.
+    """
     return [
-        _with_start_of(
-            drive, model_inputs(_noisy(recording, drive, problem.noise, rng), problem.vector.reference)
+        replace(
+            model_inputs(_noisy(recording, drive, problem.noise, rng), problem.vector.reference),
+            p2_start=drive.p2_start,
         )
         for recording, drive in zip(problem.calibration, drives, strict=True)
         for _ in range(INPUT_DRAWS)
@@ -182,8 +186,3 @@ def _noisy(
         name: getattr(drive, name) + noise[name] * rng.standard_normal(len(recording)) for name in INPUTS
     }
     return replace(recording, **drawn)
-
-
-def _with_start_of(drive: ModelInputs, redrawn: ModelInputs) -> ModelInputs:
-    """The redrawn inputs with the circuit pressure of the original start, which is a nuisance."""
-    return replace(redrawn, p2_start=drive.p2_start)

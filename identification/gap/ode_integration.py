@@ -17,7 +17,7 @@ import numpy as np
 from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
-from identification.gap.runge_kutta import advancing, workspace
+from identification.gap.runge_kutta import advancing
 
 STEP_ERROR = 0.05
 """Largest change of a reading by halving the sub-steps [noise deviations]: far below what the readings
@@ -161,7 +161,7 @@ def alone(advance: Callable, read: Callable, channels: int, wrap: Callable) -> S
                 advance(x, begin * period, period / substeps, u, p, pushed, work)
 
     def simulate(job: Job) -> tuple[NDArray, NDArray]:
-        n, work = job.start.shape[1], workspace(len(job.start))
+        n, work = job.start.shape[1], np.empty((6, len(job.start)))
         states = np.full((n, len(job.start), len(job.inputs)), np.nan)
         readings = np.full((n, channels, len(job.inputs)), np.nan)
         total = totals(job.inputs)
@@ -195,7 +195,7 @@ def simulator(records: Records, functions: Sequence[tuple[Callable, int]], mode:
     """
     if mode not in MODES:
         raise ValueError(f"mode '{mode}' is none of {', '.join(MODES)}: choose one of them")
-    own = compiled if mode == "compiled" else _as_it_is
+    own: Callable = compiled if mode == "compiled" else lambda function: function
     rate, read, thresholds = (own(records.flat(own(f), results)) for f, results in functions)
     channels, count = functions[1][1], functions[2][1]
     advance = advancing(rate, thresholds, count, own)
@@ -217,10 +217,6 @@ def _explained(simulation: Simulation) -> Simulation:
             ) from error
 
     return simulate
-
-
-def _as_it_is(function: Callable) -> Callable:
-    return function
 
 
 def settled_steps(read: Callable[[int], Sequence[NDArray]]) -> int:

@@ -11,7 +11,7 @@ from identification.gap.evidence import EvaluatedHypothesis
 from identification.gap.fitting_problem import Estimate
 from identification.gap.form_modes import law_in_words, laws
 from identification.gap.gap_json import discrepancy, drawn_term, inclusion, parameter_intervals
-from identification.gap.gaps import FLOOR, Gap, regimes_of
+from identification.gap.gaps import FLOOR, regimes_of
 from identification.gap.localisation import Localisation
 from identification.gap.plant import GreyBox
 from identification.gap.quantities import (
@@ -277,22 +277,16 @@ def gap_table(diagnosis: Diagnosis) -> Table:
     return Table(
         columns=["Model", *(f"{c} [noise]" for c in columns), *(f"{c} [%]" for c in shown)],
         rows=[
-            [in_words(diagnosis, name), *_noise_units(model, channels), *_percent(model, shown)]
+            [
+                in_words(diagnosis, name),
+                gap_with_interval(model.overall),
+                *(gap_text(model.channels[channel].value) for channel in channels),
+                *(f"{model.percent[column]:.2f}" if model.percent else "-" for column in shown),
+            ]
             for name, model in models.items()
         ],
         caption=caption,
     )
-
-
-def _noise_units(model: Gap, channels: list[str]) -> list[str]:
-    return [
-        gap_with_interval(model.overall),
-        *(gap_text(model.channels[channel].value) for channel in channels),
-    ]
-
-
-def _percent(model: Gap, columns: list[str]) -> list[str]:
-    return [f"{model.percent[column]:.2f}" if model.percent else "-" for column in columns]
 
 
 def calibrated_values(diagnosis: Diagnosis, status: str) -> Table:

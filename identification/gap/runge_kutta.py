@@ -8,7 +8,6 @@ a threshold push back slides along it, to first order, and exactly where it stic
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 APPROACH_FACTOR = 8.0
 """By what a sub-step is divided when it would pass a threshold; computing time only."""
@@ -24,7 +23,8 @@ MOST_EVENT_STEPS = 600
 def advancing(rate: Callable, thresholds: Callable, count: int, wrap: Callable) -> Callable:
     """A function (x, t, h, u, p, push, work) that advances one candidate's states x (states,) by h [s].
 
-    push: forcing of the rates, (states,). work: scratch of `workspace`, (rows, states).
+    push: forcing of the rates, (states,). work: scratch, (6, states):
+    four slopes, a stage and the end.
 
     Args:
         rate: derivatives of the states, as `Records.flat` makes it.
@@ -119,8 +119,3 @@ def advancing(rate: Callable, thresholds: Callable, count: int, wrap: Callable) 
             x[:] = work[5]
 
     return advance
-
-
-def workspace(states: int) -> NDArray:
-    """Scratch of a step: four slopes, a stage and the end, (6, states)."""
-    return np.empty((6, states))

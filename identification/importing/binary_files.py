@@ -81,19 +81,17 @@ def read_tdms(path: Path) -> tuple[str, list[SourceChannel]]:
         return "TDMS", limited(path, channels)
 
 
-def _tdms_unit(properties: dict[str, Any]) -> str:
-    return next((str(properties[name]) for name in UNIT_PROPERTIES if name in properties), "")
-
-
 def _tdms_channel(group: str, channel: Any) -> SourceChannel:
     """A waveform with its times and their begin, or a channel whose times are another channel."""
     if channel.dtype.kind not in "iufM":
         return unread(channel.name, group)
     values, begin = seconds(np.asarray(channel[:]))
     time = _waveform_times(channel.properties, len(values))
+    given = channel.properties
+    unit = next((str(given[name]) for name in UNIT_PROPERTIES if name in given), "")
     return SourceChannel(
         name=channel.name,
-        unit=_tdms_unit(channel.properties) or ("s" if begin is not None else ""),
+        unit=unit or ("s" if begin is not None else ""),
         values=values,
         time=time,
         begin=begin if time is None else channel.properties.get("wf_start_time"),

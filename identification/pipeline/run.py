@@ -161,7 +161,8 @@ def run(identification: Identification, out: Path, next_step: NextStep) -> Plant
     began, done = perf_counter(), 0.0
     results: list[Result] = []
     for number, stage in enumerate(STAGES, start=1):
-        left = _remaining(perf_counter() - began, done)
+        seconds = perf_counter() - began
+        left = f", about {seconds * (1 - done) / done:.0f} s left" if done else ""
         print(f"[{number}/{len(STAGES)}] {stage.name}{left}", file=sys.stderr)
         results.append(result_or_omission(stage, identification))
         done += stage.time_share
@@ -214,8 +215,3 @@ def _write_report(
         facts=campaign_facts(identification.campaign),
         next_step=next_step,
     )
-
-
-def _remaining(seconds: float, done: float) -> str:
-    """Text about the time left, from the seconds and the share done so far."""
-    return f", about {seconds * (1 - done) / done:.0f} s left" if done else ""

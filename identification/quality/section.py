@@ -46,7 +46,7 @@ def quality_section(quality: QualityAssessment) -> Section:
             _trends(quality),
             _statistics(quality),
             _correlations(quality),
-            *_pictures(quality),
+            *(Picture(figure=draw(quality), caption=text) for draw, text in figures.CAPTIONS.items()),
         ],
     )
 
@@ -126,10 +126,6 @@ def _correlations(quality: QualityAssessment) -> Table:
         f"±{white_noise_band(quality.samples):.4f} in 95 % of cases."
     )
     return Table(columns=columns, rows=rows, caption=caption)
-
-
-def _pictures(quality: QualityAssessment) -> list[Picture]:
-    return [Picture(figure=draw(quality), caption=text) for draw, text in figures.CAPTIONS.items()]
 
 
 def as_json(quality: QualityAssessment) -> dict[str, Any]:

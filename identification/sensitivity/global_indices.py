@@ -8,7 +8,6 @@ Samples and estimators are SALib's (Iwanaga, Usher and Herman, 2022; Saltelli et
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,7 +80,7 @@ def sobol_indices(
 
     samples: a power of two. bounds: (parameters, 2) [SI].
     """
-    problem = _problem(symbols, bounds)
+    problem = {"num_vars": len(symbols), "names": list(symbols), "bounds": bounds.tolist()}
     drawn = sobol_sample.sample(problem, samples, calc_second_order=False, seed=seed)
     indices = sobol_analysis.analyze(
         problem,
@@ -97,7 +96,3 @@ def sobol_indices(
         total=np.asarray(indices["ST"]),
         total_half_width=np.asarray(indices["ST_conf"]),
     )
-
-
-def _problem(symbols: Sequence[str], bounds: NDArray) -> dict[str, Any]:
-    return {"num_vars": len(symbols), "names": list(symbols), "bounds": bounds.tolist()}

@@ -87,7 +87,11 @@ def effects() -> list[Cause]:
             variant=variant,
             component=effect.component,
             parameters=tuple(effect_size(size) for size in sizes),
-            run_parameters=tuple(_run_parameter(size) for size in effect.sizes if size.scatter),
+            run_parameters=tuple(
+                NuisanceParameter(symbol=size.symbol, sd=size.scatter, step=size.difference or 0.0)
+                for size in effect.sizes
+                if size.scatter
+            ),
             prior=1.0 / len(effect.fitted),
         )
         for effect in EFFECTS
@@ -123,11 +127,6 @@ def effect_size(size: Size) -> FreeParameter:
         trials=size.trials,
         scale=abs(size.trials[0]),
     )
-
-
-def _run_parameter(size: Size) -> NuisanceParameter:
-    """A size that every recording has its own of."""
-    return NuisanceParameter(symbol=size.symbol, sd=size.scatter or 0.0, step=size.difference or 0.0)
 
 
 def parameter_size(symbol: str, nominal: Parameters) -> FreeParameter:

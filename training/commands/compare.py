@@ -82,10 +82,10 @@ def run(options: argparse.Namespace) -> None:
         journal=Journal(options.out / "finished.jsonl", subject(plant, scenarios, options.duration)),
     )  # fmt: skip
     times = {
-        label: 1e6 * decision_times(controller, options.decisions, plant=plant, scenario="steps")
-        for label, controller in controllers.items()
+        label: 1e6 * np.median(decision_times(each, options.decisions, plant=plant, scenario="steps"))
+        for label, each in controllers.items()
     }
-    table: Any = rows(results).assign(decision_us=lambda row: row["controller"].map(_medians(times)))
+    table: Any = rows(results).assign(decision_us=lambda row: row["controller"].map(times))
     paired = differences(results, against)
     settings = {name: getattr(options, name) for name in ("episodes", "duration", "seed", "plants")}
     write_results(options, table, paired, results, first_seed, {**settings, "controllers": digests})
@@ -111,10 +111,6 @@ def subject(plant: Plant, scenarios: dict[str, EvaluationScenario], duration: fl
         "duration": duration,
         "scenarios": {name: repr(scenario) for name, scenario in scenarios.items()},
     }
-
-
-def _medians(times: dict[str, Any]) -> dict[str, float]:
-    return {label: float(np.median(each)) for label, each in times.items()}
 
 
 def write_results(

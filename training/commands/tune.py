@@ -31,13 +31,12 @@ its physical limit."""
 
 def suggest(space: SearchSpace, trial: Trial) -> dict[str, Any]:
     """A trial's values of the quantities of a search space, by name."""
-    return {name: _suggested(name, quantity, trial) for name, quantity in space.items()}
-
-
-def _suggested(name: str, quantity: Range | Choice, trial: Trial) -> Any:
-    if isinstance(quantity, Choice):
-        return trial.suggest_categorical(name, list(quantity.values))
-    return trial.suggest_float(name, quantity.low, quantity.high, log=quantity.log)
+    return {
+        name: trial.suggest_categorical(name, list(quantity.values))
+        if isinstance(quantity, Choice)
+        else trial.suggest_float(name, quantity.low, quantity.high, log=quantity.log)
+        for name, quantity in space.items()
+    }
 
 
 def tune(

@@ -155,10 +155,6 @@ def model_description(model: Model) -> bytes:
     for reference, variable in enumerate(model.variables):
         _scalar_variable(variables, variable, reference)
     _structure(xml.SubElement(root, "ModelStructure"), model)
-    return _text(root)
-
-
-def _text(root: xml.Element) -> bytes:
     xml.indent(root)
     return xml.tostring(root, encoding="UTF-8", xml_declaration=True)
 
