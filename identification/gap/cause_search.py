@@ -103,17 +103,16 @@ class HypothesisPool:
         """Whether a set of causes was refitted."""
         return labels in self._best
 
-    def posterior(self) -> tuple[list[EvaluatedHypothesis], Posterior]:
-        """All hypotheses with causes, and their probabilities in the same order."""
-        hypotheses = list(self._best.values())
-        return hypotheses, posterior(self.problem, self.recalibrated, hypotheses)
+    def posterior(self) -> Posterior:
+        """All hypotheses with causes, and their probabilities."""
+        return posterior(self.problem, self.recalibrated, list(self._best.values()))
 
     def ranked(self, number: int | None = None) -> list[tuple[EvaluatedHypothesis, float]]:
         """Hypotheses with a number of causes, or all, and their scores [nats], the best first."""
-        hypotheses, found = self.posterior()
+        found = self.posterior()
         pairs = [
             (each, score)
-            for each, score in zip(hypotheses, found.scores, strict=True)
+            for each, score in zip(found.hypotheses, found.scores, strict=True)
             if number is None or len(each.labels) == number
         ]
         return sorted(pairs, key=lambda pair: (-pair[1], misfit(pair[0])))
@@ -163,8 +162,8 @@ def _another_cause_may_act(pool: HypothesisPool, number: int) -> bool:
     Where four causes act, the second one alone may hardly pay: the search goes on in a small catalogue,
     and where the gap has no name yet.
     """
-    hypotheses, found = pool.posterior()
-    every = [misfit_beyond_white_noise(each, found.discrepancies) for each in hypotheses]
+    found = pool.posterior()
+    every = [misfit_beyond_white_noise(each, found.discrepancies) for each in found.hypotheses]
     whole = misfit_beyond_white_noise(pool.recalibrated, found.discrepancies)
     if not every or min(every) <= LITTLE_LEFT + LITTLE_SHARE * whole:
         return False

@@ -16,7 +16,6 @@ from identification.gap.held_out import (
 from identification.gap.localisation import Localisation, locate
 from identification.gap.plant import GreyBox
 from identification.gap.plant_checks import check, check_description
-from identification.gap.posterior import CHANCE_MISFIT
 from identification.gap.prepared_plant import prepared
 from identification.gap.recalibration import (
     recalibrate,
@@ -199,17 +198,18 @@ def _searched(problem: FittingProblem, base: Estimate, cache: FitCache, most_cau
     recalibrated = with_own_nuisances(problem, [evaluated], "recalibration: own nuisances", cache)[0]
     pool = HypothesisPool(problem, recalibrated, cache)
     search_causes(pool, base, base_runs, signatures, most_causes)
-    hypotheses, found = pool.posterior()
+    found = pool.posterior()
     keys = list(zip(found.probabilities, found.scores, strict=True))
     order = sorted(range(len(keys)), key=keys.__getitem__, reverse=True)
     return Ranking(
         problem=problem,
         recalibrated=recalibrated,
-        hypotheses=[hypotheses[i] for i in order],
+        hypotheses=[found.hypotheses[i] for i in order],
         probabilities=[found.probabilities[i] for i in order],
         no_cause=found.no_cause,
         unknown=found.unknown,
-        shares_left=[found.misfits[i] / (found.misfit + CHANCE_MISFIT) for i in order],
+        scores=[found.scores[i] for i in order],
+        shares_left=[found.shares_left[i] for i in order],
         discrepancies=found.discrepancies,
         separability=separability,
         figures=found.figures[[*order, -2, -1]],

@@ -44,8 +44,10 @@ WEIGHTS = _weights()
 
 @dataclass(frozen=True, kw_only=True)
 class Posterior:
-    """Probabilities of n hypotheses with causes, in the order given, and of the others."""
+    """Probabilities of n hypotheses with causes, and of the others."""
 
+    hypotheses: list[EvaluatedHypothesis]
+    """Single causes and sets of causes, (n,)."""
     probabilities: list[float]
     """Of each hypothesis, (n,); with the two following they sum to 1."""
     no_cause: float
@@ -56,12 +58,10 @@ class Posterior:
     """Of each hypothesis, then of no cause and of an unknown one, (n + 2, figures)."""
     scores: list[float]
     """Log probability of each but for a constant, (n,) [nats]."""
-    misfit: float
-    """Of the recalibrated model beyond noise [nats]."""
-    misfits: list[float]
-    """The same of each hypothesis, (n,) [nats]."""
+    shares_left: list[float]
+    """Share of the misfit beyond noise that each hypothesis leaves, (n,) [1]."""
     discrepancies: list[ChannelDiscrepancy]
-    """By channel, under the best hypothesis."""
+    """Noise and discrepancy of each channel under the best hypothesis."""
 
 
 def posterior(
@@ -78,13 +78,13 @@ def posterior(
     scores[:-2][[each.at_bound for each in hypotheses]] = -np.inf
     weights = softmax(scores)
     return Posterior(
+        hypotheses=list(hypotheses),
         probabilities=weights[:-2].tolist(),
         no_cause=float(weights[-2]),
         unknown=float(weights[-1]),
         figures=figures,
         scores=scores[:-2].tolist(),
-        misfit=float(misfits[0]),
-        misfits=misfits[1:].tolist(),
+        shares_left=(misfits[1:] / (misfits[0] + CHANCE_MISFIT)).tolist(),
         discrepancies=discrepancies,
     )
 

@@ -3,13 +3,11 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from numpy.typing import NDArray
-
-from identification.gap.discrepancy import ChannelDiscrepancy
 from identification.gap.evidence import EvaluatedHypothesis
 from identification.gap.fitting_problem import FittingProblem
 from identification.gap.held_out import DiscrepancyReduction
 from identification.gap.localisation import Localisation
+from identification.gap.posterior import Posterior
 from identification.gap.screening import Separability
 
 NO_GAP, KNOWN, AMBIGUOUS = "no_gap", "known", "ambiguous"
@@ -36,29 +34,14 @@ SURE_INCLUSION = 0.9
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ranking:
-    """Every hypothesis that was refitted, and the probability of each."""
+class Ranking(Posterior):
+    """Every hypothesis that was refitted, the most probable first."""
 
     problem: FittingProblem
     recalibrated: EvaluatedHypothesis
     """The model without a cause."""
-    hypotheses: list[EvaluatedHypothesis]
-    """Single causes and sets of causes, the most probable first."""
-    probabilities: list[float]
-    """Probabilities of `hypotheses`; with the two following they sum to 1."""
-    no_cause: float
-    """Probability that no cause acts."""
-    unknown: float
-    """Probability that what acts has no name in the catalogue."""
-    shares_left: list[float]
-    """Share of the misfit beyond noise that each of `hypotheses` leaves [1]."""
-    discrepancies: list[ChannelDiscrepancy]
-    """Noise and discrepancy of each channel under the best hypothesis."""
     separability: Separability
     """What the recordings could tell apart, whatever the residual."""
-    figures: NDArray
-    """Figures of posterior.py behind the probabilities: of `hypotheses`, of no cause, of an unknown one,
-    (n + 2, figures)."""
 
     @property
     def inclusion(self) -> Mapping[str, float]:
