@@ -254,9 +254,11 @@ class _Search:
             self._take_anew()
             return
         else:
-            self._tighten()
+            raised = DAMPING_INCREASE * self.damping + 1e-6  # leaves zero as well
+            self.damping = min(raised, MOST_DAMPING)
             current = self.equations
-        self.trial, decrease = self._step(current)
+        step, decrease = current.step(*self.problem.ends(self.best), self.damping)
+        self.trial = replace(self.best, vector=self.best.vector + step)
         self._decide(decrease, rival_chi_square)
 
     def _accept(self, runs: Sequence[LinearisedRun], equations: NormalEquations) -> None:
@@ -275,10 +277,6 @@ class _Search:
         self.best = replace(self.best, slopes=slopes)
         self.trial, self.equations = self.best, None
 
-    def _tighten(self) -> None:
-        raised = DAMPING_INCREASE * self.damping + 1e-6  # leaves zero as well
-        self.damping = min(raised, MOST_DAMPING)
-
     def _stepped_run_values(self, runs: Sequence[LinearisedRun], equations: NormalEquations) -> NDArray:
         """Run parameters of the causes after one Gauss-Newton step; run offsets stay linear."""
         run_values = self.trial.run_values.copy()
@@ -288,12 +286,6 @@ class _Search:
                 step = without_run_nuisances(run, equations.shared)[1]
                 run_values[r] += step[:count]
         return run_values
-
-    def _step(self, equations: NormalEquations) -> tuple[Estimate, float]:
-        """The next trial, within the ranges, and the decrease of chi-square that it promises."""
-        ends = self.problem.ends(self.best)
-        step, decrease = equations.step(*ends, self.damping)
-        return replace(self.best, vector=self.best.vector + step), decrease
 
     def _decide(self, decrease: float, rival_chi_square: float) -> None:
         """Mark the fit as converged or given up."""

@@ -11,29 +11,10 @@ PREFIXES = {"M": 1e6, "k": 1e3, "": 1.0, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1
 POWER_PREFIXES = {"": 1.0, "d": 1e-1, "c": 1e-2, "m": 1e-3, "u": 1e-6}
 """Prefixes of units, and of units with a power of two or three."""
 
-PREFIXED = frozenset(
-    (
-        "A",
-        "C",
-        "F",
-        "H",
-        "Hz",
-        "J",
-        "K",
-        "N",
-        "Ohm",
-        "Pa",
-        "S",
-        "T",
-        "V",
-        "W",
-        "bar",
-        "g",
-        "m",
-        "rad",
-        "s",
-    )
-)
+PREFIXED = (
+    "A", "C", "F", "H", "Hz", "J", "K", "N", "Ohm", "Pa", "S", "T", "V", "W", "bar", "g", "m", "rad",
+    "s",
+)  # fmt: skip
 """Units that take a prefix."""
 
 

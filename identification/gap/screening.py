@@ -103,18 +103,6 @@ class Separability:
         )
 
 
-def trial_estimates(
-    problem: FittingProblem, base: Estimate, causes: Sequence[Cause]
-) -> list[tuple[Cause, Estimate]]:
-    """The base estimate with each cause added at each of its trial values."""
-    trials = []
-    for cause in causes:
-        for trial in range(max(len(p.trials) for p in cause.parameters)):
-            at = {p.symbol: p.trials[min(trial, len(p.trials) - 1)] for p in cause.parameters}
-            trials.append((cause, with_cause(problem, base, cause, at)))
-    return trials
-
-
 def with_cause(
     problem: FittingProblem, base: Estimate, cause: Cause, values: Mapping[str, float]
 ) -> Estimate:
@@ -129,7 +117,11 @@ def simulate_signatures(
     problem: FittingProblem, base: Estimate, causes: Sequence[Cause]
 ) -> list[CauseSignature]:
     """Signatures of every cause at each of its trial values, all simulated side by side."""
-    trials = trial_estimates(problem, base, causes)
+    trials = []
+    for cause in causes:
+        for trial in range(max(len(p.trials) for p in cause.parameters)):
+            at = {p.symbol: p.trials[min(trial, len(p.trials) - 1)] for p in cause.parameters}
+            trials.append((cause, with_cause(problem, base, cause, at)))
     residuals = problem.residuals([base, *(estimate for _, estimate in trials)], problem.fitted_runs)
     return [
         CauseSignature(
@@ -282,8 +274,15 @@ def assess_separability(
 
     base_runs: the base estimate linearised in the fitted runs. signatures: beside the same base.
     """
-    first, equations, k = _with_signatures(base_runs, signatures)
-    hessian, cross = equations.hessian, equations.hessian[:k, k:]
+    first: dict[str, CauseSignature] = {}
+    for signature in signatures:
+        first.setdefault(signature.cause.label, signature)
+    runs = [
+        replace(run, slopes=np.column_stack([run.slopes, *(s.changes[r] for s in first.values())]))
+        for r, run in enumerate(base_runs)
+    ]
+    hessian, k = normal_equations(runs).hessian, base_runs[0].slopes.shape[1]
+    cross = hessian[:k, k:]
     gram = hessian[k:, k:] - cross.T @ np.linalg.solve(hessian[:k, :k] + 1e-9 * np.eye(k), cross)
     norms = np.sqrt(np.maximum(np.diag(gram), 0.0))
     divisors = np.maximum(norms, np.sqrt(np.finfo(float).tiny))
@@ -292,17 +291,3 @@ def assess_separability(
         signature_norms=norms,
         correlation=gram / np.outer(divisors, divisors),
     )
-
-
-def _with_signatures(
-    base_runs: Sequence[LinearisedRun], signatures: Sequence[CauseSignature]
-) -> tuple[dict[str, CauseSignature], NormalEquations, int]:
-    """The first signature of each cause, normal equations with them as slopes, and number of others."""
-    first: dict[str, CauseSignature] = {}
-    for signature in signatures:
-        first.setdefault(signature.cause.label, signature)
-    runs = [
-        replace(run, slopes=np.column_stack([run.slopes, *(s.changes[r] for s in first.values())]))
-        for r, run in enumerate(base_runs)
-    ]
-    return first, normal_equations(runs), base_runs[0].slopes.shape[1]

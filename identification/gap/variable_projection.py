@@ -6,7 +6,7 @@ problem. Eliminating them from the normal equations leaves equations in the para
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numba
 import numpy as np
@@ -245,7 +245,7 @@ def _bounded_solution(
         if np.array_equal(held, beyond, equal_nan=True):
             break
         held = beyond
-    return best, _sum_of_squares(gram, best)
+    return best, float(gram[0, 0] - 2 * best @ gram[1:, 0] + best @ gram[1:, 1:] @ best)
 
 
 def _together(reduced: NDArray, k: int) -> NDArray:
@@ -284,19 +284,11 @@ def without_run_nuisances(run: LinearisedRun, shared: NDArray) -> tuple[NDArray,
 
 def shared_as_slopes(run: LinearisedRun) -> LinearisedRun:
     """The run with its shared nuisances appended to the parameters, (values, k + m), and none left."""
-    return LinearisedRun(
-        residual=run.residual,
+    return replace(
+        run,
         slopes=np.column_stack([run.slopes, run.shared_slopes]),
-        run_slopes=run.run_slopes,
-        run_values=run.run_values,
-        run_sd=run.run_sd,
         shared_slopes=np.zeros((len(run.residual), 0)),
     )
-
-
-def _sum_of_squares(gram: NDArray, numbers: NDArray) -> float:
-    """Sum of squares after the numbers have taken their share of the residual in row 0."""
-    return float(gram[0, 0] - 2 * numbers @ gram[1:, 0] + numbers @ gram[1:, 1:] @ numbers)
 
 
 def _shifted(grams: NDArray, first: int, amounts: NDArray) -> NDArray:
