@@ -1,52 +1,8 @@
 """The bench's own forms of the effects, unlike those that the diagnosis fits.
 
-If the data were made with the fitted forms, the check would be too easy. Two things differ. Without the
-effect both are the plant.
-
-**Deviating forms.** Each size depends on the state as it may in a real valve, by a share `d` of itself:
-
-| Effect | Form here, relative to that of docs/explanation/effects.md | Why |
-|---|---|---|
-| coil_heating | part of the heat flows on into the iron, rate d/(1 s) | the winding is not alone |
-| eddy_current | G (1 + d o_MV) | a closed iron path links the shorted turn better |
-| flyback_voltage | U_clamp (1 + d (I/0.3 A - 1)) | a diode's or Zener's slope resistance |
-| driver_voltage_drop | U_drop (1 + d (I/I_steady - 1)) | part of the drop is resistive |
-| magnetic_saturation | sMV (1 + d (u - 0.3)/(u + 0.3)) | iron stays linear longer, then bends sharper |
-| magnetic_remanence | I_rem (1 + d o_MV) | an open gap demagnetises |
-| armature_friction | F (1 + d (v/0.3 m/s - 1)) | a viscous share |
-| armature_bounce | a squeeze film of 20 um takes 0.1 m/s d eMV each way | slow landings bounce less |
-| armature_pressure_force | inlet (1 - d o_MV), exhaust (1 + d o_MV) | an open seat's jet sucks |
-| inlet_seat_leak, exhaust_seat_leak | A (1 + d (drop/6 bar - 1)) | the seat lifts under pressure |
-| control_chamber_heat | 1/tau (1 + d (2 w/(w + 0.3 g/s) - 1)) | moving gas exchanges more heat |
-| output_chamber_heat | the same with 20 g/s | |
-| moving_control_volume | s (1 + d o_PV) | a piston with a shoulder |
-| pressure_dependent_discharge | k (1 + d (3 (1 - p2/p1) - 1)) | curvature |
-| critical_pressure_ratio | deficit (1 + d o_PV) | b falls as the seat opens |
-| piston_friction | F (1 + d ((p3 - p_env)/6 bar + v/0.2 m/s - 1.5)) | lip pressure, viscosity |
-| flow_force | c (1 - d o_PV) | the jet's angle grows with the stroke |
-| local_gas_speed | a1, a2 (1 + d o_PV) | the cone widens |
-| seat_leak | A (1 + d ((p1 - p2)/4 bar - 1)) | as the MV seats |
-| circuit_leak | A (1 + d ((p2 - p_env)/6 bar - 1)) | the same |
-| output_pipe | A (1 + d (1 - 2 D/(D + 0.2 bar))), D the pipe's drop | wall friction beside the orifice |
-| supply_restriction | loss times (w/20 g/s)^(-2 d) | exponent below 2 of smooth pipes (Blasius) |
-| pressure_sensor_lag | 1/tau (1 - d D/(D + 50 mbar)), D: reading less pressure | empties slower |
-| pressure_sensor_bias | b (1 + d (p/8 bar - 1)) | part of it is a scale error |
-| current_sensor_gain | g (1 + d (I/0.4 A - 1)) | curvature of the amplifier |
-| command_delay | each switching by its own delay, t (1 ± d) | a controller's cycle |
-
-o_MV, o_PV = 2 x/x_max - 1: -1 shut, 1 open. w: flow. v, I, drops: absolute values.
-
-**Other forms.** Two effects may follow another law for the same thing, as a second simulator or a real
-valve may have it:
-
-| Effect | Fitted form | Other form here | They agree |
-|---|---|---|---|
-| supply_restriction | the drop follows the flow in 2 ms | the flow's drop at once | at a steady flow |
-| magnetic_saturation | Φ sMV = u/(1 + u), Fröhlich | Φ sMV = coth 3u − 1/(3u) | u near 0, u large |
-
-u = sMV N I/Rm. z_supply and sMV mean the same in both forms. Instant drop: the root of
-D = (z w)²/(2 ρ), flow w and density ρ as behind D; a flow back has no drop. Langevin's curve (1905) is
-the anhysteretic curve of Jiles and Atherton 1986; the force is that of its coenergy.
+If the data were made with the fitted forms, the check would be too easy. Two things differ, of which
+docs/studies/blind/forms.md has the tables: each size depends on the state, and two effects may follow
+another law. Without the effect both are the plant.
 """
 
 import math
