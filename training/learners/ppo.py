@@ -11,6 +11,7 @@ import numpy as np
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.utils import set_random_seed
 from stable_baselines3.common.vec_env import VecEnv
 from tqdm import tqdm
@@ -291,6 +292,7 @@ def train(
     model = (
         PPO.load(newest, env=env, device=device) if newest else make_model(env, seed=seed, device=device)
     )
+    model.set_logger(Logger(folder=None, output_formats=[]))  # the default leaves a folder in /tmp
     seed_episodes(model, seed)
     selection = Selection(
         task, folder, total=timesteps, episodes=validation_episodes, duration=validation_duration,
