@@ -14,6 +14,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.actions import OnOff
 from epv_env.common.files import JSONFileError, read_json, write_json
 
 FORMAT = "epv-monitor/1"
@@ -211,18 +212,19 @@ class Monitor:
     """Follows one valve: `update` once a control period, beside whatever controller.
 
     Attributes:
+        period: of control [s], in which the features count.
         time: since the start [s].
         probability: that something has changed, if changes are as frequent as the stated false alarms.
         history: the latest (time [s], log odds [-]), for a plot.
     """
 
-    def __init__(
-        self, model: MonitorModel, *, false_alarms_per_hour: float = 0.01, control_period: float = 5e-3
-    ):
-        """control_period: [s]. Raises ValueError for a rate that is not positive."""
+    period = OnOff.default_period
+
+    def __init__(self, model: MonitorModel, *, false_alarms_per_hour: float = 0.01):
+        """Raises ValueError for a rate that is not positive."""
         if not false_alarms_per_hour > 0.0:
             raise ValueError(f"false_alarms_per_hour = {false_alarms_per_hour:g}: give more than 0")
-        self.model, self.period, self.threshold = model, control_period, 1.0 / false_alarms_per_hour
+        self.model, self.threshold = model, 1.0 / false_alarms_per_hour
         self.history: deque[tuple[float, float]] = deque(maxlen=10_000)
         self._reader, self._periods = OpeningReader(), 0
         width = len(model.offset)

@@ -124,7 +124,7 @@ def test_c_code_says_what_python_says(tmp_path: Path) -> None:
     controller = Hysteresis(open_below=-0.3, shut_above=0.0)
     drive = drives(plant, controller, [3], {}, duration=10.0)[0]
     model, monitor = white_model(), Monitor(white_model())
-    for name, text in sources(model, monitor.period).items():
+    for name, text in sources(model).items():
         (tmp_path / name).write_text(text)
     build = ["cc", "-std=c99", "-Wall", "-Werror", "-O2", "-shared", "-fPIC", "-o", "m.so"]
     subprocess.run([*build, "epv_monitor.c", "-lm"], cwd=tmp_path, check=True)

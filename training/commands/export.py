@@ -17,7 +17,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from controllers.monitor import MonitorModel
+from controllers.monitor import Monitor, MonitorModel
 from controllers.policy import TRAINED, load_policy
 from controllers.policy_files import WEIGHTS_FILE, read_contract
 from epv_env.common.command_line import COUNT, SECONDS, NextStep, beside, plant_option, writable_folder
@@ -79,9 +79,14 @@ def run(options: argparse.Namespace) -> None:
     check_free(options.folder)
     compiler = compiled.find_compiler(options.compiler)
     export = prepared(Path(options.what), load_plant(options.plant))
+    if options.monitor is not None and export.period != Monitor.period:
+        raise ExportError(
+            f"{options.what} decides each {1e3 * export.period:g} ms, but a monitor counts periods of "
+            f"{1e3 * Monitor.period:g} ms: export it without --monitor"
+        )
     files, report = verified(export, compiler, options.episodes, options.duration)
     if options.monitor is not None:
-        files |= monitor_c.sources(MonitorModel.load(options.monitor), export.period)
+        files |= monitor_c.sources(MonitorModel.load(options.monitor))
     contract = deployment_contract(export)
     files["contract.json"] = json.dumps(contract, indent=1) + "\n"
     files["report.json"] = json.dumps(report, indent=1) + "\n"

@@ -25,7 +25,7 @@ from epv_env.common.command_line import (
 )
 from epv_env.common.units import BAR
 from epv_env.plant.plantfile import load_plant
-from identification.recordings.log_files import Log, read_log
+from identification.recordings.log_files import PERIOD_TOLERANCE, Log, read_log
 from training.evaluation.plots import save_figure
 from training.monitoring import made
 
@@ -56,12 +56,17 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Write the monitor and its picture, and say what it found. Raises ValueError."""
     log = read_log(options.log)
+    if abs(log.period / Monitor.period - 1.0) > PERIOD_TOLERANCE:
+        raise ValueError(
+            f"{options.log} has a row each {1e3 * log.period:g} ms: give a log of a control period of "
+            f"{1e3 * Monitor.period:g} ms, in which the monitor counts"
+        )
     if options.model is None:
         model = made(load_plant(options.plant), valves=options.valves, seed=options.seed)
         model.save(options.out / MODEL)
     else:
         model = MonitorModel.load(options.model)
-    monitor = Monitor(model, false_alarms_per_hour=options.false_alarms, control_period=log.period)
+    monitor = Monitor(model, false_alarms_per_hour=options.false_alarms)
     ends = follow(monitor, log)
     save_figure(picture(monitor, ends), options.out / FIGURE)
     print(sentence(monitor))

@@ -20,8 +20,8 @@ CONSTANTS = {
 }  # fmt: skip
 
 
-def sources(model: MonitorModel, control_period: float) -> dict[str, str]:
-    """The files by name; control_period: [s]."""
+def sources(model: MonitorModel) -> dict[str, str]:
+    """The files by name."""
     shifts, weights, later, names = Monitor(model).hypotheses()
     effects = list(dict.fromkeys(names))
     arrays = {
@@ -33,7 +33,7 @@ def sources(model: MonitorModel, control_period: float) -> dict[str, str]:
     numbers = {
         "conditions": len(CONDITIONS), "kink_count": len(monitor.KINKS),
         "terms": model.expected.shape[1], "features": len(FEATURES),
-        "count": len(shifts), "causes": len(effects), "period": control_period,
+        "count": len(shifts), "causes": len(effects), "period": Monitor.period,
         "rows": monitor.BEFORE + monitor.LONGEST + monitor.AFTER,
     }  # fmt: skip
     values = {name: braced(array.tolist()) for name, array in arrays.items()}
