@@ -142,10 +142,12 @@ def polynomial(conditions: NDArray, centre: NDArray, scale: NDArray) -> NDArray:
 
 
 def features(rows: NDArray) -> tuple[NDArray, NDArray] | None:
-    """Conditions and features of one opening; None where it does not open or was not at rest.
+    """Conditions and features of one opening; None without all readings, rest before, or an opening.
 
     rows: (BEFORE + periods off + AFTER, 6) with coil, U [V], p1, p2, p3 [bar] and I [A].
     """
+    if not (np.all(np.isfinite(rows)) and np.all(rows[:, 1] > 0.0)):
+        return None
     U, p1, p2, p3, I = rows[:, 1:].T  # noqa: E741
     i, j = BEFORE, len(rows) - AFTER
     voltage, supply = U[i - 1], p1[:i].sum() / i

@@ -59,7 +59,9 @@ class Fleet:
         """One drive of every valve with these parameters; which monitors have given an alarm in it."""
         seeds = self.rng.integers(2**32, size=len(self.monitors)).tolist()
         voltage = self.rng.uniform(*VOLTAGES)
-        readings = drives(self.plant, self.controller, seeds, parameters, voltage=voltage)
+        readings = drives(
+            self.plant, self.controller, seeds, {"parameters": list(parameters)}, voltage=voltage
+        )
         return [alarm_in(monitor, drive) for monitor, drive in zip(self.monitors, readings, strict=True)]
 
 
