@@ -98,7 +98,7 @@ def test_an_opening_is_read_as_it_was() -> None:
     for row in zip(coil, *np.broadcast_arrays(24.0, 11.0, p2, p3, 0.48), strict=True):
         found += [opening for opening in [reader.update(row)] if opening is not None]
     ((conditions, z),) = found
-    values = dict(zip(FEATURES, z, strict=True)) | dict(zip(CONDITIONS, conditions, strict=True))
+    values: dict[str, float] = dict(zip((*FEATURES, *CONDITIONS), [*z, *conditions], strict=True))
     opens = 10.0 + RISE / 0.1  # periods after the command
     expected = {
         "I_on": 0.02, "p3_rest": 0.0, "p3_off_1": np.log(0.9), "p3_vents_late": 4 * np.log(0.9),
