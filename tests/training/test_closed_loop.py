@@ -74,7 +74,7 @@ def test_nothing_is_claimed_without_an_effect():
 def test_only_drives_in_which_the_cause_acts_count(monkeypatch):
     monkeypatch.setattr(closed_loop, "REPEATS", 2)
     loop = ClosedLoop(logged(PLANT), PLANT, POLICY)
-    kept = SimpleNamespace(labels=("lag",), titles=("lag of p2",))
+    kept = SimpleNamespace(labels=("lag",), title="lag of p2")
     found: Any = SimpleNamespace(onset=("drive-1.csv", 0.99), kept=kept)
     (section,) = loop.sections(found, with_effect(tau_p2=0.02))
     table: Any = section.blocks[0]
