@@ -32,7 +32,7 @@ from identification.valve_gap.rounds import Bench, Round, certain, rounds
 
 FOLDER = Path(__file__).parent
 SEED = 4901
-TRIALS, MOST = 12, 2
+TRIALS, MOST = 16, 2
 WAYS = ("proposed", "random")
 FIRST = ("test1", "test2", "validation")
 """Programmes of the first campaign; the last is held out."""
