@@ -13,11 +13,8 @@ from controllers.policy import TRAINED
 from epv_env.common.command_line import NextStep, add_out, add_plant, add_seed
 from epv_env.common.files import decoded
 from epv_env.plant.plantfile import load_plant
-from identification.commands.gap import say
 from identification.gap.gap_json import GAP
 from identification.recordings.log_files import read_log
-from identification.valve_gap import operation
-from identification.valve_gap.diagnose import REPORT
 from training.closed_loop import ClosedLoop
 from training.evaluation.named import HELP, named_controllers
 
@@ -39,10 +36,15 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Diagnose the log, and compare its controller's figures. Raises ValueError."""
+    # Imported here: with the extra `identification`, which the other commands do without.
+    from identification.commands.gap import say
+    from identification.valve_gap.diagnose import REPORT
+    from identification.valve_gap.operation import diagnose_log
+
     given = load_plant(options.plant)
     named, _ = named_controllers([options.controller], given)
     loop = ClosedLoop(read_log(options.log), given, next(iter(named.values())))
-    found = operation.diagnose_log(
+    found = diagnose_log(
         options.log, options.out, plant=options.plant, without=options.without, seed=options.seed,
         more=loop.sections,
     )  # fmt: skip
@@ -52,5 +54,7 @@ def run(options: argparse.Namespace) -> None:
 
 def next_step(options: argparse.Namespace) -> NextStep:
     """What the verdict in the folder of results asks for."""
+    from identification.valve_gap.operation import next_step as after
+
     verdict = decoded(options.out / GAP, remedy="diagnose again")["verdict"]
-    return operation.next_step(verdict, options.log, options.out, options.plant)
+    return after(verdict, options.log, options.out, options.plant)
