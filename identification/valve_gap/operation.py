@@ -148,8 +148,11 @@ class LoggedValve(Valve):
         """campaign, steady: of `steady_openings`. See `Valve`."""
         super().__init__(campaign, plant, without=without, offsets=CONSUMPTION)
         for run in self.runs:
+            p2 = run.trusted[OUTPUTS.index("p2")]
+            # The controller opens the valve because this reading is low, by noise as often as not.
+            p2[np.flatnonzero(np.diff(run.inputs["U"]) < 0.0) + 1] = False
             if run.name not in steady:  # p2 then follows from a consumption that nobody knows
-                run.trusted[OUTPUTS.index("p2")] = False
+                p2[:] = False
         self.screened = tuple(_in_drive(finding, campaign) for finding in self.screened)
         self.drives = list(dict.fromkeys(drive_of(r.name) for r in campaign.recordings))
         self.acting = np.ones(len(self.recordings), dtype=bool)

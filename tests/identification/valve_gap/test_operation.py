@@ -90,6 +90,15 @@ def test_a_cause_acts_from_its_drive_on(healthy):
         assert np.any(both != without)
 
 
+def test_the_reading_on_which_the_controller_opens_does_not_count(healthy):
+    campaign, steady = steady_openings(read_log(healthy), PLANT)
+    for run in LoggedValve(campaign, PLANT, steady).runs:
+        opens = np.flatnonzero(np.diff(run.inputs["U"]) < 0.0) + 1
+        doubted = np.zeros(len(run.time), dtype=bool)
+        doubted[opens] = True
+        assert np.all(run.trusted[0] == (~doubted if run.name in steady else False))
+
+
 @pytest.mark.slow
 def test_cause_and_onset_are_found(tmp_path):
     eddy = {"eddy_current": {"G_eddy": 0.004}}

@@ -1,0 +1,183 @@
+"""How well logs of a control unit tell causes: simulated valves whose effects deviate from the laws.
+
+    python -m docs.studies.logs.study
+
+drives valves with and without an effect by the package's policy, and diagnoses their logs. valves.jsonl
+keeps each answer; logs and finished fits are in runs/logs.
+"""
+
+import shutil
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numba
+import numpy as np
+from numpy.typing import ArrayLike
+
+import epv_env  # noqa: F401 - registers the environments
+from controllers.policy import load_policy
+from docs.studies.common import PAGE, fill, study_options, study_parser, table
+from epv_env.common.command_line import COUNT, fail_clearly
+from epv_env.common.files import Journal
+from epv_env.operation_log import OperationLog
+from epv_env.plant.effects.registry import EFFECTS
+from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at
+from epv_env.plant.plantfile import Plant
+from epv_env.plant.region import CALIBRATED_SYMBOLS
+from epv_env.plant.valves import Valves
+from identification.blind.forms import deviating_sizes
+from identification.blind.score import named_cause, named_set
+from identification.gap.gap_json import as_json
+from identification.gap.verdict import NO_GAP
+from identification.recordings.log_files import read_log
+from identification.recordings.openings import drive_of, openings
+from identification.valve_gap.operation import diagnose_log
+
+FOLDER = Path(__file__).parent
+SEED = 4931
+VALVES, WITHOUT = 100, 5
+"""Valves; every fifth has no effect."""
+DRIVES, QUICK, PERIODS = 10, 2, 6000
+"""Drives of a valve, the same under --quick, and control periods of a drive: five minutes in all."""
+SPREAD, SIZES, DEVIATIONS = (0.94, 1.06), (1.0, 2.0), (0.2, 0.5)
+"""Ranges of the calibrated parameters, as shares of the report's; of an effect's size, in sizes from
+which a fit begins; and of the deviation of its law [1]."""
+PARTS = 5
+"""Parts of a control period, in each of which a deviating size is held."""
+
+
+def drawn(number: int, drives: int = DRIVES) -> dict[str, Any]:
+    """A valve: parameters, label and sizes of its effect, deviation, first drive with it, and seeds."""
+    rng = np.random.default_rng([SEED, number])
+    p = Plant.calibrated().parameters
+    parameters = {s: p[s] * rng.uniform(*SPREAD) for s in CALIBRATED_SYMBOLS}
+    valve = {"parameters": parameters, "seeds": rng.integers(2**32, size=drives).tolist()}
+    if number % WITHOUT == 0:
+        return valve | {"cause": "", "label": "", "effects": {}, "deviation": 0.0, "onset": 0}
+    effect = EFFECTS[int(rng.integers(len(EFFECTS)))]
+    variant = str(rng.choice(list(effect.fitted)))
+    factor, deviation = rng.uniform(*SIZES), rng.uniform(*DEVIATIONS)
+    sizes = {
+        s.symbol: s.trials[0] * (1 / factor if s.stronger_when_smaller else factor)
+        for s in effect.fitted[variant]
+    }
+    label = f"{effect.name} ({variant})" if variant else effect.name
+    onset = int(rng.integers(drives // 2 + 1))  # the effect acts for half of the time at least
+    own = {"cause": effect.name, "label": label, "effects": {effect.name: sizes}}
+    return valve | own | {"deviation": deviation, "onset": onset}
+
+
+def write_log(valve: dict[str, Any], folder: Path) -> None:
+    """Drive a valve and log it."""
+    plant, policy = Plant.calibrated(), load_policy()
+    plant = replace(plant, parameters=plant.parameters.replace(**valve["parameters"]))
+    made = gymnasium.make("EPValve-v0", plant=plant, scenario="mixed", max_episode_steps=PERIODS)
+    env = OperationLog(made, folder)
+    for number, seed in enumerate(valve["seeds"]):
+        effects = valve["effects"] if number >= valve["onset"] else {}
+        observation, _ = env.reset(seed=seed, options={"effects": effects})
+        deviate(env.valve.task.valves, valve["deviation"])
+        policy.reset(1)
+        over = False
+        while not over:
+            action = int(policy.act(observation[None])[0])
+            observation, _, failed, out_of_time, _ = env.step(action)
+            over = failed or out_of_time
+    env.close()
+
+
+def deviate(valves: Valves, deviation: float) -> None:
+    """Have the sizes of a valve's effects depend on its state, as in identification/blind/forms.py."""
+    tables = valves.tables
+    fitted = tables.effects.copy()
+
+    def in_parts(duration: ArrayLike) -> None:
+        inputs = np.array(valves.inputs)
+        for _ in range(PARTS):
+            set_sizes(tables.state, inputs, tables.coefficients, tables.effects, fitted, deviation)
+            Valves.advance(valves, np.asarray(duration) / PARTS)
+
+    valves.advance = in_parts
+
+
+@numba.njit
+def set_sizes(state, inputs, coefficients, effects, fitted, d):
+    """Write the sizes at a valve's state into its table `effects`."""
+    q, u = state_at(state, 0, 0), inputs_at(inputs, 0, 0)
+    sizes = deviating_sizes(q, u, coefficients_at(coefficients, 0, 0), effects_at(fitted, 0, 0), d)
+    for row in range(len(sizes)):
+        effects[row, 0] = sizes[row]
+
+
+def answer(valve: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """What the diagnosis says of a valve's log, and whether that is right."""
+    log, driven = folder / "log", folder / "driven"
+    if not driven.exists():
+        shutil.rmtree(log, ignore_errors=True)
+        write_log(valve, log)
+        driven.touch()
+    return judged(valve, log, as_json(diagnose_log(log, folder / "out", report=False)))
+
+
+def judged(valve: dict[str, Any], log: Path, found: dict[str, Any]) -> dict[str, Any]:
+    """The content of gap.json beside the truth; log: the folder, for the drives that have openings."""
+    compared, _ = openings(read_log(log), Plant.calibrated().parameters)
+    drives = [int(drive_of(each.name)[len("drive-") : -len(".csv")]) for each in compared.recordings]
+    first = next((drive for drive in drives if drive > valve["onset"]), 0)
+    onset = found["onset"]["drive"] if found["onset"] else f"drive-{drives[0]}.csv"
+    true, named = (valve["cause"],), named_cause(found)
+    return {
+        "label": valve["label"],
+        "verdict": found["verdict"],
+        "named": named,
+        "told": valve["label"] not in found["absorbed"],
+        "listed": [true] == [tuple(cause["effects"]) for cause in found["causes"][:1]],
+        "right": named == true,
+        "in_set": true in named_set(found),
+        "onset": onset == f"drive-{first}.csv",
+    }
+
+
+def rows(answers: Sequence[dict[str, Any]]) -> list[list[str]]:
+    """Counts for the page's table."""
+    struck = [each for each in answers if each["label"]]
+    healthy = [each["verdict"] != NO_GAP for each in answers if not each["label"]]
+    told = [each for each in struck if each["told"]]
+    named = [each for each in told if each["named"]]
+    right = [each for each in named if each["right"]]
+    return [
+        ["Valves, each driven for five minutes", f"{len(answers)}"],
+        ["False alarms, of valves without an effect", f"{sum(healthy)} of {len(healthy)}"],
+        ["Effects that logs cannot tell", f"{len(struck) - len(told)} of {len(struck)}"],
+        ["Most probable cause right, of effects that can be told, whatever the verdict",
+         f"{sum(each['listed'] for each in told)} of {len(told)}"],
+        ["A cause named, of effects that can be told", f"{len(named)} of {len(told)}"],
+        ["Named cause right, of effects that can be told", f"{len(right)} of {len(told)}"],
+        ["Named cause right, of those named", f"{len(right)} of {len(named)}"],
+        ["Truth in the set, of those named", f"{sum(e['in_set'] for e in named)} of {len(named)}"],
+        ["First drive right, where the cause is", f"{sum(e['onset'] for e in right)} of {len(right)}"],
+    ]  # fmt: skip
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the study; returns the exit status."""
+    parser = study_parser(__doc__ or "", FOLDER)
+    parser.add_argument("--valves", type=COUNT, default=VALVES)
+    options = study_options(parser, arguments)
+    numbers, drives = ([2], QUICK) if options.quick else (range(options.valves), DRIVES)
+    journal = Journal(options.out / "valves.jsonl", {"seed": SEED, "drives": drives})
+    for number in numbers:
+        if str(number) not in journal:
+            journal.add(str(number), answer(drawn(number, drives), options.work / str(number)))
+            print(number, journal[str(number)], flush=True)
+    answers = [journal[str(number)] for number in numbers]
+    fill(options.out / PAGE, {"figures": table(["", "Number"], rows(answers))})
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(fail_clearly(main))
