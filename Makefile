@@ -20,10 +20,11 @@ help: ## list the targets
 venv: $(VENV)/.installed ## create .venv with the pinned packages and this project
 
 # An environment whose installation was interrupted has no stamp and is made anew.
+# Python compiles what it imports; to compile all packages takes as long as to install them.
 $(VENV)/.locked: requirements.lock
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or later is needed")'
 	$(PYTHON) -m venv --clear $(VENV)
-	$(PY) -m pip install -r requirements.lock
+	$(PY) -m pip install --no-compile -r requirements.lock
 	@touch $@
 
 $(VENV)/.installed: $(VENV)/.locked pyproject.toml
@@ -33,7 +34,7 @@ $(VENV)/.installed: $(VENV)/.locked pyproject.toml
 $(OLDEST)/.locked: requirements-oldest.lock
 	@$(PYTHON_OLDEST) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11) and "Python 3.11 is needed: set PYTHON_OLDEST")'
 	$(PYTHON_OLDEST) -m venv --clear $(OLDEST)
-	$(OLDEST)/bin/python -m pip install -r requirements-oldest.lock
+	$(OLDEST)/bin/python -m pip install --no-compile -r requirements-oldest.lock
 	@touch $@
 
 $(OLDEST)/.installed: $(OLDEST)/.locked pyproject.toml
