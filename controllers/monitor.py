@@ -146,7 +146,7 @@ def features(rows: NDArray) -> tuple[NDArray, NDArray] | None:
 
     rows: (BEFORE + periods off + AFTER, 6) with coil, U [V], p1, p2, p3 [bar] and I [A].
     """
-    if not (np.all(np.isfinite(rows)) and np.all(rows[:, 1] > 0.0)):
+    if not (np.all(np.isfinite(rows)) and rows[BEFORE - 1, 1] > 0.0):
         return None
     U, p1, p2, p3, I = rows[:, 1:].T  # noqa: E741
     i, j = BEFORE, len(rows) - AFTER

@@ -5,6 +5,7 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import gymnasium
 import numpy as np
 import pytest
 
@@ -19,7 +20,10 @@ from controllers.monitor import (
     MonitorModel,
     OpeningReader,
 )
+from epv_env.operation_log import OperationLog
 from epv_env.plant.plantfile import Plant
+from identification.recordings.log_files import read_log
+from training.commands.monitor import follow
 from training.deploy.monitor_c import sources
 from training.monitoring import drives
 
@@ -118,6 +122,21 @@ def test_an_opening_without_a_known_beginning_does_not_count(lengths, pause) -> 
         assert reader.update((coil, 24.0, 11.0, 8.0 + 0.1 * number, 11.0, 0.5)) is None
 
 
+def test_the_log_of_a_drive_has_openings(tmp_path) -> None:
+    """A log gives the coil's voltage, which is 0 while the coil is off."""
+    controller = Hysteresis(open_below=-0.3, shut_above=0.0)
+    env = OperationLog(gymnasium.make("EPValve-v0", max_episode_steps=2000), tmp_path / "log")
+    observation, _ = env.reset(seed=3)
+    controller.reset(1)
+    over = False
+    while not over:
+        observation, _, _, over, _ = env.step(int(controller.act(observation[None])[0]))
+    env.close()
+    monitor = Monitor(white_model())
+    follow(monitor, read_log(tmp_path / "log"))
+    assert len(monitor.history) >= 3
+
+
 @pytest.mark.parametrize(("channel", "value"), [(4, np.nan), (2, np.inf), (1, 0.0)])
 def test_an_opening_with_a_missing_reading_does_not_count(channel, value) -> None:
     plant = Plant.calibrated()
@@ -134,6 +153,7 @@ def test_c_code_says_what_python_says(tmp_path: Path) -> None:
     plant = Plant.calibrated()
     controller = Hysteresis(open_below=-0.3, shut_above=0.0)
     drive = drives(plant, controller, [3], {}, duration=10.0)[0]
+    drive[:, 1] *= drive[:, 0]  # as logs have it: no voltage while the coil is off
     model, monitor = white_model(), Monitor(white_model())
     for name, text in sources(model).items():
         (tmp_path / name).write_text(text)

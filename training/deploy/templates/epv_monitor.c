@@ -38,10 +38,8 @@ static int features(const double (*r)[6], int rows, double *x, double *z) {
     const int i = I0, j = rows - $after, n = i + $shut;
     double supply = 0, rest = 0, slope = 0, mean = 0, level = 0, low = r[i][4], high = low, rise[LENGTH];
     int at;
-    for (int k = 0; k < rows; k++) {
-        for (int l = 0; l < 6; l++) if (!isfinite(r[k][l])) return 0;
-        if (r[k][1] <= 0.0) return 0;
-    }
+    for (int k = 0; k < rows; k++) for (int l = 0; l < 6; l++) if (!isfinite(r[k][l])) return 0;
+    if (r[i - 1][1] <= 0.0) return 0;
     for (int k = 0; k < i; k++) supply += r[k][2] / i;
     for (int k = i - 4; k <= i; k++) rest += r[k][4] / 5;
     for (int k = i - 4; k <= i; k++) low = least(low, r[k][4]), high = most(high, r[k][4]);
