@@ -125,11 +125,6 @@ class _File(msgspec.Struct):
     shifts: list[list[list[float]]]
 
 
-def terms(model: MonitorModel, conditions: NDArray) -> NDArray:
-    """Terms (openings, TERMS) on which features depend, or (TERMS,): of conditions, as `polynomial`."""
-    return polynomial(conditions, model.centre, model.scale)
-
-
 def polynomial(conditions: NDArray, centre: NDArray, scale: NDArray) -> NDArray:
     """1, scaled conditions, products of the first QUADRATIC, and what `open` exceeds the KINKS by.
 
@@ -302,10 +297,16 @@ class Monitor:
         if found is not None:
             self.observe(*found)
 
+    def follow(self, rows: NDArray) -> None:
+        """Take in a drive (periods, 6): coil, U [V], p1, p2, p3 [bar] and I [A]; a pause precedes it."""
+        self.pause()
+        for row in rows.tolist():
+            self.update(*row)
+
     def observe(self, conditions: NDArray, z: NDArray) -> None:
         """Take in one opening: conditions (conditions,) and features (features,)."""
         model, spread = self.model, 1.0 + self._variance
-        x = terms(model, conditions)
+        x = polynomial(conditions, model.centre, model.scale)
         limit = CLIPPED * np.sqrt(spread)
         found = model.whiten @ z - model.expected @ x - self._mean
         shift = self._shifts @ x[:LINEAR] - self._learnt

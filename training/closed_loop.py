@@ -23,7 +23,7 @@ from epv_env.plant.supply import Supply
 from epv_env.reward import BAND_BAR
 from epv_env.signals import MovingTarget, RecordedConsumption
 from identification.gap.diagnosis import Diagnosis
-from identification.recordings.log_files import PERIOD_TOLERANCE, Drive, Log
+from identification.recordings.log_files import Drive, Log
 from identification.report.page import Section, Table, Verdict
 from training.monitoring import drives
 
@@ -192,14 +192,10 @@ class ClosedLoop:
 
     def __post_init__(self) -> None:
         """Simulate as given. Raises ValueError for another kind of controller, or as `simulated`."""
-        name, decides = self.controller.name, OnOff.default_period
+        name = self.controller.name
         if self.controller.environment != "EPValve-v0" or isinstance(self.controller, Privileged):
             raise ValueError(f"{name!r} cannot have written a log: give a controller for EPValve-v0")
-        if abs(self.log.period / decides - 1.0) > PERIOD_TOLERANCE:
-            raise ValueError(
-                f"the log has a row each {1e3 * self.log.period:g} ms, but {name!r} decides each "
-                f"{1e3 * decides:g} ms: give a log of that control period"
-            )
+        self.log.check_period(OnOff.default_period, f"{name!r} decides each")
         for drive in self.log.drives:
             if len(drive.coil) * self.log.period < SHORTEST:
                 raise ValueError(

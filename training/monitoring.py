@@ -14,7 +14,6 @@ from controllers.monitor import (
     MonitorModel,
     OpeningReader,
     polynomial,
-    terms,
 )
 from controllers.tuned import tuned
 from epv_env.observation import decode
@@ -84,7 +83,7 @@ def drives(
         p2 = decode(observation, "target") + decode(observation, "p2_error")
         read = [decode(observation, name) for name in ("p1", "p3", "I")]
         found[:, k, 0], found[:, k, 2:] = action, np.stack([read[0], p2, read[1], read[2]], axis=-1)
-        observation = env.task.step(*env.action.decode(action)).observation
+        observation = env.advance(action).observation
     return found
 
 
@@ -97,7 +96,9 @@ def openings(drive: NDArray) -> Iterator[tuple[NDArray, NDArray]]:
             yield found
 
 
-def made(plant: Plant, *, valves: int = 48, seed: int = 0, progress: Callable = print) -> MonitorModel:
+def monitor_model(
+    plant: Plant, *, valves: int = 48, seed: int = 0, progress: Callable = print
+) -> MonitorModel:
     """The model of a monitor for a plant, from simulated drives of valves of its region."""
     rng = np.random.default_rng(seed)
     drawn = [plant.region.draw(rng) if plant.region.varies else plant.parameters for _ in range(valves)]
@@ -206,7 +207,7 @@ def _levels(x: NDArray, data: Openings, keep: NDArray) -> tuple[NDArray, NDArray
 
 def _regressed(model: MonitorModel, data: Openings) -> NDArray:
     """Mean departures from the nominal plant by the linear terms, (features, LINEAR)."""
-    x = terms(model, data.conditions)
+    x = polynomial(data.conditions, model.centre, model.scale)
     departure = data.features @ model.whiten.T - x @ model.expected.T
     departure = np.clip(departure, *np.percentile(departure, [1.0, 99.0], axis=0))
     return np.linalg.lstsq(x[:, :LINEAR], departure, rcond=None)[0].T

@@ -53,6 +53,14 @@ class Log:
     """Control period [s]."""
     drives: tuple[Drive, ...]
 
+    def check_period(self, period: float, needs: str) -> None:
+        """Raises CampaignError for another control period [s]. needs: words before it in the error."""
+        if abs(self.period / period - 1.0) > PERIOD_TOLERANCE:
+            raise CampaignError(
+                f"{self.name} has a row each {1e3 * self.period:g} ms, but {needs} {1e3 * period:g} ms: "
+                "give a log of that control period"
+            )
+
 
 class _Environment(msgspec.Struct):
     temperature_K: float

@@ -178,5 +178,10 @@ def test_a_device_that_is_not_there_is_refused():
         made("ordinary", "tpu")
 
 
+def test_an_option_of_the_device_is_refused_on_the_cpu():
+    with pytest.raises(OptionError, match="precision is an option of device"):
+        gymnasium.make_vec("EPValve-v0", num_envs=2, precision="single")
+
+
 if __name__ == "__main__":
     np.savez(sys.argv[3], **rollout(*sys.argv[1:3]))  # type: ignore[arg-type]

@@ -25,9 +25,9 @@ from epv_env.common.command_line import (
 )
 from epv_env.common.units import BAR
 from epv_env.plant.plantfile import load_plant
-from identification.recordings.log_files import PERIOD_TOLERANCE, Log, read_log
+from identification.recordings.log_files import Log, read_log
 from training.evaluation.plots import save_figure
-from training.monitoring import made
+from training.monitoring import monitor_model
 
 MODEL, FIGURE = "monitor.json", "monitor.png"
 """What is written."""
@@ -56,13 +56,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Write the monitor and its picture, and say what it found. Raises ValueError."""
     log = read_log(options.log)
-    if abs(log.period / Monitor.period - 1.0) > PERIOD_TOLERANCE:
-        raise ValueError(
-            f"{options.log} has a row each {1e3 * log.period:g} ms: give a log of a control period of "
-            f"{1e3 * Monitor.period:g} ms, in which the monitor counts"
-        )
+    log.check_period(Monitor.period, "the monitor counts periods of")
     if options.model is None:
-        model = made(load_plant(options.plant), valves=options.valves, seed=options.seed)
+        model = monitor_model(load_plant(options.plant), valves=options.valves, seed=options.seed)
         model.save(options.out / MODEL)
     else:
         model = MonitorModel.load(options.model)
@@ -90,10 +86,8 @@ def follow(monitor: Monitor, log: Log) -> list[float]:
     """Feed the drives in order; returns the time at each one's end [s]."""
     ends = []
     for drive in log.drives:
-        monitor.pause()
         pressures = [each / BAR for each in (drive.p1, drive.p2, drive.p3)]
-        for row in np.column_stack([drive.coil, drive.U, *pressures, drive.I]).tolist():
-            monitor.update(*row)
+        monitor.follow(np.column_stack([drive.coil, drive.U, *pressures, drive.I]))
         ends.append(monitor.time)
     return ends
 

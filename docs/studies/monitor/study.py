@@ -26,7 +26,7 @@ from epv_env.common.results_folder import progress
 from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import load_plant
-from training.monitoring import DRIVE, drives, made
+from training.monitoring import DRIVE, drives, monitor_model
 
 FOLDER = Path(__file__).parent
 SEED = 4977
@@ -67,10 +67,8 @@ class Fleet:
 
 def alarm_in(monitor: Monitor, drive: np.ndarray) -> bool:
     """Whether the monitor gives an alarm in a drive (periods, 6)."""
-    monitor.pause()
     begun = monitor.time
-    for row in drive.tolist():
-        monitor.update(*row)
+    monitor.follow(drive)
     return any(log_odds > 0.0 for time, log_odds in monitor.history if time > begun)
 
 
@@ -166,7 +164,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     runs, count = (1, 1) if options.quick else (RUNS, DRIVES)
     path = options.work / "monitor.json"
     if not path.exists():
-        made(load_plant(None)).save(path)
+        monitor_model(load_plant(None)).save(path)
     subject = {"seed": SEED, "valves": VALVES, "quick": options.quick}
     journal = Journal(options.out / "results.jsonl", subject)
     missing = {
