@@ -129,7 +129,8 @@ def monitor_model(
 def _cases(p: Parameters) -> Iterator[tuple]:
     """Effect, label and parameters of each variant, trial and sign at medium size."""
     for effect in EFFECTS:
-        for sizes in effect.fitted.values():
+        for fitted in effect.fitted.values():
+            sizes = [size for size in fitted if size.trials]
             for k in range(max(len(size.trials) for size in sizes)):
                 values = {
                     s.symbol: min(

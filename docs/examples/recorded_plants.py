@@ -205,7 +205,7 @@ def command(title: str, name: str, plant_of: Callable[[Path], OdePlant]) -> int:
 def held_out_errors(diagnosis: Diagnosis) -> str:
     """Root mean square errors on recordings never fitted to, of all channels together, in a sentence."""
     ranking, plant = diagnosis.ranking, diagnosis.ranking.problem.plant
-    models = {"nominal": diagnosis.nominal, "recalibrated": ranking.recalibrated.estimate}
+    models = {"nominal": diagnosis.nominal.estimate, "recalibrated": ranking.recalibrated.estimate}
     if diagnosis.best:
         models[" + ".join(diagnosis.best.effects)] = diagnosis.best.hypothesis.estimate
     noise = np.array([channel.known_noise / channel.scale for channel in plant.channels])[:, None]

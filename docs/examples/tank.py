@@ -8,7 +8,7 @@ nominal model has neither leak nor evaporation, and a sensor without lag.
 
 import argparse
 import sys
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from pathlib import Path
 
@@ -213,9 +213,6 @@ class Tank:
         """`GreyBox.forced`."""
         (acting,) = forcing.values()
         return (self._read(values, run, acting) - self._read(values, run))[None]
-
-    def contribution(self, values: Mapping[str, NDArray], symbols: Collection[str], run: int) -> None:
-        """`GreyBox.contribution`: left to the change of the readings."""
 
     def _read(self, values: Mapping[str, NDArray], run: int, forcing: NDArray | None = None) -> NDArray:
         """Readings (samples, n) of the level in a run."""

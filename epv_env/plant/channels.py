@@ -123,7 +123,8 @@ P1 = MeasuredChannel(
     sensor=Sensor(low=1.0, high=16.0, accuracy=0.016, noise=0.0068, offset=0.000909, trend=7.9e-5),
     columns=("p1_bar", "p1a_bar", "p1b_bar"),
     decimals=5,
-    reading=lambda state, p: state.p1,
+    reading=lambda state, p: state.p1 * (1.0 + p["g_p1"]),
+    symbols=("g_p1",),
     observed=True,
 )
 """Input chamber pressure, absolute."""
@@ -135,8 +136,8 @@ P2 = MeasuredChannel(
     sensor=Sensor(low=1.0, high=16.0, accuracy=0.016, noise=0.0098, offset=-0.00728, trend=-1.16e-4),
     columns=("p2_bar",),
     decimals=5,
-    reading=lambda state, p: state.p2 + state.lag_2 + p["b_p2"],
-    symbols=("b_p2",),
+    reading=lambda state, p: (state.p2 + state.lag_2) * (1.0 + p["g_p2"]) + p["b_p2"],
+    symbols=("b_p2", "g_p2"),
     observed=True,
     output=True,
 )
@@ -149,8 +150,8 @@ P3 = MeasuredChannel(
     sensor=Sensor(low=1.0, high=16.0, accuracy=0.016, noise=0.0075, offset=-0.003112, trend=-8.2e-5),
     columns=("p3_bar",),
     decimals=5,
-    reading=lambda state, p: state.p3 + state.lag_3 + p["b_p3"],
-    symbols=("b_p3",),
+    reading=lambda state, p: (state.p3 + state.lag_3) * (1.0 + p["g_p3"]) + p["b_p3"],
+    symbols=("b_p3", "g_p3"),
     observed=True,
     output=True,
 )

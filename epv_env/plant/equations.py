@@ -20,9 +20,9 @@ from epv_env.plant.effects.friction import (
     stop_friction,
     stribeck,
 )
-from epv_env.plant.effects.learnt import learnt_value
 from epv_env.plant.effects.magnet import saturated_force, saturation_level
 from epv_env.plant.effects.measurement import lag_rate
+from epv_env.plant.effects.registry import with_laws
 from epv_env.plant.effects.seats import opened
 from epv_env.plant.primitives import QUARTER_PI, Value, inlined, mass_flux, replacing
 
@@ -166,18 +166,6 @@ class Coefficients(NamedTuple):
 
 
 _with_supply = replacing(State, "p1")
-_forced = replacing(Inputs, "U", "sigma_S", "air_3", "force_PV", "force_MV")
-
-
-@inlined
-def with_learnt(u, q, effects):
-    """The inputs with what a learnt term adds to the equations."""
-    term = learnt_value(q, u.U, effects)
-    return _forced(
-        u, u.U + effects.learnt_f7 * term, u.sigma_S - effects.learnt_f1 * term,
-        u.air_3 + effects.learnt_f2 * term, u.force_PV + effects.learnt_f4 * term,
-        u.force_MV + effects.learnt_f6 * term,
-    )  # fmt: skip
 
 
 @inlined
@@ -226,7 +214,7 @@ def armature_force(q, c, inverse_Rm, effects, extended):
     current, half = q.I, 0.5
     if extended:
         current = q.I + effects.I_rem
-        half = saturated_force(saturation_level(current, inverse_Rm, effects))
+        half = saturated_force(saturation_level(current, inverse_Rm, effects.force_saturation))
     flux_linkage = current * inverse_Rm
     magnetic = half * c.N_squared * flux_linkage * flux_linkage * c.gap_reluctance
     force = magnetic - c.cMV * (q.xMV + c.xMV0) - c.kMV * q.vMV
@@ -242,7 +230,7 @@ def current_rate(q, u, c, inverse_Rm, effects, extended):
     current, per_inductance = q.I, c.N_squared_inverse * reluctance(q, c)
     if extended:
         current = q.I + effects.I_rem
-        flattened = 1.0 + saturation_level(current, inverse_Rm, effects)
+        flattened = 1.0 + saturation_level(current, inverse_Rm, effects.saturation)
         per_inductance *= flattened * flattened
         linkage_rate = flux_rate(u.U, q.I, heated(c.R, q.coil_heat), effects)
     else:
@@ -329,7 +317,9 @@ def effect_rates(q, u, c, effects, through_PV, inlet, exhaust, leak):
         heat_3_rate,
         heat_2_rate,
         pipe_rate(pipe - u.sigma_S, p2_rate, c.RT_V2, effects),
-        supply_drop_rate(through_PV + inlet, q.p1, q.supply_drop, effects),
+        supply_drop_rate(
+            effects.supply_PV * through_PV + effects.supply_MV * inlet, q.p1, q.supply_drop, effects
+        ),
         lag_rate(q.lag_2, p2_rate, effects.lag_2_on, effects.lag_2_rate),
         lag_rate(q.lag_3, p3_rate, effects.lag_3_on, effects.lag_3_rate),
         current,
@@ -345,15 +335,16 @@ def derivative(q, u, c, effects, free_PV, free_MV, extended):
     free_PV, free_MV: 1.0 where the mover may move, 0.0 where a stop holds it. extended: a literal
     bool; False compiles the effects away. Returns (State of rates, piston force, armature force).
     """
-    supplied = u.U
+    feed_MV = q
     if extended:
-        q = _with_supply(q, q.p1 - q.supply_drop)
-        u = with_learnt(u, q, effects)
+        feed_MV = _with_supply(q, q.p1 - effects.supply_MV * q.supply_drop)
+        q = _with_supply(q, q.p1 - effects.supply_PV * q.supply_drop)
+        effects = with_laws(q, u.U, effects)
     force_PV = piston_force(q, c, effects, extended)
     inverse_Rm = reluctance_inverse(q, c)
-    force_MV = armature_force(q, c, inverse_Rm, effects, extended)
+    force_MV = armature_force(feed_MV, c, inverse_Rm, effects, extended)
     through_PV = flow_PV(q, c, effects, extended)
-    inlet = flow_inlet(q, c, effects, extended)
+    inlet = flow_inlet(feed_MV, c, effects, extended)
     exhaust = flow_exhaust(q, c, effects, extended)
     leak = flow_circuit_leak(q, c, effects, extended)
     moving_PV, moving_MV = force_PV, force_MV
@@ -384,7 +375,7 @@ def derivative(q, u, c, effects, free_PV, free_MV, extended):
         air_in_PV=through_PV,
         air_in_MV=inlet,
         air_vented=exhaust + leak,
-        coil_energy=supplied * current,
+        coil_energy=u.U * current,
         I_coil=0.0,
         coil_heat=coil_heat_rate,
         heat_3=heat_3_rate,

@@ -12,7 +12,7 @@ import numpy as np
 
 from epv_env.common.field_types import check_type
 from epv_env.common.units import BAR
-from epv_env.plant.effects import learnt
+from epv_env.plant.effects import law
 from epv_env.plant.effects.record import Size
 from epv_env.plant.effects.registry import EFFECTS
 
@@ -63,7 +63,7 @@ def _data() -> dict[str, Any]:
 
 @cache
 def table() -> Mapping[str, Parameter]:
-    """Every parameter by its symbol: the report's in order, then sizes of effects and learnt terms."""
+    """Every parameter by its symbol: the report's in order, then sizes of effects and laws."""
     rows = [
         Parameter(**{**row, **{name: tuple(row[name]) if row[name] else None for name in _RANGES}})
         for row in _data()["parameters"]
@@ -74,12 +74,12 @@ def table() -> Mapping[str, Parameter]:
         for size in effect.sizes
         if size.domain
     ]
-    rows += [_size_row("learnt term", size) for size in learnt.SIZES]
+    rows += [_size_row("law of an effect", size) for size in law.sizes(EFFECTS)]
     return MappingProxyType({row.symbol: row for row in rows})
 
 
 def _size_row(source: str, size: Size) -> Parameter:
-    """The row of a number that sizes an effect or a learnt term; 0, which is off, is its value."""
+    """The row of a number that sizes an effect or a law; 0, which is off, is its value."""
     return Parameter(
         symbol=size.symbol, unit=size.unit, value=0.0, domain=size.domain,
         possible=size.domain, group="unmodelled", sensitive=False, source=source,

@@ -12,8 +12,8 @@ import numpy as np
 from epv_env.common.field_types import check_type
 from epv_env.common.files import JSONFileError, checked, decoded, write_json
 from epv_env.plant.channels import SENSORS, Sensor, changed_fields, own_sensors
-from epv_env.plant.effects.learnt import SYMBOLS, LearntTerm
-from epv_env.plant.effects.registry import CATALOGUE
+from epv_env.plant.effects.law import SLOTS, SYMBOLS, Law, laws_of, placed
+from epv_env.plant.effects.registry import CATALOGUE, PLACES
 from epv_env.plant.force_balance import check_valve
 from epv_env.plant.free_parameters import FREE_PARAMETERS, Freedom, check_free
 from epv_env.plant.parameters import ParameterError, Parameters
@@ -54,8 +54,6 @@ class Plant:
     """The bench's sensor of each channel [bar absolute, A or V]."""
     free: Mapping[str, Freedom] = field(default_factory=lambda: FREE_PARAMETERS)
     """What a calibration may move, by symbol."""
-    learnt_term: LearntTerm | None = None
-    """What no effect explains, learnt from recordings; `parameters` holds it, too."""
 
     @classmethod
     def calibrated(cls) -> "Plant":
@@ -96,6 +94,7 @@ class _Values(msgspec.Struct, kw_only=True):
 
     parameters: Any
     effects: dict[str, dict[str, Any]] = {}
+    laws: list[Law] = []
     region: _RegionFields = msgspec.field(default_factory=_RegionFields)
     name: str = "unnamed"
 
@@ -114,7 +113,6 @@ class _PlantFile(_Values):
     sensors: dict[str, dict[str, float]] = {}
     free: dict[str, _FreeFields] | None = None
     alternatives: list[_AlternativeFields] = []
-    learnt_term: LearntTerm | None = None
     provenance: dict[str, Any] = {}
 
 
@@ -172,9 +170,6 @@ def save_plant(plant: Plant, path: str | PathLike[str]) -> None:
             | _written(each.region.centre, each.region)
             for each in plant.diagnosis.alternatives
         ]
-    if plant.learnt_term:
-        content["learnt_term"] = asdict(plant.learnt_term)
-        content["parameters"] = {s: v for s, v in content["parameters"].items() if s not in SYMBOLS}
     write_json(path, content)
 
 
@@ -184,7 +179,7 @@ def _written(parameters: Parameters, region: Region) -> dict[str, Any]:
         name: {symbol: parameters[symbol] for symbol in symbols} for name, symbols in CATALOGUE.items()
     }
     sizing = {symbol for symbols in CATALOGUE.values() for symbol in symbols}
-    sizing |= {symbol for symbol in SYMBOLS if not parameters[symbol]}
+    sizing |= set(SYMBOLS)
     uncertain: dict[str, Any] = {"boxes": {symbol: list(ends) for symbol, ends in region.boxes.items()}}
     if region.covariance is not None:
         uncertain["joint"] = {
@@ -195,6 +190,7 @@ def _written(parameters: Parameters, region: Region) -> dict[str, Any]:
     return {
         "parameters": {s: value for s, value in parameters.items() if s not in sizing},
         "effects": {name: sizes for name, sizes in effects.items() if any(sizes.values())},
+        "laws": [asdict(law) for law in laws_of(parameters, tuple(CATALOGUE))],
         "region": uncertain,
     }
 
@@ -203,8 +199,6 @@ def _plant(content: _PlantFile, place: str) -> Plant:
     """The plant that a file describes; place: how messages begin. Raises PlantFileError."""
     try:
         parameters = _parameters(content, content.domains)
-        if content.learnt_term:
-            parameters = parameters.replace(**content.learnt_term.parameters)
         sensors = own_sensors(content.sensors)
         if content.domains or content.sensors or content.voltage_V != VOLTAGE:
             check_valve(parameters, content.voltage_V, sensors)
@@ -217,7 +211,6 @@ def _plant(content: _PlantFile, place: str) -> Plant:
             voltage=content.voltage_V,
             sensors=sensors,
             free=_free(content, parameters),
-            learnt_term=content.learnt_term,
         )
     except ParameterError as error:
         raise PlantFileError(f"{place}: {error}") from None
@@ -256,7 +249,7 @@ def _alternative(given: _AlternativeFields, content: _PlantFile) -> Alternative:
 
 
 def _parameters(content: _Values, domains: Mapping[str, tuple[float, float]]) -> Parameters:
-    """All parameters, those of effects included; the report's where none are given.
+    """All parameters, those of effects and laws included; the report's where none are given.
 
     Raises ParameterError.
     """
@@ -269,6 +262,14 @@ def _parameters(content: _Values, domains: Mapping[str, tuple[float, float]]) ->
         if not set(sizes) <= set(CATALOGUE[name]):
             raise ParameterError(f"effect {name} is sized by {', '.join(CATALOGUE[name])} only")
         values |= sizes
+    if len(content.laws) > len(SLOTS):
+        raise ParameterError(f"laws has {len(content.laws)} entries: give at most {len(SLOTS)}")
+    for slot, law in zip(SLOTS, content.laws, strict=False):
+        if law.effect not in PLACES:
+            raise ParameterError(
+                f"law of unknown effect {law.effect!r}: choose one of {', '.join(PLACES)}"
+            )
+        values |= placed(slot, PLACES[law.effect], law.argument, law.low, law.high, law.growth)
     return Parameters({**Parameters.calibrated(), **values}, domains)
 
 

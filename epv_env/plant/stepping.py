@@ -12,6 +12,7 @@ The functions that locate are scalar and rarely called: only for the few lanes t
 import numba
 
 from epv_env.plant.effects.coil import coil_current
+from epv_env.plant.effects.registry import with_laws
 from epv_env.plant.effects.step_limits import longest_step
 from epv_env.plant.equations import State, derivative
 from epv_env.plant.lanes import (
@@ -243,7 +244,10 @@ def _stepper(lanes):
 
             xPV, vPV = _landed(end.xPV, end.vPV, c.xPVmax, c.ePV)
             xMV, vMV = _landed(end.xMV, end.vMV, c.xMVmax, c.eMV)
-            current = coil_current(u.U, end.I, c.R, end.coil_heat, effects) if extended else end.I
+            current = end.I
+            if extended:
+                acting = with_laws(end, u.U, effects)
+                current = coil_current(u.U, end.I, c.R, end.coil_heat, acting)
             landed = _with_landing(end, xPV, vPV, xMV, vMV, current)
             reached = chosen_state(refused, q, landed)
             if extended:

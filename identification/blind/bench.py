@@ -178,10 +178,14 @@ def _simulated(schedule: Schedule, time: NDArray, rates: RightHandSide) -> State
 
 
 def _sensed(state: State, p: Parameters, form_deviation: float) -> dict[str, NDArray]:
-    """Sensor inputs by channel [SI], (samples,): biases grow with pressure, the gain with current."""
+    """Sensor inputs by channel [SI], (samples,): errors grow with the pressure or the current read."""
+    p1, p2, p3 = (1.0 + form_deviation * (own / 8e5 - 1.0) for own in (state.p1, state.p2, state.p3))
     sensors = {
-        "b_p2": p["b_p2"] * (1.0 + form_deviation * (state.p2 / 8e5 - 1.0)),
-        "b_p3": p["b_p3"] * (1.0 + form_deviation * (state.p3 / 8e5 - 1.0)),
+        "g_p1": p["g_p1"] * p1,
+        "b_p2": p["b_p2"] * p2,
+        "g_p2": p["g_p2"] * p2,
+        "b_p3": p["b_p3"] * p3,
+        "g_p3": p["g_p3"] * p3,
         "g_I": p["g_I"] * (1.0 + form_deviation * (np.abs(state.I_coil) / 0.4 - 1.0)),
     }
     return readings(state, sensors)

@@ -18,7 +18,7 @@ from identification.blind.truth import NOMINAL, UNIT_SCATTER, UNIT_SCATTER_LIMIT
 from identification.calibration.problem import ParameterVector
 from identification.recordings.recording import OUTPUTS, UNITS
 from identification.replay.model_inputs import ModelInputs
-from identification.replay.replay import P2_SHIFT, Replay
+from identification.replay.replay import Replay
 from identification.valve_gap.causes import PARAMETER_COMPONENTS
 
 DIFFERENCE_STEP = 1e-4
@@ -108,12 +108,10 @@ class _Comparison:
         self.replay = Replay([_inputs(true) for true in truths], base)
         self.true = [np.stack([true.channels[name] for name in OUTPUTS]) for true in truths]
         self.weights = [_weights(true) for true in truths]
-        self.bias = base["b_p2"]  # the circuit starts at what its sensor reads, less the bias
 
     def residuals(self, values: Mapping[str, NDArray]) -> list[NDArray]:
         """(model - truth)/noise of n candidates per recording [-], (3 samples, n)."""
-        n = len(next(iter(values.values())))
-        outputs = self.replay.outputs({**values, P2_SHIFT: np.full(n, -self.bias)})
+        outputs = self.replay.outputs(values)
         return [
             np.nan_to_num((model - true[:, :, None]) * weights[:, :, None], nan=LOST_RESIDUAL).reshape(
                 true.size, -1

@@ -51,8 +51,8 @@ LEVEL_RATIO = 2.0
 """Largest Froelich level that gives the force of a Langevin level, relative to it [-]."""
 
 _with_electric = replacing(
-    Effects, "eddy", "U_clamp", "U_drop", "saturation", "I_rem", "friction_MV", "inlet_area",
-    "exhaust_area",
+    Effects, "eddy", "U_clamp", "U_drop", "saturation", "force_saturation", "I_rem", "friction_MV",
+    "inlet_area", "exhaust_area",
 )  # fmt: skip
 _with_gas = replacing(
     Effects, "leak_inlet", "leak_exhaust", "exchange_3", "swept", "drop_deficit", "leak_PV",
@@ -63,7 +63,7 @@ _with_piston = replacing(
 )
 _with_supply = replacing(State, "p1")
 _with_drop = replacing(State, "supply_drop")
-_with_saturation = replacing(Effects, "saturation")
+_with_saturation = replacing(Effects, "saturation", "force_saturation")
 _with_rates = replacing(State, "vMV", "coil_heat", "I", "supply_drop")
 
 
@@ -71,14 +71,16 @@ _with_rates = replacing(State, "vMV", "coil_heat", "I", "supply_drop")
 def _solenoid_sizes(q, u, c, e, d):
     """Sizes of the solenoid's and the armature's effects."""
     closed = 2.0 * q.xMV / c.xMVmax - 1.0
-    level = e.saturation * abs(q.I) * reluctance_inverse(q, c)
+    level = saturation_level(q.I, reluctance_inverse(q, c), e.saturation)
+    saturated = 1.0 + d * (level - 0.3) / (level + 0.3)
     steady = max(u.U - e.U_drop, OFF_VOLTAGE) / heated(c.R, q.coil_heat)
     return _with_electric(
         e,
         e.eddy * (1.0 + d * closed),
         e.U_clamp * (1.0 + d * (abs(q.I) / 0.3 - 1.0)),
         e.U_drop * (1.0 + d * (abs(q.I) / steady - 1.0)),
-        e.saturation * (1.0 + d * (level - 0.3) / (level + 0.3)),
+        e.saturation * saturated,
+        e.force_saturation * saturated,
         e.I_rem * (1.0 + d * closed),
         e.friction_MV * (1.0 + d * (abs(q.vMV) / 0.3 - 1.0)),
         e.inlet_area * (1.0 - d * closed),
@@ -227,7 +229,7 @@ def langevin_size(q, c, e):
 
     q: state. c: coefficients. e: sizes of the effects.
     """
-    level = saturation_level(q.I + e.I_rem, reluctance_inverse(q, c), e)
+    level = saturation_level(q.I + e.I_rem, reluctance_inverse(q, c), e.saturation)
     return e.saturation * level_of_force(level) / level if level > 0.0 else e.saturation
 
 
@@ -241,7 +243,7 @@ def langevin_current_rate(q, c, e, size, rate):
     inverse_Rm = reluctance_inverse(q, c)
     current = q.I + e.I_rem
     motion = current * q.vMV * c.gap_reluctance * inverse_Rm
-    level = saturation_level(current, inverse_Rm, e)
+    level = saturation_level(current, inverse_Rm, e.saturation)
     fitted = 1.0 + (size / e.saturation * level if e.saturation > 0.0 else 0.0)
     return (rate + motion) / (fitted * fitted * langevin_slope(level)) - motion
 
@@ -261,7 +263,7 @@ def _compile(digest: str):
             q = _with_drop(q, instant_drop(q, inputs, valve, fitted, d))
         deviating = deviating_sizes(q, inputs, valve, fitted, d)
         size = langevin_size(q, valve, deviating) if langevin else deviating.saturation
-        sizes = _with_saturation(deviating, size)
+        sizes = _with_saturation(deviating, size, size) if langevin else deviating
         rates, force_PV, force_MV = derivative(q, inputs, valve, sizes, free_PV, free_MV, True)
         slowed = rates.vMV - d * film_rate(q, valve) * q.vMV * free_MV
         cooled = rates.coil_heat - d * q.coil_heat / IRON_TIME_CONSTANT

@@ -4,7 +4,7 @@ An FMU (Functional Mock-up Unit, fmi-standard.org) is simulated through FMPy, an
 """
 
 import importlib
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from copy import copy
 from dataclasses import dataclass
@@ -119,9 +119,6 @@ class BlackBoxPlant:
         raise ValueError(
             f"{', '.join(forcing)} cannot be forced: the equations of a black box are not known"
         )
-
-    def contribution(self, values: Mapping[str, NDArray], symbols: Collection[str], run: int) -> None:
-        """`GreyBox.contribution`: None, as no equation is known."""
 
     def _candidate(self, values: Mapping[str, NDArray], i: int, run: int) -> dict[str, float]:
         """Values of candidate i in a run, by symbol; nominal ones where none is given."""

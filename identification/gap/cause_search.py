@@ -1,32 +1,39 @@
-"""Search for the causes: singles, then sets grown by one cause at a time and pruned again."""
+"""Search for the causes: singles, then sets grown by one cause at a time; the finalists' laws are open.
+
+Each set of causes is first fitted with the laws that the catalogue assumes. The laws of the best sets
+are then opened, over the states that promise most by linear prediction, and fitted in the simulation.
+"""
 
 from collections.abc import Iterable, Sequence
 from itertools import combinations
 
+import numpy as np
+
 from identification.gap.evidence import EvaluatedHypothesis, evaluate, misfit
 from identification.gap.fitting_problem import Estimate, FitCache, FittingProblem, Hypothesis
 from identification.gap.gauss_newton import fit, linearise
+from identification.gap.law_screening import law_starts
+from identification.gap.laws import MOST_LAWS
 from identification.gap.plant import GreyBox
-from identification.gap.posterior import Posterior, misfit_beyond_white_noise, posterior
-from identification.gap.recalibration import refit, with_own_nuisances
+from identification.gap.posterior import CHANCE, TOLERANCE, Posterior, posterior, tolerated_misfit
+from identification.gap.recalibration import with_own_nuisances
 from identification.gap.screening import (
     CauseSignature,
     Start,
     best_start_of_each,
-    promising_causes,
     screen_causes,
     simulate_signatures,
     simulated_starts,
     with_cause,
 )
-from identification.gap.variable_projection import LinearisedRun
+from identification.gap.variable_projection import LinearisedRun, normal_equations
 
 MOST_CAUSES = 4
 """Largest number of causes that are taken to act together."""
 
-LITTLE_LEFT, LITTLE_SHARE = 15.0, 3e-3
-"""Misfit beyond white noise up to which a set leaves little, in nats and as a share of the whole [1],
-added: another cause can hardly be seen."""
+LAW_PRICE = 2.0
+"""Factor by which an open law must lower the misfit [1]: the law of the catalogue is kept where it is
+about as good, and the two laws are left to those causes that need them."""
 
 # Numbers for the sake of computing time.
 
@@ -34,24 +41,28 @@ MULTI_START_CAUSES = 12
 """Largest catalogue of which every cause is refitted from each of its trial values, and every pair:
 causes may help together that do not help alone. A larger one begins at the most promising values."""
 
-REFITTED_CAUSES = 12
-"""Single causes that are refitted, those with the least predicted chi-square."""
+PARTNERS = 8
+"""Causes of a large catalogue that are refitted beside a set."""
+
+STARTS = 1
+"""Starts from which a cause of a large catalogue is refitted, with the law assumed and with an open one:
+the most promising of all."""
+
+FAR_WORSE = 10.0
+"""Factor on what the best set leaves, beyond which another set of as many causes is not followed [1]."""
+
+HELPED = 0.8
+"""Share of what the sets of one cause less leave, up to which a cause has helped and another one may
+[1]."""
 
 FINALISTS = 4
-"""Best sets of one size that are fitted further, with slopes and modes of form of their own."""
+"""Best sets of one size that are fitted further, with nuisance slopes of their own and other laws."""
 
 BASES = 2
 """The best sets of one size to which another cause is added."""
 
-PARTNERS = 5
-"""Causes tried beside a set."""
-
-SIMULATED_PER_PARTNER = 2
-"""Causes of a large catalogue that are simulated beside a set for each that is refitted there."""
-
-STARTS = 2
-"""Starts from which a cause of a large catalogue is refitted, and a pair of a small one: the most
-promising of all trial values. From one start a fit may end in a local minimum."""
+FIRST_ITERATIONS = 5
+"""Most steps of the first fits: those of finalists go on."""
 
 
 def is_small(plant: GreyBox) -> bool:
@@ -68,36 +79,31 @@ class HypothesisPool:
         self.recalibrated = recalibrated
         self.cache = cache
         self.small = is_small(problem.plant)
-        self.first_fits: dict[frozenset[str], Estimate] = {}
-        """Estimate of each set before its refinement. Refined nuisance parameters follow what the set
-        lacks; from the first fit another cause is seen better."""
         self._best: dict[frozenset[str], EvaluatedHypothesis] = {}
-        self._refined: set[frozenset[str]] = set()
+        self._finished: set[str] = set()
 
     def add(self, estimates: Iterable[Estimate]) -> None:
         """Evaluate refitted estimates and keep the best of each set of causes."""
-        for evaluated in evaluate(self.problem, list(estimates)):
+        self.keep(evaluate(self.problem, [each for each in estimates if not each.given_up]))
+
+    def keep(self, found: Iterable[EvaluatedHypothesis]) -> None:
+        """Keep each evaluated hypothesis that is better than the present one of its set."""
+        for evaluated in found:
             labels = frozenset(evaluated.labels)
-            if self._keep(evaluated):
-                self.first_fits[labels] = evaluated.estimate
+            present = self._best.get(labels)
+            if present is None or self._order(evaluated) < self._order(present):
+                self._best[labels] = evaluated
 
-    def refine(self, number: int) -> None:
-        """Fit the best sets of a number of causes further, with slopes and modes of their own."""
-        ranked = [each for each, _ in self.ranked(number)[:FINALISTS]]
-        best = [each for each in ranked if frozenset(each.labels) not in self._refined]
-        name = f"modes of {number}: {', '.join(' and '.join(each.labels) for each in best)}"
-        for refined in with_own_nuisances(self.problem, best, name, self.cache):
-            self._refined.add(frozenset(refined.labels))
-            self._best[frozenset(refined.labels)] = refined
+    def _order(self, evaluated: EvaluatedHypothesis) -> tuple[float, float]:
+        """The less, the better; within noise the better fit counts."""
+        return self._cost(evaluated), misfit(evaluated)
 
-    def _keep(self, evaluated: EvaluatedHypothesis) -> bool:
-        """Keep a fit that is better than the present one of its set."""
-        labels = frozenset(evaluated.labels)
-        present = self._best.get(labels)
-        better = present is None or misfit(evaluated) < misfit(present)
-        if better:
-            self._best[labels] = evaluated
-        return better
+    def _cost(self, evaluated: EvaluatedHypothesis) -> float:
+        """What counts when one of two fits of a set is kept [nats]: an open law must pay."""
+        readings = sum(np.count_nonzero(run.trusted) for run in self.problem.plant.runs)
+        tolerated = CHANCE + TOLERANCE * readings
+        left = max(0.5 * (misfit(evaluated) - readings), 0.0)
+        return (left + tolerated) * LAW_PRICE ** len(evaluated.estimate.hypothesis.laws)
 
     def __contains__(self, labels: frozenset[str]) -> bool:
         """Whether a set of causes was refitted."""
@@ -107,21 +113,74 @@ class HypothesisPool:
         """All hypotheses with causes, and their probabilities."""
         return posterior(self.problem, self.recalibrated, list(self._best.values()))
 
-    def ranked(self, number: int | None = None) -> list[tuple[EvaluatedHypothesis, float]]:
-        """Hypotheses with a number of causes, or all, and their scores [nats], the best first."""
+    def ranked(self, number: int | None = None) -> list[EvaluatedHypothesis]:
+        """Hypotheses with a number of causes, or all, the most probable first."""
+        found = self.posterior().hypotheses
+        return [each for each in found if number is None or len(each.labels) == number]
+
+    def by_cost(self) -> list[tuple[EvaluatedHypothesis, float]]:
+        """All hypotheses with what they leave, laws priced [nats], the least first."""
+        pairs = [(each, self._cost(each)) for each in self._best.values()]
+        return sorted(pairs, key=lambda pair: pair[1])
+
+    def much_is_left(self) -> bool:
+        """Whether the best hypothesis leaves more than what no model is free of."""
         found = self.posterior()
-        pairs = [
-            (each, score)
-            for each, score in zip(found.hypotheses, found.scores, strict=True)
-            if number is None or len(each.labels) == number
-        ]
-        return sorted(pairs, key=lambda pair: (-pair[1], misfit(pair[0])))
+        return bool(found.misfits) and min(found.misfits) > tolerated_misfit(found.noise)
+
+    def promising(self, number: int, most: int) -> list[EvaluatedHypothesis]:
+        """The best sets of a number of causes that do not leave far more than the best of them."""
+        ranked = self.ranked(number)[:most]
+        return [each for each in ranked if self._cost(each) <= FAR_WORSE * self._cost(ranked[0])]
+
+    def finish(self, number: int) -> None:
+        """Fit the best sets of a number of causes further: own nuisances, then one law more.
+
+        As long as a law pays and much is left, another one is opened.
+        """
+        best = self.promising(number, FINALISTS)
+        for _ in range(1 + MOST_LAWS):
+            best = [each for each in best if _name(each) not in self._finished]
+            if not best:
+                return
+            self._finished |= {_name(each) for each in best}
+            best = self._with_own_nuisances(best)
+            self.keep(best)
+            if not self.much_is_left():
+                return
+            self.keep(evaluate(self.problem, self._with_another_law(best)))
+            best = self.promising(number, FINALISTS)
+
+    def _with_own_nuisances(self, chosen: Sequence[EvaluatedHypothesis]) -> list[EvaluatedHypothesis]:
+        name = "; ".join(_name(each) for each in chosen)
+        return with_own_nuisances(self.problem, chosen, f"further: {name}", self.cache)
+
+    def _with_another_law(self, chosen: Sequence[EvaluatedHypothesis]) -> list[Estimate]:
+        """Fits of each of the best with those laws open that promise most."""
+
+        def fits() -> list[Estimate]:
+            starts = []
+            for each in chosen:
+                causes = each.estimate.hypothesis.causes
+                found = law_starts(self.problem, [each.estimate] * len(causes), causes)
+                starts += [start.estimate for start in found[:STARTS]]
+            return fit(self.problem, starts, iterations=FIRST_ITERATIONS)
+
+        name = "; ".join(_name(each) for each in chosen)
+        return [each for each in self.cache(f"one law more: {name}", fits) if not each.given_up]
+
+
+def _name(evaluated: EvaluatedHypothesis) -> str:
+    """A hypothesis with its open laws, for the journal."""
+    laws = evaluated.estimate.hypothesis.laws
+    return ", ".join(
+        [evaluated.label, *(f"law of {law.cause.label} over {law.argument}" for law in laws)]
+    )
 
 
 def search_causes(
     pool: HypothesisPool,
     base: Estimate,
-    base_runs: Sequence[LinearisedRun],
     signatures: Sequence[CauseSignature],
     most_causes: int = MOST_CAUSES,
 ) -> None:
@@ -130,96 +189,101 @@ def search_causes(
     Args:
         pool: begins without causes.
         base: the recalibrated model.
-        base_runs: the same linearised in the fitted runs.
         signatures: of all causes beside it.
         most_causes: largest number of causes of a set.
     """
-    screened = screen_causes(pool.problem, base, base_runs, signatures, every_start=True)
-    starts = screened if pool.small else _promising_starts(screened)
-    pool.add(pool.cache("single causes", lambda: refit(pool.problem, base, starts)))
-    pool.refine(1)
+    pool.add(_fits_beside(pool, base, signatures))
+    pool.finish(1)
     for number in range(2, most_causes + 1):
         if not _another_cause_may_act(pool, number):
             break
-        for smaller, _ in pool.ranked(number - 1)[:BASES]:
-            pool.add(_fits_with_another(pool, smaller, signatures))
+        for smaller in pool.promising(number - 1, BASES):
+            pool.add(_fits_beside(pool, smaller.estimate, signatures))
         if number == 2 and pool.small:
-            _fit_pairs(pool, base, base_runs, screened)
-        pool.refine(number)
+            _fit_pairs(pool, base, signatures)
+        pool.finish(number)
     _leave_causes_out(pool)
 
 
-def _promising_starts(screened: Sequence[Start]) -> list[Start]:
-    """The best starts of the most promising causes."""
-    first = best_start_of_each(screened)[:REFITTED_CAUSES]
-    kept = {start.labels for start in first}
-    return _best_starts([start for start in screened if start.labels in kept], STARTS)
-
-
 def _another_cause_may_act(pool: HypothesisPool, number: int) -> bool:
-    """Whether sets of `number` causes are worth a search: much is left, and the last cause helped.
-
-    Where four causes act, the second one alone may hardly pay: the search goes on in a small catalogue,
-    and where the gap has no name yet.
-    """
-    found = pool.posterior()
-    every = [misfit_beyond_white_noise(each, found.discrepancies) for each in found.hypotheses]
-    whole = misfit_beyond_white_noise(pool.recalibrated, found.discrepancies)
-    if not every or min(every) <= LITTLE_LEFT + LITTLE_SHARE * whole:
+    """Whether sets of `number` causes are worth a search: much is left, and the last cause helped."""
+    if not pool.much_is_left():
         return False
-    if pool.small or number == 2 or found.unknown > sum(found.probabilities):
-        return True
-    larger, smaller = pool.ranked(number - 1), pool.ranked(number - 2)
-    return bool(larger) and larger[0][1] > smaller[0][1]
+    best = {len(each.labels): cost for each, cost in reversed(pool.by_cost())}
+    return number <= 2 or pool.small or best.get(number - 1, np.inf) <= HELPED * best[number - 2]
 
 
-def _fits_with_another(
-    pool: HypothesisPool, smaller: EvaluatedHypothesis, signatures: Sequence[CauseSignature]
+def _fits_beside(
+    pool: HypothesisPool, base: Estimate, signatures: Sequence[CauseSignature]
 ) -> list[Estimate]:
-    """Fits of a set with each of the most promising further causes.
+    """Fits of a set with each of the most promising further causes, as assumed and with an open law.
 
-    In a large catalogue those are simulated beside the set whose signatures promise something there.
+    base: the set's estimate. signatures: of all causes beside the recalibrated model; those that promise
+    something beside the set are simulated there.
     """
-    problem = pool.problem
-    base = pool.first_fits[frozenset(smaller.labels)]
-    own = {cause.name for cause in base.hypothesis.causes}
+    problem, hypothesis = pool.problem, base.hypothesis
+    own = {cause.name for cause in hypothesis.causes}
     others = [
         signature
         for signature in signatures
         if signature.cause.name not in own
-        and frozenset((*smaller.labels, signature.cause.label)) not in pool
+        and frozenset((*hypothesis.labels, signature.cause.label)) not in pool
     ]
+    if not others:
+        return []
 
     def fits() -> list[Estimate]:
         base_runs = linearise(problem, [base], problem.fitted_runs)[0]
-        causes = promising_causes(problem, base_runs, others)
-        if not pool.small:
-            causes = causes[: SIMULATED_PER_PARTNER * PARTNERS]
+        causes = list({signature.cause.label: signature.cause for signature in others}.values())
         beside = simulate_signatures(problem, base, causes)
-        screened = screen_causes(problem, base, base_runs, beside, every_start=pool.small)
-        kept = screened if pool.small else screened[:PARTNERS]
-        return refit(problem, base, kept)
+        assumed = screen_causes(problem, base, base_runs, beside, every_start=pool.small)
+        # Chi-squares of some of the runs are compared as shares of what the base leaves of them.
+        runs = _most_misfitting(problem, base_runs)
+        estimates = [start.estimate for start in assumed]
+        opened = law_starts(problem, estimates, [start.cause for start in assumed], runs)
+        promise = {start.labels: start.chi_square / base.chi_square for start in reversed(assumed)}
+        whole = normal_equations(
+            [run for run, r in zip(base_runs, problem.fitted_runs, strict=True) if r in runs]
+        ).chi_square
+        for start in opened:
+            share = start.chi_square / whole
+            promise[start.labels] = min(promise.get(start.labels, np.inf), share)
+        best = sorted(promise, key=lambda labels: promise[labels])
+        kept = set(best if pool.small else best[:PARTNERS])
+        most = len(assumed) if pool.small else STARTS
+        starts = [
+            start
+            for part in (assumed, opened)
+            for start in _best_starts([start for start in part if start.labels in kept], most)
+        ]
+        return fit(problem, [s.estimate for s in starts], base.chi_square, iterations=FIRST_ITERATIONS)
 
-    return pool.cache(f"beside {' and '.join(smaller.labels)}", fits) if others else []
+    return pool.cache(f"beside {' and '.join(hypothesis.labels) or 'nothing'}", fits)
 
 
-def _fit_pairs(
-    pool: HypothesisPool,
-    base: Estimate,
-    base_runs: Sequence[LinearisedRun],
-    screened: Sequence[Start],
-) -> None:
+def _most_misfitting(problem: FittingProblem, base_runs: Sequence[LinearisedRun]) -> list[int]:
+    """The fitted runs with the largest mean square residuals, up to half of all samples."""
+    squares = [float(np.mean(run.residual**2)) for run in base_runs]
+    lengths = {r: len(problem.plant.runs[r].time) for r in problem.fitted_runs}
+    order = [problem.fitted_runs[i] for i in np.argsort(squares)[::-1]]
+    before = np.cumsum([0, *(lengths[r] for r in order)])[:-1]
+    return [r for r, b in zip(order, before, strict=True) if b < 0.5 * sum(lengths.values())]
+
+
+def _fit_pairs(pool: HypothesisPool, base: Estimate, signatures: Sequence[CauseSignature]) -> None:
     """All pairs of a small catalogue."""
     problem = pool.problem
-    together = [
-        _both(problem, base, first, second)
-        for first, second in combinations(screened, 2)
-        if first.cause.name != second.cause.name
-    ]
 
     def fits() -> list[Estimate]:
-        starts = simulated_starts(problem, base, base_runs, together)
-        return refit(problem, base, _best_starts(starts, STARTS))
+        base_runs = linearise(problem, [base], problem.fitted_runs)[0]
+        screened = screen_causes(problem, base, base_runs, signatures)
+        together = [
+            _both(problem, base, first, second)
+            for first, second in combinations(screened, 2)
+            if first.cause.name != second.cause.name
+        ]
+        starts = _best_starts(simulated_starts(problem, base, base_runs, together), STARTS)
+        return fit(problem, [start.estimate for start in starts], base.chi_square)
 
     pool.add(pool.cache("pairs", fits))
 
@@ -253,17 +317,16 @@ def _leave_causes_out(pool: HypothesisPool) -> None:
     problem = pool.problem
     for _ in range(MOST_CAUSES - 1):
         ranked = pool.ranked()
-        if not ranked or len(ranked[0][0].labels) < 2:
+        if not ranked or len(ranked[0].labels) < 2:
             return
-        best = ranked[0][0]
-        values = problem.values(best.estimate)
-        causes = best.estimate.hypothesis.causes
-        starts = [
-            problem.start(Hypothesis(causes=tuple(kept)), values)
-            for kept in combinations(causes, len(causes) - 1)
-        ]
+        best = ranked[0]
+        values, hypothesis = problem.values(best.estimate), best.estimate.hypothesis
+        starts = []
+        for causes in combinations(hypothesis.causes, len(hypothesis.causes) - 1):
+            laws = tuple(law for law in hypothesis.laws if law.cause in causes)
+            starts.append(problem.start(Hypothesis(causes=causes, laws=laws), values))
         name = f"without one of {' and '.join(best.labels)}"
         pool.add(pool.cache(name, lambda starts=starts: fit(problem, starts)))
-        pool.refine(len(causes) - 1)
-        if pool.ranked()[0][0].labels == best.labels:
+        pool.finish(len(hypothesis.causes) - 1)
+        if pool.ranked()[0].labels == best.labels:
             return

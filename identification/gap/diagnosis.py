@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from identification.block_bootstrap import Interval
 from identification.gap.cause_search import MOST_CAUSES, HypothesisPool, is_small, search_causes
-from identification.gap.evidence import EvaluatedHypothesis, evaluate_linearised
+from identification.gap.evidence import EvaluatedHypothesis, evaluate, evaluate_linearised
 from identification.gap.fitting_problem import Estimate, FitCache, FittingProblem, Hypothesis
 from identification.gap.gauss_newton import linearise
 from identification.gap.held_out import (
@@ -19,8 +19,8 @@ from identification.gap.plant_checks import check, check_description
 from identification.gap.prepared_plant import prepared
 from identification.gap.recalibration import (
     recalibrate,
-    with_disturbance,
     with_own_nuisances,
+    with_ripple,
     with_seen_noise,
 )
 from identification.gap.screened import Finding
@@ -65,7 +65,7 @@ class Diagnosis:
     remaining: Localisation | None
     """Where the gap lies that the best cause leaves; None where nothing predictable is left."""
     reduction: DiscrepancyReduction
-    nominal: Estimate
+    nominal: EvaluatedHypothesis
     """The nominal model."""
     judged: list[RankedCause]
     """Causes whose discrepancy reduction was measured, the most probable first."""
@@ -106,8 +106,14 @@ class Diagnosis:
 
     @property
     def kept(self) -> EvaluatedHypothesis:
-        """The model to use: with the cause to add, else recalibrated."""
-        return self.advised.hypothesis if self.advised else self.ranking.recalibrated
+        """The model to use: with the cause to add, else recalibrated or nominal.
+
+        The nominal one where the others are clearly worse on held-out recordings.
+        """
+        best = self.advised.hypothesis if self.advised else self.ranking.recalibrated
+        label = best.label or RECALIBRATED
+        gaps = {name: self.reduction.gaps[name].overall.value for name in (label, NOMINAL)}
+        return best if gaps[label] <= (1.0 + NOTICED_WORSENING) * gaps[NOMINAL] else self.nominal
 
     def surely_helps(self, cause: RankedCause) -> bool:
         """Whether adding a judged cause surely reduces the gap on held-out recordings."""
@@ -146,12 +152,12 @@ def diagnose(plant: GreyBox, *, seed: int = 0, cache: FitCache | None = None) ->
         localisation=localisation,
         remaining=_locate(ranking, judged[0].hypothesis, seed) if left and judged else None,
         reduction=reduction,
-        nominal=nominal,
+        nominal=evaluate(ranking.problem, [nominal])[0],
         judged=judged,
         screened=usable.screened,
         warnings=[
             *warnings,
-            *_disturbances(ranking),
+            *_ripples(ranking),
             *_worse_by_recalibration(reduction),
             *_unconverged(ranking.recalibrated, judged),
         ],
@@ -171,10 +177,10 @@ def rank_hypotheses(
     cache, plant = cache or FitCache(plant), prepared(plant)
     problem, base = recalibrated_by_seen_noise(plant, cache)
     ranking = _searched(problem, base, cache, most_causes)
-    weighted = with_disturbance(prepared(problem.plant), ranking.discrepancies)
+    weighted = with_ripple(prepared(problem.plant), ranking.noise)
     if weighted is problem.plant:
         return ranking
-    cache, thorough = cache.named("with the disturbance: "), is_small(plant)
+    cache, thorough = cache.named("with the ripple filtered: "), is_small(plant)
     return _searched(*recalibrate(weighted, cache, thorough=thorough), cache, most_causes)
 
 
@@ -197,22 +203,9 @@ def _searched(problem: FittingProblem, base: Estimate, cache: FitCache, most_cau
     evaluated = evaluate_linearised(problem, base, runs)
     recalibrated = with_own_nuisances(problem, [evaluated], "recalibration: own nuisances", cache)[0]
     pool = HypothesisPool(problem, recalibrated, cache)
-    search_causes(pool, base, base_runs, signatures, most_causes)
-    found = pool.posterior()
-    keys = list(zip(found.probabilities, found.scores, strict=True))
-    order = sorted(range(len(keys)), key=keys.__getitem__, reverse=True)
+    search_causes(pool, base, signatures, most_causes)
     return Ranking(
-        problem=problem,
-        recalibrated=recalibrated,
-        hypotheses=[found.hypotheses[i] for i in order],
-        probabilities=[found.probabilities[i] for i in order],
-        no_cause=found.no_cause,
-        unknown=found.unknown,
-        scores=[found.scores[i] for i in order],
-        shares_left=[found.shares_left[i] for i in order],
-        discrepancies=found.discrepancies,
-        separability=separability,
-        figures=found.figures[[*order, -2, -1]],
+        problem=problem, recalibrated=recalibrated, separability=separability, **vars(pool.posterior())
     )
 
 
@@ -240,15 +233,15 @@ def _worse_by_recalibration(reduction: DiscrepancyReduction) -> list[str]:
     ]
 
 
-def _disturbances(ranking: Ranking) -> list[str]:
-    """Channels whose readings carry a disturbance at all times, a sentence each."""
-    channels = ranking.problem.plant.channels
+def _ripples(ranking: Ranking) -> list[str]:
+    """Channels whose readings carry a ripple at all times, a sentence each."""
+    plant = prepared(ranking.problem.plant)
     return [
-        f"{channel.name}: a disturbance of {d.sd * channel.known_noise / channel.scale:.2g} "
-        f"{channel.unit}, correlated over {d.time_scale:.2g} s, lies on the readings at all times: they "
-        "weigh less"
-        for channel, d in zip(channels, ranking.discrepancies, strict=True)
-        if d.inflation > 1.0
+        f"{channel.name}: a ripple of {ripple.sd * channel.known_noise / channel.scale:.2g} "
+        f"{channel.unit}, correlated over {ripple.samples * plant.runs[0].time[1]:.2g} s, lies on the "
+        "readings at all times: they are filtered"
+        for channel, ripple in zip(plant.channels, plant.ripples, strict=False)
+        if ripple
     ]
 
 

@@ -35,15 +35,14 @@ class EvaluatedHypothesis:
     """Sums of squared residuals over all runs, (channels,) [1]."""
     nuisance_penalty: float
     """Half the squared deviations of all nuisance parameters from their centres [nats]."""
+    law_penalty: float
+    """The same of laws and of what else the causes have a prior for [nats]."""
     tolerances: NDArray
     """Tolerances that the fitted runs determine, (m,) [standard deviations from the centres]."""
-    forms: NDArray
-    """Shares of the form modes that they determine, (modes,) [standard deviations]; (0,) where the
-    hypothesis was not refined."""
     covariance: NDArray
     """Of calibrated parameters and parameters of causes for white noise, all else free, (k, k) [SI]."""
-    at_bound: bool
-    """Whether a parameter of a cause lies at a bound: the recordings ask for what cannot be."""
+    unusual: bool
+    """Whether a parameter of a cause lies at an end of its range."""
 
     @property
     def converged(self) -> bool:
@@ -77,8 +76,8 @@ class EvaluatedHypothesis:
 
 
 def misfit(evaluated: EvaluatedHypothesis) -> float:
-    """Sum of squares of all channels and nuisance parameters [1]."""
-    return float(evaluated.squares.sum()) + 2.0 * evaluated.nuisance_penalty
+    """Sum of squares of all channels, nuisance parameters and laws [1]."""
+    return float(evaluated.squares.sum()) + 2.0 * (evaluated.nuisance_penalty + evaluated.law_penalty)
 
 
 def evaluate(problem: FittingProblem, estimates: Sequence[Estimate]) -> list[EvaluatedHypothesis]:
@@ -109,16 +108,16 @@ def evaluate_linearised(
     fitted = normal_equations([runs[r] for r in problem.fitted_runs])
     scales = [parameter.scale for parameter in problem.parameters(estimate)]
     deviations = _squared_deviations(runs, [step for _, step in freed], shared)
-    count = len(problem.plant.tolerances)
+    precision, values = problem.priors(estimate)
     return EvaluatedHypothesis(
         estimate=estimate,
         residuals=residuals,
         squares=np.sum([np.sum(residual**2, axis=1) for residual in residuals], axis=0),
         nuisance_penalty=0.5 * deviations,
-        tolerances=fitted.shared[:count],
-        forms=fitted.shared[count:],
+        law_penalty=0.5 * float(precision @ values**2),
+        tolerances=fitted.shared,
         covariance=_covariance(fitted) * np.outer(scales, scales),
-        at_bound=_at_bound(estimate),
+        unusual=_unusual(estimate),
     )
 
 
@@ -140,9 +139,9 @@ def _covariance(equations: NormalEquations) -> NDArray:
     return root @ root.T  # symmetric to the last digit, which the product with the eigenvalues is not
 
 
-def _at_bound(estimate: Estimate) -> bool:
+def _unusual(estimate: Estimate) -> bool:
     """Whether a cause's parameter lies at an end of its range and is not merely nominal there."""
-    for p, scaled in zip(estimate.hypothesis.parameters, estimate.cause_vector, strict=True):
+    for p, scaled in zip(estimate.hypothesis.cause_parameters, estimate.cause_vector, strict=True):
         low, high = sorted((p.low, p.high))
         value, margin = scaled * p.scale, BOUND_MARGIN * (high - low)
         if min(value - low, high - value) < margin and abs(value - p.nominal) > margin:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.common.files import Journal
+from identification.gap.laws import Law
 from identification.gap.plant import Cause, FreeParameter, GreyBox, NuisanceParameter, noise_weighted
 
 UNSTABLE = 1e9
@@ -23,11 +24,18 @@ class Hypothesis:
     """Causes that are taken to act together; without causes: the recalibrated nominal model."""
 
     causes: tuple[Cause, ...]
+    laws: tuple[Law, ...] = ()
+    """Laws of these causes that are open; the others are as assumed."""
 
     @property
     def parameters(self) -> tuple[FreeParameter, ...]:
-        """Parameters of all causes, which are fitted beside the calibrated parameters."""
-        return tuple(parameter for cause in self.causes for parameter in cause.parameters)
+        """Parameters of the laws, then of all causes; they are fitted beside the calibrated ones."""
+        return tuple(p for part in (*self.laws, *self.causes) for p in part.parameters)
+
+    @property
+    def cause_parameters(self) -> tuple[FreeParameter, ...]:
+        """Parameters of all causes."""
+        return tuple(p for cause in self.causes for p in cause.parameters)
 
     @property
     def run_parameters(self) -> tuple[NuisanceParameter, ...]:
@@ -58,48 +66,6 @@ class NuisanceSlopes:
     calibrated: list[NDArray] | None = None
     """Per run: derivatives by the calibrated parameters, (values, parameters) [noise deviations], which
     fits from here keep as long as they help; None where they are taken anew in each step."""
-    forms: "FormSlopes | None" = None
-    """Derivatives by the form modes of the causes; None for an estimate that has none."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class FormSlopes:
-    """Derivatives of the outputs by n form modes, which grow with the sizes of their causes."""
-
-    names: list[str]
-    """Of the modes (form_modes.py)."""
-    slopes: list[NDArray]
-    """Per run, (values, n) [noise deviations/standard deviation]."""
-    owners: NDArray
-    """Number of the cause of each mode, among those of the hypothesis, (n,)."""
-    sizes: NDArray
-    """Size of that cause at which they hold, (n,) [1]."""
-
-    def at(self, estimate: "Estimate", run: int) -> tuple[NDArray, NDArray]:
-        """The derivatives (values, n) at an estimate's sizes, and what they add to its own slopes.
-
-        Returns the latter (values, k) for the modes' shares of the estimate.
-        """
-        sizes, directions = cause_sizes(estimate)
-        slopes = self.slopes[run] * (sizes[self.owners] / self.sizes)
-        added = np.zeros((len(slopes), len(estimate.vector)))
-        if estimate.shares is not None and len(estimate.shares) == len(self.owners):
-            for cause, direction in enumerate(directions):
-                own = self.owners == cause
-                change = self.slopes[run][:, own] @ (estimate.shares[own] / self.sizes[own])
-                added += change[:, None] * direction
-        return slopes, added
-
-
-def cause_sizes(estimate: "Estimate") -> tuple[NDArray, NDArray]:
-    """Length of the scaled vector of each cause (causes,), and its gradient (causes, k) [1]."""
-    places = cause_places(estimate)
-    sizes, directions = np.zeros(len(places)), np.zeros((len(places), len(estimate.vector)))
-    for i, (cause, place, _) in enumerate(places):
-        apart = estimate.vector[place] - nominal_vector(cause)
-        sizes[i] = max(float(np.linalg.norm(apart)), np.finfo(float).eps)
-        directions[i, place] = apart / sizes[i]
-    return sizes, directions
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,13 +74,11 @@ class Estimate:
 
     hypothesis: Hypothesis
     vector: NDArray
-    """Calibrated parameters, then parameters of the causes, each divided by its scale, (k,) [1]."""
+    """Calibrated parameters, those of laws and of causes, each divided by its scale, (k,) [1]."""
     run_values: NDArray
     """Run parameters of the causes less their centres, (runs, l) [SI]."""
     slopes: NuisanceSlopes | None = None
     """Nuisance slopes taken at this estimate; None: those of the fitting problem."""
-    shares: NDArray | None = None
-    """Shares of the form modes, (modes,) [standard deviations]; None before a fit."""
     chi_square: float = np.inf
     """Weighted sum of squares on the fitted runs, infinite before a fit [1]."""
     converged: bool = False
@@ -124,12 +88,22 @@ class Estimate:
     @property
     def cause_start(self) -> int:
         """Index of the vector at which the parameters of the causes begin."""
-        return len(self.vector) - len(self.hypothesis.parameters)
+        return len(self.vector) - len(self.hypothesis.cause_parameters)
 
     @property
     def cause_vector(self) -> NDArray:
         """Scaled parameters of the causes, (parameters of causes,) [1]."""
         return self.vector[self.cause_start :]
+
+    @property
+    def laws(self) -> list[tuple[Law, NDArray]]:
+        """Each law with its components (m,) [standard deviations]."""
+        first, found = len(self.vector) - len(self.hypothesis.parameters), []
+        for law in self.hypothesis.laws:
+            end = first + len(law.parameters)
+            found.append((law, self.vector[first:end]))
+            first = end
+        return found
 
 
 def cause_places(estimate: Estimate) -> list[tuple[Cause, slice, slice]]:
@@ -141,11 +115,6 @@ def cause_places(estimate: Estimate) -> list[tuple[Cause, slice, slice]]:
         places.append((cause, slice(first, end), slice(first_run, end_run)))
         first, first_run = end, end_run
     return places
-
-
-def nominal_vector(cause: Cause) -> NDArray:
-    """Scaled parameters of a cause that does not act, (parameters,) [1]."""
-    return np.array([parameter.nominal / parameter.scale for parameter in cause.parameters])
 
 
 class FitCache:
@@ -190,12 +159,17 @@ class FitCache:
         causes = {cause.label: cause for cause in self.plant.causes}
         runs = len(self.plant.runs)
         return Estimate(
-            hypothesis=Hypothesis(causes=tuple(causes[label] for label in entry["causes"])),
+            hypothesis=Hypothesis(
+                causes=tuple(causes[label] for label in entry["causes"]),
+                laws=tuple(
+                    Law(cause=causes[label], argument=argument, low=low, high=high)
+                    for label, argument, low, high in entry["laws"]
+                ),
+            ),
             vector=np.array(entry["vector"]),
             run_values=np.array(entry["local"]).reshape(runs, -1),
             chi_square=entry["chi_square"],
             converged=entry["converged"],
-            shares=np.array(entry["shares"]),
         )
 
 
@@ -207,7 +181,7 @@ def _entry(estimate: Estimate) -> dict[str, Any]:
         "local": estimate.run_values.tolist(),
         "chi_square": estimate.chi_square,
         "converged": estimate.converged,
-        "shares": [] if estimate.shares is None else estimate.shares.tolist(),
+        "laws": [[o.cause.label, o.argument, o.low, o.high] for o in estimate.hypothesis.laws],
     }
 
 
@@ -262,10 +236,21 @@ class FittingProblem:
         """Values by symbol, (1,) or (1, runs) [SI], as `GreyBox` takes one candidate."""
         values = {symbol: np.array([value]) for symbol, value in self.values(estimate).items()}
         run_values = {
-            nuisance.symbol: estimate.run_values[None, :, j]
+            nuisance.symbol: nuisance.centre + estimate.run_values[None, :, j]
             for j, nuisance in enumerate(estimate.hypothesis.run_parameters)
         }
-        return {**values, **run_values}
+        laws = {symbol: np.array([value]) for symbol, value in self.law_values(estimate).items()}
+        return {**values, **run_values, **laws}
+
+    def law_values(self, estimate: Estimate) -> dict[str, float]:
+        """Values by symbol [SI] with which the plant simulates the laws of an estimate."""
+        values: dict[str, float] = {}
+        acting = [(law, components) for law, components in estimate.laws if np.any(components)]
+        for number, (law, components) in enumerate(acting, start=1):
+            growth = law.growth(components)
+            simulated = self.plant.law_values  # type: ignore[attr-defined]
+            values |= simulated(number, law.cause, law.argument, law.low, law.high, growth)
+        return values
 
     def candidates(self, estimates: Sequence[Estimate]) -> dict[str, NDArray]:
         """Values by symbol of n estimates side by side, (n,) or (n, runs) [SI], for `GreyBox`."""
@@ -275,10 +260,12 @@ class FittingProblem:
             for p, scaled in zip(self.parameters(estimate), estimate.vector, strict=True):
                 nominal = np.full(n, p.nominal, dtype=float)
                 columns.setdefault(p.symbol, nominal)[i] = scaled * p.scale
+            for symbol, value in self.law_values(estimate).items():
+                columns.setdefault(symbol, np.zeros(n))[i] = value
             run_parameters = estimate.hypothesis.run_parameters
             for nuisance, own in zip(run_parameters, estimate.run_values.T, strict=True):
                 centre = np.full((n, len(self.plant.runs)), nuisance.centre)
-                columns.setdefault(nuisance.symbol, centre)[i] = own
+                columns.setdefault(nuisance.symbol, centre)[i] = nuisance.centre + own
             # A cause may set the same parameter: the unit's scatter is added to its value.
             deviations = self.slopes_of(estimate).deviations
             tolerances = self.plant.tolerances[: len(deviations)]
@@ -293,6 +280,12 @@ class FittingProblem:
         low = np.array([min(p.low / p.scale, p.high / p.scale) for p in parameters])
         high = np.array([max(p.low / p.scale, p.high / p.scale) for p in parameters])
         return np.minimum(low - vector, 0.0), np.maximum(high - vector, 0.0)
+
+    def priors(self, estimate: Estimate) -> tuple[NDArray, NDArray]:
+        """Precision of the vector's Gaussian priors, and the vector less their means, (k,) each [1]."""
+        parameters = self.parameters(estimate)
+        precision = np.array([(p.scale / p.sd) ** 2 for p in parameters])
+        return precision, estimate.vector - np.array([p.nominal / p.scale for p in parameters])
 
     def slopes_of(self, estimate: Estimate) -> NuisanceSlopes:
         """Nuisance slopes that hold for an estimate."""

@@ -17,9 +17,9 @@ from epv_env.common.files import write_json
 from identification.block_bootstrap import LEVEL, Interval
 from identification.gap.diagnosis import Diagnosis
 from identification.gap.evidence import EvaluatedHypothesis
-from identification.gap.form_modes import law_in_words
 from identification.gap.gaps import FLOOR
 from identification.gap.held_out import NOMINAL, RECALIBRATED
+from identification.gap.laws import in_words
 from identification.gap.localisation import Localisation, MissingTerm
 from identification.gap.posterior import variance_inflation
 from identification.gap.verdict import RankedCause
@@ -101,7 +101,7 @@ def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = 
         },
         "discrepancy": discrepancy(diagnosis),
         "parameters": {
-            "nominal": ranking.problem.values(diagnosis.nominal),
+            "nominal": fitted_values(diagnosis, diagnosis.nominal),
             "recalibrated": fitted_values(diagnosis, ranking.recalibrated),
             "with_cause": fitted_values(diagnosis, with_cause),
         },
@@ -144,7 +144,7 @@ def discrepancy(diagnosis: Diagnosis) -> dict[str, dict[str, float]]:
     Its standard deviation [unit of the channel] and its time scale [s]; 0 where nothing is seen.
     """
     ranking = diagnosis.ranking
-    channels = zip(ranking.problem.plant.channels, ranking.discrepancies, strict=True)
+    channels = zip(ranking.problem.plant.channels, ranking.noise, strict=True)
     return {
         channel.name: {
             "sd": float(seen.sd * (channel.noise or 0.0) / channel.scale),
@@ -159,7 +159,7 @@ def magnitudes(diagnosis: Diagnosis, cause: RankedCause) -> dict[str, tuple[floa
     intervals = parameter_intervals(diagnosis, cause.hypothesis)
     return {
         f"{p.symbol}_{unit_name(p.unit)}": intervals[p.symbol]
-        for p in cause.hypothesis.estimate.hypothesis.parameters
+        for p in cause.hypothesis.estimate.hypothesis.cause_parameters
     }
 
 
@@ -201,7 +201,17 @@ def _cause(diagnosis: Diagnosis, cause: RankedCause) -> dict[str, Any]:
         "effects": list(cause.effects),
         "probability": cause.probability,
         "magnitude": {name: list(values) for name, values in magnitudes(diagnosis, cause).items()},
-        "form": law_in_words(cause.hypothesis.estimate),
+        "form": in_words(cause.hypothesis.estimate.laws),
+        "laws": [
+            {
+                "effect": law.cause.label,
+                "argument": law.argument,
+                "low": law.low,
+                "high": law.high,
+                "growth": law.growth(components).tolist(),
+            }
+            for law, components in cause.hypothesis.estimate.laws
+        ],
         "converged": cause.hypothesis.converged,
     }
     label = cause.hypothesis.label
@@ -312,12 +322,13 @@ def _share_left(diagnosis: Diagnosis) -> Interval:
 
 
 def fitted_values(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis) -> dict[str, float]:
-    """Calibrated parameters, parameters of causes and the unit's tolerances by symbol [SI].
+    """Calibrated parameters, sizes of causes and the unit's tolerances by symbol [SI].
 
     A cause's parameter that is also a tolerance includes its own scatter.
     """
-    problem = diagnosis.ranking.problem
-    values = problem.values(hypothesis.estimate)
+    problem, estimate = diagnosis.ranking.problem, hypothesis.estimate
+    opened = {p.symbol for law in estimate.hypothesis.laws for p in law.parameters}
+    values = {s: v for s, v in problem.values(estimate).items() if s not in opened}
     for tolerance, deviation in zip(problem.plant.tolerances, hypothesis.tolerances, strict=True):
         own = values.get(tolerance.symbol, tolerance.centre)
         values[tolerance.symbol] = float(own + deviation * tolerance.sd)
@@ -340,16 +351,16 @@ def parameter_intervals(
 
 
 def parameter_covariance(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis) -> NDArray:
-    """Covariance of calibrated parameters and parameters of causes, (k, k) [SI].
+    """Covariance of calibrated parameters, components of laws and sizes of causes, (k, k) [SI].
 
-    Noise and discrepancy of the readings, as large and as correlated as they are, and errors of form
-    that no recording shows.
+    The residuals count as large and as correlated as they are. Beside them stand errors of form that no
+    recording shows.
     """
-    inflation = variance_inflation(hypothesis, diagnosis.ranking.discrepancies)
+    inflation = variance_inflation(hypothesis, diagnosis.ranking.noise)
     estimate = hypothesis.estimate
     deviations = np.zeros(len(estimate.vector))
     exact = [cause.exact_form for cause in estimate.hypothesis.causes for _ in cause.parameters]
-    pairs = zip(estimate.hypothesis.parameters, exact, strict=True)
+    pairs = zip(estimate.hypothesis.cause_parameters, exact, strict=True)
     for i, (p, known) in enumerate(pairs, start=estimate.cause_start):
         acting = estimate.vector[i] * p.scale - p.nominal
         deviations[i] = 0.0 if known else SYSTEMATIC_FORM_ERROR * acting

@@ -15,7 +15,7 @@ from identification.block_bootstrap import (
     block_weights,
     interval,
 )
-from identification.gap.discrepancy import LAGS, noise_ratios, squared_differences
+from identification.gap.noise import residual_noise
 from identification.gap.plant import GreyBox, Run
 
 FLOOR = 1.0
@@ -74,9 +74,8 @@ class GapDraws:
         )
         squares = {label: self._sums([np.square(y) for y in own]) for label, own in residuals.items()}
         best = min(squares, key=lambda label: np.sum(squares[label][0]))
-        variograms = np.array([self._variogram(residuals[best], lag) for lag in LAGS])
-        self.noise = noise_ratios(variograms, squares[best] / self._readings)
-        """Noise deviation relative to the channel's, (1 + draws, channels) [1]."""
+        self.noise = np.sqrt([own.floor for own in residual_noise(plant, residuals[best])])
+        """Noise deviation relative to the channel's, (channels,) [1]."""
         self._squares = {label: own / self.noise**2 for label, own in squares.items()}
 
     def overall(self, label: str) -> NDArray:
@@ -121,15 +120,6 @@ class GapDraws:
         kept = [value, *grid[(below >= tail) & (below <= 1 - tail)]]
         low, high = np.clip([min(kept) - grid[1], max(kept) + grid[1]], 0, 1)
         return Interval(value=value, low=float(low), high=float(high))
-
-    def _variogram(self, residuals: Sequence[NDArray], lag: int) -> NDArray:
-        """Half the mean squared differences over a lag [readings], (1 + draws, channels) [variances].
-
-        residuals: per run (channels, samples) [noise deviations].
-        """
-        differences = squared_differences(self.plant, residuals, lag)
-        changes, count = [self._sums(own) for own in differences]
-        return 0.5 * changes / np.maximum(count, np.finfo(float).tiny)
 
     def _sums(self, series: Sequence[NDArray]) -> NDArray:
         """Sums of series, per run (channels, samples), over the held-out runs, (1 + draws, channels)."""

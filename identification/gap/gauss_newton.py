@@ -26,11 +26,15 @@ SMALLEST_DIFFERENCED = 0.1
 """Scaled parameter [1] below which the difference step no longer shrinks with the parameter: a cause
 that does not act yet has the value 0."""
 
+PRIOR_STEP = 0.02
+"""Finite difference of a parameter with a Gaussian prior [standard deviations]: such a law changes a
+strength by a percent."""
+
 ITERATIONS, THOROUGH_ITERATIONS = 12, 40
 """Most Gauss-Newton iterations, for computing time. A fit that needs more is weighed as it is and
 reported as not converged. Plants with a small catalogue have thorough fits, which cost little."""
 
-INITIAL_DAMPING = 1e-3
+INITIAL_DAMPING = 0.1
 """Levenberg-Marquardt damping of the first step, relative to the diagonal [1]: nearly none, as starts
 are expected to be close."""
 
@@ -103,8 +107,10 @@ def _kept(problem: FittingProblem, estimate: Estimate) -> int:
 def _steps(problem: FittingProblem, estimate: Estimate) -> NDArray:
     """Finite differences of the scaled vector (k,) [1], away from the nearer end of each range."""
     middle = np.array([0.5 * (p.low + p.high) / p.scale for p in problem.parameters(estimate)])
-    relative = np.where(estimate.vector > middle, -DIFFERENCE_STEP, DIFFERENCE_STEP)
-    return relative * np.maximum(np.abs(estimate.vector), SMALLEST_DIFFERENCED)
+    sizes = np.maximum(np.abs(estimate.vector), SMALLEST_DIFFERENCED)
+    sd = np.array([p.sd / p.scale for p in problem.parameters(estimate)])
+    steps = np.where(np.isfinite(sd), PRIOR_STEP * sd, DIFFERENCE_STEP * sizes)
+    return np.where(estimate.vector > middle, -steps, steps)
 
 
 def _linearised(
@@ -154,13 +160,12 @@ def linearised_run(
     known = (*run_parameters, *problem.plant.run_offsets[:offsets])
     # The slopes describe tolerances from their centres: their part in the simulation is undone.
     undone = shared_slopes @ nuisances.deviations
-    if nuisances.forms:
-        modes, added = nuisances.forms.at(estimate, run)
-        shared_slopes = np.column_stack([shared_slopes, modes])
-        slopes = slopes + added if slopes.size else slopes
+    precision, values = problem.priors(estimate)
     return LinearisedRun(
         residual=problem.residual(run, outputs[:, None])[:, 0] + undone,
         slopes=slopes,
+        slope_precision=precision[: slopes.shape[1]],
+        slope_values=values[: slopes.shape[1]],
         run_slopes=np.column_stack([run_slopes, offset_slopes]),
         run_values=np.concatenate([run_values, np.zeros(offsets)]),
         run_sd=np.array([nuisance.sd for nuisance in known]),
@@ -268,7 +273,6 @@ class _Search:
             self.trial,
             chi_square=equations.chi_square,
             run_values=self._stepped_run_values(runs, equations),
-            shares=equations.shared[len(self.problem.plant.tolerances) :],
         )
 
     def _take_anew(self) -> None:

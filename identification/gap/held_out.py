@@ -102,7 +102,7 @@ def measure_discrepancy_reduction(
         label: _unexplained(draws, label, p_value(plant, predictions[label].residuals, box, seed, scale))
         for label, box in boxes.items()
     }
-    ratios = zip(plant.channels, draws.noise[0], strict=True)
+    ratios = zip(plant.channels, draws.noise, strict=True)
     return DiscrepancyReduction(
         gaps={
             label: draws.gap(label, percentage_errors(plant, predictions[label].outputs))

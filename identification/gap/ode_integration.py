@@ -17,6 +17,7 @@ import numpy as np
 from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
+from identification.gap.laws import KNOTS, MOST_LAWS
 from identification.gap.runge_kutta import advancing
 
 STEP_ERROR = 0.05
@@ -45,33 +46,77 @@ def record(kind: str, names: Sequence[str]) -> Any:
     return namedtuple(kind.replace(" ", "_"), names)
 
 
-class Records:
-    """The records of one plant: states, inputs with the time, and parameters."""
+LAW_ROWS = 4 + KNOTS
+"""Numbers of a law behind the symbols: place of its cause, of its argument, both ends, and the knots."""
 
-    def __init__(self, states: Sequence[str], inputs: Sequence[str], symbols: Sequence[str]):
+
+class Records:
+    """The records of one plant: states, inputs with the time, and parameters.
+
+    Symbols of a cause follow its law: what they have beyond their nominal values is multiplied by 1 + g.
+    """
+
+    def __init__(
+        self,
+        states: Sequence[str],
+        inputs: Sequence[str],
+        symbols: Sequence[str],
+        nominal: Sequence[float] = (),
+        owners: Sequence[int] = (),
+    ):
+        """nominal, owners: value [SI] and number of the cause of each symbol, from 1 on; 0: none."""
         self.states, self.inputs, self.symbols = tuple(states), tuple(inputs), tuple(symbols)
+        self.nominal = np.array(nominal or [0.0] * len(symbols), dtype=float)
+        self.owners = np.array(owners or [0] * len(symbols), dtype=np.int64)
         self.x = record("state", self.states)
         self.u = record("input", (TIME, *self.inputs))
         self.p = record("parameter", self.symbols)
 
-    def flat(self, function: Callable, count: int) -> Callable:
+    def flat(self, function: Callable, count: int, wrap: Callable) -> Callable:
         """A function (x, t, u, p, out) of arrays that writes `count` results into `out`.
 
-        The arrays' axes are states, inputs, symbols and results. The text is generated, as numba needs
-        every field written out.
+        The arrays' axes are states, inputs, symbols with the laws behind them, and results. The text is
+        generated, as numba needs every field written out. wrap: compiles a function, or leaves it.
         """
         x = ", ".join(f"x[{i}]" for i in range(len(self.states)))
         u = ", ".join(["t", *(f"u[{i}]" for i in range(len(self.inputs)))])
         p = ", ".join(f"p[{i}]" for i in range(len(self.symbols)))
         lines = [
             "def flat(x, t, u, p, out):",
+            "    p = lawful(x, u, p)",
             f"    r = function(State({x}), Input({u}), Parameter({p}))",
             *(f"    out[{i}] = r[{i}]" for i in range(count)),
             "    return out",
         ]
         names = {"function": function, "State": self.x, "Input": self.u, "Parameter": self.p}
+        names["lawful"] = wrap(self._lawful())
         exec("\n".join(lines), names)
         return names["flat"]
+
+    def _lawful(self) -> Callable:
+        """A function (x, u, p) that gives the symbols as strong as their laws make them."""
+        count, states, owners, nominal = len(self.symbols), len(self.states), self.owners, self.nominal
+
+        def lawful(x, u, p):
+            strong = p
+            for law in range(MOST_LAWS):
+                first = count + law * LAW_ROWS
+                cause, argument = int(p[first]), int(p[first + 1])
+                if cause == 0:
+                    continue
+                strong = strong.copy()
+                a = x[argument - 1] if argument <= states else u[argument - 1 - states]
+                at = (a - p[first + 2]) / (p[first + 3] - p[first + 2]) * (KNOTS - 1)
+                at = min(max(at, 0.0), KNOTS - 1.0)
+                knot = min(int(at), KNOTS - 2)
+                g = p[first + 4 + knot]
+                g += (at - knot) * (p[first + 5 + knot] - g)
+                for i in range(count):
+                    if owners[i] == cause:
+                        strong[i] = nominal[i] + (strong[i] - nominal[i]) * max(1.0 + g, 0.0)
+            return strong
+
+        return lawful
 
 
 def compiled(function: Callable) -> Callable:
@@ -113,7 +158,7 @@ class Job:
     delays: NDArray
     """By how much each input acts late, (inputs, n) [s]."""
     parameters: NDArray
-    """Values of all symbols, (symbols, n) [SI]."""
+    """Values of all symbols [SI], and the laws behind them, (symbols + laws, n)."""
     period: float
     """Sampling period [s]."""
     steps: int
@@ -196,7 +241,7 @@ def simulator(records: Records, functions: Sequence[tuple[Callable, int]], mode:
     if mode not in MODES:
         raise ValueError(f"mode '{mode}' is none of {', '.join(MODES)}: choose one of them")
     own: Callable = compiled if mode == "compiled" else lambda function: function
-    rate, read, thresholds = (own(records.flat(own(f), results)) for f, results in functions)
+    rate, read, thresholds = (own(records.flat(own(f), results, own)) for f, results in functions)
     channels, count = functions[1][1], functions[2][1]
     advance = advancing(rate, thresholds, count, own)
     return _explained(alone(advance, read, channels, own))

@@ -1,6 +1,6 @@
 """A plant for the diagnosis from plain differential equations: x' = rate(x, u, p)."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from typing import Any
@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.ode_integration import TIME, Job, Records, settled_steps, simulator
+from identification.gap.laws import MOST_LAWS
+from identification.gap.noise import channel_noise
+from identification.gap.ode_integration import LAW_ROWS, TIME, Job, Records, settled_steps, simulator
 from identification.gap.plant import (
     Cause,
     Channel,
-    Contribution,
     FreeParameter,
     NuisanceParameter,
     Run,
     StateEquation,
     StateTrace,
 )
-from identification.gap.reading_noise import channel_noise
 
 
 class OdePlant:
@@ -86,7 +86,10 @@ class OdePlant:
         self.parameters, self.causes = tuple(parameters), tuple(causes)
         self.run_offsets, self.tolerances = tuple(run_offsets), tuple(tolerances)
         self.nominal = _nominal_values(parameters, causes, (*run_offsets, *tolerances))
-        self._records = Records(states, inputs, tuple(self.nominal))
+        self._records = Records(
+            states, inputs, tuple(self.nominal), [*self.nominal.values()], self._owners()
+        )
+        self.law_arguments = (*states, *inputs)
         self._start, self._regimes = start, regimes
         self._rate, self._read = rate, readings
         self._delays = dict(delays or {})
@@ -109,6 +112,21 @@ class OdePlant:
         """`GreyBox.outputs`: per run (channels, samples, n) [SI]."""
         return [self._simulated(self._job(values, r))[0] for r in runs]
 
+    def law_values(
+        self, number: int, cause: Cause, argument: str, low: float, high: float, growth: NDArray
+    ) -> dict[str, float]:
+        """`GreyBox.law_values`; growth: (knots,)."""
+        place = [own.label for own in self.causes].index(cause.label) + 1
+        numbers = (place, self.law_arguments.index(argument) + 1, low, high, *growth)
+        return {f"law {number}, {row}": float(value) for row, value in enumerate(numbers)}
+
+    def _owners(self) -> list[int]:
+        """Number of the cause of each symbol, from 1 on; 0 for those of no cause."""
+        owners = dict.fromkeys(self.nominal, 0)
+        for number, cause in enumerate(self.causes, start=1):
+            owners |= {p.symbol: number for p in cause.parameters}
+        return list(owners.values())
+
     def states(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, StateTrace]:
         """`GreyBox.states`: states and inputs, values (samples,) [SI]."""
         x = self._simulated(self._job(_first(values), run))[1][..., 0]
@@ -124,7 +142,7 @@ class OdePlant:
             return {}
         x = self._simulated(self._job(_first(values), run))[1][..., 0]
         own = self.runs[run]
-        p = self._records.p(*self._parameters(_first(values), run)[:, 0])
+        p = self._records.p(*self._parameters(_first(values), run)[: len(self.nominal), 0])
         return self._regimes(self._records.x(*x), self._records.u(own.time, *own.inputs.values()), p)
 
     def forced(self, values: Mapping[str, NDArray], run: int, forcing: Mapping[str, NDArray]) -> NDArray:
@@ -138,39 +156,6 @@ class OdePlant:
         copies = copies or {symbol: np.full(m + 1, v) for symbol, v in self.nominal.items()}
         read = self._simulated(replace(self._job(copies, run), push=push))[0]
         return read[..., 1:] - read[..., :1]
-
-    def contribution(
-        self, values: Mapping[str, NDArray], symbols: Collection[str], run: int
-    ) -> Contribution:
-        """`GreyBox.contribution`: forcings of the states, and readings (channels, samples) [SI]."""
-        job = self._job(_first(values), run)
-        x = self._simulated(job)[1][..., 0]
-        without = job.parameters.copy()
-        for symbol in symbols:
-            without[self._records.symbols.index(symbol)] = self.nominal[symbol]
-        rates, readings = (
-            with_them - without_them
-            for with_them, without_them in zip(
-                self._along(x, run, job.parameters), self._along(x, run, without), strict=True
-            )
-        )
-        return Contribution(
-            equations={
-                equation.name: rate
-                for equation, rate in zip(self.equations, rates, strict=True)
-                if equation.step
-            },
-            readings=readings,
-        )
-
-    def _along(self, x: NDArray, run: int, p: NDArray) -> tuple[NDArray, NDArray]:
-        """Rates (states, samples) and readings (channels, samples) at states x (states, samples)."""
-        names, own = self._records, self.runs[run]
-        parameters = names.p(*p[:, 0])
-        inputs = np.array([own.time - own.time[0], *own.inputs.values()], dtype=float)
-        given = [(names.x(*a), names.u(*b), parameters) for a, b in zip(x.T, inputs.T, strict=True)]
-        rates, readings = ([f(*each) for each in given] for f in (self._rate, self._read))
-        return np.array(rates, dtype=float).T, np.array(readings, dtype=float).T
 
     def _simulated(self, job: Job) -> tuple[NDArray, NDArray]:
         """Readings (channels, samples, n) and states (states, samples, n) [SI]."""
@@ -195,10 +180,12 @@ class OdePlant:
         )
 
     def _parameters(self, values: Mapping[str, NDArray], run: int) -> NDArray:
-        """Values of all symbols in a run, (symbols, n) [SI]."""
+        """Values of all symbols in a run [SI] with the laws behind them, (symbols + laws, n)."""
         n = max((np.shape(v)[0] for v in values.values()), default=1)
-        p = np.repeat(np.array([*self.nominal.values()], dtype=float)[:, None], n, axis=1)
-        for i, symbol in enumerate(self._records.symbols):
+        laws = [f"law {law}, {row}" for law in range(1, 1 + MOST_LAWS) for row in range(LAW_ROWS)]
+        nominal = [*self.nominal.values(), *[0.0] * len(laws)]
+        p = np.repeat(np.array(nominal, dtype=float)[:, None], n, axis=1)
+        for i, symbol in enumerate((*self._records.symbols, *laws)):
             if symbol in values:
                 given = np.asarray(values[symbol])
                 p[i] = given[:, run] if given.ndim == 2 else given
@@ -206,7 +193,9 @@ class OdePlant:
 
     def _starts(self, run: Run, p: NDArray) -> NDArray:
         """States at the first sample, (states, n) [SI]."""
-        return np.array([self._start(run, self._records.p(*own)) for own in p.T], dtype=float).T.copy()
+        return np.array(
+            [self._start(run, self._records.p(*own[: len(self.nominal)])) for own in p.T], dtype=float
+        ).T.copy()
 
     def _state_equations(
         self, components: Mapping[str, str], forcing_steps: Mapping[str, float]

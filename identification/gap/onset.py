@@ -5,12 +5,11 @@ So one simulation of each cause serves every onset.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.screening import CauseSignature
+from identification.gap.screening import CauseSignature, with_changes
 from identification.gap.variable_projection import LinearisedRun, eliminated, normal_equations
 
 
@@ -25,7 +24,7 @@ def least_squares_by_onset(
         parts: number of the part that each run belongs to, (runs,).
     """
     joint = [
-        replace(run, slopes=np.column_stack([run.slopes, *(s.changes[r] for s in signatures)]))
+        with_changes(run, [signature.changes[r] for signature in signatures])
         for r, run in enumerate(runs)
     ]
     grams = normal_equations(joint).runs.free()

@@ -5,12 +5,13 @@ nuisance parameters, state equations, and a simulator of several candidates side
 """
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 
 class PlantError(ValueError):
@@ -83,6 +84,8 @@ class FreeParameter:
     """What the parameter is, in words; empty where the symbol says it."""
     scale: float = math.nan
     """Usual size [SI], not 0; the optimiser works with value/scale. Left out: `usual_size`."""
+    sd: float = math.inf
+    """Standard deviation of its Gaussian prior about `nominal` [SI]; infinity for none."""
 
     def __post_init__(self):
         """Give a parameter without a scale its usual size, so that every scale is a number."""
@@ -136,7 +139,12 @@ class Cause:
     words: str = ""
     """What people read instead of a name that they cannot know; empty where the name says it."""
     exact_form: bool = False
-    """True where the form is not in doubt: a parameter of the model differs from its nominal value."""
+    """True where the cause has no law but its own: a parameter of the model that is off, an offset."""
+
+    @property
+    def sizes(self) -> tuple[FreeParameter, ...]:
+        """Parameters without which the cause does not act; the others say how its form departs."""
+        return tuple(parameter for parameter in self.parameters if parameter.trials)
 
     @property
     def label(self) -> str:
@@ -185,25 +193,19 @@ class StateTrace:
     """Time course, (samples,) [SI]."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Contribution:
-    """What a cause adds to the equations and readings of the nominal model."""
-
-    equations: Mapping[str, NDArray]
-    """Forcing that it amounts to, (samples,) [SI] by name of the equation."""
-    readings: NDArray
-    """Added to the readings themselves, (channels, samples) [SI]."""
-
-
 class GreyBox(Protocol):
     """A plant with recordings. Values are SI; n candidates are simulated side by side.
 
     Candidate values are a mapping from symbol to an array: (n,), or (n, runs) for a parameter that takes
     a separate value in every run. A symbol that is left out has its nominal value.
 
-    Two members are optional. `with_runs(runs)` is the plant with other readings and inputs of its runs:
+    Some members are optional. `with_runs(runs)` is the plant with other readings and inputs of its runs:
     without it, a wild sample of an input is refused. `screened` are the faulty readings of a plant that
-    has screened its own recordings (`identification.gap.screened`).
+    has screened its own recordings (`identification.gap.screened`). `law_values(number, cause, argument,
+    low, high, growth)` gives values by symbol [SI] with which `outputs` simulates law `number`, 1 or 2,
+    of a cause: its strength times 1 + g, where g is linear between the knots `growth`, equally spaced
+    from `low` to `high` of one of the states in `law_arguments`, and constant beyond. Without it, all
+    causes have the laws that are assumed.
     """
 
     @property
@@ -281,21 +283,6 @@ class GreyBox(Protocol):
         """
         ...
 
-    def contribution(
-        self, values: Mapping[str, NDArray], symbols: Collection[str], run: int
-    ) -> "Contribution | None":
-        """What some symbols add to the equations and readings along the candidate's course.
-
-        Args:
-            values: values of one candidate by symbol, (1,) or (1, runs) [SI].
-            symbols: which otherwise have their nominal values.
-            run: index into `self.runs`.
-
-        Returns:
-            None where the plant cannot tell.
-        """
-        ...
-
 
 def window_forcing(equation: StateEquation, samples: int, edges: NDArray) -> dict[str, NDArray]:
     """A forcing of the equation's step in each window, (samples, windows) by the equation's name.
@@ -306,8 +293,43 @@ def window_forcing(equation: StateEquation, samples: int, edges: NDArray) -> dic
     return {equation.name: equation.step * (window == np.arange(len(edges) - 1))}
 
 
+@dataclass(frozen=True, kw_only=True)
+class Ripple:
+    """A first-order process beside white noise, as an ARMA(1, 1) process (Granger and Morris 1976)."""
+
+    decay: float
+    """Autocorrelation of the process at two successive samples [1]."""
+    memory: float
+    """Coefficient of the former innovation in a reading [1]."""
+    noise: float
+    """Standard deviation of the innovations, what no former reading predicts [noise deviations]."""
+    sd: float
+    """Standard deviation of the process [noise deviations]."""
+
+    @classmethod
+    def of(cls, variance: float, white: float, decay: float) -> "Ripple":
+        """A process and white noise of these variances [noise variances]."""
+        sides = variance * (1.0 - decay**2) + white * (1.0 + decay**2)
+        product = white * decay
+        half = 0.5 * sides
+        innovations = half + math.sqrt(max(half**2 - product**2, 0.0))
+        return cls(decay=decay, memory=product / innovations, noise=math.sqrt(innovations),
+                   sd=math.sqrt(variance))  # fmt: skip
+
+    @property
+    def samples(self) -> float:
+        """Samples over which the process is correlated."""
+        return -1.0 / math.log(self.decay)
+
+    def whitened(self, series: NDArray) -> NDArray:
+        """Innovations of series (samples, ...) that were 0 before, in standard deviations of theirs."""
+        return np.asarray(lfilter([1.0, -self.decay], [1.0, -self.memory], series / self.noise, axis=0))
+
+
 def noise_weighted(plant: GreyBox, run: int, values: NDArray) -> NDArray:
     """Values (channels, samples, ...) [SI] in noise standard deviations, 0 at untrusted readings.
+
+    A channel with a ripple is filtered so that its noise is white.
 
     Raises ValueError where the noise of a channel is not known: see `prepared`.
     """
@@ -316,4 +338,8 @@ def noise_weighted(plant: GreyBox, run: int, values: NDArray) -> NDArray:
     mask = trusted / noise[:, None]
     weighted = values * mask.reshape(*mask.shape, *[1] * (values.ndim - 2))
     weighted[~trusted] = 0.0  # NaN times 0 is NaN
+    for c, ripple in enumerate(getattr(plant, "ripples", ())):
+        if ripple:
+            weighted[c] = ripple.whitened(weighted[c])
+            weighted[c, ~trusted[c]] = 0.0
     return weighted

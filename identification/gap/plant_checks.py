@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import combinations
-from math import isfinite
+from math import isfinite, isinf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -160,7 +160,7 @@ def _number_faults(plant: GreyBox) -> Iterator[str]:
         for p in cause.parameters:
             place = f"causes, {cause.label}, {p.symbol}"
             yield from _range_faults(place, p, "trial", p.trials)
-            if not p.trials:
+            if not p.trials and isinf(p.sd):
                 yield f"{place}: it has no trials, but the search begins there: give one value or more"
             if p.nominal in p.trials:
                 yield f"{place}: trial {p.nominal:g} is the nominal value, where no cause acts"
@@ -227,7 +227,7 @@ def _trials(plant: GreyBox) -> dict[str, dict[str, float]]:
         value = p.nominal + (step if p.nominal + step <= p.high else -step)
         found[f"parameters, {p.symbol}"] = {p.symbol: value}
     for cause in plant.causes:
-        found[f"causes, {cause.label}"] = {p.symbol: p.trials[0] for p in cause.parameters}
+        found[f"causes, {cause.label}"] = {p.symbol: p.trials[0] for p in cause.sizes}
     return found
 
 

@@ -1,45 +1,41 @@
-"""Probabilities of hypotheses: a conditional logit of a few figures, with weights learnt on trials.
+"""Probabilities of hypotheses, all on one scale: the misfit that each leaves beyond noise.
 
-A hypothesis is a set of causes, no cause, or an unknown one. Its log probability is, but for a constant,
-a weighted sum of figures that mean the same for every plant (McFadden 1974), less the logarithm of the
-number of sets with as many causes, of which each is as probable before the data. The share of the misfit
-that it leaves stands in for the likelihood: where the variance of the model's discrepancy is unknown,
-the likelihood is a power of the misfit. The weights were fitted on opened trials of several virtual
-plants (docs/studies/calibration), so the probabilities are as often right there as they say.
+A hypothesis is a set of causes with their laws, no cause, or an unknown one. Its misfit M is half its
+sum of squares beyond the noise floors, with the penalties of nuisance parameters. Where the variance of
+the model's discrepancy is unknown, the likelihood is a power of the misfit (Student's t): the log
+probability is -POWER log(1 + M/T) + log prior. T is the misfit that no model is free of. The prior
+counts causes and open laws, and how far the laws depart from those that are assumed.
 """
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import resources
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln, softmax
 
-from identification.gap.discrepancy import ChannelDiscrepancy, channel_discrepancies
 from identification.gap.evidence import EvaluatedHypothesis
 from identification.gap.fitting_problem import FittingProblem
+from identification.gap.noise import ChannelNoise, residual_noise
 
-FIGURES = ("fit", "causes", "strain", "no_cause", "seen", "unknown")
-"""Names of the figures, in the order of their weights."""
+POWER = 10.0
+"""How many powers of the misfit the likelihood falls by [1]: a cause that leaves twice the tolerated
+misfit is 60 times less probable."""
 
-CHANCE_MISFIT = 15.0
-"""Misfit that chance leaves [nats]: less is no misfit."""
+CHANCE = 15.0
+"""Misfit that chance leaves, however few the readings [nats]: more parameters fit noise as well."""
 
-FORM_SHARE, UNKNOWN_SHARE = 3e-4, 0.05
-"""Share of the recalibrated model's misfit that counts as none [1], 2 % in amplitude, and the share that
-an unknown cause is taken to leave: less is rarely left by chance."""
+TOLERANCE = 2e-3
+"""Misfit that no model is free of [nats per reading]: its root mean square then rises by a fifth of a
+percent, which no estimate of the noise resolves."""
 
+NO_CAUSE, ONE_CAUSE, FURTHER_CAUSE = 0.5, 0.3, 0.1
+"""Probability before the data of no cause and of one cause, and of each further one relative to that:
+most valves have no fault or one."""
 
-def _weights() -> NDArray:
-    text = resources.files("identification.gap").joinpath("weights.json").read_text(encoding="utf-8")
-    values = json.loads(text)["weights"]
-    return np.array([values[name] for name in FIGURES])
-
-
-WEIGHTS = _weights()
-"""Weight of each figure, (figures,)."""
+UNKNOWN_SHARE = 3e-3
+"""Share of the recalibrated model's misfit that an unknown cause is taken to leave [1], beside the
+tolerated one: 5 % in amplitude, which a wrong cause rarely reaches."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,21 +43,17 @@ class Posterior:
     """Probabilities of n hypotheses with causes, and of the others."""
 
     hypotheses: list[EvaluatedHypothesis]
-    """Single causes and sets of causes, (n,)."""
+    """Single causes and sets of causes, the most probable first, (n,)."""
     probabilities: list[float]
     """Of each hypothesis, (n,); with the two following they sum to 1."""
     no_cause: float
     """Probability that no cause acts."""
     unknown: float
     """Probability that what acts has no name in the catalogue."""
-    figures: NDArray
-    """Of each hypothesis, then of no cause and of an unknown one, (n + 2, figures)."""
-    scores: list[float]
-    """Log probability of each but for a constant, (n,) [nats]."""
-    shares_left: list[float]
-    """Share of the misfit beyond noise that each hypothesis leaves, (n,) [1]."""
-    discrepancies: list[ChannelDiscrepancy]
-    """Noise and discrepancy of each channel under the best hypothesis."""
+    misfits: list[float]
+    """Misfit beyond noise that each hypothesis leaves, (n,) [nats]."""
+    noise: list[ChannelNoise]
+    """Noise of each channel under the best hypothesis."""
 
 
 def posterior(
@@ -70,85 +62,66 @@ def posterior(
     """Probabilities of hypotheses with causes, of no cause and of an unknown one."""
     every = [recalibrated, *hypotheses]
     best = min(every, key=lambda each: float(np.sum(np.log(np.maximum(each.squares, 1e-300)))))
-    discrepancies = channel_discrepancies(problem.plant, best.residuals)
-    misfits = np.array([misfit_beyond_noise(each, discrepancies) for each in every])
+    noise = residual_noise(problem.plant, best.residuals)
+    misfits = np.array([misfit_beyond_noise(each, noise) for each in every])
     misfits = misfits - min(float(np.min(misfits)), 0.0)
-    figures = hypothesis_figures(every, misfits)
-    scores = figures @ WEIGHTS - log_sets(problem, hypotheses)
-    scores[:-2][[each.at_bound for each in hypotheses]] = -np.inf
+    tolerated = tolerated_misfit(noise)
+    left = np.append(misfits, tolerated + UNKNOWN_SHARE * misfits[0])
+    scores = -POWER * np.log1p(left / tolerated) + log_priors(problem, hypotheses)
     weights = softmax(scores)
+    order = np.lexsort((misfits[1:], -weights[1:-1]))
     return Posterior(
-        hypotheses=list(hypotheses),
-        probabilities=weights[:-2].tolist(),
-        no_cause=float(weights[-2]),
+        hypotheses=[hypotheses[i] for i in order],
+        probabilities=weights[1:-1][order].tolist(),
+        no_cause=float(weights[0]),
         unknown=float(weights[-1]),
-        figures=figures,
-        scores=scores[:-2].tolist(),
-        shares_left=(misfits[1:] / (misfits[0] + CHANCE_MISFIT)).tolist(),
-        discrepancies=discrepancies,
+        misfits=misfits[1:][order].tolist(),
+        noise=noise,
     )
 
 
-def hypothesis_figures(every: Sequence[EvaluatedHypothesis], misfits: NDArray) -> NDArray:
-    """Figures of hypotheses, then of no cause and of an unknown one, (n + 2, figures).
+def tolerated_misfit(noise: Sequence[ChannelNoise]) -> float:
+    """The misfit that no model is free of [nats]."""
+    return CHANCE + TOLERANCE * sum(own.readings for own in noise)
 
-    fit: minus the log of the share of the misfit that is left. causes: their number. strain: log of
-    1 + half the squared deviations of all nuisances, modes of form included. seen: log of the misfit
-    over that of chance, of no cause.
 
-    every: no cause first. misfits: of each beyond noise, (n + 1,) [nats].
+def log_priors(problem: FittingProblem, hypotheses: Sequence[EvaluatedHypothesis]) -> NDArray:
+    """Log probability before the data of no cause, of hypotheses and of an unknown cause, (n + 2,).
+
+    All sets of as many causes share the probability of their number, and an open law that of all states
+    that it may follow. A size at an end of its range costs 1 nat. An unknown cause is as probable as two
+    causes.
     """
-    whole = misfits[0] + CHANCE_MISFIT
-    least = CHANCE_MISFIT + FORM_SHARE * misfits[0]
-    rows = [
-        (
-            -np.log((misfit + least) / whole),
-            len(each.labels),
-            np.log1p(each.nuisance_penalty),
-            float(not each.labels),
-            0.0 if each.labels else np.log(whole / CHANCE_MISFIT),
-            0.0,
-        )
-        for each, misfit in zip(every, misfits, strict=True)
+    arguments = max(len(getattr(problem.plant, "law_arguments", ())), 1)
+    count = len({cause.name for cause in problem.plant.causes})
+    chosen = np.array([*(len(each.labels) for each in hypotheses), min(2, count)])
+    sets = gammaln(count + 1) - gammaln(chosen + 1) - gammaln(count - chosen + 1)
+    logs = np.log(ONE_CAUSE) + (chosen - 1) * np.log(FURTHER_CAUSE) - sets
+    own = [sum(np.log(c.prior) for c in each.estimate.hypothesis.causes) for each in hypotheses]
+    laws = [
+        each.law_penalty + len(each.estimate.hypothesis.laws) * np.log(arguments) + each.unusual
+        for each in hypotheses
     ]
-    unknown_fit = -np.log((CHANCE_MISFIT + UNKNOWN_SHARE * misfits[0]) / whole)
-    unknown = (unknown_fit, 0.0, 0.0, 0.0, 0.0, 1.0)
-    return np.array([*rows[1:], rows[0], unknown])
+    sizes = [sum(len(c.sizes) for c in each.estimate.hypothesis.causes) for each in hypotheses]
+    # Sizes that are fitted fit noise as well (Schwarz 1978); an unknown cause has two.
+    fitted = 0.5 * np.log(max(problem.readings, 1)) * np.array([*sizes, 2.0])
+    logs = logs - fitted
+    return np.array([np.log(NO_CAUSE), *(logs[:-1] + own - np.array(laws)), logs[-1]])
 
 
-def log_sets(problem: FittingProblem, every: Sequence[EvaluatedHypothesis]) -> NDArray:
-    """Log of the number of sets with as many causes as each, as none and as an unknown one, (n + 2,).
-
-    every: with causes.
-    """
-    causes = len({cause.name for cause in problem.plant.causes})
-    chosen = np.array([*(len(each.labels) for each in every), 0, 0])
-    return gammaln(causes + 1) - gammaln(chosen + 1) - gammaln(causes - chosen + 1)
-
-
-def misfit_beyond_noise(each: EvaluatedHypothesis, discrepancies: Sequence[ChannelDiscrepancy]) -> float:
+def misfit_beyond_noise(each: EvaluatedHypothesis, noise: Sequence[ChannelNoise]) -> float:
     """Half the sum of squares beyond the floors, in their variances, and of nuisances [nats]."""
     return each.nuisance_penalty + sum(
-        (float(squares) / d.floor - d.readings) / (2.0 * d.inflation)
-        for squares, d in zip(each.squares, discrepancies, strict=True)
+        (float(squares) / own.floor - own.readings) / 2.0
+        for squares, own in zip(each.squares, noise, strict=True)
     )
 
 
-def misfit_beyond_white_noise(
-    each: EvaluatedHypothesis, discrepancies: Sequence[ChannelDiscrepancy]
-) -> float:
-    """The same beyond white noise alone: a misfit that is always there may look like a disturbance."""
-    return each.nuisance_penalty + sum(
-        (float(squares) / max(d.mean_square - d.sd**2, d.floor * 1e-3) - d.readings) / 2.0
-        for squares, d in zip(each.squares, discrepancies, strict=True)
-    )
-
-
-def variance_inflation(each: EvaluatedHypothesis, discrepancies: Sequence[ChannelDiscrepancy]) -> float:
+def variance_inflation(each: EvaluatedHypothesis, noise: Sequence[ChannelNoise]) -> float:
     """Variance of a parameter relative to that under white noise of the channels' size [1], at least 1.
 
     Noise and discrepancy together count, and readings that are correlated tell less.
     """
-    correlations = np.array([d.autocorrelation for d in discrepancies])
-    readings = sum(d.readings for d in discrepancies)
+    correlations = np.array([own.correlated for own in noise])
+    readings = sum(own.readings for own in noise)
     return max(float(np.sum(correlations * each.squares)) / max(readings, 1), 1.0)

@@ -1,14 +1,14 @@
 """A plant as the stages of the diagnosis need it: screened, noise known, every reading a number."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.plant import Channel, Contribution, GreyBox, PlantError, Run, StateTrace
-from identification.gap.reading_noise import channel_noise
+from identification.gap.noise import channel_noise
+from identification.gap.plant import Cause, Channel, GreyBox, PlantError, Ripple, Run, StateTrace
 from identification.gap.screened import Finding, bridged, screen
 
 
@@ -37,9 +37,13 @@ class PreparedPlant:
             )
             for c, channel in enumerate(plant.channels)
         )
+        self.law_arguments: tuple[str, ...] = tuple(getattr(plant, "law_arguments", ()))
+        """States over which the plant simulates laws; () where it cannot."""
         self.time_scale: float | None = getattr(plant, "time_scale", None)
         """Of the plant [s]; None: its readings show it."""
         self.runs: tuple[Run, ...] = tuple(_prepared_run(run) for run in runs)
+        self.ripples: tuple[Ripple | None, ...] = ()
+        """By channel, what filters its readings; () where none ripples."""
 
     def with_noise(self, ratios: Sequence[float]) -> "PreparedPlant":
         """The plant whose channels have their noise times a ratio each, as residuals show it [1]."""
@@ -49,6 +53,12 @@ class PreparedPlant:
             for channel, ratio in zip(self.channels, ratios, strict=True)
         )
         return corrected
+
+    def with_ripples(self, ripples: Sequence[Ripple | None]) -> "PreparedPlant":
+        """The plant whose readings are filtered where a channel has a ripple."""
+        filtered = copy(self)
+        filtered.ripples = tuple(ripples)
+        return filtered
 
     def outputs(self, values: Mapping[str, NDArray], runs: Sequence[int]) -> list[NDArray]:
         """`GreyBox.outputs`: (channels, samples, n) [SI] of each run."""
@@ -66,11 +76,11 @@ class PreparedPlant:
         """`GreyBox.forced`: changes (channels, samples, m) [SI]."""
         return self.plant.forced(values, run, forcing)
 
-    def contribution(
-        self, values: Mapping[str, NDArray], symbols: Collection[str], run: int
-    ) -> Contribution | None:
-        """`GreyBox.contribution` of the symbols: readings (channels, samples) [SI]."""
-        return self.plant.contribution(values, symbols, run)
+    def law_values(
+        self, number: int, cause: Cause, argument: str, low: float, high: float, growth: NDArray
+    ) -> Mapping[str, float]:
+        """`GreyBox.law_values` by symbol [SI]; growth: (knots,)."""
+        return self.plant.law_values(number, cause, argument, low, high, growth)  # type: ignore[attr-defined]
 
 
 def prepared(plant: GreyBox) -> PreparedPlant:

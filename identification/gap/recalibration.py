@@ -6,23 +6,20 @@ channels would have wrong weights.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
-from identification.gap.discrepancy import LAGS, ChannelDiscrepancy, noise_ratios, squared_differences
-from identification.gap.evidence import EvaluatedHypothesis, evaluate, misfit
+from identification.gap.evidence import EvaluatedHypothesis, evaluate
 from identification.gap.fitting_problem import Estimate, FitCache, FittingProblem, Hypothesis
-from identification.gap.form_modes import form_modes
 from identification.gap.gauss_newton import fit, nuisance_slopes
+from identification.gap.noise import ChannelNoise, raw_noise_ratio, white_noise
 from identification.gap.plant import GreyBox
 from identification.gap.prediction import predict
 from identification.gap.prepared_plant import PreparedPlant, prepared
 from identification.gap.screening import Start
 
-ROUNDS, ITERATIONS_OF_A_ROUND = 2, 4
-"""Rounds in which the modes of form are taken anew, as they change with the estimate, and most steps
-in between."""
+FURTHER_ITERATIONS = 12
+"""Most steps of a fit that goes on with nuisance slopes of its own."""
 
 WRONG_NOISE_RATIO = 1.25
 """Ratio of the noise that the residuals show to the stated noise, or its inverse, above which the stated
@@ -67,27 +64,16 @@ def with_own_nuisances(
     """Hypotheses fitted further, with nuisance slopes taken at each estimate; name: in the journal."""
     if not evaluated:
         return []
-    best = list(evaluated)
     slopes = nuisance_slopes(
         problem, [each.estimate for each in evaluated], [each.tolerances for each in evaluated]
     )
-    for round_ in range(ROUNDS):
-        slopes = [
-            replace(own, forms=form_modes(problem, replace(each.estimate, slopes=own)))
-            for own, each in zip(slopes, evaluated, strict=True)
-        ]
-        starts = [
-            replace(restarted(each.estimate), slopes=own)
-            for each, own in zip(evaluated, slopes, strict=True)
-        ]
-        another = partial(fit, problem, starts, iterations=ITERATIONS_OF_A_ROUND)
-        fitted = cache(f"{name}, round {round_ + 1}", another)
-        # A journal keeps no slopes.
-        refined = [replace(e, slopes=own) for e, own in zip(fitted, slopes, strict=True)]
-        evaluated = evaluate(problem, refined)
-        pairs = zip(best, evaluated, strict=True)
-        best = [new if round_ == 0 or misfit(new) < misfit(old) else old for old, new in pairs]
-    return best
+    starts = [
+        replace(restarted(each.estimate), slopes=own)
+        for each, own in zip(evaluated, slopes, strict=True)
+    ]
+    fitted = cache(name, lambda: fit(problem, starts, iterations=FURTHER_ITERATIONS))
+    # A journal keeps no slopes.
+    return evaluate(problem, [replace(e, slopes=own) for e, own in zip(fitted, slopes, strict=True)])
 
 
 def with_seen_noise(problem: FittingProblem, base: Estimate) -> PreparedPlant:
@@ -97,31 +83,19 @@ def with_seen_noise(problem: FittingProblem, base: Estimate) -> PreparedPlant:
     """
     plant = prepared(problem.plant)
     residuals = predict(problem, base).residuals
-    squares = np.sum([np.sum(r**2, axis=1) for r in residuals], axis=0)
-    counts = np.sum([np.sum(run.trusted, axis=1) for run in plant.runs], axis=0)
-    variograms = []
-    for lag in LAGS:
-        changes, kept = squared_differences(plant, residuals, lag)
-        total = np.sum([np.sum(change, axis=1) for change in changes], axis=0)
-        number = np.sum([np.sum(keep, axis=1) for keep in kept], axis=0)
-        variograms.append(0.5 * total / np.maximum(number, 1))
-    mean_squares = squares / np.maximum(counts, 1)
-    ratios = noise_ratios(np.array(variograms)[:, None], mean_squares[None])[0]
-    wrong = (ratios > WRONG_NOISE_RATIO) | (ratios < 1.0 / WRONG_NOISE_RATIO)
-    if not np.any(wrong):
-        return plant
-    return plant.with_noise(np.where(wrong, ratios, 1.0).tolist())
+    ratios = []
+    for c in range(len(plant.channels)):
+        series = [r[c][run.trusted[c]] for r, run in zip(residuals, plant.runs, strict=True)]
+        seen = min(white_noise(series), raw_noise_ratio(plant, c))
+        right = not seen > 0 or 1.0 / WRONG_NOISE_RATIO <= seen <= WRONG_NOISE_RATIO
+        ratios.append(1.0 if right else seen)
+    return plant if max(ratios) == min(ratios) == 1.0 else plant.with_noise(ratios)
 
 
-def with_disturbance(plant: PreparedPlant, discrepancies: Sequence[ChannelDiscrepancy]) -> PreparedPlant:
-    """The plant whose disturbed channels weigh as much as they tell; the same object where none is.
+def with_ripple(plant: PreparedPlant, noise: Sequence[ChannelNoise]) -> PreparedPlant:
+    """The plant whose rippling channels are filtered; the same object where none ripples.
 
-    Readings under a slow disturbance do not err independently: n of them tell as much as n/inflation.
-    Weighted as white noise, such a channel would pull the parameters after its disturbance.
-
-    plant: with the noise that the readings show. discrepancies: under the best hypothesis.
+    noise: under the best hypothesis.
     """
-    ratios = [np.sqrt(d.floor * d.inflation) if d.inflation > 1.0 else 1.0 for d in discrepancies]
-    if max(ratios) <= WRONG_NOISE_RATIO:
-        return plant
-    return plant.with_noise([max(float(ratio), 1.0) for ratio in ratios])
+    ripples = tuple(own.ripple for own in noise)
+    return plant.with_ripples(ripples) if any(ripples) else plant

@@ -12,9 +12,9 @@ from scipy.stats import norm
 
 from identification.block_bootstrap import LEVEL, Interval
 from identification.gap.diagnosis import Diagnosis
-from identification.gap.form_modes import Law
 from identification.gap.gaps import FLOOR, RegimeGap
 from identification.gap.held_out import DiscrepancyReduction
+from identification.gap.laws import Law
 from identification.gap.localisation import ForcingEstimate, MissingTerm
 from identification.gap.plant import GreyBox
 from identification.gap.quantities import probability_text
@@ -185,25 +185,28 @@ def residual_figure(plant: GreyBox, run: int, residual: NDArray, masks: Mapping[
     return figure
 
 
-def law_figure(laws: Sequence[Law], terms: Mapping[str, tuple[str, str, float]]) -> Figure:
-    """What causes add to equations and readings: as the recordings want it over what the catalogue has.
+def law_figure(
+    laws: Sequence[tuple[Law, NDArray, NDArray]], units: Mapping[str, tuple[str, float]]
+) -> Figure:
+    """Strength of causes over the states that they follow, relative to the law of the catalogue.
 
-    terms: title, unit and its size [SI], by name of the equation or channel.
+    laws: each with g at the knots and its standard deviation, (knots,) [1]. units: unit of each state
+    and its size [SI], by the state's name.
     """
-    columns = min(len(laws), 3)
-    rows = -(-len(laws) // columns)
-    figure = Figure(figsize=(3.4 * columns + 0.4, 3.1 * rows + 0.4), layout="constrained")
-    for place, law in enumerate(laws):
-        axes, (title, unit, size) = figure.add_subplot(rows, columns, place + 1), terms[law.term]
-        assumed, wanted = law.assumed / size, law.wanted / size
-        ends = [np.min(assumed), np.max(assumed)]
-        axes.plot(assumed, wanted, ".", color="tab:blue", markersize=2, label="as recorded")
-        axes.plot(ends, ends, color="0.4", linewidth=1.0, label="as assumed")
-        axes.set_title(f"{law.cause},\nin {title}", fontsize="small")
-        axes.set_xlabel(f"assumed [{unit}]", fontsize=8)
-        axes.set_ylabel(f"wanted [{unit}]", fontsize=8)
+    figure = Figure(figsize=(4.2 * len(laws) + 0.4, 3.6), layout="constrained")
+    for place, (law, growth, sd) in enumerate(laws, start=1):
+        axes, (unit, size) = figure.add_subplot(1, len(laws), place), units[law.argument]
+        state = np.linspace(law.low, law.high, len(growth)) / size
+        strength, margin = 1.0 + growth, QUANTILE * sd
+        axes.fill_between(state, strength - margin, strength + margin, color=BAND, linewidth=0.0)
+        axes.plot(state, strength, "o-", color="tab:blue", markersize=3, label="as recorded")
+        axes.axhline(1.0, color="0.4", linewidth=1.0, linestyle="--", label="as assumed")
+        axes.set_title(law.cause.title, fontsize="small", wrap=True)
+        axes.set_xlabel(f"{law.argument} [{unit}]" if unit else law.argument)
+        axes.set_ylabel("strength over the fitted size [1]")
+        axes.set_ylim(bottom=min(0.0, float(np.min(strength))))
         axes.grid(alpha=0.3)
-    figure.axes[0].legend(fontsize="small")
+        axes.legend(fontsize="small")
     return figure
 
 

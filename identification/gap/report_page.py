@@ -8,10 +8,16 @@ import numpy as np
 from identification.block_bootstrap import LEVEL
 from identification.gap.diagnosis import MENTIONED_PROBABILITY, Diagnosis
 from identification.gap.evidence import EvaluatedHypothesis
-from identification.gap.fitting_problem import Estimate
-from identification.gap.form_modes import law_in_words, laws
-from identification.gap.gap_json import discrepancy, drawn_term, inclusion, parameter_intervals
+from identification.gap.gap_json import (
+    discrepancy,
+    drawn_term,
+    inclusion,
+    parameter_covariance,
+    parameter_intervals,
+)
 from identification.gap.gaps import FLOOR, regimes_of
+from identification.gap.laws import COMPONENTS
+from identification.gap.laws import in_words as in_words_of_laws
 from identification.gap.localisation import Localisation
 from identification.gap.plant import GreyBox
 from identification.gap.quantities import (
@@ -53,11 +59,14 @@ LEVEL_TEXT = f"{100 * LEVEL:g} %"
 
 
 def sections(
-    diagnosis: Diagnosis, next_experiment: str = "", learnt: str = "", more: Sequence[Section] = ()
+    diagnosis: Diagnosis,
+    next_experiment: str = "",
+    plan: Sequence[Block] = (),
+    more: Sequence[Section] = (),
 ) -> list[Section]:
     """The whole report: verdict, localisation, ranking, reduction, remainder, next experiment, warnings.
 
-    next_experiment: a sentence or two; empty where none was sought. learnt: of what has no name. more:
+    next_experiment: a sentence or two; empty where none was sought. plan: what stands below it. more:
     sections that follow the remainder.
     """
     parts = [
@@ -65,12 +74,12 @@ def sections(
         _localisation(diagnosis),
         _ranking(diagnosis),
         _reduction(diagnosis),
-        _remainder(diagnosis, learnt),
+        _remainder(diagnosis),
         *more,
     ]
     if next_experiment:
-        plan = Verdict(status="note", text=next_experiment)
-        parts.append(Section(title="Next experiment", verdicts=[plan], blocks=[]))
+        verdict = Verdict(status="note", text=next_experiment)
+        parts.append(Section(title="Next recording", verdicts=[verdict], blocks=list(plan)))
     return [*parts, _warnings(diagnosis)]
 
 
@@ -129,7 +138,7 @@ def _ranking(diagnosis: Diagnosis) -> Section:
     if diagnosis.judged:
         blocks += [inclusion_table(diagnosis), ranking_table(diagnosis)]
     if diagnosis.named:
-        blocks += drawn_laws(diagnosis, diagnosis.named.hypothesis.estimate)
+        blocks += drawn_laws(diagnosis, diagnosis.named.hypothesis)
     return Section(title="Which cause it is", verdicts=verdicts, blocks=blocks)
 
 
@@ -153,7 +162,7 @@ def _reduction(diagnosis: Diagnosis) -> Section:
     )
 
 
-def _remainder(diagnosis: Diagnosis, learnt: str) -> Section:
+def _remainder(diagnosis: Diagnosis) -> Section:
     """What no named cause explains: how much, where, of which shape, and what is only disturbance."""
     blocks: list[Block] = []
     if diagnosis.remaining and diagnosis.best:
@@ -163,7 +172,6 @@ def _remainder(diagnosis: Diagnosis, learnt: str) -> Section:
     text = remainder_sentence(diagnosis)
     if not diagnosis.remaining:
         text = f"{text} {disturbance_sentence(diagnosis)}".strip()
-    text = f"{text} {learnt}".strip()
     return Section(
         title="What remains",
         verdicts=[Verdict(status="note", text=text)],
@@ -205,20 +213,30 @@ def ranking_table(diagnosis: Diagnosis) -> Table:
     )
 
 
-def drawn_laws(diagnosis: Diagnosis, estimate: Estimate) -> list[Block]:
-    """The law that the recordings want of each named cause beside the one assumed."""
-    problem = diagnosis.ranking.problem
-    found = laws(problem, estimate)
-    if not found:
+def drawn_laws(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis) -> list[Block]:
+    """The open laws of a hypothesis over their states, beside the law that is assumed."""
+    problem, estimate = diagnosis.ranking.problem, hypothesis.estimate
+    if not estimate.laws:
         return []
-    plant = problem.plant
-    terms = {e.name: (e.title, e.unit, e.scale) for e in plant.equations}
-    terms |= {c.name: (c.name, c.unit, c.scale) for c in plant.channels}
+    covariance = parameter_covariance(diagnosis, hypothesis)
+    symbols = [p.symbol for p in problem.parameters(estimate)]
+    drawn = []
+    for law, components in estimate.laws:
+        growth, size = law.growth(components), law.cause.sizes[0]
+        own = [symbols.index(p.symbol) for p in (*law.parameters, size)]
+        value = problem.values(estimate)[size.symbol] - size.nominal
+        # A larger size with a smaller g is the same strength: both count together.
+        slopes = np.column_stack([COMPONENTS, (1.0 + growth) / value])
+        sd = np.sqrt(np.diag(slopes @ covariance[np.ix_(own, own)] @ slopes.T))
+        drawn.append((law, growth, sd))
+    traces = problem.plant.states(problem.candidate(estimate), problem.fitted_runs[0])
+    units = {name: (trace.unit, trace.scale) for name, trace in traces.items()}
     caption = (
-        "What the cause adds, sample by sample, by the law that the recordings want, over the law of "
-        f"the catalogue: {law_in_words(estimate, plant)}."
+        f"Strength of the cause over the state that it follows ({LEVEL_TEXT} band), relative to its "
+        "fitted size; dashed: the law that the catalogue assumes. In words: "
+        f"{in_words_of_laws(estimate.laws)}."
     )
-    return [Picture(figure=law_figure(found, terms), caption=caption)]
+    return [Picture(figure=law_figure(drawn, units), caption=caption)]
 
 
 def inclusion_table(diagnosis: Diagnosis) -> Table:

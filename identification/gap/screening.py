@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.fitting_problem import Estimate, FittingProblem, Hypothesis
+from identification.gap.fitting_problem import Estimate, FittingProblem, cause_places
 from identification.gap.plant import Cause
 from identification.gap.variable_projection import (
     ChangedRuns,
@@ -58,16 +58,17 @@ class CauseSignature:
     @property
     def trial(self) -> NDArray:
         """The trial values of the cause's parameters, (parameters,) [SI]."""
-        parameters, vector = self.cause.parameters, self.estimate.vector
-        return vector[len(vector) - len(parameters) :] * [p.scale for p in parameters]
+        place = next(place for cause, place, _ in cause_places(self.estimate) if cause is self.cause)
+        return self.estimate.vector[place] * [p.scale for p in self.cause.parameters]
 
     @property
     def shares(self) -> tuple[float, float]:
         """Least and largest multiple of the trial at which no parameter leaves its range [1]."""
-        parameters = self.cause.parameters
-        nominal = np.array([p.nominal for p in parameters])
-        ends = np.array([(p.low, p.high) for p in parameters]) - nominal[:, None]
-        shares = ends / (self.trial - nominal)[:, None]
+        sizes = self.cause.sizes
+        nominal = np.array([p.nominal for p in sizes])
+        trial = dict(zip((p.symbol for p in self.cause.parameters), self.trial, strict=True))
+        ends = np.array([(p.low, p.high) for p in sizes]) - nominal[:, None]
+        shares = ends / (np.array([trial[p.symbol] for p in sizes]) - nominal)[:, None]
         return float(np.max(np.min(shares, axis=1))), float(np.min(np.max(shares, axis=1)))
 
 
@@ -107,7 +108,7 @@ def with_cause(
     problem: FittingProblem, base: Estimate, cause: Cause, values: Mapping[str, float]
 ) -> Estimate:
     """The base estimate with another cause, whose parameters have these values [SI] by symbol."""
-    joint = Hypothesis(causes=(*base.hypothesis.causes, cause))
+    joint = replace(base.hypothesis, causes=(*base.hypothesis.causes, cause))
     start = problem.start(joint, {**problem.values(base), **values})
     start.run_values[:, : base.run_values.shape[1]] = base.run_values
     return replace(start, slopes=base.slopes)
@@ -119,8 +120,8 @@ def simulate_signatures(
     """Signatures of every cause at each of its trial values, all simulated side by side."""
     trials = []
     for cause in causes:
-        for trial in range(max(len(p.trials) for p in cause.parameters)):
-            at = {p.symbol: p.trials[min(trial, len(p.trials) - 1)] for p in cause.parameters}
+        for trial in range(max(len(p.trials) for p in cause.sizes)):
+            at = {p.symbol: p.trials[min(trial, len(p.trials) - 1)] for p in cause.sizes}
             trials.append((cause, with_cause(problem, base, cause, at)))
     residuals = problem.residuals([base, *(estimate for _, estimate in trials)], problem.fitted_runs)
     return [
@@ -267,6 +268,17 @@ def _bounded_last_step(equations: NormalEquations, low: float, high: float) -> t
     return step, float(left)
 
 
+def with_changes(run: LinearisedRun, changes: Sequence[NDArray]) -> LinearisedRun:
+    """The run with changes of its outputs (values,) as further slopes, which have no prior."""
+    none = np.zeros(len(changes))
+    return replace(
+        run,
+        slopes=np.column_stack([run.slopes, *changes]),
+        slope_precision=np.append(run.slope_precision, none),
+        slope_values=np.append(run.slope_values, none),
+    )
+
+
 def assess_separability(
     base_runs: Sequence[LinearisedRun], signatures: Sequence[CauseSignature]
 ) -> Separability:
@@ -278,7 +290,7 @@ def assess_separability(
     for signature in signatures:
         first.setdefault(signature.cause.label, signature)
     runs = [
-        replace(run, slopes=np.column_stack([run.slopes, *(s.changes[r] for s in first.values())]))
+        with_changes(run, [signature.changes[r] for signature in first.values()])
         for r, run in enumerate(base_runs)
     ]
     hessian, k = normal_equations(runs).hessian, base_runs[0].slopes.shape[1]

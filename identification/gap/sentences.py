@@ -7,10 +7,10 @@ from identification.gap.diagnosis import (
     MENTIONED_PROBABILITY,
     Diagnosis,
 )
-from identification.gap.form_modes import AS_ASSUMED, law_in_words
 from identification.gap.gap_json import Remainder, discrepancy, parameter_intervals, remainder
 from identification.gap.gaps import FLOOR
 from identification.gap.held_out import LEAST_GAP_CLOSED, NOMINAL, RECALIBRATED
+from identification.gap.laws import in_words as laws_in_words
 from identification.gap.plant import FreeParameter
 from identification.gap.quantities import (
     gap_text,
@@ -83,8 +83,8 @@ def _known(diagnosis: Diagnosis) -> str:
     )
     if not diagnosis.surely_helps(best):
         return f"{text}: {add_or_not(diagnosis, best)}."
-    law = law_in_words(best.hypothesis.estimate, diagnosis.ranking.problem.plant)
-    other = "" if law == AS_ASSUMED else f" Its law differs from the one assumed: it {law}."
+    laws = best.hypothesis.estimate.laws
+    other = f" The law differs from the one assumed: {laws_in_words(laws)}." if laws else ""
     left = diagnosis.reduction.left.overall.value
     rest = (
         f"{gap_text(left)} noise deviations are left, which nothing predicts from the inputs"
@@ -278,7 +278,7 @@ def remainder_sentence(diagnosis: Diagnosis) -> str:
 def disturbance_sentence(diagnosis: Diagnosis) -> str:
     """Disturbances that are seen beside the noise, with a blank at the end; empty where none is seen."""
     ranking, seen = diagnosis.ranking, discrepancy(diagnosis)
-    channels = zip(ranking.problem.plant.channels, ranking.discrepancies, strict=True)
+    channels = zip(ranking.problem.plant.channels, ranking.noise, strict=True)
     texts = [
         f"{quantity(seen[channel.name]['sd'], channel.unit)} in {channel.name}, correlated over "
         f"{quantity(seen[channel.name]['time_scale_s'], 's')}"
@@ -391,7 +391,7 @@ def sizes_with_intervals(diagnosis: Diagnosis, cause: RankedCause) -> list[str]:
     intervals = parameter_intervals(diagnosis, cause.hypothesis)
     return [
         f"{p.title} = {quantity_with_interval(*intervals[p.symbol], p.unit)}"
-        for p in cause.hypothesis.estimate.hypothesis.parameters
+        for p in cause.hypothesis.estimate.hypothesis.cause_parameters
     ]
 
 
@@ -400,7 +400,7 @@ def sizes_text(diagnosis: Diagnosis, cause: RankedCause) -> str:
     values = diagnosis.ranking.problem.values(cause.hypothesis.estimate)
     return " and ".join(
         f"{p.title} = {quantity(values[p.symbol], p.unit)}"
-        for p in cause.hypothesis.estimate.hypothesis.parameters
+        for p in cause.hypothesis.estimate.hypothesis.cause_parameters
     )
 
 

@@ -92,13 +92,17 @@ that sets do not follow each other in a circle."""
 class LinearisedRun:
     """A hypothesis linearised in one run; values are weighted readings, 0 where they do not count.
 
-    k parameters, l nuisance parameters of the run, m shared ones: tolerances, then modes of form.
+    k parameters, l nuisance parameters of the run, m shared ones: tolerances.
     """
 
     residual: NDArray
     """measured - model, (values,) [noise deviations]."""
     slopes: NDArray
     """Derivatives of the model by the scaled vector, (values, k) [noise deviations]."""
+    slope_precision: NDArray
+    """Precision of the vector's Gaussian priors, the same in every run, (k,) [1]."""
+    slope_values: NDArray
+    """The vector less their means, (k,) [1]."""
     run_slopes: NDArray
     """Derivatives by the run's nuisance parameters: run parameters of causes, then run offsets,
     (values, l) [noise deviations/SI]."""
@@ -119,6 +123,9 @@ class RunProducts:
     (runs, 1 + k + m + l, 1 + k + m + l) [1]."""
     bounds: NDArray
     """Bounds of the run nuisances, (runs, l) [SI]."""
+    prior: NDArray
+    """What the priors of slopes and shared nuisances add to the sum of all runs' Gram matrices,
+    (1 + k + m, 1 + k + m) [1]."""
 
     @property
     def count(self) -> int:
@@ -154,6 +161,20 @@ class RunProducts:
     def free(self) -> NDArray:
         """`reduced` with all run nuisances minimised over."""
         return self.reduced(np.full(self.bounds.shape, np.nan))
+
+    def of(self, kept: NDArray) -> "RunProducts":
+        """The products of some of the columns before those of the run nuisances; kept: their places."""
+        every = np.concatenate([kept, np.arange(self.count, self.grams.shape[1])])
+        return replace(
+            self, grams=self.grams[:, every][:, :, every], prior=self.prior[np.ix_(kept, kept)]
+        )
+
+    def together(self, reduced: NDArray) -> NDArray:
+        """Gram matrix of residual, slopes and shared slopes of all runs, with the priors of the latter.
+
+        reduced: of each run, (runs, 1 + k + m, 1 + k + m) [1].
+        """
+        return np.sum(reduced, axis=0) + self.prior
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,15 +218,19 @@ class NormalEquations:
 
 def normal_equations(runs: Sequence[LinearisedRun]) -> NormalEquations:
     """Normal equations of several runs together: the same hypothesis linearised in each of them."""
+    return equations_of(products_of(runs), runs[0].slopes.shape[1])
+
+
+def products_of(runs: Sequence[LinearisedRun]) -> RunProducts:
+    """Products of the columns of runs, the same hypothesis linearised in each of them."""
     columns = [_columns(run) for run in runs]
-    products = _with_priors(np.array([own.T @ own for own in columns]), runs)
-    return _equations(products, runs[0].slopes.shape[1])
+    return _with_priors(np.array([own.T @ own for own in columns]), runs)
 
 
-def _equations(products: RunProducts, k: int) -> NormalEquations:
+def equations_of(products: RunProducts, k: int) -> NormalEquations:
     """Normal equations in k slopes from the products of several runs."""
     m = products.count - 1 - k
-    gram = _together(products.free(), k)
+    gram = products.together(products.free())
     free = eliminated(gram, np.arange(1 + k, 1 + k + m), np.arange(1 + k))
     none, bound = np.zeros(k), np.full(m, LARGEST_DEVIATION)
     ends = np.concatenate([none, -bound]), np.concatenate([none, bound])
@@ -232,7 +257,7 @@ def _bounded_solution(
     free = ends[1] > ends[0]
     best, gram = np.zeros(len(free)), np.zeros((1 + len(free), 1 + len(free)))
     for iteration in range(ACTIVE_SET_ITERATIONS):
-        gram = _together(runs.reduced(held), k)
+        gram = runs.together(runs.reduced(held))
         matrix = gram[1:, 1:].copy()
         damped = np.arange(k)
         matrix[damped, damped] *= 1.0 + damping
@@ -246,17 +271,6 @@ def _bounded_solution(
             break
         held = beyond
     return best, float(gram[0, 0] - 2 * best @ gram[1:, 0] + best @ gram[1:, 1:] @ best)
-
-
-def _together(reduced: NDArray, k: int) -> NDArray:
-    """Gram matrix of residual, slopes and shared slopes of all runs, with the priors of the latter.
-
-    reduced: of each run, (runs, 1 + k + m, 1 + k + m) [1].
-    """
-    gram = np.sum(reduced, axis=0)
-    shared = np.arange(1 + k, len(gram))
-    gram[shared, shared] += 1.0
-    return gram
 
 
 def without_run_nuisances(run: LinearisedRun, shared: NDArray) -> tuple[NDArray, NDArray]:
@@ -287,6 +301,8 @@ def shared_as_slopes(run: LinearisedRun) -> LinearisedRun:
     return replace(
         run,
         slopes=np.column_stack([run.slopes, run.shared_slopes]),
+        slope_precision=np.append(run.slope_precision, np.ones(run.shared_slopes.shape[1])),
+        slope_values=np.append(run.slope_values, np.zeros(run.shared_slopes.shape[1])),
         shared_slopes=np.zeros((len(run.residual), 0)),
     )
 
@@ -322,7 +338,19 @@ def _with_priors(grams: NDArray, runs: Sequence[LinearisedRun]) -> RunProducts:
     grams = _shifted(grams, first, -values)
     nuisances = np.arange(first, grams.shape[1])
     grams[:, nuisances, nuisances] += 1.0 / sd**2
-    return RunProducts(grams=grams, bounds=LARGEST_DEVIATION * sd)
+    prior = _prior(runs[0], first)
+    return RunProducts(grams=grams, bounds=LARGEST_DEVIATION * sd, prior=prior)
+
+
+def _prior(run: LinearisedRun, count: int) -> NDArray:
+    """`RunProducts.prior` of `count` columns: residual, slopes, slopes added to them, shared ones."""
+    prior, k, m = np.zeros((count, count)), len(run.slope_precision), run.shared_slopes.shape[1]
+    moment = run.slope_precision * run.slope_values
+    prior[0, 0] = moment @ run.slope_values
+    prior[0, 1 : 1 + k] = prior[1 : 1 + k, 0] = -moment
+    prior[np.arange(1, 1 + k), np.arange(1, 1 + k)] = run.slope_precision
+    prior[np.arange(count - m, count), np.arange(count - m, count)] = 1.0
+    return prior
 
 
 class ChangedRuns:
@@ -349,7 +377,7 @@ class ChangedRuns:
         grams[:, 0] -= cross
         grams[:, :, 0] -= cross
         grams[:, 0, 0] += self._squares[:, change]
-        return _equations(_with_priors(grams, self._runs), self._slopes)
+        return equations_of(_with_priors(grams, self._runs), self._slopes)
 
     def with_slope(self, change: int) -> NormalEquations:
         """Normal equations with one change as a further slope, after the others."""
@@ -357,4 +385,4 @@ class ChangedRuns:
         row = np.insert(self._crosses[:, change], place, self._squares[:, change], axis=1)
         grams = np.insert(np.insert(self._grams, place, 0.0, axis=1), place, 0.0, axis=2)
         grams[:, place], grams[:, :, place] = row, row
-        return _equations(_with_priors(grams, self._runs), self._slopes + 1)
+        return equations_of(_with_priors(grams, self._runs), self._slopes + 1)

@@ -14,17 +14,12 @@ NO_GAP, KNOWN, AMBIGUOUS = "no_gap", "known", "ambiguous"
 PARTIAL, UNKNOWN = "partial", "unknown"
 """Verdicts as gap.json has them."""
 
-NOTICED_REMAINDER = 0.04
-"""Share of the misfit [1] beyond which a named cause leaves a part of the gap that is missing still: a
-fifth of the gap. Less is an error of the cause's form."""
+KNOWN_GAP = 1.15
+"""Gap on held-out recordings up to which a cause explains all of it [noise deviations]: a third of the
+noise's variance."""
 
-LEFT_ON_HELD_OUT, FAR_ABOVE_NOISE = 0.1, 1.5
-"""Share of the gap on held-out recordings [1], and gap [noise deviations], twice the noise's variance:
-a cause that leaves more of both does not explain the whole gap."""
-
-NO_CAUSE_DOUBT = 0.01
-"""Probability of no cause above which no cause is named: a false alarm costs more than missing a faint
-cause."""
+FAR_ABOVE_NOISE = 1.5
+"""Gap that no word may call small [noise deviations]: twice the noise's variance."""
 
 AMBIGUITY_SHARE = 0.9
 """Share of the probability of all causes that the ambiguity set holds."""
@@ -106,7 +101,8 @@ def conclude(
 
 def _held(ranking: Ranking) -> tuple[str, ...]:
     """Effects whose inclusion is sure."""
-    return tuple(name for name, share in ranking.inclusion.items() if share >= SURE_INCLUSION)
+    named = sum(ranking.probabilities)
+    return tuple(name for name, share in ranking.inclusion.items() if share >= SURE_INCLUSION * named)
 
 
 def causes_by_name(ranking: Ranking) -> list[RankedCause]:
@@ -158,17 +154,10 @@ def component_probabilities(ranking: Ranking, localisation: Localisation) -> dic
 
 def _verdict(ranking: Ranking, reduction: DiscrepancyReduction) -> str:
     """NO_GAP, UNKNOWN, PARTIAL or KNOWN."""
-    if ranking.no_cause > NO_CAUSE_DOUBT or ranking.unknown > sum(ranking.probabilities):
+    named = sum(ranking.probabilities)
+    if max(ranking.no_cause, ranking.unknown) > named:
         something = ranking.unknown > ranking.no_cause
         return UNKNOWN if something or reduction.recalibration_leaves.still_predictable else NO_GAP
-    held_out, rest = reduction.unexplained, reduction.left.overall.value
-    left = ranking.shares_left[0] > NOTICED_REMAINDER or (
-        held_out.fraction > LEFT_ON_HELD_OUT and rest > FAR_ABOVE_NOISE
-    )
-    if not left and not held_out.still_predictable:
+    if reduction.left.overall.value <= KNOWN_GAP and not reduction.unexplained.still_predictable:
         return KNOWN
-    if _held(ranking):
-        return PARTIAL
-    # Look-alikes share the probability; less than that names nothing while much is left.
-    sure = sum(ranking.probabilities) >= SURE_INCLUSION
-    return KNOWN if sure and not held_out.still_predictable else UNKNOWN
+    return PARTIAL if _held(ranking) else UNKNOWN

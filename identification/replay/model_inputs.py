@@ -54,6 +54,11 @@ class ModelInputs:
         """Supply pressure at the first sample [Pa]."""
         return float(self.p1[0])
 
+    def without_sensor_errors(self, p: Mapping[str, float]) -> "ModelInputs":
+        """The inputs as they are where sensors have read them with offset and scale error; p: [SI]."""
+        p2_start = (self.p2_start - p["b_p2"]) / (1.0 + p["g_p2"])
+        return replace(self, p1=self.p1 / (1.0 + p["g_p1"]), p2_start=p2_start)
+
 
 def model_inputs(recording: Recording, p: Mapping[str, float]) -> ModelInputs:
     """The inputs that the model is given for a recording; p: volumes and temperature by symbol [SI]."""

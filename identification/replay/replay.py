@@ -156,7 +156,10 @@ def _simulate(drives: list[ModelInputs], tiled: dict[str, ArrayLike], n: int) ->
         np.repeat([getattr(drive, name) for drive in drives], n, axis=0)
         for name in ("p1_start", "U_start", "p2_start")
     )
-    initial = energised(tiled, p1=p1, p2=p2 + p2_shift, U=U)
+    # What was recorded is what the sensors read.
+    supply = 1.0 / (1.0 + np.asarray(tiled["g_p1"]))
+    p2 = (p2 - tiled["b_p2"]) / (1.0 + np.asarray(tiled["g_p2"]))
+    initial = energised(tiled, p1=p1 * supply, p2=p2 + p2_shift, U=U)
     for field, value in zip(valves.state, initial, strict=True):
         field[:] = value
     inputs, duration = _inputs(drives)
@@ -168,6 +171,7 @@ def _simulate(drives: list[ModelInputs], tiled: dict[str, ArrayLike], n: int) ->
     for first in range(0, steps, max(together, 1)):
         part = slice(first, first + together)
         own = {name: np.repeat(field[part], n, axis=1) for name, field in inputs.items()}
+        own["p1_slope"] = own["p1_slope"] * supply
         own["sigma_S"] = own["sigma_S"] + flow_shift + flow_ramp * own.pop("course")
         every = Inputs(**own)
         states = valves.record(every, np.repeat(duration[part], n, axis=1))

@@ -1,5 +1,6 @@
 """The catalogue of causes of a gap, with physical ranges and sizes to begin a search from."""
 
+import math
 from collections.abc import Collection, Sequence
 
 from epv_env.plant.effects.record import Size
@@ -54,6 +55,7 @@ WORDS = {
     "supply_restriction": "restriction in the supply line",
     "pressure_sensor_lag": "lag of a pressure sensor",
     "pressure_sensor_bias": "offset of a pressure sensor",
+    "pressure_sensor_gain": "scale error of a pressure sensor",
     "current_sensor_gain": "scale error of the current sensor",
     "command_delay": "delay of the command",
 }
@@ -93,6 +95,7 @@ def effects() -> list[Cause]:
                 if size.scatter
             ),
             prior=1.0 / len(effect.fitted),
+            exact_form=not effect.strength,
         )
         for effect in EFFECTS
         for variant, sizes in effect.fitted.items()
@@ -125,7 +128,8 @@ def effect_size(size: Size) -> FreeParameter:
         low=max(low, low if size.least_fitted is None else size.least_fitted),
         high=high,
         trials=size.trials,
-        scale=abs(size.trials[0]),
+        scale=abs(size.trials[0]) if size.trials else 1.0,
+        sd=size.spread or math.inf,
     )
 
 

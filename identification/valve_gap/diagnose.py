@@ -10,27 +10,29 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from epv_env.common.command_line import NextStep, beside, plant_option
 from epv_env.common.files import Journal
+from epv_env.plant.effects.law import knot_symbols
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from epv_env.plant.region import Alternative, Mixture, Region
 from identification.bench.programmes import at_voltage, save_programmes
 from identification.gap.diagnosis import Diagnosis, diagnose
 from identification.gap.evidence import EvaluatedHypothesis
-from identification.gap.fitting_problem import FitCache
+from identification.gap.fitting_problem import Estimate, FitCache, FittingProblem
 from identification.gap.gap_json import fitted_values, parameter_covariance, write_results
 from identification.gap.held_out import RECALIBRATED
+from identification.gap.laws import COMPONENTS
 from identification.gap.report_page import sections
 from identification.gap.verdict import AMBIGUOUS, UNKNOWN
 from identification.recordings.campaign_files import read_campaign
 from identification.recordings.recording import campaign_facts
 from identification.recordings.rules import RULES, rules_of
 from identification.report.page import Section, write_page
-from identification.valve_gap.learnt_term import LearntModel, learn
-from identification.valve_gap.programmes import CANDIDATES, next_experiment
-from identification.valve_gap.programmes import FILE_NAME as PROGRAMME
+from identification.valve_gap.next_recording import CANDIDATES, NextRecording, next_recording
+from identification.valve_gap.next_recording import FILE_NAME as PROGRAMME
 from identification.valve_gap.valve import Valve
 
 GUIDE = "docs/explanation/diagnosis.md"
@@ -56,8 +58,6 @@ def diagnose_campaign(
 ) -> Diagnosis:
     """Diagnose a campaign; write gap.json, and unless `report` is False report, plan and plant file.
 
-    What remains is modelled in missing_term.json where a state explains it.
-
     plant: plant file of the nominal parameters, None for Table 10. without: causes to leave out of the
     catalogue. noise: standard deviation of the readings by channel [Pa, A], where it is not to be
     estimated. Finished fits are kept in `out` and taken up again. Raises CampaignError for recordings
@@ -72,16 +72,13 @@ def diagnose_campaign(
     found = diagnose(valve, seed=seed, cache=FitCache(valve, journal, steps))
     found = replace(found, warnings=[*valve.warnings, *found.warnings])
     step = next_step(found.conclusion.verdict, campaign, out, Path(plant) if plant else None)
-    learnt, text = None, ""
+    following = NextRecording(text="")
     if report:
-        steps("what has no name")
-        learnt = learn(found, valve, seed)
-        steps("next experiment")
-        text = _plan(found, valve, out)
+        steps("next recording")
+        following = _plan(found, valve, out)
         steps("report")
-        write_report(found, valve, out, recorded.name, campaign_facts(recorded), step, text, learnt)
-    entry = learnt.entry if learnt else None
-    write_results(found, out, text, learnt_term=entry, seconds=perf_counter() - began)
+        write_report(found, valve, out, recorded.name, campaign_facts(recorded), step, following)
+    write_results(found, out, following.text, seconds=perf_counter() - began)
     return found
 
 
@@ -100,14 +97,14 @@ def next_step(verdict: str, campaign: Path, out: Path, plant: Path | None) -> Ne
     )
 
 
-def _plan(found: Diagnosis, valve: Valve, out: Path) -> str:
-    """Write what to record next; the same in a sentence."""
+def _plan(found: Diagnosis, valve: Valve, out: Path) -> NextRecording:
+    """Find what to record next, and write its programme."""
     programmes = at_voltage(CANDIDATES, valve.plant.voltage)
-    experiment = next_experiment(found.ranking, valve, found.conclusion.verdict, programmes)
+    following = next_recording(found.ranking, valve, found.conclusion.verdict, programmes)
     (out / PROGRAMME).unlink(missing_ok=True)
-    if experiment.programme:
-        save_programmes([experiment.programme], out / PROGRAMME, valve.plant.sensors)
-    return experiment.text
+    if following.programme:
+        save_programmes([following.programme], out / PROGRAMME, valve.plant.sensors)
+    return following
 
 
 def write_report(
@@ -117,20 +114,20 @@ def write_report(
     name: str,
     facts: Mapping[str, str],
     step: NextStep,
-    next_experiment: str = "",
-    learnt: LearntModel | None = None,
+    following: NextRecording | None = None,
     more: More | None = None,
 ) -> None:
     """Write the report and the plant file. name: of the recordings; facts: what the page rests on."""
-    corrected = refitted_plant(found, valve, name, learnt)
+    following = following or NextRecording(text="")
+    corrected = refitted_plant(found, valve, name)
     save_plant(corrected, out / PLANT)
     write_page(
         out / REPORT,
         title=f"Gap between model and recordings: {name}",
         sections=sections(
             found,
-            next_experiment,
-            learnt.sentence(found) if learnt else "",
+            following.text,
+            [following.table] if following.table else [],
             more(found, corrected) if more else (),
         ),
         facts=facts,
@@ -139,29 +136,24 @@ def write_report(
     )
 
 
-def refitted_plant(
-    found: Diagnosis, valve: Valve, name: str, learnt: LearntModel | None = None
-) -> Plant:
-    """The plant refitted together with the cause to add, else recalibrated, and with a learnt term.
+def refitted_plant(found: Diagnosis, valve: Valve, name: str) -> Plant:
+    """The plant refitted together with the cause to add, laws included, else recalibrated or nominal.
 
     To be added is what the verdict names, whether it explains all or a part, and what surely reduces the
-    gap on held-out recordings.
-
-    Its region is where the recordings leave the calibrated parameters and the sizes, jointly;
-    autocorrelated residuals widen it. Its `diagnosis` holds every plant that is still possible.
+    gap on held-out recordings. Its region is where the recordings leave parameters, sizes and laws,
+    jointly; autocorrelated residuals widen it. Its `diagnosis` holds every plant that is still possible.
     """
     best = found.kept
-    named = bool(best.labels)
-    region = _region(found, best, valve, learnt)
+    region = region_of(found, best, valve)
+    refitted = "recalibration" if best is not found.nominal else "none: recalibration makes it worse"
     return replace(
         valve.plant,
         parameters=region.centre,
         region=region,
-        diagnosis=possible_plants(found, valve, learnt),
-        learnt_term=learnt.term if learnt else valve.plant.learnt_term,
-        name=f"{name} with {best.label}" if named else f"{name}, recalibrated",
+        diagnosis=possible_plants(found, valve),
+        name=f"{name} with {best.label}" if best.labels else f"{name}, recalibrated",
         provenance={
-            "method": "joint refit with the cause of the gap" if named else "recalibration",
+            "method": "joint refit with the cause of the gap" if best.labels else refitted,
             "software": f"epv-valve {version('epv-valve')}",
             "verdict": found.conclusion.verdict,
             "recordings_sha256": {r.name: r.sha256 for r in valve.recordings},
@@ -170,10 +162,10 @@ def refitted_plant(
     )
 
 
-def possible_plants(found: Diagnosis, valve: Valve, learnt: LearntModel | None = None) -> Mixture:
+def possible_plants(found: Diagnosis, valve: Valve) -> Mixture:
     """The likeliest plants that hold nearly all of the probability, each with its region.
 
-    No cause and an unknown one are both the recalibrated plant, with a learnt term where it has one.
+    No cause and an unknown one are both the recalibrated plant.
     """
     ranking = found.ranking
     unnamed = (ranking.no_cause + ranking.unknown, ranking.recalibrated)
@@ -187,31 +179,48 @@ def possible_plants(found: Diagnosis, valve: Valve, learnt: LearntModel | None =
             Alternative(
                 name=hypothesis.label or RECALIBRATED,
                 probability=float(probability / whole),
-                region=_region(found, hypothesis, valve, learnt),
+                region=region_of(found, hypothesis, valve),
             )
             for probability, hypothesis in kept
         )
     )
 
 
-def _region(
-    found: Diagnosis, hypothesis: EvaluatedHypothesis, valve: Valve, learnt: LearntModel | None
-) -> Region:
-    """Where the recordings leave the calibrated parameters and the sizes of a hypothesis, jointly.
-
-    learnt: the term that the kept hypothesis has.
-    """
-    if learnt and hypothesis is found.kept:
-        return learnt.region(valve.base, REGION_PROBABILITY)
-    fitted = fitted_values(found, hypothesis)
+def region_of(found: Diagnosis, hypothesis: EvaluatedHypothesis, valve: Valve) -> Region:
+    """Where the recordings leave calibrated parameters, laws and sizes of a hypothesis, jointly."""
+    problem, estimate = found.ranking.problem, hypothesis.estimate
+    fitted = fitted_values(found, hypothesis) | problem.law_values(estimate)
     inside = {s: float(np.clip(value, *valve.base.domain(s))) for s, value in fitted.items()}
-    symbols = tuple(p.symbol for p in found.ranking.problem.parameters(hypothesis.estimate))
+    symbols, jacobian = _plant_symbols(problem, estimate)
     return Region(
         centre=valve.base.replace(**inside),
         symbols=symbols,
-        covariance=parameter_covariance(found, hypothesis),
-        chi_square=float(chi2.ppf(REGION_PROBABILITY, len(symbols))),
+        covariance=jacobian @ parameter_covariance(found, hypothesis) @ jacobian.T,
+        chi_square=float(chi2.ppf(REGION_PROBABILITY, jacobian.shape[1])),
     )
+
+
+def _plant_symbols(problem: FittingProblem, estimate: Estimate) -> tuple[tuple[str, ...], NDArray]:
+    """Symbols of the plant that were fitted, and their derivatives by the fitted numbers [SI].
+
+    A law has several components, of which its knots follow.
+    """
+    names = [p.symbol for p in problem.parameters(estimate)]
+    symbols, rows = [], []
+    knots = {}
+    for number, (law, _) in enumerate(estimate.laws, start=1):
+        first = names.index(law.parameters[0].symbol)
+        knots[first] = dict(zip(knot_symbols(number), COMPONENTS, strict=True))
+    opened = {p.symbol for law in estimate.hypothesis.laws for p in law.parameters}
+    for place, name in enumerate(names):
+        for symbol, weights in knots.get(place, {}).items():
+            symbols.append(symbol)
+            rows.append(np.zeros(len(names)))
+            rows[-1][place : place + len(weights)] = weights
+        if name not in opened:
+            symbols.append(name)
+            rows.append(np.eye(len(names))[place])
+    return tuple(symbols), np.array(rows).reshape(len(symbols), len(names))
 
 
 def steps_on_stderr(began: float) -> Callable[[str], None]:

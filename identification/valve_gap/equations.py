@@ -1,21 +1,16 @@
 """The valve's state equations f1 to f7 (report eqs 5 to 12), forcings on them, and its regimes."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.common.units import BAR, GRAM, MILLIGRAM, MILLIMETRE
 from epv_env.plant.channels import readings
-from epv_env.plant.coefficients import coefficients
-from epv_env.plant.effects.registry import effect_constants
-from epv_env.plant.equations import Inputs, State, derivative
-from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at, store_state
-from epv_env.plant.primitives import FLAGS, source_digest
+from epv_env.plant.equations import Inputs
 from epv_env.plant.simulate import Trajectory, energised, simulate
 from epv_env.plant.valves import Valves
-from identification.gap.plant import Contribution, StateEquation, StateTrace
+from identification.gap.plant import StateEquation, StateTrace
 from identification.recordings.recording import OUTPUTS
 from identification.replay.model_inputs import ModelInputs
 
@@ -61,9 +56,6 @@ FORCINGS = {
 """Input of the simulator by which each equation is forced, the state whose rate it changes, and its
 sign: drawn air lacks in p2."""
 
-OF_EFFECTS = State._fields[State._fields.index("I_coil") + 1 :]
-"""States that effects add; they rest at 0 without them."""
-
 SETTLED_CURRENT = 0.02
 """Distance from the end value, relative to the greatest current, where a transient is over [-]."""
 
@@ -79,6 +71,7 @@ MOVING_SPEED = 2e-3
 
 def modelled(drive: ModelInputs, p: Mapping[str, float]) -> Trajectory:
     """The model on a recording's inputs; p: every parameter by symbol [SI]."""
+    drive = drive.without_sensor_errors(p)
     initial = energised(p, p1=drive.p1_start, p2=drive.p2_start, U=drive.U_start)
     return simulate(
         p, initial=initial, U=drive.U, period=drive.period, sigma_S=drive.sigma_S, p1=drive.p1
@@ -92,6 +85,7 @@ def forced_changes(
 
     p: every parameter by symbol [SI]. forcing: by equation, (samples, m) [kg/s, N, V].
     """
+    drive = drive.without_sensor_errors(p)
     m = next(iter(forcing.values())).shape[1]
     base = {
         "U": drive.U[:-1, None],
@@ -108,66 +102,6 @@ def forced_changes(
     outputs = _simulated(drive, p, m + 1, acting)
     changes[:, 1:] = outputs[..., 1:] - outputs[..., :1]
     return changes
-
-
-def contribution(
-    drive: ModelInputs, p: Mapping[str, float], without: Mapping[str, float]
-) -> Contribution:
-    """Forcings and readings that the model with the parameters `p` has beyond that with `without`.
-
-    Both along the course of the model with p; parameters by symbol [SI].
-    """
-    answer = modelled(drive, p)
-    course = np.array([np.broadcast_to(field, answer.time.shape) for field in answer.state])
-    bare = course.copy()
-    bare[State._fields.index(OF_EFFECTS[0]) :] = 0.0
-    inputs = np.zeros((len(Inputs._fields), len(drive.U)))
-    inputs[Inputs._fields.index("U")] = drive.U
-    inputs[Inputs._fields.index("sigma_S")] = drive.sigma_S
-    valve = coefficients(without), effect_constants(without)
-    nominal = _rates(bare, inputs, *valve)
-    added = _rates(course, inputs, coefficients(p), effect_constants(p)) - nominal
-    equations = {}
-    for equation, (name, state, sign) in FORCINGS.items():
-        row, pushed = State._fields.index(state), inputs.copy()
-        pushed[Inputs._fields.index(name)] += sign * _STEPS[equation]
-        gain = (_rates(bare, pushed, *valve) - nominal)[row] / _STEPS[equation]
-        # Where a diode holds the voltage of the coil, none acts from outside.
-        equations[equation] = np.divide(added[row], gain, out=np.zeros_like(gain), where=gain != 0.0)
-    with_p, bared = readings(answer.state, p), readings(answer.state, {**p, **without})
-    return Contribution(
-        equations=equations,
-        readings=np.stack([(with_p[o] - bared[o]) + np.zeros(len(drive.U)) for o in OUTPUTS]),
-    )
-
-
-_STEPS = {equation.name: equation.step for equation in EQUATIONS}
-
-
-def _compiled_rates(digest: str) -> Callable[..., None]:
-    @numba.njit(cache=True, **FLAGS)
-    def rates_along(states, inputs, c, e, out):
-        if digest == "":
-            return
-        valve, effects = coefficients_at(c, 0, 0), effects_at(e, 0, 0)
-        for k in range(states.shape[1]):
-            q, u = state_at(states, 0, k), inputs_at(inputs, 0, k)
-            store_state(out, 0, k, derivative(q, u, valve, effects, 1.0, 1.0, True)[0])
-
-    return rates_along
-
-
-_rates_along = _compiled_rates(source_digest())
-
-
-def _rates(states: NDArray, inputs: NDArray, valve: NDArray, effects: NDArray) -> NDArray:
-    """Rates of free movers at states (states, samples) under inputs (inputs, samples), likewise [SI].
-
-    valve, effects: `coefficients` and `effect_constants` of one valve.
-    """
-    out = np.empty_like(states)
-    _rates_along(states, inputs, valve, effects, out)
-    return out
 
 
 def _simulated(

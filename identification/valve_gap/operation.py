@@ -23,7 +23,7 @@ from identification.gap.gap_json import write_results
 from identification.gap.gauss_newton import linearise
 from identification.gap.onset import least_squares_by_onset
 from identification.gap.plant import NuisanceParameter
-from identification.gap.posterior import CHANCE_MISFIT, FIGURES, WEIGHTS
+from identification.gap.posterior import CHANCE, POWER, TOLERANCE
 from identification.gap.prepared_plant import prepared
 from identification.gap.screened import Finding
 from identification.gap.screening import simulate_signatures
@@ -41,8 +41,6 @@ from identification.valve_gap.diagnose import (
 )
 from identification.valve_gap.diagnose import next_step as after_diagnosis
 from identification.valve_gap.valve import Valve
-
-FIT_WEIGHT = WEIGHTS[FIGURES.index("fit")]
 
 CONSUMPTION = (
     NuisanceParameter(symbol=FLOW_SHIFT, sd=3e-4, step=1e-4),
@@ -121,7 +119,7 @@ def onset_probabilities(valve: "LoggedValve", cache: FitCache) -> NDArray:
     drives = np.array([valve.drives.index(name) for name in names])
     squares = least_squares_by_onset(runs, signatures, drives)
     misfits = (squares / np.min(squares) - 1.0) * problem.readings / 2.0
-    scores = -FIT_WEIGHT * np.log(misfits + CHANCE_MISFIT)
+    scores = -POWER * np.log1p(misfits / (CHANCE + TOLERANCE * problem.readings))
     scores[1:] -= np.log(max(len(squares) - 1, 1))
     return softmax(scores)
 

@@ -1,17 +1,19 @@
 """The valve behind the grey-box protocol: replayed recordings, and what may be wrong with the model."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.plant.effects.law import ARGUMENTS, placed
+from epv_env.plant.effects.registry import PLACES
 from epv_env.plant.free_parameters import FREE_PARAMETERS
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from identification.calibration.problem import calibration_problem
-from identification.gap.plant import Channel, Contribution, NuisanceParameter, Run, StateTrace
-from identification.gap.reading_noise import noise_of_blocks
+from identification.gap.noise import noise_of_blocks
+from identification.gap.plant import Cause, Channel, NuisanceParameter, Run, StateTrace
 from identification.gap.screened import Finding, screen
 from identification.recordings.noise import coarse_step_warnings, reliable_step, rounding_error
 from identification.recordings.recording import OUTPUTS, UNITS, Campaign, Recording
@@ -20,7 +22,6 @@ from identification.replay.replay import P2_SHIFT, SHIFTS, Replay, measured_outp
 from identification.valve_gap import causes
 from identification.valve_gap.equations import (
     EQUATIONS,
-    contribution,
     forced_changes,
     modelled,
     regimes,
@@ -136,6 +137,7 @@ class Valve:
         self.warnings = coarse_step_warnings(problem.steps)
         self.run_offsets = (_rounded(P2_START, problem.steps.get("p2", 0.0)), P3_ZERO, I_ZERO, *offsets)
         self.equations = EQUATIONS
+        self.law_arguments = tuple(ARGUMENTS)
         self.replay = Replay([model_inputs(r, self.base) for r in self.recordings], self.base)
 
     def outputs(self, values: Mapping[str, NDArray], runs: Sequence[int]) -> list[NDArray]:
@@ -147,10 +149,6 @@ class Valve:
             if symbol in values:
                 given = np.asarray(values[symbol])
                 start[symbol] = start[symbol] + (given[:, None] if given.ndim == 1 else given)
-        if "b_p2" in plant:
-            # The recorded start is what the biased sensor read.
-            bias = np.asarray(plant["b_p2"])
-            start[P2_SHIFT] = start[P2_SHIFT] - (bias[:, None] if bias.ndim == 1 else bias)
         shifts = {s: start[s] for s in SHIFTS if s in start}
         found = self.replay.outputs({**plant, **shifts}, runs)
         for run, output in zip(runs, found, strict=True):
@@ -172,13 +170,11 @@ class Valve:
         """`GreyBox.forced`: changes (3, samples, m) of OUTPUTS [Pa, Pa, A]."""
         return forced_changes(self.replay.drives[run], self._one(values, run), forcing)
 
-    def contribution(
-        self, values: Mapping[str, NDArray], symbols: Collection[str], run: int
-    ) -> Contribution:
-        """`GreyBox.contribution`: f1 to f7, and readings (3, samples) [Pa, Pa, A]."""
-        p = self._one(values, run)
-        nominal = {symbol: self.base[symbol] for symbol in symbols}
-        return contribution(self.replay.drives[run], p, {**p, **nominal})
+    def law_values(
+        self, number: int, cause: Cause, argument: str, low: float, high: float, growth: NDArray
+    ) -> dict[str, float]:
+        """`GreyBox.law_values`; growth: (knots,)."""
+        return placed(number, PLACES[cause.name], argument, low, high, tuple(growth))
 
     def _one(self, values: Mapping[str, NDArray], run: int) -> dict[str, float]:
         """Plant parameters of the first candidate in a run."""

@@ -25,7 +25,7 @@ from identification.recordings.recording import CHANNELS, OUTPUTS, Recording
 def test_the_order_of_channels_is_that_of_files_and_of_drawn_noise():
     """A further channel comes after these."""
     assert MEASURED[:4] == ("p1", "p2", "p3", "I")
-    assert SENSOR_SYMBOLS[:3] == ("b_p2", "b_p3", "g_I")
+    assert SENSOR_SYMBOLS[:6] == ("g_p1", "b_p2", "g_p2", "b_p3", "g_p3", "g_I")
     assert OUTPUTS[:3] == ("p2", "p3", "I")
     assert CHANNELS[:5] == ("I", "U", "p1", "p2", "p3")
     assert list(SENSORS)[:5] == ["p1", "p2", "p3", "I", "U"]
@@ -126,7 +126,15 @@ def test_sensors_without_effects_read_the_state():
 
 
 @pytest.mark.parametrize(
-    ("symbol", "size", "name"), [("b_p2", 2e4, "p2"), ("b_p3", -3e4, "p3"), ("g_I", 0.05, "I")]
+    ("symbol", "size", "name"),
+    [
+        ("b_p2", 2e4, "p2"),
+        ("b_p3", -3e4, "p3"),
+        ("g_p1", 0.01, "p1"),
+        ("g_p2", -0.02, "p2"),
+        ("g_p3", 0.03, "p3"),
+        ("g_I", 0.05, "I"),
+    ],
 )
 def test_a_bias_adds_and_a_gain_multiplies_one_reading_exactly(symbol, size, name):
     p = CALIBRATED.replace(**{symbol: size})
@@ -135,8 +143,14 @@ def test_a_bias_adds_and_a_gain_multiplies_one_reading_exactly(symbol, size, nam
     for other, field in TRUE.items():
         true = getattr(nominal.state, field)
         np.testing.assert_array_equal(getattr(run.state, field), true)
-        wrong = true * (1.0 + size) if symbol == "g_I" else true + size
+        wrong = true * (1.0 + size) if symbol.startswith("g_") else true + size
         np.testing.assert_array_equal(values[other], wrong if other == name else true, err_msg=other)
+
+
+def test_a_bias_adds_to_what_a_scale_error_makes_of_the_pressure():
+    p = CALIBRATED.replace(b_p2=2e4, g_p2=0.01)
+    run = opening(p)
+    np.testing.assert_array_equal(readings(run.state, p)["p2"], run.state.p2 * 1.01 + 2e4)
 
 
 def test_every_valve_of_a_batch_has_sensors_of_its_own():

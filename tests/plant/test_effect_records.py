@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 import epv_env.plant
+from epv_env.plant.effects.law import SLOTS
 from epv_env.plant.effects.record import Constant, Effect, EffectError, Size
-from epv_env.plant.effects.registry import CONSTANTS, EFFECTS, effect
+from epv_env.plant.effects.registry import CONSTANTS, EFFECTS, LAWFUL, effect
 from epv_env.plant.parameters import Parameters, table
 
 PLANT = Path(epv_env.plant.__file__).parent
@@ -27,8 +28,9 @@ def source(folder: Path, pattern: str = "*.py") -> str:
 
 
 def unread_constants(constants: tuple[Constant, ...]) -> list[str]:
-    """Constants that no compiled function reads."""
+    """Constants that no compiled function reads; `with_laws` reads an effect's own two by its name."""
     text = source(PLANT) + re.sub(r"name=\S+", "", source(PLANT / "effects"))
+    text += " ".join(f".law{slot}_on_{name}" for slot in SLOTS for name in LAWFUL.values())
     read = [row.name for row in constants if row.in_equations]
     return [name for name in read if not re.search(rf"\.{name}\b", text)]
 

@@ -30,7 +30,10 @@ from tests.reference.schedule import away_from_events, largest_difference, pulse
 CALIBRATED = Parameters.calibrated()
 RT = CALIBRATED["R_gas"] * CALIBRATED["T_env"]
 RATE = 2000.0
-OUTSIDE = ("armature_bounce", "pressure_sensor_bias", "current_sensor_gain", "command_delay")
+OUTSIDE = (
+    "armature_bounce", "pressure_sensor_bias", "pressure_sensor_gain", "current_sensor_gain",
+    "command_delay",
+)  # fmt: skip
 """Effects that act outside of the equations: where a stop is met, before them, or behind them."""
 
 

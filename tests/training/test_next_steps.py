@@ -32,7 +32,6 @@ ENDED = {
     "export plant --out fmu --plant valve.json": "export",
     **{f"gap campaign --out {verdict} --plant valve.json": name for verdict, name in VERDICTS.items()},
     "import a.csv --out campaign --plant valve.json": "run",
-    "gap campaign --out ambiguous --rounds 1 --bench truth.json": "gap",
     "monitor log --out monitor": "gap",
     "run campaign --out results": "gap",
     "run campaign --out results --stage quality --seed 3": "run",

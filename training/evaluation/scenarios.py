@@ -213,10 +213,11 @@ def effect_levels() -> Iterator[tuple[str, str, dict[str, float]]]:
     """(effect, level, sizes by symbol [SI]) of every effect, variant and sign, at LEVELS.
 
     Small is the least and typical the (geometric) middle of what sealed trials draw; top is the end of
-    the physical range, which may lie far beyond what a sound valve has.
+    the physical range, which may lie far beyond what a sound valve has. All have their usual form.
     """
     for effect in EFFECTS:
-        for sizes in effect.variants.values():
+        for variant in effect.variants.values():
+            sizes = tuple(size for size in variant if size.spread is None)
             for sign in (1, -1) if sizes[0].either_sign else (1,):
                 name = _name(effect.name, sizes, sign, several=len(effect.variants) > 1)
                 for level in LEVELS:

@@ -23,6 +23,7 @@ ARMATURE_BOUNCE = Effect(
 ARMATURE_PRESSURE_FORCE = Effect(
     name="armature_pressure_force",
     component="armature",
+    strength=("inlet_area", "exhaust_area"),
     form="+ s π/4 (dMVin² (p1 − p3) − dMVexh² (p3 − p_env))",
     source="poppet balance: the seats' areas at s = 1",
     sizes=(

@@ -24,6 +24,7 @@ def _heat(chamber: str, number: int, size: Size) -> Effect:
     return Effect(
         name=f"{chamber}_heat",
         component=chamber,
+        strength=(f"exchange_{number}",),
         form=HEAT_FORM,
         source=HEAT_SOURCE,
         sizes=(size,),
@@ -74,6 +75,7 @@ OUTPUT_CHAMBER_HEAT = _heat(
 MOVING_CONTROL_VOLUME = Effect(
     name="moving_control_volume",
     component="control_chamber",
+    strength=("swept",),
     form="V3 − s π/4 d1² xPV, with its work on p3",
     source="geometry at s = 1: a tenth of V3",
     sizes=(
@@ -130,6 +132,7 @@ def _pipe_rate(p: Mapping[str, NDArray]) -> NDArray:
 OUTPUT_PIPE = Effect(
     name="output_pipe",
     component="output_chamber",
+    strength=("pipe_area",),
     form=(
         "the circuit as two volumes, (1 − s) V2 at the valve and s V2, with the consumer, behind an "
         "orifice A"

@@ -23,6 +23,7 @@ COOLING_TIME = 60.0
 COIL_HEATING = Effect(
     name="coil_heating",
     component="solenoid",
+    strength=("heating",),
     form="dθ/dt = h R(θ) I² − θ/60 s, R(θ) = R (1 + 0.00393 θ)",
     source=(
         "copper, 0.393 %/K; h: inverse heat capacity, 50 g of copper 0.05 K/J; 60 s of cooling: assumed"
@@ -66,6 +67,7 @@ COIL_HEATING = Effect(
 EDDY_CURRENT = Effect(
     name="eddy_current",
     component="solenoid",
+    strength=("eddy",),
     form="the coil's terminals carry (I + G U)/(1 + G R), I makes the flux: dλ/dt = (U − R I)/(1 + G R)",
     source=(
         "one shorted secondary turn, seen from the coil; measured beside a leakage inductance: "
@@ -93,6 +95,7 @@ EDDY_CURRENT = Effect(
 FLYBACK_VOLTAGE = Effect(
     name="flyback_voltage",
     component="solenoid",
+    strength=("U_clamp",),
     form="with the stage off (U ≤ 1 V) the coil sees U − U_clamp I/√(I² + (10 mA)²)",
     source=(
         "free-wheeling diode 0.7 V, Zener or avalanche clamp 30–60 V: data sheets of low-side drivers"
@@ -119,6 +122,7 @@ FLYBACK_VOLTAGE = Effect(
 DRIVER_VOLTAGE_DROP = Effect(
     name="driver_voltage_drop",
     component="solenoid",
+    strength=("U_drop",),
     form="the coil sees U − U_drop while on",
     source="saturation voltage of bipolar stages 1–2 V, of MOSFETs 0.1–0.5 V: data sheets",
     sizes=(

@@ -14,6 +14,7 @@ FILLING_TIME = 2e-3
 PRESSURE_DEPENDENT_DISCHARGE = Effect(
     name="pressure_dependent_discharge",
     component="protection_valve",
+    strength=("discharge_slope",),
     form="alphaPV (1 + k (1 − p2/p1))",
     source="Perry 1949: sharp edges discharge 0.6 at small drops, 0.85 choked",
     sizes=(
@@ -39,6 +40,7 @@ PRESSURE_DEPENDENT_DISCHARGE = Effect(
 CRITICAL_PRESSURE_RATIO = Effect(
     name="critical_pressure_ratio",
     component="flow",
+    strength=("drop_deficit",),
     form=(
         "all orifices (but that of the output pipe) choke at b = 0.528 − d: the drop 1 − r counts by "
         "(1 − 0.528)/(1 − b)"
@@ -66,6 +68,7 @@ CRITICAL_PRESSURE_RATIO = Effect(
 FLOW_FORCE = Effect(
     name="flow_force",
     component="protection_valve",
+    strength=("flow_force",),
     form="− c A_eff (p1 − p2), A_eff the seat's effective opening",
     source="Merritt 1967: 2 cos 69° = 0.72",
     sizes=(
@@ -90,6 +93,7 @@ FLOW_FORCE = Effect(
 LOCAL_GAS_SPEED = Effect(
     name="local_gas_speed",
     component="protection_valve",
+    strength=("a1", "a2"),
     form="the cone model of eqs 9 and 15: de = d2 − 2 xPV (a1 + a2 w)",
     source="the report",
     sizes=(
@@ -123,6 +127,7 @@ LOCAL_GAS_SPEED = Effect(
 SUPPLY_RESTRICTION = Effect(
     name="supply_restriction",
     component="supply",
+    strength=("supply_loss",),
     form="the valve sees p1 less (z w)²/(2 ρ), ρ at what it sees, reached in 2 ms; z = √ζ/A",
     source=(
         "ζ w²/(2 ρ A²), loss coefficients of pipes and fittings; the 2 ms of filling only decouple flow "
@@ -137,12 +142,38 @@ SUPPLY_RESTRICTION = Effect(
             trials=(2e4,),
             drawn=(5e3, 5e4),
         ),
+        Size(
+            symbol="wPV_supply",
+            unit="1",
+            domain=(-1, 1),
+            meaning="how much more than assumed the PV lies behind the restriction; -1: not at all",
+            spread=0.5,
+        ),
+        Size(
+            symbol="wMV_supply",
+            unit="1",
+            domain=(-1, 1),
+            meaning="the same for the MV",
+            spread=0.5,
+        ),
     ),
     constants=(
         Constant(
             name="supply_loss",
             meaning="pressure lost before the valve, times p1 over the flow squared [Pa^2 s^2/kg^2]",
             value=lambda p: 0.5 * (p["R_gas"] * p["T_env"]) * p["z_supply"] ** 2,
+        ),
+        Constant(
+            name="supply_PV",
+            meaning="share of that pressure that the PV feels, and of its flow that loses it [-]",
+            value=lambda p: 1 + p["wPV_supply"],
+            is_size=False,
+        ),
+        Constant(
+            name="supply_MV",
+            meaning="the same for the MV [-]",
+            value=lambda p: 1 + p["wMV_supply"],
+            is_size=False,
         ),
     ),
 )

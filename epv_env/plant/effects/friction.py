@@ -17,6 +17,7 @@ STRIBECK_SPEED = 0.05
 ARMATURE_FRICTION = Effect(
     name="armature_friction",
     component="armature",
+    strength=("friction_MV",),
     form="−F v/√(v² + (20 mm/s)²); at rest on a stop it resists the release",
     source="Coulomb friction, Armstrong-Hélouvry 1991",
     sizes=(
@@ -41,6 +42,7 @@ ARMATURE_FRICTION = Effect(
 PISTON_FRICTION = Effect(
     name="piston_friction",
     component="protection_valve",
+    strength=("friction_PV",),
     form="as armature_friction, times 1 + S/(1 + (v/v_s)²), v_s = 50 mm/s",
     source=(
         "sliding O-ring of 25.7 mm, measured: 4.3 ± 0.8 N + (0.56 ± 0.18) N/bar; at rest 1.6–2.9 times "

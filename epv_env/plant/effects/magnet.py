@@ -21,6 +21,7 @@ def inverse_inductance(p: Mapping[str, NDArray]) -> NDArray:
 MAGNETIC_SATURATION = Effect(
     name="magnetic_saturation",
     component="solenoid",
+    strength=("saturation", "force_saturation"),
     form=(
         "Φ = N I/(Rm + N I sMV); force from its coenergy, N² I²/(Rm² μ0 A) (ln(1+u) − u/(1+u))/u², "
         "u = sMV N I/Rm"
@@ -35,12 +36,24 @@ MAGNETIC_SATURATION = Effect(
             trials=(4e3,),
             drawn=(8e2, 8e3),
         ),
+        Size(
+            symbol="wF_sat",
+            unit="1",
+            domain=(-1, 3),
+            meaning="how much more the force saturates than the inductance, relative to the curve's law",
+            spread=0.5,
+        ),
     ),
     constants=(
         Constant(
             name="saturation",
             meaning="turns over the saturation flux: with I/Rm, how far the iron saturates [1/(V s)]",
             value=lambda p: p["sMV"] * p["N"],
+        ),
+        Constant(
+            name="force_saturation",
+            meaning="the same, as far as the force feels it [1/(V s)]",
+            value=lambda p: p["sMV"] * p["N"] * (1 + p["wF_sat"]),
         ),
     ),
     fastest_rate=lambda p: p["R"] * inverse_inductance(p),
@@ -49,6 +62,7 @@ MAGNETIC_SATURATION = Effect(
 MAGNETIC_REMANENCE = Effect(
     name="magnetic_remanence",
     component="armature",
+    strength=("I_rem",),
     form="flux and force act as with I + I_rem",
     source="coercive field of soft solenoid steel, 50–200 A/m over a few cm of iron",
     sizes=(
@@ -72,9 +86,9 @@ MAGNETIC_REMANENCE = Effect(
 
 
 @inlined
-def saturation_level(current, inverse_Rm, effects):
+def saturation_level(current, inverse_Rm, saturation):
     """u of the Froelich-Kennelly curve: flux = N I / (Rm (1 + u)) [-]; 0 for iron that is linear."""
-    return effects.saturation * abs(current) * inverse_Rm
+    return saturation * abs(current) * inverse_Rm
 
 
 @inlined

@@ -26,6 +26,7 @@ def _lag_constants(number: int) -> tuple[Constant, ...]:
 PRESSURE_SENSOR_LAG = Effect(
     name="pressure_sensor_lag",
     component="sensor",
+    strength=("lag_2_rate", "lag_3_rate"),
     form="τ dy/dt = p − y",
     source="first-order sensor with its line",
     sizes=tuple(
@@ -63,6 +64,26 @@ PRESSURE_SENSOR_BIAS = Effect(
         for channel in ("p2", "p3")
     ),
     alternatives={"p2": ("b_p2",), "p3": ("b_p3",)},
+)
+
+PRESSURE_SENSOR_GAIN = Effect(
+    name="pressure_sensor_gain",
+    component="sensor",
+    form="y = (1 + g) p",
+    source="ratiometric sensors follow their supply: 4.92 V instead of 5 V are 1.6 %; Table 1: 1.6 %",
+    sizes=tuple(
+        Size(
+            symbol=f"g_{channel}",
+            unit="1",
+            domain=(-0.1, 0.1),
+            meaning=f"scale error of the sensor of {channel}",
+            trials=(0.01,),
+            drawn=(3e-3, 4e-2),
+            either_sign=True,
+        )
+        for channel in ("p1", "p2", "p3")
+    ),
+    alternatives={"p1": ("g_p1",), "p2": ("g_p2",), "p3": ("g_p3",)},
 )
 
 CURRENT_SENSOR_GAIN = Effect(

@@ -32,6 +32,9 @@ class Size:
     """Sizes from which a fit begins; (): the diagnosis does not fit this size."""
     least_fitted: float | None = None
     """Lower end of a fit's range where a smaller size is not felt, or is too stiff to simulate."""
+    spread: float | None = None
+    """Standard deviation of a size that says how the effect departs from its usual form at 0; None: the
+    size says how strong the effect is."""
     drawn: tuple[float, float] | None = None
     """Range of sealed trials and sweeps, log-uniform; None: neither draws this size."""
     swept: tuple[float, float] | None = None
@@ -93,6 +96,8 @@ class Effect:
     """Symbols that act together, by the label of the variant; {}: one variant with all sizes."""
     constants: tuple[Constant, ...] = ()
     """Rows of the kernel's table; () for an effect that acts outside of the equations."""
+    strength: tuple[str, ...] = ()
+    """Constants that a law multiplies (law.py); (): the effect has no law but its own."""
     fastest_rate: Callable[[Mapping[str, NDArray]], NDArray] | None = None
     """Fastest rate that the effect adds to the state [1/s], shape as its parameters; None: none."""
 
@@ -115,13 +120,16 @@ class Effect:
     @property
     def fitted(self) -> dict[str, tuple[Size, ...]]:
         """The sizes that the diagnosis fits together, by variant."""
-        chosen = {v: tuple(s for s in sizes if s.trials) for v, sizes in self.variants.items()}
+        chosen = {
+            v: tuple(s for s in sizes if s.trials or s.spread) for v, sizes in self.variants.items()
+        }
         return {variant: sizes for variant, sizes in chosen.items() if sizes}
 
     @property
     def drawn(self) -> tuple[tuple[Size, ...], ...]:
         """The sizes that a sealed trial draws together, by variant."""
-        return tuple(sizes for sizes in self.variants.values() if all(s.drawn for s in sizes))
+        strengths = (tuple(s for s in v if s.spread is None) for v in self.variants.values())
+        return tuple(sizes for sizes in strengths if all(s.drawn for s in sizes))
 
 
 def _faults(effect: Effect) -> list[str]:
@@ -135,6 +143,9 @@ def _faults(effect: Effect) -> list[str]:
     unknown = {s for each in effect.alternatives.values() for s in each} - set(effect.symbols)
     if unknown:
         faults.append(f"alternatives name {', '.join(sorted(unknown))}: give a Size for each")
+    strange = set(effect.strength) - {row.name for row in effect.constants}
+    if strange:
+        faults.append(f"strength names {', '.join(sorted(strange))}: name constants of the effect")
     for size in effect.sizes:
         if size.domain and not (size.unit and size.meaning):
             faults.append(f"{size.symbol} lacks its unit or its meaning: give both")

@@ -12,13 +12,15 @@ from epv_env.plant.effects import (
     coil,
     flows,
     friction,
-    learnt,
+    law,
     magnet,
     measurement,
     seats,
 )
+from epv_env.plant.effects.law import growth_1, growth_2
 from epv_env.plant.effects.record import Effect, EffectError
 from epv_env.plant.effects.step_limits import step_limits
+from epv_env.plant.primitives import generated, inlined
 
 EFFECTS: tuple[Effect, ...] = (
     coil.COIL_HEATING,
@@ -46,6 +48,7 @@ EFFECTS: tuple[Effect, ...] = (
     flows.SUPPLY_RESTRICTION,
     measurement.PRESSURE_SENSOR_LAG,
     measurement.PRESSURE_SENSOR_BIAS,
+    measurement.PRESSURE_SENSOR_GAIN,
     measurement.CURRENT_SENSOR_GAIN,
     measurement.COMMAND_DELAY,
 )
@@ -54,15 +57,40 @@ EFFECTS: tuple[Effect, ...] = (
 CATALOGUE: dict[str, tuple[str, ...]] = {effect.name: effect.symbols for effect in EFFECTS}
 """Symbols that size each effect, by its name; all 0 is off."""
 
+PLACES = {name: place for place, name in enumerate(CATALOGUE, start=1)}
+"""Number by which a law names its effect."""
+
 CONSTANTS = (
     *(row for effect in EFFECTS for row in effect.constants),
-    *learnt.CONSTANTS,
+    *law.constants(EFFECTS),
     *step_limits(EFFECTS),
 )
 """Rows of the kernel's table of effects."""
 
 Effects = namedtuple("Effects", [row.name for row in CONSTANTS])
 Effects.__doc__ = "Constants of the effects as the equations use them (CONSTANTS); a size of 0 is off."
+
+LAWFUL = {name: record.name for record in EFFECTS for name in record.strength}
+"""Effect of each constant that a law multiplies."""
+
+_scaled = generated(
+    "scaled",
+    "e, g1, g2",
+    "return Effects(" + ", ".join(
+        f"e.{name} * (1.0 + e.law1_on_{LAWFUL[name]} * g1) * (1.0 + e.law2_on_{LAWFUL[name]} * g2)"
+        if name in LAWFUL else f"e.{name}"
+        for name in Effects._fields
+    ) + ")",
+    Effects=Effects,
+)  # fmt: skip
+
+
+@inlined
+def with_laws(q, U, e):
+    """The constants whose strengths follow their laws at a state q under a voltage U [V]; e: Effects."""
+    g1 = growth_1(q, U, e)
+    g2 = growth_2(q, U, e)
+    return _scaled(e, g1, g2)
 
 
 def effect(name: str) -> Effect:

@@ -10,8 +10,9 @@ def _leak(name: str, component: str, size: Size, constant: str, form: str, sourc
         name=constant, meaning=f"{size.meaning} [m^2]", value=lambda p, symbol=size.symbol: p[symbol]
     )
     return Effect(
-        name=name, component=component, form=form, source=source, sizes=(size,), constants=(row,)
-    )
+        name=name, component=component, form=form, source=source, sizes=(size,), constants=(row,),
+        strength=(constant,),
+    )  # fmt: skip
 
 
 INLET_SEAT_LEAK = _leak(

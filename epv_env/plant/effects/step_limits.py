@@ -6,6 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.plant.effects import law
 from epv_env.plant.effects.coil import CLAMP_WIDTH, NO_CURRENT, OFF_VOLTAGE
 from epv_env.plant.effects.flows import FILLING_TIME
 from epv_env.plant.effects.friction import SLIDING_SPEED_MV, SLIDING_SPEED_PV
@@ -31,7 +32,7 @@ def step_limits(effects: tuple[Effect, ...]) -> tuple[Constant, ...]:
         for effect in effects:
             if effect.fastest_rate:
                 fastest = np.maximum(fastest, effect.fastest_rate(p))
-        return STABLE / fastest
+        return STABLE / (fastest * law.most_growth(p))
 
     return (
         Constant(
@@ -43,22 +44,27 @@ def step_limits(effects: tuple[Effect, ...]) -> tuple[Constant, ...]:
         Constant(
             name="clamp_step",
             meaning="longest step at which it follows the current's decay against a clamp [s]",
-            value=lambda p: STABLE / np.maximum(_clamp_rate(p), STABLE / UNLIMITED),
+            value=lambda p: STABLE / np.maximum(_clamp_rate(p) * law.most_growth(p), STABLE / UNLIMITED),
             is_size=False,
         ),
         Constant(
             name="slow_step_PV",
             meaning="longest step at which it follows the friction of a piston about to stop [s]",
-            value=lambda p: FRICTION_STABLE / np.maximum(_friction_rate_PV(p), STABLE / UNLIMITED),
+            value=lambda p: _friction_step(_friction_rate_PV(p), p),
             is_size=False,
         ),
         Constant(
             name="slow_step_MV",
             meaning="the same of the armature [s]",
-            value=lambda p: FRICTION_STABLE / np.maximum(_friction_rate_MV(p), STABLE / UNLIMITED),
+            value=lambda p: _friction_step(_friction_rate_MV(p), p),
             is_size=False,
         ),
     )
+
+
+def _friction_step(rate: NDArray, p: Mapping[str, NDArray]) -> NDArray:
+    """Longest step for a friction that stops a mover at a rate [1/s], as strong as a law may make it."""
+    return FRICTION_STABLE / np.maximum(rate * law.most_growth(p), STABLE / UNLIMITED)
 
 
 def _clamp_rate(p: Mapping[str, NDArray]) -> NDArray:

@@ -25,7 +25,9 @@ from identification.blind.truth import EFFECTS, top_sizes
 PLANT = COMPILED_RIGHT_HAND_SIDES[True]
 DROP, CURRENT = (State._fields.index(name) for name in ("supply_drop", "I"))
 LEVELS = (1e-3, 0.02, 0.03, 0.2, 1.0, 3.0)
-BESIDE_THE_STATE = {"pressure_sensor_bias", "current_sensor_gain", "command_delay"}
+BESIDE_THE_STATE = {
+    "pressure_sensor_bias", "pressure_sensor_gain", "current_sensor_gain", "command_delay",
+}  # fmt: skip
 """Effects that act before or behind the equations of state (tests of the bench)."""
 
 

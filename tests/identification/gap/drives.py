@@ -73,9 +73,6 @@ class Drive:
         """`GreyBox.forced`: never, without equations."""
         raise NotImplementedError
 
-    def contribution(self, values, symbols, run):
-        """`GreyBox.contribution`: left to the change of the readings."""
-
 
 def _cause(name: str) -> Cause:
     low, high, nominal, trials = RANGES[name]

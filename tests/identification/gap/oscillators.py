@@ -1,6 +1,6 @@
 """A lightly damped, driven oscillator whose nominal model knows viscous drag alone, as a `GreyBox`."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,9 +64,6 @@ class Oscillator:
         """`GreyBox.forced`."""
         (acting,) = forcing.values()
         return (self._swing(values, run, acting)[0] - self._swing(values, run)[0])[None]
-
-    def contribution(self, values: Mapping[str, NDArray], symbols: Collection[str], run: int) -> None:
-        """`GreyBox.contribution`: left to the change of the angle."""
 
     def _swing(
         self, values: Mapping[str, NDArray], run: int, forcing: NDArray | None = None

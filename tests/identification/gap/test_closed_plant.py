@@ -34,9 +34,6 @@ class ClosedTank(Tank):
         """There is no equation to force."""
         raise AssertionError
 
-    def contribution(self, values, symbols, run):
-        """Left to the change of the readings."""
-
 
 @cache
 def diagnosed() -> Diagnosis:

@@ -17,8 +17,9 @@ def test_what_no_reading_tells_is_wide_but_known_to_be():
     assert np.min(np.linalg.eigvalsh(hessian)) <= 0
     none = np.zeros((3, 0))
     run = LinearisedRun(
-        residual=np.zeros(3), slopes=np.eye(3)[:, :2], run_slopes=none, run_values=np.zeros(0),
-        run_sd=np.zeros(0), shared_slopes=none,
+        residual=np.zeros(3), slopes=np.eye(3)[:, :2], slope_precision=np.zeros(2),
+        slope_values=np.zeros(2), run_slopes=none, run_values=np.zeros(0), run_sd=np.zeros(0),
+        shared_slopes=none,
     )  # fmt: skip
     equations = replace(normal_equations([run]), hessian=hessian)
     found = _covariance(equations)

@@ -11,6 +11,7 @@ from identification.gap.gap_json import (
     magnitudes,
     unit_name,
 )
+from identification.gap.laws import AS_ASSUMED
 from tests.identification.gap.tanks import TANKS, diagnosed
 
 KEYS = {
@@ -39,7 +40,8 @@ def test_every_verdict_has_all_fields_of_the_format(verdict):
     assert 0 <= remainder["low"] <= remainder["fraction"] <= remainder["high"] <= 1
     assert set(content["discrepancy"]) == set(content["where"]["channel"])
     judged = content["causes"][0]
-    assert set(judged) >= {"effects", "probability", "magnitude", "shrink", "gap"}
+    assert set(judged) >= {"effects", "probability", "magnitude", "shrink", "gap", "converged"}
+    assert (judged["form"], judged["laws"]) == (AS_ASSUMED, []), "this tank simulates no laws"
 
 
 @pytest.mark.parametrize("verdict", TANKS)

@@ -1,5 +1,6 @@
-"""Probabilities under noise and discrepancy: for noise none, whatever its stated size."""
+"""Probabilities from what hypotheses leave beyond noise: for noise none, whatever its stated size."""
 
+from copy import copy
 from dataclasses import replace
 from functools import cache
 
@@ -8,15 +9,19 @@ import pytest
 
 from identification.gap.diagnosis import rank_hypotheses
 from identification.gap.evidence import EvaluatedHypothesis
+from identification.gap.laws import Law
 from identification.gap.posterior import (
-    FIGURES,
+    POWER,
     UNKNOWN_SHARE,
     Posterior,
+    log_priors,
     misfit_beyond_noise,
     posterior,
+    tolerated_misfit,
 )
+from identification.gap.prepared_plant import prepared
 from identification.gap.verdict import Ranking
-from tests.identification.gap.drives import Drive
+from tests.identification.gap.drives import RANGES, Drive
 
 
 @cache
@@ -28,10 +33,13 @@ def ranked(truth: dict[str, float], seed: int = 0) -> Ranking:
     return _ranked(tuple(truth.items()), seed)
 
 
-def weighed(found: Ranking, change=lambda each: each) -> Posterior:
-    """Probabilities of the same fits, each changed."""
+def weighed(found: Ranking, change=lambda each: each, noise: float = 1.0) -> Posterior:
+    """Probabilities of the same fits, each changed; the noise is stated `noise` times as large."""
+    problem = copy(found.problem)
+    plant = prepared(problem.plant)
+    problem.plant = plant.with_noise([noise] * len(plant.channels))
     every = [change(each) for each in (found.recalibrated, *found.hypotheses)]
-    return posterior(found.problem, every[0], every[1:])
+    return posterior(problem, every[0], every[1:])
 
 
 def in_units_of(factor: float, each: EvaluatedHypothesis) -> EvaluatedHypothesis:
@@ -48,6 +56,12 @@ def everything(found: Posterior) -> list[float]:
     return [found.no_cause, found.unknown, *found.probabilities]
 
 
+def odds(found: Posterior) -> dict[tuple[str, ...], float]:
+    """Probability of each hypothesis relative to that of an unknown cause."""
+    pairs = zip(found.hypotheses, found.probabilities, strict=True)
+    return {each.labels: probability / found.unknown for each, probability in pairs}
+
+
 TRUTHS = [{}, {"coupling": 0.1}, {"dead_zone": 0.15, "lag": 0.03, "coupling": 0.1}]
 
 
@@ -55,9 +69,11 @@ TRUTHS = [{}, {"coupling": 0.1}, {"dead_zone": 0.15, "lag": 0.03, "coupling": 0.
 def test_the_scale_of_the_noise_does_not_matter(truth, factor):
     """But for nuisance parameters, whose deviations do not scale and hardly count here."""
     found = ranked(truth)
-    scaled = weighed(found, lambda each: in_units_of(factor, replace(each, nuisance_penalty=0.0)))
-    plain = weighed(found, lambda each: replace(each, nuisance_penalty=0.0))
-    assert everything(scaled) == pytest.approx(everything(plain), abs=0.02)
+    at_rest = weighed(found, lambda each: replace(each, nuisance_penalty=0.0))
+    scaled = weighed(
+        found, lambda each: in_units_of(factor, replace(each, nuisance_penalty=0.0)), factor
+    )
+    assert everything(scaled) == pytest.approx(everything(at_rest), abs=0.02)
 
 
 @pytest.mark.parametrize("truth", TRUTHS)
@@ -82,35 +98,64 @@ def test_the_more_a_cause_explains_the_less_no_cause_is_believed(seed, size):
     assert larger.no_cause <= found.no_cause + 1e-3
 
 
-def test_a_cause_at_the_end_of_its_range_is_not_named():
+def test_a_cause_at_the_end_of_its_range_is_e_times_less_probable():
     found = ranked({"coupling": 0.1})
-    ended = weighed(found, lambda each: replace(each, at_bound="coupling" in each.labels))
-    for each, probability in zip(found.hypotheses, ended.probabilities, strict=True):
-        if "coupling" in each.labels:
-            assert probability == 0.0
-    assert sum(everything(ended)) == pytest.approx(1.0)
+    before = odds(weighed(found))
+    ended = odds(weighed(found, lambda each: replace(each, unusual="coupling" in each.labels)))
+    for labels, share in before.items():
+        expected = share / np.e if "coupling" in labels else share
+        assert ended[labels] == pytest.approx(expected, rel=1e-9)
 
 
-def test_a_cause_that_removes_more_has_less_misfit_and_share():
+def test_a_probability_is_a_power_of_what_is_left_times_its_prior():
+    found = ranked({"coupling": 0.1})
+    tolerated = tolerated_misfit(found.noise)
+    whole = misfit_beyond_noise(found.recalibrated, found.noise)
+    priors = np.exp(log_priors(found.problem, found.hypotheses))
+    unknown = (2.0 + UNKNOWN_SHARE * whole / tolerated) ** -POWER * priors[-1]
+    for each, prior in zip(found.hypotheses, priors[1:-1], strict=True):
+        left = max(misfit_beyond_noise(each, found.noise), 0.0)
+        expected = (1.0 + left / tolerated) ** -POWER * prior / unknown
+        assert odds(found)[each.labels] == pytest.approx(expected, rel=1e-6)
+
+
+def test_sets_of_as_many_causes_share_a_prior_and_an_open_law_costs_its_choice():
     found = ranked({"dead_zone": 0.15, "lag": 0.03, "coupling": 0.1})
-    shares = {frozenset(e.labels): s for e, s in zip(found.hypotheses, found.shares_left, strict=True)}
-    assert shares[frozenset({"dead_zone", "lag", "coupling"})] < 1e-6
-    assert shares[frozenset({"lag", "coupling"})] > 0.05
-    misfits = [misfit_beyond_noise(each, found.discrepancies) for each in found.hypotheses]
-    order = np.argsort(misfits)
-    assert np.all(np.diff(np.array(found.shares_left)[order]) >= 0.0)
+    sets = {len(each.labels): each for each in found.hypotheses}
+    problem = copy(found.problem)
+    none, *own, unknown = np.exp(log_priors(problem, list(sets.values())))
+    count = len(RANGES)
+    each_size = problem.readings**-0.5
+    shared = {1: 0.3 / count, 2: 0.03 / (count * (count - 1) / 2), 3: 0.003 / 20}
+    shared = {number: prior * each_size**number for number, prior in shared.items()}
+    assert none == pytest.approx(0.5)
+    assert unknown == pytest.approx(shared[2])
+    given = dict(zip(sets, own, strict=True))
+    assert {number: given[number] for number in shared} == pytest.approx(shared)
+    problem.plant.law_arguments = ("u", "w")  # type: ignore[attr-defined]
+    single = sets[1].estimate
+    law = Law(cause=single.hypothesis.causes[0], argument="u", low=0.0, high=1.0)
+    lawful = replace(single, hypothesis=replace(single.hypothesis, laws=(law,)))
+    opened = replace(sets[1], estimate=lawful, law_penalty=0.7)
+    found_prior = np.exp(log_priors(problem, [opened])[1])
+    assert found_prior == pytest.approx(shared[1] * np.exp(-0.7) / 2.0)
+
+
+def test_a_cause_that_removes_more_has_less_misfit():
+    found = ranked({"dead_zone": 0.15, "lag": 0.03, "coupling": 0.1})
+    left = {frozenset(e.labels): m for e, m in zip(found.hypotheses, found.misfits, strict=True)}
+    tolerated = tolerated_misfit(found.noise)
+    assert left[frozenset({"dead_zone", "lag", "coupling"})] < tolerated
+    assert left[frozenset({"lag", "coupling"})] > 10 * tolerated
+    misfits = [misfit_beyond_noise(each, found.noise) for each in found.hypotheses]
+    assert np.diff(found.misfits) == pytest.approx(np.diff(misfits))
 
 
 def test_a_small_second_cause_beside_a_large_one_is_named():
-    """Its effect is far beyond what another law of the large one would leave."""
     found = rank_hypotheses(Drive({"coupling": 0.3, "dead_zone": 0.06}))
     assert found.inclusion["dead_zone"] > 0.9
 
 
-def test_figures_say_what_a_hypothesis_leaves_and_costs():
-    found = ranked({"coupling": 0.1})
-    figures = dict(zip(FIGURES, found.figures.T, strict=True))
-    assert figures["fit"][-2] == pytest.approx(0.0, abs=0.05)  # no cause leaves all
-    assert figures["fit"][-1] == pytest.approx(-np.log(UNKNOWN_SHARE), abs=0.05)
-    assert list(figures["causes"][:-2]) == [len(each.labels) for each in found.hypotheses]
-    assert list(figures["no_cause"]) == [0.0] * len(found.hypotheses) + [1.0, 0.0]
+def test_hypotheses_fall_in_probability():
+    for truth in TRUTHS:
+        assert np.all(np.diff(ranked(truth).probabilities) <= 0.0)

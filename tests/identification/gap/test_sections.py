@@ -43,13 +43,13 @@ def test_every_report_has_the_same_parts(name):
     found = sections(diagnosed(name), NEXT)
     assert [section.title for section in found] == [
         "Verdict", "Where the gap lies", "Which cause it is", "How far the gap shrinks",
-        "What remains", "Next experiment", "Warnings",
+        "What remains", "Next recording", "Warnings",
     ]  # fmt: skip
     assert all(section.verdicts for section in found)
     assert not re.search(r"\b(nan|inf)\b", texts(found))
     assert plt.get_fignums() == []
     without = [section.title for section in sections(diagnosed(name))]
-    assert "Next experiment" not in without
+    assert "Next recording" not in without
 
 
 def test_a_known_cause_is_named_with_its_size_and_what_it_closes():

@@ -10,19 +10,24 @@ from identification.gap.variable_projection import (
     LARGEST_DEVIATION,
     LinearisedRun,
     bounded_minimiser,
+    equations_of,
     normal_equations,
+    products_of,
     without_run_nuisances,
 )
 
 RNG = np.random.default_rng(2)
 SD = np.array([0.3, 2.0])
+PRECISION, VALUES = np.array([0.0, 30.0]), np.array([0.0, 0.7])
+"""Of the priors of the two slopes, the first of which has none."""
 
 
 def runs(count=3):
     return [
         LinearisedRun(
             residual=RNG.normal(size=40), slopes=RNG.normal(size=(40, 2)),
-            run_slopes=RNG.normal(size=(40, 2)), run_values=RNG.normal(size=2), run_sd=SD,
+            slope_precision=PRECISION, slope_values=VALUES,
+            run_slopes=RNG.normal(size=(40, 2)), run_values=0.5 * SD * RNG.normal(size=2), run_sd=SD,
             shared_slopes=RNG.normal(size=(40, 3)),
         )
         for _ in range(count)
@@ -41,6 +46,8 @@ def one_problem(given):
         prior[:, 5 + 2 * r : 7 + 2 * r] = np.diag(1 / SD)
         blocks.append(prior)
         right.append(-run.run_values / SD)
+    blocks.append(np.hstack([np.diag(np.sqrt(PRECISION)), np.zeros((2, 3 + 2 * len(given)))]))
+    right.append(-np.sqrt(PRECISION) * VALUES)
     blocks.append(np.hstack([np.zeros((3, 2)), np.eye(3), np.zeros((3, 2 * len(given)))]))
     right.append(np.zeros(3))
     return np.vstack(blocks), np.concatenate(right)
@@ -55,6 +62,27 @@ def test_the_reduced_equations_have_the_whole_problem_s_solution():
     np.testing.assert_allclose(step, solution[:2], rtol=1e-9)
     left = found.least - found.gradient @ step
     assert left == pytest.approx(squares[0], rel=1e-9)
+
+
+@pytest.mark.parametrize("kept", [0, 1])
+def test_the_products_of_some_columns_are_those_of_a_smaller_problem(kept):
+    given = runs()
+    fewer = [
+        replace(
+            run,
+            slopes=run.slopes[:, [kept]],
+            slope_precision=PRECISION[[kept]],
+            slope_values=VALUES[[kept]],
+        )
+        for run in given
+    ]
+    expected, columns = normal_equations(fewer), np.array([0, 1 + kept, 3, 4, 5])
+    # Values apart from the prior's mean count in both: only the slope left out loses its own.
+    found = equations_of(products_of(given).of(columns), 1)
+    lost = PRECISION[1 - kept] * VALUES[1 - kept] ** 2
+    assert found.hessian == pytest.approx(expected.hessian)
+    assert found.gradient == pytest.approx(expected.gradient)
+    assert found.chi_square - lost == pytest.approx(expected.chi_square)
 
 
 def test_residuals_without_nuisances_are_what_the_whole_problem_leaves():

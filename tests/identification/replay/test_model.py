@@ -75,6 +75,26 @@ def test_consumed_air_is_missing_from_the_circuit():
     assert (tight - leaky)[100] == pytest.approx(lost, rel=1e-6)
 
 
+def test_a_supply_that_a_sensor_reads_too_high_is_replayed_as_it_was():
+    recording = exact_recording("test1")
+    high = replace(recording, p1=1.01 * recording.p1)
+    drives = [model_inputs(each, TRUE) for each in (recording, high)]
+    true, found = Replay(drives, TRUE).outputs({"g_p1": np.array([[0.0, 0.01]])})
+    np.testing.assert_allclose(found, true, rtol=1e-6, atol=1e-7)
+    uncorrected = Replay(drives[1:], TRUE).outputs({"g_p1": np.zeros(1)})[0]
+    assert np.max(np.abs(uncorrected - true)[1]) > 1e3  # p3 [Pa]
+
+
+def test_a_start_of_p2_that_a_sensor_reads_wrong_is_replayed_as_it_was():
+    """The valve is the same; its p2 is shown with the sensor's scale error and bias."""
+    drive = mixed()[0]
+    wrong = replace(drive, p2_start=1.02 * drive.p2_start + 3e3)
+    errors = {"g_p2": np.array([[0.0, 0.02]]), "b_p2": np.array([[0.0, 3e3]])}
+    true, found = Replay([drive, wrong], TRUE).outputs(errors)
+    np.testing.assert_allclose(found[0], 1.02 * true[0] + 3e3, rtol=1e-9)
+    np.testing.assert_allclose(found[1:], true[1:], rtol=1e-9)
+
+
 def test_a_candidate_that_cannot_be_integrated_is_nan_and_harms_no_other():
     drive = model_inputs(cut(), TRUE)
     outputs = Replay([drive], TRUE).outputs({"alphaMV": np.array([TRUE["alphaMV"], np.nan])})[0]

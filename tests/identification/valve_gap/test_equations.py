@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from epv_env.plant.equations import Inputs, State
-from epv_env.plant.parameters import Parameters, table
+from epv_env.plant.parameters import Parameters
 from identification.bench.programmes import DIAGNOSIS_SUITE
 from identification.bench.session import measured_campaign, run_programme
 from identification.gap.plant import StateEquation, window_forcing
@@ -31,21 +31,6 @@ def forced(equation: StateEquation, edges: np.ndarray) -> np.ndarray:
     """Changes (3, samples, windows) in the first run."""
     samples = len(valve().runs[0].time)
     return valve().forced(values(), 0, window_forcing(equation, samples, edges))
-
-
-@pytest.mark.parametrize(
-    ("symbols", "equations"),
-    [(("A_PV",), {"f1"}), (("F_PV",), {"f4"}), (("U_drop",), {"f7"}), (("g_I",), set())],
-)
-def test_an_effect_adds_to_its_own_equation_or_to_a_reading(symbols, equations):
-    highest = {s: np.array(table()[s].domain)[1] for s in symbols}
-    size = {s: np.array([high / 10]) for s, high in highest.items()}
-    found = valve().contribution(size, symbols, 0)
-    assert found is not None
-    steps = {equation.name: equation.step for equation in EQUATIONS}
-    acting = {name for name, forcing in found.equations.items() if np.max(np.abs(forcing)) > steps[name]}
-    assert acting == equations
-    assert bool(np.any(found.readings)) != bool(equations)
 
 
 def test_the_seven_equations_are_those_of_the_report_s_states():

@@ -12,6 +12,7 @@ from identification.bench.programmes import DIAGNOSIS_SUITE
 from identification.bench.session import measured_campaign, run_programme
 from identification.calibration.problem import calibration_problem
 from identification.gap.diagnosis import rank_hypotheses
+from identification.gap.laws import KNOTS
 from identification.gap.prediction import percentage_errors
 from identification.recordings.recording import OUTPUTS, Campaign
 from identification.replay.replay import responses, total_response_error
@@ -35,10 +36,13 @@ def campaign(**effect: float) -> Campaign:
 def test_every_effect_of_the_plant_is_a_cause_with_a_component():
     assert {cause.name for cause in effects()} == set(CATALOGUE)
     for cause in effects() + parameters(Parameters.calibrated()):
-        for size in cause.parameters:
-            assert size.low < size.high
-            assert size.trials, cause.label
-            assert all(size.low <= trial <= size.high for trial in size.trials), cause.label
+        assert cause.sizes, cause.label
+        for parameter in cause.parameters:
+            assert parameter.low < parameter.high
+            # What is no size weighs the form, and has a prior about the form that is assumed.
+            assert parameter.trials or np.isfinite(parameter.sd), cause.label
+            inside = [parameter.low <= trial <= parameter.high for trial in parameter.trials]
+            assert all(inside), cause.label
 
 
 def test_outputs_are_the_replay_s():
@@ -103,6 +107,17 @@ def test_numbers_of_one_run_leave_the_others_alone():
             assert change[0] < -0.01
         else:
             np.testing.assert_allclose(change, 1e-3)
+
+
+def test_a_constant_law_is_a_larger_cause():
+    valve = Valve(campaign())
+    (friction,) = (cause for cause in valve.causes if cause.label == "piston_friction")
+    law = valve.law_values(1, friction, "p3", 1e5, 9e5, np.full(KNOTS, 0.5))
+    values = {"F_PV": 4.0} | law
+    found = valve.outputs({symbol: np.array([value]) for symbol, value in values.items()}, [0])[0]
+    expected = valve.outputs({"F_PV": np.array([6.0])}, [0])[0]
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
+    assert not np.allclose(found, valve.outputs({"F_PV": np.array([4.0])}, [0])[0], rtol=1e-4)
 
 
 def diagnosed(causes: tuple[str, ...], **effect: float):

@@ -11,7 +11,7 @@ from typing import Any
 from epv_env.plant.channels import MEASURED_CHANNELS
 from epv_env.plant.coefficients import folded
 from epv_env.plant.effects.coil import coil_current
-from epv_env.plant.effects.registry import CONSTANTS, Effects
+from epv_env.plant.effects.registry import CONSTANTS, Effects, with_laws
 from epv_env.plant.effects.step_limits import longest_step
 from epv_env.plant.equations import Coefficients, Inputs, State, derivative
 from epv_env.plant.lanes import moved
@@ -142,6 +142,7 @@ def _sources() -> dict[str, str]:
         derivative, (state, inputs, coefficients, effects, NUMBER, NUMBER, TRUTH)
     )
     for function, types in (
+        (with_laws, (state, NUMBER, effects)),
         (coil_current, (*[NUMBER] * 4, effects)),
         (longest_step, (NUMBER, state, effects, NUMBER, NUMBER)),
         (is_held, (NUMBER,) * 4),

@@ -159,8 +159,11 @@ static double step(State *q, const conditions *on, double remaining, double *hin
     }
     land(&end->xPV, &end->vPV, c->xPVmax, c->ePV);
     land(&end->xMV, &end->vMV, c->xMVmax, c->eMV);
-    end->I_coil = on->extended ? coil_current(on->u.U, end->I, c->R, end->coil_heat, &on->effects)
-                               : end->I;
+    end->I_coil = end->I;
+    if (on->extended) {
+        const Effects acting = with_laws(end, on->u.U, &on->effects);
+        end->I_coil = coil_current(on->u.U, end->I, c->R, end->coil_heat, &acting);
+    }
     *q = *end;
     *hint = NO_LIMIT;
     *located = 0;

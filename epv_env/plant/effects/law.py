@@ -1,0 +1,234 @@
+"""Laws: the strength of an effect as a function of a state of the valve, in place of a constant.
+
+The catalogue assumes a law for each mechanism: friction that does not depend on the pressure, a leak
+that flows like a nozzle. In a real valve the mechanism may follow another law. Then the strength of the
+effect, one of the constants that its equations read, becomes strength x (1 + g(a)): a is an argument,
+such as p3, and g is linear between nine knots and constant beyond them. Two laws may act at once, on one
+effect or on two; their factors multiply.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epv_env.plant.effects.record import Constant, Effect, Size
+from epv_env.plant.primitives import Value, inlined
+
+KNOTS = 9
+"""Knots: what a smooth law of physics needs, since it bends once or twice."""
+
+SLOTS = (1, 2)
+"""Numbers of the laws that may act at once."""
+
+MOST_GROWTH = 3.0
+"""Largest g at a knot [1]: a strength of four times the effect's own."""
+
+ARGUMENTS = {
+    "p1 - p2": ("Pa", {"p1": 1.0, "p2": -1.0}),
+    "p1 - p3": ("Pa", {"p1": 1.0, "p3": -1.0}),
+    "p2": ("Pa", {"p2": 1.0}),
+    "p3": ("Pa", {"p3": 1.0}),
+    "xPV": ("m", {"xPV": 1.0}),
+    "vPV": ("m/s", {"vPV": 1.0}),
+    "xMV": ("m", {"xMV": 1.0}),
+    "vMV": ("m/s", {"vMV": 1.0}),
+    "I": ("A", {"I": 1.0}),
+    "U": ("V", {"U": 1.0}),
+}
+"""Unit of an argument, and its weights in the state and the voltage."""
+
+PARTS = ("p1", "p2", "p3", "xPV", "vPV", "xMV", "vMV", "I", "U")
+"""What arguments are made of."""
+
+
+def knot_symbols(slot: int) -> tuple[str, ...]:
+    """Symbols of a law's values at its knots."""
+    return tuple(f"law{slot}_{k}" for k in range(1, KNOTS + 1))
+
+
+def place_symbols(slot: int) -> tuple[str, ...]:
+    """Symbols that say on which effect a law acts, over which argument, and between which ends."""
+    return tuple(f"law{slot}_{name}" for name in ("effect", "argument", "low", "high"))
+
+
+SYMBOLS = tuple(s for slot in SLOTS for s in (*place_symbols(slot), *knot_symbols(slot)))
+"""Rows of the parameter table; all 0 is off."""
+
+
+def sizes(effects: tuple[Effect, ...]) -> tuple[Size, ...]:
+    """The rows as the parameter table has them. effects: the catalogue."""
+    rows = []
+    for slot in SLOTS:
+        effect, argument, low, high = place_symbols(slot)
+        rows += [
+            Size(symbol=effect, unit="1", domain=(0, len(effects)), meaning="place of a law's effect"),
+            Size(symbol=argument, unit="1", domain=(0, len(ARGUMENTS)), meaning="place of its argument"),
+            Size(symbol=low, unit="1", domain=(-2e6, 2e6), meaning="argument [SI] at the first knot"),
+            Size(symbol=high, unit="1", domain=(-2e6, 2e6), meaning="argument [SI] at the last knot"),
+            *(
+                Size(
+                    symbol=symbol,
+                    unit="1",
+                    domain=(-MOST_GROWTH, MOST_GROWTH),
+                    meaning=f"relative growth of the effect at knot {k}",
+                )
+                for k, symbol in enumerate(knot_symbols(slot), start=1)
+            ),
+        ]
+    return tuple(rows)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Law:
+    """An entry of field `laws` of a plant file (docs/reference/files.md)."""
+
+    effect: str
+    """Name in the catalogue."""
+    argument: str
+    """One of ARGUMENTS."""
+    unit: str
+    """Of the argument."""
+    low: float
+    """Argument at the first knot [unit]."""
+    high: float
+    """Argument at the last knot; the knots are equally far apart [unit]."""
+    growth: tuple[float, ...]
+    """g at the knots [1]: the strength of the effect is multiplied by 1 + g."""
+
+    def __post_init__(self) -> None:
+        if self.argument not in ARGUMENTS or self.unit != ARGUMENTS[self.argument][0]:
+            raise ValueError(
+                f"law of {self.effect}: argument {self.argument!r} in {self.unit!r} is unknown: "
+                "choose one of "
+                + ", ".join(f"{name} in {unit}" for name, (unit, _) in ARGUMENTS.items())
+            )
+        if not self.low < self.high or len(self.growth) != KNOTS:
+            raise ValueError(f"law of {self.effect}: give low < high and {KNOTS} numbers as growth")
+
+
+def placed(
+    slot: int, place: int, argument: str, low: float, high: float, growth: tuple[float, ...] = ()
+) -> dict[str, float]:
+    """A law as parameters by symbol. place: of its effect in the catalogue, from 1 on."""
+    where = (float(place), 1.0 + list(ARGUMENTS).index(argument), low, high)
+    knots = dict(zip(knot_symbols(slot), growth or (0.0,) * KNOTS, strict=True))
+    return dict(zip(place_symbols(slot), where, strict=True)) | knots
+
+
+def laws_of(p: Mapping[str, float], names: tuple[str, ...]) -> tuple[Law, ...]:
+    """The laws that parameters by symbol hold. names: of all effects, in the catalogue's order."""
+    found = []
+    for slot in SLOTS:
+        effect, argument, low, high = (p[symbol] for symbol in place_symbols(slot))
+        if effect and argument:
+            name = list(ARGUMENTS)[round(argument) - 1]
+            growth = tuple(p[symbol] for symbol in knot_symbols(slot))
+            found.append(
+                Law(effect=names[round(effect) - 1], argument=name, unit=ARGUMENTS[name][0], low=low,
+                    high=high, growth=growth)
+            )  # fmt: skip
+    return tuple(found)
+
+
+def _per_interval(p: Mapping[str, NDArray], slot: int) -> NDArray:
+    """Knots per unit of the argument; 0 without a law."""
+    width = (p[f"law{slot}_high"] - p[f"law{slot}_low"]) / (KNOTS - 1)
+    return np.where(width > 0.0, 1.0 / np.maximum(width, 1e-9), 0.0)
+
+
+def _weight(slot: int, part: str) -> Callable[[Mapping[str, NDArray]], Value]:
+    """How a part of the argument counts, in knots per unit."""
+
+    def value(p: Mapping[str, NDArray]) -> Value:
+        weights = [own.get(part, 0.0) for _, own in ARGUMENTS.values()]
+        codes = enumerate(weights, start=1)
+        total = sum(np.where(p[f"law{slot}_argument"] == code, w, 0.0) for code, w in codes if w)
+        return total * _per_interval(p, slot)
+
+    return value
+
+
+def _bend(slot: int, knot: int) -> Callable[[Mapping[str, NDArray]], Value]:
+    """Change of the slope of g at a knot [1/interval]; the value itself at the first one."""
+    symbols = knot_symbols(slot)
+
+    def value(p: Mapping[str, NDArray]) -> Value:
+        if knot == 0:
+            return p[symbols[0]] + 0.0
+        slope = p[symbols[knot]] - p[symbols[knot - 1]]
+        return slope - (p[symbols[knot - 1]] - p[symbols[knot - 2]]) if knot > 1 else slope
+
+    return value
+
+
+def _acts_on(slot: int, place: int) -> Callable[[Mapping[str, NDArray]], Value]:
+    """1 where the law acts on an effect, else 0."""
+    return lambda p: np.where(p[f"law{slot}_effect"] == float(place), 1.0, 0.0)
+
+
+def constants(effects: tuple[Effect, ...]) -> tuple[Constant, ...]:
+    """Rows of the kernel's table. effects: the catalogue."""
+    rows: list[Constant] = []
+
+    def add(name: str, meaning: str, value: Callable[..., Value]) -> None:
+        rows.append(Constant(name=name, meaning=meaning, value=value, is_size=False))
+
+    for slot in SLOTS:
+        for part in PARTS:
+            add(f"law{slot}_by_{part}", f"knots per unit of {part} [1/SI]", _weight(slot, part))
+        add(
+            f"law{slot}_first",
+            "argument at the first knot [intervals]",
+            lambda p, slot=slot: p[f"law{slot}_low"] * _per_interval(p, slot),
+        )
+        for k in range(KNOTS):
+            meaning = "g at the first knot [1]" if k == 0 else "change of its slope at a knot [1]"
+            add(f"law{slot}_{k}", meaning, _bend(slot, k))
+        for place, effect in enumerate(effects, start=1):
+            if effect.strength:
+                meaning = f"1 where the law acts on {effect.name}, else 0 [1]"
+                add(f"law{slot}_on_{effect.name}", meaning, _acts_on(slot, place))
+    return tuple(rows)
+
+
+def most_growth(p: Mapping[str, NDArray]) -> NDArray:
+    """Largest factor by which laws may raise a strength [1], shape as the parameters."""
+    factor = np.full_like(p["law1_1"], 1.0)
+    for slot in SLOTS:
+        largest = p[knot_symbols(slot)[0]]
+        for symbol in knot_symbols(slot)[1:]:
+            largest = np.maximum(largest, p[symbol])
+        factor = factor * (1.0 + np.maximum(largest, 0.0))
+    return factor
+
+
+@inlined
+def bent(s, bend):
+    """What a bend adds behind its knot."""
+    return max(s, 0.0) * bend
+
+
+@inlined
+def growth_1(q, U, e):
+    """g of the first law at a state, at least -1 [1]; e: Effects."""
+    s = e.law1_by_p1 * q.p1 + e.law1_by_p2 * q.p2 + e.law1_by_p3 * q.p3 + e.law1_by_xPV * q.xPV
+    s += e.law1_by_vPV * q.vPV + e.law1_by_xMV * q.xMV + e.law1_by_vMV * q.vMV + e.law1_by_I * q.I
+    s += e.law1_by_U * U - e.law1_first
+    s = min(max(s, 0.0), 8.0)
+    g = e.law1_0 + bent(s, e.law1_1) + bent(s - 1.0, e.law1_2) + bent(s - 2.0, e.law1_3)
+    g += bent(s - 3.0, e.law1_4) + bent(s - 4.0, e.law1_5) + bent(s - 5.0, e.law1_6)
+    return max(g + bent(s - 6.0, e.law1_7) + bent(s - 7.0, e.law1_8), -1.0)
+
+
+@inlined
+def growth_2(q, U, e):
+    """The same of the second law."""
+    s = e.law2_by_p1 * q.p1 + e.law2_by_p2 * q.p2 + e.law2_by_p3 * q.p3 + e.law2_by_xPV * q.xPV
+    s += e.law2_by_vPV * q.vPV + e.law2_by_xMV * q.xMV + e.law2_by_vMV * q.vMV + e.law2_by_I * q.I
+    s += e.law2_by_U * U - e.law2_first
+    s = min(max(s, 0.0), 8.0)
+    g = e.law2_0 + bent(s, e.law2_1) + bent(s - 1.0, e.law2_2) + bent(s - 2.0, e.law2_3)
+    g += bent(s - 3.0, e.law2_4) + bent(s - 4.0, e.law2_5) + bent(s - 5.0, e.law2_6)
+    return max(g + bent(s - 6.0, e.law2_7) + bent(s - 7.0, e.law2_8), -1.0)

@@ -1,0 +1,115 @@
+"""Over which states the law of a cause should be open, by linear prediction.
+
+The law of a cause is opened over every state of the plant, at the cause's trial size where it has ended
+at nearly nothing: with the wrong law a fit may send the true cause there. One step of least squares then
+says what each law promises.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from identification.gap.fitting_problem import Estimate, FittingProblem
+from identification.gap.gauss_newton import linearise
+from identification.gap.laws import MOST_LAWS, Law
+from identification.gap.plant import Cause
+from identification.gap.recalibration import restarted
+from identification.gap.screening import Start
+from identification.gap.variable_projection import LinearisedRun, equations_of, products_of
+
+SMALL_SIZE = 0.3
+"""Size, in trial sizes, below which a law is opened at the trial size [1]."""
+
+TOGETHER = 4
+"""Causes whose laws are linearised together, for memory."""
+
+STEP_DAMPING = 1e-3
+"""Damping of the step, relative to the diagonal [1]: nearly none."""
+
+
+def law_starts(
+    problem: FittingProblem,
+    estimates: Sequence[Estimate],
+    causes: Sequence[Cause],
+    runs: Sequence[int] | None = None,
+) -> list[Start]:
+    """Starts with one more open law, by the chi-square that they promise, the least first.
+
+    Args:
+        problem: the plant with its readings.
+        estimates: from which the law is opened.
+        causes: whose law, by estimate; the estimate has the cause.
+        runs: indices of the runs that count; None: all fitted ones.
+    """
+    runs = problem.fitted_runs if runs is None else runs
+    if not getattr(problem.plant, "law_arguments", ()):
+        return []
+    pairs = [
+        (at_least_trial_size(problem, estimate, cause), cause)
+        for estimate, cause in zip(estimates, causes, strict=True)
+        if not cause.exact_form and len(estimate.hypothesis.laws) < MOST_LAWS
+    ]
+    starts: list[Start] = []
+    for first in range(0, len(pairs), TOGETHER):
+        part = pairs[first : first + TOGETHER]
+        opened = [_with_every_law(problem, estimate, cause, runs) for estimate, cause in part]
+        linearised = linearise(problem, opened, runs)
+        for (estimate, _), whole, own in zip(part, opened, linearised, strict=True):
+            starts += _starts(problem, estimate, whole, own)
+    return sorted(starts, key=lambda start: start.chi_square)
+
+
+def _starts(
+    problem: FittingProblem, estimate: Estimate, whole: Estimate, runs: Sequence[LinearisedRun]
+) -> Iterator[Start]:
+    """Starts with each of the laws that `whole` has beyond `estimate`. runs: `whole`, linearised."""
+    products, known = products_of(runs), len(estimate.hypothesis.laws)
+    low, high = problem.ends(whole)
+    opened = whole.hypothesis.laws[known:]
+    behind = np.arange(len(whole.vector) - len(whole.hypothesis.cause_parameters), len(whole.vector))
+    first = behind[0] - sum(len(law.parameters) for law in opened)
+    shared = np.arange(1 + len(whole.vector), products.count)
+    place = first
+    for law in opened:
+        components = np.arange(place, place + len(law.parameters))
+        place += len(law.parameters)
+        places = np.concatenate([np.arange(first), components, behind])
+        columns = np.concatenate([[0], 1 + places, shared])
+        equations = equations_of(products.of(columns), len(places))
+        step, decrease = equations.step(low[places], high[places], STEP_DAMPING)
+        hypothesis = replace(estimate.hypothesis, laws=(*estimate.hypothesis.laws, law))
+        yield Start(
+            estimate=replace(estimate, hypothesis=hypothesis, vector=whole.vector[places] + step),
+            chi_square=equations.chi_square - decrease,
+        )
+
+
+def at_least_trial_size(problem: FittingProblem, estimate: Estimate, cause: Cause) -> Estimate:
+    """The estimate as a start, with a cause at its first trial where its size is nearly nothing."""
+    values = problem.values(estimate)
+    sizes = [abs((values[p.symbol] - p.nominal) / (p.trials[0] - p.nominal)) for p in cause.sizes]
+    if max(sizes) >= SMALL_SIZE:
+        return restarted(estimate)
+    trial = {p.symbol: p.trials[0] for p in cause.sizes}
+    begun = problem.start(estimate.hypothesis, {**values, **trial})
+    return replace(restarted(estimate), vector=begun.vector)
+
+
+def _with_every_law(
+    problem: FittingProblem, estimate: Estimate, cause: Cause, runs: Sequence[int]
+) -> Estimate:
+    """The estimate with the law of a cause open over every state that changes; all as assumed yet."""
+    known = estimate.hypothesis.laws
+    taken = {law.argument for law in known if law.cause.label == cause.label}
+    values = problem.candidate(estimate)
+    traces = [problem.plant.states(values, r) for r in runs]
+    laws = []
+    for argument in problem.plant.law_arguments:  # type: ignore[attr-defined]
+        low = float(min(np.min(trace[argument].values) for trace in traces))
+        high = float(max(np.max(trace[argument].values) for trace in traces))
+        if argument not in taken and low < high:
+            laws.append(Law(cause=cause, argument=argument, low=low, high=high))
+    hypothesis = replace(estimate.hypothesis, laws=(*known, *laws))
+    begun = problem.start(hypothesis, problem.values(estimate))
+    return replace(estimate, hypothesis=hypothesis, vector=begun.vector)

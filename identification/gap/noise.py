@@ -1,0 +1,339 @@
+"""The noise of a channel: white, in steps, or with a ripple, as raw readings and residuals show it.
+
+White noise shows in differences of neighbouring readings (Rice 1984; second differences: Gasser, Sroka
+and Jennen-Steinmetz 1986), a smooth course hardly does. The median over blocks leaves out where it moves
+fast. Readings in coarse steps may not differ at all: then the step tells how far they may be off.
+
+What the best model leaves is noise too, as long as it is no larger than the raw readings allow. A
+ripple is in all parts of the residual, a wrong form shows in motion only. Ripple and white noise
+together are an ARMA(1, 1) process (Granger and Morris 1976), which a filter turns into white noise:
+readings, outputs and derivatives pass it alike.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.gap.plant import Channel, GreyBox, PlantError, Ripple
+
+BLOCK_READINGS = 20
+"""Length of a block whose noise is estimated by itself [readings]: four blocks in a run of 80 readings,
+and motion in some of them does not move the median."""
+
+DIFFERENCE_ORDERS = (2, 4)
+"""Orders of the differences of neighbouring readings that show the noise; the least estimate counts. The
+second suffices for finely sampled runs; the fourth removes the motion of runs with a few dozen readings
+per transient as well."""
+
+LARGEST_ROUNDING = 1e-9
+"""Distance of two readings that is rounding of the same value, relative to the range of half of them
+[1]."""
+
+STEP_QUANTILE = 0.1
+"""Quantile of the distances of neighbouring values that is tried as the step of a quantised channel [1]:
+most values of a range occur, so that a small quantile is one step."""
+
+STEP_TOLERANCE = 0.05
+"""Distance of a difference from the next multiple of the step up to which it is one [steps]."""
+
+SHARE_OF_MULTIPLES = 0.95
+"""Share of differences that must be multiples of the step [1]: all but faulty readings."""
+
+FEWEST_DISTANCES = 4
+"""Fewest distances of neighbouring values that can show a step: by chance two may be alike."""
+
+STEP_TO_SD = float(np.sqrt(1.0 / 12.0))
+"""Standard deviation of rounding to a step, in steps."""
+
+
+def channel_noise(channel: Channel, series: Sequence[NDArray]) -> float:
+    """Noise of a channel [SI]: as given or as its readings show it, at least the error of rounding.
+
+    series: trusted readings of each run, (readings,) [SI]. Raises PlantError where noise is neither
+    given nor seen.
+    """
+    if channel.noise is not None:
+        return max(channel.noise, STEP_TO_SD * channel.resolution)
+    floor = STEP_TO_SD * (channel.resolution or quantisation_step(series))
+    level = white_noise(series)
+    if level > floor:
+        return level
+    if not floor > 0:
+        raise PlantError(
+            f"channel {channel.name}: its noise is None, but its trusted readings do not show any "
+            "(too few, or most neighbours are equal): give `noise` or `resolution`"
+        )
+    return floor
+
+
+def white_noise(series: Sequence[NDArray]) -> float:
+    """Standard deviation of white noise on readings about a smooth course.
+
+    Args:
+        series: consecutive trusted readings of each run, (readings,) [unit of the readings].
+
+    Returns:
+        In the unit of the readings; 0 where most neighbours are equal, NaN where no run has enough
+        readings.
+    """
+    levels = [_from_differences(series, order) for order in DIFFERENCE_ORDERS]
+    known = [level for level in levels if not np.isnan(level)]
+    return min(known, default=float("nan"))
+
+
+def quantisation_step(series: Sequence[NDArray]) -> float:
+    """Step of which all readings are multiples, but for an offset.
+
+    series: readings of each run, (readings,) [unit of the readings]. Returns the step in the unit of the
+    readings, 0 where there is none.
+    """
+    gaps = distances(series)
+    if len(gaps) < FEWEST_DISTANCES:
+        return 0.0
+    step = float(np.quantile(gaps, STEP_QUANTILE, method="lower"))
+    multiples = gaps / step
+    close = np.abs(multiples - np.round(multiples)) <= STEP_TOLERANCE
+    return step if np.mean(close) >= SHARE_OF_MULTIPLES else 0.0
+
+
+def distances(series: Sequence[NDArray]) -> NDArray:
+    """Distances of neighbouring values among all readings, (values - 1,); rounding is none.
+
+    series: readings of each run, (readings,).
+    """
+    values = np.unique(np.concatenate([np.zeros(0), *series]))
+    if len(values) < 2:
+        return np.zeros(0)
+    low, high = np.quantile(values, (0.25, 0.75))  # faulty readings may lie anywhere
+    gaps = np.diff(values)
+    return gaps[gaps > LARGEST_ROUNDING * (high - low)]
+
+
+def differences(readings: NDArray, order: int) -> NDArray:
+    """Differences of readings (n,) with the standard deviation of their white noise, (n - order,)."""
+    return np.diff(readings, order) / np.sqrt(comb(2 * order, order))
+
+
+def _from_differences(series: Sequence[NDArray], order: int) -> float:
+    """Noise by differences of one order; NaN where no run has enough readings."""
+    blocks = [
+        block
+        for readings in series
+        if len(readings) > order
+        for block in _blocks(differences(readings, order), BLOCK_READINGS)
+    ]
+    if not blocks:
+        return float("nan")
+    freedom = min(len(block) for block in blocks) / _correlated_readings(order)
+    return noise_of_blocks([float(np.mean(block**2)) for block in blocks], max(freedom, 1.0))
+
+
+def noise_of_blocks(variances: NDArray | Sequence[float], freedom: float) -> float:
+    """Standard deviation of white noise from its variance in blocks of readings, a few of them lively.
+
+    variances: (blocks,). freedom: independent values in a block. The median of a chi-square variable
+    becomes its mean (Wilson and Hilferty 1931).
+    """
+    return float(np.sqrt(np.median(variances) / (1.0 - 2.0 / (9.0 * freedom)) ** 3))
+
+
+def _blocks(differences: NDArray, length: int) -> list[NDArray]:
+    """Differences (readings,) in blocks of at least this length, or in one block."""
+    return np.array_split(differences, max(1, len(differences) // length))
+
+
+def _correlated_readings(order: int) -> float:
+    """Number of differences of white noise that tell as much as one independent value."""
+    weights = np.diff(np.eye(1, 2 * order + 1, order)[0], order)
+    correlation = np.correlate(weights, weights, "full") / (weights @ weights)
+    return float(np.sum(correlation**2))
+
+
+# What the best model leaves
+
+QUIET_SHARE = 0.75
+"""Share of the blocks, those with the least residual, that show a ripple [1]: a wrong form is in the
+others."""
+
+CORRELATED_READINGS = 10.0
+"""Length of a block of residuals in correlated readings [1]: its mean square must not scatter much."""
+
+FEWEST_BLOCKS, FEWEST_MEANS = 8, 40
+"""Fewest blocks that show a ripple, and whose means show a faint correlation."""
+
+LONGEST_CORRELATION = 0.5
+"""Longest lag of the autocovariance, as a share of the longest run [1]: beyond, there are few pairs."""
+
+LEAST_CORRELATION = 0.05
+"""Autocorrelation below which the sum of autocorrelations ends [1]: what follows is chance."""
+
+STEEPEST_DECAY = 2.0
+"""Largest ratio of autocovariances at successive readings [1]: what decays faster counts as white."""
+
+SEEN = 3.0
+"""Autocorrelation that is no chance, in standard deviations of that of white noise [1]."""
+
+ALWAYS_THERE = 0.6
+"""Mean square of the quiet blocks over that of all [1] from which what they show is always there."""
+
+RIPPLE_SHARE = 0.2
+"""Share of the ripple in what a quiet block holds [1] from which it matters: less hardly moves the
+weights of the readings."""
+
+RAW_TOLERANCE = 1.05
+"""Noise that a residual shows over that of the raw readings [1], up to which both agree."""
+
+LEAST = np.finfo(float).tiny
+"""Mean square in place of none, for recordings without noise."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChannelNoise:
+    """What the best model leaves of one channel; deviations in units of `Channel.noise`."""
+
+    readings: int
+    """Number of trusted readings."""
+    floor: float
+    """Mean square that no cause can remove [1]."""
+    correlated: float
+    """Readings of what remains that tell as much as one independent reading [1]; 1 for white noise."""
+    sd: float
+    """Standard deviation of what remains beside white noise [noise deviations]; 0 where none is seen."""
+    time_scale: float
+    """Integral of its autocorrelation over positive lags [s]; 0 where `sd` is 0."""
+    ripple: Ripple | None
+    """A ripple that is there at all times; None where none is seen."""
+
+
+def residual_noise(plant: GreyBox, residuals: Sequence[NDArray]) -> list[ChannelNoise]:
+    """Noise by channel, from the residuals of the best hypothesis.
+
+    residuals: per run (channels, samples) [noise deviations], 0 at untrusted readings.
+    """
+    durations = sum(len(run.time) * float(run.time[1] - run.time[0]) for run in plant.runs)
+    return [
+        _channel_noise(
+            [r[c][run.trusted[c]] for r, run in zip(residuals, plant.runs, strict=True)],
+            durations,
+            raw_noise_ratio(plant, c),
+        )
+        for c in range(len(plant.channels))
+    ]
+
+
+def raw_noise_ratio(plant: GreyBox, channel: int) -> float:
+    """Largest noise that raw readings, or who states it, allow, over the channel's [1]."""
+    series = [run.measured[channel][run.trusted[channel]] for run in plant.runs]
+    seen = np.nan_to_num(white_noise(series))
+    ratio = max(float(seen) / plant.channels[channel].known_noise, 1.0)
+    ripples = getattr(plant, "ripples", ())
+    ripple = ripples[channel] if ripples else None
+    return ratio / ripple.noise if ripple else ratio
+
+
+def _channel_noise(series: Sequence[NDArray], duration: float, raw: float) -> ChannelNoise:
+    """duration: of all runs [s]. raw: of `raw_noise_ratio`."""
+    readings = [own for own in series if len(own)]
+    count = sum(len(own) for own in readings)
+    if count < 3:
+        return ChannelNoise(
+            readings=count, floor=1.0, correlated=1.0, sd=0.0, time_scale=0.0, ripple=None
+        )
+    covariance = autocovariance(readings)
+    mean_square, correlated = float(covariance[0]), _correlated(covariance)
+    coloured = covariance[1] > SEEN * mean_square / np.sqrt(count)
+    white = white_variance(covariance) if coloured else mean_square
+    beside = max(mean_square - white, 0.0)
+    period = duration / count  # readings may be sparser than samples
+    return ChannelNoise(
+        readings=count,
+        floor=max(min(white, (RAW_TOLERANCE * raw) ** 2), LEAST),
+        correlated=max(correlated, _faintly_correlated(readings, mean_square)),
+        sd=float(np.sqrt(beside)),
+        time_scale=0.5 * (correlated - 1.0) * mean_square / beside * period if beside else 0.0,
+        ripple=_ripple(readings, correlated, mean_square) if coloured else None,
+    )
+
+
+def autocovariance(readings: Sequence[NDArray]) -> NDArray:
+    """Mean products of readings by lag [1], (lags,), pooled over runs; per run (readings,) [1]."""
+    longest = max(2, int(LONGEST_CORRELATION * max(len(own) for own in readings)))
+    total, count = np.zeros(longest + 1), np.zeros(longest + 1)
+    for own in readings:
+        size = 1 << int(np.ceil(np.log2(2 * len(own))))
+        spectrum = np.abs(np.fft.rfft(own, size)) ** 2
+        products = np.fft.irfft(spectrum, size)[: min(len(own), longest + 1)]
+        total[: len(products)] += products
+        count[: len(products)] += len(own) - np.arange(len(products))
+    return total / np.maximum(count, 1)
+
+
+def white_variance(covariance: NDArray) -> float:
+    """Variance of the white part [1]: what the first lags, continued to lag 0, do not reach.
+
+    A course that decays faster than STEEPEST_DECAY cannot be told from white noise.
+
+    covariance: by lag, (at least 3,) [1].
+    """
+    variance, first, second = (float(value) for value in covariance[:3])
+    if first <= 0:
+        return variance
+    ratio = min(max(first / second, 1.0), STEEPEST_DECAY) if second > 0 else STEEPEST_DECAY
+    return max(variance - ratio * first, 0.5 * max(variance - first, 0.0), LEAST)
+
+
+def _correlated(covariance: NDArray) -> float:
+    """1 + twice the sum of autocorrelations up to the first small one [1] (Geyer 1992)."""
+    if covariance[0] <= 0:
+        return 1.0
+    correlation = covariance[1:] / covariance[0]
+    small = np.flatnonzero(correlation < LEAST_CORRELATION)
+    kept = correlation[: small[0]] if len(small) else correlation
+    return float(1.0 + 2.0 * np.sum(kept))
+
+
+def _faintly_correlated(readings: Sequence[NDArray], mean_square: float) -> float:
+    """The same by means of blocks (Alexopoulos and Seila 1998): a faint correlation may last long [1].
+
+    Rounding to coarse steps leaves one: the same error as long as the reading does not move. The largest
+    of several lengths of block, each less its chance.
+    """
+    found, length = 1.0, BLOCK_READINGS
+    while mean_square > 0:
+        means = [float(np.mean(part)) for own in readings for part in _whole_blocks(own, length)]
+        if len(means) < FEWEST_MEANS:
+            break
+        chance = 1.0 + SEEN * np.sqrt(2.0 / len(means))
+        found = max(found, float(length * np.mean(np.square(means)) / (mean_square * chance)))
+        length *= 2
+    return found
+
+
+def _whole_blocks(readings: NDArray, length: int) -> list[NDArray]:
+    """Parts of readings of at least this length; none of fewer readings."""
+    return np.array_split(readings, len(readings) // length) if len(readings) >= length else []
+
+
+def _ripple(readings: Sequence[NDArray], correlated: float, mean_square: float) -> Ripple | None:
+    """A first-order process in the quieter blocks that is as large in all of them; None for none."""
+    length = max(BLOCK_READINGS, round(CORRELATED_READINGS * correlated))
+    blocks = [part for own in readings for part in _whole_blocks(own, length)]
+    if len(blocks) < FEWEST_BLOCKS:
+        return None
+    blocks.sort(key=lambda part: float(np.mean(part**2)))
+    quiet = blocks[: round(QUIET_SHARE * len(blocks))]
+    covariance = autocovariance(quiet)
+    chance = SEEN * covariance[0] / np.sqrt(sum(len(part) for part in quiet))
+    if covariance[1] < chance or covariance[0] < ALWAYS_THERE * mean_square:
+        return None
+    small = np.flatnonzero(covariance[:-1] < max(chance, 0.2 * covariance[1]))
+    last = int(small[0]) if len(small) else len(covariance) - 1
+    early, late = covariance[1:last], covariance[2 : last + 1]
+    decay = float(np.clip(early @ late / (early @ early), 0.0, 0.999))
+    if decay < 1.0 / STEEPEST_DECAY or covariance[1] < RIPPLE_SHARE * covariance[0]:
+        return None
+    rippling = min(float(covariance[1]) / decay, float(covariance[0]))
+    return Ripple.of(rippling, float(covariance[0]) - rippling, decay)

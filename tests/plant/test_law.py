@@ -1,0 +1,130 @@
+"""A law: linear between its knots, a factor of its effect's strength, kept in plant files."""
+
+import json
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from epv_env.plant.channels import readings
+from epv_env.plant.effects.law import ARGUMENTS, KNOTS, Law, growth_1, growth_2, laws_of, placed
+from epv_env.plant.effects.registry import PLACES, Effects, effect, effect_constants, with_laws
+from epv_env.plant.equations import State
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.plantfile import FORMAT, Plant, PlantFileError, load_plant, save_plant
+from epv_env.plant.region import Region
+from epv_env.plant.simulate import energised, simulate
+
+CALIBRATED = Parameters.calibrated()
+GROWTH = (0.4, 1.0, 0.2, -0.5, -2.0, 0.3, 0.8, 0.6, 0.5)
+GIVEN: Any = {"effect": "piston_friction", "argument": "p3", "unit": "Pa", "low": 1e5, "high": 9e5}
+ENDS = {"Pa": (1e5, 9e5), "m": (0.0, 2e-3), "m/s": (-0.5, 0.5), "A": (0.0, 0.3), "V": (0.0, 24.0)}
+LAWFUL = [name for name in PLACES if effect(name).strength]
+
+
+def law(name: str, argument: str = "p3", growth: tuple[float, ...] = GROWTH, slot: int = 1):
+    return placed(slot, PLACES[name], argument, *ENDS[ARGUMENTS[argument][0]], growth)
+
+
+def trial(name: str) -> dict[str, float]:
+    """Every size of an effect, as a fit begins with it or as sweeps draw it."""
+    return {s.symbol: s.trials[0] if s.trials else s.typical for s in effect(name).sizes}
+
+
+def openings(p: Any) -> np.ndarray:
+    """Readings of p2, p3 and I, (3, samples) or (3, samples, n) [Pa, A]; no law shortens the step."""
+    U = np.where(np.arange(600) % 300 // 50 % 5 > 0, 0.0, 24.0)
+    run = simulate(p, initial=energised(p, p1=12e5, p2=7e5, U=24.0), U=U, period=1e-3, step=1e-4)
+    return np.array([readings(run.state, p)[name] for name in ("p2", "p3", "I")])
+
+
+@pytest.mark.parametrize(("slot", "growth"), [(1, growth_1), (2, growth_2)])
+@pytest.mark.parametrize("argument", ARGUMENTS)
+def test_growth_is_linear_between_its_knots_and_constant_beyond(argument, slot, growth):
+    (low, high), weights = ENDS[ARGUMENTS[argument][0]], ARGUMENTS[argument][1]
+    e = Effects(*effect_constants({**CALIBRATED, **law("seat_leak", argument, slot=slot)})[:, 0])
+    at = np.linspace(low - 0.4 * (high - low), high + 0.4 * (high - low), 61)
+    parts = {name: at * weight / len(weights) for name, weight in weights.items()}
+    U = parts.pop("U", np.zeros(61))
+    states = [State(*(parts.get(name, 0.0 * at)[k] for name in State._fields)) for k in range(61)]
+    found = [growth.py_func(q, U[k], e) for k, q in enumerate(states)]
+    expected = np.interp(at, np.linspace(low, high, KNOTS), GROWTH)
+    np.testing.assert_allclose(found, np.maximum(expected, -1.0), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("growths", [(0.5,), (0.25, 0.2)], ids=["one law", "two laws"])
+def test_a_constant_law_is_a_larger_effect(growths):
+    p = CALIBRATED.replace(F_PV=4.0)
+    for slot, growth in enumerate(growths, start=1):
+        p = p.replace(**law("piston_friction", growth=KNOTS * (growth,), slot=slot))
+    np.testing.assert_allclose(openings(p), openings(CALIBRATED.replace(F_PV=6.0)), rtol=1e-9)
+
+
+def each_with_its_law(growth: float, changed: dict[str, Any]) -> np.ndarray:
+    """Outputs of a plant for each lawful effect, which has a law of constant growth, (3, samples, n)."""
+    each = {"law1_effect": np.array([float(PLACES[name]) for name in LAWFUL])}
+    return openings({**CALIBRATED, **law("seat_leak", growth=KNOTS * (growth,)), **each, **changed})
+
+
+@pytest.mark.parametrize("changed", [{}, {"theta_coil": 20.0}], ids=["nominal", "extended kernel"])
+def test_a_law_of_an_effect_that_is_off_does_nothing(changed):
+    found, plain = (each_with_its_law(growth, changed) for growth in (0.5, 0.0))
+    np.testing.assert_array_equal(found, plain)
+
+
+def test_a_law_of_every_effect_changes_readings_by_a_tenth_of_their_noise():
+    own = [trial(name) for name in LAWFUL]
+    sizes = {s: np.array([each.get(s, 0.0) for each in own]) for each in own for s in each}
+    change = np.abs(each_with_its_law(0.5, sizes) - each_with_its_law(0.0, sizes)).max(axis=1)
+    felt = np.max(change.T / [980.0, 750.0, 8e-4], axis=1)
+    assert {name: f for name, f in zip(LAWFUL, felt, strict=True) if f < 0.1} == {}
+
+
+@pytest.mark.parametrize("name", LAWFUL)
+def test_a_law_multiplies_the_strengths_of_its_effect_and_nothing_else(name):
+    every = {symbol: size for other in LAWFUL for symbol, size in trial(other).items()}
+    e = Effects(*effect_constants({**CALIBRATED, **every, **law(name, growth=KNOTS * (0.5,))})[:, 0])
+    expected = {strength: 1.5 * getattr(e, strength) for strength in effect(name).strength}
+    found = with_laws.py_func(State(*[0.0] * len(State._fields)), 0.0, e)
+    assert all(expected.values())
+    assert found._asdict() == {**e._asdict(), **expected}
+
+
+def test_air_is_conserved_where_a_leak_has_a_law():
+    p, volume = CALIBRATED.replace(A_PV=5e-7, **law("seat_leak", "p1 - p2")), 0.02
+    start = energised(p, p1=12e5, p2=6e5, U=24.0)
+    run = simulate(p, initial=start, U=np.full(400, 24.0), period=5e-3, reservoir_volume=volume)
+    q, RT = run.state, p["R_gas"] * p["T_env"]
+    assert q.air_in_PV[-1] > 5e-4
+    np.testing.assert_allclose((q.p2 - q.p2[0]) * p["V2"] / RT, q.air_in_PV, rtol=0, atol=1e-14)
+    lost = (q.p1[0] - q.p1) * volume / RT
+    np.testing.assert_allclose(lost, q.air_in_PV + q.air_in_MV, rtol=0, atol=1e-13)
+
+
+def test_laws_travel_in_a_plant_file_and_act_in_the_environment(tmp_path):
+    path, last, own = tmp_path / "plant.json", [], CALIBRATED.replace(F_PV=8.0, cflow=0.5)
+    for p in (own, own.replace(**law("piston_friction"), **law("flow_force", "xPV", slot=2))):
+        save_plant(Plant(parameters=p, region=Region(centre=p)), path)
+        assert dict(load_plant(path).parameters) == dict(p)
+        env = gym.make("EPValve-v0", plant=path, parameters="exact")
+        last.append([env.reset(seed=1), *(env.step(k // 20 % 2) for k in range(80))][-1][0])
+    assert not np.array_equal(*last)
+    assert laws_of(load_plant(path).parameters, tuple(PLACES))[0] == Law(**GIVEN, growth=GROWTH)
+
+
+@pytest.mark.parametrize(
+    ("laws", "message"),
+    [
+        ([GIVEN | {"unit": "bar"}], r"laws\[0\]: .*'p3' in 'bar' is unknown: choose one of p1"),
+        ([GIVEN | {"effect": "rust"}], "law of unknown effect 'rust': choose one of coil_heating"),
+        ([GIVEN] * 3, "laws has 3 entries: give at most 2"),
+        ([GIVEN | {"growth": [0.1] * 8}], r"laws\[0\]: .*give low < high and 9 numbers as growth"),
+        ([GIVEN | {"growth": [9.0] * 9}], r"law1_1 = 9 1 is outside its domain \[-3, 3\].*give a value"),
+    ],
+)
+def test_a_wrong_law_is_refused_in_a_sentence(tmp_path, laws, message):
+    laws, path = [{"growth": [0.1] * KNOTS} | each for each in laws], tmp_path / "plant.json"
+    path.write_text(json.dumps({"format": FORMAT, "parameters": {}, "laws": laws}))
+    with pytest.raises(PlantFileError, match=message):
+        load_plant(path)
