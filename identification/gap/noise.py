@@ -231,7 +231,7 @@ def raw_noise_ratio(plant: GreyBox, channel: int) -> float:
     ratio = max(float(seen) / plant.channels[channel].known_noise, 1.0)
     ripples = getattr(plant, "ripples", ())
     ripple = ripples[channel] if ripples else None
-    return ratio / ripple.noise if ripple else ratio
+    return max(ratio / ripple.noise, 1.0) if ripple else ratio
 
 
 def _channel_noise(series: Sequence[NDArray], duration: float, raw: float) -> ChannelNoise:
