@@ -19,8 +19,8 @@ from identification.gap.fitting_problem import FittingProblem
 from identification.gap.noise import ChannelNoise, residual_noise
 
 POWER = 10.0
-"""How many powers of the misfit the likelihood falls by [1]: a cause that leaves twice the tolerated
-misfit is 60 times less probable."""
+"""How many powers of 1 + M/T the likelihood falls by [1]: a cause that leaves 2 T is 60 times less
+probable than one that leaves T."""
 
 CHANCE = 15.0
 """Misfit that chance leaves, however few the readings [nats]: more parameters fit noise as well."""

@@ -16,7 +16,6 @@ from identification.gap.noise import ChannelNoise, raw_noise_ratio, white_noise
 from identification.gap.plant import GreyBox
 from identification.gap.prediction import predict
 from identification.gap.prepared_plant import PreparedPlant, prepared
-from identification.gap.screening import Start
 
 FURTHER_ITERATIONS = 12
 """Most steps of a fit that goes on with nuisance slopes of its own."""
@@ -50,12 +49,6 @@ def recalibrate(
 def restarted(estimate: Estimate) -> Estimate:
     """The estimate as the start of another fit."""
     return replace(estimate, chi_square=np.inf, converged=False, given_up=False)
-
-
-def refit(problem: FittingProblem, base: Estimate, starts: Sequence[Start]) -> list[Estimate]:
-    """Fits from starts beside a base; those that were given up are left out."""
-    fitted = fit(problem, [start.estimate for start in starts], base.chi_square)
-    return [estimate for estimate in fitted if not estimate.given_up]
 
 
 def with_own_nuisances(
