@@ -12,6 +12,7 @@ from identification.gap.held_out import (
     RECALIBRATED,
     DiscrepancyReduction,
     measure_discrepancy_reduction,
+    predictable_shares,
 )
 from identification.gap.localisation import Localisation, locate
 from identification.gap.plant import GreyBox
@@ -177,7 +178,10 @@ def rank_hypotheses(
     cache, plant = cache or FitCache(plant), prepared(plant)
     problem, base = recalibrated_by_seen_noise(plant, cache)
     ranking = _searched(problem, base, cache, most_causes)
-    weighted = with_ripple(prepared(problem.plant), ranking.noise)
+    if not any(own.ripple for own in ranking.noise):
+        return ranking
+    foreseen = predictable_shares(problem, ranking.best.estimate)
+    weighted = with_ripple(prepared(problem.plant), ranking.noise, foreseen)
     if weighted is problem.plant:
         return ranking
     cache, thorough = cache.named("with the ripple filtered: "), is_small(plant)

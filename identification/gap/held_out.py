@@ -122,6 +122,16 @@ def measure_discrepancy_reduction(
     )
 
 
+def predictable_shares(problem: FittingProblem, estimate: Estimate) -> list[float]:
+    """Share of a model's held-out squares that a black box foresees, by channel [1]."""
+    plant, model = problem.plant, predict(problem, estimate)
+    box = predict_residuals(plant, model, ridge_on_random_features, 0, time_scale(plant))
+    held_out = [r for r, run in enumerate(plant.runs) if run.held_out]
+    before = sum(np.sum(model.residuals[r] ** 2, axis=1) for r in held_out)
+    after = sum(np.sum((model.residuals[r] - box[r]) ** 2, axis=1) for r in held_out)
+    return list(1.0 - after / np.maximum(before, np.finfo(float).tiny))
+
+
 def _helpful(
     residuals: Sequence[NDArray], predicted: Sequence[NDArray], plant: GreyBox
 ) -> list[NDArray]:

@@ -52,8 +52,10 @@ class Posterior:
     """Probability that what acts has no name in the catalogue."""
     misfits: list[float]
     """Misfit beyond noise that each hypothesis leaves, (n,) [nats]."""
+    best: EvaluatedHypothesis
+    """The hypothesis, or the model without a cause, that leaves the least; it shows the noise."""
     noise: list[ChannelNoise]
-    """Noise of each channel under the best hypothesis."""
+    """Noise of each channel under it."""
 
 
 def posterior(
@@ -76,6 +78,7 @@ def posterior(
         no_cause=float(weights[0]),
         unknown=float(weights[-1]),
         misfits=misfits[1:][order].tolist(),
+        best=best,
         noise=noise,
     )
 

@@ -24,6 +24,10 @@ WRONG_NOISE_RATIO = 1.25
 """Ratio of the noise that the residuals show to the stated noise, or its inverse, above which the stated
 noise is corrected [1]: less changes no judgement."""
 
+FORESEEN_SHARE = 0.2
+"""Share of the held-out squares that a black box may foresee of a ripple, by chance: its readings are
+correlated [1]."""
+
 
 def recalibrate(
     plant: GreyBox, cache: FitCache | None = None, *, thorough: bool = False, prefix: str = ""
@@ -85,10 +89,16 @@ def with_seen_noise(problem: FittingProblem, base: Estimate) -> PreparedPlant:
     return plant if max(ratios) == min(ratios) == 1.0 else plant.with_noise(ratios)
 
 
-def with_ripple(plant: PreparedPlant, noise: Sequence[ChannelNoise]) -> PreparedPlant:
+def with_ripple(
+    plant: PreparedPlant, noise: Sequence[ChannelNoise], foreseen: Sequence[float]
+) -> PreparedPlant:
     """The plant whose rippling channels are filtered; the same object where none ripples.
 
-    noise: under the best hypothesis.
+    noise: by channel under the best hypothesis. foreseen: share of its held-out squares that a black box
+    predicts, by channel [1]; what a model of the inputs foresees is a misfit, no ripple.
     """
-    ripples = tuple(own.ripple for own in noise)
+    ripples = tuple(
+        own.ripple if share < FORESEEN_SHARE else None
+        for own, share in zip(noise, foreseen, strict=True)
+    )
     return plant.with_ripples(ripples) if any(ripples) else plant

@@ -63,6 +63,7 @@ PISTON_FRICTION = Effect(
             domain=(0, 2),
             meaning="excess of the piston's friction at rest over that in motion",
             drawn=(0.1, 1.0),
+            spread=0.5,
         ),
     ),
     constants=(

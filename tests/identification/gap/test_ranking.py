@@ -8,6 +8,7 @@ import pytest
 
 from docs.examples.tank import Tank, virtual_recordings
 from identification.gap.diagnosis import Diagnosis, diagnose, rank_hypotheses
+from identification.gap.prepared_plant import prepared
 from identification.gap.sentences import verdict_sentence
 from identification.gap.verdict import KNOWN_GAP, PARTIAL, UNKNOWN, Ranking
 from tests.identification.gap.drives import Drive
@@ -104,3 +105,10 @@ def test_what_remains_is_located(sizes):
     found = beside_a_lag(*sizes)
     assert found.remaining is not None
     assert max(found.remaining.equation_probabilities.values()) > 0.5
+
+
+def test_what_the_inputs_foresee_is_no_ripple():
+    """What a missing lag leaves is correlated as a ripple is; a black box tells them apart."""
+    ranking = beside_a_lag(*A_PART).ranking
+    assert any(own.ripple for own in ranking.noise)
+    assert not any(prepared(ranking.problem.plant).ripples)

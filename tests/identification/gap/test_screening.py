@@ -3,7 +3,7 @@
 import pytest
 
 from identification.gap.gauss_newton import fit, linearise
-from identification.gap.recalibration import recalibrate, refit
+from identification.gap.recalibration import recalibrate
 from identification.gap.screening import (
     Start,
     _predicted,
@@ -33,7 +33,7 @@ def test_a_threshold_begins_at_its_trial_where_a_linear_step_leads_to_off():
     assert predicted["limit"] > 1.0  # beyond the largest command: no effect, and no slope either
     (stuck,) = fit(problem, [with_cause(problem, base, limit, predicted)])
     (start,) = screen_causes(problem, base, runs, signatures)
-    (found,) = refit(problem, base, [start])
+    (found,) = fit(problem, [start.estimate])
     assert problem.values(found)["limit"] == pytest.approx(0.8, abs=0.02)
     assert problem.values(stuck)["limit"] > 1.0
     assert found.chi_square < 0.5 * stuck.chi_square
