@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from epv_env.plant.effects.law import SYMBOLS
 from epv_env.plant.parameters import ParameterError, Parameters, table
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 
@@ -44,7 +45,8 @@ def check_free(free: Mapping[str, Freedom], parameters: Parameters) -> None:
 
 def _movable() -> list[str]:
     """Symbols of the valve's parameters and of the sizes of effects."""
-    return [s for s, row in table().items() if row.domain and row.group != "environment"]
+    rows = table().items()
+    return [s for s, row in rows if row.domain and row.group != "environment" and s not in SYMBOLS]
 
 
 def _check_bounds(symbol: str, bounds: tuple[float, float], parameters: Parameters) -> None:

@@ -13,7 +13,7 @@ from epv_env.common.field_types import check_type
 from epv_env.common.files import JSONFileError, checked, decoded, write_json
 from epv_env.plant.channels import SENSORS, Sensor, changed_fields, own_sensors
 from epv_env.plant.effects.law import SLOTS, SYMBOLS, Law, laws_of, placed
-from epv_env.plant.effects.registry import CATALOGUE, PLACES
+from epv_env.plant.effects.registry import CATALOGUE, LAWFUL, PLACES
 from epv_env.plant.force_balance import check_valve
 from epv_env.plant.free_parameters import FREE_PARAMETERS, Freedom, check_free
 from epv_env.plant.parameters import ParameterError, Parameters
@@ -265,10 +265,9 @@ def _parameters(content: _Values, domains: Mapping[str, tuple[float, float]]) ->
     if len(content.laws) > len(SLOTS):
         raise ParameterError(f"laws has {len(content.laws)} entries: give at most {len(SLOTS)}")
     for slot, law in zip(SLOTS, content.laws, strict=False):
-        if law.effect not in PLACES:
-            raise ParameterError(
-                f"law of unknown effect {law.effect!r}: choose one of {', '.join(PLACES)}"
-            )
+        lawful = sorted(set(LAWFUL.values()))
+        if law.effect not in lawful:
+            raise ParameterError(f"law of {law.effect!r}: choose one of {', '.join(lawful)}")
         values |= placed(slot, PLACES[law.effect], law.argument, law.low, law.high, law.growth)
     return Parameters({**Parameters.calibrated(), **values}, domains)
 

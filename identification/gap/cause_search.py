@@ -15,7 +15,7 @@ from identification.gap.gauss_newton import fit, linearise
 from identification.gap.law_screening import law_starts
 from identification.gap.laws import MOST_LAWS
 from identification.gap.plant import GreyBox
-from identification.gap.posterior import CHANCE, TOLERANCE, Posterior, posterior, tolerated_misfit
+from identification.gap.posterior import Posterior, posterior, tolerated_misfit
 from identification.gap.recalibration import with_own_nuisances
 from identification.gap.screening import (
     CauseSignature,
@@ -79,6 +79,8 @@ class HypothesisPool:
         self.recalibrated = recalibrated
         self.cache = cache
         self.small = is_small(problem.plant)
+        self.readings = sum(int(np.sum(run.trusted)) for run in problem.plant.runs)
+        self.tolerated = tolerated_misfit(self.readings)
         self._best: dict[frozenset[str], EvaluatedHypothesis] = {}
         self._finished: set[str] = set()
 
@@ -100,10 +102,8 @@ class HypothesisPool:
 
     def _cost(self, evaluated: EvaluatedHypothesis) -> float:
         """What counts when one of two fits of a set is kept [nats]: an open law must pay."""
-        readings = sum(np.count_nonzero(run.trusted) for run in self.problem.plant.runs)
-        tolerated = CHANCE + TOLERANCE * readings
-        left = max(0.5 * (misfit(evaluated) - readings), 0.0)
-        return (left + tolerated) * LAW_PRICE ** len(evaluated.estimate.hypothesis.laws)
+        left = max(0.5 * (misfit(evaluated) - self.readings), 0.0)
+        return (left + self.tolerated) * LAW_PRICE ** len(evaluated.estimate.hypothesis.laws)
 
     def __contains__(self, labels: frozenset[str]) -> bool:
         """Whether a set of causes was refitted."""
@@ -125,8 +125,7 @@ class HypothesisPool:
 
     def much_is_left(self) -> bool:
         """Whether the best hypothesis leaves more than what no model is free of."""
-        found = self.posterior()
-        return bool(found.misfits) and min(found.misfits) > tolerated_misfit(found.noise)
+        return min(self.posterior().misfits, default=0.0) > self.tolerated
 
     def promising(self, number: int, most: int) -> list[EvaluatedHypothesis]:
         """The best sets of a number of causes that do not leave far more than the best of them."""

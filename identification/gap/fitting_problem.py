@@ -105,6 +105,11 @@ class Estimate:
             first = end
         return found
 
+    @property
+    def acting_laws(self) -> list[tuple[Law, NDArray]]:
+        """Laws that differ from those assumed; a plant simulates two of them at most."""
+        return [(law, components) for law, components in self.laws if np.any(components)]
+
 
 def cause_places(estimate: Estimate) -> list[tuple[Cause, slice, slice]]:
     """Each cause with the places of its parameters in the vector and of its run parameters."""
@@ -206,7 +211,7 @@ class FittingProblem:
         self.thorough = thorough
         self.fitted_runs = [r for r, run in enumerate(plant.runs) if not run.held_out]
         self.all_runs = list(range(len(plant.runs)))
-        self.readings = sum(np.count_nonzero(plant.runs[r].trusted) for r in self.fitted_runs)
+        self.readings = sum(int(np.sum(plant.runs[r].trusted)) for r in self.fitted_runs)
         self.measured = [
             noise_weighted(plant, r, run.measured).reshape(-1) for r, run in enumerate(plant.runs)
         ]
@@ -245,8 +250,7 @@ class FittingProblem:
     def law_values(self, estimate: Estimate) -> dict[str, float]:
         """Values by symbol [SI] with which the plant simulates the laws of an estimate."""
         values: dict[str, float] = {}
-        acting = [(law, components) for law, components in estimate.laws if np.any(components)]
-        for number, (law, components) in enumerate(acting, start=1):
+        for number, (law, components) in enumerate(estimate.acting_laws, start=1):
             growth = law.growth(components)
             simulated = self.plant.law_values  # type: ignore[attr-defined]
             values |= simulated(number, law.cause, law.argument, law.low, law.high, growth)

@@ -116,15 +116,16 @@ class OdePlant:
         self, number: int, cause: Cause, argument: str, low: float, high: float, growth: NDArray
     ) -> dict[str, float]:
         """`GreyBox.law_values`; growth: (knots,)."""
-        place = [own.label for own in self.causes].index(cause.label) + 1
+        place = list(dict.fromkeys(own.name for own in self.causes)).index(cause.name) + 1
         numbers = (place, self.law_arguments.index(argument) + 1, low, high, *growth)
         return {f"law {number}, {row}": float(value) for row, value in enumerate(numbers)}
 
     def _owners(self) -> list[int]:
-        """Number of the cause of each symbol, from 1 on; 0 for those of no cause."""
+        """Number of the cause of each symbol, from 1 on, one for all variants; 0 for no cause."""
+        numbers = {name: n for n, name in enumerate(dict.fromkeys(c.name for c in self.causes), start=1)}
         owners = dict.fromkeys(self.nominal, 0)
-        for number, cause in enumerate(self.causes, start=1):
-            owners |= {p.symbol: number for p in cause.parameters}
+        for cause in self.causes:
+            owners |= {p.symbol: numbers[cause.name] for p in cause.parameters}
         return list(owners.values())
 
     def states(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, StateTrace]:

@@ -67,9 +67,9 @@ def posterior(
     noise = residual_noise(problem.plant, best.residuals)
     misfits = np.array([misfit_beyond_noise(each, noise) for each in every])
     misfits = misfits - min(float(np.min(misfits)), 0.0)
-    tolerated = tolerated_misfit(noise)
-    left = np.append(misfits, tolerated + UNKNOWN_SHARE * misfits[0])
-    scores = -POWER * np.log1p(left / tolerated) + log_priors(problem, hypotheses)
+    readings = sum(own.readings for own in noise)
+    left = np.append(misfits, tolerated_misfit(readings) + UNKNOWN_SHARE * misfits[0])
+    scores = log_likelihoods(left, readings) + log_priors(problem, hypotheses)
     weights = softmax(scores)
     order = np.lexsort((misfits[1:], -weights[1:-1]))
     return Posterior(
@@ -83,9 +83,14 @@ def posterior(
     )
 
 
-def tolerated_misfit(noise: Sequence[ChannelNoise]) -> float:
+def tolerated_misfit(readings: int) -> float:
     """The misfit that no model is free of [nats]."""
-    return CHANCE + TOLERANCE * sum(own.readings for own in noise)
+    return CHANCE + TOLERANCE * readings
+
+
+def log_likelihoods(misfits: NDArray, readings: int) -> NDArray:
+    """Of misfits (n,) [nats] where the variance of the model's discrepancy is unknown, (n,)."""
+    return -POWER * np.log1p(misfits / tolerated_misfit(readings))
 
 
 def log_priors(problem: FittingProblem, hypotheses: Sequence[EvaluatedHypothesis]) -> NDArray:

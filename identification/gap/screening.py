@@ -173,28 +173,6 @@ def screen_causes(
     return sorted(kept, key=lambda start: start.chi_square)
 
 
-def promising_causes(
-    problem: FittingProblem, base_runs: Sequence[LinearisedRun], signatures: Sequence[CauseSignature]
-) -> list[Cause]:
-    """Causes by the chi-square that their signatures leave, as simulated or scaled, the least first.
-
-    base_runs: an estimate linearised in the fitted runs, near the one beside which the signatures were
-    simulated.
-    """
-    if not signatures:
-        return []
-    changes = [signature.changes for signature in signatures]
-    changed = ChangedRuns(base_runs, changes)
-    least: dict[str, float] = {}
-    for i, signature in enumerate(signatures):
-        label = signature.cause.label
-        scaled = _predicted(changed.with_slope(i), signature)[0]
-        simulated = changed.explained(i).chi_square
-        least[label] = min(scaled, simulated, least.get(label, np.inf))
-    causes = {signature.cause.label: signature.cause for signature in signatures}
-    return [causes[label] for label in sorted(least, key=lambda label: least[label])]
-
-
 def best_start_of_each(starts: Sequence[Start]) -> list[Start]:
     """The start with the least chi-square of each set of causes."""
     best: dict[frozenset[str], Start] = {}

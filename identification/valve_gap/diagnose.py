@@ -208,7 +208,7 @@ def _plant_symbols(problem: FittingProblem, estimate: Estimate) -> tuple[tuple[s
     names = [p.symbol for p in problem.parameters(estimate)]
     symbols, rows = [], []
     knots = {}
-    for number, (law, _) in enumerate(estimate.laws, start=1):
+    for number, (law, _) in enumerate(estimate.acting_laws, start=1):
         first = names.index(law.parameters[0].symbol)
         knots[first] = dict(zip(knot_symbols(number), COMPONENTS, strict=True))
     opened = {p.symbol for law in estimate.hypothesis.laws for p in law.parameters}

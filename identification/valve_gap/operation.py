@@ -23,7 +23,7 @@ from identification.gap.gap_json import write_results
 from identification.gap.gauss_newton import linearise
 from identification.gap.onset import least_squares_by_onset
 from identification.gap.plant import NuisanceParameter
-from identification.gap.posterior import CHANCE, POWER, TOLERANCE
+from identification.gap.posterior import log_likelihoods
 from identification.gap.prepared_plant import prepared
 from identification.gap.screened import Finding
 from identification.gap.screening import simulate_signatures
@@ -119,7 +119,7 @@ def onset_probabilities(valve: "LoggedValve", cache: FitCache) -> NDArray:
     drives = np.array([valve.drives.index(name) for name in names])
     squares = least_squares_by_onset(runs, signatures, drives)
     misfits = (squares / np.min(squares) - 1.0) * problem.readings / 2.0
-    scores = -POWER * np.log1p(misfits / (CHANCE + TOLERANCE * problem.readings))
+    scores = log_likelihoods(misfits, problem.readings)
     scores[1:] -= np.log(max(len(squares) - 1, 1))
     return softmax(scores)
 

@@ -109,7 +109,7 @@ def test_a_cause_at_the_end_of_its_range_is_e_times_less_probable():
 
 def test_a_probability_is_a_power_of_what_is_left_times_its_prior():
     found = ranked({"coupling": 0.1})
-    tolerated = tolerated_misfit(found.noise)
+    tolerated = tolerated_misfit(sum(own.readings for own in found.noise))
     whole = misfit_beyond_noise(found.recalibrated, found.noise)
     priors = np.exp(log_priors(found.problem, found.hypotheses))
     unknown = (2.0 + UNKNOWN_SHARE * whole / tolerated) ** -POWER * priors[-1]
@@ -144,7 +144,7 @@ def test_sets_of_as_many_causes_share_a_prior_and_an_open_law_costs_its_choice()
 def test_a_cause_that_removes_more_has_less_misfit():
     found = ranked({"dead_zone": 0.15, "lag": 0.03, "coupling": 0.1})
     left = {frozenset(e.labels): m for e, m in zip(found.hypotheses, found.misfits, strict=True)}
-    tolerated = tolerated_misfit(found.noise)
+    tolerated = tolerated_misfit(sum(own.readings for own in found.noise))
     assert left[frozenset({"dead_zone", "lag", "coupling"})] < tolerated
     assert left[frozenset({"lag", "coupling"})] > 10 * tolerated
     misfits = [misfit_beyond_noise(each, found.noise) for each in found.hypotheses]
