@@ -339,7 +339,7 @@ def derivative(q, u, c, effects, free_PV, free_MV, extended):
     if extended:
         feed_MV = _with_supply(q, q.p1 - effects.supply_MV * q.supply_drop)
         q = _with_supply(q, q.p1 - effects.supply_PV * q.supply_drop)
-        effects = with_laws(q, u.U, effects)
+        effects = with_laws(q, effects)
     force_PV = piston_force(q, c, effects, extended)
     inverse_Rm = reluctance_inverse(q, c)
     force_MV = armature_force(feed_MV, c, inverse_Rm, effects, extended)

@@ -5,6 +5,7 @@ are then opened, over the states that promise most by linear prediction, and fit
 """
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -12,7 +13,7 @@ import numpy as np
 from identification.gap.evidence import EvaluatedHypothesis, evaluate, misfit
 from identification.gap.fitting_problem import Estimate, FitCache, FittingProblem, Hypothesis
 from identification.gap.gauss_newton import fit, linearise
-from identification.gap.law_screening import law_starts
+from identification.gap.law_screening import law_starts, over_reached_states
 from identification.gap.laws import MOST_LAWS
 from identification.gap.plant import GreyBox
 from identification.gap.posterior import Posterior, posterior, tolerated_misfit
@@ -152,7 +153,8 @@ class HypothesisPool:
 
     def _with_own_nuisances(self, chosen: Sequence[EvaluatedHypothesis]) -> list[EvaluatedHypothesis]:
         name = "; ".join(_name(each) for each in chosen)
-        return with_own_nuisances(self.problem, chosen, f"further: {name}", self.cache)
+        starts = [replace(e, estimate=over_reached_states(self.problem, e.estimate)) for e in chosen]
+        return with_own_nuisances(self.problem, starts, f"further: {name}", self.cache)
 
     def _with_another_law(self, chosen: Sequence[EvaluatedHypothesis]) -> list[Estimate]:
         """Fits of each of the best with those laws open that promise most."""
@@ -192,6 +194,10 @@ def search_causes(
         most_causes: largest number of causes of a set.
     """
     pool.add(_fits_beside(pool, base, signatures))
+    if pool.small:
+        # Without the cause recalibration may have ended in a corner, far from the truth.
+        nominal = pool.problem.start(Hypothesis(causes=()), {})
+        pool.add(_fits_beside(pool, nominal, signatures, "the nominal model"))
     pool.finish(1)
     for number in range(2, most_causes + 1):
         if not _another_cause_may_act(pool, number):
@@ -213,12 +219,13 @@ def _another_cause_may_act(pool: HypothesisPool, number: int) -> bool:
 
 
 def _fits_beside(
-    pool: HypothesisPool, base: Estimate, signatures: Sequence[CauseSignature]
+    pool: HypothesisPool, base: Estimate, signatures: Sequence[CauseSignature], name: str = ""
 ) -> list[Estimate]:
     """Fits of a set with each of the most promising further causes, as assumed and with an open law.
 
     base: the set's estimate. signatures: of all causes beside the recalibrated model; those that promise
-    something beside the set are simulated there.
+    something beside the set are simulated there. name: of the base where sets that were fitted are
+    fitted again.
     """
     problem, hypothesis = pool.problem, base.hypothesis
     own = {cause.name for cause in hypothesis.causes}
@@ -226,7 +233,7 @@ def _fits_beside(
         signature
         for signature in signatures
         if signature.cause.name not in own
-        and frozenset((*hypothesis.labels, signature.cause.label)) not in pool
+        and (name or frozenset((*hypothesis.labels, signature.cause.label)) not in pool)
     ]
     if not others:
         return []
@@ -249,15 +256,14 @@ def _fits_beside(
             promise[start.labels] = min(promise.get(start.labels, np.inf), share)
         best = sorted(promise, key=lambda labels: promise[labels])
         kept = set(best if pool.small else best[:PARTNERS])
-        most = len(assumed) if pool.small else STARTS
         starts = [
             start
-            for part in (assumed, opened)
+            for part, most in ((assumed, len(assumed) if pool.small else STARTS), (opened, STARTS))
             for start in _best_starts([start for start in part if start.labels in kept], most)
         ]
         return fit(problem, [s.estimate for s in starts], base.chi_square, iterations=FIRST_ITERATIONS)
 
-    return pool.cache(f"beside {' and '.join(hypothesis.labels) or 'nothing'}", fits)
+    return pool.cache(f"beside {name or ' and '.join(hypothesis.labels) or 'nothing'}", fits)
 
 
 def _most_misfitting(problem: FittingProblem, base_runs: Sequence[LinearisedRun]) -> list[int]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from identification.gap.fitting_problem import Estimate, FittingProblem
 from identification.gap.gauss_newton import linearise
-from identification.gap.laws import MOST_LAWS, Law
+from identification.gap.laws import COMPONENTS, LARGEST, MOST_LAWS, Law
 from identification.gap.plant import Cause
 from identification.gap.recalibration import restarted
 from identification.gap.screening import Start
@@ -23,6 +23,9 @@ SMALL_SIZE = 0.3
 
 TOGETHER = 4
 """Causes whose laws are linearised together, for memory."""
+
+LEAST_MEAN = 0.1
+"""Least factor on a size that stands for the mean of its law [1]."""
 
 STEP_DAMPING = 1e-3
 """Damping of the step, relative to the diagonal [1]: nearly none."""
@@ -102,14 +105,52 @@ def _with_every_law(
     """The estimate with the law of a cause open over every state that changes; all as assumed yet."""
     known = estimate.hypothesis.laws
     taken = {law.argument for law in known if law.cause.label == cause.label}
-    values = problem.candidate(estimate)
-    traces = [problem.plant.states(values, r) for r in runs]
-    laws = []
-    for argument in problem.plant.law_arguments:  # type: ignore[attr-defined]
-        low = float(min(np.min(trace[argument].values) for trace in traces))
-        high = float(max(np.max(trace[argument].values) for trace in traces))
-        if argument not in taken and low < high:
-            laws.append(Law(cause=cause, argument=argument, low=low, high=high))
+    laws = [
+        Law(cause=cause, argument=argument, low=low, high=high)
+        for argument, (low, high) in _ranges(problem, estimate, runs).items()
+        if argument not in taken and low < high
+    ]
     hypothesis = replace(estimate.hypothesis, laws=(*known, *laws))
     begun = problem.start(hypothesis, problem.values(estimate))
     return replace(estimate, hypothesis=hypothesis, vector=begun.vector)
+
+
+def _ranges(
+    problem: FittingProblem, estimate: Estimate, runs: Sequence[int]
+) -> dict[str, tuple[float, float]]:
+    """Least and greatest value of every state that a law may follow, by name [SI]."""
+    traces = [problem.plant.states(problem.candidate(estimate), r) for r in runs]
+    return {
+        argument: (
+            float(min(np.min(trace[argument].values) for trace in traces)),
+            float(max(np.max(trace[argument].values) for trace in traces)),
+        )
+        for argument in problem.plant.law_arguments  # type: ignore[attr-defined]
+    }
+
+
+def over_reached_states(problem: FittingProblem, estimate: Estimate) -> Estimate:
+    """The estimate as a start, with the knots of its laws between the states that it reaches itself.
+
+    The start of the fit may have moved much further, or less. What has no room in the prior is lost.
+    """
+    if not estimate.laws:
+        return restarted(estimate)
+    ranges = _ranges(problem, estimate, problem.fitted_runs)
+    values, laws = problem.values(estimate), []
+    for law, components in estimate.laws:
+        low, high = ranges[law.argument]
+        moved = replace(law, low=low, high=high) if low < high else law
+        growth = law.at(components, moved.knots)
+        mean = float(np.mean(growth))
+        parts = np.linalg.lstsq(COMPONENTS, (growth - mean) / max(1.0 + mean, LEAST_MEAN), rcond=None)[0]
+        parts = np.clip(parts, -LARGEST, LARGEST)
+        values |= dict(zip((p.symbol for p in law.parameters), parts, strict=True))
+        values |= {
+            p.symbol: p.nominal + (values[p.symbol] - p.nominal) * max(1.0 + mean, LEAST_MEAN)
+            for p in law.cause.sizes
+        }
+        laws.append(moved)
+    hypothesis = replace(estimate.hypothesis, laws=tuple(laws))
+    begun = problem.start(hypothesis, values)
+    return replace(restarted(estimate), hypothesis=hypothesis, vector=begun.vector)

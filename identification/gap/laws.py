@@ -78,14 +78,18 @@ class Law:
             for k in range(1, COMPONENTS.shape[1] + 1)
         )
 
+    @property
+    def knots(self) -> NDArray:
+        """The state at the knots, (knots,) [SI]."""
+        return np.linspace(self.low, self.high, KNOTS)
+
     def growth(self, components: NDArray) -> NDArray:
         """g at the knots, (knots,) [1]; components: (m,) [standard deviations]."""
         return COMPONENTS @ components
 
     def at(self, components: NDArray, state: NDArray) -> NDArray:
         """g at values of the state [SI], constant beyond the ends."""
-        knots = np.linspace(self.low, self.high, KNOTS)
-        return np.interp(state, knots, self.growth(components))
+        return np.interp(state, self.knots, self.growth(components))
 
 
 AS_ASSUMED = "as assumed"

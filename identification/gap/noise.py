@@ -183,8 +183,8 @@ weights of the readings."""
 RAW_TOLERANCE = 1.05
 """Noise that a residual shows over that of the raw readings [1], up to which both agree."""
 
-LEAST = np.finfo(float).tiny
-"""Mean square in place of none, for recordings without noise."""
+LEAST = 1e-4
+"""Least floor [1], for recordings without noise: a hundredth of the noise that is stated."""
 
 
 @dataclass(frozen=True, kw_only=True)

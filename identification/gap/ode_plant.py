@@ -89,7 +89,7 @@ class OdePlant:
         self._records = Records(
             states, inputs, tuple(self.nominal), [*self.nominal.values()], self._owners()
         )
-        self.law_arguments = (*states, *inputs)
+        self.law_arguments = tuple(states)
         self._start, self._regimes = start, regimes
         self._rate, self._read = rate, readings
         self._delays = dict(delays or {})
@@ -117,7 +117,8 @@ class OdePlant:
     ) -> dict[str, float]:
         """`GreyBox.law_values`; growth: (knots,)."""
         place = list(dict.fromkeys(own.name for own in self.causes)).index(cause.name) + 1
-        numbers = (place, self.law_arguments.index(argument) + 1, low, high, *growth)
+        every = (*self._records.states, *self._records.inputs)
+        numbers = (place, every.index(argument) + 1, low, high, *growth)
         return {f"law {number}, {row}": float(value) for row, value in enumerate(numbers)}
 
     def _owners(self) -> list[int]:

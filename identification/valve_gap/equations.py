@@ -157,8 +157,10 @@ def traces(answer: Trajectory) -> dict[str, StateTrace]:
         "p3": ("bar", BAR, q.p3),
         "xPV": ("mm", MILLIMETRE, q.xPV),
         "vPV": ("m/s", 1.0, q.vPV),
+        "|vPV|": ("m/s", 1.0, np.abs(q.vPV)),
         "xMV": ("mm", MILLIMETRE, q.xMV),
         "vMV": ("m/s", 1.0, q.vMV),
+        "|vMV|": ("m/s", 1.0, np.abs(q.vMV)),
         "I": ("A", 1.0, q.I),
         "U": ("V", 1.0, answer.U),
     }

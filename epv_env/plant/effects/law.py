@@ -31,16 +31,15 @@ ARGUMENTS = {
     "p2": ("Pa", {"p2": 1.0}),
     "p3": ("Pa", {"p3": 1.0}),
     "xPV": ("m", {"xPV": 1.0}),
-    "vPV": ("m/s", {"vPV": 1.0}),
+    "|vPV|": ("m/s", {"vPV": 1.0}),
     "xMV": ("m", {"xMV": 1.0}),
-    "vMV": ("m/s", {"vMV": 1.0}),
+    "|vMV|": ("m/s", {"vMV": 1.0}),
     "I": ("A", {"I": 1.0}),
-    "U": ("V", {"U": 1.0}),
 }
-"""Unit of an argument, and its weights in the state and the voltage."""
+"""Unit of an argument, and its weights in the state."""
 
-PARTS = ("p1", "p2", "p3", "xPV", "vPV", "xMV", "vMV", "I", "U")
-"""What arguments are made of."""
+PARTS = ("p1", "p2", "p3", "xPV", "vPV", "xMV", "vMV", "I")
+"""What arguments are made of; speeds count by magnitude."""
 
 
 def knot_symbols(slot: int) -> tuple[str, ...]:
@@ -211,11 +210,11 @@ def bent(s, bend):
 
 
 @inlined
-def growth_1(q, U, e):
+def growth_1(q, e):
     """g of the first law at a state, at least -1 [1]; e: Effects."""
     s = e.law1_by_p1 * q.p1 + e.law1_by_p2 * q.p2 + e.law1_by_p3 * q.p3 + e.law1_by_xPV * q.xPV
-    s += e.law1_by_vPV * q.vPV + e.law1_by_xMV * q.xMV + e.law1_by_vMV * q.vMV + e.law1_by_I * q.I
-    s += e.law1_by_U * U - e.law1_first
+    s += e.law1_by_vPV * abs(q.vPV) + e.law1_by_xMV * q.xMV + e.law1_by_vMV * abs(q.vMV)
+    s += e.law1_by_I * q.I - e.law1_first
     s = min(max(s, 0.0), 8.0)
     g = e.law1_0 + bent(s, e.law1_1) + bent(s - 1.0, e.law1_2) + bent(s - 2.0, e.law1_3)
     g += bent(s - 3.0, e.law1_4) + bent(s - 4.0, e.law1_5) + bent(s - 5.0, e.law1_6)
@@ -223,11 +222,11 @@ def growth_1(q, U, e):
 
 
 @inlined
-def growth_2(q, U, e):
+def growth_2(q, e):
     """The same of the second law."""
     s = e.law2_by_p1 * q.p1 + e.law2_by_p2 * q.p2 + e.law2_by_p3 * q.p3 + e.law2_by_xPV * q.xPV
-    s += e.law2_by_vPV * q.vPV + e.law2_by_xMV * q.xMV + e.law2_by_vMV * q.vMV + e.law2_by_I * q.I
-    s += e.law2_by_U * U - e.law2_first
+    s += e.law2_by_vPV * abs(q.vPV) + e.law2_by_xMV * q.xMV + e.law2_by_vMV * abs(q.vMV)
+    s += e.law2_by_I * q.I - e.law2_first
     s = min(max(s, 0.0), 8.0)
     g = e.law2_0 + bent(s, e.law2_1) + bent(s - 1.0, e.law2_2) + bent(s - 2.0, e.law2_3)
     g += bent(s - 3.0, e.law2_4) + bent(s - 4.0, e.law2_5) + bent(s - 5.0, e.law2_6)

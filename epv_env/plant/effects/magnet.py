@@ -14,8 +14,8 @@ GREATEST_CURRENT = 1.0
 def inverse_inductance(p: Mapping[str, NDArray]) -> NDArray:
     """Greatest reciprocal of the coil's differential inductance [1/H], shape as the parameters."""
     reluctance = p["RML"] + p["xMVmax"] / (p["mu0"] * QUARTER_PI * p["dMB"] ** 2)
-    flattened = (1 + p["sMV"] * p["N"] * GREATEST_CURRENT / p["RML"]) ** 2
-    return reluctance / p["N"] ** 2 * flattened
+    level = p["sMV"] * p["N"] * (1 + p["wL_sat"]) * GREATEST_CURRENT / p["RML"]
+    return reluctance / p["N"] ** 2 * (1 + level) ** 2
 
 
 MAGNETIC_SATURATION = Effect(
@@ -39,8 +39,15 @@ MAGNETIC_SATURATION = Effect(
         Size(
             symbol="wF_sat",
             unit="1",
-            domain=(-1, 3),
-            meaning="how much more the force saturates than the inductance, relative to the curve's law",
+            domain=(-1, 1),
+            meaning="how much more than by the curve's law the force saturates; -1: not at all",
+            spread=0.5,
+        ),
+        Size(
+            symbol="wL_sat",
+            unit="1",
+            domain=(-1, 1),
+            meaning="the same for the inductance",
             spread=0.5,
         ),
     ),
@@ -48,7 +55,7 @@ MAGNETIC_SATURATION = Effect(
         Constant(
             name="saturation",
             meaning="turns over the saturation flux: with I/Rm, how far the iron saturates [1/(V s)]",
-            value=lambda p: p["sMV"] * p["N"],
+            value=lambda p: p["sMV"] * p["N"] * (1 + p["wL_sat"]),
         ),
         Constant(
             name="force_saturation",

@@ -86,10 +86,10 @@ _scaled = generated(
 
 
 @inlined
-def with_laws(q, U, e):
-    """The constants whose strengths follow their laws at a state q under a voltage U [V]; e: Effects."""
-    g1 = growth_1(q, U, e)
-    g2 = growth_2(q, U, e)
+def with_laws(q, e):
+    """The constants whose strengths follow their laws at a state q; e: Effects."""
+    g1 = growth_1(q, e)
+    g2 = growth_2(q, e)
     return _scaled(e, g1, g2)
 
 

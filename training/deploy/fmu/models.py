@@ -142,7 +142,7 @@ def _sources() -> dict[str, str]:
         derivative, (state, inputs, coefficients, effects, NUMBER, NUMBER, TRUTH)
     )
     for function, types in (
-        (with_laws, (state, NUMBER, effects)),
+        (with_laws, (state, effects)),
         (coil_current, (*[NUMBER] * 4, effects)),
         (longest_step, (NUMBER, state, effects, NUMBER, NUMBER)),
         (is_held, (NUMBER,) * 4),
