@@ -14,6 +14,7 @@ from identification.gap.fitting_problem import Estimate, FittingProblem
 from identification.gap.gauss_newton import linearise
 from identification.gap.laws import COMPONENTS, LARGEST, MOST_LAWS, Law
 from identification.gap.plant import Cause
+from identification.gap.prepared_plant import prepared
 from identification.gap.recalibration import restarted
 from identification.gap.screening import Start
 from identification.gap.variable_projection import LinearisedRun, equations_of, products_of
@@ -119,13 +120,14 @@ def _ranges(
     problem: FittingProblem, estimate: Estimate, runs: Sequence[int]
 ) -> dict[str, tuple[float, float]]:
     """Least and greatest value of every state that a law may follow, by name [SI]."""
-    traces = [problem.plant.states(problem.candidate(estimate), r) for r in runs]
+    plant = prepared(problem.plant)
+    traces = [plant.law_states(problem.candidate(estimate), r) for r in runs]
     return {
         argument: (
             float(min(np.min(trace[argument].values) for trace in traces)),
             float(max(np.max(trace[argument].values) for trace in traces)),
         )
-        for argument in problem.plant.law_arguments  # type: ignore[attr-defined]
+        for argument in plant.law_arguments
     }
 
 

@@ -204,8 +204,9 @@ class GreyBox(Protocol):
     has screened its own recordings (`identification.gap.screened`). `law_values(number, cause, argument,
     low, high, growth)` gives values by symbol [SI] with which `outputs` simulates law `number`, 1 or 2,
     of a cause: its strength times 1 + g, where g is linear between the knots `growth`, equally spaced
-    from `low` to `high` of one of the states in `law_arguments`, and constant beyond. Without it, all
-    causes have the laws that are assumed.
+    from `low` to `high` of one of the states in `law_arguments`, and constant beyond. Without it,
+    all causes have the laws that are assumed. `law_states(values, run)` gives these states as `states`
+    does; without it they are among `states`.
     """
 
     @property

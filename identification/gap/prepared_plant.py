@@ -76,6 +76,10 @@ class PreparedPlant:
         """`GreyBox.forced`: changes (channels, samples, m) [SI]."""
         return self.plant.forced(values, run, forcing)
 
+    def law_states(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, StateTrace]:
+        """`GreyBox.law_states` by name; the states where the plant has no such method."""
+        return getattr(self.plant, "law_states", self.plant.states)(values, run)
+
     def law_values(
         self, number: int, cause: Cause, argument: str, low: float, high: float, growth: NDArray
     ) -> Mapping[str, float]:

@@ -20,6 +20,7 @@ from identification.gap.laws import COMPONENTS
 from identification.gap.laws import in_words as in_words_of_laws
 from identification.gap.localisation import Localisation
 from identification.gap.plant import GreyBox
+from identification.gap.prepared_plant import prepared
 from identification.gap.quantities import (
     gap_text,
     gap_with_interval,
@@ -229,7 +230,8 @@ def drawn_laws(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis) -> list[Bl
         slopes = np.column_stack([COMPONENTS, (1.0 + growth) / value])
         sd = np.sqrt(np.diag(slopes @ covariance[np.ix_(own, own)] @ slopes.T))
         drawn.append((law, growth, sd))
-    traces = problem.plant.states(problem.candidate(estimate), problem.fitted_runs[0])
+    values, plant = problem.candidate(estimate), prepared(problem.plant)
+    traces = plant.law_states(values, problem.fitted_runs[0])
     units = {name: (trace.unit, trace.scale) for name, trace in traces.items()}
     caption = (
         f"Strength of the cause over the state that it follows ({LEVEL_TEXT} band), relative to its "

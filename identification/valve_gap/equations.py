@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from epv_env.common.units import BAR, GRAM, MILLIGRAM, MILLIMETRE
 from epv_env.plant.channels import readings
+from epv_env.plant.effects.law import ARGUMENTS, arguments_of
 from epv_env.plant.equations import Inputs
 from epv_env.plant.simulate import Trajectory, energised, simulate
 from epv_env.plant.valves import Valves
@@ -157,10 +158,8 @@ def traces(answer: Trajectory) -> dict[str, StateTrace]:
         "p3": ("bar", BAR, q.p3),
         "xPV": ("mm", MILLIMETRE, q.xPV),
         "vPV": ("m/s", 1.0, q.vPV),
-        "|vPV|": ("m/s", 1.0, np.abs(q.vPV)),
         "xMV": ("mm", MILLIMETRE, q.xMV),
         "vMV": ("m/s", 1.0, q.vMV),
-        "|vMV|": ("m/s", 1.0, np.abs(q.vMV)),
         "I": ("A", 1.0, q.I),
         "U": ("V", 1.0, answer.U),
     }
@@ -168,6 +167,16 @@ def traces(answer: Trajectory) -> dict[str, StateTrace]:
         name: StateTrace(unit=unit, scale=scale, values=np.asarray(values))
         for name, (unit, scale, values) in found.items()
     }
+
+
+def law_traces(answer: Trajectory) -> dict[str, StateTrace]:
+    """The states that the laws of effects may follow."""
+    sizes = {"Pa": ("bar", BAR), "m": ("mm", MILLIMETRE)}
+    traces = {}
+    for name, values in arguments_of(answer.state).items():
+        unit, scale = sizes.get(ARGUMENTS[name][0], (ARGUMENTS[name][0], 1.0))
+        traces[name] = StateTrace(unit=unit, scale=scale, values=values)
+    return traces
 
 
 def _widened(mask: NDArray) -> NDArray:

@@ -23,6 +23,7 @@ from identification.valve_gap import causes
 from identification.valve_gap.equations import (
     EQUATIONS,
     forced_changes,
+    law_traces,
     modelled,
     regimes,
     traces,
@@ -159,6 +160,10 @@ class Valve:
     def states(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, StateTrace]:
         """`GreyBox.states`: traces by name, values (samples,) [SI]."""
         return traces(modelled(self.replay.drives[run], self._one(values, run)))
+
+    def law_states(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, StateTrace]:
+        """`GreyBox.law_states`: traces by name, values (samples,) [SI]."""
+        return law_traces(modelled(self.replay.drives[run], self._one(values, run)))
 
     def regimes(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, NDArray]:
         """`GreyBox.regimes`: boolean (samples,) by regime; values: (n,) or (n, runs) by symbol [SI]."""

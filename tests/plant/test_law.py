@@ -19,7 +19,14 @@ from epv_env.plant.simulate import energised, simulate
 CALIBRATED = Parameters.calibrated()
 GROWTH = (0.4, 1.0, 0.2, -0.5, -2.0, 0.3, 0.8, 0.6, 0.5)
 GIVEN: Any = {"effect": "piston_friction", "argument": "p3", "unit": "Pa", "low": 1e5, "high": 9e5}
-ENDS = {"Pa": (1e5, 9e5), "m": (0.0, 2e-3), "m/s": (-0.5, 0.5), "A": (0.0, 0.3)}
+ENDS = {
+    "Pa": (1e5, 9e5),
+    "m": (0.0, 2e-3),
+    "m/s": (-0.5, 0.5),
+    "A": (0.0, 0.3),
+    "K": (0.0, 60.0),
+    "1": (-0.1, 0.1),
+}
 LAWFUL = [name for name in PLACES if effect(name).strength]
 
 

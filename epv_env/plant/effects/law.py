@@ -9,6 +9,7 @@ effect or on two; their factors multiply.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,11 +36,19 @@ ARGUMENTS = {
     "xMV": ("m", {"xMV": 1.0}),
     "|vMV|": ("m/s", {"vMV": 1.0}),
     "I": ("A", {"I": 1.0}),
+    "coil_heat": ("K", {"coil_heat": 1.0}),
+    "heat_3": ("1", {"heat_3": 1.0}),
+    "heat_2": ("1", {"heat_2": 1.0}),
+    "supply_drop": ("Pa", {"supply_drop": 1.0}),
+    "|far_pressure|": ("Pa", {"far_pressure": 1.0}),
+    "|lag_2|": ("Pa", {"lag_2": 1.0}),
+    "|lag_3|": ("Pa", {"lag_3": 1.0}),
 }
-"""Unit of an argument, and its weights in the state."""
+"""Unit of an argument, and its weights in the state. The last seven are states of effects: so a strength
+may follow the size of what the effect does."""
 
-PARTS = ("p1", "p2", "p3", "xPV", "vPV", "xMV", "vMV", "I")
-"""What arguments are made of; speeds count by magnitude."""
+PARTS = tuple(dict.fromkeys(part for _, weights in ARGUMENTS.values() for part in weights))
+"""States that arguments are made of; those between bars count by magnitude."""
 
 
 def knot_symbols(slot: int) -> tuple[str, ...]:
@@ -131,6 +140,15 @@ def laws_of(p: Mapping[str, float], names: tuple[str, ...]) -> tuple[Law, ...]:
     return tuple(found)
 
 
+def arguments_of(q: Any) -> dict[str, NDArray]:
+    """Every argument over states q, a record of arrays [SI]."""
+    found = {}
+    for name, (_, weights) in ARGUMENTS.items():
+        value = sum(weight * np.asarray(getattr(q, part)) for part, weight in weights.items())
+        found[name] = np.abs(value) if name.startswith("|") else np.asarray(value)
+    return found
+
+
 def _per_interval(p: Mapping[str, NDArray], slot: int) -> NDArray:
     """Knots per unit of the argument; 0 without a law."""
     width = (p[f"law{slot}_high"] - p[f"law{slot}_low"]) / (KNOTS - 1)
@@ -214,7 +232,10 @@ def growth_1(q, e):
     """g of the first law at a state, at least -1 [1]; e: Effects."""
     s = e.law1_by_p1 * q.p1 + e.law1_by_p2 * q.p2 + e.law1_by_p3 * q.p3 + e.law1_by_xPV * q.xPV
     s += e.law1_by_vPV * abs(q.vPV) + e.law1_by_xMV * q.xMV + e.law1_by_vMV * abs(q.vMV)
-    s += e.law1_by_I * q.I - e.law1_first
+    s += e.law1_by_I * q.I + e.law1_by_coil_heat * q.coil_heat - e.law1_first
+    s += e.law1_by_heat_3 * q.heat_3 + e.law1_by_heat_2 * q.heat_2
+    s += e.law1_by_supply_drop * q.supply_drop + e.law1_by_far_pressure * abs(q.far_pressure)
+    s += e.law1_by_lag_2 * abs(q.lag_2) + e.law1_by_lag_3 * abs(q.lag_3)
     s = min(max(s, 0.0), 8.0)
     g = e.law1_0 + bent(s, e.law1_1) + bent(s - 1.0, e.law1_2) + bent(s - 2.0, e.law1_3)
     g += bent(s - 3.0, e.law1_4) + bent(s - 4.0, e.law1_5) + bent(s - 5.0, e.law1_6)
@@ -226,7 +247,10 @@ def growth_2(q, e):
     """The same of the second law."""
     s = e.law2_by_p1 * q.p1 + e.law2_by_p2 * q.p2 + e.law2_by_p3 * q.p3 + e.law2_by_xPV * q.xPV
     s += e.law2_by_vPV * abs(q.vPV) + e.law2_by_xMV * q.xMV + e.law2_by_vMV * abs(q.vMV)
-    s += e.law2_by_I * q.I - e.law2_first
+    s += e.law2_by_I * q.I + e.law2_by_coil_heat * q.coil_heat - e.law2_first
+    s += e.law2_by_heat_3 * q.heat_3 + e.law2_by_heat_2 * q.heat_2
+    s += e.law2_by_supply_drop * q.supply_drop + e.law2_by_far_pressure * abs(q.far_pressure)
+    s += e.law2_by_lag_2 * abs(q.lag_2) + e.law2_by_lag_3 * abs(q.lag_3)
     s = min(max(s, 0.0), 8.0)
     g = e.law2_0 + bent(s, e.law2_1) + bent(s - 1.0, e.law2_2) + bent(s - 2.0, e.law2_3)
     g += bent(s - 3.0, e.law2_4) + bent(s - 4.0, e.law2_5) + bent(s - 5.0, e.law2_6)
