@@ -267,7 +267,7 @@ def test_the_supply_loses_pressure_with_the_square_of_the_flow():
     assert run.state.supply_drop[-1] == pytest.approx(steady, rel=1e-3)
     rising = steady * (1 - np.exp(-run.time / FILLING_TIME))
     # Meanwhile the control chamber gives a little back through the open inlet.
-    np.testing.assert_allclose(run.state.supply_drop, rising, rtol=0, atol=0.02 * steady)
+    np.testing.assert_allclose(run.state.supply_drop, rising, rtol=0, atol=0.05 * steady)
     np.testing.assert_allclose(run.state.p1, 12e5)
 
 

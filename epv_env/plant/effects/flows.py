@@ -8,7 +8,7 @@ from numpy.polynomial import Polynomial, chebyshev
 from epv_env.plant.effects.record import Constant, Effect, Size
 from epv_env.plant.primitives import CRITICAL_RATIO, KAPPA, inlined
 
-FILLING_TIME = 2e-3
+FILLING_TIME = 0.5e-3
 """Time constant with which the pressure before the valve follows the flow through its pipe [s]."""
 
 PRESSURE_DEPENDENT_DISCHARGE = Effect(
@@ -128,9 +128,9 @@ SUPPLY_RESTRICTION = Effect(
     name="supply_restriction",
     component="supply",
     strength=("supply_loss",),
-    form="the valve sees p1 less (z w)²/(2 ρ), ρ at what it sees, reached in 2 ms; z = √ζ/A",
+    form="the valve sees p1 less (z w)²/(2 ρ), ρ at what it sees, reached in 0.5 ms; z = √ζ/A",
     source=(
-        "ζ w²/(2 ρ A²), loss coefficients of pipes and fittings; the 2 ms of filling only decouple flow "
+        "ζ w²/(2 ρ A²), loss coefficients of pipes and fittings; the 0.5 ms only decouples flow "
         "and pressure"
     ),
     sizes=(
@@ -176,6 +176,7 @@ SUPPLY_RESTRICTION = Effect(
             is_size=False,
         ),
     ),
+    fastest_rate=lambda p: np.where(np.asarray(p["z_supply"]) > 0, 1 / FILLING_TIME, 0.0),
 )
 
 

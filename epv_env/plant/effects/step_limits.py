@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from epv_env.plant.effects import law
 from epv_env.plant.effects.coil import CLAMP_WIDTH, NO_CURRENT, OFF_VOLTAGE
-from epv_env.plant.effects.flows import FILLING_TIME
 from epv_env.plant.effects.friction import SLIDING_SPEED_MV, SLIDING_SPEED_PV
 from epv_env.plant.effects.magnet import inverse_inductance
 from epv_env.plant.effects.record import Constant, Effect
@@ -28,7 +27,7 @@ def step_limits(effects: tuple[Effect, ...]) -> tuple[Constant, ...]:
     """The longest steps as further constants of the kernel."""
 
     def steady_step(p: Mapping[str, NDArray]) -> NDArray:
-        fastest = np.full_like(p["s_pipe"], 1 / FILLING_TIME)
+        fastest = np.full_like(p["s_pipe"], STABLE / UNLIMITED)
         for effect in effects:
             if effect.fastest_rate:
                 fastest = np.maximum(fastest, effect.fastest_rate(p))
