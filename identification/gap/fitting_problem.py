@@ -107,7 +107,7 @@ class Estimate:
 
     @property
     def acting_laws(self) -> list[tuple[Law, NDArray]]:
-        """Laws that differ from those assumed; a plant simulates two of them at most."""
+        """Laws that differ from those assumed, with their components (m,); at most two are simulated."""
         return [(law, components) for law, components in self.laws if np.any(components)]
 
 

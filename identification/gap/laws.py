@@ -88,7 +88,7 @@ class Law:
         return COMPONENTS @ components
 
     def at(self, components: NDArray, state: NDArray) -> NDArray:
-        """g at values of the state [SI], constant beyond the ends."""
+        """g at values (n,) of the state [SI], constant beyond the ends, (n,) [1]; components: (m,)."""
         return np.interp(state, self.knots, self.growth(components))
 
 

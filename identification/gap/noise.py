@@ -161,8 +161,8 @@ others."""
 CORRELATED_READINGS = 10.0
 """Length of a block of residuals in correlated readings [1]: its mean square must not scatter much."""
 
-FEWEST_MEANS = 40
-"""Fewest means of blocks that show a faint correlation."""
+FEWEST_BLOCKS, FEWEST_MEANS = 8, 40
+"""Fewest blocks that show a ripple, and whose means show a faint correlation."""
 
 LONGEST_CORRELATION = 0.5
 """Longest lag of the autocovariance, as a share of the longest run [1]: beyond, there are few pairs."""
@@ -175,6 +175,9 @@ STEEPEST_DECAY = 2.0
 
 SEEN = 3.0
 """Autocorrelation that is no chance, in standard deviations of that of white noise [1]."""
+
+ALWAYS_THERE = 0.6
+"""Mean square of the quiet blocks over that of all [1] from which what they show is always there."""
 
 RIPPLE_SHARE = 0.2
 """Share of the ripple in what a quiet block holds [1] from which it matters: less hardly moves the
@@ -251,7 +254,7 @@ def _channel_noise(series: Sequence[NDArray], duration: float, raw: float) -> Ch
         correlated=max(correlated, _faintly_correlated(readings, mean_square)),
         sd=float(np.sqrt(beside)),
         time_scale=0.5 * (correlated - 1.0) * mean_square / beside * period if beside else 0.0,
-        ripple=_ripple(readings, correlated) if coloured else None,
+        ripple=_ripple(readings, correlated, mean_square) if coloured else None,
     )
 
 
@@ -314,20 +317,20 @@ def _whole_blocks(readings: NDArray, length: int) -> list[NDArray]:
     return np.array_split(readings, len(readings) // length) if len(readings) >= length else []
 
 
-def _ripple(readings: Sequence[NDArray], correlated: float) -> Ripple | None:
-    """A first-order process in the quieter blocks; None for none.
+def _ripple(readings: Sequence[NDArray], correlated: float, mean_square: float) -> Ripple | None:
+    """A first-order process in the quieter blocks that is as large in all of them; None for none.
 
     Whether a model of the inputs could predict it is asked elsewhere.
     """
     length = max(BLOCK_READINGS, round(CORRELATED_READINGS * correlated))
     blocks = [part for own in readings for part in _whole_blocks(own, length)]
     blocks.sort(key=lambda part: float(np.mean(part**2)))
-    quiet = blocks[: round(QUIET_SHARE * len(blocks))]
-    if not quiet:
+    if len(blocks) < FEWEST_BLOCKS:
         return None
+    quiet = blocks[: round(QUIET_SHARE * len(blocks))]
     covariance = autocovariance(quiet)
     chance = SEEN * covariance[0] / np.sqrt(sum(len(part) for part in quiet))
-    if covariance[1] < chance:
+    if covariance[1] < chance or covariance[0] < ALWAYS_THERE * mean_square:
         return None
     small = np.flatnonzero(covariance[:-1] < max(chance, 0.2 * covariance[1]))
     last = int(small[0]) if len(small) else len(covariance) - 1

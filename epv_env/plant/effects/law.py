@@ -141,7 +141,7 @@ def laws_of(p: Mapping[str, float], names: tuple[str, ...]) -> tuple[Law, ...]:
 
 
 def arguments_of(q: Any) -> dict[str, NDArray]:
-    """Every argument over states q, a record of arrays [SI]."""
+    """Every argument by name, of any shape [SI]; q: states as arrays of this shape."""
     found = {}
     for name, (_, weights) in ARGUMENTS.items():
         value = sum(weight * np.asarray(getattr(q, part)) for part, weight in weights.items())

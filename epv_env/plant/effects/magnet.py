@@ -46,8 +46,8 @@ MAGNETIC_SATURATION = Effect(
         Size(
             symbol="wL_sat",
             unit="1",
-            domain=(-1, 1),
-            meaning="the same for the inductance",
+            domain=(-1, 0),
+            meaning="the same for the inductance, which saturates no more than that",
             spread=0.5,
         ),
     ),

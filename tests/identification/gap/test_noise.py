@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from identification.gap.noise import (
+    LEAST,
     RAW_TOLERANCE,
     ChannelNoise,
     autocovariance,
@@ -104,7 +105,7 @@ def test_recordings_without_noise_have_a_finite_floor(misfit):
     shape = misfit * np.sin(np.arange(SAMPLES) / 50.0)
     found = seen(RUNS * [shape])
     assert np.all(np.isfinite([found.floor, found.correlated, found.sd, found.time_scale]))
-    assert 0.0 < found.floor <= max(np.mean(shape**2), np.finfo(float).tiny)
+    assert 0.0 < found.floor <= max(np.mean(shape**2), LEAST)
 
 
 def test_chance_in_few_readings_is_neither_ripple_nor_discrepancy():

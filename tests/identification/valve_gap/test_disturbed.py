@@ -1,20 +1,35 @@
 """Valves whose recordings are disturbed as on real benches: noise is no gap and hides no effect."""
 
+from functools import cache
+
 import pytest
 
 from epv_env.plant.channels import SENSORS
+from epv_env.plant.parameters import Parameters
+from identification.bench.programmes import DIAGNOSIS_SUITE
+from identification.bench.session import measured_campaign, run_programme
 from identification.gap.diagnosis import rank_hypotheses
 from identification.gap.prepared_plant import prepared
 from identification.gap.verdict import Ranking
 from identification.recordings.recording import UNITS, Campaign
 from identification.valve_gap.valve import Valve
 from tests.identification.disturbances import add_ripple, round_pressures
-from tests.identification.valve_gap.test_diagnose import campaign
 
 pytestmark = pytest.mark.slow
 
 RIPPLE = {name: 2.0 * SENSORS[name].noise for name in ("p1", "p2", "p3")}
 """Twice the sensors' noise."""
+
+NAMES = ("test1", "low_supply", "long_open", "high_voltage", "validation", "steps")
+"""Recordings of a campaign: enough blocks to see a ripple, and half as long as the whole suite."""
+
+
+@cache
+def campaign(**effect: float) -> Campaign:
+    truth = Parameters.calibrated().replace(**effect)
+    programmes = [programme for programme in DIAGNOSIS_SUITE if programme.name in NAMES]
+    truths = [run_programme(truth, programme) for programme in programmes]
+    return measured_campaign(truths, truth, seed=3, offsets={})
 
 
 def rippled(recorded: Campaign) -> Campaign:
