@@ -8,7 +8,9 @@ import pytest
 
 from docs.examples.tank import Tank, virtual_recordings
 from identification.gap.diagnosis import Diagnosis, diagnose, rank_hypotheses
+from identification.gap.plant import Ripple
 from identification.gap.prepared_plant import prepared
+from identification.gap.recalibration import with_ripple
 from identification.gap.sentences import verdict_sentence
 from identification.gap.verdict import KNOWN_GAP, PARTIAL, UNKNOWN, Ranking
 from tests.identification.gap.drives import Drive
@@ -108,7 +110,8 @@ def test_what_remains_is_located(sizes):
 
 
 def test_what_the_inputs_foresee_is_no_ripple():
-    """What a missing lag leaves is correlated as a ripple is; a black box tells them apart."""
     ranking = beside_a_lag(*A_PART).ranking
-    assert any(own.ripple for own in ranking.noise)
-    assert not any(prepared(ranking.problem.plant).ripples)
+    plant = prepared(ranking.problem.plant)
+    noise = [replace(own, ripple=Ripple.of(1.0, 1.0, 0.9)) for own in ranking.noise]
+    assert with_ripple(plant, noise, [0.5] * len(noise)) is plant
+    assert all(with_ripple(plant, noise, [0.0] * len(noise)).ripples)
