@@ -1,7 +1,8 @@
-"""Search for the causes: singles, then sets grown by one cause at a time; the finalists' laws are open.
+"""Search for the causes: singles, then sets grown by one cause at a time, with their laws.
 
-Each set of causes is first fitted with the laws that the catalogue assumes. The laws of the best sets
-are then opened, over the states that promise most by linear prediction, and fitted in the simulation.
+A cause is fitted with the law that the catalogue assumes and with an open law, side by side; the state
+that the law follows promises most by linear prediction. The best sets get one law more, as long as it
+pays.
 """
 
 from collections.abc import Iterable, Sequence
@@ -46,8 +47,8 @@ PARTNERS = 8
 """Causes of a large catalogue that are refitted beside a set."""
 
 STARTS = 1
-"""Starts from which a cause of a large catalogue is refitted, with the law assumed and with an open one:
-the most promising of all."""
+"""The most promising starts of a set of causes that are fitted, with the law assumed and with an open
+one; in a small catalogue all starts with the law assumed."""
 
 FAR_WORSE = 10.0
 """Factor on what the best set leaves, beyond which another set of as many causes is not followed [1]."""
@@ -152,7 +153,7 @@ class HypothesisPool:
             best = self.promising(number, FINALISTS)
 
     def _with_own_nuisances(self, chosen: Sequence[EvaluatedHypothesis]) -> list[EvaluatedHypothesis]:
-        name = "; ".join(_name(each) for each in chosen)
+        name = _names(chosen)
         starts = [replace(e, estimate=over_reached_states(self.problem, e.estimate)) for e in chosen]
         return with_own_nuisances(self.problem, starts, f"further: {name}", self.cache)
 
@@ -167,7 +168,7 @@ class HypothesisPool:
                 starts += [start.estimate for start in found[:STARTS]]
             return fit(self.problem, starts, iterations=FIRST_ITERATIONS)
 
-        name = "; ".join(_name(each) for each in chosen)
+        name = _names(chosen)
         return [each for each in self.cache(f"one law more: {name}", fits) if not each.given_up]
 
 
@@ -177,6 +178,11 @@ def _name(evaluated: EvaluatedHypothesis) -> str:
     return ", ".join(
         [evaluated.label, *(f"law of {law.cause.label} over {law.argument}" for law in laws)]
     )
+
+
+def _names(chosen: Sequence[EvaluatedHypothesis]) -> str:
+    """Several hypotheses in one line, for the journal."""
+    return "; ".join(_name(each) for each in chosen)
 
 
 def search_causes(

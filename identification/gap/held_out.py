@@ -126,10 +126,21 @@ def predictable_shares(problem: FittingProblem, estimate: Estimate) -> list[floa
     """Share of a model's held-out squares that a black box foresees, by channel [1]."""
     plant, model = problem.plant, predict(problem, estimate)
     box = predict_residuals(plant, model, ridge_on_random_features, 0, time_scale(plant))
-    held_out = [r for r, run in enumerate(plant.runs) if run.held_out]
-    before = sum(np.sum(model.residuals[r] ** 2, axis=1) for r in held_out)
-    after = sum(np.sum((model.residuals[r] - box[r]) ** 2, axis=1) for r in held_out)
+    before, after = _held_out_squares(plant, model.residuals, box)
     return list(1.0 - after / np.maximum(before, np.finfo(float).tiny))
+
+
+def _held_out_squares(
+    plant: GreyBox, residuals: Sequence[NDArray], predicted: Sequence[NDArray]
+) -> tuple[NDArray, NDArray]:
+    """Sums of squares on held-out runs, without and with a prediction subtracted, (channels,) each [1].
+
+    residuals, predicted: per run (channels, samples) [noise deviations].
+    """
+    held_out = [r for r, run in enumerate(plant.runs) if run.held_out]
+    before = np.sum([np.sum(residuals[r] ** 2, axis=1) for r in held_out], axis=0)
+    after = np.sum([np.sum((residuals[r] - predicted[r]) ** 2, axis=1) for r in held_out], axis=0)
+    return before, after
 
 
 def _helpful(
@@ -139,10 +150,8 @@ def _helpful(
 
     residuals, predicted: per run (channels, samples) [noise deviations].
     """
-    held_out = [r for r, run in enumerate(plant.runs) if run.held_out]
-    before = sum(np.sum(residuals[r] ** 2) for r in held_out)
-    after = sum(np.sum((residuals[r] - predicted[r]) ** 2) for r in held_out)
-    return [block if after < before else np.zeros_like(block) for block in predicted]
+    before, after = _held_out_squares(plant, residuals, predicted)
+    return [block if after.sum() < before.sum() else np.zeros_like(block) for block in predicted]
 
 
 def _all_residuals(

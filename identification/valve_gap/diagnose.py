@@ -145,13 +145,15 @@ def refitted_plant(found: Diagnosis, valve: Valve, name: str) -> Plant:
     """
     best = found.kept
     region = region_of(found, best, valve)
-    refitted = "recalibration" if best is not found.nominal else "none: recalibration makes it worse"
+    refitted, kind = "recalibration", "recalibrated"
+    if best is found.nominal:
+        refitted, kind = "none: recalibration makes it worse", "nominal"
     return replace(
         valve.plant,
         parameters=region.centre,
         region=region,
         diagnosis=possible_plants(found, valve),
-        name=f"{name} with {best.label}" if best.labels else f"{name}, recalibrated",
+        name=f"{name} with {best.label}" if best.labels else f"{name}, {kind}",
         provenance={
             "method": "joint refit with the cause of the gap" if best.labels else refitted,
             "software": f"epv-valve {version('epv-valve')}",

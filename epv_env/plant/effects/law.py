@@ -228,30 +228,48 @@ def bent(s, bend):
 
 
 @inlined
+def weighted(
+    q, p1, p2, p3, xPV, vPV, xMV, vMV, current, coil_heat, heat_3, heat_2, drop, far, lag_2, lag_3
+):
+    """Argument at a state [intervals], by the weight of each part; see ARGUMENTS."""
+    s = p1 * q.p1 + p2 * q.p2 + p3 * q.p3 + xPV * q.xPV + vPV * abs(q.vPV)
+    s += xMV * q.xMV + vMV * abs(q.vMV) + current * q.I + coil_heat * q.coil_heat
+    s += heat_3 * q.heat_3 + heat_2 * q.heat_2 + drop * q.supply_drop
+    return s + far * abs(q.far_pressure) + lag_2 * abs(q.lag_2) + lag_3 * abs(q.lag_3)
+
+
+@inlined
+def growth(s, g, b1, b2, b3, b4, b5, b6, b7, b8):
+    """g at s [intervals from the first knot], at least -1 [1], from its value there and its bends."""
+    s = min(max(s, 0.0), 8.0)
+    g += bent(s, b1) + bent(s - 1.0, b2) + bent(s - 2.0, b3) + bent(s - 3.0, b4)
+    g += bent(s - 4.0, b5) + bent(s - 5.0, b6) + bent(s - 6.0, b7) + bent(s - 7.0, b8)
+    return max(g, -1.0)
+
+
+@inlined
 def growth_1(q, e):
     """g of the first law at a state, at least -1 [1]; e: Effects."""
-    s = e.law1_by_p1 * q.p1 + e.law1_by_p2 * q.p2 + e.law1_by_p3 * q.p3 + e.law1_by_xPV * q.xPV
-    s += e.law1_by_vPV * abs(q.vPV) + e.law1_by_xMV * q.xMV + e.law1_by_vMV * abs(q.vMV)
-    s += e.law1_by_I * q.I + e.law1_by_coil_heat * q.coil_heat - e.law1_first
-    s += e.law1_by_heat_3 * q.heat_3 + e.law1_by_heat_2 * q.heat_2
-    s += e.law1_by_supply_drop * q.supply_drop + e.law1_by_far_pressure * abs(q.far_pressure)
-    s += e.law1_by_lag_2 * abs(q.lag_2) + e.law1_by_lag_3 * abs(q.lag_3)
-    s = min(max(s, 0.0), 8.0)
-    g = e.law1_0 + bent(s, e.law1_1) + bent(s - 1.0, e.law1_2) + bent(s - 2.0, e.law1_3)
-    g += bent(s - 3.0, e.law1_4) + bent(s - 4.0, e.law1_5) + bent(s - 5.0, e.law1_6)
-    return max(g + bent(s - 6.0, e.law1_7) + bent(s - 7.0, e.law1_8), -1.0)
+    s = weighted(
+        q, e.law1_by_p1, e.law1_by_p2, e.law1_by_p3, e.law1_by_xPV, e.law1_by_vPV, e.law1_by_xMV,
+        e.law1_by_vMV, e.law1_by_I, e.law1_by_coil_heat, e.law1_by_heat_3, e.law1_by_heat_2,
+        e.law1_by_supply_drop, e.law1_by_far_pressure, e.law1_by_lag_2, e.law1_by_lag_3,
+    )  # fmt: skip
+    return growth(
+        s - e.law1_first, e.law1_0, e.law1_1, e.law1_2, e.law1_3, e.law1_4, e.law1_5, e.law1_6,
+        e.law1_7, e.law1_8,
+    )  # fmt: skip
 
 
 @inlined
 def growth_2(q, e):
     """The same of the second law."""
-    s = e.law2_by_p1 * q.p1 + e.law2_by_p2 * q.p2 + e.law2_by_p3 * q.p3 + e.law2_by_xPV * q.xPV
-    s += e.law2_by_vPV * abs(q.vPV) + e.law2_by_xMV * q.xMV + e.law2_by_vMV * abs(q.vMV)
-    s += e.law2_by_I * q.I + e.law2_by_coil_heat * q.coil_heat - e.law2_first
-    s += e.law2_by_heat_3 * q.heat_3 + e.law2_by_heat_2 * q.heat_2
-    s += e.law2_by_supply_drop * q.supply_drop + e.law2_by_far_pressure * abs(q.far_pressure)
-    s += e.law2_by_lag_2 * abs(q.lag_2) + e.law2_by_lag_3 * abs(q.lag_3)
-    s = min(max(s, 0.0), 8.0)
-    g = e.law2_0 + bent(s, e.law2_1) + bent(s - 1.0, e.law2_2) + bent(s - 2.0, e.law2_3)
-    g += bent(s - 3.0, e.law2_4) + bent(s - 4.0, e.law2_5) + bent(s - 5.0, e.law2_6)
-    return max(g + bent(s - 6.0, e.law2_7) + bent(s - 7.0, e.law2_8), -1.0)
+    s = weighted(
+        q, e.law2_by_p1, e.law2_by_p2, e.law2_by_p3, e.law2_by_xPV, e.law2_by_vPV, e.law2_by_xMV,
+        e.law2_by_vMV, e.law2_by_I, e.law2_by_coil_heat, e.law2_by_heat_3, e.law2_by_heat_2,
+        e.law2_by_supply_drop, e.law2_by_far_pressure, e.law2_by_lag_2, e.law2_by_lag_3,
+    )  # fmt: skip
+    return growth(
+        s - e.law2_first, e.law2_0, e.law2_1, e.law2_2, e.law2_3, e.law2_4, e.law2_5, e.law2_6,
+        e.law2_7, e.law2_8,
+    )  # fmt: skip
