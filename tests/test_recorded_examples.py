@@ -12,7 +12,7 @@ from docs.examples.recorded_plants import RIPPLE_PERIODS, RIPPLE_SIZE, command, 
 from docs.examples.thermal_lab import thermal_lab
 from docs.examples.toy_car import toy_car
 from identification.gap.ode_plant import OdePlant
-from identification.gap.prepared_plant import prepared
+from identification.gap.prepare.prepared_plant import prepared
 
 ROOT = Path(__file__).parents[1]
 RECORDED = ROOT.parent / "shared" / "recorded"

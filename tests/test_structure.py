@@ -41,10 +41,14 @@ def imports(path: Path, known: dict[str, Path]) -> set[str]:
 
 
 def folder_graph(root: Path) -> dict[str, set[str]]:
-    """Folders that each folder imports from, as dotted names; a package's own files count as folders."""
+    """Folders that each folder imports from, as dotted names.
+
+    A file beside folders of its own folder counts as a folder.
+    """
     known = modules(root)
     parents = {name: ".".join(path.relative_to(root).parent.parts) for name, path in known.items()}
-    folder = {name: name if parent in PACKAGES else parent for name, parent in parents.items()}
+    with_folders = {parent.rpartition(".")[0] for parent in parents.values()}
+    folder = {name: name if parent in with_folders else parent for name, parent in parents.items()}
     graph: dict[str, set[str]] = {}
     for name, path in known.items():
         targets = {folder[target] for target in imports(path, known)}

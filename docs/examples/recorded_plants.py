@@ -14,13 +14,13 @@ from scipy.signal import lfilter
 
 from epv_env.common.command_line import writable_folder
 from identification.gap.diagnosis import Diagnosis, diagnose
-from identification.gap.gap_json import write_results
+from identification.gap.fit.prediction import predict
 from identification.gap.ode_plant import OdePlant
 from identification.gap.plant import Cause, FreeParameter, Run
-from identification.gap.prediction import predict
-from identification.gap.prepared_plant import prepared
-from identification.gap.report_page import sections
-from identification.gap.sentences import verdict_sentence
+from identification.gap.prepare.prepared_plant import prepared
+from identification.gap.report.gap_json import write_results
+from identification.gap.report.page import sections
+from identification.gap.report.sentences import verdict_sentence
 from identification.report.page import write_page
 
 NOISE_FACTORS = {"sigma=0.3": 0.3, "sigma=3": 3.0}

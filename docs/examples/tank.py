@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from epv_env.common.command_line import fail_clearly, writable_folder
 from epv_env.common.files import write_text
 from identification.gap.diagnosis import diagnose
-from identification.gap.gap_json import write_results
 from identification.gap.plant import (
     Cause,
     Channel,
@@ -28,9 +27,10 @@ from identification.gap.plant import (
     StateEquation,
     StateTrace,
 )
-from identification.gap.report_figures import missing_term_figure
-from identification.gap.report_page import sections
-from identification.gap.sentences import verdict_sentence
+from identification.gap.report.figures import missing_term_figure
+from identification.gap.report.gap_json import write_results
+from identification.gap.report.page import sections
+from identification.gap.report.sentences import verdict_sentence
 from identification.report.page import write_page
 
 AREA = 0.5

@@ -9,9 +9,9 @@ from pathlib import Path
 from epv_env.common.command_line import NextStep, add_out, add_plant, add_seed
 from epv_env.common.files import decoded
 from identification.gap.diagnosis import Diagnosis
-from identification.gap.gap_json import GAP as GAP_FILE
-from identification.gap.screened import sentences
-from identification.gap.sentences import verdict_sentence
+from identification.gap.prepare.screened import sentences
+from identification.gap.report.gap_json import GAP as GAP_FILE
+from identification.gap.report.sentences import verdict_sentence
 from identification.valve_gap import diagnose, operation
 
 

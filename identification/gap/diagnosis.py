@@ -3,30 +3,23 @@
 from dataclasses import dataclass
 
 from identification.block_bootstrap import Interval
-from identification.gap.cause_search import MOST_CAUSES, HypothesisPool, is_small, search_causes
-from identification.gap.evidence import EvaluatedHypothesis, evaluate, evaluate_linearised
-from identification.gap.fitting_problem import Estimate, FitCache, FittingProblem, Hypothesis
-from identification.gap.gauss_newton import linearise
-from identification.gap.held_out import (
+from identification.gap.fit.evidence import EvaluatedHypothesis, evaluate, evaluate_linearised
+from identification.gap.fit.fitting_problem import Estimate, FitCache, FittingProblem, Hypothesis
+from identification.gap.fit.gauss_newton import linearise
+from identification.gap.fit.recalibration import (
+    recalibrate,
+    with_own_nuisances,
+    with_ripple,
+    with_seen_noise,
+)
+from identification.gap.judge.held_out import (
     NOMINAL,
     RECALIBRATED,
     DiscrepancyReduction,
     measure_discrepancy_reduction,
     predictable_shares,
 )
-from identification.gap.localisation import Localisation, locate
-from identification.gap.plant import GreyBox
-from identification.gap.plant_checks import check, check_description
-from identification.gap.prepared_plant import prepared
-from identification.gap.recalibration import (
-    recalibrate,
-    with_own_nuisances,
-    with_ripple,
-    with_seen_noise,
-)
-from identification.gap.screened import Finding
-from identification.gap.screening import assess_separability, simulate_signatures
-from identification.gap.verdict import (
+from identification.gap.judge.verdict import (
     AMBIGUITY_SHARE,
     AMBIGUOUS,
     KNOWN,
@@ -39,6 +32,13 @@ from identification.gap.verdict import (
     conclude,
     smallest_set,
 )
+from identification.gap.locate.localisation import Localisation, locate
+from identification.gap.plant import GreyBox
+from identification.gap.plant_checks import check, check_description
+from identification.gap.prepare.prepared_plant import prepared
+from identification.gap.prepare.screened import Finding
+from identification.gap.search.cause_search import MOST_CAUSES, HypothesisPool, is_small, search_causes
+from identification.gap.search.screening import assess_separability, simulate_signatures
 
 JUDGED_RUNNERS_UP = 3
 """Single causes beyond the ambiguity set whose discrepancy reduction is measured too; computing time and

@@ -17,7 +17,7 @@ import numpy as np
 from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
-from identification.gap.laws import KNOTS, MOST_LAWS
+from identification.gap.fit.laws import KNOTS, MOST_LAWS
 from identification.gap.runge_kutta import advancing
 
 STEP_ERROR = 0.05

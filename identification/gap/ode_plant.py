@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.laws import MOST_LAWS
-from identification.gap.noise import channel_noise
+from identification.gap.fit.laws import MOST_LAWS
 from identification.gap.ode_integration import LAW_ROWS, TIME, Job, Records, settled_steps, simulator
 from identification.gap.plant import (
     Cause,
@@ -20,6 +19,7 @@ from identification.gap.plant import (
     StateEquation,
     StateTrace,
 )
+from identification.gap.prepare.noise import channel_noise
 
 
 class OdePlant:

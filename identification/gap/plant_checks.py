@@ -16,8 +16,8 @@ from identification.gap.plant import (
     Run,
     window_forcing,
 )
-from identification.gap.prepared_plant import prepared
-from identification.gap.screened import sentences
+from identification.gap.prepare.prepared_plant import prepared
+from identification.gap.prepare.screened import sentences
 
 UNEVEN_PERIOD = 0.01
 """Largest deviation from uniform sampling [sampling periods]: rounding of a logger's clock."""

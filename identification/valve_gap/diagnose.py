@@ -20,13 +20,13 @@ from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from epv_env.plant.region import Alternative, Mixture, Region
 from identification.bench.programmes import at_voltage, save_programmes
 from identification.gap.diagnosis import Diagnosis, diagnose
-from identification.gap.evidence import EvaluatedHypothesis
-from identification.gap.fitting_problem import Estimate, FitCache, FittingProblem
-from identification.gap.gap_json import fitted_values, parameter_covariance, write_results
-from identification.gap.held_out import RECALIBRATED
-from identification.gap.laws import COMPONENTS
-from identification.gap.report_page import sections
-from identification.gap.verdict import AMBIGUOUS, UNKNOWN
+from identification.gap.fit.evidence import EvaluatedHypothesis
+from identification.gap.fit.fitting_problem import Estimate, FitCache, FittingProblem
+from identification.gap.fit.laws import COMPONENTS
+from identification.gap.judge.held_out import RECALIBRATED
+from identification.gap.judge.verdict import AMBIGUOUS, UNKNOWN
+from identification.gap.report.gap_json import fitted_values, parameter_covariance, write_results
+from identification.gap.report.page import sections
 from identification.recordings.campaign_files import read_campaign
 from identification.recordings.recording import campaign_facts
 from identification.recordings.rules import RULES, rules_of

@@ -18,16 +18,16 @@ from epv_env.common.command_line import NextStep, plant_option
 from epv_env.common.files import Journal
 from epv_env.plant.plantfile import Plant, load_plant
 from identification.gap.diagnosis import Diagnosis, diagnose, recalibrated_by_seen_noise
-from identification.gap.fitting_problem import FitCache
-from identification.gap.gap_json import write_results
-from identification.gap.gauss_newton import linearise
-from identification.gap.onset import least_squares_by_onset
+from identification.gap.fit.fitting_problem import FitCache
+from identification.gap.fit.gauss_newton import linearise
+from identification.gap.judge.verdict import AMBIGUOUS, NO_GAP, UNKNOWN
 from identification.gap.plant import NuisanceParameter
-from identification.gap.posterior import log_likelihoods
-from identification.gap.prepared_plant import prepared
-from identification.gap.screened import Finding
-from identification.gap.screening import simulate_signatures
-from identification.gap.verdict import AMBIGUOUS, NO_GAP, UNKNOWN
+from identification.gap.prepare.prepared_plant import prepared
+from identification.gap.prepare.screened import Finding
+from identification.gap.report.gap_json import write_results
+from identification.gap.search.onset import least_squares_by_onset
+from identification.gap.search.posterior import log_likelihoods
+from identification.gap.search.screening import simulate_signatures
 from identification.recordings.log_files import Log, read_log
 from identification.recordings.openings import drive_of, evenly, openings, start_of
 from identification.recordings.recording import OUTPUTS, Campaign, campaign_facts

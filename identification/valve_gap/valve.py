@@ -12,9 +12,9 @@ from epv_env.plant.free_parameters import FREE_PARAMETERS
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from identification.calibration.problem import calibration_problem
-from identification.gap.noise import noise_of_blocks
 from identification.gap.plant import Cause, Channel, NuisanceParameter, Run, StateTrace
-from identification.gap.screened import Finding, screen
+from identification.gap.prepare.noise import noise_of_blocks
+from identification.gap.prepare.screened import Finding, screen
 from identification.recordings.noise import coarse_step_warnings, reliable_step, rounding_error
 from identification.recordings.recording import OUTPUTS, UNITS, Campaign, Recording
 from identification.replay.model_inputs import model_inputs

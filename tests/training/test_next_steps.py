@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip("stable_baselines3")
 from epv_env.common.command_line import NextStep
 from epv_env.common.commands import commands, parse
-from identification.gap.verdict import AMBIGUOUS, KNOWN, NO_GAP, PARTIAL, UNKNOWN
+from identification.gap.judge.verdict import AMBIGUOUS, KNOWN, NO_GAP, PARTIAL, UNKNOWN
 from identification.report.page import write_page
 from training.epv import PACKAGES
 

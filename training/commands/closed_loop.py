@@ -13,7 +13,7 @@ from controllers.policy import TRAINED
 from epv_env.common.command_line import NextStep, add_out, add_plant, add_seed
 from epv_env.common.files import decoded
 from epv_env.plant.plantfile import load_plant
-from identification.gap.gap_json import GAP
+from identification.gap.report.gap_json import GAP
 from identification.recordings.log_files import read_log
 from training.closed_loop import ClosedLoop
 from training.evaluation.named import HELP, named_controllers

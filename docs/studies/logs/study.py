@@ -31,8 +31,8 @@ from epv_env.plant.region import CALIBRATED_SYMBOLS
 from epv_env.plant.valves import Valves
 from identification.blind.forms import deviating_sizes
 from identification.blind.score import named_cause, named_set
-from identification.gap.gap_json import as_json
-from identification.gap.verdict import NO_GAP
+from identification.gap.judge.verdict import NO_GAP
+from identification.gap.report.gap_json import as_json
 from identification.recordings.log_files import read_log
 from identification.recordings.openings import drive_of, openings
 from identification.valve_gap.operation import diagnose_log

@@ -32,7 +32,7 @@ from epv_env.task import LimitingTask
 from identification.bench.session import measured_campaign
 from identification.blind.bench import NO_OFFSETS, blind_suite, run_programme
 from identification.blind.truth import draw_unit
-from identification.gap.gap_json import GAP
+from identification.gap.report.gap_json import GAP
 from identification.recordings.campaign_files import FILE_NAME, write_campaign
 from identification.valve_gap.diagnose import PLANT, diagnose_campaign
 from training.evaluation.metrics import violation_interval

@@ -3,8 +3,8 @@
 import numpy as np
 
 from docs.examples.tank import Tank, virtual_recordings
-from identification.gap.black_box import LearningRun, ridge_on_random_features
-from identification.gap.held_out import p_value
+from identification.gap.judge.black_box import LearningRun, ridge_on_random_features
+from identification.gap.judge.held_out import p_value
 
 
 def task(seed: int, wave: float) -> LearningRun:

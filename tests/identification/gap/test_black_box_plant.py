@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from docs.examples.tank import START, Tank, levels, readings, virtual_recordings
 from identification.gap.black_box_plant import BlackBoxPlant, FmuSimulator
 from identification.gap.diagnosis import diagnose
-from identification.gap.gap_json import as_json
 from identification.gap.plant import NuisanceParameter, PlantError, Run
 from identification.gap.plant_checks import check
-from identification.gap.report_page import sections
+from identification.gap.report.gap_json import as_json
+from identification.gap.report.page import sections
 from tests.identification.gap.tank_fmu import build_tank_fmu, can_build
 
 TANK = Tank(virtual_recordings({"c": 0.021, "leak": 4e-3}))

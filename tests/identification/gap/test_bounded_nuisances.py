@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from docs.examples.tank import Tank, virtual_recordings
-from identification.gap.evidence import evaluate
-from identification.gap.fitting_problem import Estimate, FittingProblem
-from identification.gap.gauss_newton import linearise
-from identification.gap.recalibration import recalibrate
-from identification.gap.variable_projection import (
+from identification.gap.fit.evidence import evaluate
+from identification.gap.fit.fitting_problem import Estimate, FittingProblem
+from identification.gap.fit.gauss_newton import linearise
+from identification.gap.fit.recalibration import recalibrate
+from identification.gap.fit.variable_projection import (
     without_run_nuisances,
 )
 

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from identification.gap import cause_search
-from identification.gap.cause_search import HypothesisPool, _leave_causes_out
 from identification.gap.diagnosis import rank_hypotheses
-from identification.gap.evidence import evaluate
-from identification.gap.fitting_problem import FitCache, Hypothesis
-from identification.gap.gauss_newton import fit
-from identification.gap.recalibration import recalibrate
-from identification.gap.verdict import Ranking
+from identification.gap.fit.evidence import evaluate
+from identification.gap.fit.fitting_problem import FitCache, Hypothesis
+from identification.gap.fit.gauss_newton import fit
+from identification.gap.fit.recalibration import recalibrate
+from identification.gap.judge.verdict import Ranking
+from identification.gap.search import cause_search
+from identification.gap.search.cause_search import HypothesisPool, _leave_causes_out
 from tests.identification.gap.drives import Drive
 
 THREE = {"dead_zone": 0.15, "lag": 0.03, "coupling": 0.1}

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from docs.examples.tank import Tank, virtual_recordings
-from identification.gap import sensor_faults
 from identification.gap.diagnosis import Diagnosis, diagnose
-from identification.gap.gap_json import as_json
-from identification.gap.gaps import WHOLE
-from identification.gap.report_page import sections
-from identification.gap.sensor_faults import reading_faults
+from identification.gap.fit.gaps import WHOLE
+from identification.gap.prepare import sensor_faults
+from identification.gap.prepare.sensor_faults import reading_faults
+from identification.gap.report.gap_json import as_json
+from identification.gap.report.page import sections
 from identification.report.page import Picture
 
 

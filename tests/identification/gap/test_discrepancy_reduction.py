@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from docs.examples.tank import NOISE, Tank, virtual_recordings
-from identification.gap.fitting_problem import Estimate, FittingProblem, Hypothesis
-from identification.gap.gauss_newton import fit
-from identification.gap.held_out import (
+from identification.gap.fit.fitting_problem import Estimate, FittingProblem, Hypothesis
+from identification.gap.fit.gauss_newton import fit
+from identification.gap.fit.prediction import percentage_errors, predict
+from identification.gap.fit.recalibration import recalibrate
+from identification.gap.judge.held_out import (
     DiscrepancyReduction,
     measure_discrepancy_reduction,
 )
-from identification.gap.prediction import percentage_errors, predict
-from identification.gap.recalibration import recalibrate
 
 
 def estimates(tank: Tank, causes: tuple[str, ...]) -> tuple[FittingProblem, dict[str, Estimate]]:

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.evidence import _covariance
-from identification.gap.variable_projection import LinearisedRun, normal_equations
+from identification.gap.fit.evidence import _covariance
+from identification.gap.fit.variable_projection import LinearisedRun, normal_equations
 
 ALONG = np.array([1.0, 1.0])
 

@@ -5,8 +5,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from identification.gap.evidence import evaluate
-from identification.gap.forcing import (
+from identification.gap.fit.evidence import evaluate
+from identification.gap.fit.recalibration import recalibrate
+from identification.gap.locate.forcing import (
     MOST_VALUES,
     MOST_WINDOWS,
     WINDOWS,
@@ -14,9 +15,8 @@ from identification.gap.forcing import (
     most_windows,
     resolving_edges,
 )
-from identification.gap.localisation import Localisation, MissingTerm, locate
+from identification.gap.locate.localisation import Localisation, MissingTerm, locate
 from identification.gap.plant import StateTrace
-from identification.gap.recalibration import recalibrate
 from tests.identification.gap.oscillators import swung
 
 PERIODS = 960

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from docs.examples.tank import Tank, virtual_recordings
-from identification.gap.evidence import evaluate
-from identification.gap.fitting_problem import Estimate, FittingProblem
-from identification.gap.forcing import quadratic_forms, window_edges
-from identification.gap.gaps import RegimeGap, regime_gaps
-from identification.gap.localisation import Localisation, fit_processes, locate
+from identification.gap.fit.evidence import evaluate
+from identification.gap.fit.fitting_problem import Estimate, FittingProblem
+from identification.gap.fit.gaps import RegimeGap, regime_gaps
+from identification.gap.fit.recalibration import recalibrate
+from identification.gap.locate.forcing import quadratic_forms, window_edges
+from identification.gap.locate.localisation import Localisation, fit_processes, locate
 from identification.gap.plant import noise_weighted, window_forcing
-from identification.gap.recalibration import recalibrate
 
 LEAK = 2e-3
 """Of the tank [1/s]."""

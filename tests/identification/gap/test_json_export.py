@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.gap_json import (
+from identification.gap.fit.laws import AS_ASSUMED
+from identification.gap.report.gap_json import (
     as_json,
     magnitudes,
     unit_name,
 )
-from identification.gap.laws import AS_ASSUMED
 from tests.identification.gap.tanks import TANKS, diagnosed
 
 KEYS = {

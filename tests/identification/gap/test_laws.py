@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 
 from identification.gap.diagnosis import Diagnosis, diagnose
-from identification.gap.evidence import evaluate
-from identification.gap.fitting_problem import Hypothesis
-from identification.gap.gap_json import as_json
-from identification.gap.gauss_newton import fit
-from identification.gap.law_screening import law_starts
-from identification.gap.laws import COMPONENTS, KEPT_VARIANCE, KNOTS, LENGTH, SD, Law, in_words
+from identification.gap.fit.evidence import evaluate
+from identification.gap.fit.fitting_problem import Hypothesis
+from identification.gap.fit.gauss_newton import fit
+from identification.gap.fit.laws import COMPONENTS, KEPT_VARIANCE, KNOTS, LENGTH, SD, Law, in_words
+from identification.gap.judge.verdict import KNOWN
 from identification.gap.ode_plant import OdePlant
 from identification.gap.plant import Cause, Channel, Run
-from identification.gap.posterior import misfit_beyond_noise, tolerated_misfit
-from identification.gap.report_page import drawn_laws
-from identification.gap.sentences import verdict_sentence
-from identification.gap.verdict import KNOWN
+from identification.gap.report.gap_json import as_json
+from identification.gap.report.page import drawn_laws
+from identification.gap.report.sentences import verdict_sentence
+from identification.gap.search.law_screening import law_starts
+from identification.gap.search.posterior import misfit_beyond_noise, tolerated_misfit
 from tests.identification.gap.ode_plants import decay, free, quiet_run
 
 PERIOD, SAMPLES, NOISE = 0.1, 300, 1e-2

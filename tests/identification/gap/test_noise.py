@@ -8,7 +8,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from identification.gap.noise import (
+from identification.gap.plant import Channel, Ripple
+from identification.gap.prepare.noise import (
     LEAST,
     RAW_TOLERANCE,
     ChannelNoise,
@@ -17,7 +18,6 @@ from identification.gap.noise import (
     white_noise,
     white_variance,
 )
-from identification.gap.plant import Channel, Ripple
 
 PERIOD, SAMPLES, RUNS = 1e-3, 4000, 3
 

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 from docs.examples.tank import AREA, PERIOD, START, levels
 from identification.gap.diagnosis import diagnose
-from identification.gap.gaps import WHOLE
+from identification.gap.fit.gaps import WHOLE
 from identification.gap.plant import Cause, Channel, GreyBox, Run, window_forcing
 from tests.identification.gap.ode_plants import block, decay, decay_rate, free, quiet_run
 

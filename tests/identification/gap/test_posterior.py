@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from identification.gap.diagnosis import rank_hypotheses
-from identification.gap.evidence import EvaluatedHypothesis
-from identification.gap.laws import Law
-from identification.gap.posterior import (
+from identification.gap.fit.evidence import EvaluatedHypothesis
+from identification.gap.fit.laws import Law
+from identification.gap.judge.verdict import Ranking
+from identification.gap.prepare.prepared_plant import prepared
+from identification.gap.search.posterior import (
     POWER,
     UNKNOWN_SHARE,
     Posterior,
@@ -19,8 +21,6 @@ from identification.gap.posterior import (
     posterior,
     tolerated_misfit,
 )
-from identification.gap.prepared_plant import prepared
-from identification.gap.verdict import Ranking
 from tests.identification.gap.drives import RANGES, Drive
 
 

@@ -8,9 +8,9 @@ import pytest
 from numpy.typing import NDArray
 
 from docs.examples.tank import Tank, virtual_recordings
-from identification.gap.fitting_problem import FittingProblem
+from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.plant import Channel, FreeParameter, PlantError, Run, noise_weighted
-from identification.gap.prepared_plant import PreparedPlant, prepared
+from identification.gap.prepare.prepared_plant import PreparedPlant, prepared
 from tests.identification.gap.tanks import without_gap
 
 SIGMA = 0.02

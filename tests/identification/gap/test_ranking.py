@@ -8,11 +8,11 @@ import pytest
 
 from docs.examples.tank import Tank, virtual_recordings
 from identification.gap.diagnosis import Diagnosis, diagnose, rank_hypotheses
+from identification.gap.fit.recalibration import with_ripple
+from identification.gap.judge.verdict import KNOWN_GAP, PARTIAL, UNKNOWN, Ranking
 from identification.gap.plant import Ripple
-from identification.gap.prepared_plant import prepared
-from identification.gap.recalibration import with_ripple
-from identification.gap.sentences import verdict_sentence
-from identification.gap.verdict import KNOWN_GAP, PARTIAL, UNKNOWN, Ranking
+from identification.gap.prepare.prepared_plant import prepared
+from identification.gap.report.sentences import verdict_sentence
 from tests.identification.gap.drives import Drive
 from tests.identification.gap.tanks import disturbed, leaking, without_gap
 

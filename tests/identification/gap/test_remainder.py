@@ -10,7 +10,8 @@ import pytest
 from docs.examples.tank import Tank, virtual_recordings
 from identification.block_bootstrap import Interval
 from identification.gap.diagnosis import Diagnosis, diagnose
-from identification.gap.gap_json import (
+from identification.gap.judge.verdict import NO_GAP, PARTIAL, UNKNOWN
+from identification.gap.report.gap_json import (
     GAP,
     SYSTEMATIC_FORM_ERROR,
     TERM,
@@ -19,9 +20,8 @@ from identification.gap.gap_json import (
     term_table,
     write_results,
 )
-from identification.gap.posterior import variance_inflation
-from identification.gap.sentences import verdict_sentence
-from identification.gap.verdict import NO_GAP, PARTIAL, UNKNOWN
+from identification.gap.report.sentences import verdict_sentence
+from identification.gap.search.posterior import variance_inflation
 from tests.identification.gap.tanks import TANKS, diagnosed
 
 

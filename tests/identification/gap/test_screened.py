@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from docs.examples.tank import Tank, virtual_recordings
 from identification.gap.diagnosis import Diagnosis, diagnose
-from identification.gap.gap_json import as_json
 from identification.gap.plant import Channel, PlantError, Run
-from identification.gap.prepared_plant import prepared
-from identification.gap.screened import Finding, screen
-from identification.gap.sentences import verdict_sentence
+from identification.gap.prepare.prepared_plant import prepared
+from identification.gap.prepare.screened import Finding, screen
+from identification.gap.report.gap_json import as_json
+from identification.gap.report.sentences import verdict_sentence
 from tests.identification.gap.drives import Drive
 from tests.identification.gap.oscillators import swung
 from tests.identification.gap.tanks import diagnosed

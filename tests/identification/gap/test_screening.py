@@ -2,16 +2,16 @@
 
 import pytest
 
-from identification.gap.gauss_newton import fit, linearise
-from identification.gap.recalibration import recalibrate
-from identification.gap.screening import (
+from identification.gap.fit.gauss_newton import fit, linearise
+from identification.gap.fit.recalibration import recalibrate
+from identification.gap.fit.variable_projection import ChangedRuns
+from identification.gap.search.screening import (
     Start,
     _predicted,
     screen_causes,
     simulate_signatures,
     with_cause,
 )
-from identification.gap.variable_projection import ChangedRuns
 from tests.identification.gap.drives import Drive
 
 

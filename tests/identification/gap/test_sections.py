@@ -9,11 +9,11 @@ import pytest
 
 from docs.examples.tank import Tank, virtual_recordings
 from identification.gap.diagnosis import Diagnosis, diagnose
-from identification.gap.gap_json import as_json
-from identification.gap.quantities import probability_text
-from identification.gap.report_figures import location_figure
-from identification.gap.report_page import calibrated_values, sections
-from identification.gap.sentences import (
+from identification.gap.report.figures import location_figure
+from identification.gap.report.gap_json import as_json
+from identification.gap.report.page import calibrated_values, sections
+from identification.gap.report.quantities import probability_text
+from identification.gap.report.sentences import (
     look_alikes,
     parameters_at_bounds,
     reduction_sentence,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from identification.gap.variable_projection import (
+from identification.gap.fit.variable_projection import (
     LARGEST_DEVIATION,
     LinearisedRun,
     bounded_minimiser,

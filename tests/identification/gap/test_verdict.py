@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 
 from identification.block_bootstrap import Interval
-from identification.gap.evidence import EvaluatedHypothesis
-from identification.gap.fitting_problem import Hypothesis
-from identification.gap.held_out import DiscrepancyReduction
-from identification.gap.localisation import ForcingEstimate, Localisation
-from identification.gap.plant import Cause, StateEquation
-from identification.gap.verdict import (
+from identification.gap.fit.evidence import EvaluatedHypothesis
+from identification.gap.fit.fitting_problem import Hypothesis
+from identification.gap.judge.held_out import DiscrepancyReduction
+from identification.gap.judge.verdict import (
     AMBIGUOUS,
     KNOWN,
     KNOWN_GAP,
@@ -26,6 +24,8 @@ from identification.gap.verdict import (
     conclude,
     smallest_set,
 )
+from identification.gap.locate.localisation import ForcingEstimate, Localisation
+from identification.gap.plant import Cause, StateEquation
 from tests.identification.gap.tanks import diagnosed
 
 LEAK = Cause(name="leak", component="tank", parameters=())

@@ -133,7 +133,7 @@ def test_finished_fits_are_taken_up_again(diagnosed, monkeypatch, tmp_path):
     def never(*args, **options):
         raise AssertionError("a kept fit was run again")
 
-    monkeypatch.setattr("identification.gap.gauss_newton._Search", never)
+    monkeypatch.setattr("identification.gap.fit.gauss_newton._Search", never)
     diagnose_campaign(diagnosed / "campaign", diagnosed / "out", report=False)
     again = json.loads((diagnosed / "out" / "gap.json").read_text())
     for volatile in ("seconds", "next_experiment"):

@@ -9,8 +9,8 @@ from epv_env.plant.parameters import Parameters
 from identification.bench.programmes import DIAGNOSIS_SUITE
 from identification.bench.session import measured_campaign, run_programme
 from identification.gap.diagnosis import rank_hypotheses
-from identification.gap.prepared_plant import prepared
-from identification.gap.verdict import Ranking
+from identification.gap.judge.verdict import Ranking
+from identification.gap.prepare.prepared_plant import prepared
 from identification.recordings.recording import UNITS, Campaign
 from identification.valve_gap.valve import Valve
 from tests.identification.disturbances import add_ripple, round_pressures

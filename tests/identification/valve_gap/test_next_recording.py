@@ -11,8 +11,8 @@ import pytest
 from epv_env.plant.parameters import Parameters
 from identification.bench.programmes import REPORT_SUITE, load_programmes
 from identification.bench.session import measured_campaign, run_programme
-from identification.gap.fitting_problem import Estimate, FittingProblem, Hypothesis
-from identification.gap.verdict import AMBIGUOUS, NO_GAP, UNKNOWN
+from identification.gap.fit.fitting_problem import Estimate, FittingProblem, Hypothesis
+from identification.gap.judge.verdict import AMBIGUOUS, NO_GAP, UNKNOWN
 from identification.report_2003 import Case
 from identification.valve_gap.diagnose import _plan
 from identification.valve_gap.next_recording import CANDIDATES, next_recording, planned, separation

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap import prediction
-from identification.gap.fitting_problem import FittingProblem, Hypothesis
-from identification.gap.prepared_plant import prepared
+from identification.gap.fit import prediction
+from identification.gap.fit.fitting_problem import FittingProblem, Hypothesis
+from identification.gap.prepare.prepared_plant import prepared
 from identification.valve_gap.valve import Valve
 from tests.identification.valve_gap.test_diagnose import campaign
 

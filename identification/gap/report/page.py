@@ -7,28 +7,15 @@ import numpy as np
 
 from identification.block_bootstrap import LEVEL
 from identification.gap.diagnosis import MENTIONED_PROBABILITY, Diagnosis
-from identification.gap.evidence import EvaluatedHypothesis
-from identification.gap.gap_json import (
-    discrepancy,
-    drawn_term,
-    inclusion,
-    parameter_covariance,
-    parameter_intervals,
-)
-from identification.gap.gaps import FLOOR, regimes_of
-from identification.gap.laws import COMPONENTS
-from identification.gap.laws import in_words as in_words_of_laws
-from identification.gap.localisation import Localisation
+from identification.gap.fit.evidence import EvaluatedHypothesis
+from identification.gap.fit.gaps import FLOOR, regimes_of
+from identification.gap.fit.laws import COMPONENTS
+from identification.gap.fit.laws import in_words as in_words_of_laws
+from identification.gap.judge.verdict import AMBIGUITY_SHARE, AMBIGUOUS, KNOWN, SURE_INCLUSION
+from identification.gap.locate.localisation import Localisation
 from identification.gap.plant import GreyBox
-from identification.gap.prepared_plant import prepared
-from identification.gap.quantities import (
-    gap_text,
-    gap_with_interval,
-    probability_text,
-    quantity,
-    quantity_with_interval,
-)
-from identification.gap.report_figures import (
+from identification.gap.prepare.prepared_plant import prepared
+from identification.gap.report.figures import (
     forcing_figure,
     gap_figure,
     heat_map,
@@ -38,7 +25,21 @@ from identification.gap.report_figures import (
     ranking_figure,
     residual_figure,
 )
-from identification.gap.sentences import (
+from identification.gap.report.gap_json import (
+    discrepancy,
+    drawn_term,
+    inclusion,
+    parameter_covariance,
+    parameter_intervals,
+)
+from identification.gap.report.quantities import (
+    gap_text,
+    gap_with_interval,
+    probability_text,
+    quantity,
+    quantity_with_interval,
+)
+from identification.gap.report.sentences import (
     at_an_end,
     disturbance_sentence,
     hidden_causes_sentence,
@@ -52,7 +53,6 @@ from identification.gap.sentences import (
     sizes_with_intervals,
     verdict_sentence,
 )
-from identification.gap.verdict import AMBIGUITY_SHARE, AMBIGUOUS, KNOWN, SURE_INCLUSION
 from identification.report.page import ANSWERS, Block, Picture, Section, Table, Text, Verdict
 
 LEVEL_TEXT = f"{100 * LEVEL:g} %"

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.common.files import Journal
-from identification.gap.laws import Law
+from identification.gap.fit.laws import Law
 from identification.gap.plant import Cause, FreeParameter, GreyBox, NuisanceParameter, noise_weighted
 
 UNSTABLE = 1e9

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.block_bootstrap import Interval, block_starts
-from identification.gap.black_box import Learner, predict_residuals, ridge_on_random_features
-from identification.gap.fitting_problem import Estimate, FittingProblem
-from identification.gap.gaps import FLOOR, Gap, GapDraws, block_samples
+from identification.gap.fit.fitting_problem import Estimate, FittingProblem
+from identification.gap.fit.gaps import FLOOR, Gap, GapDraws, block_samples
+from identification.gap.fit.prediction import Prediction, percentage_errors, predict
+from identification.gap.judge.black_box import Learner, predict_residuals, ridge_on_random_features
 from identification.gap.plant import GreyBox
-from identification.gap.prediction import Prediction, percentage_errors, predict
-from identification.gap.time_scale import time_scale
+from identification.gap.prepare.time_scale import time_scale
 
 NOMINAL, RECALIBRATED = "nominal", "recalibrated"
 """Labels of the two models without a cause."""

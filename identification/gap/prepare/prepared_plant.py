@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.noise import channel_noise
 from identification.gap.plant import Cause, Channel, GreyBox, PlantError, Ripple, Run, StateTrace
-from identification.gap.screened import Finding, bridged, screen
+from identification.gap.prepare.noise import channel_noise
+from identification.gap.prepare.screened import Finding, bridged, screen
 
 
 class PreparedPlant:

@@ -7,12 +7,20 @@ from identification.gap.diagnosis import (
     MENTIONED_PROBABILITY,
     Diagnosis,
 )
-from identification.gap.gap_json import Remainder, discrepancy, parameter_intervals, remainder
-from identification.gap.gaps import FLOOR
-from identification.gap.held_out import LEAST_GAP_CLOSED, NOMINAL, RECALIBRATED
-from identification.gap.laws import in_words as laws_in_words
+from identification.gap.fit.gaps import FLOOR
+from identification.gap.fit.laws import in_words as laws_in_words
+from identification.gap.judge.held_out import LEAST_GAP_CLOSED, NOMINAL, RECALIBRATED
+from identification.gap.judge.verdict import (
+    AMBIGUOUS,
+    FAR_ABOVE_NOISE,
+    KNOWN,
+    NO_GAP,
+    PARTIAL,
+    RankedCause,
+)
 from identification.gap.plant import FreeParameter
-from identification.gap.quantities import (
+from identification.gap.report.gap_json import Remainder, discrepancy, parameter_intervals, remainder
+from identification.gap.report.quantities import (
     gap_text,
     gap_with_interval,
     listed,
@@ -20,14 +28,6 @@ from identification.gap.quantities import (
     quantity,
     quantity_with_interval,
     share_text,
-)
-from identification.gap.verdict import (
-    AMBIGUOUS,
-    FAR_ABOVE_NOISE,
-    KNOWN,
-    NO_GAP,
-    PARTIAL,
-    RankedCause,
 )
 
 LIKELY_PROBABILITY = 0.5

@@ -13,17 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from identification.gap.fitting_problem import Estimate, FittingProblem
-from identification.gap.forcing import (
+from identification.gap.fit.fitting_problem import Estimate, FittingProblem
+from identification.gap.fit.gaps import RegimeGap, regime_gaps, regimes_of
+from identification.gap.locate.forcing import (
     LocalisationDesign,
     QuadraticForm,
     Window,
     most_misfitting_runs,
     quadratic_forms,
 )
-from identification.gap.gaps import RegimeGap, regime_gaps, regimes_of
 from identification.gap.plant import StateEquation
-from identification.gap.time_scale import time_scale
+from identification.gap.prepare.time_scale import time_scale
 
 FREE, SLOW = "free", "slow"
 """Processes in time: independent windows, or neighbours alike. Other processes bear a state's name."""

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln, softmax
 
-from identification.gap.evidence import EvaluatedHypothesis
-from identification.gap.fitting_problem import FittingProblem
-from identification.gap.noise import ChannelNoise, residual_noise
+from identification.gap.fit.evidence import EvaluatedHypothesis
+from identification.gap.fit.fitting_problem import FittingProblem
+from identification.gap.prepare.noise import ChannelNoise, residual_noise
 
 POWER = 10.0
 """How many powers of 1 + M/T the likelihood falls by [1]: a cause that leaves 2 T is 60 times less

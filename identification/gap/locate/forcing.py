@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.fitting_problem import Estimate, FittingProblem
-from identification.gap.gauss_newton import linearise
+from identification.gap.fit.fitting_problem import Estimate, FittingProblem
+from identification.gap.fit.gauss_newton import linearise
+from identification.gap.fit.variable_projection import LinearisedRun
 from identification.gap.plant import (
     GreyBox,
     StateEquation,
@@ -20,8 +21,7 @@ from identification.gap.plant import (
     noise_weighted,
     window_forcing,
 )
-from identification.gap.sensor_faults import physical_forms, reading_faults
-from identification.gap.variable_projection import LinearisedRun
+from identification.gap.prepare.sensor_faults import physical_forms, reading_faults
 
 WINDOWS, MOST_WINDOWS = 80, 400
 """Windows of a run in which a forcing is constant, where they follow its motion, and the most of them

@@ -11,15 +11,16 @@ from itertools import combinations
 
 import numpy as np
 
-from identification.gap.evidence import EvaluatedHypothesis, evaluate, misfit
-from identification.gap.fitting_problem import Estimate, FitCache, FittingProblem, Hypothesis
-from identification.gap.gauss_newton import fit, linearise
-from identification.gap.law_screening import law_starts, over_reached_states
-from identification.gap.laws import MOST_LAWS
+from identification.gap.fit.evidence import EvaluatedHypothesis, evaluate, misfit
+from identification.gap.fit.fitting_problem import Estimate, FitCache, FittingProblem, Hypothesis
+from identification.gap.fit.gauss_newton import fit, linearise
+from identification.gap.fit.laws import MOST_LAWS
+from identification.gap.fit.recalibration import with_own_nuisances
+from identification.gap.fit.variable_projection import LinearisedRun, normal_equations
 from identification.gap.plant import GreyBox
-from identification.gap.posterior import Posterior, posterior, tolerated_misfit
-from identification.gap.recalibration import with_own_nuisances
-from identification.gap.screening import (
+from identification.gap.search.law_screening import law_starts, over_reached_states
+from identification.gap.search.posterior import Posterior, posterior, tolerated_misfit
+from identification.gap.search.screening import (
     CauseSignature,
     Start,
     best_start_of_each,
@@ -28,7 +29,6 @@ from identification.gap.screening import (
     simulated_starts,
     with_cause,
 )
-from identification.gap.variable_projection import LinearisedRun, normal_equations
 
 MOST_CAUSES = 4
 """Largest number of causes that are taken to act together."""

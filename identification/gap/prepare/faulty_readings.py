@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.stats import norm
 
-from identification.gap.noise import STEP_TO_SD, differences, distances, quantisation_step
 from identification.gap.plant import Channel
+from identification.gap.prepare.noise import STEP_TO_SD, differences, distances, quantisation_step
 
 Kind = Literal["wild", "stuck", "clipped", "dropout"]
 

@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.fitting_problem import Estimate, FittingProblem, cause_places
-from identification.gap.plant import Cause
-from identification.gap.variable_projection import (
+from identification.gap.fit.fitting_problem import Estimate, FittingProblem, cause_places
+from identification.gap.fit.variable_projection import (
     ChangedRuns,
     LinearisedRun,
     NormalEquations,
     normal_equations,
 )
+from identification.gap.plant import Cause
 
 TWIN_CORRELATION = 0.98
 """Correlation of signatures [1] above which the recordings hardly tell two causes apart; an announcement

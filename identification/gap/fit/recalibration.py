@@ -9,13 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.gap.evidence import EvaluatedHypothesis, evaluate
-from identification.gap.fitting_problem import Estimate, FitCache, FittingProblem, Hypothesis
-from identification.gap.gauss_newton import fit, nuisance_slopes
-from identification.gap.noise import ChannelNoise, raw_noise_ratio, white_noise
+from identification.gap.fit.evidence import EvaluatedHypothesis, evaluate
+from identification.gap.fit.fitting_problem import Estimate, FitCache, FittingProblem, Hypothesis
+from identification.gap.fit.gauss_newton import fit, nuisance_slopes
+from identification.gap.fit.prediction import predict
 from identification.gap.plant import GreyBox
-from identification.gap.prediction import predict
-from identification.gap.prepared_plant import PreparedPlant, prepared
+from identification.gap.prepare.noise import ChannelNoise, raw_noise_ratio, white_noise
+from identification.gap.prepare.prepared_plant import PreparedPlant, prepared
 
 FURTHER_ITERATIONS = 12
 """Most steps of a fit that goes on with nuisance slopes of its own."""

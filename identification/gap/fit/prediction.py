@@ -6,10 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.fitting_problem import Estimate, FittingProblem
-from identification.gap.gauss_newton import linearised_run
+from identification.gap.fit.fitting_problem import Estimate, FittingProblem
+from identification.gap.fit.gauss_newton import linearised_run
+from identification.gap.fit.variable_projection import (
+    LinearisedRun,
+    normal_equations,
+    without_run_nuisances,
+)
 from identification.gap.plant import GreyBox, noise_weighted
-from identification.gap.variable_projection import LinearisedRun, normal_equations, without_run_nuisances
 from identification.report_2003 import partial_error, relative_error, total_error
 
 SETTLING_STEPS = 3

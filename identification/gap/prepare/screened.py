@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.faulty_readings import MOST_FAULTY, Kind, faults
 from identification.gap.plant import Channel, PlantError, Run
+from identification.gap.prepare.faulty_readings import MOST_FAULTY, Kind, faults
 
 WORDS: Mapping[Kind, str] = {
     "wild": "wild readings",

@@ -10,14 +10,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.gap.fitting_problem import Estimate, FittingProblem
-from identification.gap.gauss_newton import linearise
-from identification.gap.laws import COMPONENTS, LARGEST, MOST_LAWS, Law
+from identification.gap.fit.fitting_problem import Estimate, FittingProblem
+from identification.gap.fit.gauss_newton import linearise
+from identification.gap.fit.laws import COMPONENTS, LARGEST, MOST_LAWS, Law
+from identification.gap.fit.recalibration import restarted
+from identification.gap.fit.variable_projection import LinearisedRun, equations_of, products_of
 from identification.gap.plant import Cause
-from identification.gap.prepared_plant import prepared
-from identification.gap.recalibration import restarted
-from identification.gap.screening import Start
-from identification.gap.variable_projection import LinearisedRun, equations_of, products_of
+from identification.gap.prepare.prepared_plant import prepared
+from identification.gap.search.screening import Start
 
 SMALL_SIZE = 0.3
 """Size, in trial sizes, below which a law is opened at the trial size [1]."""

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.fitting_problem import Estimate, FittingProblem
-from identification.gap.gauss_newton import linearise
-from identification.gap.prediction import with_settled_runs
-from identification.gap.variable_projection import (
+from identification.gap.fit.fitting_problem import Estimate, FittingProblem
+from identification.gap.fit.gauss_newton import linearise
+from identification.gap.fit.prediction import with_settled_runs
+from identification.gap.fit.variable_projection import (
     LinearisedRun,
     NormalEquations,
     normal_equations,

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.gap.fit.prediction import Prediction
 from identification.gap.plant import GreyBox
-from identification.gap.prediction import Prediction
 
 HISTORY_UNIT = 0.1
 """Unit of the lags below [time scales], or the sampling period if that is longer: a transient has about

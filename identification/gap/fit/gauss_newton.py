@@ -9,14 +9,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.fitting_problem import Estimate, FittingProblem, NuisanceSlopes
-from identification.gap.plant import noise_weighted
-from identification.gap.variable_projection import (
+from identification.gap.fit.fitting_problem import Estimate, FittingProblem, NuisanceSlopes
+from identification.gap.fit.variable_projection import (
     LinearisedRun,
     NormalEquations,
     normal_equations,
     without_run_nuisances,
 )
+from identification.gap.plant import noise_weighted
 
 DIFFERENCE_STEP = 1e-3
 """Relative change of a scaled parameter for a finite difference [1]: large against rounding of the

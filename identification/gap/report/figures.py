@@ -12,12 +12,12 @@ from scipy.stats import norm
 
 from identification.block_bootstrap import LEVEL, Interval
 from identification.gap.diagnosis import Diagnosis
-from identification.gap.gaps import FLOOR, RegimeGap
-from identification.gap.held_out import DiscrepancyReduction
-from identification.gap.laws import Law
-from identification.gap.localisation import ForcingEstimate, MissingTerm
+from identification.gap.fit.gaps import FLOOR, RegimeGap
+from identification.gap.fit.laws import Law
+from identification.gap.judge.held_out import DiscrepancyReduction
+from identification.gap.locate.localisation import ForcingEstimate, MissingTerm
 from identification.gap.plant import GreyBox
-from identification.gap.quantities import probability_text
+from identification.gap.report.quantities import probability_text
 
 NAMED, OTHER, NO_NAME = "tab:blue", "0.7", "tab:orange"
 """Colours: causes that the verdict names, other causes, hypotheses without a named cause."""

@@ -16,13 +16,13 @@ from scipy.stats import norm
 from epv_env.common.files import write_json
 from identification.block_bootstrap import LEVEL, Interval
 from identification.gap.diagnosis import Diagnosis
-from identification.gap.evidence import EvaluatedHypothesis
-from identification.gap.gaps import FLOOR
-from identification.gap.held_out import NOMINAL, RECALIBRATED
-from identification.gap.laws import in_words
-from identification.gap.localisation import Localisation, MissingTerm
-from identification.gap.posterior import variance_inflation
-from identification.gap.verdict import RankedCause
+from identification.gap.fit.evidence import EvaluatedHypothesis
+from identification.gap.fit.gaps import FLOOR
+from identification.gap.fit.laws import in_words
+from identification.gap.judge.held_out import NOMINAL, RECALIBRATED
+from identification.gap.judge.verdict import RankedCause
+from identification.gap.locate.localisation import Localisation, MissingTerm
+from identification.gap.search.posterior import variance_inflation
 
 GAP, TERM = "gap.json", "missing_term.json"
 

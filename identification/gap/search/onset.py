@@ -9,8 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.screening import CauseSignature, with_changes
-from identification.gap.variable_projection import LinearisedRun, eliminated, normal_equations
+from identification.gap.fit.variable_projection import LinearisedRun, eliminated, normal_equations
+from identification.gap.search.screening import CauseSignature, with_changes
 
 
 def least_squares_by_onset(

@@ -3,12 +3,12 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from identification.gap.evidence import EvaluatedHypothesis
-from identification.gap.fitting_problem import FittingProblem
-from identification.gap.held_out import DiscrepancyReduction
-from identification.gap.localisation import Localisation
-from identification.gap.posterior import Posterior
-from identification.gap.screening import Separability
+from identification.gap.fit.evidence import EvaluatedHypothesis
+from identification.gap.fit.fitting_problem import FittingProblem
+from identification.gap.judge.held_out import DiscrepancyReduction
+from identification.gap.locate.localisation import Localisation
+from identification.gap.search.posterior import Posterior
+from identification.gap.search.screening import Separability
 
 NO_GAP, KNOWN, AMBIGUOUS = "no_gap", "known", "ambiguous"
 PARTIAL, UNKNOWN = "partial", "unknown"

@@ -15,8 +15,8 @@ from identification.block_bootstrap import (
     block_weights,
     interval,
 )
-from identification.gap.noise import residual_noise
 from identification.gap.plant import GreyBox, Run
+from identification.gap.prepare.noise import residual_noise
 
 FLOOR = 1.0
 """Gap that noise alone leaves [noise deviations]; a definition."""

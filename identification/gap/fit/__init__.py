@@ -1,0 +1,1 @@
+"""Hypotheses and their fits to the recordings."""

@@ -1,0 +1,1 @@
+"""Probabilities, held-out gaps and the verdict."""

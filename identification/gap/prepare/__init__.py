@@ -1,0 +1,1 @@
+"""Recordings and plant made ready: screened, checked, noise known."""

@@ -1,0 +1,1 @@
+"""The diagnosis for programs and for readers."""

@@ -1,0 +1,1 @@
+"""Which causes, and which laws of theirs, are worth a fit."""
