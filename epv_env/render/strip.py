@@ -68,7 +68,7 @@ def run_ends(values: Array) -> NDArray[np.intp]:
     return np.unique(np.r_[0, changes, changes + 1, len(values) - 1])
 
 
-def spread(heights: Array, top: float, bottom: float) -> Array:
+def spread(heights: Array, top: float, bottom: float) -> NDArray:
     """Heights of labels (n,) [px], moved so that none overlaps another or leaves the panel."""
     order = np.argsort(heights, kind="stable")
     down = SPACING * np.arange(len(heights))

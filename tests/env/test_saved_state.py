@@ -165,7 +165,7 @@ def test_a_state_beyond_all_valves_shows_no_learner_a_number_that_is_none(row, v
     restore_state(env, changed(save_state(env), env, "state", row, value))
     observation, reward, *_ = env.step(np.ones(2, dtype=int))
     assert np.all(np.isfinite(observation))
-    assert np.all(np.isfinite(reward))
+    assert np.all(np.isfinite(np.asarray(reward)))
 
 
 @pytest.mark.parametrize(
