@@ -157,6 +157,10 @@ class RecordedConsumption:
         return self.__dict__["_taken"][k] + since * (begins + ends) / 2
 
 
+Followed = tuple[Supply | None, MovingTarget | None, RecordedConsumption | None]
+"""What an episode follows: a recorded supply, a target, a consumption."""
+
+
 class Signals(NamedTuple):
     """Signals that are read in every control period, each with the indices of its episodes."""
 

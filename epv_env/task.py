@@ -31,7 +31,7 @@ from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves, share
 from epv_env.result import N_FIGURE, StepResult
 from epv_env.settings import Settings
-from epv_env.signals import PRESSURE_LIMITS_BAR, MovingTarget, RecordedConsumption, Signals, shared
+from epv_env.signals import PRESSURE_LIMITS_BAR, Followed, Signals, shared
 
 PRESSURES = ("p1", "p2", "p3")
 """Pressures with which an episode begins."""
@@ -51,12 +51,13 @@ class LimitingTask:
         self._begun = False
         self.parameter_values = np.zeros((n, len(Parameters.calibrated())))
         """The same as numbers, in the order of the parameter table (n, parameters) [SI]."""
-        self.supplies = [settings.supply] * n
+        self.volumes = np.full(n, np.inf)
+        """V1 of each episode's reservoirs (n,) [m^3]; infinite: the supply does not sag."""
         self.consumption = Profiles(n)
         """What is drawn from each circuit, the rest of the episode included."""
         self._episodes = np.zeros(n, dtype=EPISODE)
-        self.moving_targets: list[MovingTarget | None] = [None] * n
-        self.recorded_consumptions: list[RecordedConsumption | None] = [None] * n
+        self.signals: list[Followed] = [(None, None, None)] * n
+        """Recorded supply, moving target and recorded consumption of each episode."""
         self._signals = Signals([], [], [])
         self.noise_of: list[np.random.Generator | None] = [None] * n
         self._noise = np.zeros((n, NOISE_BLOCK, len(MEASURED)))
@@ -95,12 +96,12 @@ class LimitingTask:
         """The arrays, by name, in which the episodes keep their past (see `Valves.memory`)."""
         own = {
             "episodes": self._episodes, "progress": self.consumption.progress, "noise": self._noise,
-            "parameter_values": self.parameter_values,
+            "parameter_values": self.parameter_values, "volumes": self.volumes,
         }  # fmt: skip
         return {**own, **self.valves.memory}
 
     def settle(self) -> None:
-        """Take note of what `memory` and the lists of each episode's objects hold now."""
+        """Take note of what `memory` and `signals` hold now."""
         self._begun = None not in self.parameters
         self.valves.settle()
         self._find_signals()
@@ -125,10 +126,9 @@ class LimitingTask:
         self._set_plants(where, starts)
         for i, start in zip(where.tolist(), starts, strict=True):
             self.parameters[i] = start.parameters
-            self.supplies[i] = start.supply
             self.consumption.start(i, start.consumption)
-            self.moving_targets[i] = start.moving_target
-            self.recorded_consumptions[i] = start.recorded_consumption
+            recorded = None if start.supply.recording is None else start.supply
+            self.signals[i] = (recorded, start.moving_target, start.recorded_consumption)
             self.noise_of[i] = start.noise
         e = self._episodes
         for name in ("target", "coil", "p3_frozen_at", "target_steps_at", "target_steps_to"):
@@ -189,8 +189,8 @@ class LimitingTask:
         values = np.array([list(start.parameters.values()) for start in starts])
         self.parameter_values[where] = values
         p = dict(zip(starts[0].parameters, values.T, strict=True))
-        volumes = np.array([start.supply.volume for start in starts])
-        self.valves.set_parameters(where, p, volumes)
+        self.volumes[where] = [start.supply.volume for start in starts]
+        self.valves.set_parameters(where, p, self.volumes[where])
         p1, p2, p3 = (np.array([getattr(start, name) for start in starts]) for name in PRESSURES)
         coil = np.array([start.coil for start in starts])
         initial = energised(p, p1=p1, p2=p2, U=self.settings.supply_voltage * coil)
@@ -200,11 +200,7 @@ class LimitingTask:
 
     def _find_signals(self) -> None:
         """Note which episodes have a signal that has to be read in every period, and which."""
-        self._signals = Signals(
-            supplies=shared([s if s.recording is not None else None for s in self.supplies]),
-            targets=shared(self.moving_targets),
-            consumptions=shared(self.recorded_consumptions),
-        )
+        self._signals = Signals(*map(shared, zip(*self.signals, strict=True)))
 
     def _follow_signals(self) -> None:
         """Set what recordings and moving targets say of the period that begins."""

@@ -1,6 +1,5 @@
 """Where the input chamber's air comes from: constant, recorded, or reservoirs with a compressor."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -64,22 +63,6 @@ class Supply:
                 f"compressor cut-in {self.cut_in:g} Pa is above its cut-out {self.cut_out:g} Pa: "
                 "give cut_in <= cut_out"
             )
-
-    @property
-    def numbers(self) -> list[float]:
-        """All fields but the recording."""
-        return [
-            *self.pressure, self.volume, self.cut_in, self.cut_out, self.delivery, self.idle_until
-        ]  # fmt: skip
-
-    @classmethod
-    def from_numbers(cls, numbers: Sequence[float]) -> "Supply":
-        """The supply with these `numbers`."""
-        low, high, volume, cut_in, cut_out, delivery, idle_until = numbers
-        return cls(
-            pressure=(low, high), volume=volume, cut_in=cut_in, cut_out=cut_out, delivery=delivery,
-            idle_until=idle_until,
-        )  # fmt: skip
 
     @classmethod
     def constant(cls, low_bar: float, high_bar: float | None = None) -> "Supply":

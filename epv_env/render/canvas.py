@@ -1,6 +1,6 @@
 """A pygame surface with anti-aliased shapes and text, and its colours, one for each thing.
 
-Everything is drawn at twice the size, then averaged: this is what makes edges smooth.
+Everything is drawn at twice the size, then scaled down: this is what makes edges smooth.
 """
 
 import os
@@ -10,7 +10,6 @@ from math import hypot
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-import numba
 import numpy as np
 from gymnasium.error import DependencyNotInstalled
 from numpy.typing import NDArray
@@ -51,16 +50,9 @@ BAD: Colour = (205, 52, 52)  # A violated limit
 SCALE_TOP_BAR = 14.0  # pressure at the dark end of the scale [bar absolute]; the light end is vacuum
 
 _ANCHORS: tuple[Colour, ...] = (
-    (255, 255, 225),
-    (232, 246, 184),
-    (190, 229, 181),
-    (127, 205, 187),
-    (65, 174, 200),
-    (34, 134, 190),
-    (36, 92, 168),
-    (37, 56, 146),
-    (14, 30, 92),
-)
+    (255, 255, 225), (232, 246, 184), (190, 229, 181), (127, 205, 187), (65, 174, 200),
+    (34, 134, 190), (36, 92, 168), (37, 56, 146), (14, 30, 92),
+)  # fmt: skip
 
 
 def mix(a: Colour, b: Colour, share: float) -> Colour:
@@ -70,32 +62,11 @@ def mix(a: Colour, b: Colour, share: float) -> Colour:
     return red, green, blue
 
 
-_STEPS = tuple(pairwise(_ANCHORS))
-
-
 def pressure_colour(p_bar: float) -> Colour:
     """Colour of gas at a pressure [bar absolute]: pale when low, dark blue when high."""
-    place = min(max(p_bar / SCALE_TOP_BAR, 0.0), 1.0) * len(_STEPS)
-    step = min(int(place), len(_STEPS) - 1)
-    return mix(*_STEPS[step], place - step)
-
-
-@numba.njit(cache=True)
-def halved(drawing: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Mean of every 2 x 2 pixels, from pygame's memory to an image.
-
-    drawing: (2 h, 2 w, 4), bytes blue, green, red, unused. Returns (h, w, 3), red, green, blue.
-    """
-    height, width = drawing.shape[0] // 2, drawing.shape[1] // 2
-    image = np.empty((height, width, 3), np.uint8)
-    for y in range(height):
-        above, below = drawing[2 * y], drawing[2 * y + 1]
-        for x in range(width):
-            for k in range(3):
-                upper = np.uint32(above[2 * x, k]) + above[2 * x + 1, k]
-                lower = np.uint32(below[2 * x, k]) + below[2 * x + 1, k]
-                image[y, x, 2 - k] = (upper + lower + 2) >> 2
-    return image
+    place = min(max(p_bar / SCALE_TOP_BAR, 0.0), 1.0) * (len(_ANCHORS) - 1)
+    step = min(int(place), len(_ANCHORS) - 2)
+    return mix(_ANCHORS[step], _ANCHORS[step + 1], place - step)
 
 
 if TYPE_CHECKING:
@@ -104,8 +75,7 @@ if TYPE_CHECKING:
 Point = tuple[float, float]  # place from the left and from above [px]
 Box = tuple[float, float, float, float]  # left, top, right, bottom [px]
 
-FACTOR = 2  # drawing pixels per frame pixel, in each direction: what `halved` takes back
-TEXT_CACHE = 1024  # rendered texts kept; numbers that change would otherwise fill the memory
+FACTOR = 2  # drawing pixels per frame pixel, in each direction
 
 
 def load_pygame() -> ModuleType:
@@ -121,7 +91,7 @@ def load_pygame() -> ModuleType:
 
 
 class Canvas:
-    """Draws in frame pixels on a surface FACTOR times as large; `image` gives the frame."""
+    """Draws in frame pixels on a surface FACTOR times as large; `frame` gives the frame."""
 
     def __init__(self, width: int, height: int):
         """width, height: size of the frame [px]."""
@@ -132,37 +102,29 @@ class Canvas:
         self._drawing = self._pygame.Surface((FACTOR * width, FACTOR * height), 0, 32, masks)
         self._background = self._drawing.copy()
         self._fonts: dict[int, pygame.font.Font] = {}
-        self._texts: dict[tuple[str, int, Colour], pygame.Surface] = {}
 
     def keep_as_background(self) -> None:
         """What is drawn now is what `clear` returns to."""
         self._background.blit(self._drawing, (0, 0))
 
-    def clear(self, box: Box) -> None:
-        """Draw the background over what is in the box."""
-        area = self._rect(box)
-        self._drawing.blit(self._background, area, area)
+    def clear(self) -> None:
+        """Draw the background over everything."""
+        self._drawing.blit(self._background, (0, 0))
 
     def clip(self, box: Box | None) -> None:
         """Draw only within the box; None: everywhere."""
         self._drawing.set_clip(None if box is None else self._rect(box))
 
-    def image(self) -> NDArray[np.uint8]:
-        """The frame, uint8 (height, width, 3): red, green, blue."""
+    def frame(self) -> "pygame.Surface":
+        """The frame, a surface of its size."""
         width, height = self._drawing.get_size()
-        # The view locks the surface, so it must not outlive this call.
-        memory = np.frombuffer(self._drawing.get_buffer(), np.uint8)
-        return halved(memory.reshape(height, width, 4))
+        size = (width // FACTOR, height // FACTOR)
+        return self._pygame.transform.smoothscale(self._drawing, size)
 
     def rectangle(self, box: Box, colour: Colour, *, radius: float = 0.0, outline: float = 0.0) -> None:
         """A filled rectangle, or with outline > 0 [px] its rim; radius of its corners [px]."""
-        self._pygame.draw.rect(
-            self._drawing,
-            colour,
-            self._rect(box),
-            round(outline * FACTOR),
-            border_radius=round(radius * FACTOR),
-        )
+        rim, corner = round(outline * FACTOR), round(radius * FACTOR)
+        self._pygame.draw.rect(self._drawing, colour, self._rect(box), rim, border_radius=corner)
 
     def polygon(self, points: Sequence[Point], colour: Colour, rim: Colour | None = None) -> None:
         """A filled polygon, and its rim, 1.5 px wide, in a second colour."""
@@ -220,26 +182,19 @@ class Canvas:
         align: 0 begins there, 0.5 is centred, 1 ends there. `_` puts the rest of a word lower and
         smaller: "p_2 [bar]".
         """
-        pieces = [self._rendered(*piece, size, colour) for piece in _pieces(text)]
+        pieces = []
+        for piece, lowered in _pieces(text):
+            height = round(size * FACTOR * (0.74 if lowered else 1.0))
+            if height not in self._fonts:
+                self._fonts[height] = self._pygame.font.Font(None, height)
+            surface = self._fonts[height].render(piece, True, colour)
+            pieces.append((surface, 0.24 * height if lowered else 0.0))
         total = sum(surface.get_width() for surface, _ in pieces)
         x, y = at[0] * FACTOR - align * total, at[1] * FACTOR
         for surface, drop in pieces:
             self._drawing.blit(surface, (round(x), round(y + drop - surface.get_height() / 2)))
             x += surface.get_width()
         return total / FACTOR
-
-    def _rendered(
-        self, text: str, lowered: bool, size: int, colour: Colour
-    ) -> "tuple[pygame.Surface, float]":
-        size = round(size * FACTOR * (0.74 if lowered else 1.0))
-        key = (text, size, colour)
-        if key not in self._texts:
-            if len(self._texts) >= TEXT_CACHE:
-                self._texts.clear()
-            if size not in self._fonts:
-                self._fonts[size] = self._pygame.font.Font(None, size)
-            self._texts[key] = self._fonts[size].render(text, True, colour)
-        return self._texts[key], 0.24 * size if lowered else 0.0
 
     @staticmethod
     def _rect(box: Box) -> tuple[int, int, int, int]:

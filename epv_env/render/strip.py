@@ -1,31 +1,16 @@
 """The strip chart: pressures with the target's band, coil command and consumption over time."""
 
 from collections import deque
+from collections.abc import Mapping
+from dataclasses import fields
 from itertools import count, pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.render.canvas import (
-    BAND,
-    CARD,
-    COIL,
-    CONSUMPTION,
-    EDGE,
-    GRID,
-    INK,
-    MUTED,
-    P1,
-    P2,
-    P3,
-    SCALE_TOP_BAR,
-    TARGET,
-    Box,
-    Canvas,
-    Colour,
-    mix,
-)
+from epv_env.render import canvas as c
+from epv_env.render.canvas import Box, Canvas, Colour
 from epv_env.render.geometry import Snapshot
 from epv_env.reward import BAND_BAR
 
@@ -34,17 +19,6 @@ WINDOW_S = 3.0  # time shown [s]
 TICK_S = 0.5  # distance of numbered grid lines [s]
 
 Array = NDArray[np.float64]  # an array of floats
-
-
-class Label(NamedTuple):
-    """Words at the end of a line, and the height at which they should stand [px]."""
-
-    y: float
-    """Height of the words [px]."""
-    words: str
-    """The text."""
-    colour: Colour
-    """Colour of the text."""
 
 
 class Axis(NamedTuple):
@@ -70,8 +44,8 @@ def draw_levels(canvas: Canvas, axis: Axis, step: float) -> None:
     left, _, right, _ = axis.box
     for value in np.arange(0.0, axis.top + step / 2, step).tolist():
         y = axis.y(value)
-        canvas.rectangle((left, y - 0.5, right, y + 0.5), GRID)
-        canvas.text(f"{value:g}", (left - 8, y), 16, MUTED, align=1.0)
+        canvas.rectangle((left, y - 0.5, right, y + 0.5), c.GRID)
+        canvas.text(f"{value:g}", (left - 8, y), 16, c.MUTED, align=1.0)
 
 
 def draw_steps(canvas: Canvas, x: Array, axis: Axis, values: Array, colour: Colour) -> None:
@@ -80,7 +54,7 @@ def draw_steps(canvas: Canvas, x: Array, axis: Axis, values: Array, colour: Colo
     corners = axis.points(np.repeat(x[ends], 2)[:-1], np.repeat(values[ends], 2)[1:])
     left, top, right, base = axis.box
     canvas.clip((left, top - 2, right, base + 2))
-    pale = mix(CARD, colour, 0.25)
+    pale = c.mix(c.CARD, colour, 0.25)
     for (x0, _), (x1, y1) in pairwise(corners.tolist()):
         if x1 > x0 and y1 < base:
             canvas.rectangle((x0, y1, x1, base), pale)
@@ -91,20 +65,16 @@ def draw_steps(canvas: Canvas, x: Array, axis: Axis, values: Array, colour: Colo
 def run_ends(values: Array) -> NDArray[np.intp]:
     """Indices (k,) at which a run of equal values begins or ends; values: (n,), any unit."""
     changes = np.flatnonzero(np.diff(values))
-    return np.unique(np.concatenate([[0], changes, changes + 1, [len(values) - 1]]))
+    return np.unique(np.r_[0, changes, changes + 1, len(values) - 1])
 
 
-def spread(labels: list[Label], top: float, bottom: float) -> list[Label]:
-    """The labels from above, moved so that none overlaps another or leaves the panel."""
-    placed: list[Label] = []
-    for label in sorted(labels, key=lambda label: label.y):
-        least = placed[-1].y + SPACING if placed else top
-        placed.append(label._replace(y=max(label.y, least)))
-    limit = bottom
-    for k in reversed(range(len(placed))):
-        placed[k] = placed[k]._replace(y=min(placed[k].y, limit))
-        limit = placed[k].y - SPACING
-    return placed
+def spread(heights: Array, top: float, bottom: float) -> NDArray:
+    """Heights of labels (n,) [px], moved so that none overlaps another or leaves the panel."""
+    order = np.argsort(heights, kind="stable")
+    down = SPACING * np.arange(len(heights))
+    placed = np.maximum.accumulate(np.maximum(heights[order], top) - down) + down
+    placed = np.minimum.accumulate((np.minimum(placed, bottom) - down)[::-1])[::-1] + down
+    return placed[np.argsort(order)]
 
 
 def round_up(value: float) -> float:
@@ -121,31 +91,12 @@ CONSUMED: Box = (LEFT, 558, RIGHT, 650)  # panel of the consumption [px]
 PER_SECOND = (RIGHT - LEFT) / WINDOW_S  # length of a second on the time axis [px]
 
 
-class Samples(NamedTuple):
-    """What the chart keeps of a snapshot; or of all of them, then every field is an array."""
-
-    time: Array
-    """[s]; once drawn: its place [px]."""
-    p1: Array
-    """Supply pressure [bar absolute]."""
-    p2: Array
-    """Circuit pressure [bar absolute]."""
-    p3: Array
-    """Control pressure [bar absolute]."""
-    target: Array
-    """Target pressure [bar absolute]."""
-    coil: Array
-    """1 where the coil is on, else 0 [-]."""
-    consumption: Array
-    """[g/s]."""
-
-
 class Strip:
     """The last WINDOW_S of snapshots, and their drawing."""
 
     def __init__(self):
         """Begin without a history."""
-        self._history: deque[tuple[float, ...]] = deque()
+        self._history: deque[Snapshot] = deque()
 
     def reset(self) -> None:
         """Forget the history."""
@@ -154,41 +105,42 @@ class Strip:
     def append(self, s: Snapshot) -> None:
         """Add a snapshot. One of the same time replaces the last, an earlier one begins anew."""
         history = self._history
-        if history and s.time_s < history[-1][0]:
+        if history and s.time_s < history[-1].time_s:
             history.clear()
-        elif history and s.time_s == history[-1][0]:
+        if history and s.time_s == history[-1].time_s:
             history.pop()
-        history.append(
-            (s.time_s, s.p1_bar, s.p2_bar, s.p3_bar, s.target_bar, s.coil_on, s.sigma_S_g_per_s)
-        )
+        history.append(s)
         # One sample before the window stays, so that the lines begin at the panel's edge.
-        while len(history) > 1 and history[1][0] < s.time_s - WINDOW_S:
+        while len(history) > 1 and history[1].time_s < s.time_s - WINDOW_S:
             history.popleft()
 
     def draw_background(self, canvas: Canvas) -> None:
         """What never moves: the titles."""
-        canvas.text("Pressure [bar absolute]", (LEFT, 90), 18, INK)
-        canvas.text("Coil command", (LEFT, COMMAND[1] - 16), 18, INK)
-        canvas.text("on", (LEFT - 8, COMMAND[1] + 7), 16, MUTED, align=1.0)
-        canvas.text("off", (LEFT - 8, COMMAND[3] - 5), 16, MUTED, align=1.0)
-        canvas.text("Consumption [g/s]", (LEFT, CONSUMED[1] - 16), 18, INK)
-        canvas.text("time [s]", ((LEFT + RIGHT) / 2, 691), 18, INK, align=0.5)
+        canvas.text("Pressure [bar absolute]", (LEFT, 90), 18, c.INK)
+        canvas.text("Coil command", (LEFT, COMMAND[1] - 16), 18, c.INK)
+        canvas.text("on", (LEFT - 8, COMMAND[1] + 7), 16, c.MUTED, align=1.0)
+        canvas.text("off", (LEFT - 8, COMMAND[3] - 5), 16, c.MUTED, align=1.0)
+        canvas.text("Consumption [g/s]", (LEFT, CONSUMED[1] - 16), 18, c.INK)
+        canvas.text("time [s]", ((LEFT + RIGHT) / 2, 691), 18, c.INK, align=0.5)
         words = f"target ±{1000 * BAND_BAR:.0f} mbar"
-        width = canvas.text(words, (RIGHT, 90), 18, TARGET, align=1.0)
-        canvas.rectangle((RIGHT - width - 32, 83, RIGHT - width - 8, 97), BAND)
-        canvas.rectangle((RIGHT - width - 32, 89, RIGHT - width - 8, 91), TARGET)
+        width = canvas.text(words, (RIGHT, 90), 18, c.TARGET, align=1.0)
+        canvas.rectangle((RIGHT - width - 32, 83, RIGHT - width - 8, 97), c.BAND)
+        canvas.rectangle((RIGHT - width - 32, 89, RIGHT - width - 8, 91), c.TARGET)
 
     def draw(self, canvas: Canvas) -> None:
         """Draw the history."""
-        samples = Samples(*np.array(self._history, dtype=float).T)
-        begin = max(0.0, float(samples.time[-1]) - WINDOW_S)
+        s = {
+            entry.name: np.array([getattr(each, entry.name) for each in self._history], dtype=float)
+            for entry in fields(Snapshot)
+        }
+        begin = max(0.0, float(s["time_s"][-1]) - WINDOW_S)
         self._draw_time_axis(canvas, begin)
-        place = LEFT + PER_SECOND * (samples.time - begin)
-        samples = samples._replace(time=place)
-        for draw in (self._draw_pressures, _draw_command, _draw_consumption):
-            draw(canvas, samples)
+        x = LEFT + PER_SECOND * (s["time_s"] - begin)
+        _draw_pressures(canvas, x, s)
+        _draw_command(canvas, x, s["coil_on"])
+        _draw_consumption(canvas, x, s["sigma_S_g_per_s"])
         for panel in (PRESSURES, COMMAND, CONSUMED):
-            canvas.rectangle(panel, EDGE, outline=1)
+            canvas.rectangle(panel, c.EDGE, outline=1)
 
     def _draw_time_axis(self, canvas: Canvas, begin: float) -> None:
         """Grid lines through all panels, and their times."""
@@ -198,57 +150,50 @@ class Strip:
             if x > RIGHT + 0.5:
                 break
             for _, top, _, bottom in (PRESSURES, COMMAND, CONSUMED):
-                canvas.rectangle((x - 0.5, top, x + 0.5, bottom), GRID)
-            canvas.text(f"{k * TICK_S:.10g}", (x, CONSUMED[3] + 14), 16, MUTED, align=0.5)
-
-    def _draw_pressures(self, canvas: Canvas, s: Samples) -> None:
-        highest = max(s.p1.max(), s.p2.max(), s.p3.max())
-        axis = Axis(PRESSURES, max(SCALE_TOP_BAR, 2.0 * float(np.ceil(highest / 2.0))))
-        canvas.clip(PRESSURES)
-        self._draw_band(canvas, s, axis)
-        canvas.clip(None)
-        draw_levels(canvas, axis, 2.0)
-        canvas.clip(PRESSURES)
-        rows = (
-            ("target", s.target, TARGET, 1.5),
-            ("p_1", s.p1, P1, 4.0),
-            ("p_3", s.p3, P3, 2.0),
-            ("p_2", s.p2, P2, 3.0),
-        )
-        for _, values, colour, width in rows:
-            canvas.polyline(axis.points(s.time, values), colour, width)
-        canvas.clip(None)
-        labels = [
-            Label(axis.y(float(values[-1])), f"{name} {values[-1]:.2f}", colour)
-            for name, values, colour, _ in rows
-        ]
-        for label in spread(labels, PRESSURES[1] + 4, PRESSURES[3] - 4):
-            canvas.text(label.words, (RIGHT + 10, label.y), 18, label.colour)
-
-    def _draw_band(self, canvas: Canvas, s: Samples, axis: Axis) -> None:
-        """The band lies under the whole window: beside the samples their first and last target."""
-        ends = run_ends(s.target)
-        time = np.concatenate([[LEFT], s.time[ends], [RIGHT]])
-        target = np.concatenate([s.target[:1], s.target[ends], s.target[-1:]])
-        upper = axis.points(time, target + BAND_BAR)
-        lower = axis.points(time, target - BAND_BAR)
-        canvas.polygon(np.concatenate([upper, lower[::-1]]).tolist(), BAND)
+                canvas.rectangle((x - 0.5, top, x + 0.5, bottom), c.GRID)
+            canvas.text(f"{k * TICK_S:.10g}", (x, CONSUMED[3] + 14), 16, c.MUTED, align=0.5)
 
 
-def _draw_command(canvas: Canvas, s: Samples) -> None:
+def _draw_pressures(canvas: Canvas, x: Array, s: Mapping[str, Array]) -> None:
+    """x: places of the samples [px]. s: fields of the snapshots, (samples,) each."""
+    target = s["target_bar"]
+    rows = (
+        ("target", target, c.TARGET, 1.5),
+        ("p_1", s["p1_bar"], c.P1, 4.0),
+        ("p_3", s["p3_bar"], c.P3, 2.0),
+        ("p_2", s["p2_bar"], c.P2, 3.0),
+    )
+    highest = max(float(values.max()) for _, values, *_ in rows[1:])
+    axis = Axis(PRESSURES, max(c.SCALE_TOP_BAR, 2.0 * float(np.ceil(highest / 2.0))))
+    # The band lies under the whole window: beside the samples their first and last target.
+    time, middle = np.r_[LEFT, x, RIGHT], np.r_[target[0], target, target[-1]]
+    upper, lower = (axis.points(time, middle + side * BAND_BAR) for side in (1, -1))
+    canvas.clip(PRESSURES)
+    canvas.polygon(np.concatenate([upper, lower[::-1]]).tolist(), c.BAND)
+    canvas.clip(None)
+    draw_levels(canvas, axis, 2.0)
+    canvas.clip(PRESSURES)
+    for _, values, colour, width in rows:
+        canvas.polyline(axis.points(x, values), colour, width)
+    canvas.clip(None)
+    heights = np.array([axis.y(float(values[-1])) for _, values, *_ in rows])
+    places = spread(heights, PRESSURES[1] + 4, PRESSURES[3] - 4).tolist()
+    for y, (name, values, colour, _) in zip(places, rows, strict=True):
+        canvas.text(f"{name} {values[-1]:.2f}", (RIGHT + 10, y), 18, colour)
+
+
+def _draw_command(canvas: Canvas, x: Array, coil: Array) -> None:
     """Filled while the coil is commanded on."""
     _, top, _, bottom = COMMAND
-    axis = Axis((LEFT, top + 5, RIGHT, bottom - 4), 1.0)
-    draw_steps(canvas, s.time, axis, s.coil, COIL)
-    state, colour = ("coil on", COIL) if s.coil[-1] else ("coil off", MUTED)
+    draw_steps(canvas, x, Axis((LEFT, top + 5, RIGHT, bottom - 4), 1.0), coil, c.COIL)
+    state, colour = ("coil on", c.COIL) if coil[-1] else ("coil off", c.MUTED)
     canvas.text(state, (RIGHT + 10, (top + bottom) / 2), 18, colour)
 
 
-def _draw_consumption(canvas: Canvas, s: Samples) -> None:
-    top = round_up(1.1 * float(s.consumption.max()))
-    axis = Axis(CONSUMED, top)
-    draw_levels(canvas, axis, top / 2.0)
-    draw_steps(canvas, s.time, axis, s.consumption, CONSUMPTION)
-    now = float(s.consumption[-1])
+def _draw_consumption(canvas: Canvas, x: Array, consumption: Array) -> None:
+    axis = Axis(CONSUMED, round_up(1.1 * float(consumption.max())))
+    draw_levels(canvas, axis, axis.top / 2.0)
+    draw_steps(canvas, x, axis, consumption, c.CONSUMPTION)
+    now = float(consumption[-1])
     y = min(max(axis.y(now), CONSUMED[1] + 8), CONSUMED[3] - 8)
-    canvas.text(f"{now:.2f} g/s", (RIGHT + 10, y), 18, CONSUMPTION)
+    canvas.text(f"{now:.2f} g/s", (RIGHT + 10, y), 18, c.CONSUMPTION)

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.render.canvas import BAD, CARD, EDGE, GOOD, INK, MUTED, PAGE, Box, Canvas, load_pygame
+from epv_env.render import canvas as c
+from epv_env.render.canvas import Canvas, load_pygame
 from epv_env.render.geometry import Snapshot
 from epv_env.render.section import draw_section, draw_section_background
 from epv_env.render.strip import Strip
@@ -17,13 +18,6 @@ if TYPE_CHECKING:
 WIDTH, HEIGHT = 1280, 720  # size of the frame [px]
 SECTION_CARD = (20, 68, 664, 704)  # card behind the section of the valve [px]
 STRIP_CARD = (680, 68, 1260, 704)  # card behind the chart [px]
-MOVING_BOXES: tuple[Box, ...] = (
-    (16, 16, 700, 52),
-    (896, 16, 1264, 52),
-    (24, 104, 662, 630),
-    (690, 102, 1258, 676),
-)
-"""The parts of the frame that change [px]."""
 MOVING = 0.01  # stroke fraction from which the piston counts as off its seat [-]
 
 
@@ -75,10 +69,11 @@ class Renderer:
         if not self.is_open:
             return None
         self._strip.append(snapshot)
-        image = self._compose(snapshot)
+        frame = self._compose(snapshot)
         if self.mode == "rgb_array":
-            return image
-        self._show(image)
+            pixels = bytearray(load_pygame().image.tobytes(frame, "RGB"))
+            return np.frombuffer(pixels, np.uint8).reshape(HEIGHT, WIDTH, 3)
+        self._show(frame)
         return None
 
     def __getstate__(self) -> dict[str, Any]:
@@ -91,42 +86,41 @@ class Renderer:
             load_pygame().display.quit()
         self._canvas = self._window = self._clock = None
 
-    def _compose(self, snapshot: Snapshot) -> NDArray[np.uint8]:
+    def _compose(self, snapshot: Snapshot) -> "pygame.Surface":
         if self._canvas is None:
             self._canvas = Canvas(WIDTH, HEIGHT)
             self._draw_background(self._canvas)
         canvas = self._canvas
-        for box in MOVING_BOXES:
-            canvas.clear(box)
+        canvas.clear()
         self._draw_header(canvas, snapshot)
         draw_section(canvas, snapshot)
         self._strip.draw(canvas)
-        return canvas.image()
+        return canvas.frame()
 
     def _draw_background(self, canvas: Canvas) -> None:
-        canvas.rectangle((0, 0, WIDTH, HEIGHT), PAGE)
+        canvas.rectangle((0, 0, WIDTH, HEIGHT), c.PAGE)
         for card in (SECTION_CARD, STRIP_CARD):
-            canvas.rectangle(card, CARD, radius=10)
-            canvas.rectangle(card, EDGE, radius=10, outline=1)
+            canvas.rectangle(card, c.CARD, radius=10)
+            canvas.rectangle(card, c.EDGE, radius=10, outline=1)
         draw_section_background(canvas)
         self._strip.draw_background(canvas)
         canvas.keep_as_background()
 
     def _draw_header(self, canvas: Canvas, snapshot: Snapshot) -> None:
         name, sentence = phase(snapshot)
-        canvas.rectangle((20, 18, 124, 50), INK, radius=8)
-        canvas.text(name, (72, 34), 22, CARD, align=0.5)
-        canvas.text(sentence, (138, 34), 20, INK)
+        canvas.rectangle((20, 18, 124, 50), c.INK, radius=8)
+        canvas.text(name, (72, 34), 22, c.CARD, align=0.5)
+        canvas.text(sentence, (138, 34), 20, c.INK)
         deviation = snapshot.p2_bar - snapshot.target_bar
         inside = abs(deviation) <= BAND_BAR
-        canvas.rectangle((900, 18, 1122, 50), GOOD if inside else BAD, radius=8)
+        canvas.rectangle((900, 18, 1122, 50), c.GOOD if inside else c.BAD, radius=8)
         # The font has no minus sign; its dash is as wide as the plus, the hyphen is not.
         words = f"p_2 – target  {deviation:+.2f} bar".replace("-", "–")
-        canvas.text(words, (1011, 34), 20, CARD, align=0.5)
-        width = canvas.text(f"{snapshot.time_s:.3f} s", (1258, 34), 22, INK, align=1.0)
-        canvas.text("time", (1250 - width, 34), 18, MUTED, align=1.0)
+        canvas.text(words, (1011, 34), 20, c.CARD, align=0.5)
+        width = canvas.text(f"{snapshot.time_s:.3f} s", (1258, 34), 22, c.INK, align=1.0)
+        canvas.text("time", (1250 - width, 34), 18, c.MUTED, align=1.0)
 
-    def _show(self, image: NDArray[np.uint8]) -> None:
+    def _show(self, frame: "pygame.Surface") -> None:
         pygame = load_pygame()
         if self._window is None:
             pygame.display.init()
@@ -139,6 +133,6 @@ class Renderer:
             return
         assert self._window is not None
         assert self._clock is not None
-        self._window.blit(pygame.image.frombuffer(image, (WIDTH, HEIGHT), "RGB"), (0, 0))
+        self._window.blit(frame, (0, 0))
         pygame.display.flip()
         self._clock.tick(self.fps)

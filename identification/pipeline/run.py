@@ -9,6 +9,7 @@ from time import perf_counter
 from typing import Any
 
 from epv_env.common.command_line import NextStep
+from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant, save_plant
 from identification.calibration.section import calibration_json, calibration_section
 from identification.confidence.section import confidence_json, confidence_section
@@ -21,12 +22,8 @@ from identification.recordings.noise import campaign_steps
 from identification.recordings.recording import CampaignError, campaign_facts
 from identification.report.page import Section, Verdict, write_results
 from identification.sensitivity.collinearity import sensitivities_on_recordings
-from identification.sensitivity.one_at_a_time import studied_symbols
-from identification.sensitivity.section import (
-    run_sensitivity_study,
-    sensitivity_json,
-    sensitivity_section,
-)
+from identification.sensitivity.one_at_a_time import sensitivities, studied_symbols
+from identification.sensitivity.section import sensitivity_json, sensitivity_section
 from identification.validation import validation_json, validation_section
 
 PLANT_FILE = "plant.json"
@@ -81,12 +78,12 @@ def quality(identification: Identification) -> Result:
 def sensitivity(identification: Identification) -> Result:
     """Section 5 at the report's conditions, and what the campaign's own recordings can separate."""
     problem = identification.problem
-    replay = problem.least_squares().replay
-    outputs = sensitivities_on_recordings(replay, studied_symbols(), problem.noise)
-    study = run_sensitivity_study(outputs=outputs, seed=identification.seed)
+    replay, symbols = problem.least_squares().replay, studied_symbols()
+    outputs = sensitivities_on_recordings(replay, symbols, problem.noise)
+    errors = sensitivities(Parameters.nominal(), symbols)
     return Result(
-        sections=[sensitivity_section(study)],
-        content={"sensitivity": sensitivity_json(study)},
+        sections=[sensitivity_section(errors, outputs)],
+        content={"sensitivity": sensitivity_json(errors, outputs)},
     )
 
 
@@ -119,23 +116,23 @@ def validation(identification: Identification) -> Result:
 STAGES = (
     Stage(
         name="quality", help="is the data good enough (section 4)",
-        compute=quality, time_share=0.15, role="quality",
+        compute=quality, time_share=0.24, role="quality",
     ),
     Stage(
         name="sensitivity", help="which parameters matter (section 5)",
-        compute=sensitivity, time_share=0.4,
+        compute=sensitivity, time_share=0.04,
     ),
     Stage(
         name="calibrate", help="fit the parameters (section 6.2)",
-        compute=calibration, time_share=0.25,
+        compute=calibration, time_share=0.4,
     ),
     Stage(
         name="confidence", help="how sure the estimates are (section 6.3)",
-        compute=confidence, time_share=0.1,
+        compute=confidence, time_share=0.16,
     ),
     Stage(
         name="validate", help="does the model hold on held-out recordings (section 7)",
-        compute=validation, time_share=0.1, role="validation",
+        compute=validation, time_share=0.16, role="validation",
     ),
 )  # fmt: skip
 """In the order of the report."""

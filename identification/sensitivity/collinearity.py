@@ -39,23 +39,14 @@ class OutputSensitivities:
     columns: NDArray
     """Change of each output for the stated change, (samples, parameters) [deviations of noise]."""
 
-    def columns_of(self, symbols: Sequence[str]) -> NDArray:
-        """The columns of some parameters, (samples, symbols) [deviations of noise]."""
-        return self.columns[:, [self.symbols.index(symbol) for symbol in symbols]]
-
     @property
     def effect(self) -> NDArray:
         """Root mean square of each column [standard deviations of the noise], (parameters,)."""
         return np.sqrt(np.mean(np.square(self.columns), axis=0))
 
-    @property
-    def correlation(self) -> NDArray:
-        """Cosines between the columns, (parameters, parameters), without unit."""
-        return cosines(self.columns)
-
     def index(self, symbols: Sequence[str]) -> float:
         """Collinearity index of a set of parameters; infinite if one can replace another exactly."""
-        return collinearity_index(self.columns_of(symbols))
+        return collinearity_index(self.columns[:, [self.symbols.index(symbol) for symbol in symbols]])
 
     def inseparable_pairs(self) -> list[tuple[str, str, float]]:
         """(symbol, symbol, index) of every pair above the critical index, the worst first."""

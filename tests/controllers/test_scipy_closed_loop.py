@@ -47,7 +47,7 @@ def replace_kernel_by_scipy(task: LimitingTask, flow_factor: float) -> None:
                 piecewise_schedule(
                     plant, State(*[float(field[i]) for field in valves.state]), [0.0, duration[i]],
                     U=inputs.U, sigma_S=flow_factor * inputs.sigma_S, p1_slope=inputs.p1_slope,
-                    refill=inputs.refill, reservoir_volume=task.supplies[i].volume,
+                    refill=inputs.refill, reservoir_volume=task.volumes[i],
                 ),
                 [duration[i]], rtol=1e-10,
             )  # fmt: skip

@@ -19,7 +19,6 @@ from epv_env.plant.plantfile import load_plant
 from identification.__main__ import main
 from identification.calibration import search as starts
 from identification.recordings.campaign_files import read_campaign
-from identification.sensitivity import section as sensitivity
 from tests.identification.browser import DESK, PHONE, box, check_layout, opened
 
 
@@ -35,13 +34,11 @@ def campaign(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def finished(campaign, tmp_path_factory):
-    """A folder in which `run` has worked on it; with few valves, on which only the indices depend."""
+    """A folder in which `run` has worked on it."""
     out = tmp_path_factory.mktemp("run")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sensitivity, "SAMPLES", 16)
-        said = StringIO()
-        with redirect_stdout(said):
-            assert main(["run", str(campaign), "--out", str(out), "--starts", "2"]) == 0
+    said = StringIO()
+    with redirect_stdout(said):
+        assert main(["run", str(campaign), "--out", str(out), "--starts", "2"]) == 0
     (out / "said.txt").write_text(said.getvalue())
     return out
 

@@ -1,6 +1,6 @@
-"""Turn a policy into C, ONNX and an FMU, or the plant into an FMU.
+"""Turn a policy into C and an FMU, or the plant into an FMU.
 
-    epv export runs/ppo --out runs/ecu            # C and ONNX
+    epv export runs/ppo --out runs/ecu            # C
     epv export runs/ppo --out runs/ecu --fmu      # and epv_policy.fmu
     epv export plant --out runs/fmu               # epv_plant.fmu, of --plant FILE
 
@@ -25,21 +25,15 @@ from epv_env.common.files import write_bytes
 from epv_env.plant.plantfile import Plant, load_plant
 from training.deploy import agreement as verdict
 from training.deploy import compiled, monitor_c
-from training.deploy.c_code import CODE, Export, checks, deployment_contract, sources
+from training.deploy.c_code import CODE, Export, deployment_contract, sources
 from training.deploy.fmu.archive import fmu
 from training.deploy.fmu.models import plant_model, policy_model
-from training.deploy.onnx_model import onnx_model
 from training.deploy.translation import ExportError
 
 PLANT = "plant"
 """What is exported in place of a policy's folder."""
-FILES = {
-    *CODE, "policy.onnx", "contract.json", "states.csv", "states.h", "parity.c", "bench.c",
-    "report.json", "epv_policy.fmu",
-}  # fmt: skip
+FILES = {*CODE, "contract.json", "states.csv", "report.json", "epv_policy.fmu"}
 """What the export of a policy consists of."""
-BUILT = {"parity", "bench"}
-"""What its reader builds there, and another export may sweep away."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -91,7 +85,6 @@ def run(options: argparse.Namespace) -> None:
     files["contract.json"] = json.dumps(contract, indent=1) + "\n"
     files["report.json"] = json.dumps(report, indent=1) + "\n"
     content = {name: text.encode() for name, text in files.items()}
-    content["policy.onnx"] = onnx_model(export.policy.network, period=export.period).SerializeToString()
     if options.fmu:
         content["epv_policy.fmu"] = fmu(policy_model(export.period, files), options.compiler)
     write_folder(options.folder, content)
@@ -122,45 +115,39 @@ def prepared(folder: Path, plant: Plant) -> Export:
 def verified(
     export: Export, compiler: list[str], episodes: int, duration: float
 ) -> tuple[dict[str, str], dict[str, Any]]:
-    """The C files by name and the report, once compiled code has passed. Raises ExportError.
+    """The C files and states.csv by name, and the report, once compiled code has passed.
 
     Args:
         export: the controller.
         compiler: the words of its command.
         episodes: under the compiled code.
         duration: length of one of them [s].
+
+    Raises:
+        ExportError: the code does not compile, or does not decide as the controller.
     """
     states = verdict.visit(export.controller)
     inputs = verdict.inputs_along(export, states)
     files = sources(export)
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
-        _write(folder, files)
+        for name, text in files.items():
+            (folder / name).write_text(text, encoding="utf-8")
         code = compiled.library(compiler, folder)
         agreement = verdict.agreement(export, code, states, inputs)
-        tests = checks(states.actions.size, agreement["rounding_of_c"])
-        tests["states.csv"] = verdict.states_table(states, inputs, verdict.margins(export, inputs))
-        _write(folder, tests)
-        compiled.run_parity(compiler, folder)
         loop = verdict.closed_loop(export.controller, code, episodes=episodes, duration=duration)
         report = {
             "agreement": agreement,
             "closed_loop": {"episodes": episodes, "duration_s": duration, "controllers": loop},
-            "microseconds": compiled.run_bench(compiler, folder),
             "machine": compiled.machine(compiler),
         }
-    return files | tests, report
-
-
-def _write(folder: Path, files: dict[str, str]) -> None:
-    for name, text in files.items():
-        (folder / name).write_text(text, encoding="utf-8")
+    return files | {"states.csv": verdict.states_table(states, inputs)}, report
 
 
 def check_free(folder: Path) -> None:
     """Raises ExportError if the folder holds anything but the files of an earlier export."""
     there = {path.name for path in folder.iterdir()} if folder.exists() else set()
-    if foreign := sorted(there - FILES - BUILT - {*monitor_c.FILES}):
+    if foreign := sorted(there - FILES - {*monitor_c.FILES}):
         raise ExportError(
             f"{folder} holds {foreign[0]!r}, which no export writes: give --out a new or empty folder"
         )

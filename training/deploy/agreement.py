@@ -135,32 +135,30 @@ def closed_loop(
     return figures
 
 
-def states_table(states: VisitedStates, inputs: NDArray, exact: NDArray) -> str:
-    """states.csv: episode, readings, inputs of the network, the decision, and the network's margin."""
+def states_table(states: VisitedStates, inputs: NDArray) -> str:
+    """states.csv: episode, readings, inputs of the network, and the decision."""
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     names = [entry.name for entry in (*LAYOUT, *LEARNT)]
-    writer.writerow(["episode", *READINGS, *names, "decision", "logit_margin"])
+    writer.writerow(["episode", *READINGS, *names, "decision"])
     readings = readings_of(states.flat)
     periods = states.actions.shape[1]
     for k, (row, action) in enumerate(zip(inputs, states.actions.ravel(), strict=True)):
         numbers = [*(readings[name][k] for name in READINGS), *row]
         written = (f"{number:.9g}" for number in numbers)  # nine digits give a float back to the bit
-        writer.writerow([k // periods, *written, action, f"{exact[k]:.9g}"])
+        writer.writerow([k // periods, *written, action])
     return stream.getvalue()
 
 
 def as_text(report: dict[str, Any], contract: dict[str, Any]) -> str:
     """The report of an export, for people."""
-    a, time, loop = report["agreement"], report["microseconds"], report["closed_loop"]
+    a, loop = report["agreement"], report["closed_loop"]
     operations, size = contract["operations"], contract["bytes"]
     return "\n".join(
         [
             f"agreement on {a['states']} visited states: {a['agrees']}",
             f"rounding of the logits: {a['rounding_of_c']:.2g} in C, {a['rounding_of_python']:.2g} in "
             "Python",
-            f"a decision: median {time['median_us']:.2f} us, slowest state "
-            f"{time['slowest_state_us']:.2f} us, slowest call {time['slowest_call_us']:.1f} us",
             f"{operations['multiply_accumulates']} multiply-accumulates, {size['constants']} B of "
             f"constants, {size['memory_of_a_valve']} B of memory for each valve",
             f"in closed loop, {loop['episodes']} episodes of {loop['duration_s']:g} s:",

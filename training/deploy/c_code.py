@@ -39,16 +39,6 @@ CODE = ("epv_policy.h", "epv_policy.c", "epv_learner.h")
 INPUTS = len(LAYOUT) + len(LEARNT)
 """Inputs of the network: readings and learnt quantities."""
 
-OBSERVATION_TOLERANCE = 2e-5
-"""How far the C code's observation may lie from Python's [1], which is made of readings in double
-precision: single precision's 5e-7 bar at 8 bar, over the least scale, 0.1 bar, and rounded several
-times."""
-MARGIN_FACTOR = 8.0
-"""How many times the rounding of the logits measured here is allowed elsewhere [1]: another compiler may
-contract or reorder sums, so that it rounds otherwise, but not much worse."""
-LEAST_ROUNDING = 1e-6
-"""Rounding of the logits that is allowed at least, before the factor [1]."""
-
 LEAST_AGREEMENT = 0.9999
 """Share of the states on which the code must decide as Python: single precision may pass a threshold."""
 
@@ -193,21 +183,6 @@ def _p3_check_fields(export: Export) -> dict[str, Any]:
     }
 
 
-def checks(states: int, rounding: float) -> dict[str, str]:
-    """The text of the programs that test and time the code on so many states, by file name.
-
-    rounding: how far the code's logits lie from exact ones here [1]; MARGIN_FACTOR times it is allowed.
-    """
-    allowed = MARGIN_FACTOR * max(rounding, LEAST_ROUNDING)
-    fields = {
-        "states": states,
-        "observation_tolerance": f"{OBSERVATION_TOLERANCE:g}",
-        "margin_tolerance": f"{allowed:g}",
-        "allowed_decisions": round((1 - LEAST_AGREEMENT) * states),
-    }
-    return {name: filled(TEMPLATES / name, fields) for name in ("states.h", "parity.c", "bench.c")}
-
-
 def filled(template: Path, fields: Mapping[str, Any]) -> str:
     """A template with its fields filled in. Raises KeyError for a field without a value."""
     return Template(template.read_text(encoding="utf-8")).substitute(fields)
@@ -243,10 +218,6 @@ def deployment_contract(export: Export) -> dict[str, Any]:
         "decision": "1 if a rule says so; else 0 if the logit of off is at least that of on, else 1; "
         "where p3 is implausible, a hysteresis that does not read it decides",
         "timing": "read, decide and switch at each period's start; the coil stays so through it",
-        "onnx": {
-            "input": "inputs: (batch, entries) float32, readings and learnt quantities",
-            "outputs": {"logits": "(batch, 2) float32: off, on", "action": "(batch,) int64"},
-        },
         "operations": {
             "multiply_accumulates": sum(weights for weights, _ in sizes),
             "tanh": tangents,

@@ -1,6 +1,5 @@
-"""The exported C code, compiled: called from Python, and run as a stranger runs it."""
+"""The exported C code, compiled and called from Python."""
 
-import csv
 import ctypes
 import platform
 import shlex
@@ -115,25 +114,8 @@ def logits_of(code: ctypes.CDLL, inputs: NDArray) -> NDArray:
     return logits
 
 
-def run_parity(compiler: list[str], folder: Path) -> str:
-    """Compile and run parity.c in the folder; what it printed. Raises ExportError if it fails."""
-    program = build(compiler, folder, "parity.c", "epv_policy.c", "-lm", output="parity")
-    done = subprocess.run([program], cwd=folder, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise ExportError(f"the parity test failed: {' '.join((done.stdout + done.stderr).split())}")
-    return done.stdout
-
-
-def run_bench(compiler: list[str], folder: Path) -> dict[str, float]:
-    """Compile and run bench.c in the folder: microseconds for a decision."""
-    program = build(compiler, folder, "bench.c", "epv_policy.c", "-lm", output="bench")
-    done = subprocess.run([program], cwd=folder, capture_output=True, text=True, check=True)
-    row = next(csv.DictReader(done.stdout.splitlines()))
-    return {name: float(value) for name, value in row.items()}
-
-
 def machine(compiler: list[str]) -> dict[str, str]:
-    """Processor, system and compiler of the measured times."""
+    """Processor, system and compiler of the code that was compared."""
     done = subprocess.run([*compiler, "--version"], capture_output=True, text=True, check=False)
     version = (done.stdout.splitlines() or ["unknown"])[0]
     return {"processor": platform.machine(), "system": platform.system(), "compiler": version}

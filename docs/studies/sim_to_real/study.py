@@ -122,8 +122,7 @@ class UnevenLag:
         valves = self.task.valves
         ahead = valves.state.lag_2
         tau = self.values["tau_p2"] / (1.0 - self.unevenness * ahead / (np.abs(ahead) + 5e3))
-        volumes = [supply.volume for supply in self.task.supplies]
-        valves.set_parameters(np.arange(self.task.n), {**self.values, "tau_p2": tau}, volumes)
+        valves.set_parameters(np.arange(self.task.n), {**self.values, "tau_p2": tau}, self.task.volumes)
         return self.policy.act(observations)
 
 

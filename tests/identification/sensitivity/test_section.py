@@ -1,35 +1,26 @@
-"""The study's section can be written, and its data is JSON."""
+"""The section can be written, and its data is JSON."""
 
 import json
 
-from epv_env.plant.parameters import Parameters
-from identification.report.page import Picture, write_page
-from identification.sensitivity.global_indices import (
-    ranges,
-    sobol_indices,
-    total_error_model,
-)
-from identification.sensitivity.section import SensitivityStudy, sensitivity_json, sensitivity_section
+from identification.report.page import Table, write_page
+from identification.sensitivity.section import sensitivity_json, sensitivity_section
 from tests.identification.sensitivity.test_collinearity import nominal_sensitivities
 from tests.identification.sensitivity.test_one_at_a_time import exact
 
 
-def short_study() -> SensitivityStudy:
-    p, symbols = Parameters.nominal(), ["d1", "R"]
-    model, bounds = total_error_model(p, symbols), ranges(p, symbols)
-    return SensitivityStudy(
-        one_at_a_time=exact(),
-        outputs=nominal_sensitivities(),
-        indices=sobol_indices(model, symbols, bounds, samples=8, seed=1),
-    )
-
-
 def test_section_and_data(tmp_path):
-    study = short_study()
-    section = sensitivity_section(study)
-    assert [verdict.status for verdict in section.verdicts] == ["good", "note", "note"]
-    assert sum(isinstance(block, Picture) for block in section.blocks) == 2
+    section = sensitivity_section(exact(), nominal_sensitivities())
+    assert [verdict.status for verdict in section.verdicts] == ["good", "note"]
+    errors, pairs = section.blocks
+    assert isinstance(errors, Table)
+    assert isinstance(pairs, Table)
+    assert len(errors.rows) == len(exact())
+    assert ["V2, alphaPV", "infinite"] in [sorted_pair(row) for row in pairs.rows]
     write_page(tmp_path / "page.html", title="Sensitivity", sections=[section])
-    data = json.loads(json.dumps(sensitivity_json(study), allow_nan=False))
+    data = json.loads(json.dumps(sensitivity_json(exact(), nominal_sensitivities()), allow_nan=False))
     assert data["collinearity"]["all_sensitive"] is None
-    assert set(data["sobol"]) == {"d1", "R"}
+    assert data["exact"]["R"]["sensitive"]
+
+
+def sorted_pair(row):
+    return [", ".join(sorted(row[0].split(", "))), row[1]]

@@ -6,9 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("onnx")
-pytest.importorskip("safetensors")
-
 from controllers.policy import TRAINED
 from epv_env.plant.plantfile import Plant
 from tests.training.exports import PERIODS, column, export
