@@ -10,9 +10,10 @@ import pytest
 pytest.importorskip("stable_baselines3")
 import torch
 
-from controllers.knowledge import LEARNT, READINGS
+from controllers.knowledge import READINGS
 from controllers.policy import load_policy
 from controllers.policy_files import read_policy
+from controllers.valve_learner import LEARNT
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from training.commands.train import sentence_of
