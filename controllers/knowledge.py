@@ -40,7 +40,8 @@ _CENTRE, _SCALE, _LIMIT = (
 )
 
 
-_COLUMNS = np.array([(VALVE.fields or {})[quantity.name][1] // 8 for quantity in LEARNT])
+_FIELDS: Any = VALVE.fields
+_COLUMNS = np.array([_FIELDS[quantity.name][1] // 8 for quantity in LEARNT])
 """Of the learnt quantities in a record of VALVE, which holds eight bytes for each number."""
 
 
