@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import replace
+from typing import Any
 
 import pandas as pd
 import pytest
@@ -48,7 +49,7 @@ def test_a_bench_without_an_effect_measures_exactly_what_was_simulated():
 
 def test_a_late_coil_gives_larger_errors_than_simulated():
     gaps = gap_table(deployments(t_delay=0.008))
-    errors = gaps[gaps["score"] == "rms error [mbar]"]
+    errors: Any = gaps[gaps["score"] == "rms error [mbar]"]
     assert list(errors["plants"]) == ["calibrated", "ten_percent"]
     assert (errors["low"] > 10).all()
     assert (errors["low"] < errors["difference"]).all()
@@ -58,7 +59,8 @@ def test_a_late_coil_gives_larger_errors_than_simulated():
 def test_the_picture_has_a_line_for_each_row():
     shares = pd.DataFrame({"a": [1.0, 2.0], "b": [3.0, 4.0]}, index=["one", "two"])
     (axes,) = share_picture(shares, {"a": ("o", "white", 7), "b": ("s", "black", 7)}).axes
-    assert [list(line.get_xdata()) for line in axes.lines] == [[1.0, 2.0], [3.0, 4.0]]
+    lines: Any = axes.lines
+    assert [list(line.get_xdata()) for line in lines] == [[1.0, 2.0], [3.0, 4.0]]
     assert [label.get_text() for label in axes.get_yticklabels()] == ["one", "two"]
 
 

@@ -138,7 +138,7 @@ def report(results: Results, options: argparse.Namespace) -> None:
     print(f"withheld: {options.effect}; diagnosis: {diagnosis_text(out / DIAGNOSIS)}\n")
     for _, stage in itself.groupby("scenario", sort=False):
         print(f"{as_text(stage)}\n")
-    error = gaps[(gaps["plants"] == "calibrated") & (gaps["score"] == "rms error [mbar]")]
+    error: Any = gaps[(gaps["plants"] == "calibrated") & (gaps["score"] == "rms error [mbar]")]
     columns = ["stage", "controller", "difference", "low", "high"]
     print("rms error, measured minus simulated [mbar], with its 95 % interval:")
     print(error[columns].to_string(index=False, float_format=lambda value: f"{value:+.0f}"))
