@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from controllers.base import Controller
 from controllers.pulse import PLAN, PulsePlan, plan
 from controllers.pulse_table import compiled, nominal_table
-from controllers.valve_learner import DIGEST, LEAST_HEAD, ValveLearner
-from epv_env.observation import LAYOUT, Quantity
+from controllers.valve_learner import DIGEST, LEARNT, LEAST_HEAD, VALVE, ValveLearner
+from epv_env.observation import LAYOUT
 from epv_env.plant.plantfile import Plant
 
 CEILING = 0.2
@@ -33,37 +33,6 @@ HORIZON = 0.1
 """Time over which consumption lowers p2 there [s]: an overshoot in an emergency does not last."""
 
 
-def _learnt() -> tuple[Quantity, ...]:
-    def quantity(name: str, unit: str, scale: float, limit: float, centre: float = 0.0) -> Quantity:
-        return Quantity(name=name, unit=unit, centre=centre, scale=scale, limit=limit)
-
-    return (
-        quantity("offset", "bar", 0.5, 8.0),
-        quantity("offset_deviation", "bar", 0.5, 8.0),
-        quantity("gain", "1", 0.2, 8.0, centre=1.0),
-        quantity("gain_deviation", "1", 0.2, 8.0),
-        quantity("pace", "1", 0.2, 8.0, centre=1.0),
-        quantity("pace_deviation", "1", 0.2, 8.0),
-        quantity("error", "bar", 0.5, 4.0),
-        quantity("fall", "bar/s", 2.0, 4.0),
-        quantity("opens_in", "s", 0.05, 2.0),
-        quantity("opens_in_early", "s", 0.05, 2.0),
-        quantity("opens_from_rest", "s", 0.05, 2.0, centre=0.05),
-        quantity("forecast", "bar", 0.5, 4.0),
-        quantity("under_way", "bar", 0.3, 4.0),
-        quantity("after_period", "bar", 0.3, 4.0),
-        quantity("after_period_early", "bar", 0.3, 4.0),
-        quantity("reserve", "bar", 0.1, 4.0),
-        quantity("deepest", "bar", 0.25, 4.0),
-        quantity("head", "bar", 2.0, 2.0),
-        quantity("margin", "bar", 0.2, 2.0),
-        quantity("remaining", "s", 0.02, 2.0),
-        quantity("advised", "1", 0.5, 1.0, centre=0.5),
-    )
-
-
-LEARNT = _learnt()
-"""The learnt quantities, the advice last; controllers.valve_learner.VALVE says what they mean."""
 READINGS = len(LAYOUT)
 """Number of the readings, which come first."""
 _CENTRE, _SCALE, _LIMIT = (
@@ -71,36 +40,15 @@ _CENTRE, _SCALE, _LIMIT = (
 )
 
 
+_FIELDS: Any = VALVE.fields
+_COLUMNS = np.array([_FIELDS[quantity.name][1] // 8 for quantity in LEARNT])
+"""Of the learnt quantities in a record of VALVE, which holds eight bytes for each number."""
+
+
 @compiled
 def shown(value, k):
     """The k-th learnt quantity as a policy sees it [-]."""
     return min(max((value - _CENTRE[k]) / _SCALE[k], -_LIMIT[k]), _LIMIT[k])
-
-
-@compiled
-def describe(v, out):
-    """Write the learnt quantities of one valve into out (readings + learnt quantities,)."""
-    out[READINGS + 0] = shown(v.offset, 0)
-    out[READINGS + 1] = shown(v.offset_deviation, 1)
-    out[READINGS + 2] = shown(v.gain, 2)
-    out[READINGS + 3] = shown(v.gain_deviation, 3)
-    out[READINGS + 4] = shown(v.pace, 4)
-    out[READINGS + 5] = shown(v.pace_deviation, 5)
-    out[READINGS + 6] = shown(v.error, 6)
-    out[READINGS + 7] = shown(v.fall, 7)
-    out[READINGS + 8] = shown(v.opens_in, 8)
-    out[READINGS + 9] = shown(v.opens_in_early, 9)
-    out[READINGS + 10] = shown(v.opens_from_rest, 10)
-    out[READINGS + 11] = shown(v.forecast, 11)
-    out[READINGS + 12] = shown(v.under_way, 12)
-    out[READINGS + 13] = shown(v.after_period, 13)
-    out[READINGS + 14] = shown(v.after_period_early, 14)
-    out[READINGS + 15] = shown(v.reserve, 15)
-    out[READINGS + 16] = shown(v.deepest, 16)
-    out[READINGS + 17] = shown(v.head, 17)
-    out[READINGS + 18] = shown(v.margin, 18)
-    out[READINGS + 19] = shown(v.remaining, 19)
-    out[READINGS + 20] = shown(v.advised, 20)
 
 
 @compiled
@@ -121,12 +69,13 @@ def _loop(digest: str) -> Any:
     """Advice, learnt quantities and rules of a batch of valves."""
 
     @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def describe_all(valves, table, p, period, out, must_shut):
+    def describe_all(valves, numbers, table, p, period, out, must_shut):
         if digest == "":
             return
         for i in range(len(valves)):
             plan(valves[i], table, 0, p, period)
-            describe(valves[i], out[i])
+            for k, column in enumerate(_COLUMNS):
+                out[i, READINGS + k] = shown(numbers[i, column], k)
             must_shut[i] = cannot_raise(valves[i]) or would_rise_too_far(valves[i])
 
     return describe_all
@@ -171,7 +120,8 @@ class ValveKnowledge:
         out = np.empty((len(observations), READINGS + len(LEARNT)), dtype=np.float32)
         out[:, :READINGS] = observations
         table, period = self.learner.table, self.learner.control_period
-        _describe_all(valves, table, self._pulse, period, out, must_shut)
+        numbers = valves.view(np.float64).reshape(len(valves), VALVE.itemsize // 8)
+        _describe_all(valves, numbers, table, self._pulse, period, out, must_shut)
         return out
 
 

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
-from controllers.knowledge import LEARNT, RULES
+from controllers.knowledge import RULES
+from controllers.valve_learner import LEARNT
 from epv_env.common.files import JSONFileError, read_bytes, read_json, write_bytes, write_json
 from epv_env.observation import LAYOUT, contract
 

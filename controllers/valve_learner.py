@@ -28,7 +28,7 @@ from controllers.pulse_table import (
     opens_at,
     time_to_open,
 )
-from epv_env.observation import CENTRE, INDEX, SCALE
+from epv_env.observation import CENTRE, INDEX, SCALE, Quantity
 from epv_env.plant.primitives import source_digest
 from epv_env.reward import BAND_BAR
 
@@ -82,29 +82,53 @@ _STATE = (
     "off_periods", "on_periods", "was_shut", "slope", "pace_variance", "measuring",
     "end_p1", "end_p2", "end_p3", "end_fall", "reached",
 )  # fmt: skip
-_KNOWN = (
-    "on",  # 1 if the coil is on
-    "p1", "p2", "p3",  # as read [bar]
-    "error",  # p2 - target, filtered while the valve is shut [bar]
-    "fall",  # rate of change of p2 by consumption, at most 0 [bar/s]
-    "offset", "offset_deviation",  # of the opening pressure from the table's [bar]
-    "early_offset",  # the same if the valve opens early [bar]
-    "gain", "gain_deviation",  # rise of a pulse over the table's [1]
-    "pace", "pace_deviation",  # venting rate over the table's [1]
-    "opens_in", "opens_in_early",  # time to open with the coil off from now [s]; negative: it is open
-    "opens_from_rest",  # the same from a full control chamber [s]
-    "forecast",  # p2 - target when the valve opens, if the coil is switched off now [bar]
-    "under_way",  # rise of p2 if the coil is switched on now [bar]
-    "after_period", "after_period_early",  # the same after one period more off; if the valve opens early
-    "reserve",  # how much higher p2 is held where the valve is slow [bar]
-    "deepest",  # deepest breakdown lately [bar]
-    "head",  # p1 - p2 [bar]
-    "advised", "remaining", "margin",  # what the adaptive pulse advises (controllers/pulse.py)
-)  # fmt: skip
+
+
+def _learnt() -> tuple[Quantity, ...]:
+    def quantity(name: str, unit: str, scale: float, limit: float, centre: float = 0.0) -> Quantity:
+        return Quantity(name=name, unit=unit, centre=centre, scale=scale, limit=limit)
+
+    return (
+        quantity("offset", "bar", 0.5, 8.0),  # of the opening pressure from the table's
+        quantity("offset_deviation", "bar", 0.5, 8.0),
+        quantity("gain", "1", 0.2, 8.0, centre=1.0),  # rise of a pulse over the table's
+        quantity("gain_deviation", "1", 0.2, 8.0),
+        quantity("pace", "1", 0.2, 8.0, centre=1.0),  # venting rate over the table's
+        quantity("pace_deviation", "1", 0.2, 8.0),
+        quantity("error", "bar", 0.5, 4.0),  # p2 - target, filtered while the valve is shut
+        quantity("fall", "bar/s", 2.0, 4.0),  # rate of change of p2 by consumption, at most 0
+        quantity("opens_in", "s", 0.05, 2.0),  # with the coil off from now; negative: it is open
+        quantity("opens_in_early", "s", 0.05, 2.0),  # the same if the valve opens early
+        quantity("opens_from_rest", "s", 0.05, 2.0, centre=0.05),  # from a full control chamber
+        quantity("forecast", "bar", 0.5, 4.0),  # p2 - target at the opening, if the coil goes off now
+        quantity("under_way", "bar", 0.3, 4.0),  # rise of p2 if the coil is switched on now
+        quantity("after_period", "bar", 0.3, 4.0),  # the same after one period more off
+        quantity("after_period_early", "bar", 0.3, 4.0),  # the same if the valve opens early
+        quantity("reserve", "bar", 0.1, 4.0),  # how much higher p2 is held where the valve is slow
+        quantity("deepest", "bar", 0.25, 4.0),  # deepest breakdown lately
+        quantity("head", "bar", 2.0, 2.0),  # p1 - p2
+        quantity("margin", "bar", 0.2, 2.0),  # these three: the adaptive pulse (controllers/pulse.py)
+        quantity("remaining", "s", 0.02, 2.0),
+        quantity("advised", "1", 0.5, 1.0, centre=0.5),
+    )
+
+
+LEARNT = _learnt()
+"""What is known of a valve, as a policy sees it; the advice last."""
+
 VALVE = np.dtype(
-    [(name, np.float64) for name in (*_STATE, *_KNOWN)]
+    [
+        (name, np.float64)
+        for name in (
+            *_STATE,
+            "on",  # 1 if the coil is on
+            "p1", "p2", "p3",  # as read [bar]
+            "early_offset",  # `offset` if the valve opens early [bar]
+            *(quantity.name for quantity in LEARNT),
+        )
+    ]
     + [(name, np.float64, (MEMBERS,)) for name in ("probability", "member_gain", "member_variance")]
-)
+)  # fmt: skip
 """State of a learner and what it knows of one valve."""
 
 _ERROR, _TARGET, _P1, _P3, _COIL, _P2_CHANGE, _P3_CHANGE = (

@@ -5,7 +5,15 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from epv_env.common.field_types import shown
-from epv_env.signals import PRESSURE_LIMITS_BAR, OptionError, Range, as_number, as_range, check_count
+from epv_env.signals import (
+    PRESSURE_LIMITS_BAR,
+    OptionError,
+    Range,
+    as_number,
+    as_range,
+    check_count,
+    check_known,
+)
 
 PROBABILITIES = (
     "starved", "far", "vented", "coil_off", "rest", "target_steps", "noisy", "frozen_p3", "worn",
@@ -130,7 +138,5 @@ def as_conditions(value: Any) -> Conditions:
             f"conditions is {shown(value)}: give one of {', '.join(CONDITIONS)}, a Conditions, or a "
             "mapping of its fields"
         )
-    known = {entry.name for entry in fields(Conditions)}
-    if unknown := sorted(map(str, set(value) - known)):
-        raise OptionError(f"unknown condition {unknown[0]!r}: known are {', '.join(sorted(known))}")
+    check_known("condition", value, [entry.name for entry in fields(Conditions)])
     return Conditions(**value)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.common.field_types import check_fields
+from epv_env.signals import as_number
 
 BAND_BAR = 0.5
 """Tolerance of control aim C1 (section 2.3)."""
@@ -16,6 +16,9 @@ EMPTY_CIRCUIT_BAR = 1.5
 
 WIDEST_BAND_BAR = 16.0
 """The sensors' range: no pressure is farther from a target."""
+
+LARGEST = 1e9
+"""More than any weight or parameter is."""
 
 REFERENCE_PERIOD = 5e-3
 """Control period to which the weights refer [s]; other periods scale the running terms."""
@@ -41,11 +44,8 @@ class RewardWeights:
     """An empty circuit, which ends the episode."""
 
     def __post_init__(self) -> None:
-        check_fields(self)
         for entry in fields(self):
-            value = getattr(self, entry.name)
-            if not (np.isfinite(value) and value >= 0):
-                raise ValueError(f"reward weight {entry.name} = {value!r} must be finite and at least 0")
+            as_number(f"weights: {entry.name}", getattr(self, entry.name), (0.0, LARGEST))
         if not 0 < self.band_bar <= WIDEST_BAND_BAR:
             raise ValueError(
                 f"band_bar = {self.band_bar!r} must lie above 0 and at most at {WIDEST_BAND_BAR:g} bar"

@@ -1,6 +1,6 @@
 """What a user may write for an environment's arguments, and the settings that they become."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from os import PathLike
@@ -16,7 +16,7 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.region import DIAGNOSIS, Mixture, Region
 from epv_env.plant.supply import Supply
-from epv_env.reward import EMPTY_CIRCUIT_BAR, WIDEST_BAND_BAR, RewardWeights
+from epv_env.reward import EMPTY_CIRCUIT_BAR, LARGEST, WIDEST_BAND_BAR, RewardWeights
 from epv_env.signals import (
     PRESSURE_LIMITS_BAR,
     MovingTarget,
@@ -25,6 +25,7 @@ from epv_env.signals import (
     RecordedConsumption,
     as_number,
     as_range,
+    check_known,
     shown,
 )
 
@@ -107,15 +108,12 @@ def as_scenario(value: Any) -> str | Scenario | RecordedConsumption:
 
 
 def as_weights(value: Any, band_bar: Any) -> RewardWeights:
-    """Weights from themselves or from a mapping of some by name; band_bar: the band's half-width."""
-    known = {entry.name for entry in fields(RewardWeights)}
+    """Weights from themselves, a mapping of some by name, or None; band_bar: the band's half-width."""
+    if value is None:
+        value = RewardWeights()
     if isinstance(value, Mapping):
-        if unknown := sorted(map(str, set(value) - known)):
-            raise OptionError(
-                f"unknown reward weight {unknown[0]!r}: known are {', '.join(sorted(known))}"
-            )
-        weights = {k: as_number(f"weights: {k}", v, (0.0, LARGEST)) for k, v in value.items()}
-        value = RewardWeights(**weights)
+        check_known("reward weight", value, [entry.name for entry in fields(RewardWeights)])
+        value = RewardWeights(**value)
     if not isinstance(value, RewardWeights):
         raise OptionError(f"weights is {shown(value)}: give a RewardWeights, or a mapping of its fields")
     if band_bar is None:
@@ -126,8 +124,10 @@ def as_weights(value: Any, band_bar: Any) -> RewardWeights:
 def as_effects(value: Any) -> dict[str, Any]:
     """Sizes of effects by symbol, each a number or (low, high) [SI].
 
-    value: by the effect's name a size, or where it has several a mapping of sizes by symbol.
+    value: by the effect's name a size, or where it has several a mapping of sizes by symbol; None: none.
     """
+    if value is None:
+        return {}
     if not isinstance(value, Mapping):
         raise OptionError(f"effects is {shown(value)}: give a mapping from an effect's name to its size")
     sizes: dict[str, Any] = {}
@@ -143,8 +143,6 @@ def as_effects(value: Any) -> dict[str, Any]:
     return sizes
 
 
-LARGEST = 1e9
-"""More than any weight or parameter is."""
 NUMBERS: dict[str, Range] = {
     "control_period": (0.5e-3, 0.1),
     "supply_voltage": (0.1, 32.0),  # Table 1
@@ -233,38 +231,36 @@ class Settings:
             )
 
 
-def make_settings(
-    plant: Plant,
-    *,
-    parameters: Any = "exact",
-    effects: Any = None,
-    scenario: Any = MIXED,
-    supply: Any = None,
-    weights: Any = None,
-    band_bar: float | None = None,
-    target_bar: Any = (6.0, 9.5),
-    p2_bar: Any = None,
-    p3_bar: Any = None,
-    drop_bar: Any = (0.0, 2.0),
-    conditions: Any = None,
-    supply_voltage: float | None = None,
-    **rest: Any,
-) -> Settings:
-    """Settings from what a user writes; see `EPValveEnv` for the arguments."""
-    return Settings(
-        region=as_region(parameters, plant),
-        effects=as_effects({} if effects is None else effects),
-        scenario=as_scenario(scenario),
-        supply=as_supply(supply),
-        weights=as_weights(RewardWeights() if weights is None else weights, band_bar),
-        target_bar=as_target(target_bar),
-        p2_bar=None if p2_bar is None else as_range("p2_bar", p2_bar),
-        p3_bar=None if p3_bar is None else as_range("p3_bar", p3_bar),
-        drop_bar=as_range("drop_bar", drop_bar, (0.0, 16.0)),
-        conditions=as_conditions(conditions),
-        supply_voltage=plant.voltage if supply_voltage is None else supply_voltage,
-        **rest,
-    )
+READERS: dict[str, Callable[[Any], Any]] = {
+    "effects": as_effects,
+    "supply": as_supply,
+    "scenario": as_scenario,
+    "target_bar": as_target,
+    "p2_bar": lambda value: None if value is None else as_range("p2_bar", value),
+    "p3_bar": lambda value: None if value is None else as_range("p3_bar", value),
+    "drop_bar": lambda value: as_range("drop_bar", value, (0.0, 16.0)),
+    "conditions": as_conditions,
+}
+"""Fields of Settings by what reads them from what a user writes."""
+
+ARGUMENTS = (
+    "plant", "privileged", "render_mode", "parameters", "band_bar", "weights", *READERS, *NUMBERS,
+)  # fmt: skip
+"""What an environment takes; see `EPValveEnv`."""
+
+
+def make_settings(plant: Plant, **options: Any) -> Settings:
+    """Settings from what a user writes, an environment's arguments but the first three of ARGUMENTS.
+
+    Raises OptionError for an unknown argument, or another ValueError for what cannot be used.
+    """
+    check_known("argument", options, ARGUMENTS)
+    region = as_region(options.pop("parameters", "exact"), plant)
+    weights = as_weights(options.pop("weights", None), options.pop("band_bar", None))
+    if options.get("supply_voltage") is None:
+        options["supply_voltage"] = plant.voltage
+    read = {name: READERS[name](v) if name in READERS else v for name, v in options.items()}
+    return Settings(region=region, weights=weights, **read)
 
 
 def checked_options(options: Any) -> dict[str, Any]:
@@ -276,19 +272,8 @@ def checked_options(options: Any) -> dict[str, Any]:
 
 def with_options(settings: Settings, options: Mapping[str, Any], plant: Plant) -> Settings:
     """The settings of one episode. Raises OptionError for an unknown key."""
-    unknown = [key for key in options if key not in OPTIONS]
-    if unknown:
-        raise OptionError(
-            f"unknown reset option {', '.join(map(shown, unknown))}: known are {', '.join(OPTIONS)}"
-        )
-    chosen = {name: options.get(name, getattr(settings, name)) for name in OPTIONS[2:]}
-    made = make_settings(
-        plant,
-        parameters=options.get("parameters", settings.region),
-        effects=options.get("effects"),
-        drop_bar=settings.drop_bar,
-        weights=settings.weights,
-        **{name: getattr(settings, name) for name in NUMBERS},
-        **chosen,
-    )
+    check_known("reset option", options, OPTIONS)
+    others = [entry.name for entry in fields(Settings) if entry.name not in ("region", "effects")]
+    own = {"parameters": settings.region, **{name: getattr(settings, name) for name in others}}
+    made = make_settings(plant, **{**own, **options})
     return made if "effects" in options else replace(made, effects=settings.effects)

@@ -1,6 +1,6 @@
 """What may stand for a number: a range, a target that moves, a recorded consumption."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar
 
@@ -29,6 +29,13 @@ def check_count(name: str, value: Any, least: int = 1, most: int = 10**9) -> Non
     whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     if not whole or not least <= value <= most:
         raise OptionError(f"{name} = {shown(value)}: give a whole number from {least} to {most}")
+
+
+def check_known(what: str, given: Iterable[Any], known: Collection[str]) -> None:
+    """Raises OptionError for a name that is not among the known ones. what: the kind of name."""
+    for name in given:
+        if name not in known:
+            raise OptionError(f"unknown {what} {shown(name)}: known are {', '.join(known)}")
 
 
 def as_seed(value: Any) -> int | None:

@@ -195,3 +195,20 @@ def add_seed(parser: argparse.ArgumentParser, *, default: int = 0, help: str) ->
 def add_workers(parser: argparse.ArgumentParser) -> None:
     """Add --workers, the number of processes."""
     parser.add_argument("--workers", type=Number(int, 1, 1024), help="processes (default: all cores)")
+
+
+def add_device(parser: argparse.ArgumentParser, *, help: str) -> None:
+    """Add --device; help: what runs there."""
+    parser.add_argument(
+        "--device", choices=("cpu", "cuda"), default="cpu",
+        help=f"{help}: the processor, or an NVIDIA accelerator (extra gpu)",
+    )  # fmt: skip
+
+
+def add_episodes(parser: argparse.ArgumentParser) -> None:
+    """Add --duration, --seed, --plant, --workers and --device of the episodes that are compared."""
+    parser.add_argument("--duration", type=SECONDS, default=10.0, help="of an episode [s]")
+    add_seed(parser, help="of the first episode, within its range")
+    add_plant(parser)
+    add_workers(parser)
+    add_device(parser, help="of the plants")

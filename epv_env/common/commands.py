@@ -21,7 +21,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from importlib.metadata import version
-from pathlib import Path
+from importlib.resources import files
 from types import ModuleType
 
 from epv_env.common.command_line import fail_clearly
@@ -49,17 +49,18 @@ def main_of(module: str, *, program: str, arguments: Sequence[str] | None = None
 def commands(packages: Sequence[str]) -> dict[str, str]:
     """Modules of all commands by the commands' names, in alphabetical order."""
     found = {
-        name.strip("_").replace("_", "-"): f"{package}.{name}"
+        module.name.strip("_").replace("_", "-"): f"{package}.{module.name}"
         for package in packages
-        for name in _module_names(package)
-        if {"add_options", "run"} <= _functions(f"{package}.{name}")
+        for module in pkgutil.iter_modules(importlib.import_module(package).__path__)
     }
     return dict(sorted(found.items()))
 
 
 def help_line(module: str) -> str:
     """First line of a module's docstring, without an import: its packages may be missing."""
-    return (ast.get_docstring(_parsed(module)) or "").partition("\n")[0]
+    package, _, name = module.rpartition(".")
+    text = files(package).joinpath(f"{name}.py").read_text(encoding="utf-8")
+    return (ast.get_docstring(ast.parse(text)) or "").partition("\n")[0]
 
 
 def parser_of(module: ModuleType, program: str) -> argparse.ArgumentParser:
@@ -131,18 +132,3 @@ def _alone(run: Callable[[argparse.Namespace], None], options: argparse.Namespac
     # The matrices are small: threads of the linear algebra would only wait for each other.
     with threadpool_limits(1, user_api="blas"), nullcontext() if out is None else only_writer(out):
         run(options)
-
-
-def _module_names(package: str) -> list[str]:
-    path = importlib.import_module(package).__path__
-    return [module.name for module in pkgutil.iter_modules(path)]
-
-
-def _functions(module: str) -> set[str]:
-    return {node.name for node in _parsed(module).body if isinstance(node, ast.FunctionDef)}
-
-
-def _parsed(module: str) -> ast.Module:
-    package, _, name = module.rpartition(".")
-    folder = Path(next(iter(importlib.import_module(package).__path__)))
-    return ast.parse((folder / f"{name}.py").read_text(encoding="utf-8"))

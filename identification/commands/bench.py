@@ -1,16 +1,15 @@
 """Write a campaign of a virtual bench whose truth is known."""
 
 import argparse
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from epv_env.common.command_line import NextStep, add_out, add_plant, add_seed, beside, plant_option
 from epv_env.plant.effects.registry import CATALOGUE
-from epv_env.plant.parameters import Domains, Parameters, written_value
-from epv_env.plant.plantfile import Plant, load_plant, save_plant
+from epv_env.plant.parameters import written_value
+from epv_env.plant.plantfile import load_plant, save_plant
 from epv_env.plant.region import Region
-from identification.bench.programmes import SUITES, Programme, at_voltage, load_programmes
+from identification.bench.programmes import SUITES, at_voltage, load_programmes
 from identification.bench.session import run_bench
 from identification.recordings.campaign_files import check_vacant, write_campaign
 from identification.recordings.rules import RULES, rules_of
@@ -43,15 +42,19 @@ def run(options: argparse.Namespace) -> None:
     """Write the campaign. Raises ValueError for a wrong value, or a folder that holds a campaign."""
     check_vacant(options.out)
     plant = load_plant(options.plant)
+    own = plant.parameters.own_domains
+    true = {name: written_value(name, value, own) for name, value in _true_values(options).items()}
+    truth = plant.parameters.replace(**true)
+    if options.programme:
+        programmes = load_programmes(options.programme, plant.sensors)
+    else:
+        programmes = at_voltage(SUITES[options.suite], plant.voltage)
     rules = rules_of(plant) if options.plant else RULES
-    truth = _with_values(plant.parameters, options.set)
-    truth = _with_effects(truth, options.effect)
-    campaign = run_bench(
-        _suite(options, plant), truth, seed=options.seed, rate=options.rate, rules=rules
-    )
+    campaign = run_bench(programmes, truth, seed=options.seed, rate=options.rate, rules=rules)
     write_campaign(campaign, options.out)
     if options.truth is not None:
-        _save_truth(truth, options)
+        itself = {"parameters": truth, "region": Region(centre=truth), "diagnosis": None}
+        save_plant(replace(plant, **itself, name="truth", provenance={}), options.truth)
     print(f"{len(campaign.recordings)} recordings in {options.out}")
     if options.programme:
         print("to add them to another campaign, see docs/how-to/diagnose-a-gap.md")
@@ -63,55 +66,26 @@ def next_step(options: argparse.Namespace) -> NextStep:
     return NextStep("to calibrate the model on these recordings", words)
 
 
-def _suite(options: argparse.Namespace, plant: Plant) -> Sequence[Programme]:
-    """The recordings to make, at the voltage of the plant's coil."""
-    if options.programme:
-        return load_programmes(options.programme, plant.sensors)
-    return at_voltage(SUITES[options.suite], plant.voltage)
-
-
-def _save_truth(truth: Parameters, options: argparse.Namespace) -> None:
-    """Write the true parameters as a plant file whose region is that one point."""
-    plant = load_plant(options.plant)
-    truthful = replace(
-        plant, parameters=truth, region=Region(centre=truth), diagnosis=None, name="truth", provenance={}
-    )
-    save_plant(truthful, options.truth)
-
-
-def _with_values(parameters: Parameters, settings: list[str]) -> Parameters:
-    """Parameters with SYMBOL=VALUE settings applied. Raises ValueError for what is not of that form."""
-    changes = {}
-    for setting in settings:
+def _true_values(options: argparse.Namespace) -> dict[str, float]:
+    """What --set and --effect give, by symbol. Raises ValueError for what is not of their form."""
+    values: dict[str, float] = {}
+    for setting in options.set:
         symbol, _, text = setting.partition("=")
-        changes[symbol] = _number(text, f"--set {setting}: give SYMBOL=VALUE", "--set R=43.5")
-    return parameters.replace(**_written(changes, parameters.own_domains))
-
-
-def _written(values: dict[str, float], own: Domains) -> dict[str, float]:
-    """Values by symbol as a person wrote them; ParameterError for one in the wrong unit."""
-    return {symbol: written_value(symbol, value, own) for symbol, value in values.items()}
-
-
-def _with_effects(parameters: Parameters, settings: list[str]) -> Parameters:
-    """Parameters with NAME=SIZE effects switched on; commas separate several sizes of one effect."""
-    for setting in settings:
+        values[symbol] = _number(text, f"--set {setting}: give SYMBOL=VALUE", "--set R=43.5")
+    for setting in options.effect:
         name, _, text = setting.partition("=")
-        symbols = CATALOGUE.get(name)
+        symbols, sizes = CATALOGUE.get(name), text.split(",")
         if symbols is None:
             raise ValueError(f"--effect {setting}: unknown effect; known are {', '.join(CATALOGUE)}")
-        sizes = text.split(",")
         if len(sizes) != len(symbols):
             raise ValueError(
                 f"--effect {setting}: {name} is sized by {', '.join(symbols)}: give a number for each, "
                 "parted by commas"
             )
         rule = f"--effect {setting}: give NAME=SIZE"
-        values = [_number(size, rule, "--effect piston_friction=8,0") for size in sizes]
-        parameters = parameters.replace(
-            **_written(dict(zip(symbols, values, strict=True)), parameters.own_domains)
-        )
-    return parameters
+        for symbol, size in zip(symbols, sizes, strict=True):
+            values[symbol] = _number(size, rule, "--effect piston_friction=8,0")
+    return values
 
 
 def _number(text: str, rule: str, example: str) -> float:

@@ -50,7 +50,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Run all stages on the campaign, or one. Raises CampaignError."""
-    identification = _identification(options)
+    plant = load_plant(options.plant) if options.plant else None
+    campaign = read_campaign(options.campaign, rules_of(plant) if plant else RULES)
+    searches, chosen = options.out / JOURNAL, {"seed": options.seed, "starts": options.starts}
+    identification = Identification(campaign, searches, plant=plant, **chosen)
     if options.stage:
         _run_stage(options, identification)
         return
@@ -68,18 +71,6 @@ def next_step(options: argparse.Namespace) -> NextStep:
         return NextStep("to run all stages and write plant.json", words)
     words = ("gap", options.campaign, "--out", beside(options.out, "gap"), *plant)
     return NextStep("to find out what the model lacks", words)
-
-
-def _identification(options: argparse.Namespace) -> Identification:
-    plant = load_plant(options.plant) if options.plant else None
-    campaign = read_campaign(options.campaign, rules_of(plant) if plant else RULES)
-    return Identification(
-        campaign,
-        options.out / JOURNAL,
-        seed=options.seed,
-        plant=plant,
-        starts=options.starts,
-    )
 
 
 def _run_stage(options: argparse.Namespace, identification: Identification) -> None:

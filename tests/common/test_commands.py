@@ -46,7 +46,6 @@ def package(tmp_path, monkeypatch):
     folder.mkdir()
     (folder / "__init__.py").touch()
     (folder / "say_hello_.py").write_text(GREET)
-    (folder / "shared.py").write_text("def run():\n    pass\n")
     monkeypatch.syspath_prepend(tmp_path)
     yield "greeting_commands"
     for name in [name for name in sys.modules if name.startswith("greeting_commands")]:

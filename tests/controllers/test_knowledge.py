@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from controllers.knowledge import (
-    LEARNT,
     READINGS,
     LearntObservation,
     ValveKnowledge,
@@ -15,7 +14,7 @@ from controllers.knowledge import (
 )
 from controllers.pulse import AdaptivePulse
 from controllers.tuned import tuned
-from controllers.valve_learner import VALVE
+from controllers.valve_learner import LEARNT, VALVE
 from epv_env.observation import LAYOUT, encode
 from epv_env.plant.plantfile import Plant
 from training.evaluation.rollout import run_episodes

@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("safetensors")
 from safetensors.numpy import load_file, save_file
 
-from controllers.knowledge import LEARNT, READINGS
+from controllers.knowledge import READINGS
 from controllers.policy import TRAINED, Policy, load_policy
 from controllers.policy_files import (
     CONTRACT_FILE,
@@ -20,6 +20,7 @@ from controllers.policy_files import (
     read_policy,
     write_policy,
 )
+from controllers.valve_learner import LEARNT
 from epv_env.plant.plantfile import Plant
 from training.evaluation.rollout import run_episodes
 

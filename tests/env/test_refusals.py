@@ -37,6 +37,7 @@ EITHER_WAY = [
     ),
 ]
 AT_CONSTRUCTION = [
+    ({"foo": 1}, "unknown argument 'foo': known are plant, privileged, .* target_bar, .* sensor_noise"),
     ({"control_period": 2.0}, "control_period = 2 must lie in 0.0005 to 0.1"),
     ({"supply_voltage": 48.0}, "supply_voltage = 48 must lie in 0.1 to 32"),
     ({"settling_time": float("nan")}, "settling_time = nan must lie in 0 to 3600"),

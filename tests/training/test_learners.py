@@ -9,11 +9,11 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 import torch
-from stable_baselines3.common.callbacks import BaseCallback
 
-from controllers.knowledge import LEARNT, READINGS
+from controllers.knowledge import READINGS
 from controllers.policy import load_policy
 from controllers.policy_files import read_policy
+from controllers.valve_learner import LEARNT
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from training.commands.train import sentence_of
@@ -91,13 +91,11 @@ def test_an_episode_that_leaves_costs_more_than_a_good_one_loses():
     assert score(good) > score(leaving)
 
 
-class Stop(BaseCallback):
+def stop(course: ppo.Course) -> bool:
     """Ends a training as a kill would: nothing more is written."""
-
-    def _on_step(self) -> bool:
-        if self.num_timesteps >= 1500:
-            raise KeyboardInterrupt
-        return True
+    if course.num_timesteps >= 1500:
+        raise KeyboardInterrupt
+    return True
 
 
 def test_a_stopped_training_ends_with_the_same_policy(tmp_path: Path, monkeypatch):
@@ -105,7 +103,7 @@ def test_a_stopped_training_ends_with_the_same_policy(tmp_path: Path, monkeypatc
     whole, stopped = tmp_path / "whole", tmp_path / "stopped"
     rows = train(TASK, whole, timesteps=2048, **SHORT)
     with monkeypatch.context() as patch:
-        patch.setattr(ppo, "Progress", lambda total: Stop())
+        patch.setattr(ppo.Course, "_on_step", stop)
         with pytest.raises(KeyboardInterrupt):
             train(TASK, stopped, timesteps=2048, **SHORT)
     newest = newest_checkpoint(stopped)

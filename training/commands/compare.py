@@ -15,12 +15,11 @@ import numpy as np
 import pandas as pd
 
 from controllers.tuned import load_tunings
-from epv_env.common.command_line import COUNT, NextStep, add_out, beside, plant_option
+from epv_env.common.command_line import COUNT, NextStep, add_episodes, add_out, beside, plant_option
 from epv_env.common.files import Journal, write_json, write_text
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.valves import available_cores
 from epv_env.vector_entry import check_device
-from training.commands.options import add_episodes
 from training.evaluation.named import HELP, is_own, named_controllers
 from training.evaluation.plots import episode_overlay, save_figure
 from training.evaluation.rollout import decision_times, run_episodes

@@ -20,7 +20,15 @@ from typing import Any
 from controllers.monitor import Monitor, MonitorModel
 from controllers.policy import TRAINED, load_policy
 from controllers.policy_files import WEIGHTS_FILE, read_contract
-from epv_env.common.command_line import COUNT, SECONDS, NextStep, beside, plant_option, writable_folder
+from epv_env.common.command_line import (
+    COUNT,
+    SECONDS,
+    NextStep,
+    add_plant,
+    beside,
+    plant_option,
+    writable_folder,
+)
 from epv_env.common.files import write_bytes
 from epv_env.plant.plantfile import Plant, load_plant
 from training.deploy import agreement as verdict
@@ -44,11 +52,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--monitor", type=Path, help="monitor.json of `epv monitor`: its C code, too")
     parser.add_argument("--fmu", action="store_true", help="an FMU of the policy, too")
-    parser.add_argument(
-        "--plant",
-        type=Path,
-        help="plant file: exported, or nominal for a policy (default: the report's)",
-    )
+    add_plant(parser, help="plant file: exported, or nominal for a policy (default: the report's)")
     parser.add_argument(
         "--compiler", default=os.environ.get("CC", "cc"),
         help="C compiler; '' for a plant's sources alone (default: cc)",

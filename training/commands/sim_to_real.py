@@ -7,53 +7,47 @@ simulation and diagnosis see what a user sees. Finished steps in --out are kept.
 """
 
 import argparse
-import importlib
 import sys
-from pathlib import Path
 from typing import Any
 
-from controllers.base import Controller
-from controllers.policy import load_policy
-from controllers.policy_files import holds_policy
 from controllers.tuned import tuned_controllers
 from epv_env.common.command_line import COUNT, SECONDS, NextStep, add_out, add_seed, beside
 from epv_env.common.commands import parse
 from epv_env.common.files import Journal, decoded, write_json, write_text
 from epv_env.common.results_folder import check_options, write_options
 from epv_env.plant.plantfile import Plant, load_plant
-from epv_env.reward import RewardWeights
 from identification.bench.programmes import SUITES
-from training.evaluation.metrics import EpisodeMetrics
+from identification.commands import bench
+from identification.gap.report.gap_json import GAP
+from training.evaluation.plots import COLOURS, save_figure
 from training.evaluation.scenarios import EvaluationScenario
-from training.studies.comparison import compare
+from training.studies.comparison import Results, as_text, compare, rows
 from training.studies.sim_to_real import (
-    AFTER,
-    AROUND,
-    BEFORE,
-    ITSELF,
+    CORRECTED,
     MEASURED,
+    SCENARIO,
     SIMULATED,
-    Deployments,
     diagnosis_text,
     gap_table,
-    performance_figure,
-    performance_table,
-    short_table,
+    share_picture,
+    trained,
 )
 
 QUICK: dict[str, Any] = {"timesteps": 8192, "episodes": 8, "duration": 1.0, "suite": "report"}
 
-SCENARIO = "mixed"
-"""Consumption of trainings and deployments."""
-TRAINING_REGION = "ten_percent"
-"""Plants around the simulated one that PPO trains on: no wider, so that a gap is felt."""
-SWITCHING_PRICE = 0.2
-"""Price of a switching in the reward [1]. Below the default: at a high price, so short a training has
-not learned to control yet."""
-
-WITHHELD, CAMPAIGN = "withheld/plant.json", "campaign"
-GAP, CORRECTED = "diagnosis/gap.json", "diagnosis/plant.json"
-RESULT, PICTURE = "sim-to-real.json", "sim-to-real.png"
+BEFORE, AFTER = "before", "after"
+"""Stages: trained on the nominal plant, retrained on the corrected one."""
+REGION = "ten_percent"
+"""Plants around the simulated one that PPO trains on: no wider, so that a gap is felt. Policies are
+deployed on the plant itself (C1, C2), and on plants of this region around it (C3)."""
+MARKS = {
+    f"{stage}, {place}": (marker, inside, 7)
+    for stage, marker in ((BEFORE, "s"), (AFTER, "o"))
+    for place, inside in ((SIMULATED, "white"), (MEASURED, COLOURS[0]))
+}
+"""In the picture."""
+WITHHELD, CAMPAIGN, DIAGNOSIS = "withheld/plant.json", "campaign", "diagnosis"
+"""The bench's valve, its recordings, and what is made of them, within the folder of results."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -73,23 +67,29 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """The four steps, those that --out lacks; write sim-to-real.json, tables and the picture.
+    """The four steps, those that --out lacks; write sim-to-real.json, performance.csv and the picture.
 
     Raises ValueError for a folder that was begun with other options, or an effect that cannot be used.
     """
+    from identification.commands import gap  # with the extra `identification`
+
+    out, seed = options.out, ("--seed", str(options.seed))
     settings = {name: v for name, v in vars(options).items() if name not in ("out", "quick")}
-    check_options(options.out, settings, "sim-to-real run")
-    _announce("1 of 4: the bench records its valve")
-    record(options)
-    write_options(options.out, settings)
+    check_options(out, settings, "sim-to-real run")
+    _announce("1 of 4: the bench records its valve")  # first: refuses an effect that cannot be used
+    if not (out / WITHHELD).exists():
+        made = ("--suite", options.suite, "--effect", options.effect, *seed)
+        where = ("--out", str(out / CAMPAIGN), "--truth", str(out / WITHHELD))
+        bench.run(parse(bench, "bench", [*made, *where]))
+    write_options(out, settings)
     _announce("2 of 4: train on the nominal plant, deploy")
-    before = stage(BEFORE, load_plant(None), options)
+    results = deployed(BEFORE, load_plant(None), options)
     _announce("3 of 4: diagnose the campaign")
-    diagnosis = diagnose(options)
+    if not (out / DIAGNOSIS / GAP).exists():  # written last, after the corrected plant
+        gap.run(parse(gap, "gap", [str(out / CAMPAIGN), "--out", str(out / DIAGNOSIS), *seed]))
     _announce("4 of 4: train on the corrected plant, deploy")
-    after = stage(AFTER, load_plant(options.out / CORRECTED), options)
-    print(report({**before, **after}, diagnosis, options.effect, options.out))
-    print(f"\nresults in {options.out}")
+    results |= deployed(AFTER, load_plant(out / DIAGNOSIS / CORRECTED), options)
+    report(results, options)
 
 
 def next_step(options: argparse.Namespace) -> NextStep:
@@ -100,92 +100,49 @@ def next_step(options: argparse.Namespace) -> NextStep:
     return NextStep("to compare both policies on the bench's valve", words)
 
 
-def record(options: argparse.Namespace) -> None:
-    """Build the bench's valve and record its campaign: the only step that knows the effect.
-
-    It comes first, so that an effect that cannot be used is refused before anything is trained.
-    """
-    if not (options.out / WITHHELD).exists():
-        _identification("bench", [
-            "--suite", options.suite, "--effect", options.effect, "--seed", str(options.seed),
-            "--out", str(options.out / CAMPAIGN), "--truth", str(options.out / WITHHELD),
-        ])  # fmt: skip
-
-
-def diagnose(options: argparse.Namespace) -> dict[str, Any]:
-    """The diagnosis of the campaign, as gap.json has it; it gets nothing but the recordings."""
-    path = options.out / GAP  # written last, after the corrected plant
-    if not path.exists():
-        into = ["--out", str(path.parent), "--seed", str(options.seed)]
-        _identification("gap", [str(options.out / CAMPAIGN), *into])
-    return decoded(path, remedy=f"remove {path.parent}, and the diagnosis runs again")
-
-
-def trained(folder: Path, plant: Plant, options: argparse.Namespace) -> Controller:
-    """PPO trained on plants around this one, or as it was trained before."""
-    if not holds_policy(folder):
-        from training.learners.ppo import Task, train  # torch takes seconds to import: only now
-
-        task = Task(
-            plant=plant, scenario=SCENARIO, parameters=TRAINING_REGION,
-            weights=RewardWeights(switching=SWITCHING_PRICE),
-        )  # fmt: skip
-        train(
-            task, folder, seed=options.seed, timesteps=options.timesteps, resume=True,
-            provenance={"plant": plant.name},
-        )  # fmt: skip
-    return load_policy(folder, plant)
-
-
-def stage(name: str, simulated: Plant, options: argparse.Namespace) -> Deployments:
+def deployed(stage: str, simulated: Plant, options: argparse.Namespace) -> Results:
     """Train on the simulated plant, then deploy in simulation and on the bench's valve.
 
     The classic controllers keep their tuning for the nominal plant.
     """
-    folder = options.out / name
-    everyone = [trained(folder, simulated, options), *tuned_controllers()]
+    folder, training = options.out / stage, {"seed": options.seed, "timesteps": options.timesteps}
+    policy = trained(folder, simulated, REGION, **training)
+    journal = Journal(folder / "deployments.jsonl", {"stage": stage})
+    controllers = {controller.name: controller for controller in (policy, *tuned_controllers())}
     scenario = EvaluationScenario(meaning="as in training", options={"scenario": SCENARIO})
-    deployments: dict[tuple[str, str, str, str], EpisodeMetrics] = {}
+    results: Results = {}
     for place, plant in ((SIMULATED, simulated), (MEASURED, load_plant(options.out / WITHHELD))):
-        found = compare(
-            {controller.name: controller for controller in everyone}, plant=plant,
-            scenarios={SCENARIO: scenario}, episodes=options.episodes, duration=options.duration,
-            plant_sets=(ITSELF, AROUND), journal=Journal(folder / f"{place}.jsonl", {"place": place}),
+        results |= compare(
+            controllers, plant=plant, scenarios={f"{stage}, {place}": scenario},
+            episodes=options.episodes, duration=options.duration, plant_sets=("calibrated", REGION),
+            journal=journal,
         )  # fmt: skip
-        for (plants, _, label), metrics in found.items():
-            deployments[name, place, plants, label] = metrics
-    return deployments
+    return results
 
 
-def report(deployments: Deployments, diagnosis: dict[str, Any], withheld: str, folder: Path) -> str:
-    """Write sim-to-real.json, performance.csv and the picture; return what is to be printed.
-
-    Args:
-        deployments: of both stages.
-        diagnosis: the content of gap.json.
-        withheld: the effect of the bench's valve.
-        folder: where the files are written.
-    """
-    from training.evaluation.plots import save_figure  # matplotlib takes a second to import: only now
-
-    performance, gaps = performance_table(deployments), gap_table(deployments)
+def report(results: Results, options: argparse.Namespace) -> None:
+    """Write the files of results, and print what they say of the valve itself."""
+    out, performance, gaps = options.out, rows(results), gap_table(results)
+    diagnosis = decoded(out / DIAGNOSIS / GAP, remedy=f"remove {out / DIAGNOSIS}")
     content = {
-        "withheld": withheld,
+        "withheld": options.effect,
         "diagnosis": {key: diagnosis[key] for key in ("verdict", "causes", "ambiguity_set", "gap")},
         "aims": performance.to_dict("records"),
         "gaps": gaps.to_dict("records"),
     }
-    write_json(folder / RESULT, content, allow_nan=False)
-    write_text(folder / "performance.csv", performance.to_csv(index=False))
-    save_figure(performance_figure(performance), folder / PICTURE)
-    text = short_table(performance, gaps).to_string(index=False)
-    return f"{diagnosis_text(diagnosis, withheld)}\n\n{text}"
-
-
-def _identification(command: str, arguments: list[str]) -> None:
-    """Run a command of the identification."""
-    module = importlib.import_module(f"identification.commands.{command}")
-    module.run(parse(module, command, arguments))
+    write_json(out / "sim-to-real.json", content, allow_nan=False)
+    write_text(out / "performance.csv", performance.to_csv(index=False))
+    itself: Any = performance[performance["plants"] == "calibrated"]
+    shares = itself.pivot(index="controller", columns="scenario", values="left_percent")
+    save_figure(share_picture(shares, MARKS), out / "sim-to-real.png")
+    print(f"withheld: {options.effect}; diagnosis: {diagnosis_text(out / DIAGNOSIS)}\n")
+    for _, stage in itself.groupby("scenario", sort=False):
+        print(f"{as_text(stage)}\n")
+    error: Any = gaps[(gaps["plants"] == "calibrated") & (gaps["score"] == "rms error [mbar]")]
+    columns = ["stage", "controller", "difference", "low", "high"]
+    print("rms error, measured minus simulated [mbar], with its 95 % interval:")
+    print(error[columns].to_string(index=False, float_format=lambda value: f"{value:+.0f}"))
+    print(f"\nresults in {out}")
 
 
 def _announce(step: str) -> None:

@@ -14,13 +14,12 @@ from typing import Any
 import pandas as pd
 
 from controllers.policy_files import holds_policy
-from epv_env.common.command_line import COUNT, NextStep, add_out, beside, plant_option
+from epv_env.common.command_line import COUNT, NextStep, add_episodes, add_out, beside, plant_option
 from epv_env.common.files import Journal, write_json, write_text
 from epv_env.plant.consumption import check_scenario
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.valves import available_cores
 from epv_env.vector_entry import check_device
-from training.commands.options import add_episodes
 from training.evaluation.batches import Batch, in_batches, run_batches
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.named import HELP, named_controllers

@@ -24,6 +24,7 @@ from epv_env.common.command_line import (
     SECONDS,
     NextStep,
     Number,
+    add_device,
     add_out,
     add_plant,
     add_seed,
@@ -37,7 +38,6 @@ from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.region import DIAGNOSIS, REGIONS
 from epv_env.reward import RewardWeights
 from epv_env.settings import as_region
-from training.commands.options import add_device
 from training.evaluation.plots import plt, save_figure
 from training.evaluation.scenarios import EvaluationScenario
 from training.studies.comparison import as_text, compare, differences, figure, rows

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.base import Controller
-from controllers.knowledge import LEARNT, ValveKnowledge
+from controllers.knowledge import ValveKnowledge
+from controllers.valve_learner import LEARNT
 from epv_env.observation import LAYOUT
 from training.deploy.c_code import LEAST_AGREEMENT, Export
 from training.deploy.compiled import READINGS, CompiledPolicy, logits_of, readings_of

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from controllers import knowledge, p3_check, pulse, valve_learner
 from controllers.hysteresis import Hysteresis
-from controllers.knowledge import LEARNT
 from controllers.p3_check import P3Check
 from controllers.policy import Policy
 from controllers.policy_files import RULES, learnt_contract
+from controllers.valve_learner import LEARNT
 from epv_env.observation import HISTORY, INDEX, LAYOUT, LONGEST_WAIT, P2_LAGS, P3_LAGS, contract
 from training.deploy.controller_c import (
     ARRAY,
@@ -114,7 +114,7 @@ def learner_c(export: Export) -> ControllerC:
     c.function(valve_learner.begin, (VALVE,))
     c.function(valve_learner.observe, (VALVE, PLANT, PLANT, ARRAY, REAL, REAL, REAL))
     c.function(pulse.plan, (VALVE, PLANT, PLANT, PLANT, REAL))
-    c.function(knowledge.describe, (VALVE, ARRAY))
+    c.function(knowledge.shown, (REAL, REAL))
     c.function(knowledge.cannot_raise, (VALVE,))
     c.function(knowledge.would_rise_too_far, (VALVE,))
     return c
@@ -124,6 +124,10 @@ def sources(export: Export) -> dict[str, str]:
     """The text of each file of CODE. A KeyError says that an entry of the layout is new."""
     layers, learner = export.layers, learner_c(export)
     values = "\n".join(f"    value[{i}] = {VALUES[entry.name]};" for i, entry in enumerate(LAYOUT))
+    learnt = "\n".join(
+        f"    inputs[{len(LAYOUT) + k}] = fn_shown(m->valve.{entry.name}, {k});"
+        for k, entry in enumerate(LEARNT)
+    )
     fields: dict[str, Any] = {
         "title": TITLE,
         "source": f"Weights with SHA-256 {export.weights_sha256}.",
@@ -137,6 +141,7 @@ def sources(export: Export) -> dict[str, str]:
         "layers": len(layers),
         "widest": export.widest,
         "values": values,
+        "learnt": learnt,
         "valve": learner.valve(),
         "advice": listed(export.policy.network.advice_weight),
         "filter_time": literal(valve_learner.FILTER_TIME),

@@ -27,6 +27,8 @@ HELP = (
 )
 """Of the options that take controllers."""
 
+PROTOCOL = ("name", "environment", "reset", "act")
+"""What a controller has."""
 UNTUNED = tuple(entry.kind for entry in REGISTRY if entry.search_space is None)
 """Kinds that have nothing to tune, because they see what no control unit measures."""
 
@@ -96,23 +98,22 @@ def _imported(source: str) -> tuple[str, Controller, bytes]:
     module_name, _, class_name = source.partition(":")
     if os.getcwd() not in sys.path:
         sys.path.insert(0, os.getcwd())
+    remedy = "correct the module"
     try:
         module = importlib.import_module(module_name)
-    except ModuleNotFoundError as error:
-        raise ValueError(
-            f"controller {source}: {error}: give MODULE:CLASS of a module in {os.getcwd()} or installed"
-        ) from None
+        found, remedy = getattr(module, class_name, None), "give every argument a default value"
+        controller: Any = found() if inspect.isclass(found) else None
     except Exception as error:  # whatever the user's own code raises
-        raise ValueError(_failure(source, error, "correct the module")) from error
-    found = getattr(module, class_name, None)
-    if not inspect.isclass(found):
+        if isinstance(error, ModuleNotFoundError):
+            remedy = f"give MODULE:CLASS of a module in {os.getcwd()} or installed"
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        own = last.filename != __file__ and os.path.exists(last.filename)
+        place = f" ({last.filename}, line {last.lineno})" if own else ""
+        text = f"{type(error).__name__}: {' '.join(str(error).split())}{place}"
+        raise ValueError(f"controller {source}: {text}: {remedy}") from error
+    if controller is None:
         raise ValueError(f"controller {source}: module {module_name} has no class {class_name}")
-    try:
-        controller: Any = found()
-    except Exception as error:
-        raise ValueError(_failure(source, error, "give every argument a default value")) from error
-    lacking = [name for name in ("name", "environment", "reset", "act") if not hasattr(controller, name)]
-    if lacking:
+    if lacking := [name for name in PROTOCOL if not hasattr(controller, name)]:
         raise ValueError(
             f"controller {source} lacks {', '.join(lacking)}: controllers/base.py has the protocol"
         )
@@ -122,11 +123,3 @@ def _imported(source: str) -> tuple[str, Controller, bytes]:
             f"{shown(controller.environment)}: give a text and one of {', '.join(MAX_EPISODE_STEPS)}"
         )
     return controller.name, controller, inspect.getsource(module).encode()
-
-
-def _failure(source: str, error: Exception, remedy: str) -> str:
-    """A sentence on an error of the user's own code: what, and the line that raised it."""
-    last = traceback.extract_tb(error.__traceback__)[-1]
-    place = "" if last.filename == __file__ else f" ({last.filename}, line {last.lineno})"
-    text = " ".join(str(error).split())
-    return f"controller {source}: {type(error).__name__}: {text}{place}: {remedy}"

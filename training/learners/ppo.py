@@ -1,13 +1,12 @@
 """Training with stable-baselines3's PPO: the model, the choice of the best policy, and resumption."""
 
-import csv
-import io
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
@@ -73,7 +72,10 @@ there meets the same ones as an uninterrupted one."""
 
 
 def linear(first: float, last: float, remaining: float) -> float:
-    """The value between `first` and `last` when the share `remaining` of a training lies ahead [1]."""
+    """The value between `first` and `last` when the share `remaining` of a training lies ahead [1].
+
+    stable-baselines3's LinearSchedule rounds otherwise, so that a seed would give another policy.
+    """
     return last + (first - last) * remaining
 
 
@@ -117,107 +119,88 @@ class Task:
     """Prices of the reward; some are raised for the training."""
 
 
-def validate(policy: Policy, task: Task, *, episodes: int, duration: float) -> EpisodeMetrics:
-    """The policy's metrics on the validation episodes."""
-    options = {**vars(task), "conditions": VALIDATION_CONDITIONS}
-    seeds = list(range(VALIDATION_SEED, VALIDATION_SEED + episodes))
-    return run_episodes(policy, seeds=seeds, duration=duration, options=options)[0]
-
-
 def score(metrics: EpisodeMetrics) -> float:
     """How good a policy is: its mean return less the price of its violations."""
     return float(metrics.episode_return.mean() - VIOLATION_PRICE * (~metrics.stayed).mean())
 
 
-class Selection(BaseCallback):
-    """Validates the greedy policy at some points of the training, and keeps the best in a folder."""
+class Course(BaseCallback):
+    """What happens between rollouts: less entropy, validations, checkpoints, and the bar.
+
+    The policy that validates best is kept in a folder, as `score` judges the greedy one.
+    stable-baselines3's EvalCallback knows the mean return alone, and its CheckpointCallback saves amid a
+    rollout, from where a training does not go on to the same policy.
+    """
 
     def __init__(
-        self, task: Task, folder: Path, *, total: int, episodes: int, duration: float,
-        provenance: dict[str, Any],
+        self, task: Task, folder: Path, bar: tqdm, *, total: int, seed: int, episodes: int,
+        duration: float, provenance: dict[str, Any],
     ):  # fmt: skip
         super().__init__()
-        self._task, self._folder, self._total = task, folder, total
-        self._episodes, self._duration, self._provenance = episodes, duration, provenance
+        self._task, self._folder, self._bar = task, folder, bar
+        self._total, self._seed, self._provenance = total, seed, provenance
+        seeds = list(range(VALIDATION_SEED, VALIDATION_SEED + episodes))
+        options = {**vars(task), "conditions": VALIDATION_CONDITIONS}
+        self._validation: dict[str, Any] = {"seeds": seeds, "duration": duration, "options": options}
         self._points = [
             round(share * total) for share in np.linspace(FIRST_VALIDATION, 1.0, VALIDATIONS)
         ]
-        self.rows: list[dict[str, float]] = []
-        """One for each validation."""
 
     def _on_training_start(self) -> None:
         """Forget what was validated after the checkpoint that the training goes on from."""
-        done = self.num_timesteps
-        self.rows = [row for row in read_rows(self._folder) if row["timesteps"] <= done]
-        self._points = [point for point in self._points if point > done]
+        (self._folder / CHECKPOINTS).mkdir(parents=True, exist_ok=True)
+        self._checked = self._saved = self.num_timesteps
+        self._rows = [r for r in read_rows(self._folder) if r["timesteps"] <= self.num_timesteps]
 
     def _on_step(self) -> bool:
         return True
 
     def _on_rollout_start(self) -> None:
         assert isinstance(self.model, PPO)
-        self.model.ent_coef = linear(ENTROPY, 0.0, max(1 - self.num_timesteps / self._total, 0.0))
+        self.model.ent_coef = ENTROPY * max(1 - self.num_timesteps / self._total, 0.0)
         self._validate_if_due()
+        if self.num_timesteps >= self._saved + CHECKPOINT_STEPS:
+            self._saved = self.num_timesteps
+            self.model.save(self._folder / CHECKPOINTS / f"ppo_{self.num_timesteps}_steps")
+            seed_episodes(self.model, self._seed)
+            self.model._last_obs = self.training_env.reset()  # type: ignore[assignment]
+            self.model._last_episode_starts = np.ones(self.training_env.num_envs, dtype=bool)
+
+    def _on_rollout_end(self) -> None:
+        """The bar shows the share of episodes that stay within the band while the policy explores."""
+        self._bar.update(min(self.num_timesteps, self._total) - self._bar.n)
+        if self.model.ep_success_buffer:
+            self._bar.set_postfix(stayed=f"{np.mean(self.model.ep_success_buffer):.0%}")
 
     def _on_training_end(self) -> None:
         self._validate_if_due()
 
     def _validate_if_due(self) -> None:
         """Validate once for all points that have been passed since the last time."""
-        later = [point for point in self._points if point > self.num_timesteps]
-        if len(later) == len(self._points):
+        due = any(self._checked < point <= self.num_timesteps for point in self._points)
+        self._checked = self.num_timesteps
+        if not due:
             return
-        self._points = later
         assert isinstance(self.model, PPO)
         network = network_of(self.model)
         policy = Policy(network=network, plant=self._task.plant)
-        metrics = validate(policy, self._task, episodes=self._episodes, duration=self._duration)
-        best = max((row["score"] for row in self.rows), default=-np.inf)
-        row = {"timesteps": float(self.num_timesteps), **figures(metrics)}
-        if row["score"] > best:
+        metrics, _ = run_episodes(policy, **self._validation)
+        row = {
+            "timesteps": float(self.num_timesteps),
+            "score": score(metrics),
+            "episodes": float(len(metrics)),
+            "left": float((~metrics.stayed).sum()),
+            "mean_return": float(metrics.episode_return.mean()),
+            "rms_error_bar": float((metrics.rms_bar**2).mean() ** 0.5),
+            "switchings_per_s": float(metrics.switchings_per_s.mean()),
+        }
+        if row["score"] > max((row["score"] for row in self._rows), default=-np.inf):
             write_policy(
                 network, self._folder / BEST, control_period=OnOff.default_period,
                 provenance={**self._provenance, "timesteps": self.num_timesteps},
             )  # fmt: skip
-        self.rows.append(row)
-        write_rows(self._folder, self.rows)
-
-
-def figures(metrics: EpisodeMetrics) -> dict[str, float]:
-    """A row of the validation's table; `left` counts episodes that leave the band."""
-    return {
-        "score": score(metrics),
-        "episodes": float(len(metrics)),
-        "left": float((~metrics.stayed).sum()),
-        "mean_return": float(metrics.episode_return.mean()),
-        "rms_error_bar": float((metrics.rms_bar**2).mean() ** 0.5),
-        "switchings_per_s": float(metrics.switchings_per_s.mean()),
-    }
-
-
-class Checkpoints(BaseCallback):
-    """Saves the model from time to time, and begins new episodes then."""
-
-    def __init__(self, seed: int, folder: Path):
-        super().__init__()
-        self._seed, self._folder = seed, folder
-
-    def _on_training_start(self) -> None:
-        self._folder.mkdir(parents=True, exist_ok=True)
-        self._next = self.num_timesteps + CHECKPOINT_STEPS
-
-    def _on_step(self) -> bool:
-        return True
-
-    def _on_rollout_start(self) -> None:
-        if self.num_timesteps < self._next:
-            return
-        self._next = self.num_timesteps + CHECKPOINT_STEPS
-        assert isinstance(self.model, PPO)
-        self.model.save(self._folder / f"ppo_{self.num_timesteps}_steps")
-        seed_episodes(self.model, self._seed)
-        self.model._last_obs = self.training_env.reset()  # type: ignore[assignment]
-        self.model._last_episode_starts = np.ones(self.training_env.num_envs, dtype=bool)
+        self._rows.append(row)
+        write_text(self._folder / VALIDATION_FILE, pd.DataFrame(self._rows).to_csv(index=False))
 
 
 def seed_episodes(model: PPO, seed: int) -> None:
@@ -226,31 +209,6 @@ def seed_episodes(model: PPO, seed: int) -> None:
     assert env is not None
     set_random_seed(seed + model.num_timesteps)
     env.seed(first_training_seed(seed, model.num_timesteps, env.num_envs))
-
-
-class Progress(BaseCallback):
-    """A progress bar with the share of episodes that stay within the band while the policy explores."""
-
-    def __init__(self, total: int):
-        super().__init__()
-        self._total = total
-
-    def _on_training_start(self) -> None:
-        self._bar = tqdm(
-            total=self._total, initial=self.num_timesteps, desc="PPO", unit="step",
-            unit_scale=True, mininterval=0.5,
-        )  # fmt: skip
-
-    def _on_step(self) -> bool:
-        return True
-
-    def _on_rollout_end(self) -> None:
-        self._bar.update(min(self.num_timesteps, self._total) - self._bar.n)
-        if self.model.ep_success_buffer:
-            self._bar.set_postfix(stayed=f"{np.mean(self.model.ep_success_buffer):.0%}")
-
-    def _on_training_end(self) -> None:
-        self._bar.close()
 
 
 def train(
@@ -294,17 +252,18 @@ def train(
     )
     model.set_logger(Logger(folder=None, output_formats=[]))  # the default leaves a folder in /tmp
     seed_episodes(model, seed)
-    selection = Selection(
-        task, folder, total=timesteps, episodes=validation_episodes, duration=validation_duration,
-        provenance={"seed": seed, **(provenance or {})},
-    )  # fmt: skip
-    checkpoints = Checkpoints(seed, folder / CHECKPOINTS)
     if model.num_timesteps < timesteps:
-        model.learn(
-            timesteps - model.num_timesteps,
-            callback=[selection, checkpoints, Progress(timesteps)],
-            reset_num_timesteps=newest is None,
-        )
+        with tqdm(
+            total=timesteps, initial=model.num_timesteps, desc="PPO", unit="step", unit_scale=True,
+            mininterval=0.5,
+        ) as bar:  # fmt: skip
+            course = Course(
+                task, folder, bar, total=timesteps, seed=seed, episodes=validation_episodes,
+                duration=validation_duration, provenance={"seed": seed, **(provenance or {})},
+            )  # fmt: skip
+            model.learn(
+                timesteps - model.num_timesteps, callback=course, reset_num_timesteps=newest is None
+            )
     contract, network = read_policy(folder / BEST)
     write_policy(network, folder, control_period=OnOff.default_period, provenance=contract.provenance)
     return read_rows(folder)
@@ -321,14 +280,5 @@ def read_rows(folder: Path) -> list[dict[str, float]]:
     path = folder / VALIDATION_FILE
     if not path.exists():
         return []
-    with path.open(newline="", encoding="utf-8") as stream:
-        return [{name: float(v) for name, v in row.items()} for row in csv.DictReader(stream)]
-
-
-def write_rows(folder: Path, rows: list[dict[str, float]]) -> None:
-    """Write the table of the validations."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(rows[0]))
-    writer.writeheader()
-    writer.writerows(rows)
-    write_text(folder / VALIDATION_FILE, text.getvalue())
+    rows: Any = pd.read_csv(path, dtype=float).to_dict("records")
+    return rows

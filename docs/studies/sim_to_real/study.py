@@ -14,20 +14,16 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from controllers.base import Controller
-from controllers.policy import load_policy
-from controllers.policy_files import holds_policy
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
 from epv_env.common.command_line import COUNT, fail_clearly
-from epv_env.common.files import Journal, decoded, write_text
+from epv_env.common.files import Journal, write_text
 from epv_env.episode import WORN
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.region import Alternative, Mixture, Region
-from epv_env.reward import RewardWeights
 from epv_env.task import LimitingTask
 from identification.bench.session import measured_campaign
 from identification.blind.bench import NO_OFFSETS, blind_suite, run_programme
@@ -36,11 +32,17 @@ from identification.gap.report.gap_json import GAP
 from identification.recordings.campaign_files import FILE_NAME, write_campaign
 from identification.valve_gap.diagnose import PLANT, diagnose_campaign
 from training.evaluation.metrics import violation_interval
-from training.evaluation.plots import COLOURS, plt, save_figure
+from training.evaluation.plots import COLOURS, save_figure
 from training.evaluation.rollout import run_episodes
 from training.evaluation.seeds import EVALUATION_SEED
 from training.evaluation.statistics import paired_difference
-from training.learners.ppo import Task, train
+from training.studies.sim_to_real import (
+    SCENARIO,
+    alternatives,
+    diagnosis_text,
+    share_picture,
+    trained,
+)
 
 FOLDER = Path(__file__).parent
 
@@ -74,18 +76,12 @@ CASES = (
 nominal plant leave the band at sizes within the catalogue's ranges; every case holds one of them."""
 
 ARMS = {
-    "nominal plant": ("o", "white"), "best answer": ("D", COLOURS[1]), "diagnosis": ("o", COLOURS[0]),
-    "whole catalogue": ("s", "0.6"), "truth": ("|", "black"),
+    "nominal plant": ("o", "white", 7), "best answer": ("D", COLOURS[1], 10),
+    "diagnosis": ("o", COLOURS[0], 7), "whole catalogue": ("s", "0.6", 7), "truth": ("|", "black", 16),
 }  # fmt: skip
-"""What a policy was trained on, with its mark in the picture."""
+"""What a policy was trained on, with its mark in the picture; larger where others may cover it."""
 BEFORE, SINGLE, DISTRIBUTION, EVERYTHING, TRUTH = ARMS
-SIZES = {SINGLE: 10, TRUTH: 16}
-"""Of marks that others may cover [points]."""
 
-SCENARIO = "mixed"
-SWITCHING_PRICE = 0.2
-"""Price of a switching in the reward [1]. Below the default: at a high price, so short a training has
-not learned to control yet."""
 VALIDATION_EPISODES = 256
 RANDOM_PLANTS = 4096
 """Plants of the whole catalogue that a training draws from."""
@@ -156,7 +152,7 @@ def deployments(case: Case, options: Any, journal: Journal) -> list[dict[str, An
             name = f"{case.name}: {arm}, seed {seed}"
             if name not in journal:
                 print(f"[{name}]", file=sys.stderr)
-                policy = trained(arm, folder, corrected, true, seed, options)
+                policy = policy_of(arm, folder, corrected, true, seed, options)
                 journal.add(name, measured(policy, case, true, options))
             rows.append({"case": case.name, "arm": arm, "seed": seed, **journal[name]})
     return rows
@@ -186,10 +182,10 @@ def diagnosed(case: Case, true: Plant, folder: Path) -> Plant:
     return load_plant(out / PLANT)
 
 
-def trained(
+def policy_of(
     arm: str, folder: Path, corrected: Plant, true: Plant, seed: int, options: Any
 ) -> Controller:
-    """The policy of an arm, or as it was trained before."""
+    """The policy of an arm."""
     nominal, work = load_plant(None), options.work
     plant, parameters, where = {
         BEFORE: (nominal, "ten_percent", work / BEFORE),
@@ -200,26 +196,17 @@ def trained(
     }[arm]
     if arm == DISTRIBUTION and is_certain(corrected):
         where = folder / SINGLE  # the same plants: the same training
-    where /= f"seed {seed}, {options.timesteps} steps"
-    if not holds_policy(where):
-        weights = RewardWeights(switching=SWITCHING_PRICE)
-        task = Task(plant=plant, scenario=SCENARIO, parameters=parameters, weights=weights)
-        train(
-            task, where, seed=seed, timesteps=options.timesteps, resume=True,
-            validation_episodes=VALIDATION_EPISODES, validation_duration=options.duration,
-        )  # fmt: skip
-    return load_policy(where, plant)
+    return trained(
+        where / f"seed {seed}, {options.timesteps} steps", plant, parameters,
+        seed=seed, timesteps=options.timesteps,
+        validation_episodes=VALIDATION_EPISODES, validation_duration=options.duration,
+    )  # fmt: skip
 
 
 def is_certain(plant: Plant) -> bool:
     """Whether the diagnosis holds the best answer alone possible."""
     possible = alternatives(plant)
     return len(possible) == 1 and dict(possible[0].region.centre) == dict(plant.parameters)
-
-
-def alternatives(plant: Plant) -> tuple[Alternative, ...]:
-    """What a diagnosis holds possible."""
-    return plant.diagnosis.alternatives if plant.diagnosis else ()
 
 
 def whole_catalogue() -> Mixture:
@@ -254,11 +241,13 @@ def report(found: pd.DataFrame, cases: Sequence[Case], options: Any) -> None:
         [figures(name, rows) for name, rows in found.groupby(["case", "arm"], sort=False)]
     )
     write_text(options.out / "results.csv", results.drop(columns="cell").to_csv(index=False))
-    save_figure(picture(results), options.out / "sim-to-real.png")
+    shares = results.pivot(index="case", columns="arm", values="left_percent")
+    shares = shares.loc[[case.name for case in cases]]
+    save_figure(share_picture(shares, ARMS, title="trained on"), options.out / "sim-to-real.png")
     rows = [
         [
             case.name,
-            diagnosis_text(options.work / case.name),
+            diagnosis_text(options.work / case.name / "diagnosis"),
             *results["cell"][results["case"] == case.name],
         ]
         for case in cases
@@ -286,15 +275,6 @@ def figures(name: Any, rows: pd.DataFrame) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def diagnosis_text(folder: Path) -> str:
-    """Verdict and alternatives of a case's diagnosis."""
-    path = folder / "diagnosis"
-    verdict = decoded(path / GAP, remedy=f"remove {path}")["verdict"]
-    best, *others = alternatives(load_plant(path / PLANT))
-    first = f"{verdict}: {best.name.replace('_', ' ')} {best.probability:.2f}"
-    return first + (f", {len(others)} more" if others else "")
-
-
 def summary(found: pd.DataFrame, results: pd.DataFrame) -> str:
     """What each way of training gives back, and how the diagnosis compares with the whole catalogue."""
     shares = results.pivot(index="case", columns="arm", values="left_percent").mean()
@@ -317,22 +297,6 @@ def summary(found: pd.DataFrame, results: pd.DataFrame) -> str:
         f"surely beaten for {worse} (95 % interval of the difference, paired by episode)."
     )
     return "\n".join(lines)
-
-
-def picture(results: pd.DataFrame) -> Figure:
-    """Share of episodes that leave, by case and arm."""
-    names = list(results["case"].unique())
-    drawn, axes = plt.subplots(figsize=(7.2, 1.4 + 0.36 * len(names)), layout="constrained")
-    for arm, (marker, inside) in ARMS.items():
-        shares = results["left_percent"][results["arm"] == arm]
-        look: dict[str, Any] = {"mfc": inside, "mec": "black", "ms": SIZES.get(arm, 7)}
-        axes.plot(shares, np.arange(len(names)), marker, label=arm, **look)
-    axes.set_yticks(np.arange(len(names)), names)
-    axes.set(xlabel="episodes that leave ±500 mbar on the bench's valve [%]")
-    axes.set(xlim=(-2, None), ylim=(len(names) - 0.5, -0.5))
-    axes.grid(alpha=0.3)
-    drawn.legend(title="trained on", ncols=5, loc="outside upper center", frameon=False)
-    return drawn
 
 
 if __name__ == "__main__":

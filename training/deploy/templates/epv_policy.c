@@ -148,7 +148,7 @@ int epv_policy_learn(epv_policy_memory *m, float inputs[EPV_POLICY_INPUTS])
     hysteresis(m, inputs);
     fn_observe(&m->valve, inputs, EPV_POLICY_READINGS, PERIOD, $filter_time, 0.0f);
     fn_plan(&m->valve, PERIOD);
-    fn_describe(&m->valve, inputs, EPV_POLICY_INPUTS);
+$learnt
     return fn_cannot_raise(&m->valve) != 0.0f || fn_would_rise_too_far(&m->valve) != 0.0f;
 }
 
