@@ -9,7 +9,7 @@ from types import MappingProxyType
 from epv_env.plant.channels import SENSORS, Sensor
 from identification.quality.channel import ChannelAssessment, assess_channel
 from identification.quality.noise_tests import PairCorrelation, assess_correlation
-from identification.recordings.noise import rounding_error
+from identification.readings_noise import rounding_error
 from identification.recordings.recording import CHANNELS, PRESSURES, UNITS, CampaignError, Recording
 
 LEAST_SAMPLES = 250

@@ -16,7 +16,7 @@ from identification.quality.noise_tests import (
     assess_normality,
     assess_whiteness,
 )
-from identification.recordings.noise import reading_step
+from identification.readings_noise import quantisation_step
 from identification.recordings.recording import UNITS
 
 DRIFT_LEVELS = (0.1, 1.0)
@@ -256,7 +256,7 @@ def assess_channel(
     moves = bool(np.ptp(readings) > 0)
     residual = readings - trend.at(time) if moves else np.zeros_like(readings)
     description = descriptive_statistics(residual, greatest=sensor.high)
-    step = reading_step(readings) or step
+    step = quantisation_step([readings], fewest=1) or step
     rounding = step / description.standard_deviation if moves else 0.0
     return ChannelAssessment(
         name=name,
