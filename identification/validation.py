@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from statsmodels.stats.diagnostic import acorr_ljungbox
+from statsmodels.tsa.stattools import acf
 
 from epv_env.plant.parameters import Parameters
 from identification.calibration.calibrate import EXPLAINED
 from identification.calibration.problem import CalibrationProblem
-from identification.quality.noise_tests import WhitenessTest, assess_whiteness, white_noise_band
+from identification.quality.assessment import white_noise_band
 from identification.recordings.recording import OUTPUTS, CampaignError
 from identification.replay.replay import Response, responses
 from identification.replay.response_blocks import (
@@ -33,6 +35,34 @@ GREATEST_LAG = 0.05
 
 WHITE = 1e-4
 """Probability of white noise below which a residual is called predictable."""
+
+
+FIRST_LAGS = 10
+"""Lags of the short Ljung-Box test, which finds dependence between neighbours [samples]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class WhitenessTest:
+    """Whether a signal's samples are independent of each other."""
+
+    autocorrelation: NDArray
+    """At lags 0, 1, ..., (lags + 1,)."""
+    probability: float
+    """Of white noise, by Ljung-Box tests over 10 lags and over all (the lesser one, doubled)."""
+
+    @property
+    def peak(self) -> float:
+        """Greatest magnitude of the autocorrelation at a lag other than 0."""
+        return float(np.max(np.abs(self.autocorrelation[1:])))
+
+
+def assess_whiteness(residual: NDArray, lags: int) -> WhitenessTest:
+    """Of a signal (samples,), in any unit, that changes; lags: the greatest [samples]."""
+    table = acorr_ljungbox(residual, lags=sorted({min(FIRST_LAGS, lags), lags}))
+    return WhitenessTest(
+        autocorrelation=np.asarray(acf(residual, nlags=lags, fft=True)),
+        probability=float(min(1.0, 2 * np.min(table["lb_pvalue"]))),
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

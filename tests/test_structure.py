@@ -12,6 +12,7 @@ VALVE_FREE = (
     "epv_env.common",
     "identification.block_bootstrap",
     "identification.gap",
+    "identification.readings_noise",
     "identification.report",
     "identification.report_2003",
 )

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from epv_env.plant.free_parameters import FREE_PARAMETERS, Freedom, check_free
 from epv_env.plant.parameters import Parameters
 from identification.quality.assessment import SensorOffset, assess_recording, sensor_offsets
-from identification.recordings.noise import campaign_steps, pooled_noise
+from identification.recordings.noise import campaign_noise, campaign_steps
 from identification.recordings.recording import OUTPUTS, Campaign, CampaignError, Recording
 from identification.replay.model_inputs import model_inputs, without_offsets
 from identification.replay.replay import P2_SHIFT, Replay, measured_outputs
@@ -235,7 +235,7 @@ def calibration_problem(
     return CalibrationProblem(
         calibration=tuple(without_offsets(r, values) for r in campaign.with_role("calibration")),
         validation=tuple(without_offsets(r, values) for r in campaign.with_role("validation")),
-        noise=pooled_noise(campaign),
+        noise=campaign_noise(campaign),
         offsets=offsets,
         steps=steps,
         vector=ParameterVector(symbols=tuple(free), reference=start, freedoms=free),

@@ -6,18 +6,16 @@ from dataclasses import dataclass
 from itertools import combinations
 from types import MappingProxyType
 
+import numpy as np
+from scipy.stats import norm
+
 from epv_env.plant.channels import SENSORS, Sensor
 from identification.quality.channel import ChannelAssessment, assess_channel
-from identification.quality.noise_tests import PairCorrelation, assess_correlation
-from identification.recordings.noise import rounding_error
+from identification.readings_noise import rounding_error
 from identification.recordings.recording import CHANNELS, PRESSURES, UNITS, CampaignError, Recording
 
 LEAST_SAMPLES = 250
-"""Shortest record [samples]: half a second at 500 Hz. Fewer do not show the noise's distribution."""
-GREATEST_LAG = 0.1
-"""Greatest lag of the correlations [s]."""
-SAMPLES_PER_LAG = 20
-"""Samples that a record needs for each lag; with fewer, Ljung-Box alarms too often on white noise."""
+"""Shortest record [samples]: half a second at 500 Hz. Fewer do not show the noise."""
 
 FINE: Mapping[str, float] = MappingProxyType({})
 """Steps of a campaign without coarse ones."""
@@ -45,15 +43,8 @@ class QualityAssessment:
     """Of each channel."""
     channels: Mapping[str, ChannelAssessment]
     """By name, in the order of Table 1."""
-    pairs: Mapping[tuple[str, str], PairCorrelation]
-    """Of all channels that change."""
-
-    @property
-    def adjusted(self) -> dict[tuple[str, str], float]:
-        """p-values of the correlations at lag 0, family-wise over all pairs (Bonferroni)."""
-        return {
-            names: min(1.0, len(self.pairs) * pair.probability) for names, pair in self.pairs.items()
-        }
+    correlations: Mapping[tuple[str, str], float]
+    """Of the detrended signals of each pair of channels that change (Table 4)."""
 
     @property
     def coil_off(self) -> bool:
@@ -69,11 +60,6 @@ class QualityAssessment:
     def at_rest(self) -> bool:
         """Whether every channel is steady, and within the accuracy of its rest value."""
         return all(channel.at_rest for channel in self.channels.values())
-
-    @property
-    def lags(self) -> int:
-        """Greatest lag of the correlations [samples]."""
-        return greatest_lag(self.samples, self.period)
 
 
 def assess_recording(
@@ -94,16 +80,26 @@ def assess_recording(
             f"{LEAST_SAMPLES} or more: record 5 s of steady state"
         )
     channels = {
-        name: _channel(recording, sensors[name], name, environment_pressure, steps.get(name, 0.0))
+        name: assess_channel(
+            name,
+            recording.channel(name) / UNITS[name][1],
+            period=recording.period,
+            rest=environment_pressure / UNITS[name][1] if name in PRESSURES else 0.0,
+            step=steps.get(name, 0.0) / UNITS[name][1],
+            sensor=sensors[name],
+        )
         for name in CHANNELS
     }
-    pairs = _pairs(channels, greatest_lag(len(recording), recording.period))
+    moving = [channel for channel in channels.values() if channel.moves]
     return QualityAssessment(
         name=recording.name,
         period=recording.period,
         samples=len(recording),
         channels=channels,
-        pairs=pairs,
+        correlations={
+            (a.name, b.name): float(np.corrcoef(a.residual, b.residual)[0, 1])
+            for a, b in combinations(moving, 2)
+        },
     )
 
 
@@ -124,40 +120,11 @@ def _offset(channel: ChannelAssessment) -> SensorOffset:
     """
     size = UNITS[channel.name][1]
     value = channel.trend.offset - channel.rest
-    scatter = 0.0 if channel.whiteness is None else channel.trend.offset_error
+    scatter = channel.trend.offset_error if channel.moves else 0.0
     lasting = 0.0 if channel.dithered else rounding_error(channel.quantum)
     return SensorOffset(value=value * size, error=math.hypot(scatter, lasting) * size)
 
 
-def greatest_lag(samples: int, period: float) -> int:
-    """Greatest lag at which correlations are computed [samples]; period: between samples [s]."""
-    return max(1, min(round(GREATEST_LAG / period), samples // SAMPLES_PER_LAG))
-
-
-def _channel(
-    recording: Recording,
-    sensor: Sensor,
-    name: str,
-    environment_pressure: float,
-    step: float,
-) -> ChannelAssessment:
-    size = UNITS[name][1]
-    return assess_channel(
-        name,
-        recording.channel(name) / size,
-        period=recording.period,
-        rest=environment_pressure / size if name in PRESSURES else 0.0,
-        lags=greatest_lag(len(recording), recording.period),
-        step=step / size,
-        sensor=sensor,
-    )
-
-
-def _pairs(
-    channels: Mapping[str, ChannelAssessment], lags: int
-) -> dict[tuple[str, str], PairCorrelation]:
-    moving = [name for name, channel in channels.items() if channel.whiteness is not None]
-    return {
-        (first, second): assess_correlation(channels[first].residual, channels[second].residual, lags)
-        for first, second in combinations(moving, 2)
-    }
+def white_noise_band(samples: int) -> float:
+    """Half width of the band that holds 95 % of the correlations of independent white signals."""
+    return float(norm.isf(0.025) / np.sqrt(samples))

@@ -1,5 +1,6 @@
-"""Everything that section 4 says about one channel of a steady recording, in A, V or bar."""
+"""One channel of a steady recording, in A, V or bar: trend (Table 2), statistics (Table 3) and steps."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -7,29 +8,24 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from epv_env.plant.channels import SENSORS, Sensor
-from identification.quality.noise_tests import (
-    SIGNIFICANCE,
-    UNTESTED,
-    Normality,
-    WhitenessTest,
-    assess_normality,
-    assess_whiteness,
-)
-from identification.recordings.noise import reading_step
+from epv_env.plant.channels import Sensor
+from identification.readings_noise import quantisation_step, rounding_error
 from identification.recordings.recording import UNITS
 
 DRIFT_LEVELS = (0.1, 1.0)
 """Drift over the record, relative to Table 1's accuracy, from which it is in doubt, and bad."""
 LEAST_DITHER = 0.3
 """Noise in converter steps below which rounding errors no longer average out."""
-OUTLIER_CONFIDENCE = 0.999
-"""Share of normal records whose greatest outlier stays below the limit."""
+SIGNIFICANCE = 1e-4
+"""Probability that the longest run of equal readings of a live channel is taken for a dead one."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Trend:
-    """The straight line through a signal by linear least squares (Table 2)."""
+    """The straight line through a signal by linear least squares (Table 2).
+
+    A signal that never changes has no standard errors: they are NaN.
+    """
 
     factor: float
     """Slope [unit/s]."""
@@ -109,39 +105,26 @@ def descriptive_statistics(residual: NDArray, *, greatest: float) -> Descriptive
     )
 
 
-def outlier_limit(
-    samples: int, *, rounding: float, confidence: float = 0.999, hidden: float = 1.0
-) -> float:
-    """Outlier factor (eq. 18) that normal noise of n samples stays below with a given confidence.
-
-    From the distribution of the greatest of n independent |y|/sigma, (2 Phi(z) - 1)^n = confidence.
-    Rounding may move a reading outwards by half a step: `rounding` is the step over sigma. hidden: the
-    noise before rounding over sigma, where coarse steps hide most of it; at least 1.
-    """
-    exceeds = -np.expm1(np.log(confidence) / samples)
-    return float(hidden * stats.norm.isf(exceeds / 2) + rounding / 2)
-
-
 def longest_run(readings: NDArray) -> int:
     """Length of the longest run of one and the same reading [samples]; readings: (samples,)."""
     changes = np.flatnonzero(np.diff(readings) != 0)
     return int(np.max(np.diff(np.concatenate(([-1], changes, [len(readings) - 1])))))
 
 
-def run_limit(readings: NDArray, *, rounding: float, significance: float) -> int:
+def run_limit(readings: NDArray, rounding: float) -> int:
     """Length that runs of independent readings, (samples,), reach with a small probability [samples].
 
     A run of L readings starts at one of n samples with probability p^L, so the limit solves
-    n p^L = significance, a probability. p is the share of the commonest reading, or what normal noise
-    about that reading gives it if that is more, as under a drift. rounding: step over sigma. The limit
-    is n for readings that never change, and at most n.
+    n p^L = SIGNIFICANCE. p is the share of the commonest reading, or what normal noise about that
+    reading gives it if that is more, as under a drift. rounding: step over sigma. The limit is n for
+    readings that never change, and at most n.
     """
     samples = len(readings)
     share = np.max(np.unique(readings, return_counts=True)[1]) / samples
     share = max(share, 1 - 2 * stats.norm.sf(rounding / 2))
     if share == 1.0:
         return samples
-    return min(samples, int(np.ceil(np.log(significance / samples) / np.log(share))))
+    return min(samples, int(np.ceil(np.log(SIGNIFICANCE / samples) / np.log(share))))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,15 +145,6 @@ class ChannelAssessment:
     description: DescriptiveStatistics
     quantum: float
     """Step of the readings: as they show it, otherwise as the campaign does; 0.0 without a grid."""
-    rounding: float
-    """The step over the standard deviation; 0.0 for a signal that never changes."""
-    longest_run: int
-    """Longest run of one and the same reading [samples]."""
-    run_limit: int
-    """What independent readings do not reach."""
-    normality: Normality
-    whiteness: WhitenessTest | None
-    """None for a signal that never changes."""
     sensor: Sensor
     """Range, accuracy and noise that it should have; Table 1's and Table 3's on the report's bench."""
 
@@ -178,6 +152,11 @@ class ChannelAssessment:
     def unit(self) -> str:
         """A, V or bar."""
         return UNITS[self.name][0]
+
+    @property
+    def moves(self) -> bool:
+        """Whether the reading changes at all."""
+        return bool(np.ptp(self.readings) > 0)
 
     @property
     def accuracy(self) -> float:
@@ -195,14 +174,6 @@ class ChannelAssessment:
         return self.trend.factor * self.duration
 
     @property
-    def trend_deviations(self) -> float:
-        """Slope over its standard error, the error enlarged for correlated noise; 0.0 if constant."""
-        if self.whiteness is None:
-            return 0.0
-        enlarged = self.trend.factor_error * np.sqrt(max(1.0, self.whiteness.inflation))
-        return float(abs(self.trend.factor) / enlarged)
-
-    @property
     def within_accuracy(self) -> bool:
         """Whether the line stays within the accuracy of the rest value from start to end."""
         return abs(self.offset) + abs(self.drift) / 2 <= self.accuracy
@@ -213,31 +184,26 @@ class ChannelAssessment:
         return self.within_accuracy and abs(self.drift) < DRIFT_LEVELS[0] * self.accuracy
 
     @property
-    def dithered(self) -> bool:
-        """Whether noise moves the readings across steps enough for rounding errors to average out."""
-        return self.normality.standard_deviation >= LEAST_DITHER * self.quantum
+    def usual_noise(self) -> float:
+        """Standard deviation of a good sensor's readings in these steps [unit]."""
+        return math.hypot(self.sensor.noise, rounding_error(self.quantum))
 
     @property
-    def outlier_limit(self) -> float:
-        """Outlier factor that normal noise stays below in a share `outlier_confidence` of records."""
-        sigma = self.description.standard_deviation
-        return outlier_limit(
-            len(self.readings),
-            rounding=self.rounding,
-            confidence=OUTLIER_CONFIDENCE,
-            hidden=max(1.0, self.normality.standard_deviation / sigma) if sigma else 1.0,
-        )
+    def dithered(self) -> bool:
+        """Whether noise moves the readings across steps enough for rounding errors to average out."""
+        least = math.hypot(LEAST_DITHER * self.quantum, rounding_error(self.quantum))
+        return self.description.standard_deviation >= least
+
+    @property
+    def stands_still(self) -> tuple[int, int] | None:
+        """Longest run of one reading and its limit [samples]; None if independent noise explains it."""
+        longest = longest_run(self.readings)
+        limit = run_limit(self.readings, self.quantum / self.description.standard_deviation)
+        return (longest, limit) if longest > limit else None
 
 
 def assess_channel(
-    name: str,
-    readings: NDArray,
-    *,
-    period: float,
-    rest: float,
-    lags: int,
-    step: float = 0.0,
-    sensor: Sensor | None = None,
+    name: str, readings: NDArray, *, period: float, rest: float, step: float, sensor: Sensor
 ) -> ChannelAssessment:
     """Statistics of one channel.
 
@@ -246,18 +212,13 @@ def assess_channel(
         readings: (samples,) [A, V or bar].
         period: time between samples [s].
         rest: what a perfect sensor reads at rest [A, V or bar].
-        lags: greatest lag of the autocorrelation [samples].
-        sensor: of the channel; None: the report's.
         step: of the readings, where a record that hardly moves cannot show it [A, V or bar].
+        sensor: of the channel.
     """
-    sensor = sensor or SENSORS[name]
     time = np.arange(len(readings)) * period
     trend = fit_trend(time, readings)
-    moves = bool(np.ptp(readings) > 0)
+    moves = np.ptp(readings) > 0
     residual = readings - trend.at(time) if moves else np.zeros_like(readings)
-    description = descriptive_statistics(residual, greatest=sensor.high)
-    step = reading_step(readings) or step
-    rounding = step / description.standard_deviation if moves else 0.0
     return ChannelAssessment(
         name=name,
         readings=readings,
@@ -265,12 +226,7 @@ def assess_channel(
         duration=len(readings) * period,
         rest=rest,
         trend=trend,
-        description=description,
-        quantum=step,
-        rounding=rounding,
-        longest_run=longest_run(readings),
-        run_limit=run_limit(readings, rounding=rounding, significance=SIGNIFICANCE),
-        normality=assess_normality(readings, trend.at(time), step) if moves else UNTESTED,
-        whiteness=assess_whiteness(residual, lags) if moves else None,
+        description=descriptive_statistics(residual, greatest=sensor.high),
+        quantum=quantisation_step([readings], fewest=1) or step,
         sensor=sensor,
     )

@@ -1,13 +1,14 @@
-"""The quality of one recording in a report: verdicts, tables, figures, and JSON."""
+"""The quality of one recording in a report: verdicts, tables, the readings, and JSON."""
 
 import math
 from dataclasses import asdict, fields
 from typing import Any
 
-from identification.quality import figures as figures
-from identification.quality.assessment import QualityAssessment, sensor_offsets
-from identification.quality.channel import ChannelAssessment, DescriptiveStatistics
-from identification.quality.noise_tests import white_noise_band
+import numpy as np
+from matplotlib.figure import Figure
+
+from identification.quality.assessment import QualityAssessment, sensor_offsets, white_noise_band
+from identification.quality.channel import DescriptiveStatistics
 from identification.quality.verdicts import CHECKS, channel_verdict, check_results, worst_status
 from identification.recordings.recording import CHANNELS, UNITS
 from identification.report.page import Picture, Section, Table, Text
@@ -46,9 +47,23 @@ def quality_section(quality: QualityAssessment) -> Section:
             _trends(quality),
             _statistics(quality),
             _correlations(quality),
-            *(Picture(figure=draw(quality), caption=text) for draw, text in figures.CAPTIONS.items()),
+            Picture(figure=signals(quality), caption="Acquired data with its trend."),
         ],
     )
+
+
+def signals(quality: QualityAssessment) -> Figure:
+    """Readings over time, with the line of the trend (Figure 4)."""
+    figure = Figure(figsize=(9, 7.5), layout="constrained")
+    rows = figure.subplots(len(quality.channels), 1, sharex=True)
+    time = np.arange(quality.samples) * quality.period
+    for axes, channel in zip(rows, quality.channels.values(), strict=True):
+        axes.plot(time, channel.readings, color="tab:blue", linewidth=0.3)
+        axes.plot(time[[0, -1]], channel.trend.at(time[[0, -1]]), color="tab:red", linewidth=1.0)
+        axes.set_ylabel(f"{channel.name} [{channel.unit}]")
+    rows[-1].set_xlabel("time [s]")
+    figure.align_ylabels()
+    return figure
 
 
 def _state(quality: QualityAssessment) -> str:
@@ -110,22 +125,12 @@ def _cell(description: DescriptiveStatistics, name: str) -> str:
 
 
 def _correlations(quality: QualityAssessment) -> Table:
-    rows = [
-        [
-            f"{first}, {second}",
-            f"{pair.correlation:.4f}",
-            f"{quality.adjusted[first, second]:.2g}",
-            f"{pair.peak:.4f}",
-            f"{1e3 * quality.period * pair.peak_lag:.3g}",
-        ]
-        for (first, second), pair in quality.pairs.items()
-    ]
-    columns = ["Pair", "correlation", "p, family-wise", "greatest", "at lag [ms]"]
     caption = (
         f"Correlation of the detrended signals. Independent white signals lie within "
         f"±{white_noise_band(quality.samples):.4f} in 95 % of cases."
     )
-    return Table(columns=columns, rows=rows, caption=caption)
+    rows = [[", ".join(pair), f"{value:.4f}"] for pair, value in quality.correlations.items()]
+    return Table(columns=["Pair", "correlation"], rows=rows, caption=caption)
 
 
 def as_json(quality: QualityAssessment) -> dict[str, Any]:
@@ -138,14 +143,8 @@ def as_json(quality: QualityAssessment) -> dict[str, Any]:
         "sensor_offsets_SI": {n: _finite(asdict(o)) for n, o in sensor_offsets(quality).items()},
         "channels": {name: _channel_json(quality, name) for name in CHANNELS},
         "correlations": [
-            {
-                "channels": list(names),
-                "correlation": pair.correlation,
-                "adjusted_p": quality.adjusted[names],
-                "peak": pair.peak,
-                "peak_lag_s": pair.peak_lag * quality.period,
-            }
-            for names, pair in quality.pairs.items()
+            {"channels": list(pair), "correlation": value}
+            for pair, value in quality.correlations.items()
         ],
     }
 
@@ -162,21 +161,8 @@ def _channel_json(quality: QualityAssessment, name: str) -> dict[str, Any]:
         ],
         "trend": _finite(asdict(channel.trend)),
         "statistics": _finite(asdict(channel.description)),
-        "normality": _finite(asdict(channel.normality)),
         "offset": channel.offset,
         "quantum": channel.quantum,
-        "whiteness": _whiteness_json(channel),
-    }
-
-
-def _whiteness_json(channel: ChannelAssessment) -> dict[str, float] | None:
-    test = channel.whiteness
-    if test is None:
-        return None
-    return {
-        "ljung_box_p": test.probability,
-        "greatest_autocorrelation": test.peak,
-        "variance_inflation": test.inflation,
     }
 
 

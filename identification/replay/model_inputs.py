@@ -14,7 +14,7 @@ from scipy.interpolate import make_smoothing_spline
 from scipy.signal import savgol_filter
 from scipy.stats import chi2
 
-from identification.recordings.noise import reading_step, rounding_error
+from identification.readings_noise import quantisation_step, rounding_error
 from identification.recordings.recording import HOLD, Recording
 
 SMOOTHING_WINDOW = 0.01
@@ -135,7 +135,7 @@ def _is_white(residual: NDArray, period: float) -> bool:
 
 def _is_rounding(residual: NDArray, readings: NDArray) -> bool:
     """Whether a residual scatters no more than the rounding of readings, (samples,), explains."""
-    explained = ROUNDING_MARGIN * rounding_error(reading_step(readings))
+    explained = ROUNDING_MARGIN * rounding_error(quantisation_step([readings], fewest=1))
     return bool(np.sqrt(np.mean(residual**2)) <= explained)
 
 

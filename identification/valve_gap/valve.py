@@ -13,9 +13,9 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from identification.calibration.problem import calibration_problem
 from identification.gap.plant import Cause, Channel, NuisanceParameter, Run, StateTrace
-from identification.gap.prepare.noise import noise_of_blocks
 from identification.gap.prepare.screened import Finding, screen
-from identification.recordings.noise import coarse_step_warnings, reliable_step, rounding_error
+from identification.readings_noise import rounding_error
+from identification.recordings.noise import coarse_step_warnings, noise_of
 from identification.recordings.recording import OUTPUTS, UNITS, Campaign, Recording
 from identification.replay.model_inputs import model_inputs
 from identification.replay.replay import P2_SHIFT, SHIFTS, Replay, measured_outputs
@@ -29,49 +29,11 @@ from identification.valve_gap.equations import (
     traces,
 )
 
-
-def noise_of(recordings: Sequence[Recording], channel: str) -> float:
-    """Standard deviation of a channel's readings about a smooth course [SI].
-
-    Half the variance of first differences (Rice 1984), which a slope does not enter; the median over
-    blocks, which a few lively ones do not move, made the mean of a chi-square variable. A slow ripple
-    hardly enters: what neighbours share is no noise. Readings in coarse steps hardly differ between
-    neighbours, so their rounding error is the least.
-    """
-    estimates = [_block_variances(recording, channel) for recording in recordings]
-    variances = np.concatenate([part for part, _ in estimates])
-    length = min(length for _, length in estimates)
-    freedom = 2.0 * length / 3.0  # differences of white noise are correlated by -1/2
-    found = noise_of_blocks(variances, freedom)
-    step = reliable_step(np.concatenate([recording.channel(channel) for recording in recordings]))
-    return max(found, rounding_error(step))
-
-
-def _block_variances(recording: Recording, channel: str) -> tuple[NDArray, int]:
-    """Variance of the noise in each quiet block, and the block's length [samples]."""
-    changes = np.diff(recording.channel(channel))
-    length = min(max(4, round(NOISE_BLOCK / recording.period)), len(changes))
-    transient = round(SWITCHING_TRANSIENT / recording.period)
-    lively = np.zeros(len(changes), dtype=bool)
-    for switching in np.flatnonzero(np.diff(recording.energised)):
-        lively[switching : switching + transient] = True
-    count = len(changes) // length
-    blocks = changes[: count * length].reshape(count, length)
-    quiet = ~np.any(lively[: count * length].reshape(count, length), axis=1)
-    return 0.5 * np.var(blocks[quiet if np.any(quiet) else slice(None)], axis=1), length
-
-
 TIME_SCALE = 5e-3
 """How long the fastest transients last [s]: the armature's flight, the decay of the current."""
 
-NOISE_BLOCK = 0.02
-"""Length of the stretches of which each has its own estimate of the noise [s]: 40 samples."""
-
 CURRENT_TRANSIENT = 2e-3
 """Time between samples [s] in which the current has risen or fallen as good as whole."""
-
-SWITCHING_TRANSIENT = 0.02
-"""Time after a switching that the noise estimate leaves out [s]: the coil and p3 move."""
 
 PARAMETER_SCATTER = 3e-3
 """Relative standard deviation, between units, of the parameters that are not calibrated [-]."""

@@ -14,8 +14,9 @@ from identification.gap.fit.fitting_problem import Estimate, FitCache, FittingPr
 from identification.gap.fit.gauss_newton import fit, nuisance_slopes
 from identification.gap.fit.prediction import predict
 from identification.gap.plant import GreyBox
-from identification.gap.prepare.noise import ChannelNoise, raw_noise_ratio, white_noise
+from identification.gap.prepare.noise import ChannelNoise, raw_noise_ratio
 from identification.gap.prepare.prepared_plant import PreparedPlant, prepared
+from identification.readings_noise import white_noise
 
 FURTHER_ITERATIONS = 12
 """Most steps of a fit that goes on with nuisance slopes of its own."""

@@ -16,7 +16,14 @@ from scipy.ndimage import median_filter
 from scipy.stats import norm
 
 from identification.gap.plant import Channel
-from identification.gap.prepare.noise import STEP_TO_SD, differences, distances, quantisation_step
+from identification.readings_noise import (
+    NORMAL,
+    differences,
+    distances,
+    noise_despite_faults,
+    quantisation_step,
+    rounding_error,
+)
 
 Kind = Literal["wild", "stuck", "clipped", "dropout"]
 
@@ -35,12 +42,6 @@ MEDIAN, LONGEST_WILD, NEIGHBOURS, NEARBY = 7, 2, 3, 31
 """Readings of the running median; wild ones in a row; on each side of a reading that tell its course;
 and around it that tell the noise there."""
 
-NOISE_ORDERS = (2, 4, 6)
-"""Orders of the differences that show the noise; the least counts, as motion enters the low ones."""
-
-NORMAL = 1.4826
-"""Standard deviation of a normal variable over the median of its magnitude [1]."""
-
 
 def faults(
     series: Sequence[NDArray], channel: Channel | None = None
@@ -54,7 +55,7 @@ def faults(
     values = [own[at] for own, at in zip(series, places, strict=True)]
     noise, resolution = (channel.noise or 0.0, channel.resolution) if channel else (0.0, 0.0)
     seen = _noise(values)
-    scale = max(noise, seen, STEP_TO_SD * (resolution or quantisation_step(values)))
+    scale = max(noise, seen, rounding_error(resolution or quantisation_step(values)))
     for r, own in enumerate(values):
         if len(own) < len(series[r]):
             yield r, "dropout", np.flatnonzero(~np.isfinite(series[r]))
@@ -72,12 +73,7 @@ def _noise(series: Sequence[NDArray]) -> float:
     moving = [own[~_in_row(own, LONGEST_WILD + 1)] for own in series]
     if sum(map(len, moving)) < (1.0 - MOST_FAULTY) * sum(map(len, series)):
         moving = series
-    levels = [
-        NORMAL * np.median(np.abs(np.concatenate([differences(own, order) for own in moving])))
-        for order in NOISE_ORDERS
-        if any(len(own) > order for own in moving)
-    ]
-    return float(min(levels, default=0.0))
+    return noise_despite_faults(moving)
 
 
 def _wild(readings: NDArray, noise: float, held: bool) -> NDArray:

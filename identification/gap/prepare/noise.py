@@ -1,8 +1,4 @@
-"""The noise of a channel: white, in steps, or with a ripple, as raw readings and residuals show it.
-
-White noise shows in differences of neighbouring readings (Rice 1984; second differences: Gasser, Sroka
-and Jennen-Steinmetz 1986), a smooth course hardly does. The median over blocks leaves out where it moves
-fast. Readings in coarse steps may not differ at all: then the step tells how far they may be off.
+"""The noise of a channel: white or in steps in its raw readings, with a ripple in what a model leaves.
 
 What the best model leaves is noise too, as long as it is no larger than the raw readings allow. A
 ripple is in all parts of the residual, a wrong form shows in motion only. Ripple and white noise
@@ -12,147 +8,17 @@ readings, outputs and derivatives pass it alike.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.gap.plant import Channel, GreyBox, PlantError, Ripple
-
-BLOCK_READINGS = 20
-"""Length of a block whose noise is estimated by itself [readings]: four blocks in a run of 80 readings,
-and motion in some of them does not move the median."""
-
-DIFFERENCE_ORDERS = (2, 4)
-"""Orders of the differences of neighbouring readings that show the noise; the least estimate counts. The
-second suffices for finely sampled runs; the fourth removes the motion of runs with a few dozen readings
-per transient as well."""
-
-LARGEST_ROUNDING = 1e-9
-"""Distance of two readings that is rounding of the same value, relative to the range of half of them
-[1]."""
-
-STEP_QUANTILE = 0.1
-"""Quantile of the distances of neighbouring values that is tried as the step of a quantised channel [1]:
-most values of a range occur, so that a small quantile is one step."""
-
-STEP_TOLERANCE = 0.05
-"""Distance of a difference from the next multiple of the step up to which it is one [steps]."""
-
-SHARE_OF_MULTIPLES = 0.95
-"""Share of differences that must be multiples of the step [1]: all but faulty readings."""
-
-FEWEST_DISTANCES = 4
-"""Fewest distances of neighbouring values that can show a step: by chance two may be alike."""
-
-STEP_TO_SD = float(np.sqrt(1.0 / 12.0))
-"""Standard deviation of rounding to a step, in steps."""
-
-
-def channel_noise(channel: Channel, series: Sequence[NDArray]) -> float:
-    """Noise of a channel [SI]: as given or as its readings show it, at least the error of rounding.
-
-    series: trusted readings of each run, (readings,) [SI]. Raises PlantError where noise is neither
-    given nor seen.
-    """
-    if channel.noise is not None:
-        return max(channel.noise, STEP_TO_SD * channel.resolution)
-    floor = STEP_TO_SD * (channel.resolution or quantisation_step(series))
-    level = white_noise(series)
-    if level > floor:
-        return level
-    if not floor > 0:
-        raise PlantError(
-            f"channel {channel.name}: its noise is None, but its trusted readings do not show any "
-            "(too few, or most neighbours are equal): give `noise` or `resolution`"
-        )
-    return floor
-
-
-def white_noise(series: Sequence[NDArray]) -> float:
-    """Standard deviation of white noise on readings about a smooth course.
-
-    Args:
-        series: consecutive trusted readings of each run, (readings,) [unit of the readings].
-
-    Returns:
-        In the unit of the readings; 0 where most neighbours are equal, NaN where no run has enough
-        readings.
-    """
-    levels = [_from_differences(series, order) for order in DIFFERENCE_ORDERS]
-    known = [level for level in levels if not np.isnan(level)]
-    return min(known, default=float("nan"))
-
-
-def quantisation_step(series: Sequence[NDArray]) -> float:
-    """Step of which all readings are multiples, but for an offset.
-
-    series: readings of each run, (readings,) [unit of the readings]. Returns the step in the unit of the
-    readings, 0 where there is none.
-    """
-    gaps = distances(series)
-    if len(gaps) < FEWEST_DISTANCES:
-        return 0.0
-    step = float(np.quantile(gaps, STEP_QUANTILE, method="lower"))
-    multiples = gaps / step
-    close = np.abs(multiples - np.round(multiples)) <= STEP_TOLERANCE
-    return step if np.mean(close) >= SHARE_OF_MULTIPLES else 0.0
-
-
-def distances(series: Sequence[NDArray]) -> NDArray:
-    """Distances of neighbouring values among all readings, (values - 1,); rounding is none.
-
-    series: readings of each run, (readings,).
-    """
-    values = np.unique(np.concatenate([np.zeros(0), *series]))
-    if len(values) < 2:
-        return np.zeros(0)
-    low, high = np.quantile(values, (0.25, 0.75))  # faulty readings may lie anywhere
-    gaps = np.diff(values)
-    return gaps[gaps > LARGEST_ROUNDING * (high - low)]
-
-
-def differences(readings: NDArray, order: int) -> NDArray:
-    """Differences of readings (n,) with the standard deviation of their white noise, (n - order,)."""
-    return np.diff(readings, order) / np.sqrt(comb(2 * order, order))
-
-
-def _from_differences(series: Sequence[NDArray], order: int) -> float:
-    """Noise by differences of one order; NaN where no run has enough readings."""
-    blocks = [
-        block
-        for readings in series
-        if len(readings) > order
-        for block in _blocks(differences(readings, order), BLOCK_READINGS)
-    ]
-    if not blocks:
-        return float("nan")
-    freedom = min(len(block) for block in blocks) / _correlated_readings(order)
-    return noise_of_blocks([float(np.mean(block**2)) for block in blocks], max(freedom, 1.0))
-
-
-def noise_of_blocks(variances: NDArray | Sequence[float], freedom: float) -> float:
-    """Standard deviation of white noise from its variance in blocks of readings, a few of them lively.
-
-    variances: (blocks,). freedom: independent values in a block. The median of a chi-square variable
-    becomes its mean (Wilson and Hilferty 1931).
-    """
-    return float(np.sqrt(np.median(variances) / (1.0 - 2.0 / (9.0 * freedom)) ** 3))
-
-
-def _blocks(differences: NDArray, length: int) -> list[NDArray]:
-    """Differences (readings,) in blocks of at least this length, or in one block."""
-    return np.array_split(differences, max(1, len(differences) // length))
-
-
-def _correlated_readings(order: int) -> float:
-    """Number of differences of white noise that tell as much as one independent value."""
-    weights = np.diff(np.eye(1, 2 * order + 1, order)[0], order)
-    correlation = np.correlate(weights, weights, "full") / (weights @ weights)
-    return float(np.sum(correlation**2))
-
-
-# What the best model leaves
+from identification.readings_noise import (
+    BLOCK_READINGS,
+    quantisation_step,
+    rounding_error,
+    white_noise,
+)
 
 QUIET_SHARE = 0.75
 """Share of the blocks, those with the least residual, that show a ripple [1]: a wrong form is in the
@@ -188,6 +54,26 @@ RAW_TOLERANCE = 1.05
 
 LEAST = 1e-4
 """Least floor [1], for recordings without noise: a hundredth of the noise that is stated."""
+
+
+def channel_noise(channel: Channel, series: Sequence[NDArray]) -> float:
+    """Noise of a channel [SI]: as given or as its readings show it, at least the error of rounding.
+
+    series: trusted readings of each run, (readings,) [SI]. Raises PlantError where noise is neither
+    given nor seen.
+    """
+    if channel.noise is not None:
+        return max(channel.noise, rounding_error(channel.resolution))
+    floor = rounding_error(channel.resolution or quantisation_step(series))
+    level = white_noise(series)
+    if level > floor:
+        return level
+    if not floor > 0:
+        raise PlantError(
+            f"channel {channel.name}: its noise is None, but its trusted readings do not show any "
+            "(too few, or most neighbours are equal): give `noise` or `resolution`"
+        )
+    return floor
 
 
 @dataclass(frozen=True, kw_only=True)

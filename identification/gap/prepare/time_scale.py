@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.signal import correlate
 
 from identification.gap.plant import GreyBox
-from identification.gap.prepare.noise import white_noise
+from identification.readings_noise import white_noise
 
 WIDENING = 1.25
 """Ratio of successive widths over which readings are averaged before their changes are taken [1]: fine

@@ -15,9 +15,9 @@ from identification.gap.prepare.noise import (
     ChannelNoise,
     autocovariance,
     residual_noise,
-    white_noise,
     white_variance,
 )
+from identification.readings_noise import white_noise
 
 PERIOD, SAMPLES, RUNS = 1e-3, 4000, 3
 

@@ -8,7 +8,8 @@ import pytest
 from scipy.signal import lfilter
 
 from identification.gap.fit.gaps import GapDraws
-from identification.gap.prepare.noise import RAW_TOLERANCE, white_noise
+from identification.gap.prepare.noise import RAW_TOLERANCE
+from identification.readings_noise import white_noise
 
 SAMPLES = 2500
 """Of each of two recordings, as many as the valve's held-out ones have at 0.5 ms."""

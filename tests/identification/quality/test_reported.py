@@ -12,7 +12,7 @@ from docs.studies.reproduction.noise_errata import (
     TREND_SLOPES,
 )
 from epv_env.plant.channels import SENSORS
-from identification.quality.noise_tests import white_noise_band
+from identification.quality.assessment import white_noise_band
 from identification.recordings.recording import CHANNELS
 
 

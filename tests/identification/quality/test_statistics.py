@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from identification.quality.channel import (
     descriptive_statistics,
     fit_trend,
     longest_run,
-    outlier_limit,
     run_limit,
 )
 
@@ -52,25 +50,16 @@ def test_a_signal_that_never_changes_has_no_shape():
     assert np.isnan([statistics.outlier_factor, statistics.kurtosis, statistics.skewness]).all()
 
 
-@pytest.mark.parametrize("rounding", [0.0, 1.2])
-def test_999_of_1000_normal_records_stay_below_the_outlier_limit(rounding):
-    """The greatest of n |z| is drawn through its distribution; rounding adds half a step at most."""
-    uniform = np.random.default_rng(1).random(100_000)
-    greatest = stats.norm.isf(-np.expm1(np.log(uniform) / 10_000) / 2) + rounding / 2
-    above = np.mean(greatest > outlier_limit(10_000, rounding=rounding))
-    assert above == pytest.approx(0.001, abs=0.0004)
-
-
 def test_runs():
     coin = np.random.default_rng(0).integers(2, size=10_000)
     assert longest_run(np.array([1, 1, 2, 2, 2, 3])) == 3
     assert longest_run(np.ones(7)) == 7
-    assert run_limit(coin, rounding=0.0, significance=1e-4) == pytest.approx(np.log2(1e8), abs=2)
-    assert longest_run(coin) < run_limit(coin, rounding=0.0, significance=1e-4)
+    assert run_limit(coin, rounding=0.0) == pytest.approx(np.log2(1e8), abs=2)
+    assert longest_run(coin) < run_limit(coin, rounding=0.0)
 
 
 def test_a_drift_does_not_shorten_the_run_that_is_allowed():
     """The commonest reading of a drifting signal is rare, but not while the signal is there."""
     drifting = np.rint(np.linspace(0, 1000, 10_000))
-    limit = run_limit(drifting, rounding=1.0, significance=1e-4)
+    limit = run_limit(drifting, rounding=1.0)
     assert limit == pytest.approx(np.log(1e-8) / np.log(0.383), abs=2)

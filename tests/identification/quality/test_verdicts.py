@@ -8,7 +8,7 @@ import pytest
 
 from docs.studies.reproduction.noise_errata import STATISTICS, TREND_OFFSETS
 from epv_env.plant.channels import SENSORS
-from identification.quality.assessment import assess_recording, sensor_offsets
+from identification.quality.assessment import assess_recording, sensor_offsets, white_noise_band
 from identification.quality.verdicts import CHECKS, channel_verdict, check_results, worst_status
 from identification.recordings.recording import CHANNELS, UNITS, CampaignError
 from tests.identification.quality.records import (
@@ -40,7 +40,7 @@ def faulty(name, value, **changes):
 
 
 def test_a_perfect_bench_is_good_in_every_check():
-    """Over all 40 checks and long and short records; the false alarms are to stay below 1 %."""
+    """Over all 20 checks and long and short records; the false alarms are to stay below 1 %."""
     for seed in range(6):
         quality = assess_recording(rest_record(seed, 2000 if seed % 4 else SAMPLES), AMBIENT)
         for name in CHANNELS:
@@ -52,8 +52,9 @@ def test_a_rest_record_gives_tables_2_and_3_back(name):
     """Within four standard errors: sigma/sqrt(n) of a mean, sigma/sqrt(2 n) of sigma."""
     channel, sigma = perfect().channels[name], SENSORS[name].noise
     assert STATISTICS[name].standard_deviation == sigma
-    assert channel.normality.standard_deviation == pytest.approx(
-        sigma, abs=4 * sigma / np.sqrt(2 * SAMPLES)
+    rounded = np.hypot(sigma, SENSORS[name].resolution / np.sqrt(12))
+    assert channel.description.standard_deviation == pytest.approx(
+        rounded, abs=4 * rounded / np.sqrt(2 * SAMPLES)
     )
     assert channel.trend.at(np.array(2.5)) == pytest.approx(TREND_OFFSETS[name], abs=0.05 * sigma)
     assert channel.quantum == pytest.approx(SENSORS[name].resolution, rel=1e-6)
@@ -89,44 +90,10 @@ def test_a_wrong_offset(name, value):
 
 @pytest.mark.parametrize(("rate", "status"), [(0.002, "good"), (0.02, "doubt"), (0.1, "bad")])
 def test_a_drift(rate, status):
-    """Significant in all three cases; 10, 100 and 500 mbar over the record against 256."""
+    """10, 100 and 500 mbar over the record against an accuracy of 256."""
     quality = faulty("p3", 1.0 + rate * (TIME - 2.5))
     assert statuses(quality, "p3") == {**dict.fromkeys(CHECKS, "good"), "trend": status}
     assert (sensor_offsets(quality) == {}) == (status != "good")
-
-
-@pytest.mark.parametrize(("height", "status"), [(0.07, "doubt"), (0.3, "bad")])
-def test_a_spike(height, status):
-    assert statuses(faulty("p1", 1.0 + height * (TIME == 3.0)), "p1")["outliers"] == status
-
-
-@pytest.mark.parametrize(("amplitude", "status"), [(0.002, "good"), (0.006, "doubt"), (0.02, "bad")])
-def test_hum(amplitude, status):
-    quality = faulty("p2", 1.0 + amplitude * np.sin(2 * np.pi * 50 * TIME))
-    assert statuses(quality, "p2")["whiteness"] == status
-    if status != "good":
-        assert "near 50 Hz" in channel_verdict(quality, "p2").text
-
-
-def test_a_slow_wander_is_found_though_no_autocorrelation_is_great():
-    """A third of the noise's deviation, but of one sign for 100 ms: it does not average out."""
-    quality = faulty("p2", 1.0 + 0.0038 * np.sin(2 * np.pi * 1.3 * TIME))
-    whiteness = quality.channels["p2"].whiteness
-    assert whiteness is not None
-    assert whiteness.peak < 0.1
-    assert statuses(quality, "p2")["whiteness"] != "good"
-
-
-def test_crosstalk():
-    rng = np.random.default_rng(4)
-    source = rng.standard_normal(SAMPLES)
-    record = with_channel(rest_record(0), "I", SENSORS["I"].measure(0 * source, source))
-    quality = assess_recording(
-        with_channel(record, "U", readings("U", 0.005 * source, rng, SAMPLES)), AMBIENT
-    )
-    assert statuses(quality, "I")["correlation"] == "bad"
-    assert "with U at a lag of 0 ms" in channel_verdict(quality, "I").text
-    assert quality.adjusted["I", "U"] < 1e-10 < quality.adjusted["p1", "p2"]
 
 
 @pytest.mark.parametrize(("factor", "status"), [(1.3, "good"), (2.0, "doubt"), (5.0, "bad")])
@@ -143,7 +110,26 @@ def test_a_stuck_code():
     quality = assess_recording(with_channel(rest_record(0), "p3", np.ones(SAMPLES)), AMBIENT)
     assert statuses(quality, "p3") == {"offset": "good", "resolution": "bad"}
     assert statuses(quality, "p2") == dict.fromkeys(CHECKS, "good")
-    assert not any("p3" in pair for pair in quality.pairs)
+    assert not any("p3" in pair for pair in quality.correlations)
+
+
+def test_a_reading_that_stands_still_for_a_while_is_bad():
+    """A cable that breaks for 100 ms, or a converter that clips for as long."""
+    held = rest_record(0).p3 / 1e5
+    held[3000:3200] = held[3000]
+    quality = assess_recording(with_channel(rest_record(0), "p3", held), AMBIENT)
+    assert statuses(quality, "p3") == {**dict.fromkeys(CHECKS, "good"), "resolution": "bad"}
+    assert "lasts 100 ms" in channel_verdict(quality, "p3").text
+
+
+def test_table_4_shows_crosstalk():
+    rng = np.random.default_rng(4)
+    source = rng.standard_normal(SAMPLES)
+    record = with_channel(rest_record(0), "I", SENSORS["I"].measure(0 * source, source))
+    signal = readings("U", 0.005 * source, rng, SAMPLES)
+    quality = assess_recording(with_channel(record, "U", signal), AMBIENT)
+    assert quality.correlations["I", "U"] == pytest.approx(0.005 / 0.0139, abs=0.04)
+    assert abs(quality.correlations["p1", "p2"]) < 2 * white_noise_band(SAMPLES)
 
 
 def test_a_reading_that_coarse_steps_hold_is_in_doubt_and_not_bad():
@@ -151,23 +137,6 @@ def test_a_reading_that_coarse_steps_hold_is_in_doubt_and_not_bad():
     quality = assess_recording(record, AMBIENT, steps={"p3": 5e3})
     assert statuses(quality, "p3") == {"offset": "good", "resolution": "doubt"}
     assert sensor_offsets(quality)["p3"].error == pytest.approx(5e3 / np.sqrt(12))
-
-
-def test_noise_that_is_not_normal():
-    noise = SENSORS["I"].noise * np.random.default_rng(6).laplace(scale=0.7, size=SAMPLES)
-    step = SENSORS["I"].resolution
-    quality = assess_recording(with_channel(rest_record(0), "I", step * np.rint(noise / step)), AMBIENT)
-    assert statuses(quality, "I")["normality"] in ("doubt", "bad")
-
-
-def test_significant_is_not_yet_large():
-    """A correlation of 0.07, Table 4's greatest, is beyond chance with 10 000 samples, and harmless."""
-    source = np.random.default_rng(7).standard_normal(SAMPLES)
-    record = with_channel(rest_record(0), "p1", 1.0 + 0.0068 * source)
-    other = 1.0 + 0.0075 * (0.07 * source + np.random.default_rng(8).standard_normal(SAMPLES))
-    quality = assess_recording(with_channel(record, "p3", other), AMBIENT)
-    assert quality.adjusted["p1", "p3"] < 1e-3
-    assert statuses(quality, "p1")["correlation"] == "good"
 
 
 def test_too_short_a_record_is_refused():
