@@ -11,9 +11,7 @@ from epv_env.plant.coefficients import coefficients
 from epv_env.plant.effects.registry import effect_constants
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
-from identification.bench.hybrid_automaton import RightHandSide, Schedule, piecewise_schedule
 from identification.bench.programmes import DIAGNOSIS_SUITE, Programme
-from identification.bench.reference_simulation import simulate_reference
 from identification.bench.session import (
     RESERVOIR_VOLUME,
     TrueSignals,
@@ -24,6 +22,8 @@ from identification.blind.forms import currents_at_terminals, right_hand_side
 from identification.blind.truth import Trial
 from identification.recordings.recording import Campaign
 from identification.report_2003 import SAMPLING_RATE
+from tests.reference.hybrid_automaton import RightHandSide, Schedule, piecewise_schedule
+from tests.reference.reference_simulation import simulate_reference
 
 OMITTED_PROGRAMMES = ("rest", "high_voltage")
 """Programmes of the diagnosis suite that are not run. A record at rest would remove a constant sensor

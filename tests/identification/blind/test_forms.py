@@ -9,7 +9,6 @@ from epv_env.plant.effects.registry import EFFECTS as RECORDS
 from epv_env.plant.effects.registry import effect, effect_constants
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.parameters import Parameters
-from identification.bench.hybrid_automaton import COMPILED_RIGHT_HAND_SIDES
 from identification.blind.forms import (
     INSTANT_DROP,
     LANGEVIN,
@@ -21,6 +20,7 @@ from identification.blind.forms import (
     right_hand_side,
 )
 from identification.blind.truth import EFFECTS, top_sizes
+from tests.reference.hybrid_automaton import COMPILED_RIGHT_HAND_SIDES
 
 PLANT = COMPILED_RIGHT_HAND_SIDES[True]
 DROP, CURRENT = (State._fields.index(name) for name in ("supply_drop", "I"))
