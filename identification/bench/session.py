@@ -10,10 +10,8 @@ from epv_env.common.results_folder import progress
 from epv_env.plant.channels import SENSORS, Sensor, readings
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.simulate import energised
-from identification.bench.hybrid_automaton import delayed_schedule, piecewise_schedule
+from epv_env.plant.simulate import energised, simulate
 from identification.bench.programmes import Programme
-from identification.bench.reference_simulation import simulate_reference
 from identification.recordings.columns import LEAST_RATE
 from identification.recordings.recording import (
     CHANNELS,
@@ -23,9 +21,6 @@ from identification.recordings.recording import (
 )
 from identification.recordings.rules import RULES, RecordingRules
 from identification.report_2003 import SAMPLING_RATE
-
-RELATIVE_TOLERANCE = 1e-8
-"""Of the bench's solver: errors below 0.1 mbar, a thirtieth of an ADC step."""
 
 GREATEST_RATE = 20_000.0
 """Greatest sampling rate [1/s]."""
@@ -54,17 +49,14 @@ def run_programme(
 ) -> TrueSignals:
     """The true signals of one recording.
 
-    rate: samples per second [1/s]. reservoir: volume that feeds p1 [m^3]. Raises RuntimeError where the
-    solver fails.
+    rate: samples per second [1/s]. reservoir: volume that feeds p1 [m^3]. Raises SimulationError for a
+    valve that cannot be integrated.
     """
     U = programme.case.voltage(programme.U_on, rate)
-    time = np.arange(len(U)) / rate
     start = initial_state(parameters, programme)
     # Switching takes effect at the sample at which the voltage is first read, or later.
-    schedule = piecewise_schedule(parameters, start, time, U=U[:-1], reservoir_volume=reservoir)
-    delayed = delayed_schedule(schedule, parameters["t_delay"])
-    state = simulate_reference(delayed, time, rtol=RELATIVE_TOLERANCE).state
-    channels = {"U": U, **readings(state, parameters)}
+    run = simulate(parameters, initial=start, U=U, period=1.0 / rate, reservoir_volume=reservoir)
+    channels = {"U": U, **readings(run.state, parameters)}
     return TrueSignals(programme=programme, period=1.0 / rate, channels=channels)
 
 

@@ -137,8 +137,8 @@ def rate(name: str, run: Run) -> float:
 
 def one_valve(duration: float) -> dict[str, Callable[[], tuple[float, float]]]:
     """Simulators of one valve, by name: each gives seconds per CPU second and p2's error [Pa]."""
-    from identification.bench.hybrid_automaton import piecewise_schedule
-    from identification.bench.reference_simulation import simulate_reference
+    from tests.reference.hybrid_automaton import piecewise_schedule
+    from tests.reference.reference_simulation import simulate_reference
     from tests.reference.schedule import plant_states
 
     p = Parameters.calibrated()

@@ -21,8 +21,8 @@ from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
 from epv_env.plant.runge_kutta import DEFAULT_STEP
 from epv_env.task import LimitingTask
-from identification.bench.hybrid_automaton import piecewise_schedule
-from identification.bench.reference_simulation import simulate_reference
+from tests.reference.hybrid_automaton import piecewise_schedule
+from tests.reference.reference_simulation import simulate_reference
 from training.evaluation.rollout import begin_episodes, make_env
 from training.evaluation.scenarios import TUNING_REGION
 

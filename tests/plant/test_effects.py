@@ -11,8 +11,9 @@ from epv_env.plant.effects.chambers import chamber_rates
 from epv_env.plant.effects.coil import COOLING_TIME, COPPER
 from epv_env.plant.effects.flows import FILLING_TIME
 from epv_env.plant.effects.friction import STRIBECK_SPEED, stribeck
+from epv_env.plant.effects.law import KNOTS, placed
 from epv_env.plant.effects.magnet import saturated_force
-from epv_env.plant.effects.registry import CATALOGUE, Effects, effect_constants, has_effects
+from epv_env.plant.effects.registry import CATALOGUE, PLACES, Effects, effect_constants, has_effects
 from epv_env.plant.equations import (
     Coefficients,
     Inputs,
@@ -25,6 +26,8 @@ from epv_env.plant.parameters import Parameters, table
 from epv_env.plant.primitives import CRITICAL_RATIO, KAPPA, mass_flux
 from epv_env.plant.simulate import energised, simulate
 from epv_env.plant.valves import Valves
+from tests.reference.hybrid_automaton import delayed_schedule
+from tests.reference.reference_simulation import simulate_reference
 from tests.reference.schedule import away_from_events, largest_difference, pulses
 
 CALIBRATED = Parameters.calibrated()
@@ -72,12 +75,8 @@ def test_sizes_of_zero_are_no_effects():
             assert np.all(has_effects(effect_constants(sized(name, 0.1)))), name
 
 
-@pytest.mark.parametrize("name", CATALOGUE)
-def test_the_kernel_agrees_with_scipy_on_every_effect(name):
-    from identification.bench.hybrid_automaton import delayed_schedule
-    from identification.bench.reference_simulation import simulate_reference
-
-    p = sized(name, 0.3)
+def assert_scipy_agrees(p: Parameters) -> None:
+    """The kernel's readings of one opening are those of the reference."""
     schedule = delayed_schedule(pulses(p, opening=0.1, count=1, duration=0.3), p["t_delay"])
     time = np.arange(0.0, 0.3, 1 / RATE)
     reference = simulate_reference(schedule, time, rtol=1e-8)
@@ -89,6 +88,17 @@ def test_the_kernel_agrees_with_scipy_on_every_effect(name):
     for output, allowed in {"p2": 20.0, "p3": 50.0, "I": 1e-4}.items():
         found = largest_difference(simulated[output], expected[output], keep)
         assert found < allowed, output
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_the_kernel_agrees_with_scipy_on_every_effect(name):
+    assert_scipy_agrees(sized(name, 0.3))
+
+
+def test_the_kernel_agrees_with_scipy_on_a_law():
+    """An eddy current that fades with p3 acts on the coil's rate and on the current that is read."""
+    law = placed(1, PLACES["eddy_current"], "p3", 1e5, 12e5, tuple(np.linspace(1.0, -0.5, KNOTS)))
+    assert_scipy_agrees(sized("eddy_current", 0.3).replace(**law))
 
 
 def test_air_is_conserved_with_every_effect_on():

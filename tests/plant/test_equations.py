@@ -18,7 +18,7 @@ from epv_env.plant.equations import (
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.primitives import MAX_RELATIVE_ERROR
 from epv_env.plant.simulate import energised, simulate
-from identification.bench.hybrid_automaton import COMPILED_RIGHT_HAND_SIDES
+from tests.reference.hybrid_automaton import COMPILED_RIGHT_HAND_SIDES
 from tests.reference.numpy_rhs import numpy_rates
 
 CALIBRATED = Parameters.calibrated()

@@ -11,9 +11,9 @@ from epv_env.plant.coefficients import coefficients
 from epv_env.plant.effects.registry import effect_constants
 from epv_env.plant.equations import Inputs
 from epv_env.plant.parameters import Parameters
-from identification.bench.hybrid_automaton import COMPILED_RIGHT_HAND_SIDES, POSITIONS
-from identification.bench.reference_simulation import ReferenceRun, simulate_reference
 from tests.reference.closed_loop import random_schedules
+from tests.reference.hybrid_automaton import COMPILED_RIGHT_HAND_SIDES, POSITIONS
+from tests.reference.reference_simulation import ReferenceRun, simulate_reference
 from tests.reference.schedule import (
     Schedule,
     away_from_events,

@@ -9,7 +9,7 @@ from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters, table
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
-from identification.bench.hybrid_automaton import Schedule, piecewise_schedule
+from tests.reference.hybrid_automaton import Schedule, piecewise_schedule
 
 PERIOD = 5e-3
 """Time between decisions [s]."""

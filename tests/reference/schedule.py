@@ -12,8 +12,8 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.runge_kutta import DEFAULT_STEP
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
-from identification.bench.hybrid_automaton import Schedule, piecewise_schedule
-from identification.bench.reference_simulation import ReferenceRun
+from tests.reference.hybrid_automaton import Schedule, piecewise_schedule
+from tests.reference.reference_simulation import ReferenceRun
 
 MOST_STEPS = 5000
 """Steps that one `advance` is asked for; well below integrate.MAX_STEPS."""

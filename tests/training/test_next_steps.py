@@ -24,7 +24,6 @@ VERDICTS = {
 ENDED = {
     "bench --out 'my bench'": "run",
     "bench --out next --programme next.json --plant valve.json": "run",
-    "blind --out blind --trials 7": "blind",
     f"closed-loop log --controller policy --out {KNOWN}": "train",
     "compare --controllers PWM PPO=policy": "sweep",
     "compare --quick": "sweep",

@@ -20,6 +20,8 @@ from numpy.typing import ArrayLike
 
 import epv_env  # noqa: F401 - registers the environments
 from controllers.policy import load_policy
+from docs.studies.blind.forms import deviating_sizes
+from docs.studies.blind.score import named_cause, named_set
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
 from epv_env.common.command_line import COUNT, fail_clearly
 from epv_env.common.files import Journal
@@ -29,8 +31,6 @@ from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from epv_env.plant.valves import Valves
-from identification.blind.forms import deviating_sizes
-from identification.blind.score import named_cause, named_set
 from identification.gap.judge.verdict import NO_GAP
 from identification.gap.report.gap_json import as_json
 from identification.recordings.log_files import read_log
@@ -91,7 +91,7 @@ def write_log(valve: dict[str, Any], folder: Path) -> None:
 
 
 def deviate(valves: Valves, deviation: float) -> None:
-    """Have the sizes of a valve's effects depend on its state, as in identification/blind/forms.py."""
+    """Have the sizes of a valve's effects depend on its state, as in docs/studies/blind/forms.py."""
     tables = valves.tables
     fitted = tables.effects.copy()
 

@@ -17,6 +17,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from controllers.base import Controller
+from docs.studies.blind.bench import NO_OFFSETS, SUITE, run_programme
+from docs.studies.blind.truth import draw_unit
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
 from epv_env.common.command_line import COUNT, fail_clearly
 from epv_env.common.files import Journal, write_text
@@ -26,8 +28,6 @@ from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.region import Alternative, Mixture, Region
 from epv_env.task import LimitingTask
 from identification.bench.session import measured_campaign
-from identification.blind.bench import NO_OFFSETS, blind_suite, run_programme
-from identification.blind.truth import draw_unit
 from identification.gap.report.gap_json import GAP
 from identification.recordings.campaign_files import FILE_NAME, write_campaign
 from identification.valve_gap.diagnose import PLANT, diagnose_campaign
@@ -94,7 +94,7 @@ QUICK: dict[str, Any] = {"timesteps": 8192, "episodes": 8, "duration": 1.0}
 class UnevenLag:
     """A policy on valves whose reading of p2 lags unevenly: 1/tau (1 - d D/(|D| + 50 mbar)).
 
-    D is the reading less the pressure, d the unevenness, as in identification/blind/forms.py. The lag is
+    D is the reading less the pressure, d the unevenness, as in docs/studies/blind/forms.py. The lag is
     set at the begin of each control period, since the environment's own is even.
     """
 
@@ -172,7 +172,7 @@ def diagnosed(case: Case, true: Plant, folder: Path) -> Plant:
         rng = np.random.default_rng([SEED, 1])
         truths = [
             run_programme(true.parameters, programme, form_deviation=case.unevenness, rng=rng)
-            for programme in blind_suite()
+            for programme in SUITE
         ]
         write_campaign(
             measured_campaign(truths, true.parameters, seed=SEED, offsets=NO_OFFSETS), campaign

@@ -1,13 +1,17 @@
-"""The bench's truth: voltages as programmed, the plant's own trajectories, air that is conserved."""
+"""The bench's truth: voltages as programmed, SciPy's trajectories, air that is conserved."""
+
+from functools import cache
 
 import numpy as np
 import pytest
 
-from epv_env.plant.simulate import energised, simulate
+from epv_env.plant.equations import State
 from identification.bench.programmes import DIAGNOSIS_SUITE
-from identification.bench.session import RESERVOIR_VOLUME, run_programme
+from identification.bench.session import RESERVOIR_VOLUME, initial_state, run_programme
 from identification.recordings.recording import HOLD
 from tests.identification.twins import PROGRAMMES, SWITCHING, TRUE, truth
+from tests.reference.hybrid_automaton import piecewise_schedule
+from tests.reference.reference_simulation import simulate_reference
 
 SETTLED = 0.03
 """After a switching the armature rests within this [s]."""
@@ -28,11 +32,14 @@ def since_switching(true):
     return (index - last) * true.period
 
 
-def plant_s_own(true, reservoir=RESERVOIR_VOLUME):
-    programme = true.programme
-    start = energised(TRUE, p1=programme.p1, p2=programme.p2, U=programme.U_on)
-    voltage = true.channels["U"]
-    return simulate(TRUE, initial=start, U=voltage, period=true.period, reservoir_volume=reservoir).state
+@cache
+def by_scipy(name, reservoir=RESERVOIR_VOLUME) -> State:
+    """The states behind a recording by another integrator; both share the right-hand side alone."""
+    true = truth(name)
+    start, U = initial_state(TRUE, true.programme), true.channels["U"]
+    time = np.arange(len(U)) * true.period
+    schedule = piecewise_schedule(TRUE, start, time, U=U[:-1], reservoir_volume=reservoir)
+    return simulate_reference(schedule, time, rtol=1e-8).state
 
 
 def assert_agrees(true, state):
@@ -51,14 +58,14 @@ def test_the_voltage_is_on_or_off_as_the_programme_says(name):
 
 
 @pytest.mark.parametrize("name", [p.name for p in DIAGNOSIS_SUITE if p.U_on])
-def test_the_plant_s_own_integrator_finds_the_same(name):
-    """They share the right-hand side alone; 20 Pa are a twentieth of an ADC step."""
-    assert_agrees(truth(name), plant_s_own(truth(name)))
+def test_scipy_finds_the_same(name):
+    """20 Pa are a twentieth of an ADC step."""
+    assert_agrees(truth(name), by_scipy(name))
 
 
 def test_another_supply_is_noticed():
     with pytest.raises(AssertionError):
-        assert_agrees(truth("test1"), plant_s_own(truth("test1"), reservoir=1.05 * RESERVOIR_VOLUME))
+        assert_agrees(truth("test1"), by_scipy("test1", reservoir=1.05 * RESERVOIR_VOLUME))
 
 
 def test_at_rest_nothing_moves():
@@ -88,7 +95,7 @@ def test_over_a_recording_the_air_falls_by_what_the_control_chamber_vents(name):
     true = truth(name)
     lost = volumes(true)[0] - volumes(true)[-1]
     filling = TRUE["V3"] * true.channels["p3"][0] / (TRUE["R_gas"] * TRUE["T_env"])
-    vented = plant_s_own(true).air_vented[-1]
+    vented = by_scipy(name).air_vented[-1]
     assert lost == pytest.approx(vented, rel=1e-3)
     assert 0.3 < lost / (filling * len(true.programme.case.openings)) < 1.0
 

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares, minimize_scalar
 
+from docs.studies.blind.truth import NOMINAL, UNIT_SCATTER, UNIT_SCATTER_LIMIT, Trial
 from epv_env.plant.channels import SENSORS
+from epv_env.plant.free_parameters import Freedom
 from epv_env.plant.parameters import Parameters, table
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.bench.session import TrueSignals
-from identification.blind.truth import NOMINAL, UNIT_SCATTER, UNIT_SCATTER_LIMIT, Trial
 from identification.calibration.problem import ParameterVector
 from identification.recordings.recording import OUTPUTS, UNITS
 from identification.replay.model_inputs import ModelInputs
@@ -46,25 +47,27 @@ def explainable_gap(trial: Trial, truths: Sequence[TrueSignals]) -> float:
 
 def recalibrated_parameters(truths: Sequence[TrueSignals]) -> Parameters:
     """All parameters, fitted to the calibration recordings' truth; most within their scatter."""
-    vector = ParameterVector(CALIBRATED_SYMBOLS + tuple(PARAMETER_COMPONENTS), Parameters.calibrated())
-    comparison = _Comparison([true for true in truths if not is_held_out(true)], vector.reference)
-    scatters = np.array([symbol in PARAMETER_COMPONENTS for symbol in vector.symbols])
-    prior = np.where(scatters, 1.0 / UNIT_SCATTER, 0.0)
-    (low, high), reach = vector.bounds.T, UNIT_SCATTER_LIMIT * UNIT_SCATTER
-
-    def residuals(z: NDArray) -> NDArray:
-        """Of n candidates (n, k): data and prior [-], (residuals, n)."""
-        return np.vstack([*comparison.residuals(vector.values(z)), ((z - 1.0) * prior).T])
+    base, limit = Parameters.calibrated(), UNIT_SCATTER_LIMIT * UNIT_SCATTER
+    scatter = {
+        s: Freedom(
+            bounds=(base[s] * (1.0 - limit), base[s] * (1.0 + limit)),
+            mean=base[s],
+            sd=UNIT_SCATTER * base[s],
+        )
+        for s in PARAMETER_COMPONENTS
+    }
+    vector = ParameterVector((*CALIBRATED_SYMBOLS, *scatter), base, scatter)
+    comparison = _Comparison([true for true in truths if not is_held_out(true)], base)
 
     def derivatives(z: NDArray) -> NDArray:
-        changed = residuals(np.vstack([z, z + DIFFERENCE_STEP * np.eye(len(z))]))
-        return (changed[:, 1:] - changed[:, :1]) / DIFFERENCE_STEP
+        found = comparison.residuals(vector.values(z + DIFFERENCE_STEP * np.eye(len(z) + 1, len(z), -1)))
+        return np.vstack([(found[:, 1:] - found[:, :1]) / DIFFERENCE_STEP, vector.prior(z)[1]])
 
     fit = least_squares(
-        lambda z: residuals(z[None])[:, 0],
+        lambda z: np.append(comparison.residuals(vector.values(z)), vector.prior(z)[0]),
         np.ones(len(vector.symbols)),
         jac=derivatives,  # type: ignore[arg-type]
-        bounds=(np.where(scatters, 1.0 - reach, low), np.where(scatters, 1.0 + reach, high)),
+        bounds=vector.bounds.T,
         xtol=FIT_TOLERANCE,
         ftol=FIT_TOLERANCE,
         max_nfev=FIT_EVALUATIONS,
@@ -75,19 +78,15 @@ def recalibrated_parameters(truths: Sequence[TrueSignals]) -> Parameters:
 def held_out_gap(truths: Sequence[TrueSignals], values: Mapping[str, float]) -> float:
     """Gap of a model on the held-out recordings [-], at least 1.
 
-    A winding that heats starts each recording at the temperature that fits best.
-
-    values: parameters that differ from Table 12 by symbol [SI].
+    A winding that heats starts each recording at the temperature that fits best. values: parameters that
+    differ from Table 12 by symbol [SI].
     """
-    squares, count = 0.0, 0
-    base = Parameters.calibrated().replace(**values)
+    base, squares = Parameters.calibrated().replace(**values), []
     for true in filter(is_held_out, truths):
         comparison = _Comparison([true], base)
         theta = _best_temperature(comparison) if base["h_coil"] else base["theta_coil"]
-        residual = comparison.residuals({"theta_coil": np.array([theta])})[0]
-        squares += float(np.sum(residual**2))
-        count += residual.size
-    return float(np.sqrt(1.0 + squares / count))
+        squares.append(comparison.squares(theta))
+    return float(np.sqrt(1.0 + np.mean(np.concatenate(squares))))
 
 
 def is_held_out(true: TrueSignals) -> bool:
@@ -95,59 +94,58 @@ def is_held_out(true: TrueSignals) -> bool:
     return true.programme.role == "validation"
 
 
-def noise_deviation(channel: str) -> float:
-    """Standard deviation of a reading: the sensor's noise and its rounding [SI]."""
-    sensor = SENSORS[channel]
-    return float(np.hypot(sensor.noise, sensor.resolution / np.sqrt(12))) * UNITS[channel][1]
-
-
 class _Comparison:
     """The model compared with noise-free recordings; base: parameters that `residuals` is not given."""
 
     def __init__(self, truths: Sequence[TrueSignals], base: Parameters):
-        self.replay = Replay([_inputs(true) for true in truths], base)
+        self.replay = Replay([_inputs(true.channels, true.period) for true in truths], base)
         self.true = [np.stack([true.channels[name] for name in OUTPUTS]) for true in truths]
         self.weights = [_weights(true) for true in truths]
 
-    def residuals(self, values: Mapping[str, NDArray]) -> list[NDArray]:
-        """(model - truth)/noise of n candidates per recording [-], (3 samples, n)."""
-        outputs = self.replay.outputs(values)
-        return [
-            np.nan_to_num((model - true[:, :, None]) * weights[:, :, None], nan=LOST_RESIDUAL).reshape(
-                true.size, -1
+    def residuals(self, values: Mapping[str, NDArray]) -> NDArray:
+        """(model - truth)/noise of n candidates [-], (3 samples of all recordings, n)."""
+        each = [
+            ((model - true[:, :, None]) * weights[:, :, None]).reshape(true.size, -1)
+            for model, true, weights in zip(
+                self.replay.outputs(values), self.true, self.weights, strict=True
             )
-            for model, true, weights in zip(outputs, self.true, self.weights, strict=True)
         ]
+        return np.nan_to_num(np.vstack(each), nan=LOST_RESIDUAL)
+
+    def squares(self, theta: float) -> NDArray:
+        """Squared residuals (residuals,) where the windings start at a temperature [K above ambient]."""
+        return self.residuals({"theta_coil": np.array([theta])})[:, 0] ** 2
 
 
-def _inputs(true: TrueSignals) -> ModelInputs:
+def _inputs(channels: Mapping[str, NDArray], period: float) -> ModelInputs:
     """Inputs and start for the model: as a diagnosis takes them, but exact."""
-    U = true.channels["U"]
+    U, p1, p2 = channels["U"], channels["p1"], channels["p2"]
+    still = np.zeros_like(U)
     return ModelInputs(
-        period=true.period,
-        U=U,
-        p1=true.channels["p1"],
-        sigma_S=np.zeros_like(U),
-        U_start=float(U[0]),
-        p2_start=float(true.channels["p2"][0]),
+        period=period, U=U, p1=p1, sigma_S=still, U_start=float(U[0]), p2_start=float(p2[0])
     )
 
 
 def _weights(true: TrueSignals) -> NDArray:
-    """1/noise [1/SI], (3, samples); 0 for the current at a switching, where it may jump."""
+    """1/noise [1/SI], (3, samples); 0 for the current at a switching, where it may jump.
+
+    The noise is the sensor's and that of its rounding.
+    """
     U = true.channels["U"]
-    weights = np.repeat([[1.0 / noise_deviation(name)] for name in OUTPUTS], len(U), axis=1)
+    weights = np.empty((len(OUTPUTS), len(U)))
+    for row, name in zip(weights, OUTPUTS, strict=True):
+        sensor = SENSORS[name]
+        row[:] = 1.0 / (np.hypot(sensor.noise, sensor.resolution / np.sqrt(12)) * UNITS[name][1])
     weights[OUTPUTS.index("I"), np.flatnonzero(np.diff(U)) + 1] = 0.0
     return weights
 
 
 def _best_temperature(comparison: _Comparison) -> float:
     """Winding temperature above ambient at the start that fits best [K]."""
-
-    def cost(theta: float) -> float:
-        return float(np.sum(comparison.residuals({"theta_coil": np.array([theta])})[0] ** 2))
-
-    bounds = table()["theta_coil"].domain or (0.0, 0.0)
-    options = {"xatol": TEMPERATURE_TOLERANCE}
-    found = minimize_scalar(cost, bounds=bounds, method="bounded", options=options)
+    found = minimize_scalar(
+        lambda theta: float(np.sum(comparison.squares(theta))),
+        bounds=table()["theta_coil"].domain or (0.0, 0.0),
+        method="bounded",
+        options={"xatol": TEMPERATURE_TOLERANCE},
+    )
     return float(found.x)  # type: ignore[attr-defined]

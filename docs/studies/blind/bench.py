@@ -1,36 +1,40 @@
 """The blind check's bench: a trial's true recordings, with forms and solver that no fit uses."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from docs.studies.blind.forms import currents_at_terminals, right_hand_side
+from docs.studies.blind.truth import Trial
 from epv_env.plant.channels import readings
 from epv_env.plant.coefficients import coefficients
 from epv_env.plant.effects.registry import effect_constants
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
-from identification.bench.hybrid_automaton import RightHandSide, Schedule, piecewise_schedule
 from identification.bench.programmes import DIAGNOSIS_SUITE, Programme
-from identification.bench.reference_simulation import simulate_reference
 from identification.bench.session import (
     RESERVOIR_VOLUME,
     TrueSignals,
     initial_state,
     measured_campaign,
 )
-from identification.blind.forms import currents_at_terminals, right_hand_side
-from identification.blind.truth import Trial
 from identification.recordings.recording import Campaign
 from identification.report_2003 import SAMPLING_RATE
-
-OMITTED_PROGRAMMES = ("rest", "high_voltage")
-"""Programmes of the diagnosis suite that are not run. A record at rest would remove a constant sensor
-bias, which is one of the effects."""
+from tests.reference.hybrid_automaton import RightHandSide, Schedule, piecewise_schedule
+from tests.reference.reference_simulation import simulate_reference
 
 SUPPLY_VOLTAGE = 24.0
 """Coil voltage in every recording [V]: the driver's drop can hide behind the resistance."""
+
+SUITE = tuple(
+    replace(programme, U_on=SUPPLY_VOLTAGE)
+    for programme in DIAGNOSIS_SUITE
+    if programme.name not in ("rest", "high_voltage")
+)
+"""The programmes of a campaign: nine recordings, two of them held out. A record at rest would remove a
+constant sensor bias, which is one of the effects."""
 
 SOLVERS = (("LSODA", 1e-6), ("LSODA", 1e-8), ("Radau", 1e-6), ("Radau", 1e-8))
 """SciPy's methods with relative tolerances [-], tried in turn: LSODA's interpolant may lose an event."""
@@ -49,39 +53,11 @@ NO_OFFSETS: dict[str, float] = {}
 """Offsets of the bench's own sensors. They are zeroed before the session, as a bias is an effect."""
 
 
-def terminal_currents(state: State, schedule: Schedule, time: NDArray, form_deviation: float) -> NDArray:
-    """Currents at the coil's terminals [A], (samples,), where eddy currents deviate as well.
-
-    Args:
-        state: fields (samples,) each [SI].
-        schedule: the inputs and the valve.
-        time: of the samples [s], (samples,).
-        form_deviation: relative deviation of the forms [-].
-    """
-    segment = np.searchsorted(schedule.borders[1:-1], time, side="left")
-    inputs = np.ascontiguousarray([field[segment] for field in schedule.inputs])
-    c, e = coefficients(schedule.parameters), effect_constants(schedule.parameters)
-    return currents_at_terminals(np.ascontiguousarray(state), inputs, c, e, form_deviation)
-
-
-def blind_suite() -> tuple[Programme, ...]:
-    """The programmes of a campaign: nine recordings, two of them held out."""
-    return tuple(
-        replace(programme, U_on=SUPPLY_VOLTAGE)
-        for programme in DIAGNOSIS_SUITE
-        if programme.name not in OMITTED_PROGRAMMES
-    )
-
-
-def true_recordings(trial: Trial, seed: int) -> list[TrueSignals]:
+def true_recordings(trial: Trial, seed: int, suite: Sequence[Programme] = SUITE) -> list[TrueSignals]:
     """The noise-free course of every recording.
 
-    Args:
-        trial: the truth.
-        seed: of the winding's temperatures and of the jitter of delays.
-
-    Raises:
-        RuntimeError: no solver follows the valve.
+    seed: of the winding's temperatures and of the jitter of delays. Raises RuntimeError where no solver
+    follows the valve.
     """
     return [
         run_programme(
@@ -91,11 +67,11 @@ def true_recordings(trial: Trial, seed: int) -> list[TrueSignals]:
             other_forms=trial.other_forms,
             rng=np.random.default_rng([seed, trial.number, index, 2]),
         )
-        for index, programme in enumerate(blind_suite())
+        for index, programme in enumerate(suite)
     ]
 
 
-def blind_campaign(truths: list[TrueSignals], trial: Trial, seed: int) -> Campaign:
+def blind_campaign(truths: Sequence[TrueSignals], trial: Trial, seed: int) -> Campaign:
     """The readings of the bench's sensors; the campaign's name holds the trial's number only."""
     noise = int(np.random.SeedSequence([seed, trial.number, 0, 3]).generate_state(1)[0])
     name = f"trial-{trial.number:04d}"
@@ -112,37 +88,26 @@ def run_programme(
 ) -> TrueSignals:
     """One recording of a valve whose effects deviate in form; at deviation 0 the forms are the plant's.
 
-    Args:
-        parameters: the valve.
-        programme: inputs and start.
-        form_deviation: relative deviation of the forms [-].
-        rng: of the jitter of delays.
-        other_forms: effects that have their other form.
-
-    Raises:
-        RuntimeError: no solver follows the valve.
+    form_deviation: relative deviation of the forms [-]. rng: of the jitter of delays. other_forms:
+    effects that have their other form. Raises RuntimeError where no solver follows the valve.
     """
     U = programme.case.voltage(programme.U_on, SAMPLING_RATE)
     time = np.arange(len(U)) / SAMPLING_RATE
     start = initial_state(parameters, programme)
     schedule = piecewise_schedule(parameters, start, time, U=U[:-1], reservoir_volume=RESERVOIR_VOLUME)
     schedule = _delayed(schedule, parameters["t_delay"], form_deviation, rng)
-    rates = right_hand_side(form_deviation, other_forms)
-    state = _simulated(schedule, time, rates)
-    state = state._replace(I_coil=terminal_currents(state, schedule, time, form_deviation))
-    return TrueSignals(
-        programme=programme,
-        period=1.0 / SAMPLING_RATE,
-        channels={"U": U, **_sensed(state, parameters, form_deviation)},
-    )
+    state = _simulated(schedule, time, right_hand_side(form_deviation, other_forms))
+    segment = np.searchsorted(schedule.borders[1:-1], time, side="left")
+    inputs = np.ascontiguousarray([field[segment] for field in schedule.inputs])
+    c, e = coefficients(parameters), effect_constants(parameters)
+    current = currents_at_terminals(np.ascontiguousarray(state), inputs, c, e, form_deviation)
+    channels = {"U": U, **_sensed(state._replace(I_coil=current), parameters, form_deviation)}
+    return TrueSignals(programme=programme, period=1.0 / SAMPLING_RATE, channels=channels)
 
 
 def _start_temperature(trial: Trial, index: int, seed: int) -> float:
     """Winding temperature above ambient when a recording begins [K]; rises unevenly in the session."""
-    if trial.winding_temperature_rise == 0:
-        return 0.0
-    rng = np.random.default_rng([seed, trial.number, index, 4])
-    uneven = rng.uniform(*WARMING_RANGE)
+    uneven = np.random.default_rng([seed, trial.number, index, 4]).uniform(*WARMING_RANGE)
     warmed = 1.0 - np.exp(-(index + 1) / WARM_UP_RECORDINGS)
     return float(trial.winding_temperature_rise * uneven * warmed)
 
@@ -163,15 +128,9 @@ def _simulated(schedule: Schedule, time: NDArray, rates: RightHandSide) -> State
     """States at the times [s], (samples,), by the first solver that succeeds."""
     failures = []
     for method, rtol in SOLVERS:
+        own = {"method": method, "rtol": rtol, "most_evaluations": SOLVER_EVALUATIONS}
         try:
-            return simulate_reference(
-                schedule,
-                time,
-                method=method,
-                rtol=rtol,
-                right_hand_side=rates,
-                most_evaluations=SOLVER_EVALUATIONS,
-            ).state
+            return simulate_reference(schedule, time, right_hand_side=rates, **own).state
         except (ValueError, RuntimeError) as error:
             failures.append(f"{method} at {rtol:g}: {error}")
     raise RuntimeError(f"no solver followed the bench's valve: {'; '.join(failures)}")

@@ -8,14 +8,14 @@ from typing import TypeVar
 import numpy as np
 from scipy.stats import truncnorm
 
+from docs.studies.blind.forms import OTHER_FORMS
 from epv_env.plant.effects.registry import CATALOGUE, effect
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import CALIBRATED_SYMBOLS
-from identification.blind.forms import OTHER_FORMS
 from identification.valve_gap.causes import PARAMETER_COMPONENTS
 
 NOMINAL, ONE_CAUSE, TWO_EFFECTS, EXCLUDED_EFFECT = "none", "one", "pair", "left_out"
-"""Kinds as drawn, as in sealed.json and results.json.
+"""Kinds as drawn.
 
 NOMINAL: no cause. ONE_CAUSE: one effect, or one parameter off its value. TWO_EFFECTS: two effects at
 once. EXCLUDED_EFFECT: one effect that the diagnosis does not have in its catalogue.
@@ -23,15 +23,6 @@ once. EXCLUDED_EFFECT: one effect that the diagnosis does not have in its catalo
 
 ABSORBED = "absorbed"
 """Kind of a trial whose causes recalibration absorbs, so that `no_gap` is the correct verdict."""
-
-KIND_TITLES = {
-    NOMINAL: "no effect",
-    ABSORBED: "absorbed by the four",
-    ONE_CAUSE: "one cause",
-    TWO_EFFECTS: "two effects",
-    EXCLUDED_EFFECT: "effect excluded from the catalogue",
-}
-"""Kinds in the order of the tables, with their titles there."""
 
 PARAMETER = "parameter:"
 """Prefix of a cause that is a parameter off its value; the symbol follows."""
@@ -53,7 +44,7 @@ UNIT_SCATTER_LIMIT = 2.0
 
 FORM_DEVIATIONS = {"usual": (0.03, 0.15), "strong": (0.20, 0.50)}
 """Least and largest deviation of an effect's form from the fitted form, relative to the effect [-], by
-name of the study (forms.py). With strong forms causes are hard to find; probabilities must say so."""
+name of the study (forms.py)."""
 
 OTHER_FORM_SHARE = 0.5
 """Probability that an effect has its other form, where it has one (forms.py) [-]: as often as not,
@@ -71,7 +62,6 @@ PARAMETER_OFF = (0.015, 0.05)
 
 WARMEST = (1.0, 20.0)
 """How warm a winding that heats becomes over a session [K], log-uniform."""
-
 
 EFFECTS = tuple(CATALOGUE)
 
@@ -103,11 +93,6 @@ class Trial:
     def parameters(self) -> Parameters:
         """The valve with the causes."""
         return self.unit.replace(**self.sizes)
-
-    @property
-    def excluded(self) -> tuple[str, ...]:
-        """Causes that the diagnosis must do without."""
-        return self.causes if self.kind == EXCLUDED_EFFECT else ()
 
     def with_only(self, effect: str) -> "Trial":
         """The same valve with one of its two effects."""
@@ -146,22 +131,12 @@ def trial_plan(seed: int, trials: int) -> list[tuple[str, tuple[str, ...]]]:
 
 
 def draw_trial(
-    seed: int,
-    number: int,
-    kind: str,
-    causes: Sequence[str],
-    forms: str = "usual",
-    attempt: int = 0,
+    seed: int, number: int, kind: str, causes: Sequence[str], forms: str = "usual", attempt: int = 0
 ) -> Trial:
     """The truth of one trial of a plan.
 
-    Args:
-        seed: of the study.
-        number: of the trial.
-        kind: of the trial.
-        causes: their names.
-        forms: of FORM_DEVIATIONS.
-        attempt: draws other sizes and another unit, for a trial whose valve no solver could follow.
+    seed: of the study. causes: their names. forms: of FORM_DEVIATIONS. attempt: draws other sizes and
+    another unit, for a trial whose valve no solver could follow.
     """
     rng = np.random.default_rng([seed, number, *([attempt] if attempt else [])])
     unit = draw_unit(rng)
@@ -169,9 +144,13 @@ def draw_trial(
     for cause in causes:
         symbol = cause.removeprefix(PARAMETER)
         if symbol == cause:
-            sizes |= draw_sizes(cause, rng)
+            variants = effect(cause).drawn
+            chosen = variants[int(rng.integers(len(variants)))]
+            sizes |= {size.symbol: size.draw(rng, size.drawn or (0.0, 0.0)) for size in chosen}
         else:
-            sizes[symbol] = draw_parameter(Parameters.calibrated()[symbol], rng)
+            share = rng.uniform(*PARAMETER_OFF)
+            off = 1.0 + (-share if rng.uniform() < 0.5 else share)
+            sizes[symbol] = Parameters.calibrated()[symbol] * off
     deviation = rng.uniform(*FORM_DEVIATIONS[forms])
     temperature_rise = np.exp(rng.uniform(*np.log(WARMEST)))
     # Drawn last: the draws above stay those of a study without other forms.
@@ -201,22 +180,9 @@ def draw_unit(rng: np.random.Generator) -> Parameters:
     return centre.replace(**{s: float(centre[s] * factor) for s, factor in factors.items()})
 
 
-def draw_sizes(name: str, rng: np.random.Generator) -> dict[str, float]:
-    """Sizes of one variant of an effect of the catalogue by symbol [SI]. Raises EffectError."""
-    alternatives = effect(name).drawn
-    chosen = alternatives[int(rng.integers(len(alternatives)))]
-    return {size.symbol: size.draw(rng, size.drawn or (0.0, 0.0)) for size in chosen}
-
-
 def top_sizes(name: str) -> dict[str, float]:
-    """Sizes of an effect at the top of what is drawn, by symbol [SI]. Raises EffectError."""
+    """Sizes of an effect at the top of what is drawn, by symbol [SI]."""
     return {size.symbol: (size.drawn or (0.0, 0.0))[1] for size in effect(name).drawn[0]}
-
-
-def draw_parameter(value: float, rng: np.random.Generator) -> float:
-    """A value that is off the table's."""
-    share = rng.uniform(*PARAMETER_OFF)
-    return value * (1.0 + (-share if rng.uniform() < 0.5 else share))
 
 
 def _some(

@@ -3,21 +3,16 @@
 import numpy as np
 import pytest
 
-from identification.blind.report import (
+from docs.studies.blind.score import (
     FIRST,
     INCLUSION,
-    answers_by_trial,
+    answers,
     calibration_error,
     expected_calibration_error,
     reliability,
+    score_trial,
 )
-from identification.blind.score import Answer, score_trial
-from tests.identification.blind.hand_made import CLAMP, EDDY, NOTHING, answer, label
-
-
-def groups(probabilities, truths):
-    """One answer per trial."""
-    return [[Answer(probability=p, right=bool(r))] for p, r in zip(probabilities, truths, strict=True)]
+from tests.studies.blind.hand_made import CLAMP, EDDY, NOTHING, answer, label
 
 
 def error(probabilities, truths):
@@ -47,18 +42,12 @@ def test_an_overconfident_judge_has_the_error_that_hands_compute():
     assert mixed == pytest.approx((1.5 + 3.5) / 20)
 
 
-def test_the_interval_holds_the_error_and_draws_whole_trials():
-    """Ten copies of each trial's one answer say no more than one."""
+def test_the_interval_holds_the_error():
     rng = np.random.default_rng(1)
     p = rng.uniform(0.5, 1.0, 60)
-    one = calibration_error(groups(p, rng.uniform(size=60) < p - 0.3))
-    rng = np.random.default_rng(1)
-    p = rng.uniform(0.5, 1.0, 60)
-    ten = calibration_error([group * 10 for group in groups(p, rng.uniform(size=60) < p - 0.3)])
-    assert one is not None
-    assert one["low"] < one["value"] < one["high"]
-    assert ten == pytest.approx(one)
-    assert calibration_error([]) is None
+    found = calibration_error(p, rng.uniform(size=60) < p - 0.3)
+    assert found["low"] < found["value"] < found["high"]
+    assert calibration_error(np.zeros(0), np.zeros(0)) == {"value": None}
 
 
 def test_a_reliability_bin_has_its_mean_and_its_share():
@@ -80,8 +69,10 @@ def test_a_named_cause_is_wrong_where_none_is_right_and_faint_inclusions_are_lef
         (NOTHING, answer("no_gap", (["eddy_current"], 0.005))),
         (label(), None),
     ]
-    found = answers_by_trial([score_trial(*pair) for pair in said])
-    first = [(a.probability, a.right) for (a,) in found[FIRST]]
-    assert first == [(0.9, True), (0.9, False), (0.08, False)]
-    included = [[(a.probability, a.right) for a in group] for group in found[INCLUSION]]
-    assert included == [[(0.9, True), (0.08, False)], [(0.9, False)], [(0.08, False)], [(0.9, True)]]
+    trials = [score_trial(*pair) for pair in said]
+    probability, right = answers(trials, FIRST)
+    assert (list(probability), list(right)) == ([0.9, 0.9, 0.08], [True, False, False])
+    included = [[tuple(each) for each in trial[INCLUSION]] for trial in trials]
+    assert included == [
+        [(0.9, True), (0.08, False)], [(0.9, False)], [(0.08, False)], [(0.9, True)], [], [],
+    ]  # fmt: skip

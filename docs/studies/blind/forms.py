@@ -25,7 +25,7 @@ from epv_env.plant.equations import (
 )
 from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at, store_state
 from epv_env.plant.primitives import FLAGS, inlined, replacing, source_digest
-from identification.bench.hybrid_automaton import RightHandSide
+from tests.reference.hybrid_automaton import RightHandSide
 
 FILM_THICKNESS = 20e-6
 """Thickness of the air film that an armature squeezes out as it lands [m]."""

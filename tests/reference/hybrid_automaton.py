@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from epv_env.plant.coefficients import coefficients
 from epv_env.plant.effects.coil import coil_current
-from epv_env.plant.effects.registry import effect_constants, has_effects
+from epv_env.plant.effects.registry import effect_constants, has_effects, with_laws
 from epv_env.plant.equations import Coefficients, Inputs, State, derivative
 from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at, store_state
 from epv_env.plant.parameters import Parameters
@@ -87,8 +87,8 @@ def delayed_schedule(schedule: Schedule, delay: float) -> Schedule:
 RightHandSide = Callable[[NDArray, NDArray, NDArray, NDArray, float, float], NDArray]
 """(state, inputs, coefficients, effects, free_PV, free_MV) -> rates and both forces."""
 
-TerminalCurrents = Callable[[float, NDArray, NDArray, NDArray, NDArray], NDArray]
-"""(voltage, state I, state coil_heat, coefficients, effects) -> currents."""
+TerminalCurrents = Callable[[float, NDArray, NDArray, NDArray], NDArray]
+"""(voltage, states, coefficients, effects) -> currents."""
 
 
 # Closed over by the compiled functions: a change of any inlined source changes their key in the cache.
@@ -97,13 +97,14 @@ _DIGEST = source_digest(Path(__file__))
 
 def _terminal_currents(digest: str) -> TerminalCurrents:
     @numba.njit(cache=True, **FLAGS)
-    def terminal_currents(U, current, coil_heat, coefficients, effects):
-        out = np.empty_like(current)
+    def terminal_currents(U, states, coefficients, effects):
+        out = np.empty(states.shape[1])
         if digest == "":  # keeps the digest in the closure
             return out
         c, e = coefficients_at(coefficients, 0, 0), effects_at(effects, 0, 0)
-        for k in range(current.size):
-            out[k] = coil_current(U, current[k], c.R, coil_heat[k], e)
+        for k in range(out.size):
+            q = state_at(states, 0, k)
+            out[k] = coil_current(U, q.I, c.R, q.coil_heat, with_laws(q, e))
         return out
 
     return terminal_currents
@@ -112,8 +113,8 @@ def _terminal_currents(digest: str) -> TerminalCurrents:
 terminal_currents = _terminal_currents(_DIGEST)
 """Currents at the coil's terminals, (samples,) [A].
 
-U: coil voltage [V]. current: state I, (samples,) [A]. coil_heat: state, (samples,) [K].
-coefficients, effects: tables of one valve, as epv_env.plant.coefficients makes them.
+U: coil voltage [V]. states: (states, samples) [SI]. coefficients, effects: tables of one valve, as
+epv_env.plant.coefficients makes them.
 """
 
 
@@ -217,10 +218,8 @@ class HybridAutomaton:
 
         out: states (samples, states) [SI]; at: indices of samples.
         """
-        q = State(*out[at].T)
-        out[at, I_COIL] = terminal_currents(
-            self.inputs[0], q.I, q.coil_heat, self.coefficients, self.effects
-        )
+        states = np.ascontiguousarray(out[at].T)
+        out[at, I_COIL] = terminal_currents(self.inputs[0], states, self.coefficients, self.effects)
 
     def possible_events(self, y: NDArray) -> list[tuple[str, Callable, int]]:
         """(name, function of time [s] and state whose zero ends the piece, direction) of each.

@@ -3,14 +3,7 @@
 import numpy as np
 import pytest
 
-from epv_env.plant.coefficients import coefficients
-from epv_env.plant.effects.magnet import saturated_force
-from epv_env.plant.effects.registry import EFFECTS as RECORDS
-from epv_env.plant.effects.registry import effect, effect_constants
-from epv_env.plant.equations import Inputs, State
-from epv_env.plant.parameters import Parameters
-from identification.bench.hybrid_automaton import COMPILED_RIGHT_HAND_SIDES
-from identification.blind.forms import (
+from docs.studies.blind.forms import (
     INSTANT_DROP,
     LANGEVIN,
     OTHER_FORMS,
@@ -20,7 +13,14 @@ from identification.blind.forms import (
     level_of_force,
     right_hand_side,
 )
-from identification.blind.truth import EFFECTS, top_sizes
+from docs.studies.blind.truth import EFFECTS, top_sizes
+from epv_env.plant.coefficients import coefficients
+from epv_env.plant.effects.magnet import saturated_force
+from epv_env.plant.effects.registry import EFFECTS as RECORDS
+from epv_env.plant.effects.registry import effect, effect_constants
+from epv_env.plant.equations import Inputs, State
+from epv_env.plant.parameters import Parameters
+from tests.reference.hybrid_automaton import COMPILED_RIGHT_HAND_SIDES
 
 PLANT = COMPILED_RIGHT_HAND_SIDES[True]
 DROP, CURRENT = (State._fields.index(name) for name in ("supply_drop", "I"))
@@ -49,15 +49,23 @@ def states(warm=0.0):
         )  # fmt: skip
 
 
-def rates(function, p, q, U=24.0):
-    """Rates and forces at a state."""
+def at(function, p):
+    """Rates and forces of a valve as a function of its state and the coil's voltage."""
     c, e = coefficients(p), effect_constants(p)
-    return function(np.array(q, float), np.array(Inputs(U, 0.0, 0.0, 0.0), float), c, e, 1.0, 1.0)
+    return lambda q, U: function(
+        np.array(q, float), np.array(Inputs(U, 0.0, 0.0, 0.0), float), c, e, 1.0, 1.0
+    )
+
+
+def rates(function, p, q):
+    """Rates and forces at a state, energised."""
+    return at(function, p)(q, 24.0)
 
 
 def all_rates(function, p, warm=0.0):
     """Rates and forces with the coil on and off, (states, rows)."""
-    return np.array([rates(function, p, q, U) for q in states(warm) for U in (0.0, 18.9)])
+    found = at(function, p)
+    return np.array([found(q, U) for q in states(warm) for U in (0.0, 18.9)])
 
 
 def test_without_deviation_the_forms_are_the_plant_s():

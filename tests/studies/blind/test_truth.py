@@ -6,12 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from epv_env.plant.effects.registry import CATALOGUE
-from epv_env.plant.parameters import Parameters
-from epv_env.plant.region import CALIBRATED_SYMBOLS
-from identification.blind import truth
-from identification.blind.sealing import truth_label
-from identification.blind.truth import (
+from docs.studies.blind import truth
+from docs.studies.blind.study import truth_label
+from docs.studies.blind.truth import (
     CALIBRATED_SPREAD,
     EFFECTS,
     EXCLUDED_EFFECT,
@@ -25,6 +22,9 @@ from identification.blind.truth import (
     draw_unit,
     trial_plan,
 )
+from epv_env.plant.effects.registry import CATALOGUE
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.valve_gap.causes import PARAMETER_COMPONENTS
 
 

@@ -4,24 +4,28 @@ import json
 
 import pytest
 
-from identification.blind.report import CRITERIA, as_text, reliability_figure, results
-from identification.blind.score import (
+from docs.studies.blind.score import (
+    FIRST,
+    INCLUSION,
+    answers,
+    figures,
     held_effects,
     is_correct,
     is_tied,
     is_true,
-    is_well_judged,
     named_cause,
     named_set,
+    reliability,
     score_trial,
     share,
-    shares,
 )
-from identification.blind.truth import ABSORBED
-from tests.identification.blind.hand_made import CLAMP, EDDY, NOTHING, answer, label
+from docs.studies.blind.study import AT_LEAST, AT_MOST, reliability_figure, rows
+from docs.studies.blind.truth import ABSORBED
+from tests.studies.blind.hand_made import CLAMP, EDDY, NOTHING, answer, label
 
 BOTH = ["eddy_current", "flyback_voltage"]
 PAIR = label("pair", BOTH)
+RIGHT = ("named_right", "truth_in_set", "component_right", "well_judged")
 STRUCK = label("left_out", ["flow_force"])
 
 
@@ -31,21 +35,21 @@ def partial(**inclusion):
 
 
 def counts(trials):
-    return {name: (found["hits"], found["of"]) for name, found in shares(trials).items()}
+    return {name: (f["hits"], f["of"]) for name, f in figures(trials).items() if "of" in f}
 
 
 def test_the_right_cause():
     found = score_trial(label(), answer("known", EDDY, CLAMP))
-    assert all((found.named_right, found.truth_in_set, found.component_right, is_well_judged(found)))
-    assert (found.set_size, found.probability, found.tied) == (1, 0.9, False)
+    assert all(found[name] for name in RIGHT)
+    assert (found["set_size"], found["probability"], found["tied"]) == (1, 0.9, False)
     second = score_trial(label(effects=["flyback_voltage"]), answer("ambiguous", EDDY, CLAMP, named=2))
-    assert (second.named_right, second.truth_in_set, second.set_size) == (False, True, 2)
+    assert (second["named_right"], second["truth_in_set"], second["set_size"]) == (False, True, 2)
 
 
 def test_the_wrong_cause():
     found = score_trial(label(effects=["seat_leak"]), answer("known", EDDY))
-    assert not any((found.named_right, found.truth_in_set, found.component_right, is_well_judged(found)))
-    assert (found.probability, found.false_held) == (0, ("eddy_current",))
+    assert not any(found[name] for name in RIGHT)
+    assert (found["probability"], found["false_held"]) == (0, ["eddy_current"])
 
 
 def test_the_order_of_a_pair_does_not_matter_and_a_hidden_effect_need_not_be_named():
@@ -66,9 +70,9 @@ def test_effects_are_held_from_nine_tenths_the_surest_first():
 
 def test_partial_is_right_if_what_it_holds_is_the_truth():
     whole = score_trial(PAIR, partial(eddy_current=0.99, flyback_voltage=0.92))
-    assert (whole.named, whole.named_right, whole.truth_in_set) == (tuple(BOTH), True, True)
+    assert (whole["named"], whole["named_right"], whole["truth_in_set"]) == (BOTH, True, True)
     half = score_trial(PAIR, partial(eddy_current=0.99, flyback_voltage=0.6))
-    assert (half.named, half.named_right) == (("eddy_current",), False)
+    assert (half["named"], half["named_right"]) == (["eddy_current"], False)
 
 
 def test_an_ambiguity_set_of_a_partial_counts_as_it_is_given():
@@ -84,8 +88,7 @@ def test_a_first_cause_within_a_thousandth_of_the_next_is_tied_and_counts_as_wro
     said = answer("ambiguous", (["eddy_current"], 0.401), (["flyback_voltage"], second), named=2)
     assert is_tied(label(), said) is tied
     counted = counts([score_trial(label(), said)])
-    assert counted["first cause right"] == (1, 1)
-    assert counted["first cause right, ties counted as wrong"] == (int(not tied), 1)
+    assert counted["First cause right (a tie counts as wrong)"] == (int(not tied), 1)
 
 
 def test_two_right_causes_do_not_tie():
@@ -106,15 +109,15 @@ def test_an_absorbed_effect_that_is_named_is_true_though_there_was_nothing_to_ex
 def test_without_effect_any_verdict_but_no_gap_is_a_false_alarm():
     said = ["no_gap", "no_gap", "known", "ambiguous", "unknown"]
     found = [score_trial(NOTHING, answer(verdict, EDDY)) for verdict in said]
-    assert counts(found)["false alarms without an effect"] == (3, 5)
+    assert counts(found)["False alarms without an effect"] == (3, 5)
 
 
 def test_what_the_four_absorb_is_counted_apart():
     hidden = label(visible=[], explainable=1.001)
     found = [score_trial(hidden, answer(v, EDDY)) for v in ("no_gap", "known")]
-    assert [trial.kind for trial in found] == [ABSORBED] * 2
-    assert counts(found)["no gap where the four absorb it"] == (1, 2)
-    assert counts(found)["first cause right"] == (0, 0)
+    assert [trial["kind"] for trial in found] == [ABSORBED] * 2
+    assert counts(found)["No gap where recalibration absorbs the cause"] == (1, 2)
+    assert counts(found)["First cause right (a tie counts as wrong)"] == (0, 0)
 
 
 def test_a_struck_effect_may_be_left_open_but_not_replaced():
@@ -123,12 +126,11 @@ def test_a_struck_effect_may_be_left_open_but_not_replaced():
         partial(eddy_current=0.95), answer("known", EDDY), answer("no_gap", component=""), None,
     ]  # fmt: skip
     found = [score_trial(STRUCK, one) for one in said]
-    assert [is_well_judged(trial) for trial in found] == [True, True, False, False, False, False]
+    assert [trial["well_judged"] for trial in found] == [True, True, False, False, False, False]
     counted = counts(found)
-    assert counted["unknown where the effect is struck"] == (2, 6)
-    assert counted["component right where the effect is struck"] == (1, 6)
-    assert counted["detected"] == (4, 6)
-    assert counted["failed"] == (1, 6)
+    assert counted["Effect struck from the catalogue: `unknown`"] == (2, 6)
+    assert counted["Gap detected"] == (4, 6)
+    assert counted["Diagnosis failed"] == (1, 6)
 
 
 def test_intervals_are_exact():
@@ -145,32 +147,22 @@ def study():
     return found
 
 
-def test_shares_means_and_criteria_of_a_study():
-    found = results(study(), seed=0, forms="usual")
-    assert found["shares"]["first cause right"]["hits"] == found["shares"]["detected"]["hits"] == 9
-    assert found["means"]["mean probability on the truth"] == pytest.approx(0.81)
-    met = {name: criterion["met"] for name, criterion in found["criteria"].items()}
-    assert met["first cause right, ties counted as wrong"] is True
-    assert met["truth in the ambiguity set"] is False
-    assert met["false alarms without an effect"] is None
-    assert set(met) == set(CRITERIA)
+def test_shares_means_and_what_is_asked_of_a_study():
+    found = figures(study())
+    assert found["Truth in the ambiguity set"]["hits"] == found["Gap detected"]["hits"] == 9
+    assert found["Mean probability on the truth"]["value"] == pytest.approx(0.81)
+    cells = {name: (result, asked) for name, result, asked in rows(found, "usual")}
+    assert cells["Truth in the ambiguity set"] == ("9 of 10: **0.9** (0.55 to 1)", "at least 0.96")
+    assert cells["Mean size of the ambiguity set"] == ("1", "at most 1.5")
+    assert cells["False alarms without an effect"] == ("0 of 0: - (0 to 1)", "at most 0")
+    assert (AT_LEAST | AT_MOST).keys() <= cells.keys()
+    assert dict(zip(cells, rows(found, "strong"), strict=True))["Component right"][2] == "at least 0.95"
 
 
-def test_strong_forms_are_asked_for_calibration_alone():
-    """Nine right answers of 0.9 each: the error is 0.1."""
-    found = results(study(), seed=0, forms="strong")
-    error = found["criteria"].pop("calibration error of the first cause")
-    assert (error["value"], error["met"]) == (pytest.approx(0.1), False)
-    assert found["criteria"] == {}
-
-
-def test_a_study_is_written_down():
+def test_the_results_are_ready_for_json_and_the_picture_shows_both_statements():
     trials = [*study(), score_trial(NOTHING, answer("no_gap", component="")), score_trial(label(), None)]
-    found = results(trials, seed=0, forms="usual")
-    json.dumps(found, allow_nan=False)
-    text = as_text(found)
-    assert "trial 0009: eddy_current; no_gap, named: nothing" in text
-    assert "component right at least 0.95" in text
-    assert [axes.get_title() for axes in reliability_figure(found["calibration"]).axes] == [
+    json.dumps([trials, figures(trials)], allow_nan=False)
+    bins = {name: reliability(*answers(trials, name)) for name in (FIRST, INCLUSION)}
+    assert [axes.get_title() for axes in reliability_figure(bins).axes] == [
         "first cause", "inclusion of an effect",
     ]  # fmt: skip

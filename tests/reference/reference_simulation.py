@@ -1,4 +1,4 @@
-"""The bench's simulator, and the plant's reference: SciPy's integrators in a hybrid automaton.
+"""The plant's reference: SciPy's integrators in a hybrid automaton.
 
 The reference shares the right-hand side and the definition of a rebound (STICK_SPEED) with
 epv_env.plant.integrate, nothing else. The reference has its own modes (each mover free, held low or held
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
 from epv_env.plant.equations import State
-from identification.bench.hybrid_automaton import HybridAutomaton, RightHandSide, Schedule
+from tests.reference.hybrid_automaton import HybridAutomaton, RightHandSide, Schedule
 
 RTOL = 1e-9
 """Relative tolerance of the solver."""
