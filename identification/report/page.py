@@ -114,8 +114,7 @@ def write_page(
 ) -> None:
     """Write sections as one HTML file that needs no other, whole or not at all.
 
-    Summaries come first, then the contents and the verdicts of all other sections. The caller closes the
-    figures.
+    Summaries come first, then the contents, which say what is in doubt. The caller closes the figures.
 
     Args:
         path: the file.

@@ -1,20 +1,18 @@
-"""Figures of a diagnosis: probabilities, gaps, residuals, forcings and missing terms."""
+"""Figures of a diagnosis: probabilities, residuals, forcings and missing terms."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from identification.block_bootstrap import LEVEL, Interval
+from identification.block_bootstrap import LEVEL
 from identification.gap.diagnosis import Diagnosis
 from identification.gap.fit.gaps import FLOOR, RegimeGap
 from identification.gap.fit.laws import Law
-from identification.gap.judge.held_out import DiscrepancyReduction
 from identification.gap.locate.localisation import ForcingEstimate, MissingTerm
 from identification.gap.plant import GreyBox
 from identification.gap.report.quantities import probability_text
@@ -81,43 +79,6 @@ def _bars(axes: Axes, probabilities: Mapping[str, float], colours: Sequence[str]
     axes.grid(axis="x", alpha=0.3)
 
 
-def gap_figure(reduction: DiscrepancyReduction, words: Callable[[str], str] = str) -> Figure:
-    """Gap of every model on held-out runs, overall and by channel, with their intervals.
-
-    words: what people read instead of a cause's name.
-    """
-    gaps = {words(name): gap for name, gap in reduction.gaps.items()}
-    models = {**gaps, "black box": reduction.black_box}
-    panels = ["overall", *reduction.noise_ratios]
-    figure = Figure(figsize=(10, 1.4 + 0.32 * row_height(models) * len(models)), layout="constrained")
-    axes = figure.subplots(1, len(panels), sharey=True)
-    for own, panel in zip(axes, panels, strict=True):
-        _interval_bars(
-            own, [gap.overall if panel == "overall" else gap.channels[panel] for gap in models.values()]
-        )
-        own.axvline(FLOOR, color="tab:red", linewidth=1.0)
-        own.set_title(panel)
-        own.set_xscale("log")
-        own.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-        own.xaxis.set_major_formatter("{x:g}")
-        own.xaxis.set_minor_formatter(NullFormatter())
-        own.set_xlabel("gap [noise deviations]")
-    axes[0].set_yticks(range(len(models)), [wrapped(name) for name in models])
-    axes[0].invert_yaxis()
-    return figure
-
-
-def _interval_bars(axes: Axes, intervals: list[Interval]) -> None:
-    """Horizontal bars with their intervals; no interval ends on the wrong side of its value."""
-    values = [each.value for each in intervals]
-    below = [max(each.value - each.low, 0.0) for each in intervals]
-    above = [max(each.high - each.value, 0.0) for each in intervals]
-    rows = range(len(intervals))
-    axes.barh(rows, values, color="tab:blue", alpha=0.7, height=0.7)
-    axes.errorbar(values, rows, xerr=[below, above], color="black", fmt="none", capsize=3, linewidth=1.0)
-    axes.grid(axis="x", alpha=0.3)
-
-
 def heat_map(gaps: Sequence[RegimeGap]) -> Figure:
     """Gap of every channel in every regime, with its interval."""
     channels = list(dict.fromkeys(gap.channel for gap in gaps))
@@ -150,35 +111,38 @@ def _two_digits(gap: float) -> str:
     return f"{gap:.1f}" if gap < 9.95 else f"{gap:.0f}"
 
 
-def residual_figure(plant: GreyBox, run: int, residual: NDArray, masks: Mapping[str, NDArray]) -> Figure:
-    """Residual of a run over time, with the regimes in strips above.
+def residual_figure(
+    plant: GreyBox, run: int, residuals: Mapping[str, NDArray], masks: Mapping[str, NDArray]
+) -> Figure:
+    """What models leave of a run over time, with the regimes in strips above.
 
     Args:
         plant: the plant with its recordings.
         run: index of the run.
-        residual: (channels, samples) [noise deviations].
+        residuals: by model, (channels, samples) [noise deviations]; the last one is drawn on top.
         masks: samples of each regime, boolean (samples,) by name.
     """
-    time = plant.runs[run].time
-    figure = Figure(figsize=(9.5, 1.6 * len(residual) + 0.2 * len(masks) + 1), layout="constrained")
-    rows = figure.subplots(
-        1 + len(residual), 1, sharex=True, height_ratios=[0.12 * len(masks), *[1.0] * len(residual)]
-    )
+    time, channels = plant.runs[run].time, len(plant.channels)
+    figure = Figure(figsize=(9.5, 1.6 * channels + 0.2 * len(masks) + 1), layout="constrained")
+    heights = [0.12 * len(masks), *[1.0] * channels]
+    strips, *rows = figure.subplots(1 + channels, 1, sharex=True, height_ratios=heights)
     for row, mask in enumerate(masks.values()):
-        rows[0].fill_between(
+        strips.fill_between(
             time, row - 0.4, row + 0.4, where=mask.tolist(), color=f"C{row}", step="mid", linewidth=0.0
         )
-    rows[0].set_yticks(range(len(masks)), [name.replace("_", " ") for name in masks], fontsize=7)
-    rows[0].invert_yaxis()
-    compared = plant.runs[run].trusted
-    shown = np.where(compared, residual, np.nan)
-    for axes, channel, values in zip(rows[1:], plant.channels, shown, strict=True):
+    strips.set_yticks(range(len(masks)), [name.replace("_", " ") for name in masks], fontsize=7)
+    strips.invert_yaxis()
+    for c, (axes, channel) in enumerate(zip(rows, plant.channels, strict=True)):
+        compared = plant.runs[run].trusted[c]
         axes.axhspan(-QUANTILE, QUANTILE, color="0.85")
-        axes.plot(time, values, color="black", linewidth=0.6)
-        if np.all(np.isnan(values)):
+        for colour, (name, residual) in zip(("tab:red", "black"), residuals.items(), strict=False):
+            shown = np.where(compared, residual[c], np.nan)
+            axes.plot(time, shown, color=colour, linewidth=0.6, label=name)
+        if not np.any(compared):
             axes.text(0.5, 0.5, "not compared", transform=axes.transAxes, ha="center", va="center")
         axes.set_ylabel(f"{channel.name}\n[noise deviations]", fontsize=8)
         axes.grid(alpha=0.3)
+    rows[0].legend(fontsize="small", ncols=2)
     rows[-1].set_xlabel("time [s]")
     figure.suptitle(f"measured - model: {plant.runs[run].name}")
     figure.align_ylabels()

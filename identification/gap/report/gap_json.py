@@ -4,8 +4,7 @@ Format epv-gap/3, described in docs/reference/gap-json.md.
 """
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -44,22 +43,6 @@ TERM_FORMAT = "epv-term/1"
 """Format of the file that holds a missing term."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Remainder:
-    """What no named cause explains."""
-
-    share: Interval
-    """Of the explainable gap on held-out recordings [1]; 0 where there is nothing to explain."""
-    component: Mapping[str, float]
-    """Probability that it lies there, by component; empty where it was not located."""
-    equation: Mapping[str, float]
-    """Probability that it lies there, by equation or reading; empty where it was not located."""
-    location: Localisation | None
-    """Of the remainder; None where nothing is left to locate."""
-    term: MissingTerm | None
-    """The missing term over a state; None where no state explains enough of it."""
-
-
 def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = None) -> dict[str, Any]:
     """The content of gap.json.
 
@@ -69,7 +52,8 @@ def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = 
         term: name of the file beside gap.json that holds the missing term; None where none was written.
     """
     conclusion, ranking = diagnosis.conclusion, diagnosis.ranking
-    separability, left = ranking.separability, remainder(diagnosis)
+    separability = ranking.separability
+    share, left = share_left(diagnosis), remainder(diagnosis)
     unexplained, onset = diagnosis.reduction.unexplained, diagnosis.onset
     with_cause = diagnosis.best.hypothesis if diagnosis.best else ranking.recalibrated
     return {
@@ -92,11 +76,13 @@ def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = 
             "form": _forms(diagnosis),
         },
         "remainder": {
-            "fraction": left.share.value,
-            "low": left.share.low,
-            "high": left.share.high,
-            "component": left.component,
-            "equation": left.equation,
+            "fraction": share.value,
+            "low": share.low,
+            "high": share.high,
+            "component": dict(
+                sorted(left.component_probabilities.items(), key=lambda pair: -pair[1]) if left else ()
+            ),
+            "equation": dict(left.equation_probabilities if left else {}),
             "term": term,
         },
         "discrepancy": discrepancy(diagnosis),
@@ -105,10 +91,7 @@ def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = 
             "recalibrated": fitted_values(diagnosis, ranking.recalibrated),
             "with_cause": fitted_values(diagnosis, with_cause),
         },
-        "screened": [
-            {"file": own.file, "channel": own.channel, "samples": own.samples, "kind": own.kind}
-            for own in diagnosis.screened
-        ],
+        "screened": [asdict(finding) for finding in diagnosis.screened],
         "next_experiment": next_experiment,
         "probability": {"no_cause": ranking.no_cause, "unknown": ranking.unknown},
         "twins": {
@@ -259,7 +242,7 @@ def write_results(
         The content of gap.json.
     """
     (folder / TERM).unlink(missing_ok=True)
-    term = remainder(diagnosis).term
+    term = drawn_term(remainder(diagnosis))
     if term:
         write_json(folder / TERM, term_table(term), allow_nan=False)
     content = {**as_json(diagnosis, next_experiment, TERM if term else None), **further}
@@ -267,18 +250,11 @@ def write_results(
     return content
 
 
-def remainder(diagnosis: Diagnosis) -> Remainder:
-    """What the verdict's first cause leaves; the whole gap where the verdict names none."""
-    unnamed = diagnosis.localisation if _explainable(diagnosis) else None
-    location = diagnosis.remaining if diagnosis.named else unnamed
-    components = location.component_probabilities if location else {}
-    return Remainder(
-        share=_share_left(diagnosis),
-        component=dict(sorted(components.items(), key=lambda pair: -pair[1])),
-        equation=dict(location.equation_probabilities) if location else {},
-        location=location,
-        term=drawn_term(location),
-    )
+def remainder(diagnosis: Diagnosis) -> Localisation | None:
+    """Where lies what no named cause explains; None where nothing is left to locate."""
+    if diagnosis.named:
+        return diagnosis.remaining
+    return diagnosis.localisation if _explainable(diagnosis) else None
 
 
 def drawn_term(location: Localisation | None) -> MissingTerm | None:
@@ -311,8 +287,8 @@ def _explainable(diagnosis: Diagnosis) -> bool:
     return diagnosis.reduction.gaps[RECALIBRATED].overall.low > FLOOR
 
 
-def _share_left(diagnosis: Diagnosis) -> Interval:
-    """Share of the explainable gap that no named cause closes [1]."""
+def share_left(diagnosis: Diagnosis) -> Interval:
+    """Share of the explainable gap that no named cause closes [1]; 0 where nothing can be explained."""
     whole = 1.0 if _explainable(diagnosis) else 0.0
     if not diagnosis.named:
         return Interval(value=whole, low=whole, high=whole)

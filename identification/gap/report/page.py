@@ -1,23 +1,19 @@
 """The report of a diagnosis as sections of the HTML page: sentences, tables and figures."""
 
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 
 from identification.block_bootstrap import LEVEL
-from identification.gap.diagnosis import MENTIONED_PROBABILITY, Diagnosis
+from identification.gap.diagnosis import Diagnosis
 from identification.gap.fit.evidence import EvaluatedHypothesis
 from identification.gap.fit.gaps import FLOOR, regimes_of
 from identification.gap.fit.laws import COMPONENTS
-from identification.gap.fit.laws import in_words as in_words_of_laws
-from identification.gap.judge.verdict import AMBIGUITY_SHARE, AMBIGUOUS, KNOWN, SURE_INCLUSION
+from identification.gap.judge.verdict import AMBIGUITY_SHARE
 from identification.gap.locate.localisation import Localisation
-from identification.gap.plant import GreyBox
 from identification.gap.prepare.prepared_plant import prepared
 from identification.gap.report.figures import (
     forcing_figure,
-    gap_figure,
     heat_map,
     law_figure,
     location_figure,
@@ -28,29 +24,23 @@ from identification.gap.report.figures import (
 from identification.gap.report.gap_json import (
     discrepancy,
     drawn_term,
-    inclusion,
     parameter_covariance,
     parameter_intervals,
 )
 from identification.gap.report.quantities import (
     gap_text,
     gap_with_interval,
-    probability_text,
     quantity,
     quantity_with_interval,
 )
 from identification.gap.report.sentences import (
     at_an_end,
-    disturbance_sentence,
+    component_at_fault,
     hidden_causes_sentence,
     in_words,
-    location_sentence,
     look_alikes,
     parameters_at_bounds,
-    reduction_sentence,
-    remainder_sentence,
     share_closed,
-    sizes_with_intervals,
     verdict_sentence,
 )
 from identification.report.page import ANSWERS, Block, Picture, Section, Table, Text, Verdict
@@ -65,150 +55,139 @@ def sections(
     plan: Sequence[Block] = (),
     more: Sequence[Section] = (),
 ) -> list[Section]:
-    """The whole report: verdict, localisation, ranking, reduction, remainder, next experiment, warnings.
+    """The whole report: verdict, localisation, ranking, what remains, and the next recording.
 
-    next_experiment: a sentence or two; empty where none was sought. plan: what stands below it. more:
+    next_experiment: a sentence or two; empty where none was sought. plan: what it was chosen from. more:
     sections that follow the remainder.
     """
-    parts = [
-        _verdict(diagnosis, next_experiment),
-        _localisation(diagnosis),
-        _ranking(diagnosis),
-        _reduction(diagnosis),
-        _remainder(diagnosis),
-        *more,
-    ]
-    if next_experiment:
-        verdict = Verdict(status="note", text=next_experiment)
-        parts.append(Section(title="Next recording", verdicts=[verdict], blocks=list(plan)))
-    return [*parts, _warnings(diagnosis)]
+    parts = [_verdict(diagnosis, next_experiment), _localisation(diagnosis), _ranking(diagnosis)]
+    parts += [_remainder(diagnosis), *more]
+    if plan:
+        parts.append(Section(title="Next recording", verdicts=[], blocks=list(plan)))
+    return parts
 
 
 def _verdict(diagnosis: Diagnosis, next_experiment: str) -> Section:
-    status, text = verdict_sentence(diagnosis, next_experiment)
+    """The first screen: what it is and how sure, why it is in doubt, what next, and the residual."""
+    status, text = verdict_sentence(diagnosis, "")
+    doubts = [*diagnosis.warnings, *parameters_at_bounds(diagnosis)]
+    verdicts = [Verdict(status=status, text=text)]
+    verdicts += [Verdict(status="doubt", text=f"{doubt}.") for doubt in doubts]
+    if next_experiment:
+        verdicts.append(Verdict(status="note", text=next_experiment))
     explanation = (
         "The gap is the root mean square of (model - measured)/noise on recordings that were never "
-        "fitted to: 1 is noise alone. The nominal model has the parameters as given. The recalibrated "
-        "model has its calibrated parameters refitted. With a cause, both are refitted together. "
-        f"Intervals hold {LEVEL_TEXT}."
+        f"fitted to: {FLOOR:g} is noise alone. The nominal model has the parameters as given. The "
+        "recalibrated model has its calibrated parameters refitted. With a cause, both are refitted "
+        f"together. Intervals hold {LEVEL_TEXT}."
     )
     return Section(
         title="Verdict",
         summary=True,
-        verdicts=[Verdict(status=status, text=text)],
-        blocks=[calibrated_values(diagnosis, status), Text(text=explanation)],
+        verdicts=verdicts,
+        blocks=[_residuals(diagnosis), calibrated_values(diagnosis, status), Text(text=explanation)],
+    )
+
+
+def _residuals(diagnosis: Diagnosis) -> Picture:
+    """Residuals of the held-out run that recalibration misses most, before and with the best cause."""
+    problem = diagnosis.ranking.problem
+    models = {"recalibrated": diagnosis.ranking.recalibrated}
+    if diagnosis.best:
+        models[f"with {diagnosis.best.hypothesis.title}"] = diagnosis.best.hypothesis
+    squares = [np.mean(residual**2) for residual in diagnosis.ranking.recalibrated.residuals]
+    run = max((r for r, run in enumerate(problem.plant.runs) if run.held_out), key=squares.__getitem__)
+    values = problem.candidate(list(models.values())[-1].estimate)
+    masks = regimes_of(problem.plant, values, run)
+    residuals = {name: model.residuals[run] for name, model in models.items()}
+    return Picture(
+        figure=residual_figure(problem.plant, run, residuals, masks),
+        caption="What the model leaves of the held-out recording that recalibration misses most. Grey: "
+        f"where {LEVEL_TEXT} of the noise lies.",
     )
 
 
 def _localisation(diagnosis: Diagnosis) -> Section:
-    localisation = diagnosis.localisation
-    blocks: list[Block] = [
-        Picture(
-            figure=heat_map(localisation.regime_gaps),
-            caption="Gap after recalibration, by channel and regime; regimes may overlap.",
-        ),
-        residual(diagnosis, diagnosis.ranking.recalibrated, "Residual after recalibration"),
-        Picture(
-            figure=location_figure(diagnosis),
-            caption="Left: the equation or reading in which something is missing, from the residual "
-            "alone, whatever the catalogue. Right: the component at fault, from the named causes and "
-            "the equations.",
-        ),
-    ]
-    verdicts = [Verdict(status="note", text=location_sentence(diagnosis))]
-    if localisation.missing_term:
-        blocks += missing_term(diagnosis.ranking.problem.plant, localisation, "The recalibrated model")
-    return Section(title="Where the gap lies", verdicts=verdicts, blocks=blocks)
+    verdicts = []
+    if diagnosis.named:
+        text = f"Most likely at fault: {component_at_fault(diagnosis)}."
+        verdicts = [Verdict(status="note", text=text)]
+    return Section(
+        title="Where the gap lies",
+        verdicts=verdicts,
+        blocks=[
+            Picture(
+                figure=heat_map(diagnosis.localisation.regime_gaps),
+                caption="Gap after recalibration, by channel and regime; regimes may overlap.",
+            ),
+            Picture(
+                figure=location_figure(diagnosis),
+                caption="Left: the equation or reading in which something is missing, from the residual "
+                "alone, whatever the catalogue. Right: the component at fault, from the named causes "
+                "and the equations.",
+            ),
+        ],
+    )
 
 
 def _ranking(diagnosis: Diagnosis) -> Section:
-    ambiguity_set = diagnosis.conclusion.ambiguity_set
-    verdicts = [Verdict(status="note", text=hidden_causes_sentence(diagnosis))]
-    if ambiguity_set:
-        names = ", ".join(cause.hypothesis.title for cause in ambiguity_set)
-        share = f"{100 * AMBIGUITY_SHARE:g} %"
-        text = f"The fewest causes that hold {share} of the probability of all causes: {names}."
-        status = "good" if len(ambiguity_set) == 1 else "doubt"
-        verdicts.insert(0, Verdict(status=status, text=text))
     blocks: list[Block] = [
         Picture(
             figure=ranking_figure(diagnosis),
-            caption="Probability of each hypothesis; blue: the ambiguity set.",
+            caption="Probability of each hypothesis; blue, where the verdict names causes: the fewest "
+            f"that hold {100 * AMBIGUITY_SHARE:g} % of the probability of all causes.",
         )
     ]
     if diagnosis.judged:
-        blocks += [inclusion_table(diagnosis), ranking_table(diagnosis)]
+        blocks.append(ranking_table(diagnosis))
     if diagnosis.named:
         blocks += drawn_laws(diagnosis, diagnosis.named.hypothesis)
-    return Section(title="Which cause it is", verdicts=verdicts, blocks=blocks)
-
-
-def _reduction(diagnosis: Diagnosis) -> Section:
-    reduction, words = diagnosis.reduction, partial(in_words, diagnosis)
-    blocks: list[Block] = [
-        Picture(
-            figure=gap_figure(reduction, words),
-            caption="Gap of every model on held-out recordings with "
-            f"{LEVEL_TEXT} intervals; red: noise alone.",
-        ),
-        gap_table(diagnosis),
-    ]
-    if diagnosis.best and diagnosis.conclusion.verdict in (KNOWN, AMBIGUOUS):
-        best = diagnosis.best.hypothesis
-        blocks.append(residual(diagnosis, best, f"Residual with {best.title}"))
-    return Section(
-        title="How far the gap shrinks",
-        verdicts=[Verdict(status="note", text=reduction_sentence(diagnosis))],
-        blocks=blocks,
-    )
+    verdict = Verdict(status="note", text=hidden_causes_sentence(diagnosis))
+    return Section(title="Which cause it is", verdicts=[verdict], blocks=blocks)
 
 
 def _remainder(diagnosis: Diagnosis) -> Section:
-    """What no named cause explains: how much, where, of which shape, and what is only disturbance."""
-    blocks: list[Block] = []
-    if diagnosis.remaining and diagnosis.best:
-        name, plant = diagnosis.best.hypothesis.title, diagnosis.ranking.problem.plant
-        blocks += missing_term(plant, diagnosis.remaining, f"The model with {name}")
-        blocks.append(residual(diagnosis, diagnosis.best.hypothesis, f"Residual with {name}"))
-    text = remainder_sentence(diagnosis)
-    if not diagnosis.remaining:
-        text = f"{text} {disturbance_sentence(diagnosis)}".strip()
-    return Section(
-        title="What remains",
-        verdicts=[Verdict(status="note", text=text)],
-        blocks=[*blocks, discrepancy_table(diagnosis)],
-    )
+    """What each model leaves, what no named cause explains, and what is only disturbance."""
+    blocks: list[Block] = [gap_table(diagnosis)]
+    left = diagnosis.remaining if diagnosis.named else diagnosis.localisation
+    if left and left.missing_term:
+        blocks += _missing_term(diagnosis, left)
+    return Section(title="What remains", verdicts=[], blocks=[*blocks, discrepancy_table(diagnosis)])
 
 
-def _warnings(diagnosis: Diagnosis) -> Section:
-    texts = [*diagnosis.warnings, *parameters_at_bounds(diagnosis)]
-    verdicts = [Verdict(status="doubt", text=f"{text}.") for text in texts]
-    if not verdicts:
-        text = "Every relevant fit has converged, and no fitted parameter is at an end of its range."
-        verdicts = [Verdict(status="good", text=text)]
-    return Section(title="Warnings", verdicts=verdicts, blocks=[])
+def _missing_term(diagnosis: Diagnosis, left: Localisation) -> list[Block]:
+    """The missing term over time, and over a state where one explains it."""
+    forcing, named = left.likeliest, diagnosis.named
+    model = f"The model with {named.hypothesis.title}" if named else "The recalibrated model"
+    blocks: list[Block] = [
+        Picture(
+            figure=forcing_figure(diagnosis.ranking.problem.plant, forcing),
+            caption=f"{model} lacks this term in {forcing.equation.title}: the forcing with which it "
+            "meets the recordings.",
+        )
+    ]
+    if term := drawn_term(left):
+        caption = "The missing term over the state that explains it best."
+        blocks.append(Picture(figure=missing_term_figure(term), caption=caption))
+    return blocks
 
 
 def ranking_table(diagnosis: Diagnosis) -> Table:
     """Judged causes with their sizes, the share that each closes, and look-alikes."""
+    rows = []
+    for cause in diagnosis.judged:
+        intervals = parameter_intervals(diagnosis, cause.hypothesis)
+        hypothesis = cause.hypothesis.estimate.hypothesis
+        components = dict.fromkeys(c.component.replace("_", " ") for c in hypothesis.causes)
+        sizes = [
+            f"{p.title} = {quantity_with_interval(*intervals[p.symbol], p.unit)}"
+            for p in hypothesis.cause_parameters
+        ]
+        closed, alike = share_closed(diagnosis, cause), look_alikes(diagnosis, cause)
+        rows.append([cause.hypothesis.title, ", ".join(components), "; ".join(sizes), closed, alike])
     return Table(
-        columns=["Cause", "component", "probability", f"size ({LEVEL_TEXT})", "closes", "looks like"],
-        rows=[
-            [
-                cause.hypothesis.title,
-                ", ".join(
-                    dict.fromkeys(
-                        c.component.replace("_", " ")
-                        for c in cause.hypothesis.estimate.hypothesis.causes
-                    )
-                ),
-                probability_text(cause.probability),
-                "; ".join(sizes_with_intervals(diagnosis, cause)),
-                share_closed(diagnosis, cause),
-                look_alikes(diagnosis, cause),
-            ]
-            for cause in diagnosis.judged
-        ],
+        columns=["Cause", "component", f"size ({LEVEL_TEXT})", "closes", "looks like"],
+        rows=rows,
         caption="'Looks like': causes that these recordings hardly tell apart from this one, with the "
         "correlation of both effects; from the model's sensitivities alone, whatever the residual.",
     )
@@ -235,47 +214,25 @@ def drawn_laws(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis) -> list[Bl
     units = {name: (trace.unit, trace.scale) for name, trace in traces.items()}
     caption = (
         f"Strength of the cause over the state that it follows ({LEVEL_TEXT} band), relative to its "
-        "fitted size; dashed: the law that the catalogue assumes. In words: "
-        f"{in_words_of_laws(estimate.laws)}."
+        "fitted size; dashed: the law that the catalogue assumes."
     )
     return [Picture(figure=law_figure(drawn, units), caption=caption)]
 
 
-def inclusion_table(diagnosis: Diagnosis) -> Table:
-    """Probability that each effect is part of the gap, alone or beside others."""
-    components = {cause.name: cause.component for cause in diagnosis.ranking.problem.plant.causes}
-    rows = [
-        [
-            in_words(diagnosis, name),
-            components[name].replace("_", " "),
-            probability_text(probability),
-            "yes" if name in diagnosis.conclusion.held else "-",
-        ]
-        for name, probability in inclusion(diagnosis).items()
-        if probability >= MENTIONED_PROBABILITY
-    ]
-    return Table(
-        columns=["Effect", "component", "part of the gap", "held"],
-        rows=rows or [["none", "-", "-", "-"]],
-        caption="Probability that an effect is part of the gap, alone or beside others, so that the "
-        f"figures need not add to 100 %. Held: {100 * SURE_INCLUSION:g} % or more, and the verdict "
-        "names causes.",
-    )
-
-
 def discrepancy_table(diagnosis: Diagnosis) -> Table:
     """What model and recordings differ by beyond noise under the best hypothesis, by channel."""
-    channels = {channel.name: channel for channel in diagnosis.ranking.problem.plant.channels}
+    seen = discrepancy(diagnosis)
     return Table(
         columns=["Channel", "noise", "discrepancy", "correlated over"],
         rows=[
             [
-                name,
-                quantity((channels[name].noise or 0.0) / channels[name].scale, channels[name].unit),
-                quantity(seen["sd"], channels[name].unit) if seen["sd"] else "none seen",
-                quantity(seen["time_scale_s"], "s") if seen["sd"] else "-",
+                channel.name,
+                quantity((channel.noise or 0.0) / channel.scale, channel.unit),
+                quantity(own["sd"], channel.unit) if own["sd"] else "none seen",
+                quantity(own["time_scale_s"], "s") if own["sd"] else "-",
             ]
-            for name, seen in discrepancy(diagnosis).items()
+            for channel in diagnosis.ranking.problem.plant.channels
+            for own in [seen[channel.name]]
         ],
         caption="Standard deviations of the sensor noise and of what differs beyond it under the best "
         "hypothesis: errors of its form, and disturbances.",
@@ -288,11 +245,16 @@ def gap_table(diagnosis: Diagnosis) -> Table:
     channels = list(diagnosis.reduction.noise_ratios)
     columns = ["overall", *channels]
     shown = columns if any(model.percent for model in models.values()) else []
-    caption = f"Noise deviations; {FLOOR:g} is noise alone."
+    caption = "Gap of every model in noise deviations."
     if shown:
-        caption = (
-            f"Left: noise deviations, {FLOOR:g} is noise alone. Right: mean distance of model and "
-            "recording in percent of the recording's mean, every run with nominal offsets."
+        caption += (
+            " In percent: mean distance of model and recording, relative to the recording's mean, every "
+            "run with nominal offsets."
+        )
+    if not diagnosis.reduction.black_box_helps:
+        caption += (
+            " The black box finds nothing in what recalibration leaves that holds on these recordings: "
+            "the recalibrated model itself is the floor."
         )
     return Table(
         columns=["Model", *(f"{c} [noise]" for c in columns), *(f"{c} [%]" for c in shown)],
@@ -333,38 +295,4 @@ def calibrated_values(diagnosis: Diagnosis, status: str) -> Table:
         rows=rows,
         statuses=statuses,
         caption=f"Calibrated parameters of the model to use: {model}.",
-    )
-
-
-def missing_term(plant: GreyBox, localisation: Localisation, model: str) -> list[Block]:
-    """The missing term over time, and over a state where one explains it."""
-    forcing = localisation.likeliest
-    if not forcing.windows:
-        return []
-    blocks: list[Block] = [
-        Picture(
-            figure=forcing_figure(plant, forcing),
-            caption=f"{model} lacks this term in {forcing.equation.title}: the forcing with which it "
-            "meets the recordings.",
-        )
-    ]
-    term = drawn_term(localisation)
-    if term:
-        picture = missing_term_figure(term)
-        caption = "The missing term over the state that explains it best."
-        blocks.append(Picture(figure=picture, caption=caption))
-    return blocks
-
-
-def residual(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis, name: str) -> Picture:
-    """Residual of the held-out run that recalibration misses most."""
-    problem = diagnosis.ranking.problem
-    recalibrated = diagnosis.ranking.recalibrated.residuals
-    held_out = [r for r, run in enumerate(problem.plant.runs) if run.held_out]
-    run = max(held_out, key=lambda r: np.mean(recalibrated[r] ** 2))
-    masks = regimes_of(problem.plant, problem.candidate(hypothesis.estimate), run)
-    return Picture(
-        figure=residual_figure(problem.plant, run, hypothesis.residuals[run], masks),
-        caption=f"{name}, on the held-out recording that recalibration misses most. Grey: where "
-        f"{LEVEL_TEXT} of the noise lies.",
     )

@@ -1,12 +1,8 @@
 """The diagnosis in sentences that a project leader can act on."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
-from identification.gap.diagnosis import (
-    MENTIONED_PROBABILITY,
-    Diagnosis,
-)
+from identification.gap.diagnosis import MENTIONED_PROBABILITY, Diagnosis
 from identification.gap.fit.gaps import FLOOR
 from identification.gap.fit.laws import in_words as laws_in_words
 from identification.gap.judge.held_out import LEAST_GAP_CLOSED, NOMINAL, RECALIBRATED
@@ -18,15 +14,15 @@ from identification.gap.judge.verdict import (
     PARTIAL,
     RankedCause,
 )
+from identification.gap.locate.localisation import Localisation
 from identification.gap.plant import FreeParameter
-from identification.gap.report.gap_json import Remainder, discrepancy, parameter_intervals, remainder
+from identification.gap.report.gap_json import discrepancy, remainder, share_left
 from identification.gap.report.quantities import (
     gap_text,
     gap_with_interval,
     listed,
     probability_text,
     quantity,
-    quantity_with_interval,
     share_text,
 )
 
@@ -47,10 +43,10 @@ def verdict_sentence(diagnosis: Diagnosis, next_experiment: str) -> tuple[str, s
     next_experiment: a sentence for an ambiguous verdict; empty where none was sought.
     """
     status, text = _status_and_text(diagnosis, next_experiment)
-    if diagnosis.onset is None:
-        return status, text
-    drive, probability = diagnosis.onset
-    return status, f"{text} It begins with {drive} ({probability_text(probability)})."
+    if diagnosis.onset:
+        drive, probability = diagnosis.onset
+        text += f" It begins with {drive} ({probability_text(probability)})."
+    return status, text
 
 
 def _status_and_text(diagnosis: Diagnosis, next_experiment: str) -> tuple[str, str]:
@@ -107,13 +103,12 @@ def _partial(diagnosis: Diagnosis) -> str:
     ]
     together = f" together with {listed(faint)}, less sure," if faint else ""
     left = remainder(diagnosis)
-    drawn = left.location and left.location.missing_term
-    look = ", and look at the missing term" if drawn else ""
+    look = ", and look at the missing term" if left and left.missing_term else ""
     named = listed([in_words(diagnosis, name) for name in held])
     return (
         f"{named} {are} part of the gap ({chances}): adding {them}{together} with "
         f"{sizes_text(diagnosis, best)} closes {share_closed(diagnosis, best)} of it on recordings "
-        f"never fitted to. {share_text(left.share)} remains{remainder_place(left)}: "
+        f"never fitted to. {share_text(share_left(diagnosis))} remains{remainder_place(left)}: "
         f"{add_or_not(diagnosis, best)}{look}."
     )
 
@@ -123,9 +118,10 @@ def _ambiguous(diagnosis: Diagnosis) -> str:
     labels = [cause.hypothesis.titles for cause in rivals]
     common = [label for label in labels[0] if all(label in others for others in labels)]
     rests = [" + ".join(label for label in own if label not in common) for own in labels]
+    named = [f"with {rest}" if rest else "alone" for rest in rests] if common else rests
     choices = " or ".join(
-        f"{_beside(rest, common)} ({probability_text(cause.probability)})"
-        for rest, cause in zip(rests, rivals, strict=True)
+        f"{name} ({probability_text(cause.probability)})"
+        for name, cause in zip(named, rivals, strict=True)
     )
     explain, close = ("explain", "close") if len(common) > 1 else ("explains", "closes")
     text = (
@@ -137,13 +133,6 @@ def _ambiguous(diagnosis: Diagnosis) -> str:
     if any(diagnosis.surely_helps(cause) for cause in rivals):
         return text
     return f"{text} None of them surely helps on recordings never fitted to: add none yet."
-
-
-def _beside(rest: str, common: Sequence[str]) -> str:
-    """What a rival adds to the causes that all rivals share."""
-    if not common:
-        return rest
-    return f"with {rest}" if rest else "alone"
 
 
 def _no_gap(diagnosis: Diagnosis) -> str:
@@ -234,45 +223,25 @@ def nearest_cause(diagnosis: Diagnosis, cause: RankedCause) -> str:
             f"Adding {name} would reduce the gap on recordings never fitted to by {share}, but that "
             f"{true} is doubtful ({probability_text(cause.probability)})."
         )
-    gaps = diagnosis.reduction.gaps
-    before = gaps[RECALIBRATED].overall.value
-    after = gaps[cause.hypothesis.label].overall.value
+    gaps, held_out = diagnosis.reduction.gaps, "recordings never fitted to"
+    before, after = (gaps[label].overall.value for label in (RECALIBRATED, cause.hypothesis.label))
+    effect = f"closes {share} of the gap on {held_out}"
     if after > before:
-        return (
-            f"The nearest cause, {name}, makes recordings never fitted to worse (from "
-            f"{gap_text(before)} to {gap_text(after)} noise deviations): do not add it."
-        )
-    return (
-        f"The nearest cause, {name}, closes {share} of the gap on recordings never fitted to: do not "
-        "add it."
-    )
+        ends = f"from {gap_text(before)} to {gap_text(after)} noise deviations"
+        effect = f"makes {held_out} worse ({ends})"
+    return f"The nearest cause, {name}, {effect}: do not add it."
 
 
-def remainder_place(left: Remainder) -> str:
+def remainder_place(left: Localisation | None) -> str:
     """Where the remainder lies, as the end of a clause; empty where the recordings do not show it."""
-    if not left.location or not left.location.forcings:
+    if not left or not left.forcings:
         return ""
-    equation = left.location.likeliest.equation
-    probability = left.equation[equation.name]
-    if probability <= left.location.nothing_missing:
+    equation = left.likeliest.equation
+    probability = left.equation_probabilities[equation.name]
+    if probability <= left.nothing_missing:
         return ""
-    return (
-        f", most likely in {equation.title} of {equation.component.replace('_', ' ')} "
-        f"({probability_text(probability)})"
-    )
-
-
-def remainder_sentence(diagnosis: Diagnosis) -> str:
-    """How much of the explainable gap remains, and where."""
-    left = remainder(diagnosis)
-    if not left.share.value:
-        return "No named cause leaves any of the gap on recordings never fitted to."
-    if not diagnosis.named:
-        return f"No cause is named, so the whole gap remains{remainder_place(left)}."
-    return (
-        f"{diagnosis.named.hypothesis.title} leaves {share_text(left.share)} of the gap on "
-        f"recordings never fitted to{remainder_place(left)}."
-    )
+    place = f"{equation.title} of {equation.component.replace('_', ' ')}"
+    return f", most likely in {place} ({probability_text(probability)})"
 
 
 def disturbance_sentence(diagnosis: Diagnosis) -> str:
@@ -299,39 +268,6 @@ def component_at_fault(diagnosis: Diagnosis) -> str:
     own.sort(key=lambda equation: -localisation.equation_probabilities[equation.name])
     named = "".join(f", {equation.title}" for equation in own[:1])
     return f"{component.replace('_', ' ')}{named} ({probability_text(probability)})"
-
-
-def location_sentence(diagnosis: Diagnosis) -> str:
-    """Where most of the gap lies."""
-    worst = max(diagnosis.localisation.regime_gaps, key=lambda gap: gap.gap)
-    text = (
-        f"After recalibration the gap is largest in {worst.channel} during "
-        f"{worst.regime.replace('_', ' ')}: {gap_text(worst.gap)} noise deviations, where {FLOOR:g} is "
-        "noise alone."
-    )
-    if diagnosis.conclusion.verdict == NO_GAP:
-        return text
-    return f"{text} Most likely at fault: {component_at_fault(diagnosis)}."
-
-
-def reduction_sentence(diagnosis: Diagnosis) -> str:
-    """The gap of every model, from the nominal one to the black box."""
-    gaps = diagnosis.reduction.gaps
-    models = {"nominal": gaps[NOMINAL], "recalibrated": gaps[RECALIBRATED]}
-    if diagnosis.best:
-        name = diagnosis.best.hypothesis.label
-        models[f"with {diagnosis.best.hypothesis.title}"] = gaps[name]
-    models["with a black box on top of recalibration"] = diagnosis.reduction.black_box
-    listed = "; ".join(f"{name} {gap_with_interval(gap.overall)}" for name, gap in models.items())
-    text = (
-        f"Gap on recordings never fitted to, in noise deviations ({FLOOR:g} is noise alone): {listed}."
-    )
-    if diagnosis.reduction.black_box_helps:
-        return text
-    return (
-        f"{text} The black box finds nothing in what recalibration leaves that holds on these "
-        "recordings: the recalibrated model itself is the floor."
-    )
 
 
 def hidden_causes_sentence(diagnosis: Diagnosis) -> str:
@@ -384,15 +320,6 @@ def at_an_end(parameter: FreeParameter, value: float) -> bool:
 def share_closed(diagnosis: Diagnosis, cause: RankedCause) -> str:
     """The share of the gap that a cause closes, with its interval."""
     return share_text(diagnosis.share_closed(cause))
-
-
-def sizes_with_intervals(diagnosis: Diagnosis, cause: RankedCause) -> list[str]:
-    """Each fitted parameter of a cause with its interval."""
-    intervals = parameter_intervals(diagnosis, cause.hypothesis)
-    return [
-        f"{p.title} = {quantity_with_interval(*intervals[p.symbol], p.unit)}"
-        for p in cause.hypothesis.estimate.hypothesis.cause_parameters
-    ]
 
 
 def sizes_text(diagnosis: Diagnosis, cause: RankedCause) -> str:

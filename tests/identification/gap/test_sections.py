@@ -11,15 +11,14 @@ from docs.examples.tank import Tank, virtual_recordings
 from identification.gap.diagnosis import Diagnosis, diagnose
 from identification.gap.report.figures import location_figure
 from identification.gap.report.gap_json import as_json
-from identification.gap.report.page import calibrated_values, sections
+from identification.gap.report.page import calibrated_values, gap_table, sections
 from identification.gap.report.quantities import probability_text
 from identification.gap.report.sentences import (
     look_alikes,
     parameters_at_bounds,
-    reduction_sentence,
     verdict_sentence,
 )
-from identification.report.page import Picture, Section, Table
+from identification.report.page import Picture, Section, Table, Text
 from tests.identification.gap.tanks import TANKS, diagnosed
 
 NEXT = "Record a long draining"
@@ -40,16 +39,32 @@ def texts(found: list[Section]) -> str:
 
 @pytest.mark.parametrize("name", TANKS)
 def test_every_report_has_the_same_parts(name):
-    found = sections(diagnosed(name), NEXT)
-    assert [section.title for section in found] == [
-        "Verdict", "Where the gap lies", "Which cause it is", "How far the gap shrinks",
-        "What remains", "Next recording", "Warnings",
-    ]  # fmt: skip
-    assert all(section.verdicts for section in found)
+    found = sections(diagnosed(name), NEXT, plan=[Text(text="The programmes.")])
+    parts = ["Verdict", "Where the gap lies", "Which cause it is", "What remains"]
+    assert [section.title for section in found] == [*parts, "Next recording"]
+    assert all(section.blocks for section in found)
     assert not re.search(r"\b(nan|inf)\b", texts(found))
     assert plt.get_fignums() == []
-    without = [section.title for section in sections(diagnosed(name))]
-    assert "Next recording" not in without
+    assert [section.title for section in sections(diagnosed(name))] == parts
+
+
+@pytest.mark.parametrize("name", TANKS)
+def test_the_first_screen_says_what_shows_it_and_says_what_next(name):
+    first, *others = sections(diagnosed(name), NEXT)
+    assert first.summary
+    assert not any(section.summary for section in others)
+    assert first.verdicts[-1].text == NEXT
+    assert len(pictures(first)) == 1
+    models = ["recalibrated", *(["with leak"] if name in ("known", "ambiguous") else [])]
+    legend = pictures(first)[0].figure.axes[1].get_legend()
+    assert [text.get_text() for text in legend.get_texts()][: len(models)] == models
+
+
+@pytest.mark.parametrize("name", TANKS)
+def test_each_sentence_stands_once(name):
+    said = [v.text for s in sections(diagnosed(name), NEXT) for v in s.verdicts]
+    found = re.split(r"(?<=[.:;])\s+", " ".join(said))
+    assert len(found) == len(set(found))
 
 
 def test_a_known_cause_is_named_with_its_size_and_what_it_closes():
@@ -71,9 +86,9 @@ def test_no_gap_says_so_and_what_to_do():
 
 def test_a_black_box_that_does_not_help_is_said_to():
     found = diagnosed("known")
-    assert "itself is the floor" not in reduction_sentence(found)
+    assert "itself is the floor" not in gap_table(found).caption
     useless = replace(found, reduction=replace(found.reduction, black_box_helps=False))
-    assert reduction_sentence(useless).endswith("the recalibrated model itself is the floor.")
+    assert gap_table(useless).caption.endswith("the recalibrated model itself is the floor.")
 
 
 def test_an_unknown_cause_is_sent_to_the_place_and_the_shape():
@@ -128,8 +143,8 @@ def test_a_size_at_an_end_of_its_range_is_a_warning():
     assert parameters_at_bounds(at_end(found)) == [
         "leak: leak is at an end of its physical range (0.0500 1/s)"
     ]
-    assert sections(at_end(found))[-1].verdicts[0].status == "doubt"
-    assert sections(found)[-1].verdicts[0].status == "good"
+    assert [v.status for v in sections(at_end(found))[0].verdicts] == ["good", "doubt"]
+    assert [v.status for v in sections(found)[0].verdicts] == ["good"]
 
 
 def test_tables_hold_the_figures_of_the_file():
@@ -172,7 +187,7 @@ def test_people_read_words(worded):
     assert verdict.startswith(f"{NAMED_HOLE} explains the gap")
     assert "outflow at the valve (c)" in verdict
     assert "tank, balance of the water (" in texts(others)
-    assert f"with {NAMED_HOLE}" in texts(others)
+    assert NAMED_HOLE in [row[0] for row in table(others[-1], "Model").rows]
 
 
 def test_programs_read_names(worded):
