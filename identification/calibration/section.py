@@ -26,9 +26,7 @@ def calibration_section(calibration: Calibration) -> Section:
             error_table(calibration.before, "Errors at the start's parameters."),
             *(error_table(calibration.after[method], f"Errors after {method}.") for method in METHODS),
             *(
-                Picture(
-                    figure=response_figure(response), caption="Calibration: " + response.recording.name
-                )
+                Picture(figure=response_figure(response), caption=response.recording.name)
                 for response in calibration.after["least squares"][:8]
             ),
         ],
@@ -55,10 +53,8 @@ def calibration_json(calibration: Calibration) -> dict[str, Any]:
 
 
 def _verdict(calibration: Calibration) -> Verdict:
-    error, before = (
-        total_response_error(calibration.after["Nelder-Mead"]),
-        total_response_error(calibration.before),
-    )
+    error = total_response_error(calibration.after["Nelder-Mead"])
+    before = total_response_error(calibration.before)
     rms = calibration.best("least squares").error
     good = error < ACCEPTED_ERROR
     return Verdict(

@@ -1,12 +1,9 @@
-"""The confidence stage in the report: Table 14, Figures 16 and 17, and the joint region."""
+"""The confidence stage in the report: Table 14, and Figures 16 and 17."""
 
-from itertools import combinations
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from epv_env.plant.parameters import table
 from identification.confidence.confidence import Confidence
@@ -27,16 +24,8 @@ def confidence_section(confidence: Confidence) -> Section:
         verdicts=[_precision(confidence), _agreement(confidence), _minimum(confidence)],
         blocks=[
             _intervals(confidence),
-            _deviations(confidence),
             _correlations(confidence),
-            Picture(
-                figure=profiles(confidence),
-                caption="Model error over one parameter at a time.",
-            ),
-            Picture(
-                figure=region(confidence),
-                caption="Joint 95 % region along pairs of parameters, relative to the estimate.",
-            ),
+            Picture(figure=profiles(confidence), caption="Model error over one parameter at a time."),
         ],
     )
 
@@ -62,12 +51,9 @@ def _precision(confidence: Confidence) -> Verdict:
     worst = int(np.argmax(relative))
     return Verdict(
         status="good" if relative[worst] < PRECISE else "doubt",
-        text="95 % intervals, each parameter on its own: "
-        + ", ".join(
-            f"{symbol} ±{100 * width:.2g} %"
-            for symbol, width in zip(confidence.problem.vector.symbols, relative, strict=True)
-        )
-        + ". They hold the noise of outputs and inputs, not the errors of the other parameters.",
+        text=f"The widest 95 % interval is that of {confidence.problem.vector.symbols[worst]}: "
+        f"±{100 * relative[worst]:.2g} %. Intervals hold the noise of outputs and inputs, not the "
+        "errors of the other parameters.",
     )
 
 
@@ -83,8 +69,10 @@ def _agreement(confidence: Confidence) -> Verdict:
 
 
 def _minimum(confidence: Confidence) -> Verdict:
-    positive = bool(np.all(confidence.minimum.eigenvalues > 0))
-    flat = _decrease(confidence) < FLAT
+    minimum = confidence.minimum
+    positive = bool(np.all(minimum.eigenvalues > 0))
+    steepest, weakest = minimum.gradient @ minimum.gradient, np.min(np.abs(minimum.eigenvalues))
+    flat = bool(0.5 * steepest / (weakest * confidence.report.error) < FLAT)
     return Verdict(
         status="good" if positive and flat else "doubt",
         text=f"At the Nelder-Mead estimate the gradient is {'zero' if flat else 'not zero'} and the "
@@ -93,50 +81,28 @@ def _minimum(confidence: Confidence) -> Verdict:
     )
 
 
-def _decrease(confidence: Confidence) -> float:
-    """Greatest decrease of the total error that its gradient promises, relative to it."""
-    minimum = confidence.minimum
-    steepest = float(minimum.gradient @ minimum.gradient)
-    return 0.5 * steepest / (float(np.min(np.abs(minimum.eigenvalues))) * confidence.report.error)
-
-
 def _intervals(confidence: Confidence) -> Table:
-    symbols = confidence.problem.vector.symbols
-    estimates = confidence.estimate * confidence.problem.vector.scale
+    """Estimates with their intervals, and where the standard deviations come from."""
+    covariance, vector = confidence.covariance, confidence.problem.vector
+    parts = (covariance.independent, covariance.residual, covariance.inputs, covariance.total)
+    deviations = np.array([np.sqrt(np.diag(part)) for part in parts]) / confidence.estimate
+    estimates, intervals = confidence.estimate * vector.scale, confidence.intervals()
     rows = [
         [
-            f"{symbol} [{table()[symbol].unit}]",
-            f"{estimate:.7g}",
-            *(f"{end:.7g}" for end in confidence.intervals()[symbol]),
+            _axis(symbol),
+            *(f"{value:.7g}" for value in (estimate, *intervals[symbol])),
+            *(f"{100 * deviation:.4f}" for deviation in own),
         ]
-        for symbol, estimate in zip(symbols, estimates, strict=True)
+        for symbol, estimate, own in zip(vector.symbols, estimates, deviations.T, strict=True)
     ]
     return Table(
-        columns=["Parameter", "estimate", "low", "high"],
+        columns=["Parameter", "estimate", "low", "high", "independent", "sandwich", "inputs", "total"],
         rows=rows,
-        caption="95 % intervals of the least-squares estimate (sandwich covariance, inputs' noise).",
+        caption="95 % intervals of the least-squares estimate, each parameter on its own. Standard "
+        "deviations [% of the estimate]: as if residuals were independent; from the residuals as they "
+        f"are, over {covariance.lags} samples; from the noise of U and p1 and of the offsets; sandwich "
+        "and inputs together.",
     )
-
-
-def _deviations(confidence: Confidence) -> Table:
-    covariance = confidence.covariance
-    parts = [
-        np.sqrt(np.diag(covariance.independent)),
-        np.sqrt(np.diag(covariance.residual)),
-        np.sqrt(np.diag(covariance.inputs)),
-        np.sqrt(np.diag(covariance.total)),
-    ]
-    rows = [
-        [symbol, *(f"{100 * part[i] / confidence.estimate[i]:.4f}" for part in parts)]
-        for i, symbol in enumerate(confidence.problem.vector.symbols)
-    ]
-    columns = ["Parameter", "independent", "sandwich", "inputs", "total"]
-    caption = (
-        f"Standard deviations [% of the estimate]: as if residuals were independent; from the residuals "
-        f"as they are, over {covariance.lags} samples; from the noise of U and p1 and of the offsets; "
-        "sandwich and inputs together."
-    )
-    return Table(columns=columns, rows=rows, caption=caption)
 
 
 def _correlations(confidence: Confidence) -> Table:
@@ -153,9 +119,13 @@ def profiles(confidence: Confidence) -> Figure:
     """Total error over one parameter at a time, the others held (Figures 16 and 17)."""
     vector = confidence.problem.vector
     figure = Figure(figsize=(9, 5.5), layout="constrained")
-    panels = _panels(figure, len(vector.symbols))
+    count = len(vector.symbols)
+    columns = 2 if count <= 4 else 3
+    panels = np.ravel(figure.subplots(-(-count // columns), columns, squeeze=False))
+    for spare in panels[count:]:
+        spare.remove()
     centre = confidence.nelder_mead * vector.scale
-    rows = zip(panels, vector.symbols, centre, confidence.minimum.profiles, strict=True)
+    rows = zip(panels[:count], vector.symbols, centre, confidence.minimum.profiles, strict=True)
     for axes, symbol, value, profile in rows:
         axes.plot(value * (1 + confidence.minimum.offsets), 100 * profile, color="tab:blue")
         low, high = confidence.intervals()[symbol]
@@ -166,54 +136,6 @@ def profiles(confidence: Confidence) -> Figure:
     panels[0].legend(fontsize="small")
     figure.supylabel("total error [%]")
     return figure
-
-
-def region(confidence: Confidence) -> Figure:
-    """The joint region seen along pairs of parameters, with both estimates."""
-    symbols = confidence.problem.vector.symbols
-    pairs = list(combinations(range(len(symbols)), 2))
-    figure = Figure(figsize=(9, 6), layout="constrained")
-    for axes, pair in zip(_panels(figure, len(pairs)), pairs, strict=False):
-        _pair(axes, confidence, pair)
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize="small")
-    return figure
-
-
-def _pair(axes: Axes, confidence: Confidence, pair: tuple[int, int]) -> None:
-    """One panel: everything relative to the estimate, in parts per thousand."""
-    i, j = pair
-    covariance = confidence.covariance
-    centre = confidence.estimate
-    relative = 1e3 / centre[list(pair)]
-    for matrix, style, label in (
-        (covariance.independent, "--", "independent residuals, exact inputs"),
-        (covariance.total, "-", "joint 95 % region"),
-    ):
-        outline = _ellipse(matrix[np.ix_(pair, pair)], confidence.chi_square) * relative
-        axes.plot(*outline.T, style, color="tab:green", label=label)
-    apart = (confidence.nelder_mead - centre)[[i, j]] * relative
-    axes.plot(*apart, "x", color="tab:red", label="Nelder-Mead")
-    axes.plot(0.0, 0.0, "+", color="black", label="least squares")
-    symbols = confidence.problem.vector.symbols
-    axes.set_xlabel(f"{symbols[i]}: change [‰]")
-    axes.set_ylabel(f"{symbols[j]}: change [‰]")
-    axes.grid(alpha=0.3)
-
-
-def _ellipse(covariance: NDArray, radius: float) -> NDArray:
-    """Outline (points, 2) of the ellipsoid's shadow on two of its axes."""
-    angle = np.linspace(0.0, 2 * np.pi, 100)
-    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    return np.sqrt(radius) * circle @ np.linalg.cholesky(covariance).T
-
-
-def _panels(figure: Figure, count: int) -> list[Axes]:
-    columns = 2 if count <= 4 else 3
-    panels = np.ravel(figure.subplots(-(-count // columns), columns, squeeze=False))
-    for spare in panels[count:]:
-        spare.remove()
-    return list(panels[:count])
 
 
 def _axis(symbol: str) -> str:

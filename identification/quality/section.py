@@ -1,20 +1,16 @@
 """The quality of one recording in a report: verdicts, tables, the readings, and JSON."""
 
 import math
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from identification.quality.assessment import QualityAssessment, sensor_offsets, white_noise_band
-from identification.quality.channel import DescriptiveStatistics
-from identification.quality.verdicts import CHECKS, channel_verdict, check_results, worst_status
+from identification.quality.verdicts import channel_verdict, check_results, worst_status
 from identification.recordings.recording import CHANNELS, UNITS
 from identification.report.page import Picture, Section, Table, Text
-
-UNTESTED = "–"
-"""Stands where a check does not apply."""
 
 UNIT_COLUMNS = [f"{name} [{UNITS[name][0]}]" for name in CHANNELS]
 """Headings of a table with a column per channel."""
@@ -33,7 +29,7 @@ STATISTIC_NAMES = {
     "kurtosis": "kurtosis",
     "skewness": "skewness",
 }
-"""Names by field of DescriptiveStatistics."""
+"""Names by field of `DescriptiveStatistics`."""
 
 
 def quality_section(quality: QualityAssessment) -> Section:
@@ -42,7 +38,6 @@ def quality_section(quality: QualityAssessment) -> Section:
         title=f"Data quality: {quality.name} ({quality.samples} samples)",
         verdicts=[channel_verdict(quality, name) for name in CHANNELS],
         blocks=[
-            _checks(quality),
             Text(text=_state(quality)),
             _trends(quality),
             _statistics(quality),
@@ -79,15 +74,6 @@ def _state(quality: QualityAssessment) -> str:
     )
 
 
-def _checks(quality: QualityAssessment) -> Table:
-    results = {name: check_results(quality, name) for name in CHANNELS}
-    rows = [
-        [name, worst_status(own), *(own[c].status if c in own else UNTESTED for c in CHECKS)]
-        for name, own in results.items()
-    ]
-    return Table(columns=["Channel", "verdict", *CHECKS], rows=rows, caption="Status of every check.")
-
-
 def _trends(quality: QualityAssessment) -> Table:
     trends = [quality.channels[name].trend for name in CHANNELS]
     slopes = [_estimate(trend.factor, trend.factor_error) for trend in trends]
@@ -105,23 +91,16 @@ def _estimate(value: float, error: float) -> str:
 
 
 def _statistics(quality: QualityAssessment) -> Table:
-    statistics = {name: channel.description for name, channel in quality.channels.items()}
     rows = []
-    for field in fields(DescriptiveStatistics):
-        label = STATISTIC_NAMES[field.name]
-        rows.append([label, *(_cell(statistics[name], field.name) for name in CHANNELS)])
+    for field, label in STATISTIC_NAMES.items():
+        values = [getattr(quality.channels[name].description, field) for name in CHANNELS]
+        digits = ".2f" if field == "signal_to_noise" else "z.4f"
+        rows.append([label, *(format(v, digits) if math.isfinite(v) else "–" for v in values)])
     return Table(
         columns=["Parameter", *UNIT_COLUMNS],
         rows=rows,
         caption="Central, dispersion and distribution properties of the detrended signals.",
     )
-
-
-def _cell(description: DescriptiveStatistics, name: str) -> str:
-    value = getattr(description, name)
-    if not math.isfinite(value):
-        return "–"
-    return f"{value:.2f}" if name == "signal_to_noise" else f"{value:z.4f}"
 
 
 def _correlations(quality: QualityAssessment) -> Table:
