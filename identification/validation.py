@@ -215,16 +215,15 @@ def _residual_table(validation: Validation) -> Table:
     columns = ["Recording", "output", "rms / noise", "greatest autocorrelation", "p of white noise"]
     return Table(
         columns=columns,
-        rows=[_row(residual) for residual in validation.residuals],
+        rows=[
+            [
+                residual.recording,
+                residual.output,
+                f"{residual.rms:.3f}",
+                f"{residual.whiteness.peak:.3f}",
+                f"{residual.whiteness.probability:.2g}",
+            ]
+            for residual in validation.residuals
+        ],
         caption="Residuals in noise deviations (1 is the floor), and whether they are white.",
     )
-
-
-def _row(residual: OutputResidual) -> list[str]:
-    return [
-        residual.recording,
-        residual.output,
-        f"{residual.rms:.3f}",
-        f"{residual.whiteness.peak:.3f}",
-        f"{residual.whiteness.probability:.2g}",
-    ]

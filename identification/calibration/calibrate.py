@@ -100,21 +100,30 @@ def calibration_warnings(
     warnings = coarse_step_warnings(problem.steps)
     for method in METHODS:
         best = best_search(fits[method])
-        warnings += _not_converged(method, best)
-        warnings += _on_bounds(problem, method, best)
+        if not best.converged:
+            warnings.append(
+                f"{method} has not converged after {best.evaluations} evaluations ({best.message}): do "
+                "not use its estimate; start nearer, or fit fewer parameters"
+            )
+        warnings += [
+            f"{method} ends at the end of {symbol}'s domain: the recordings ask for a value outside it, "
+            "so the model lacks something or another parameter is wrong"
+            for symbol in symbols_on_bounds(problem, best)
+        ]
         warnings += _other_minima(method, fits[method])
     best = best_search(fits["least squares"])
-    warnings += _conditioning(problem, best)
-    return warnings + _unexplained(best)
-
-
-def _not_converged(method: str, fit: SearchResult) -> list[str]:
-    if fit.converged:
-        return []
-    return [
-        f"{method} has not converged after {fit.evaluations} evaluations ({fit.message}): do not use "
-        "its estimate; start nearer, or fit fewer parameters"
-    ]
+    involved, condition = inseparable_symbols(problem, best)
+    if involved:
+        warnings.append(
+            f"the recordings cannot separate {', '.join(involved)} (condition number {condition:.0f}): "
+            "fix one of them, or record what moves them apart"
+        )
+    if best.error >= EXPLAINED:
+        warnings.append(
+            f"the calibrated model misses the recordings by {best.error:.3g} noise deviations (1 is the "
+            "floor): the estimates absorb what the model lacks"
+        )
+    return warnings
 
 
 def symbols_on_bounds(problem: CalibrationProblem, fit: SearchResult) -> list[str]:
@@ -123,14 +132,6 @@ def symbols_on_bounds(problem: CalibrationProblem, fit: SearchResult) -> list[st
     margin = NEAR_BOUND * (high - low)
     at = (fit.z < low + margin) | (fit.z > high - margin)
     return [symbol for symbol, on_bound in zip(problem.vector.symbols, at, strict=True) if on_bound]
-
-
-def _on_bounds(problem: CalibrationProblem, method: str, fit: SearchResult) -> list[str]:
-    return [
-        f"{method} ends at the end of {symbol}'s domain: the recordings ask for a value outside it, so "
-        "the model lacks something or another parameter is wrong"
-        for symbol in symbols_on_bounds(problem, fit)
-    ]
 
 
 def _other_minima(method: str, fits: list[SearchResult]) -> list[str]:
@@ -156,22 +157,3 @@ def inseparable_symbols(problem: CalibrationProblem, fit: SearchResult) -> tuple
     direction = np.abs(np.linalg.svd(normalised, full_matrices=False)[2][-1])
     involved = [s for s, w in zip(problem.vector.symbols, direction, strict=True) if w > INVOLVED_WEIGHT]
     return involved, condition
-
-
-def _conditioning(problem: CalibrationProblem, fit: SearchResult) -> list[str]:
-    involved, condition = inseparable_symbols(problem, fit)
-    if not involved:
-        return []
-    return [
-        f"the recordings cannot separate {', '.join(involved)} (condition number {condition:.0f}): fix "
-        "one of them, or record what moves them apart"
-    ]
-
-
-def _unexplained(fit: SearchResult) -> list[str]:
-    if fit.error < EXPLAINED:
-        return []
-    return [
-        f"the calibrated model misses the recordings by {fit.error:.3g} noise deviations (1 is the "
-        "floor): the estimates absorb what the model lacks"
-    ]

@@ -172,7 +172,9 @@ class OdePlant:
         for name, symbol in self._delays.items():
             delays[names.inputs.index(name)] = p[names.symbols.index(symbol)]
         return Job(
-            start=self._starts(own, p),
+            start=np.array(
+                [self._start(own, names.p(*each[: len(self.nominal)])) for each in p.T], dtype=float
+            ).T.copy(),
             inputs=np.array([*own.inputs.values()], dtype=float).reshape(-1, len(own.time)).T.copy(),
             delays=delays,
             parameters=p,
@@ -192,12 +194,6 @@ class OdePlant:
                 given = np.asarray(values[symbol])
                 p[i] = given[:, run] if given.ndim == 2 else given
         return p
-
-    def _starts(self, run: Run, p: NDArray) -> NDArray:
-        """States at the first sample, (states, n) [SI]."""
-        return np.array(
-            [self._start(run, self._records.p(*own[: len(self.nominal)])) for own in p.T], dtype=float
-        ).T.copy()
 
     def _state_equations(
         self, components: Mapping[str, str], forcing_steps: Mapping[str, float]

@@ -87,32 +87,6 @@ def sensitivity(identification: Identification) -> Result:
     )
 
 
-def calibration(identification: Identification) -> Result:
-    """Section 6.2."""
-    calibrated = identification.calibration
-    return Result(
-        sections=[calibration_section(calibrated)],
-        content={"calibration": calibration_json(calibrated)},
-    )
-
-
-def confidence(identification: Identification) -> Result:
-    """Section 6.3."""
-    intervals = identification.confidence
-    return Result(
-        sections=[confidence_section(intervals)],
-        content={"confidence": confidence_json(intervals)},
-    )
-
-
-def validation(identification: Identification) -> Result:
-    """Section 7. Raises CampaignError if nothing was held out."""
-    validated = identification.validation
-    return Result(
-        sections=[validation_section(validated)], content={"validation": validation_json(validated)}
-    )
-
-
 STAGES = (
     Stage(
         name="quality", help="is the data good enough (section 4)",
@@ -124,15 +98,27 @@ STAGES = (
     ),
     Stage(
         name="calibrate", help="fit the parameters (section 6.2)",
-        compute=calibration, time_share=0.4,
+        compute=lambda i: Result(
+            sections=[calibration_section(i.calibration)],
+            content={"calibration": calibration_json(i.calibration)},
+        ),
+        time_share=0.4,
     ),
     Stage(
         name="confidence", help="how sure the estimates are (section 6.3)",
-        compute=confidence, time_share=0.16,
+        compute=lambda i: Result(
+            sections=[confidence_section(i.confidence)],
+            content={"confidence": confidence_json(i.confidence)},
+        ),
+        time_share=0.16,
     ),
     Stage(
         name="validate", help="does the model hold on held-out recordings (section 7)",
-        compute=validation, time_share=0.16, role="validation",
+        compute=lambda i: Result(
+            sections=[validation_section(i.validation)],
+            content={"validation": validation_json(i.validation)},
+        ),
+        time_share=0.16, role="validation",
     ),
 )  # fmt: skip
 """In the order of the report."""
@@ -164,7 +150,18 @@ def run(identification: Identification, out: Path, next_step: NextStep) -> Plant
         results.append(result_or_omission(stage, identification))
         done += stage.time_share
     plant = calibrated_plant(identification)
-    _write_report(out, identification, plant, results, next_step)
+    content: dict[str, Any] = {"provenance": plant.provenance}
+    for result in results:
+        content |= result.content
+    write_results(
+        out,
+        "report",
+        title=f"Identification of the protection valve: {identification.campaign.name}",
+        sections=[summary_section(identification), *(s for r in results for s in r.sections)],
+        content=content,
+        facts=campaign_facts(identification.campaign),
+        next_step=next_step,
+    )
     save_plant(plant, out / PLANT_FILE)
     print(f"[done] {perf_counter() - began:.0f} s", file=sys.stderr)
     return plant
@@ -186,29 +183,4 @@ def calibrated_plant(identification: Identification) -> Plant:
             "calibrated_on": [r.name for r in identification.campaign.with_role("calibration")],
             "warnings": identification.calibration.warnings,
         },
-    )
-
-
-def _write_report(
-    out: Path,
-    identification: Identification,
-    plant: Plant,
-    results: list[Result],
-    next_step: NextStep,
-) -> None:
-    """Write report.html and report.json."""
-    sections: list[Section] = [summary_section(identification)]
-    sections += [section for result in results for section in result.sections]
-    content: dict[str, Any] = {"provenance": plant.provenance}
-    for result in results:
-        content |= result.content
-    title = f"Identification of the protection valve: {identification.campaign.name}"
-    write_results(
-        out,
-        "report",
-        title=title,
-        sections=sections,
-        content=content,
-        facts=campaign_facts(identification.campaign),
-        next_step=next_step,
     )

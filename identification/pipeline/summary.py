@@ -100,18 +100,14 @@ def _held_out(identification: Identification) -> list[Reason]:
 def summary_section(identification: Identification) -> Section:
     """The calibrated values with their meaning, their 95 % intervals and whether to trust them."""
     common = common_reasons(identification)
+    status, reasons = worst(common), "; ".join(reason.text for reason in common)
+    text = f"{ADVICE[status]}{': ' if reasons else ''}{reasons}."
     return Section(
         title="Calibrated values",
         summary=True,
-        verdicts=[_verdict(common)],
+        verdicts=[Verdict(status=status, text=text)],
         blocks=[_values(identification, common, judge_values(identification))],
     )
-
-
-def _verdict(common: Sequence[Reason]) -> Verdict:
-    status = worst(common)
-    reasons = "; ".join(reason.text for reason in common)
-    return Verdict(status=status, text=f"{ADVICE[status]}{': ' if reasons else ''}{reasons}.")
 
 
 def _values(identification: Identification, common: Sequence[Reason], judged: Sequence[Trust]) -> Table:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from epv_env.common.files import JSONFileError, read_bytes, read_json, write_json, write_text
 from epv_env.common.units import BAR
-from epv_env.plant.channels import CHANNEL, MEASURED_CHANNELS, MeasuredChannel
+from epv_env.plant.channels import CHANNEL, MEASURED_CHANNELS
 from epv_env.plant.parameters import ParameterError, checked_value
 from identification.recordings.columns import CONSUMPTION_COLUMN, TIME_COLUMN, read_columns
 from identification.recordings.noise import column_steps
@@ -212,13 +212,11 @@ def _recording(
         period=period,
         sigma_S=columns.get(CONSUMPTION_COLUMN, np.zeros_like(columns["U_V"])),
         sha256=sha256,
-        **{channel.name: _signal(channel, columns) for channel in MEASURED_CHANNELS},
+        **{
+            c.name: np.mean([columns[n] for n in c.columns if n in columns], axis=0) * c.scale
+            for c in MEASURED_CHANNELS
+        },
     )
-
-
-def _signal(channel: MeasuredChannel, columns: Mapping[str, NDArray]) -> NDArray:
-    """One channel's signal (samples,) [SI]: the mean of its columns in the file."""
-    return np.mean([columns[n] for n in channel.columns if n in columns], axis=0) * channel.scale
 
 
 def _columns(recording: Recording) -> dict[str, NDArray]:

@@ -152,8 +152,7 @@ def sampling_period(file: str, time: NDArray) -> float:
     least, greatest = _explaining_periods(time)
     if least > greatest:
         _refuse_jitter(file, time)
-    period = _roundest(least, greatest)
-    return period
+    return _roundest(least, greatest)
 
 
 def check_rate(file: str, period: float) -> None:

@@ -93,7 +93,8 @@ def smooth_supply(recording: Recording, p: Mapping[str, float]) -> NDArray:
     """
     fitted = _air_balance(recording, p)
     residual = recording.p1 - fitted
-    if _is_white(residual, recording.period) or _is_rounding(residual, recording.p1):
+    rounding = ROUNDING_MARGIN * rounding_error(quantisation_step([recording.p1], fewest=1))
+    if _is_white(residual, recording.period) or np.sqrt(np.mean(residual**2)) <= rounding:
         return fitted
     return _spline(recording)
 
@@ -105,20 +106,18 @@ def without_offsets(recording: Recording, offsets: Mapping[str, float]) -> Recor
 
 
 def _air_balance(recording: Recording, p: Mapping[str, float]) -> NDArray:
-    """Least squares of p1 on a constant, a line in time, and the air drawn so far."""
-    drawn = _air_drawn(recording, p)
-    basis = np.stack([np.ones_like(drawn), recording.time, drawn], axis=1)
-    basis /= np.maximum(np.max(np.abs(basis), axis=0), np.finfo(float).tiny)
-    return basis @ np.linalg.lstsq(basis, recording.p1, rcond=None)[0]
+    """Least squares of p1 on a constant, a line in time, and the air drawn so far.
 
-
-def _air_drawn(recording: Recording, p: Mapping[str, float]) -> NDArray:
-    """What the circuit holds and has consumed, and what has filled the control chamber [kg]."""
+    That is what the circuit holds and has consumed, and what has filled the control chamber [kg].
+    """
     samples = min(2 * round(0.5 * SMOOTHING_WINDOW / recording.period) + 1, len(recording) // 2 * 2 - 1)
     p2, p3 = np.asarray(savgol_filter([recording.p2, recording.p3], samples, 1))
     filling = np.cumsum(np.diff(p3, prepend=p3[0]) * recording.energised)
     stored = (p["V2"] * p2 + p["V3"] * filling) / (p["R_gas"] * p["T_env"])
-    return stored + np.cumsum(recording.sigma_S) * recording.period
+    drawn = stored + np.cumsum(recording.sigma_S) * recording.period
+    basis = np.stack([np.ones_like(drawn), recording.time, drawn], axis=1)
+    basis /= np.maximum(np.max(np.abs(basis), axis=0), np.finfo(float).tiny)
+    return basis @ np.linalg.lstsq(basis, recording.p1, rcond=None)[0]
 
 
 def _is_white(residual: NDArray, period: float) -> bool:
@@ -131,12 +130,6 @@ def _is_white(residual: NDArray, period: float) -> bool:
     variance = 0.5 * np.mean(np.diff(residual) ** 2)
     statistic = length * np.sum(np.mean(blocks, axis=1) ** 2)
     return bool(statistic <= variance * chi2.isf(WHITE_PROBABILITY, len(blocks)))
-
-
-def _is_rounding(residual: NDArray, readings: NDArray) -> bool:
-    """Whether a residual scatters no more than the rounding of readings, (samples,), explains."""
-    explained = ROUNDING_MARGIN * rounding_error(quantisation_step([readings], fewest=1))
-    return bool(np.sqrt(np.mean(residual**2)) <= explained)
 
 
 def _spline(recording: Recording) -> NDArray:

@@ -54,29 +54,26 @@ class Replay:
         n = max(np.shape(value)[0] for value in candidates.values())
         each = {shift: np.zeros(n) for shift in SHIFTS}
         each |= {s: np.asarray(value) for s, value in candidates.items()}
-        with_effects = self._with_effects(each, n)
+        largest = {s: v if v.ndim == 1 else np.max(np.abs(v), axis=1) for s, v in each.items()}
+        with_effects = np.broadcast_to(has_effects(effect_constants({**self.base, **largest})), n)
         if np.all(with_effects) or not np.any(with_effects):
             return self._outputs(each, n, chosen)
         answers = [np.empty((len(OUTPUTS), len(self.drives[r].U), n)) for r in chosen]
-        for part in (
-            with_effects,
-            ~with_effects,
-        ):  # each by its own kernel, which the other need not wait for
+        for part in (with_effects, ~with_effects):  # each by its own kernel
             own = self._outputs({s: v[part] for s, v in each.items()}, int(np.sum(part)), chosen)
             for whole, some in zip(answers, own, strict=True):
                 whole[:, :, part] = some
         return answers
 
-    def _with_effects(self, each: Mapping[str, NDArray], n: int) -> NDArray:
-        """Which candidates have an effect in any recording, boolean (n,)."""
-        largest = {s: v if v.ndim == 1 else np.max(np.abs(v), axis=1) for s, v in each.items()}
-        return np.broadcast_to(has_effects(effect_constants({**self.base, **largest})), n)
-
     def _outputs(self, each: Mapping[str, NDArray], n: int, chosen: Sequence[int]) -> list[NDArray]:
         """`outputs` of candidates that one kernel can simulate."""
         answers: list[NDArray] = []
         for group in self._groups(n, chosen):
-            lanes = {s: _lanes(value, group) for s, value in each.items()}
+            # Values (n,) or (n, all recordings) in the order of the batch's lanes.
+            lanes = {
+                s: np.tile(v, len(group)) if v.ndim == 1 else v[:, group].T.ravel()
+                for s, v in each.items()
+            }
             drives, p = [self.drives[r] for r in group], {**self.base, **lanes}
             answers += _simulate(drives, p, n)
         return answers
@@ -135,13 +132,6 @@ def responses(recordings: Sequence[Recording], parameters: Parameters) -> list[R
 def total_response_error(responses: Sequence[Response]) -> float:
     """Eq. 21, as a fraction."""
     return float(total_error([np.array(response.partial) for response in responses]))
-
-
-def _lanes(value: NDArray, recordings: Sequence[int]) -> NDArray:
-    """Values (n,) or (n, all recordings) in the order of the lanes of one batch."""
-    if value.ndim == 1:
-        return np.tile(value, len(recordings))
-    return value[:, list(recordings)].T.ravel()
 
 
 def _simulate(drives: list[ModelInputs], tiled: dict[str, ArrayLike], n: int) -> list[NDArray]:

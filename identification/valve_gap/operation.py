@@ -84,7 +84,12 @@ def diagnose_log(
     found = replace(found, warnings=[*valve.warnings, *found.warnings])
     if report:
         step = next_step(found.conclusion.verdict, folder, out, Path(plant) if plant else None)
-        write_report(found, valve, out, log.name, _facts(log, campaign), step, more=more)
+        facts = {
+            "Log": log.name,
+            "Openings": f"{len(campaign.recordings)} of {len(log.drives)} drives",
+            "Environment": campaign_facts(campaign)["Environment"],
+        }
+        write_report(found, valve, out, log.name, facts, step, more=more)
     write_results(found, out, "", seconds=perf_counter() - began)
     return found
 
@@ -122,15 +127,6 @@ def onset_probabilities(valve: "LoggedValve", cache: FitCache) -> NDArray:
     scores = log_likelihoods(misfits, problem.readings)
     scores[1:] -= np.log(max(len(squares) - 1, 1))
     return softmax(scores)
-
-
-def _facts(log: Log, campaign: Campaign) -> dict[str, str]:
-    """What the report rests on, by name."""
-    return {
-        "Log": log.name,
-        "Openings": f"{len(campaign.recordings)} of {len(log.drives)} drives",
-        "Environment": campaign_facts(campaign)["Environment"],
-    }
 
 
 class LoggedValve(Valve):

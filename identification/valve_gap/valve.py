@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from epv_env.plant.effects.law import ARGUMENTS, placed
 from epv_env.plant.effects.registry import PLACES
 from epv_env.plant.free_parameters import FREE_PARAMETERS
-from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from identification.calibration.problem import calibration_problem
 from identification.gap.plant import Cause, Channel, NuisanceParameter, Run, StateTrace
@@ -93,12 +92,15 @@ class Valve:
         self.parameters = tuple(causes.calibrated(problem.vector))
         self.causes = causes.catalogue(self.base, without, free)
         self.tolerances = tuple(
-            _tolerance(symbol, self.base, PARAMETER_SCATTER)
+            NuisanceParameter(symbol=symbol, sd=scatter, centre=self.base[symbol], step=scatter)
             for symbol in causes.PARAMETER_COMPONENTS
             if symbol not in free
+            for scatter in [PARAMETER_SCATTER * self.base[symbol]]
         )
         self.warnings = coarse_step_warnings(problem.steps)
-        self.run_offsets = (_rounded(P2_START, problem.steps.get("p2", 0.0)), P3_ZERO, I_ZERO, *offsets)
+        # The mean of a hold does not average out coarse steps.
+        start_error = np.hypot(P2_START.sd, rounding_error(problem.steps.get("p2", 0.0)))
+        self.run_offsets = (replace(P2_START, sd=float(start_error)), P3_ZERO, I_ZERO, *offsets)
         self.equations = EQUATIONS
         self.law_arguments = tuple(ARGUMENTS)
         self.replay = Replay([model_inputs(r, self.base) for r in self.recordings], self.base)
@@ -187,11 +189,6 @@ def as_run(recording: Recording, faulty: Sequence[Finding] = ()) -> Run:
     )
 
 
-def _rounded(start: NuisanceParameter, step: float) -> NuisanceParameter:
-    """A start that was read in coarse steps [SI], which the mean of a hold does not average out."""
-    return replace(start, sd=float(np.hypot(start.sd, rounding_error(step))))
-
-
 def _checked_noise(noise: Mapping[str, float]) -> Mapping[str, float]:
     """The noise [SI] by channel as given. Raises ValueError for what is no noise of a channel."""
     for name, deviation in noise.items():
@@ -201,8 +198,3 @@ def _checked_noise(noise: Mapping[str, float]) -> Mapping[str, float]:
                 f"channels among {', '.join(OUTPUTS)}"
             )
     return noise
-
-
-def _tolerance(symbol: str, base: Parameters, scatter: float) -> NuisanceParameter:
-    value = base[symbol]
-    return NuisanceParameter(symbol=symbol, sd=scatter * value, centre=value, step=scatter * value)

@@ -107,7 +107,11 @@ def evaluate_linearised(
     ]
     fitted = normal_equations([runs[r] for r in problem.fitted_runs])
     scales = [parameter.scale for parameter in problem.parameters(estimate)]
-    deviations = _squared_deviations(runs, [step for _, step in freed], shared)
+    # Squared deviations of all nuisance parameters from their centres.
+    deviations = float(shared @ shared) + sum(
+        float(np.sum(((run.run_values + step) / run.run_sd) ** 2))
+        for run, (_, step) in zip(runs, freed, strict=True)
+    )
     precision, values = problem.priors(estimate)
     return EvaluatedHypothesis(
         estimate=estimate,
@@ -118,16 +122,6 @@ def evaluate_linearised(
         tolerances=fitted.shared,
         covariance=_covariance(fitted) * np.outer(scales, scales),
         unusual=_unusual(estimate),
-    )
-
-
-def _squared_deviations(
-    runs: Sequence[LinearisedRun], steps: Sequence[NDArray], shared: NDArray
-) -> float:
-    """Squared deviations of all nuisance parameters from their centres [1]."""
-    return float(shared @ shared) + sum(
-        float(np.sum(((run.run_values + step) / run.run_sd) ** 2))
-        for run, step in zip(runs, steps, strict=True)
     )
 
 

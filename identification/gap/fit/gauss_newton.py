@@ -256,7 +256,10 @@ class _Search:
             self._accept(runs, equations)
             current = equations
         elif self.problem.slopes_of(self.best).calibrated is not None:
-            self._take_anew()
+            # Return to the best estimate, from now on with derivatives of all parameters.
+            slopes = replace(self.problem.slopes_of(self.best), calibrated=None)
+            self.best = replace(self.best, slopes=slopes)
+            self.trial, self.equations = self.best, None
             return
         else:
             raised = DAMPING_INCREASE * self.damping + 1e-6  # leaves zero as well
@@ -269,27 +272,12 @@ class _Search:
     def _accept(self, runs: Sequence[LinearisedRun], equations: NormalEquations) -> None:
         self.damping = max(DAMPING_DECREASE * self.damping, LEAST_DAMPING)
         self.equations = equations
-        self.best = replace(
-            self.trial,
-            chi_square=equations.chi_square,
-            run_values=self._stepped_run_values(runs, equations),
-        )
-
-    def _take_anew(self) -> None:
-        """Return to the best estimate, from now on with derivatives of all parameters."""
-        slopes = replace(self.problem.slopes_of(self.best), calibrated=None)
-        self.best = replace(self.best, slopes=slopes)
-        self.trial, self.equations = self.best, None
-
-    def _stepped_run_values(self, runs: Sequence[LinearisedRun], equations: NormalEquations) -> NDArray:
-        """Run parameters of the causes after one Gauss-Newton step; run offsets stay linear."""
+        # Run parameters of the causes take the step as well; run offsets stay linear.
         run_values = self.trial.run_values.copy()
-        count = run_values.shape[1]
-        if count:
+        if count := run_values.shape[1]:
             for r, run in zip(self.problem.fitted_runs, runs, strict=True):
-                step = without_run_nuisances(run, equations.shared)[1]
-                run_values[r] += step[:count]
-        return run_values
+                run_values[r] += without_run_nuisances(run, equations.shared)[1][:count]
+        self.best = replace(self.trial, chi_square=equations.chi_square, run_values=run_values)
 
     def _decide(self, decrease: float, rival_chi_square: float) -> None:
         """Mark the fit as converged or given up."""

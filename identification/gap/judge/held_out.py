@@ -191,15 +191,12 @@ def _unexplained(draws: GapDraws, best: str, significance: float) -> Unexplained
     explainable = max(recalibrated.value - FLOOR, 0.0)
     matters = max(LEAST_GAP_CLOSED, LEAST_SHARE_CLOSED * explainable)
     return Unexplained(
-        fraction=_share(left - FLOOR, explainable) if recalibrated.low > FLOOR else 0.0,
+        fraction=float(np.clip((left - FLOOR) / explainable, 0.0, 1.0))
+        if min(recalibrated.low, recalibrated.value) > FLOOR
+        else 0.0,
         p_value=significance,
         still_predictable=bool(significance < SIGNIFICANCE and left - boxed > matters),
     )
-
-
-def _share(part: float, whole: float) -> float:
-    """Between 0 and 1 [1]; 0 of nothing."""
-    return float(min(max(part / whole, 0.0), 1.0)) if whole > 0 else 0.0
 
 
 def p_value(

@@ -289,19 +289,15 @@ def _covariance(form: QuadraticForm, kind: str) -> tuple[NDArray, float]:
     if kind == FREE:
         return np.zeros((count, count)), 1.0
     if kind == SLOW:
-        return _slow_covariance(windows), ROUGH_VARIANCE
+        run = np.array([window.run for window in windows])
+        time = np.array([0.5 * (window.begin + window.end) for window in windows])
+        memory = TIME_MEMORY * max(window.end for window in windows)
+        apart = np.abs(time[:, None] - time) / memory
+        return np.where(run[:, None] == run, np.exp(-apart), 0.0), ROUGH_VARIANCE
     x = np.array([window.states[kind] for window in windows])
     length = STATE_LENGTH * max(float(np.ptp(x)), np.finfo(float).tiny)
     distance = (x[:, None] - x) / length
     return np.exp(-0.5 * distance**2), ROUGH_VARIANCE
-
-
-def _slow_covariance(windows: Sequence[Window]) -> NDArray:
-    """Exponential covariance in time within each run, (windows, windows) [1]."""
-    run = np.array([window.run for window in windows])
-    time = np.array([0.5 * (window.begin + window.end) for window in windows])
-    memory = TIME_MEMORY * max(window.end for window in windows)
-    return np.where(run[:, None] == run, np.exp(-np.abs(time[:, None] - time) / memory), 0.0)
 
 
 def fit_process(subspace: IdentifiableSubspace, design: LocalisationDesign, kind: str) -> ProcessFit:

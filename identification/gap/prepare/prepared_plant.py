@@ -25,7 +25,10 @@ class PreparedPlant:
             PlantError: recordings cannot be used (`screen`), or a channel's noise is neither given nor
                 seen in its readings.
         """
-        runs, self.screened = _screened(plant)
+        found = getattr(plant, "screened", None)  # a plant that has it has seen to it itself
+        runs, self.screened = (
+            screen(plant.runs, plant.channels) if found is None else (plant.runs, tuple(found))
+        )
         """Faulty readings that no fit uses."""
         self.plant = _with_inputs(plant, runs, self.screened)
         self.parameters, self.causes = tuple(plant.parameters), tuple(plant.causes)
@@ -103,12 +106,6 @@ def prepared(plant: GreyBox) -> PreparedPlant:
     if isinstance(plant, PreparedPlant):
         return plant
     return PreparedPlant(plant)
-
-
-def _screened(plant: GreyBox) -> tuple[Sequence[Run], tuple[Finding, ...]]:
-    """Runs without their faulty readings, and these; a plant with `screened` has seen to it itself."""
-    found = getattr(plant, "screened", None)
-    return screen(plant.runs, plant.channels) if found is None else (plant.runs, tuple(found))
 
 
 def _with_inputs(plant: GreyBox, runs: Sequence[Run], found: Sequence[Finding]) -> GreyBox:

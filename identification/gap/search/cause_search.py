@@ -145,17 +145,14 @@ class HypothesisPool:
             if not best:
                 return
             self._finished |= {_name(each) for each in best}
-            best = self._with_own_nuisances(best)
+            starts = [replace(e, estimate=over_reached_states(self.problem, e.estimate)) for e in best]
+            name = f"further: {_names(best)}"
+            best = with_own_nuisances(self.problem, starts, name, self.cache)
             self.keep(best)
             if not self.much_is_left():
                 return
             self.keep(evaluate(self.problem, self._with_another_law(best)))
             best = self.promising(number, FINALISTS)
-
-    def _with_own_nuisances(self, chosen: Sequence[EvaluatedHypothesis]) -> list[EvaluatedHypothesis]:
-        name = _names(chosen)
-        starts = [replace(e, estimate=over_reached_states(self.problem, e.estimate)) for e in chosen]
-        return with_own_nuisances(self.problem, starts, f"further: {name}", self.cache)
 
     def _with_another_law(self, chosen: Sequence[EvaluatedHypothesis]) -> list[Estimate]:
         """Fits of each of the best with those laws open that promise most."""
