@@ -169,17 +169,16 @@ def noise_weights(recordings: Sequence[Recording], noise: Mapping[str, float]) -
 def report_weights(recordings: Sequence[Recording]) -> list[NDArray]:
     """Weights, (3, samples) [1/SI], under which the sum of squares is the squared total error.
 
-    Equations 19 to 21 of the report.
+    Equations 19 to 21 of the report: root of each sample's share of the time, over the output's time
+    mean and the root of the number of recordings.
     """
-    return [_relative_weights(recording) / np.sqrt(len(recordings)) for recording in recordings]
-
-
-def _relative_weights(recording: Recording) -> NDArray:
-    """Eq. 19's: root of each sample's share of the time, over the output's time mean, (3, samples)."""
-    share = np.full(len(recording), 1.0 / (len(recording) - 1))
-    share[[0, -1]] *= 0.5
-    measured = measured_outputs(recording)
-    return np.sqrt(share) / (measured @ share)[:, None]
+    weights = []
+    for recording in recordings:
+        share = np.full(len(recording), 1.0 / (len(recording) - 1))
+        share[[0, -1]] *= 0.5
+        means = measured_outputs(recording) @ share
+        weights.append(np.sqrt(share) / means[:, None] / np.sqrt(len(recordings)))
+    return weights
 
 
 @dataclass(frozen=True, kw_only=True)

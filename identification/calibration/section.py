@@ -70,15 +70,9 @@ def _estimates(calibration: Calibration) -> Table:
     rows = []
     for symbol, (low, high) in zip(vector.symbols, vector.domains.tolist(), strict=True):
         row = table()[symbol]
-        values = [calibration.parameters(method)[symbol] for method in METHODS]
-        rows.append(
-            [
-                f"{symbol} ({row.meaning}) [{row.unit}]",
-                f"{vector.reference[symbol]:.7g}",
-                *(f"{value:.7g}" for value in values),
-                f"{low:g} to {high:g}",
-            ]
-        )
+        values = (vector.reference, *(calibration.parameters(method) for method in METHODS))
+        name = f"{symbol} ({row.meaning}) [{row.unit}]"
+        rows.append([name, *(f"{p[symbol]:.7g}" for p in values), f"{low:g} to {high:g}"])
     columns = ["Parameter", "start", *METHODS, "domain"]
     return Table(columns=columns, rows=rows, caption="Estimates.")
 
@@ -96,20 +90,18 @@ def _offsets(calibration: Calibration) -> str:
 
 def _starts(calibration: Calibration) -> Table:
     scale = calibration.problem.vector.scale
-    rows = []
-    for method in METHODS:
-        fits = calibration.fits[method]
-        for fit, reached in zip(fits, reached_best(fits), strict=True):
-            rows.append(
-                [
-                    method,
-                    ", ".join(f"{value:.4g}" for value in fit.start * scale),
-                    f"{fit.error:.5g}",
-                    "yes" if reached else "no",
-                    str(fit.evaluations),
-                    f"{fit.seconds:.2f}",
-                ]
-            )
+    rows = [
+        [
+            method,
+            ", ".join(f"{value:.4g}" for value in fit.start * scale),
+            f"{fit.error:.5g}",
+            "yes" if reached else "no",
+            str(fit.evaluations),
+            f"{fit.seconds:.2f}",
+        ]
+        for method, fits in calibration.fits.items()
+        for fit, reached in zip(fits, reached_best(fits), strict=True)
+    ]
     columns = ["Method", "start", "error at the end", "reaches the best", "evaluations", "time [s]"]
     caption = (
         f"Searches from several starts ({', '.join(calibration.problem.vector.symbols)}); error: the "

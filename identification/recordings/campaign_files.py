@@ -102,7 +102,10 @@ def write_campaign(
     """
     folder = Path(folder)
     for recording, columns in check_campaign(campaign, folder):
-        write_text(folder / f"{recording.name}.csv", _csv(columns))
+        template = ",".join(f"%.{DECIMALS[name]}f" for name in columns)
+        rows = np.stack(list(columns.values()), axis=1).tolist()
+        lines = [",".join(columns), *(template % tuple(row) for row in rows)]
+        write_text(folder / f"{recording.name}.csv", "\n".join(lines) + "\n")
     content = msgspec.to_builtins(_manifest(campaign))
     write_json(folder / FILE_NAME, {**content, "provenance": provenance} if provenance else content)
 
@@ -227,13 +230,6 @@ def _columns(recording: Recording) -> dict[str, NDArray]:
     if np.any(recording.sigma_S):
         columns[CONSUMPTION_COLUMN] = recording.sigma_S
     return {name: np.round(values, DECIMALS[name]) for name, values in columns.items()}
-
-
-def _csv(columns: Mapping[str, NDArray]) -> str:
-    template = ",".join(f"%.{DECIMALS[name]}f" for name in columns)
-    rows = np.stack(list(columns.values()), axis=1)
-    lines = [",".join(columns), *(template % tuple(row) for row in rows.tolist())]
-    return "\n".join(lines) + "\n"
 
 
 def _check_writable(path: Path, recording: Recording, columns: Mapping[str, NDArray]) -> None:

@@ -58,7 +58,11 @@ def check_recording(
             _check_alive(file, name, columns[name])
     if role != "quality" and not switches(columns["U_V"]):
         _check_length(file, len(columns["U_V"]), role, period)
-        _refuse_voltage(file, columns["U_V"])
+        U = columns["U_V"]
+        raise CampaignError(
+            f"{file}, {_lines(0, len(U))}: U_V never switches, it stays between {np.min(U):g} and "
+            f"{np.max(U):g} V: record a switching of the coil, or give the recording the role quality"
+        )
     check_units(file, columns, period, ambient_bar, rules)
     check_rate(file, period)
     _check_length(file, len(columns["U_V"]), role, period)
@@ -92,13 +96,6 @@ def _check_length(file: str, samples: int, role: str, period: float) -> None:
             f"{file}, line {line_number(samples)}: the file ends after {samples} samples, and a {role} "
             f"recording at {1 / period:g} Hz needs at least {needed}: record for longer"
         )
-
-
-def _refuse_voltage(file: str, U: NDArray) -> None:
-    raise CampaignError(
-        f"{file}, {_lines(0, len(U))}: U_V never switches, it stays between {np.min(U):g} and "
-        f"{np.max(U):g} V: record a switching of the coil, or give the recording the role quality"
-    )
 
 
 def _check_range(file: str, name: str, values: NDArray, sensor: Sensor) -> None:

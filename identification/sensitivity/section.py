@@ -6,11 +6,7 @@ from typing import Any
 
 from epv_env.plant.parameters import confidence_intervals, sensitive_symbols, table
 from identification.report.page import Section, Table, Verdict
-from identification.report_2003 import (
-    CIRCUIT_PRESSURE,
-    ENERGISED_VOLTAGE,
-    SUPPLY_PRESSURE,
-)
+from identification.report_2003 import CIRCUIT_PRESSURE, ENERGISED_VOLTAGE, SUPPLY_PRESSURE
 from identification.sensitivity.collinearity import CRITICAL_INDEX, OutputSensitivities
 from identification.sensitivity.one_at_a_time import ErrorSensitivity
 
@@ -23,7 +19,15 @@ def sensitivity_section(errors: Errors, outputs: OutputSensitivities) -> Section
     return Section(
         title="Parametric sensitivity",
         verdicts=_separability(outputs),
-        blocks=[_errors(errors), _pairs(outputs)],
+        blocks=[
+            _errors(errors),
+            Table(
+                columns=["Pair", "collinearity index"],
+                rows=[[f"{a}, {b}", _index(index)] for a, b, index in outputs.inseparable_pairs()],
+                caption=f"Pairs above {CRITICAL_INDEX:g}: a change of one can be made up for by the "
+                "other.",
+            ),
+        ],
     )
 
 
@@ -76,14 +80,6 @@ def _errors(errors: Errors) -> Table:
         ],
         caption="How far the responses move when one parameter changes. a1 is zero and goes to the ends "
         "of its domain, ±0.1 rad.",
-    )
-
-
-def _pairs(outputs: OutputSensitivities) -> Table:
-    return Table(
-        columns=["Pair", "collinearity index"],
-        rows=[[f"{a}, {b}", _index(index)] for a, b, index in outputs.inseparable_pairs()],
-        caption=f"Pairs above {CRITICAL_INDEX:g}: a change of one can be made up for by the other.",
     )
 
 

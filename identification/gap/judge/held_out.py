@@ -92,11 +92,12 @@ def measure_discrepancy_reduction(
     causes = [label for label in estimates if label not in (NOMINAL, RECALIBRATED)]
     best = (*causes, RECALIBRATED)[0]
     scale = time_scale(plant)
-    boxes = {
-        label: predict_residuals(plant, predictions[label], learner, seed, scale)
-        for label in {RECALIBRATED, best}
-    }
-    boxes = {label: _helpful(predictions[label].residuals, box, plant) for label, box in boxes.items()}
+    boxes = {}
+    for label in {RECALIBRATED, best}:
+        box = predict_residuals(plant, predictions[label], learner, seed, scale)
+        before, after = _held_out_squares(plant, predictions[label].residuals, box)
+        # A box that makes the held-out residuals larger predicts nothing.
+        boxes[label] = box if after.sum() < before.sum() else [np.zeros_like(block) for block in box]
     draws = GapDraws(plant, _all_residuals(predictions, boxes), seed, scale)
     unexplained = {
         label: _unexplained(draws, label, p_value(plant, predictions[label].residuals, box, seed, scale))
@@ -141,17 +142,6 @@ def _held_out_squares(
     before = np.sum([np.sum(residuals[r] ** 2, axis=1) for r in held_out], axis=0)
     after = np.sum([np.sum((residuals[r] - predicted[r]) ** 2, axis=1) for r in held_out], axis=0)
     return before, after
-
-
-def _helpful(
-    residuals: Sequence[NDArray], predicted: Sequence[NDArray], plant: GreyBox
-) -> list[NDArray]:
-    """A black box's prediction, or none where it makes the held-out residuals larger.
-
-    residuals, predicted: per run (channels, samples) [noise deviations].
-    """
-    before, after = _held_out_squares(plant, residuals, predicted)
-    return [block if after.sum() < before.sum() else np.zeros_like(block) for block in predicted]
 
 
 def _all_residuals(

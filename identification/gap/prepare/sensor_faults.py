@@ -62,9 +62,12 @@ def _sensor_forms(outputs: NDArray, channel: int, lags: Sequence[int]) -> NDArra
 
     outputs: (channels, samples) [SI]. lags: [samples].
     """
-    changes = np.zeros((*outputs.shape, 1 + len(lags)))
-    y = outputs[channel]
-    changes[channel] = np.stack([y, *(_lag_change(y, lag) for lag in lags)], axis=1)
+    changes, y = np.zeros((*outputs.shape, 1 + len(lags))), outputs[channel]
+    changes[channel, :, 0] = y
+    for form, lag in enumerate(lags, start=1):
+        keep = np.exp(-1.0 / lag)
+        lagging = np.asarray(lfilter([1.0 - keep], [1.0, -keep], y - y[0])) + y[0]
+        changes[channel, :, form] = lagging - y
     return changes
 
 
@@ -98,12 +101,6 @@ def physical_forms(moment: NDArray, precision: NDArray, either_sign: NDArray) ->
 
 def _place(name: str, component: str) -> StateEquation:
     return StateEquation(name=name, state="", component=component, unit="", step=1.0)
-
-
-def _lag_change(y: NDArray, lag: float) -> NDArray:
-    """Change of a series (samples,) by a first-order lag of `lag` samples."""
-    keep = np.exp(-1.0 / lag)
-    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], y - y[0])) + y[0] - y
 
 
 def _delay_change(y: NDArray, delay: int) -> NDArray:

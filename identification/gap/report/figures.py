@@ -1,6 +1,6 @@
 """Figures of a diagnosis: probabilities, residuals, forcings and missing terms."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -41,8 +41,14 @@ def ranking_figure(diagnosis: Diagnosis) -> Figure:
     rest = {NO_CAUSE: diagnosis.ranking.no_cause, UNKNOWN_CAUSE: diagnosis.ranking.unknown}
     colours = [NAMED if name in named else OTHER for name in (*causes, OTHERS)] + [NO_NAME] * len(rest)
     causes[OTHERS] = sum(diagnosis.ranking.probabilities) - sum(causes.values())
-    figure = Figure(figsize=(7.5, 0.9 + 0.32 * row_height(causes) * len(colours)), layout="constrained")
-    _bars(figure.subplots(), {wrapped(name): share for name, share in (causes | rest).items()}, colours)
+    # A label has a line for each cause, and for each name in brackets.
+    bars = {
+        name.replace(" + ", "\n+ ").replace(" (", "\n("): share
+        for name, share in (causes | rest).items()
+    }
+    height = max(1.0, *(0.5 * (1 + label.count("\n")) for label in bars))
+    figure = Figure(figsize=(7.5, 0.9 + 0.32 * height * len(bars)), layout="constrained")
+    _bars(figure.subplots(), bars, colours)
     return figure
 
 
@@ -210,14 +216,3 @@ def forcing_figure(plant: GreyBox, forcing: ForcingEstimate) -> Figure:
         axes.grid(alpha=0.3)
     rows[-1].set_xlabel("time [s]")
     return figure
-
-
-def wrapped(label: str) -> str:
-    """The label of a set of causes with a line for each, and for each name in brackets."""
-    return label.replace(" + ", "\n+ ").replace(" (", "\n(")
-
-
-def row_height(labels: Iterable[str]) -> float:
-    """Height of a row that has room for each of these labels, relative to that of one cause [1]."""
-    lines = max((1 + wrapped(label).count("\n") for label in labels), default=1)
-    return max(1.0, 0.5 * lines)

@@ -55,6 +55,10 @@ def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = 
     separability = ranking.separability
     share, left = share_left(diagnosis), remainder(diagnosis)
     unexplained, onset = diagnosis.reduction.unexplained, diagnosis.onset
+    location = None
+    if diagnosis.remaining and diagnosis.remaining.forcings:
+        equation = diagnosis.remaining.likeliest.equation
+        location = f"{equation.component}: {equation.name}"
     with_cause = diagnosis.best.hypothesis if diagnosis.best else ranking.recalibrated
     return {
         "format": "epv-gap/3",
@@ -67,7 +71,7 @@ def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = 
             "fraction": unexplained.fraction,
             "still_predictable": unexplained.still_predictable,
             "p_value": unexplained.p_value,
-            "location": remaining_location(diagnosis),
+            "location": location,
         },
         "inclusion": inclusion(diagnosis),
         "levels": {
@@ -152,14 +156,6 @@ def unit_name(unit: str) -> str:
     return re.sub(r"[^A-Za-z0-9]+", "_", named).strip("_") or "1"
 
 
-def remaining_location(diagnosis: Diagnosis) -> str | None:
-    """Component and equation of what the best cause leaves; None where nothing is left."""
-    if diagnosis.remaining is None or not diagnosis.remaining.forcings:
-        return None
-    equation = diagnosis.remaining.likeliest.equation
-    return f"{equation.component}: {equation.name}"
-
-
 def _where(diagnosis: Diagnosis) -> dict[str, Any]:
     localisation = diagnosis.localisation
     return {
@@ -167,13 +163,8 @@ def _where(diagnosis: Diagnosis) -> dict[str, Any]:
         "equation": dict(localisation.equation_probabilities),
         "channel": dict(localisation.channel_gaps),
         "regimes": [
-            {
-                "channel": gap.channel,
-                "regime": gap.regime,
-                "gap": gap.gap,
-                "low": gap.low,
-                "high": gap.high if np.isfinite(gap.high) else None,
-            }
+            {name: getattr(gap, name) for name in ("channel", "regime", "gap", "low")}
+            | {"high": gap.high if np.isfinite(gap.high) else None}
             for gap in localisation.regime_gaps
         ],
     }
