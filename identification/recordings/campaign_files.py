@@ -70,7 +70,14 @@ def read_campaign(folder: str | PathLike[str], rules: RecordingRules = RULES) ->
     for path, role in roles.items():
         sha256, columns = files[path]
         period = check_recording(str(path), columns, role, pressure / BAR, steps, rules)
-        recordings.append(_recording(path.stem, sha256, columns, role, period))
+        signals = {
+            c.name: np.mean([columns[n] for n in c.columns if n in columns], axis=0) * c.scale
+            for c in MEASURED_CHANNELS
+        }
+        flow = columns.get(CONSUMPTION_COLUMN, np.zeros_like(columns["U_V"]))
+        recordings.append(
+            Recording(name=path.stem, role=role, period=period, sigma_S=flow, sha256=sha256, **signals)
+        )
     return Campaign(
         name=manifest.name,
         temperature=temperature,
@@ -204,22 +211,6 @@ def _read_file(path: Path) -> tuple[str, dict[str, NDArray]]:
             f"{path} cannot be read ({error.strerror}): add the file, or take it out of {FILE_NAME}"
         ) from None
     return hashlib.sha256(content).hexdigest(), read_columns(str(path), content)
-
-
-def _recording(
-    name: str, sha256: str, columns: Mapping[str, NDArray], role: str, period: float
-) -> Recording:
-    return Recording(
-        name=name,
-        role=role,
-        period=period,
-        sigma_S=columns.get(CONSUMPTION_COLUMN, np.zeros_like(columns["U_V"])),
-        sha256=sha256,
-        **{
-            c.name: np.mean([columns[n] for n in c.columns if n in columns], axis=0) * c.scale
-            for c in MEASURED_CHANNELS
-        },
-    )
 
 
 def _columns(recording: Recording) -> dict[str, NDArray]:

@@ -45,9 +45,14 @@ def rules_of(plant: Plant) -> RecordingRules:
     The report's limits stand in the same ratios to its own coil, voltage and venting rate as they do
     here. Where the plant has own domains of what sets its venting rate, they widen the rates.
     """
-    rates = _possible_rates(plant)
+    p = plant.parameters
+    ends = [(p[s], *p.own_domains.get(s, ())) for s in VENTING_SYMBOLS]
+    rates = [
+        venting_rate(p.replace(**dict(zip(VENTING_SYMBOLS, values, strict=True))))
+        for values in product(*ends)
+    ]
     slowest, fastest = (rate / RULES.usual_venting for rate in RULES.venting_rates)
-    R, voltage = plant.parameters["R"], plant.sensors["U"]
+    R, voltage = p["R"], plant.sensors["U"]
     least, greatest = RULES.coil_resistances
     middle = (least * greatest) ** 0.5
     return RecordingRules(
@@ -58,15 +63,5 @@ def rules_of(plant: Plant) -> RecordingRules:
         ),
         coil_resistances=(least * R / middle, greatest * R / middle),
         venting_rates=(slowest * min(rates), fastest * max(rates)),
-        usual_venting=venting_rate(plant.parameters),
+        usual_venting=venting_rate(p),
     )
-
-
-def _possible_rates(plant: Plant) -> list[float]:
-    """Rates [1/s] at the plant's values and at all ends of its own domains of VENTING_SYMBOLS."""
-    p = plant.parameters
-    ends = [(p[s], *p.own_domains.get(s, ())) for s in VENTING_SYMBOLS]
-    return [
-        venting_rate(p.replace(**dict(zip(VENTING_SYMBOLS, values, strict=True))))
-        for values in product(*ends)
-    ]
