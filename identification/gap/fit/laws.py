@@ -100,7 +100,7 @@ def in_words(laws: Sequence[tuple[Law, NDArray]]) -> str:
     """How the strengths of causes follow states; laws: each with its components (m,)."""
     texts = []
     for law, components in laws:
-        growth = law.growth(components)
+        growth = np.maximum(law.growth(components), -1.0)  # no strength is negative
         texts.append(
             f"the strength of {law.cause.label} follows {law.argument}: {growth[0]:+.0%} at its least "
             f"value, {growth[KNOTS // 2]:+.0%} in the middle, {growth[-1]:+.0%} at its greatest"

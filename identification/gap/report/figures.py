@@ -167,14 +167,16 @@ def law_figure(
     for place, (law, growth, sd) in enumerate(laws, start=1):
         axes, (unit, size) = figure.add_subplot(1, len(laws), place), units[law.argument]
         state = np.linspace(law.low, law.high, len(growth)) / size
-        strength, margin = 1.0 + growth, QUANTILE * sd
-        axes.fill_between(state, strength - margin, strength + margin, color=BAND, linewidth=0.0)
+        strength, margin = np.maximum(1.0 + growth, 0.0), QUANTILE * sd
+        axes.fill_between(
+            state, np.maximum(strength - margin, 0.0), strength + margin, color=BAND, linewidth=0.0
+        )
         axes.plot(state, strength, "o-", color="tab:blue", markersize=3, label="as recorded")
         axes.axhline(1.0, color="0.4", linewidth=1.0, linestyle="--", label="as assumed")
         axes.set_title(law.cause.title, fontsize="small", wrap=True)
         axes.set_xlabel(f"{law.argument} [{unit}]" if unit else law.argument)
         axes.set_ylabel("strength over the fitted size [1]")
-        axes.set_ylim(bottom=min(0.0, float(np.min(strength))))
+        axes.set_ylim(bottom=0.0)
         axes.grid(alpha=0.3)
         axes.legend(fontsize="small")
     return figure

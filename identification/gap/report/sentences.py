@@ -302,12 +302,18 @@ def parameters_at_bounds(diagnosis: Diagnosis) -> list[str]:
         for cause in diagnosis.judged
         if cause.probability >= MENTIONED_PROBABILITY
     }
-    return [
+    found = [
         f"{name}: {p.title} is at an end of its physical range ({quantity(value, p.unit)})"
         for name, estimate in estimates.items()
-        for p in problem.parameters(estimate)
+        for p in (*problem.plant.parameters, *estimate.hypothesis.cause_parameters)
         for value in [problem.values(estimate)[p.symbol]]
         if at_an_end(p, value)
+    ]
+    return found + [
+        f"{name}: its strength may follow {law.argument} even more than the fit allows"
+        for name, estimate in estimates.items()
+        for law, components in estimate.laws
+        if any(at_an_end(p, z) for p, z in zip(law.parameters, components, strict=True))
     ]
 
 
