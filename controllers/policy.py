@@ -52,8 +52,9 @@ class Policy:
 
 
 def p3_checked(controller: Policy, plant: Plant) -> P3Check:
-    """The controller with a check of p3, the best controller that does not read p3 behind it."""
-    return P3Check(main=controller, fallback=tuned(FALLBACK, plant), name=controller.name)
+    """The controller with a check of its sensors, the best one that does not read p3 behind it."""
+    fallback = tuned(FALLBACK, plant)
+    return P3Check(main=controller, fallback=fallback, sensors=plant.sensors, name=controller.name)
 
 
 def load_policy(
