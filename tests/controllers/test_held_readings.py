@@ -1,6 +1,7 @@
 """A lost reading is held for HELD periods; then the fall-back decides, without p2 the coil stays on."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pytest
@@ -91,8 +92,8 @@ def test_a_short_loss_ends_without_a_trace() -> None:
     check.act(seen(p3=0.0, fall=6.0))
     check.act(seen(p3=5.0, fall=-5.0))
     assert decode(main.shown[-1], "p3_change_1") == pytest.approx(-1.0, abs=1e-5)
+    good = seen(p3=5.0)
     for _ in range(8):
-        good = seen(p3=5.0)
         check.act(good)
     assert main.shown[-1] is good
     assert not check.failed
@@ -119,7 +120,7 @@ def test_what_never_was_is_not_held(channel, decided) -> None:
 
 @pytest.mark.parametrize("value", [0.0, np.nan, np.inf, 1e308])
 def test_the_learner_without_a_check_keeps_numbers(value) -> None:
-    controller = tuned("pulse, adaptive")
+    controller: Any = tuned("pulse, adaptive")
     controller.reset(1)
     for k in range(60):
         with np.errstate(all="ignore"):

@@ -212,7 +212,7 @@ def test_a_state_that_is_not_finite_restarts_and_says_so() -> None:
     observe(monitor, np.zeros(N))
     assert monitor.restarts == 1
     assert np.isfinite(monitor.log_odds)
-    assert "It began anew 1 times: its state was not finite." in sentence(monitor)
+    assert "Restarts because its state was not finite: 1." in sentence(monitor)
 
 
 HOSTILE = """

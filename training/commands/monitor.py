@@ -96,8 +96,8 @@ def sentence(monitor: Monitor) -> str:
     """What the monitor says at the end."""
     if not monitor.history:
         return "No opening of the log can be used: the coil must have been on before, and p3 at p1."
-    again = f" It began anew {monitor.restarts} times: its state was not finite."
-    again = again if monitor.restarts else ""
+    count = monitor.restarts
+    again = f" Restarts because its state was not finite: {count}." if count else ""
     if not monitor.alarm:
         return f"Nothing has changed: probability {monitor.probability:.2g} that something has.{again}"
     causes = [f"{name} {p:.2f}" for name, p in monitor.causes().items() if p >= LIKELY]
