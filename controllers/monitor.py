@@ -40,6 +40,8 @@ UNKNOWN = "unknown"
 """Name of a change that no effect of the catalogue explains."""
 UNKNOWN_SHARE, UNKNOWN_SHIFT = 0.2, 4.0
 """Its prior probability [-], and its size in each whitened feature [standard deviations]."""
+SMALLEST, LARGEST = 1e-9, 1e9
+"""Least scale and variance, and greatest magnitude, of a model's numbers: no simulation gives others."""
 LEAST = 1e-300
 """Shortest time [h]: its logarithm must stay a number."""
 STRENGTHS = (0.5, 1.0)
@@ -93,15 +95,15 @@ class MonitorModel:
         """Read it. Raises JSONFileError."""
         found = read_json(path, _File, version=FORMAT, remedy=REMEDY)
         lists = msgspec.structs.asdict(found).items()
-        values: dict[str, Any] = {name: np.array(value) for name, value in lists}
-        values |= {"effects": tuple(found.effects), "components": tuple(found.components)}
         try:
+            values: dict[str, Any] = {name: np.array(value) for name, value in lists}
+            values |= {"effects": tuple(found.effects), "components": tuple(found.components)}
             return cls(**values)
         except ValueError as error:
             raise JSONFileError(f"{path}: {error}: {REMEDY}") from None
 
     def __post_init__(self) -> None:
-        """Raises ValueError for arrays that do not fit together."""
+        """Raises ValueError for arrays that do not fit together, impossible numbers, and names."""
         n, effects = len(FEATURES), len(self.effects)
         shapes = {
             "centre": (len(CONDITIONS),), "scale": (len(CONDITIONS),), "whiten": (n, n),
@@ -110,8 +112,14 @@ class MonitorModel:
         for name, shape in shapes.items():
             if getattr(self, name).shape != shape:
                 raise ValueError(f"{name} has the shape {getattr(self, name).shape}, not {shape}")
+            low, values = SMALLEST if name in ("scale", "offset") else -LARGEST, getattr(self, name)
+            if wrong := values[~((values >= low) & (values <= LARGEST))].tolist():
+                raise ValueError(f"{name} holds {wrong[0]:g}, not a number from {low:g} to {LARGEST:g}")
         if len(self.components) != effects:
             raise ValueError(f"{len(self.components)} components for {effects} effects")
+        for name in (*self.effects, *self.components):
+            if not (name.isascii() and name.isidentifier()):
+                raise ValueError(f"{name[:40]!r} is no name: letters, digits and _ make one")
 
 
 class _File(msgspec.Struct):
@@ -136,6 +144,7 @@ def polynomial(conditions: NDArray, centre: NDArray, scale: NDArray) -> NDArray:
     return np.concatenate([np.ones_like(x[..., :1]), x, x[..., rows] * x[..., columns], kinks], axis=-1)
 
 
+@np.errstate(all="ignore")
 def features(rows: NDArray) -> tuple[NDArray, NDArray] | None:
     """Conditions and features of one opening; None without all readings, rest before, or an opening.
 
@@ -213,6 +222,7 @@ class Monitor:
         time: since the start [s].
         probability: that something has changed, if changes are as frequent as the stated false alarms.
         history: the latest (time [s], log odds [-]), for a plot.
+        restarts: how often it began anew because its state was not finite.
     """
 
     period = OnOff.default_period
@@ -223,7 +233,7 @@ class Monitor:
             raise ValueError(f"false_alarms_per_hour = {false_alarms_per_hour:g}: give more than 0")
         self.model, self.threshold = model, 1.0 / false_alarms_per_hour
         self.history: deque[tuple[float, float]] = deque(maxlen=10_000)
-        self._reader, self._periods = OpeningReader(), 0
+        self._reader, self._periods, self.restarts = OpeningReader(), 0, 0
         width = len(model.offset)
         unknown = UNKNOWN_SHIFT * np.concatenate([np.eye(width), -np.eye(width)])
         alone = np.zeros((2 * width, width, LINEAR))
@@ -303,12 +313,19 @@ class Monitor:
         for row in rows.tolist():
             self.update(*row)
 
+    @np.errstate(all="ignore")
     def observe(self, conditions: NDArray, z: NDArray) -> None:
-        """Take in one opening: conditions (conditions,) and features (features,)."""
+        """Take in one opening: conditions (conditions,) and features (features,).
+
+        One that gives numbers that are not finite does not count: a reading was absurd.
+        """
         model, spread = self.model, 1.0 + self._variance
         x = polynomial(conditions, model.centre, model.scale)
         limit = CLIPPED * np.sqrt(spread)
-        found = model.whiten @ z - model.expected @ x - self._mean
+        departure = model.whiten @ z - model.expected @ x
+        if not np.all(np.isfinite(departure)):
+            return
+        found = departure - self._mean
         shift = self._shifts @ x[:LINEAR] - self._learnt
         far = [np.minimum(each**2, limit**2) for each in (found, found - shift)]
         hours = self._later * (self.time - self._last) / 3600.0
@@ -322,6 +339,10 @@ class Monitor:
         self._mean += gain * np.clip(found, -limit, limit)
         self._variance = np.maximum(gain, 1.0 / MEMORY)
         self._last = self.time
+        state = (self._mean, self._variance, self._learnt, self._log, self._since)
+        if not all(np.all(np.isfinite(each)) for each in state):
+            self.restarts += 1
+            self.restart()
         self.history.append((self.time, self.log_odds))
 
     def _shares(self) -> NDArray:

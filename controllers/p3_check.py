@@ -1,17 +1,21 @@
-"""A plausibility check of the p3 sensor, worn around a controller that believes its readings.
+"""A check of the sensors, of p3 above all, worn around a controller that believes its readings.
 
 The coil decides where p3 goes: on, the control chamber fills up to p1; off, it empties to the ambient
 pressure. A reading far from that end that stands still contradicts the coil. From then on a controller
-that does not read p3 takes over.
+that does not read p3 takes over. So it does where readings are lost (controllers/held_readings.py) for
+more than HELD periods; without p2 and a target it is blind, and the coil stays on.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controllers.base import Controller, Privileged
+from controllers.held_readings import HELD, HeldReadings
 from epv_env.observation import LONGEST_WAIT, decode
+from epv_env.plant.channels import SENSORS, Sensor
 
 CHANGE = "p3_change_4"
 """The entry of the observation whose magnitude says whether p3 moves."""
@@ -30,7 +34,7 @@ AMBIENT = 1.0
 
 @dataclass(kw_only=True)
 class P3Check:
-    """Lets `main` act until a valve's p3 is implausible, and `fallback` from then to the reset."""
+    """Lets `main` act until a valve's sensors fail, and `fallback` from then to the reset."""
 
     main: Controller
     """For the on/off environment."""
@@ -38,6 +42,8 @@ class P3Check:
     """For the same environment; it must not read p3."""
     control_period: float = 5e-3
     """[s]"""
+    sensors: Mapping[str, Sensor] = field(default_factory=lambda: SENSORS, repr=False)
+    """By channel: their ends tell which readings are lost."""
     name: str = ""
     """Default: that of `main`, with a word about the check."""
     environment: str = field(init=False)
@@ -54,26 +60,30 @@ class P3Check:
             )
         self.name = self.name or f"{self.main.name}, p3 checked"
         self.environment = self.main.environment
+        self._readings = HeldReadings(self.sensors)
 
     @property
     def failed(self) -> NDArray:
-        """Whether the p3 of each valve was found implausible since the reset, bool (n,)."""
+        """Whether p3 was implausible or readings were lost since the reset, bool (n,)."""
         return self._failed
 
     def reset(self, n: int) -> None:
         """Believe every sensor; n episodes begin."""
         self.main.reset(n)
         self.fallback.reset(n)
+        self._readings.reset(n)
         self._failed = np.zeros(n, dtype=bool)
         self._periods = 0
 
     def act(self, observations: NDArray) -> NDArray:
         """0 (off) or 1 (on) for each valve, (n,)."""
         self._periods += 1
-        self._failed = self._failed | self._implausible(observations)
+        observations, read = self._readings.hold(observations), self._readings
+        self._failed = self._failed | self._implausible(observations) | (read.periods > HELD)
         # Both follow every valve: the one that takes over knows what has happened.
         actions = self.main.act(observations), self.fallback.act(observations)
-        return np.where(self._failed, actions[1], actions[0])
+        blind = ~read.begun | (self._failed & read.blind)
+        return np.where(blind, 1, np.where(self._failed, actions[1], actions[0]))
 
     def _implausible(self, observations: NDArray) -> NDArray:
         """Whether p3 stands still where the coil should move it, bool (n,)."""

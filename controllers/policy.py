@@ -47,13 +47,14 @@ class Policy:
     def act(self, observations: NDArray) -> NDArray:
         """0 (off) or 1 (on) for each valve, (n,)."""
         inputs = self.knowledge.observe(observations)
-        asked = np.argmax(self.network.logits(inputs), axis=1)
-        return np.where(self.knowledge.must_shut, 1, asked)
+        off, on = self.network.logits(inputs).T
+        return np.where(self.knowledge.must_shut | ~(off >= on), 1, 0)
 
 
 def p3_checked(controller: Policy, plant: Plant) -> P3Check:
-    """The controller with a check of p3, the best controller that does not read p3 behind it."""
-    return P3Check(main=controller, fallback=tuned(FALLBACK, plant), name=controller.name)
+    """The controller with a check of its sensors, the best one that does not read p3 behind it."""
+    fallback = tuned(FALLBACK, plant)
+    return P3Check(main=controller, fallback=fallback, sensors=plant.sensors, name=controller.name)
 
 
 def load_policy(

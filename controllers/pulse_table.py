@@ -100,7 +100,8 @@ def venting_time(ratio):
     While the exhaust is choked the pressure falls at a constant rate k = -d ln(p)/dt, and below the
     critical ratio at k flux(p) / choked flux(p). ratio: pressure over the ambient one, absolute [1].
     """
-    place = (np.log(min(max(ratio, LEAST_RATIO), MOST_RATIO)) - _FIRST_LOG) / _LOG_STEP
+    # The limits come first: of a limit and NaN, min and max return the limit, here and in C.
+    place = (np.log(min(MOST_RATIO, max(LEAST_RATIO, ratio))) - _FIRST_LOG) / _LOG_STEP
     node = min(int(place), RATIOS - 2)
     share = place - node
     return VENTING_TIME[node] * (1 - share) + VENTING_TIME[node + 1] * share
@@ -137,7 +138,7 @@ def place(axis, value):
         if value >= axis[k]:
             node = k
     share = (value - axis[node]) / (axis[node + 1] - axis[node])
-    return node, min(max(share, 0.0), 1.0)
+    return node, min(1.0, max(0.0, share))  # 0 of NaN
 
 
 @compiled

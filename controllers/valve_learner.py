@@ -368,6 +368,8 @@ def _loops(digest: str) -> tuple[Any, Any]:
         if digest == "":
             return
         for i in range(len(valves)):
+            if not np.isfinite(observations[i].sum()):
+                continue  # of what is not finite nothing is learnt
             t = i if informed else 0
             observe(valves[i], table, t, observations[i], period, filter_time, informed)
 

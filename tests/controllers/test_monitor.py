@@ -1,8 +1,11 @@
 """The monitor on white features, where its promises are closed forms; and on openings of the plant."""
 
 import ctypes
+import json
+import re
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import gymnasium
@@ -20,11 +23,14 @@ from controllers.monitor import (
     MonitorModel,
     OpeningReader,
 )
+from epv_env.common.files import JSONFileError
 from epv_env.operation_log import OperationLog
 from epv_env.plant.plantfile import Plant
 from identification.recordings.log_files import read_log
-from training.commands.monitor import follow
-from training.deploy.monitor_c import sources
+from tests.training.exports import sanitisers
+from training.commands.monitor import follow, sentence
+from training.deploy.compiled import build
+from training.deploy.monitor_c import effects_of, sources
 from training.monitoring import drives
 
 N = len(FEATURES)
@@ -154,12 +160,13 @@ def test_c_code_says_what_python_says(tmp_path: Path) -> None:
     controller = Hysteresis(open_below=-0.3, shut_above=0.0)
     drive = drives(plant, controller, [3], {}, duration=10.0)[0]
     drive[:, 1] *= drive[:, 0]  # as logs have it: no voltage while the coil is off
+    drive[700::131, 5], drive[757::173, 4] = 1e300, 1.7e308
+    drive[800:900, 1:], drive[1000::191, 2] = 0.0, np.nan
     model, monitor = white_model(), Monitor(white_model())
     for name, text in sources(model).items():
         (tmp_path / name).write_text(text)
-    build = ["cc", "-std=c99", "-Wall", "-Werror", "-O2", "-shared", "-fPIC", "-o", "m.so"]
-    subprocess.run([*build, "epv_monitor.c", "-lm"], cwd=tmp_path, check=True)
-    code = ctypes.CDLL(str(tmp_path / "m.so"))
+    built = build(["cc"], tmp_path, "-shared", "-fPIC", "epv_monitor.c", "-lm", output="m.so")
+    code = ctypes.CDLL(str(built))
     code.epv_monitor_probability.restype = code.epv_monitor_causes.restype = ctypes.c_double
     memory = ctypes.create_string_buffer(2**20)
     code.epv_monitor_reset(memory)
@@ -171,4 +178,124 @@ def test_c_code_says_what_python_says(tmp_path: Path) -> None:
     assert found == pytest.approx(monitor.probability, rel=1e-9)
     shares = (ctypes.c_double * 3)()
     assert code.epv_monitor_causes(memory, shares) == pytest.approx(monitor.onset, rel=1e-9)
-    assert max(shares) == pytest.approx(max(monitor.causes().values()), rel=1e-9)
+    named = dict(zip(effects_of(model), shares, strict=True))
+    assert named == pytest.approx(monitor.causes(), rel=1e-9)
+
+
+@pytest.mark.parametrize("column", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("value", [1.7e308, -1e300, 1e154, 5e-324, 0.0, np.inf, np.nan])
+def test_a_reading_of_any_size_leaves_the_monitor_able_to_find_a_change(column, value) -> None:
+    """After openings with the reading in each place, a shift of every feature is found."""
+    off, on, last = 20, 20, 10
+    monitor = Monitor(white_model())
+    for place in range(off + on + last):
+        coil = np.repeat([1.0, 0.0, 1.0], [on, off, last])
+        p3 = np.repeat(11.0, len(coil))
+        p3[on + 1 : on + off + 1] = 11.0 * 0.9 ** np.arange(1, off + 1)
+        p2 = 8.0 + 0.1 * np.maximum(np.arange(len(coil)) - on - 10.0, 0.0)
+        rows = np.column_stack(np.broadcast_arrays(coil, 24.0, 11.0, p2, p3, 0.48))
+        rows[place, column] = value
+        monitor.follow(rows)
+    assert len(monitor.history) > 0
+    assert np.isfinite(monitor.log_odds)
+    assert monitor.restarts == 0
+    before = monitor.causes()
+    for _ in range(40):
+        observe(monitor, monitor._mean + 2.0 * np.eye(N)[1])
+    assert monitor.alarm
+    assert monitor.causes()["second"] > before["second"]
+
+
+def test_a_state_that_is_not_finite_restarts_and_says_so() -> None:
+    monitor = Monitor(white_model())
+    monitor._mean[3] = np.nan
+    observe(monitor, np.zeros(N))
+    assert monitor.restarts == 1
+    assert np.isfinite(monitor.log_odds)
+    assert "Restarts because its state was not finite: 1." in sentence(monitor)
+
+
+HOSTILE = """
+#include <float.h>
+#include <limits.h>
+#include <math.h>
+#include <stdlib.h>
+#include "epv_monitor.h"
+
+int main(void)
+{
+    static epv_monitor m;
+    const double odd[] = {0, -1, 1e300, -1e300, DBL_MAX, -DBL_MAX, 5e-324, 1e154, NAN, INFINITY};
+    double share[EPV_EFFECTS];
+    unsigned k;
+    epv_monitor_reset(&m);
+    m.periods = 4294967290.0; /* 248 days */
+    m.last = m.periods * 5e-3;
+    m.on = INT_MAX;
+    for (k = 0; k < 400000; k++) {
+        const int t = (int)(k % 50), on = t < 20 || t >= 40;
+        const double p3 = on ? 11.0 : 11.0 * pow(0.9, t - 20), U = 24.0;
+        double v[5] = {U, 11.0, 8.0 + 0.1 * (t > 30 ? t - 30 : 0), p3, 0.48};
+        if (k % 97 == 0)
+            v[rand() % 5] = odd[rand() % 10];
+        if (k == 200000)
+            m.log[1] = NAN, m.off = INT_MAX;
+        epv_monitor_update(&m, k % 999 ? on : INT_MIN, v[0], v[1], v[2], v[3], v[4]);
+        if (k % 100 == 0 && k < 200000 && !isfinite(epv_monitor_probability(&m, 0.01)))
+            return 1;
+    }
+    epv_monitor_causes(&m, share);
+    return m.restarts == 1 && isfinite(share[0]) && m.on < 100 && m.off < 100 ? 0 : 2;
+}
+"""
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
+def test_c_code_survives_hostile_readings_and_counts_without_overflow(tmp_path: Path) -> None:
+    options = sanitisers(tmp_path)
+    for name, text in {**sources(white_model()), "main.c": HOSTILE}.items():
+        (tmp_path / name).write_text(text)
+    program = build(["cc"], tmp_path, *options, "main.c", "epv_monitor.c", "-lm", output="main")
+    done = subprocess.run([program], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_no_name_reaches_the_c_code() -> None:
+    model = replace(white_model(), effects=("zebra", "yak"), components=("xenon", "walrus"))
+    texts = "".join(sources(model).values())
+    assert not any(name in texts for name in (*model.effects, *model.components))
+    assert effects_of(model) == ["zebra", "yak", "unknown"]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("scale", 0.0, "scale holds 0, not a number from 1e-09 to 1e+09"),
+        ("scale", -1.0, "scale holds -1, not"),
+        ("scale", 1e300, "scale holds 1e"),
+        ("offset", 0.0, "offset holds 0, not"),
+        ("whiten", 1e12, "whiten holds 1e"),
+        ("centre", -1e30, "centre holds -1e"),
+    ],
+)
+def test_numbers_out_of_range_get_one_sentence(name, value, said, tmp_path: Path) -> None:
+    model = white_model()
+    getattr(model, name).flat[-1] = value
+    model.save(tmp_path / "monitor.json")
+    with pytest.raises(JSONFileError, match=re.escape(said)) as caught:
+        MonitorModel.load(tmp_path / "monitor.json")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "name", ["", "a b", 'x"};\nint own(void) { return 0; }', "é", "2nd", "a" * 3 + "*/"]
+)
+@pytest.mark.parametrize("which", ["effects", "components"])
+def test_a_name_that_is_none_is_refused(which, name, tmp_path: Path) -> None:
+    path = tmp_path / "monitor.json"
+    white_model().save(path)
+    content = json.loads(path.read_text())
+    content[which][0] = name
+    path.write_text(json.dumps(content))
+    with pytest.raises(JSONFileError, match="is no name"):
+        MonitorModel.load(path)

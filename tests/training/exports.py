@@ -2,12 +2,15 @@
 
 import ctypes
 import shutil
+import subprocess
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+from controllers.held_readings import READINGS
 from controllers.hysteresis import Hysteresis
 from controllers.policy_files import Network, write_policy
 from epv_env.common.commands import main_of
@@ -15,7 +18,7 @@ from epv_env.observation import LAYOUT
 from training.deploy.agreement import STATES_EPISODES as EPISODES
 from training.deploy.agreement import STATES_PERIODS as PERIODS
 from training.deploy.c_code import INPUTS, MEMORY
-from training.deploy.compiled import READINGS, READINGS_TYPE, library, logits_of
+from training.deploy.compiled import READINGS_TYPE, library, logits_of
 
 GOOD = Hysteresis(open_below=-0.1, shut_above=0.0, shut_lookahead=0.03, name="good")
 QUICK = ("--episodes", "4", "--duration", "1")
@@ -114,3 +117,13 @@ def copied(out: Path, folder: Path) -> Path:
     for path in out.glob("epv_*"):
         shutil.copy(path, folder)
     return folder
+
+
+def sanitisers(folder: Path) -> tuple[str, ...]:
+    """Options under which a program ends where it does what C leaves undefined; skips without them."""
+    options = ("-fsanitize=undefined,address", "-fno-sanitize-recover=all")
+    (folder / "empty.c").write_text("int main(void) { return 0; }\n")
+    probe = ["cc", *options, folder / "empty.c", "-o", folder / "probe"]
+    if subprocess.run(probe, check=False).returncode:
+        pytest.skip("this compiler has no sanitisers")
+    return options

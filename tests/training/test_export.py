@@ -14,6 +14,7 @@ import pytest
 from controllers.policy import TRAINED, load_policy
 from controllers.policy_files import read_policy
 from epv_env.observation import CENTRE, INDEX, P3_LAGS, SCALE, contract, decode
+from tests.controllers.test_monitor import white_model
 from tests.training.exports import (
     GOOD,
     column,
@@ -24,11 +25,14 @@ from tests.training.exports import (
     random_policy,
     readings,
     replay,
+    sanitisers,
 )
 from training.commands.export import FILES
+from training.deploy import monitor_c
 from training.deploy.agreement import follow, visit
 from training.deploy.c_code import MEMORY
 from training.deploy.compiled import CompiledPolicy, build, library
+from training.deploy.translation import ExportError
 
 pytestmark = [
     pytest.mark.training,
@@ -115,11 +119,7 @@ int main(void)
 
 
 def test_nothing_in_it_is_undefined(any_copy, tmp_path):
-    options = ("-fsanitize=undefined,address", "-fno-sanitize-recover=all")
-    (tmp_path / "empty.c").write_text("int main(void) { return 0; }\n")
-    probe = subprocess.run(["cc", *options, tmp_path / "empty.c", "-o", tmp_path / "probe"], check=False)
-    if probe.returncode:
-        pytest.skip("this compiler has no sanitisers")
+    options = sanitisers(tmp_path)
     (any_copy / "replay.c").write_text(REPLAY)
     program = build(["cc"], any_copy, *options, "replay.c", "epv_policy.c", "-lm", output="replay")
     decided = []
@@ -206,17 +206,19 @@ def test_the_controller_behind_the_check_of_p3_takes_over(fitted, tmp_path):
     assert np.mean(follow(CompiledPolicy(code=code), states) == wanted) >= 0.999
 
 
-def test_a_reading_that_is_not_a_number_shuts_the_valve_and_is_forgotten(exported, tmp_path):
+def test_a_reading_that_is_not_a_number_counts_as_the_one_before(exported, tmp_path):
     code = library(["cc"], copied(exported[1], tmp_path))
     along = visit(GOOD, first_seed=5, episodes=1, periods=3)
-    controller = CompiledPolicy(code=code)
-    controller.reset(1)
-    controller.act(along.observations[:, 0])
-    before = controller.memory.copy()
-    damaged = along.observations[:, 1].copy()
-    damaged[0, INDEX["p3"]] = np.nan
-    assert controller.act(damaged) == [1]
-    assert (controller.memory == before).all()
+    row, found = INDEX["p3"], []
+    for instead in (np.nan, along.observations[0, 0, row]):
+        controller = CompiledPolicy(code=code)
+        controller.reset(1)
+        controller.act(along.observations[:, 0])
+        second = along.observations[:, 1].copy()
+        second[0, row] = instead
+        found.append((controller.act(second), controller.memory["valve"].tobytes(), controller.memory))
+    assert found[0][:2] == found[1][:2]
+    assert [each["lost"].tolist() for *_, each in found] == [[1], [0]]
 
 
 def test_the_contract_says_what_the_files_hold(exported, tmp_path):
@@ -255,6 +257,26 @@ def good_but(*more: str):
     return lambda tmp_path: [str(random_policy(tmp_path / "policy")), *more]
 
 
+def with_a_monitor(tmp_path: Path) -> list[str]:
+    path = tmp_path / "monitor.json"
+    white_model().save(path)
+    path.write_text(path.read_text().replace("second", "x y"))
+    return [str(random_policy(tmp_path / "policy")), "--monitor", str(path)]
+
+
+def test_a_monitor_goes_out_compiled_and_the_contract_names_its_effects(tmp_path):
+    white_model().save(tmp_path / "monitor.json")
+    out = tmp_path / "ecu"
+    assert (
+        export(random_policy(tmp_path / "policy"), out, "--monitor", str(tmp_path / "monitor.json")) == 0
+    )
+    assert {path.name for path in out.iterdir()} >= set(monitor_c.FILES)
+    named = json.loads((out / "contract.json").read_text())["monitor"]["effects"]
+    assert named == ["first", "second", "unknown"]
+    with pytest.raises(ExportError, match="false does not compile the exported code"):
+        monitor_c.compiled_sources(white_model(), ["false"])
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -262,6 +284,7 @@ def good_but(*more: str):
         (folder_without_weights, "give a folder that training wrote"),
         (good_but("--compiler", "no-such-cc"), "there is no C compiler 'no-such-cc' here"),
         (good_but("--compiler", "false"), "false does not compile the exported code"),
+        (with_a_monitor, "monitor.json: 'x y' is no name"),
         (good_but("--episodes", "0"), "argument --episodes: 0 must be a whole number"),
         (good_but("--out", "/dev/null/x"), "is not a folder"),
     ],

@@ -82,10 +82,12 @@ def run(options: argparse.Namespace) -> None:
             f"{options.what} decides each {1e3 * export.period:g} ms, but a monitor counts periods of "
             f"{1e3 * Monitor.period:g} ms: export it without --monitor"
         )
+    model = None if options.monitor is None else MonitorModel.load(options.monitor)
     files, report = verified(export, compiler, options.episodes, options.duration)
-    if options.monitor is not None:
-        files |= monitor_c.sources(MonitorModel.load(options.monitor))
     contract = deployment_contract(export)
+    if model is not None:
+        files |= monitor_c.compiled_sources(model, compiler)
+        contract["monitor"] = {"effects": monitor_c.effects_of(model)}
     files["contract.json"] = json.dumps(contract, indent=1) + "\n"
     files["report.json"] = json.dumps(report, indent=1) + "\n"
     content = {name: text.encode() for name, text in files.items()}

@@ -96,13 +96,15 @@ def sentence(monitor: Monitor) -> str:
     """What the monitor says at the end."""
     if not monitor.history:
         return "No opening of the log can be used: the coil must have been on before, and p3 at p1."
+    count = monitor.restarts
+    again = f" Restarts because its state was not finite: {count}." if count else ""
     if not monitor.alarm:
-        return f"Nothing has changed: probability {monitor.probability:.2g} that something has."
+        return f"Nothing has changed: probability {monitor.probability:.2g} that something has.{again}"
     causes = [f"{name} {p:.2f}" for name, p in monitor.causes().items() if p >= LIKELY]
     parts = [f"{name} {p:.2f}" for name, p in monitor.components().items() if p >= LIKELY]
     return (
         f"Something has changed (probability {monitor.probability:.4g}), at {monitor.onset:.0f} s. "
-        f"Effects: {', '.join(causes)}. Components: {', '.join(parts)}."
+        f"Effects: {', '.join(causes)}. Components: {', '.join(parts)}.{again}"
     )
 
 

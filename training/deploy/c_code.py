@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers import knowledge, p3_check, pulse, valve_learner
+from controllers import held_readings, knowledge, p3_check, pulse, valve_learner
 from controllers.hysteresis import Hysteresis
 from controllers.p3_check import P3Check
 from controllers.policy import Policy
@@ -47,8 +47,9 @@ _VALVE_C = np.dtype(
     align=True,
 )
 MEMORY = np.dtype(
-    [("p2", "f4", HISTORY), ("p3", "f4", HISTORY), ("waited", "u2"), ("newest", "u1"), ("coil", "u1"),
-     ("begun", "u1"), ("fallback", "u1"), ("p3_failed", "u1"), ("periods", "u2"), ("valve", _VALVE_C)],
+    [("p2", "f4", HISTORY), ("p3", "f4", HISTORY), ("last", "f4", len(held_readings.CHANNELS)),
+     ("waited", "u2"), ("newest", "u1"), ("coil", "u1"), ("begun", "u1"), ("lost", "u1"),
+     ("fallback", "u1"), ("failed", "u1"), ("periods", "u2"), ("valve", _VALVE_C)],
     align=True,
 )  # fmt: skip
 """The C structure of a valve's memory."""
@@ -74,7 +75,7 @@ class Export:
     """What the files are made of."""
 
     controller: P3Check
-    """The whole: a `Policy`, and a `Hysteresis` that takes over where p3 is implausible."""
+    """The whole: a `Policy`, and a `Hysteresis` that takes over where sensors fail."""
     period: float
     """Control period [s]."""
     weights_sha256: str
@@ -154,8 +155,11 @@ def sources(export: Export) -> dict[str, str]:
             f"    {{WEIGHT_{k}, BIAS_{k}, {weight.shape[1]}, {weight.shape[0]}}},\n"
             for k, (weight, _) in enumerate(layers)
         ),
+        "held": held_readings.HELD,
         **_p3_check_fields(export),
     }
+    ends = (*held_readings.limits(export.controller.sensors), held_readings.START)
+    fields |= {n: listed(v) for n, v in zip(("least", "greatest", "start"), ends, strict=True)}
     for name in ("centre", "scale", "limit"):
         fields[name] = listed(np.array([getattr(entry, name) for entry in LAYOUT]))
     texts = {name: filled(TEMPLATES / name, fields) for name in ("epv_policy.h", "epv_policy.c")}
@@ -221,7 +225,7 @@ def deployment_contract(export: Export) -> dict[str, Any]:
         },
         "actions": {"0": "coil off: the protection valve opens", "1": "coil on: it shuts"},
         "decision": "1 if a rule says so; else 0 if the logit of off is at least that of on, else 1; "
-        "where p3 is implausible, a hysteresis that does not read it decides",
+        "where p3 is implausible or readings are lost, a hysteresis that does not read p3 decides",
         "timing": "read, decide and switch at each period's start; the coil stays so through it",
         "operations": {
             "multiply_accumulates": sum(weights for weights, _ in sizes),

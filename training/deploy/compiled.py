@@ -11,15 +11,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.observation import decode
+from controllers.held_readings import READINGS, readings_of
 from training.deploy.c_code import MEMORY
 from training.deploy.translation import ExportError
 
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
 """What the exported code is compiled with here."""
-
-READINGS = ("p1", "p2", "p3", "current", "target", "coil")
-"""Readings of a control unit at the end of a period, in the order of the C structure."""
 
 READINGS_TYPE = np.dtype([*((name, "f4") for name in READINGS[:-1]), (READINGS[-1], "u1")], align=True)
 """The C structure, laid out as C lays it out."""
@@ -62,21 +59,6 @@ def library(compiler: list[str], folder: Path) -> ctypes.CDLL:
     code.epv_policy_logits.argtypes = (ctypes.c_void_p, ctypes.c_void_p)
     code.epv_policy_logits.restype = None
     return code
-
-
-def readings_of(observations: NDArray) -> dict[str, NDArray]:
-    """The readings behind observations (..., entries), float32, in bar, A and 0 or 1, by READINGS."""
-    wide = observations.astype(np.float64)
-    target = decode(wide, "target")
-    values = {
-        "p1": decode(wide, "p1"),
-        "p2": decode(wide, "p2_error") + target,
-        "p3": decode(wide, "p3"),
-        "current": decode(wide, "I"),
-        "target": target,
-        "coil": np.rint(decode(wide, "action")),
-    }
-    return {name: values[name].astype(np.float32) for name in READINGS}
 
 
 @dataclass(kw_only=True)

@@ -1,5 +1,7 @@
 """The C files of a monitor: the same decisions as controllers.monitor, in double precision."""
 
+import tempfile
+from pathlib import Path
 from string import Template
 from typing import Any
 
@@ -8,6 +10,7 @@ import numpy as np
 from controllers import monitor
 from controllers.monitor import CONDITIONS, FEATURES, Monitor, MonitorModel
 from training.deploy.c_code import TEMPLATES
+from training.deploy.compiled import build
 
 FILES = ("epv_monitor.h", "epv_monitor.c")
 """What an export consists of."""
@@ -23,7 +26,7 @@ CONSTANTS = {
 def sources(model: MonitorModel) -> dict[str, str]:
     """The files by name."""
     shifts, weights, later, names = Monitor(model).hypotheses()
-    effects = list(dict.fromkeys(names))
+    effects = effects_of(model)
     arrays = {
         "centre": model.centre, "scale": model.scale, "whiten": model.whiten,
         "expected": model.expected, "offset": model.offset, "shifts": shifts, "weights": weights,
@@ -37,10 +40,24 @@ def sources(model: MonitorModel) -> dict[str, str]:
         "rows": monitor.BEFORE + monitor.LONGEST + monitor.AFTER,
     }  # fmt: skip
     values = {name: braced(array.tolist()) for name, array in arrays.items()}
-    values["names"] = "{" + ", ".join(f'"{name}"' for name in effects) + "}"
     texts = {name: repr(value) for name, value in (CONSTANTS | numbers).items()}
     template = {name: Template((TEMPLATES / name).read_text(encoding="utf-8")) for name in FILES}
     return {name: each.substitute(texts | values) for name, each in template.items()}
+
+
+def compiled_sources(model: MonitorModel, compiler: list[str]) -> dict[str, str]:
+    """The files by name, once this compiler takes them. Raises ExportError."""
+    files = sources(model)
+    with tempfile.TemporaryDirectory() as temporary:
+        for name, text in files.items():
+            Path(temporary, name).write_text(text, encoding="utf-8")
+        build(compiler, Path(temporary), "-c", "epv_monitor.c", output="epv_monitor.o")
+    return files
+
+
+def effects_of(model: MonitorModel) -> list[str]:
+    """Names of the effects in the order of the C code, the last "unknown"; they are no part of it."""
+    return list(dict.fromkeys(Monitor(model).hypotheses()[3]))
 
 
 def braced(value: Any) -> str:

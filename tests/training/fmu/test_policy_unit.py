@@ -80,3 +80,25 @@ def test_the_loop_of_both_units_holds_the_pressure(unit, tmp_path):
 def test_the_voltage_of_a_decision_is_a_parameter(unit):
     instance = Instance(unit).start({"U_on": 12.0, "p2": 12e5})
     assert instance.get("coil", "U") == [1.0, 12.0]
+
+
+def test_a_state_saved_while_readings_are_lost_goes_on_the_same(ecu, unit):
+    inputs = readings(ecu, 0)
+    dead = {"p1": 0.0, "p2": 0.0, "p3": 0.0}
+    instance = Instance(unit).start(inputs[0])
+    for each in [*inputs[1:100], dead, dead]:
+        assert instance.step(PERIOD, **each) == OK
+    content, time = instance.bytes_of(instance.saved()), instance.time
+    found = []
+    for _ in range(2):
+        state = instance.state_of(content)
+        assert state is not None
+        instance.restore(state, time)
+        coil = []
+        for each in [dead] * 20 + inputs[122:200] + [{"p2": 7e5}] * 10:
+            assert instance.step(PERIOD, **each) == OK
+            coil += instance.get("coil")
+        found.append(coil)
+    assert found[0] == found[1]
+    assert found[0][2:20] == [1.0] * 18  # the fourth lost period, and the later ones
+    assert found[0][-1] == 0.0  # p2 is back, and low: the hysteresis opens

@@ -2,6 +2,7 @@
  * Call epv_monitor_reset once, then epv_monitor_update once a control period. */
 #include "epv_monitor.h"
 
+#include <limits.h>
 #include <math.h>
 #include <string.h>
 
@@ -15,7 +16,6 @@ static const double OFFSET[N] = $offset;
 static const double SHIFT[H][N][$linear] = $shifts;
 static const double WEIGHT[H] = $weights, LATER[H] = $later;
 static const int EFFECT[H] = $effect;
-const char *const epv_monitor_effects[EPV_EFFECTS] = $names;
 
 static double least(double a, double b) { return a < b ? a : b; }
 static double most(double a, double b) { return a > b ? a : b; }
@@ -26,11 +26,29 @@ static double sum_log(double a, double b) { return most(a, b) + log1p(exp(-fabs(
 /* off = -1: what came before the command is not known. */
 void epv_monitor_pause(epv_monitor *m) { m->on = 0, m->off = -1; }
 
+static void restart(epv_monitor *m) {
+    memset(m->mean, 0, sizeof m->mean);
+    memset(m->learnt, 0, sizeof m->learnt);
+    memset(m->since, 0, sizeof m->since);
+    for (int k = 0; k < N; k++) m->variance[k] = OFFSET[k];
+    for (int h = 0; h < H; h++) m->log[h] = log(most($before_start * (1.0 - LATER[h]), $least));
+    m->last = m->periods * $period;
+}
+
 void epv_monitor_reset(epv_monitor *m) {
     memset(m, 0, sizeof *m);
     epv_monitor_pause(m);
-    for (int k = 0; k < N; k++) m->variance[k] = OFFSET[k];
-    for (int h = 0; h < H; h++) m->log[h] = log(most($before_start * (1.0 - LATER[h]), $least));
+    restart(m);
+}
+
+static int sound(const epv_monitor *m) {
+    double sum = 0.0;
+    for (int k = 0; k < N; k++) sum += fabs(m->mean[k]) + fabs(m->variance[k]);
+    for (int h = 0; h < H; h++) {
+        sum += fabs(m->log[h]) + fabs(m->since[h]);
+        for (int k = 0; k < N; k++) sum += fabs(m->learnt[h][k]);
+    }
+    return isfinite(sum);
 }
 
 /* Conditions and features of the opening whose command went off at row i and on at row j of r. */
@@ -78,9 +96,11 @@ static void observe(epv_monitor *m, const double *x, const double *z) {
     double found[N], spread[N];
     for (int k = 0; k < N; k++) {
         spread[k] = 1.0 + m->variance[k];
-        found[k] = -m->mean[k];
+        found[k] = 0.0;
         for (int l = 0; l < N; l++) found[k] += WHITEN[k][l] * z[l];
         for (int l = 0; l < $terms; l++) found[k] -= EXPECTED[k][l] * x[l];
+        if (!isfinite(found[k])) return; /* a reading was absurd: the opening does not count */
+        found[k] -= m->mean[k];
     }
     for (int h = 0; h < H; h++) {
         const double hours = LATER[h] * elapsed, prior = sum_log(m->log[h], log(most(hours, $least)));
@@ -103,20 +123,23 @@ static void observe(epv_monitor *m, const double *x, const double *z) {
         m->variance[k] = most(m->variance[k] / spread[k], 1.0 / $memory);
     }
     m->last = time;
+    if (sound(m)) return;
+    m->restarts += m->restarts < UINT_MAX;
+    restart(m);
 }
 
 void epv_monitor_update(epv_monitor *m, int coil, double U, double p1, double p2, double p3, double I) {
     const double row[6] = {coil, U, p1, p2, p3, I};
-    m->periods += 1;
+    m->periods += 1.0;
     memmove(m->rows[0], m->rows[1], sizeof m->rows - sizeof m->rows[0]);
     memcpy(m->rows[LENGTH - 1], row, sizeof row);
     if (!coil) {
         if (m->on) m->off = m->on >= I0 ? 0 : -1;
         m->on = 0;
-        m->off += m->off >= 0;
+        m->off += m->off >= 0 && m->off < LENGTH;
         return;
     }
-    m->on += 1;
+    m->on += m->on < LENGTH;
     if (m->on == $after && m->off >= $shortest && m->off <= $longest) {
         double x[$terms], z[N];
         const int rows = I0 + m->off + $after;

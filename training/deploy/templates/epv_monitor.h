@@ -7,12 +7,10 @@ enum { EPV_FEATURES = $features, EPV_SHIFTS = $count, EPV_ROWS = $rows, EPV_EFFE
 typedef struct {
     double rows[EPV_ROWS][6], mean[EPV_FEATURES], variance[EPV_FEATURES];
     double learnt[EPV_SHIFTS][EPV_FEATURES], log[EPV_SHIFTS], since[EPV_SHIFTS], last;
-    unsigned periods;
-    int on, off;
+    double periods; /* counts 2^53 of them exactly */
+    int on, off; /* saturating */
+    unsigned restarts; /* how often it began anew because its state was not finite; saturating */
 } epv_monitor;
-
-/* Names of the effects, the last "unknown". */
-extern const char *const epv_monitor_effects[EPV_EFFECTS];
 
 /* Before the first period: believe that nothing has changed. */
 void epv_monitor_reset(epv_monitor *m);
@@ -22,7 +20,8 @@ void epv_monitor_pause(epv_monitor *m);
 void epv_monitor_update(epv_monitor *m, int coil, double U, double p1, double p2, double p3, double I);
 /* That something has changed [-]; an alarm above 0.5. */
 double epv_monitor_probability(const epv_monitor *m, double false_alarms_per_hour);
-/* If something has changed: the probability of each effect into share[EPV_EFFECTS], and when [s]. */
+/* If something has changed: the probability of each effect into share[EPV_EFFECTS], and when [s].
+ * contract.json names the effects in this order. */
 double epv_monitor_causes(const epv_monitor *m, double *share);
 
 #endif

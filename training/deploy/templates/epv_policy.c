@@ -19,6 +19,10 @@ static const float CENTRE[EPV_POLICY_READINGS] = {$centre};
 static const float SCALE[EPV_POLICY_READINGS] = {$scale};
 static const float LIMIT[EPV_POLICY_READINGS] = {$limit};
 
+/* Of p1, p2, p3, current, target: the ends of the sensors, and what is held before the first of them. */
+enum { P2 = 1, TARGET = 4, GIVEN };
+static const float LEAST[GIVEN] = {$least}, GREATEST[GIVEN] = {$greatest}, START[GIVEN] = {$start};
+
 typedef struct {
     const float *weight; /* row after row */
     const float *bias;
@@ -66,6 +70,28 @@ static float row(const layer *l, int j, const float *signal)
 
 static const layer NETWORK[LAYERS] = {
 $network};
+
+/* Put the last good readings in place of lost ones (controllers/held_readings.py); a bit for each lost.
+ * p2 counts by its distance from the target: without a target it is lost, too. */
+static int hold(epv_policy_memory *m, epv_policy_readings *now)
+{
+    float *const given[GIVEN] = {&now->p1, &now->p2, &now->p3, &now->current, &now->target};
+    int i, lost = 0;
+    for (i = 0; i < GIVEN; i++)
+        if (!(*given[i] >= LEAST[i] && *given[i] <= GREATEST[i])) /* NaN, too */
+            lost |= i == TARGET ? 1 << TARGET | 1 << P2 : 1 << i;
+    for (i = 0; i < GIVEN; i++) {
+        if (m->periods == 0)
+            m->last[i] = START[i];
+        if (!(lost >> i & 1))
+            m->last[i] = *given[i];
+        *given[i] = m->last[i];
+    }
+    m->lost = (uint8_t)(lost ? m->lost + (m->lost < 255) : 0);
+    if (m->lost > $held)
+        m->failed = 1;
+    return lost;
+}
 
 static void remember(epv_policy_memory *m, const epv_policy_readings *now)
 {
@@ -144,7 +170,7 @@ int epv_policy_learn(epv_policy_memory *m, float inputs[EPV_POLICY_INPUTS])
     if (m->periods < 65535)
         m->periods++;
     if (implausible(m, inputs))
-        m->p3_failed = 1;
+        m->failed = 1;
     hysteresis(m, inputs);
     fn_observe(&m->valve, inputs, EPV_POLICY_READINGS, PERIOD, $filter_time, 0.0f);
     fn_plan(&m->valve, PERIOD);
@@ -167,15 +193,18 @@ void epv_policy_logits(const float inputs[EPV_POLICY_INPUTS], float logits[2])
         logits[j] = row(&NETWORK[LAYERS - 1], j, signal) + ADVICE[j] * inputs[EPV_POLICY_INPUTS - 1];
 }
 
-int epv_policy_step(epv_policy_memory *m, const epv_policy_readings *now)
+int epv_policy_step(epv_policy_memory *m, const epv_policy_readings *given)
 {
+    epv_policy_readings now = *given;
     float inputs[EPV_POLICY_INPUTS], logits[2];
+    const int begun = m->begun, lost = hold(m, &now);
     int must_shut;
-    if (!(fabsf(now->p1) + fabsf(now->p2) + fabsf(now->p3) + fabsf(now->target) < 1e6f))
-        return 1; /* a reading is not a number: shut, and remember nothing of it */
-    epv_policy_observe(m, now, inputs);
+    epv_policy_observe(m, &now, inputs);
     must_shut = epv_policy_learn(m, inputs);
-    if (m->p3_failed)
+    m->begun = begun || !lost || m->lost > $held;
+    if (!m->begun || (m->failed && (lost >> P2 & 1)))
+        return 1; /* there is nothing to decide by: shut */
+    if (m->failed)
         return m->fallback;
     epv_policy_logits(inputs, logits);
     return must_shut || !(logits[0] >= logits[1]);

@@ -41,12 +41,14 @@ $valve
 typedef struct {
     float p2[EPV_POLICY_HISTORY]; /* rings of the latest readings, bar */
     float p3[EPV_POLICY_HISTORY];
+    float last[5]; /* last good p1, p2, p3, current, target */
     uint16_t waited; /* periods since the coil was switched, saturating */
     uint8_t newest; /* place of the newest readings in the rings */
     uint8_t coil;
     uint8_t begun;
+    uint8_t lost; /* latest periods in a row with a lost reading, saturating */
     uint8_t fallback; /* what the controller that does not read p3 has decided */
-    uint8_t p3_failed; /* 1: p3 was found implausible, and that controller decides */
+    uint8_t failed; /* 1: p3 was implausible or readings were lost, and that controller decides */
     uint16_t periods; /* since the start, saturating */
     epv_valve valve;
 } epv_policy_memory;
@@ -54,7 +56,7 @@ typedef struct {
 /* One period: remember the readings, return what the coil shall do next (0 off, 1 on). */
 int epv_policy_step(epv_policy_memory *memory, const epv_policy_readings *now);
 
-/* Its parts: the readings as the observation (the first EPV_POLICY_READINGS entries of the inputs), what is
+/* Its parts, for readings that are all good: the readings as the observation (the first EPV_POLICY_READINGS entries of the inputs), what is
  * learnt and advised (the entries behind them; returns whether a rule keeps the coil on), and the network's
  * {off, on}. */
 void epv_policy_observe(epv_policy_memory *memory, const epv_policy_readings *now,

@@ -1,0 +1,159 @@
+"""Readings that no sensor can give: the code stays within its arrays, its memory stays numbers, and it
+decides as Python does."""
+
+import shutil
+import subprocess
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from controllers.held_readings import HELD
+from controllers.policy import TRAINED, load_policy
+from epv_env.observation import CENTRE, INDEX, LIMIT, P2_LAGS, P3_LAGS, SCALE, decode, scaled
+from epv_env.plant.channels import CURRENT, P1, P2, P3
+from epv_env.plant.plantfile import load_plant
+from tests.training.exports import GOOD, sanitisers
+from training.commands.export import prepared
+from training.deploy.agreement import follow, visit
+from training.deploy.c_code import sources
+from training.deploy.compiled import CompiledPolicy, build, library
+
+pytestmark = [
+    pytest.mark.training,
+    pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler (cc) here"),
+]
+
+READINGS = 1_000_000
+
+DRIVE = """
+#include <math.h>
+#include <stdio.h>
+#include "epv_policy.h"
+
+static unsigned long long seed = 1;
+static unsigned draw(unsigned n)
+{
+    seed = seed * 6364136223846793005u + 1442695040888963407u;
+    return (unsigned)(seed >> 33) % n;
+}
+
+/* A crude valve under the code. Once in 100 periods channels fail, for one period or up to a minute. */
+int main(void)
+{
+    static const float odd[] = {0.0f, -0.0f, -1.0f, 0.7403f, 16.2596f, 17.0f, 1e38f, -1e38f, 1e-42f,
+                                INFINITY, -INFINITY, NAN, (float)1e308, 1.0f, 16.0f};
+    static const unsigned lengths[] = {1, 2, HELD, HELD + 1, 40, 12000};
+    static epv_policy_memory fresh;
+    epv_policy_memory m = fresh;
+    unsigned long decisions[2] = {0, 0}, failures = 0, blind = 0, again = 0;
+    unsigned left = 0, mask = 0, kind = 0, gone = 0, k;
+    float p2 = 7.6f, p3 = 12.0f;
+    int coil = 1;
+    for (k = 0; k < READINGS; k++) {
+        float now[5];
+        epv_policy_readings given;
+        const float *learnt = (const float *)&m.valve;
+        unsigned i;
+        int lost = 0;
+        p3 = coil ? p3 + (12.0f - p3) * 0.3f : p3 * 0.93f;
+        p2 = fmaxf(fminf(p2 + (p3 < 6.0f ? 0.06f : 0.0f) - 0.005f, 12.0f), 1.0f);
+        now[0] = 12.0f + 0.01f * draw(10), now[1] = p2 + 0.01f * draw(5);
+        now[2] = p3 + 0.005f * draw(5), now[3] = coil ? 0.5f : 0.0f, now[4] = 8.0f;
+        if (left == 0 && draw(100) == 0) {
+            left = lengths[draw(100) ? draw(5) : 5], mask = draw(4) ? 1u << draw(5) : 1 + draw(31);
+            kind = draw(sizeof odd / sizeof *odd), failures++;
+        }
+        for (i = 0; i < 5 && left; i++)
+            if (mask >> i & 1)
+                now[i] = odd[kind];
+        left -= left > 0;
+        given.p1 = now[0], given.p2 = now[1], given.p3 = now[2];
+        given.current = now[3], given.target = now[4], given.coil = (uint8_t)coil;
+        coil = epv_policy_step(&m, &given);
+        lost = !(now[1] > 0.74f && now[1] < 16.26f && now[4] > 0.74f && now[4] < 16.26f);
+        gone = lost ? gone + 1 : 0;
+        if (coil != 0 && coil != 1)
+            return 1;
+        if (gone > HELD && coil != 1)
+            return 2; /* without p2 or a target it must shut */
+        blind += gone > HELD;
+        for (i = 0; i < sizeof m.valve / sizeof *learnt; i++)
+            if (!isfinite(learnt[i]))
+                return 3;
+        decisions[coil]++;
+        if (m.failed && left == 0 && draw(200) == 0)
+            m = fresh, again++;
+    }
+    printf("%lu %lu %lu %lu %lu\\n", decisions[0], decisions[1], failures, blind, again);
+    return 0;
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The C files of the package's policy."""
+    made = tmp_path_factory.mktemp("hostile")
+    for name, text in sources(prepared(TRAINED, load_plant(None))).items():
+        (made / name).write_text(text)
+    return made
+
+
+def test_a_million_hostile_readings_stay_within_arrays_and_numbers(folder):
+    (folder / "drive.c").write_text(DRIVE)
+    defined = (f"-DHELD={HELD}", f"-DREADINGS={READINGS}u")
+    program = build(
+        ["cc"], folder, *sanitisers(folder), *defined, "drive.c", "epv_policy.c", "-lm", output="drive"
+    )
+    done = subprocess.run([program], capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    off, on, failures, blind, again = map(int, done.stdout.split())
+    assert off + on == READINGS
+    assert min(off, on) > READINGS / 20  # both decisions were taken
+    assert min(failures, blind, again) > 100
+
+
+def damaged(observations, rng):
+    """Observations (episodes, periods, entries), in each episode two failures of some channels."""
+    wide, rails = (
+        observations.astype(float),
+        [each.sensor.constants()[3:] for each in (P1, P2, P3, CURRENT)],
+    )
+    target = decode(wide, "target")
+    read = [
+        decode(wide, "p1"),
+        decode(wide, "p2_error") + target,
+        decode(wide, "p3"),
+        decode(wide, "I"),
+        target,
+    ]
+    with np.errstate(all="ignore"):
+        for episode in range(len(wide)):
+            for begins in rng.integers(1, wide.shape[1] - 50, 2):
+                lasts = rng.choice([1, 2, HELD, HELD + 1, 40])
+                channels = rng.permutation(5)[: rng.choice([1, 1, 3, 5])]
+                for channel in channels:
+                    odd = [0.0, np.nan, np.inf, -np.inf, 1e308, 1e-42, *rails[channel % 4]]
+                    read[channel][episode, begins : begins + lasts] = rng.choice(odd)
+        p1, p2, p3, current, target = read
+        values = {"p1": p1, "p2_error": p2 - target, "p3": p3, "I": current, "target": target}
+        for name, lags, ring in (("p2", P2_LAGS, p2), ("p3", P3_LAGS, p3)):
+            for lag in lags:
+                before = np.concatenate([np.repeat(ring[:, :1], lag, axis=1), ring[:, :-lag]], axis=1)
+                values[f"{name}_change_{lag}"] = ring - before
+        for name, value in values.items():
+            i = INDEX[name]
+            wide[..., i] = scaled(value, CENTRE[i], SCALE[i], LIMIT[i])
+    return wide.astype(np.float32)
+
+
+def test_python_and_c_decide_alike_on_lost_readings(folder, tmp_path):
+    code = library(["cc"], folder)
+    along = visit(GOOD, first_seed=5, episodes=60, periods=150)
+    states = replace(along, observations=damaged(along.observations, np.random.default_rng(0)))
+    controller = load_policy()
+    wanted = follow(controller, states)
+    assert 0.1 < np.mean(controller.failed) < 0.9
+    assert 0.05 < np.mean(wanted) < 0.95
+    assert np.mean(follow(CompiledPolicy(code=code), states) == wanted) >= 0.999
