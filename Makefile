@@ -19,16 +19,20 @@ help: ## list the targets
 
 venv: $(VENV)/.installed ## create .venv with the pinned packages and this project
 
-# An environment whose installation was interrupted has no stamp and is made anew.
-# Python compiles what it imports; to compile all packages takes as long as to install them.
-$(VENV)/.locked: requirements.lock
+# An environment whose installation was interrupted has no stamp of its step: pip goes on with it.
+$(VENV)/.made: requirements.lock
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or later is needed")'
 	$(PYTHON) -m venv --clear $(VENV)
-	$(PY) -m pip install --no-compile -r requirements.lock
 	@touch $@
 
-$(VENV)/.installed: $(VENV)/.locked pyproject.toml
-	$(PY) -m pip install --no-deps -e .
+# Training needs a part of the lock, which takes half the time.
+# Python compiles what it imports; to compile all packages takes as long as to install them.
+$(VENV)/.training: $(VENV)/.made pyproject.toml
+	$(PY) -m pip install --no-compile -c requirements.lock -e '.[training,render]'
+	@touch $@
+
+$(VENV)/.installed: $(VENV)/.training
+	$(PY) -m pip install --no-compile -r requirements.lock
 	@touch $@
 
 $(OLDEST)/.locked: requirements-oldest.lock
@@ -41,7 +45,7 @@ $(OLDEST)/.installed: $(OLDEST)/.locked pyproject.toml
 	$(OLDEST)/bin/python -m pip install --no-deps -e .
 	@touch $@
 
-train: $(VENV)/.installed ## train the PPO controller; options in ARGS="..."
+train: $(VENV)/.training ## train the PPO controller; options in ARGS="..."
 	$(PY) training/train_ppo.py $(ARGS)
 
 # The matrices are small: threads of the linear algebra and of torch would only wait for each other.

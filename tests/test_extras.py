@@ -1,6 +1,7 @@
 """What an installation with one extra alone promises works: other packages cannot be imported here."""
 
 import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -10,6 +11,8 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
+
+from epv_env.common.extras import how_to_install
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -102,6 +105,33 @@ def test_an_extra_alone_brings_what_it_promises(extra, tmp_path):
         timeout=300, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr[-1500:]
+
+
+def test_training_installs_only_its_extras_all_of_them_pinned():
+    """What `make train` and `make test` ask of pip from an empty clone."""
+
+    def steps(target: str) -> str:
+        words = ["make", "-nB", target]
+        return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+
+    assert "-r requirements.lock" in steps("test")
+    assert "-r requirements.lock" not in steps("train")
+    found = re.search(r"-c requirements\.lock -e '\.\[([\w,]+)\]'", steps("train"))
+    assert found is not None
+    extras = PROJECT["optional-dependencies"]
+    brought = closure(
+        [*PROJECT["dependencies"], *(line for extra in found[1].split(",") for line in extras[extra])]
+    )
+    lock = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+    pinned = {canonicalize_name(name) for name in re.findall(r"^([\w.-]+)==", lock, re.M)}
+    installed = {canonicalize_name(n) for names in packages_distributions().values() for n in names}
+    assert len(brought) > 20
+    assert brought & installed <= pinned
+
+
+def test_a_missing_package_is_installed_from_the_clone():
+    assert "pip install -e '.[identification]'" in how_to_install("identification")
+    assert "epv-valve[" not in how_to_install("identification")
 
 
 def test_pictures_and_films_can_be_installed_together():

@@ -23,8 +23,8 @@ def missing_package(module: str, *, preferred: str = "") -> str | None:
 
 
 def how_to_install(extra: str) -> str:
-    """The commands that install an extra: from the package index, and in a clone."""
-    return f"pip install '{DISTRIBUTION}[{extra}]' (in a clone: pip install -e '.[{extra}]')"
+    """The command that installs an extra; no package index has this package."""
+    return f"pip install -e '.[{extra}]' in a clone of {DISTRIBUTION}"
 
 
 def _extras_of(package: str) -> list[str]:

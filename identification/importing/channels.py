@@ -92,8 +92,6 @@ def _read(
 SUPPLY_PAIR = ("p1a", "p1b")
 REQUIRED = tuple(name for name in CHANNELS if name != "p1")
 
-REMEDY = "name it in a mapping file (docs/how-to/use-your-recordings.md)"
-
 
 @dataclass(frozen=True, kw_only=True)
 class MappedChannel:
@@ -131,16 +129,23 @@ def chosen_channels(source: SourceFile, mapping: MappingFile) -> dict[str, Sourc
     }
     taken = {id(channel) for channel in chosen.values()}
     free = [channel for channel in source.channels if id(channel) not in taken]
-    for name, candidates in proposed(free).items():
-        if name == "time" or name in chosen:
-            continue
-        if len(candidates) > 1:
-            names = " or ".join(repr(source.label(channel)) for channel in candidates[:4])
-            raise ImportingError(f"{source.path}: {name} may be {names}: {REMEDY}")
-        chosen[name] = candidates[0]
+    found = {n: each for n, each in proposed(free).items() if n != "time" and n not in chosen}
+    several = {
+        name: [source.label(channel) for channel in candidates[:4]]
+        for name, candidates in found.items()
+        if len(candidates) > 1
+    }
+    if several:
+        listed = ", ".join(f"{n} may be {' or '.join(map(repr, each))}" for n, each in several.items())
+        first = {name: labels[0] for name, labels in several.items()}
+        raise ImportingError(
+            f"{source.path}: {listed}: choose in a mapping file such as "
+            f"{mapping_example(first, units=False)}"
+        )
+    chosen |= {name: candidates[0] for name, candidates in found.items()}
     if "p1" in chosen:
         chosen = {name: channel for name, channel in chosen.items() if name not in SUPPLY_PAIR}
-    _check_complete(source, chosen)
+    _check_complete(source, mapping, chosen)
     _check_units(source, mapping, chosen)
     return chosen
 
@@ -163,10 +168,14 @@ def mapped_channels(
     ]
 
 
-def _check_complete(source: SourceFile, chosen: Mapping[str, SourceChannel]) -> None:
+def _check_complete(
+    source: SourceFile, mapping: MappingFile, chosen: Mapping[str, SourceChannel]
+) -> None:
     supply = () if "p1" in chosen or all(name in chosen for name in SUPPLY_PAIR) else ("p1",)
     missing = [name for name in (*supply, *REQUIRED) if name not in chosen]
     if missing:
+        timed = any(c.time is not None or meaning(c) == "time" for c in source.channels)
+        missing = missing if timed or "time" in mapping.channels else ["time", *missing]
         used = {id(channel) for channel in chosen.values()}
         free = [source.label(c) for c in source.channels if id(c) not in used and meaning(c) != "time"]
         raise ImportingError(

@@ -3,12 +3,13 @@
 Channels of other rates and jittering times are resampled in three steps. A cubic spline through the
 samples at their true times gives values on a fine uniform grid; it takes jitter out. A symmetric
 low-pass (Kaiser window) on the fine grid removes what the lower of both rates cannot carry; being
-symmetric about each sample it delays nothing. Every n-th value is kept.
+symmetric about each sample it delays nothing. Every n-th value is kept. What goes in steps would ring:
+the coil's voltage and other commands are held from one entry to the next instead.
 """
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,7 @@ from scipy.signal import firwin, kaiserord, oaconvolve
 
 from identification.importing.channels import MappedChannel
 from identification.importing.source_file import ImportingError
-from identification.recordings.columns import LEAST_RATE, sampling_period
-from identification.recordings.recording import CampaignError
+from identification.recordings.columns import LEAST_RATE, last_digit, roundest
 
 MOST_STEP = 1.75
 """Longest step over the usual one. A missing sample makes 2; jitter of a third of a period, 1.67."""
@@ -31,8 +31,13 @@ STOPBAND = 0.5
 """Begin of the stopband over the lower of both rates: from Nyquist's frequency on nothing folds."""
 STOP_ATTENUATION = 70.0
 """Attenuation of what would fold [dB]: below a step of 12 bits."""
-SAME_TIME = 1e-3
-"""Part of a period by which times may differ and count as the same samples."""
+SAME_TIME = 1e-2
+"""Part of a period by which times may differ and count as the same samples. At 2 kHz these are 5 µs, in
+which the steepest pressure changes by less than its noise."""
+LEAST_STEP = 0.1
+"""Least change over the range of a channel that goes in steps; what is measured changes by less."""
+COMMANDS = ("U", "sigma_S")
+"""Channels that may be logged on change only."""
 GREATEST_RATE = 20_000.0
 """Greatest rate of a campaign [1/s]; a faster bench is brought down to it. Valve and sensors are
 slower, and longer files only cost time."""
@@ -47,7 +52,9 @@ class GriddedSignals:
     signals: Mapping[str, NDArray]
     """By channel, each (samples,) [SI]."""
     resampled: tuple[str, ...]
-    """Channels whose samples are not the file's own."""
+    """Channels that were filtered: their samples are not the file's own."""
+    held: tuple[str, ...]
+    """Channels of which each sample is the file's last entry before it."""
 
 
 def on_common_grid(
@@ -64,18 +71,49 @@ def on_common_grid(
     """
     for channel in channels:
         _check_times(f"{place}, {channel.source.name}", channel)
-    own = {channel.name: _own_period(channel) for channel in channels}
-    period = _period(channels, own, rate)
-    grid = _grid(place, channels, own, period)
-    signals, changed = {}, []
+    on_grids = [_on_its_grid(channel) for channel in channels]
+    channels = [channel for channel, _ in on_grids]
+    own = {channel.name: period for channel, period in on_grids}
+    sampled = [channel for channel in channels if not _is_logged_on_change(channel)]
+    period = _period(sampled, own, rate)
+    grid = _grid(place, channels, sampled, own, period)
+    signals, changed, held = {}, [], []
     for channel in channels:
         first = _first_sample(channel, own[channel.name], grid, period)
-        if first is None:
+        if first is not None:
+            signals[channel.name] = channel.values[first : first + len(grid)]
+        elif channel.name == "U" or _goes_in_steps(channel.values):
+            last = np.searchsorted(channel.time, grid + SAME_TIME * period, side="right") - 1
+            signals[channel.name] = channel.values[last]
+            held.append(channel.name)
+        else:
             signals[channel.name] = resampled(channel.time, channel.values, grid)
             changed.append(channel.name)
-        else:
-            signals[channel.name] = channel.values[first : first + len(grid)]
-    return GriddedSignals(period=period, signals=signals, resampled=tuple(changed))
+    return GriddedSignals(period=period, signals=signals, resampled=tuple(changed), held=tuple(held))
+
+
+def _on_its_grid(channel: MappedChannel) -> tuple[MappedChannel, float | None]:
+    """A channel with its times free of rounding and its period [s]; as it is and None if they jitter."""
+    found = uniform_grid(channel.time)
+    if found is None:
+        return channel, None
+    begin, period = found
+    return replace(channel, time=begin + period * np.arange(len(channel.time))), period
+
+
+def _goes_in_steps(values: NDArray) -> bool:
+    """Whether values (samples,) only stay as they are or jump: a filter would make them ring."""
+    change = np.abs(np.diff(values))
+    return bool(np.all((change == 0.0) | (change > LEAST_STEP * np.ptp(values))))
+
+
+def _is_logged_on_change(channel: MappedChannel) -> bool:
+    """Whether the entries of a command are its changes, at most each with the values around it."""
+    if channel.name not in COMMANDS or usual_rate(channel.time) >= LEAST_RATE:
+        return False
+    changes = np.diff(channel.values) != 0.0
+    dense = not np.any(changes) or float(np.mean(changes)) >= 1.0 / 3.0  # a sampled one mostly stays
+    return dense and _goes_in_steps(channel.values)
 
 
 def _check_times(place: str, channel: MappedChannel) -> None:
@@ -85,13 +123,18 @@ def _check_times(place: str, channel: MappedChannel) -> None:
         at, equal = channel.time[backward[0]], steps[backward[0]] == 0
         remedy = "print it with more digits" if equal else "sort the samples"
         raise ImportingError(f"{place}: time does not increase after {at:.6g} s: {remedy}")
+    if _is_logged_on_change(channel):
+        return
     usual = float(np.median(steps))
     gap = np.flatnonzero(steps > MOST_STEP * usual)
     if gap.size:
         first, last = channel.time[gap[0]], channel.time[gap[0] + 1]
+        absent = np.count_nonzero(~np.isfinite(channel.source.values))
+        why = f", and {absent} readings are empty or marked invalid" if absent else ""
+        remedy = "" if absent else ", or print the time with more digits"
         raise ImportingError(
             f"{place}: no samples from {first:.6g} to {last:.6g} s, where the usual step is {usual:.3g} "
-            "s: cut the recording there, since a gap is not filled, or print the time with more digits"
+            f"s{why}: cut the recording there, since a gap is not filled{remedy}"
         )
     if channel.name != "sigma_S" and usual * LEAST_RATE > 1.0 + 1e-3:
         raise ImportingError(
@@ -100,37 +143,46 @@ def _check_times(place: str, channel: MappedChannel) -> None:
         )
 
 
-def _own_period(channel: MappedChannel) -> float | None:
-    """Period of a channel's samples [s]; None if they jitter."""
-    try:
-        return sampling_period("", channel.time - channel.time[0])
-    except CampaignError:
-        return None
+def uniform_grid(time: NDArray) -> tuple[float, float] | None:
+    """Begin and period [s] of the grid of which times (samples,) [s] are rounded; None: they jitter."""
+    count, since = np.arange(len(time)), time - time[0]
+    slope = float(np.polyfit(count, since, 1)[0])
+    rounding = 0.5 * last_digit(since) + SAME_TIME * slope
+    margin = 3.0 * rounding / len(time)  # errors of no more than the rounding turn the line by less
+    for period in (roundest(slope - margin, slope + margin), slope):
+        off = since - period * count
+        if np.ptp(off) <= 2.0 * rounding:
+            return float(time[0] + 0.5 * (np.min(off) + np.max(off))), period
+    return None
 
 
 def _period(
-    channels: Sequence[MappedChannel], own: Mapping[str, float | None], rate: float | None
+    sampled: Sequence[MappedChannel], own: Mapping[str, float | None], rate: float | None
 ) -> float:
     if rate is not None:
         return 1.0 / rate
     periods = [
         own[channel.name] or 1.0 / max(round(usual_rate(channel.time)), LEAST_RATE)
-        for channel in channels
+        for channel in sampled
         if channel.name != "sigma_S"
     ]
     return max(max(periods), 1.0 / GREATEST_RATE)
 
 
 def _grid(
-    place: str, channels: Sequence[MappedChannel], own: Mapping[str, float | None], period: float
+    place: str,
+    channels: Sequence[MappedChannel],
+    sampled: Sequence[MappedChannel],
+    own: Mapping[str, float | None],
+    period: float,
 ) -> NDArray:
     """Times within all channels, (samples,) [s], on the samples of a uniform channel if there is one."""
     start = max(float(channel.time[0]) for channel in channels)
-    end = min(float(channel.time[-1]) for channel in channels)
-    for channel in channels:
+    end = min(float(channel.time[-1]) for channel in sampled)
+    for channel in sampled:
         step = own[channel.name]
         if step is not None and abs(step / period - 1.0) < 1e-6:
-            later = channel.time[channel.time >= start - 1e-3 * period]
+            later = channel.time[channel.time >= start - SAME_TIME * period]
             start = float(later[0]) if later.size else start
             break
     count = int(np.floor((end - start) / period + 1e-2)) + 1

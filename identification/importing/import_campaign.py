@@ -186,6 +186,7 @@ def _file_provenance(file: ImportedFile) -> dict[str, Any]:
             **({"reference": channel.reference} if channel.reference else {}),
             "to_SI": channel.conversion,
             "resampled": channel.name in file.gridded.resampled,
+            "held": channel.name in file.gridded.held,
         }
         for channel in file.channels
     }
@@ -256,6 +257,8 @@ def import_text(imported: ImportedCampaign) -> str:
 
 
 def _file_text(file: ImportedFile) -> str:
+    gridded = file.gridded
+    treated = dict.fromkeys(gridded.resampled, "resampled") | dict.fromkeys(gridded.held, "held")
     rows = [
         (
             channel.name,
@@ -263,7 +266,7 @@ def _file_text(file: ImportedFile) -> str:
             f"{channel.unit.text} {channel.reference}".strip(),
             channel.conversion,
             f"{usual_rate(channel.time):.6g} Hz",
-            "resampled" if channel.name in file.gridded.resampled else "as recorded",
+            treated.get(channel.name, "as recorded"),
         )
         for channel in file.channels
     ]
@@ -273,7 +276,11 @@ def _file_text(file: ImportedFile) -> str:
         f"{len(recording)} samples at {1 / recording.period:.6g} Hz"
     )
     heads = ("becomes", "channel", "unit", "to SI", "rate", "samples")
-    return f"{title}\n{_table(heads, rows)}"
+    told = "".join(f"\n{', '.join(names)}: {what}" for names, what in (
+        (gridded.resampled, "other times than the file's, low-pass filtered"),
+        (gridded.held, "other times than the file's, each sample is the last entry before it"),
+    ) if names)  # fmt: skip
+    return f"{title}\n{_table(heads, rows)}{told}"
 
 
 def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

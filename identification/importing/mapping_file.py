@@ -67,8 +67,8 @@ def split_name(name: str) -> tuple[str, str]:
 
 def meaning(channel: SourceChannel) -> str | None:
     """The channel of a recording that a channel's name and unit mean; None if they mean none."""
-    bare, inside = split_name(channel.name.rpartition(".")[2].split("\\")[0])
-    plain = re.sub(r"[^a-z0-9]", "", bare.lower())
+    bare, inside = split_name(channel.name.split("\\")[0])
+    plain = re.sub(r"[^a-z0-9]", "", bare.rpartition(".")[2].lower())
     unit = parsed_unit(channel.unit or inside)
     for name, known in NAMES.items():
         if plain in known and (unit is None or unit.quantity == QUANTITY[name]):
@@ -147,9 +147,11 @@ class MappingFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_on
     """Whether pressures are gauge where no unit says gauge or absolute."""
 
 
-def mapping_example(sources: Mapping[str, str]) -> str:
+def mapping_example(sources: Mapping[str, str], *, units: bool = True) -> str:
     """The text of a mapping file for channels of a recording by their names in the files."""
-    channels = {n: {"source": s, "unit": EXAMPLES[QUANTITY[n]]} for n, s in sources.items()}
+    channels = {
+        n: {"source": s} | ({"unit": EXAMPLES[QUANTITY[n]]} if units else {}) for n, s in sources.items()
+    }
     return json.dumps({"format": FORMAT, "channels": channels}, ensure_ascii=False)
 
 

@@ -36,8 +36,11 @@ MARKS = (
 COMMENTS = ("#", "%", "//", "!")
 """Beginnings of lines that hold no data."""
 
-COMMENT_COLUMN, UNIT_LABEL = "comment", "Y_Unit_Label"
-"""Of LabVIEW: a name beside those of the numbers, and the title of a row of units."""
+COMMENT_COLUMN, UNIT_LABEL, X_COLUMN = "comment", "Y_Unit_Label", "X_Value"
+"""Of LabVIEW: a name beside those of the numbers, the title of a row of units, and the name of times."""
+
+TIME_OF_DAY = re.compile(r"(?<![\dT ])\d\d?:\d\d:\d\d")
+"""A time of day that begins a cell."""
 
 TYPES = re.compile(r"(float|double|real|single|long|word|byte|bool|u?int)\d*|[fiu]\d+", re.IGNORECASE)
 """Types of numbers, of which some tools print a row."""
@@ -113,6 +116,11 @@ def found_dialect(file: str, lines: Sequence[str]) -> Dialect:
             "channels"
         )
     best = max(DIALECTS, key=lambda dialect: _fit(dialect, sample))
+    if _fit(best, sample) <= 0 and all(map(TIME_OF_DAY.search, sample)):
+        raise ImportingError(
+            f"{file}: times of day stand in a column of their own: put date and time into one column as "
+            "ISO 8601 (2026-03-01T10:00:00.0005), or give times in seconds"
+        )
     if _fit(best, sample) <= 0:
         raise ImportingError(
             f"{file}: no separator and decimal sign make columns of numbers of its lines: export it as "
@@ -146,6 +154,8 @@ def read_text(path: Path) -> tuple[str, list[SourceChannel]]:
     ]
     dialect = found_dialect(str(path), [line for _, line in lines])
     names, units, first = _header(path, lines, dialect)
+    cut = lines[-1][0] if _ends_cut(text, [line for _, line in lines[first:]], dialect) else None
+    lines = lines[:-1] if cut else lines
     table: Any = pd.read_csv(
         io.StringIO("\n".join(line for _, line in lines[first:])),
         sep=r"\s+" if dialect.separator == " " else dialect.separator,
@@ -168,7 +178,17 @@ def read_text(path: Path) -> tuple[str, list[SourceChannel]]:
         if name
     )
     shown = {"\t": "tab", " ": "blanks"}.get(dialect.separator, f"{dialect.separator!r}")
-    return f"text (separator {shown}, decimal {dialect.decimal!r}, {encoding})", limited(path, channels)
+    told = f"; line {cut} is cut off in its last cell and left out" if cut else ""
+    version = f"text (separator {shown}, decimal {dialect.decimal!r}, {encoding}{told})"
+    return version, limited(path, channels)
+
+
+def _ends_cut(text: str, data: Sequence[str], dialect: Dialect) -> bool:
+    """Whether a file ends within a cell: without an end of line, in one shorter than all above it."""
+    if not text.endswith(data[-1]):
+        return False
+    *above, last = (len(line.rstrip().rpartition(dialect.separator)[2]) for line in data)
+    return last < min(above, default=0)
 
 
 def _header(
@@ -196,7 +216,10 @@ def _header(
     names, units = _names_and_units(above)
     for name, count in Counter(names).items():
         if name and count > 1:
-            raise ImportingError(f"{path}: column {name!r} stands twice: rename one of them")
+            remedy = "rename one of them"
+            if name == X_COLUMN:
+                remedy = "write it with one column of times (LabVIEW's X_Columns One), or as TDMS"
+            raise ImportingError(f"{path}: column {name!r} stands {count} times: {remedy}")
     return names, units, first
 
 

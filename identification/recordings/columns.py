@@ -152,7 +152,7 @@ def sampling_period(file: str, time: NDArray) -> float:
     least, greatest = _explaining_periods(time)
     if least > greatest:
         _refuse_jitter(file, time)
-    return _roundest(least, greatest)
+    return roundest(least, greatest)
 
 
 def check_rate(file: str, period: float) -> None:
@@ -210,7 +210,7 @@ def _explaining_periods(time: NDArray) -> tuple[float, float]:
     Time k, rounded by at most h, allows (t_k - h) / k to (t_k + h) / k; the first end lies above the
     second where nothing explains all.
     """
-    rounding = 0.5 * _last_digit(time) + HARMLESS_JITTER * float(np.median(np.diff(time)))
+    rounding = 0.5 * last_digit(time) + HARMLESS_JITTER * float(np.median(np.diff(time)))
     count = np.arange(1, len(time))
     return (
         float(np.max((time[1:] - rounding) / count)),
@@ -218,7 +218,7 @@ def _explaining_periods(time: NDArray) -> tuple[float, float]:
     )
 
 
-def _last_digit(time: NDArray) -> float:
+def last_digit(time: NDArray) -> float:
     """Value of the last decimal in which times are printed [s]."""
     for digits in range(MOST_DIGITS):
         if np.max(np.abs(time - np.round(time, digits))) < 1e-12:
@@ -226,7 +226,7 @@ def _last_digit(time: NDArray) -> float:
     return 10.0**-MOST_DIGITS
 
 
-def _roundest(least: float, greatest: float) -> float:
+def roundest(least: float, greatest: float) -> float:
     """Of a range of periods the one with the roundest rate, or the middle [s]."""
     middle = 0.5 * (least + greatest)
     for unit in (1000, 100, 10, 1):

@@ -1,5 +1,6 @@
 """Operation logs of a control unit: log.json and one CSV per drive (docs/reference/files.md)."""
 
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -11,11 +12,23 @@ from numpy.typing import NDArray
 from epv_env.common.files import JSONFileError, read_bytes, read_json
 from epv_env.common.units import BAR
 from epv_env.operation_log import DECIMALS, FILE_NAME, FORMAT
-from identification.recordings.columns import read_named_columns, sampling_period
-from identification.recordings.recording import CampaignError
+from identification.recordings.campaign_files import Environment, checked_ambient
+from identification.recordings.columns import line_number, read_named_columns, sampling_period
+from identification.recordings.plausibility import check_units, gauge_contradiction
+from identification.recordings.recording import HOLD, CampaignError
+from identification.recordings.recording_checks import check_range
+from identification.recordings.rules import RULES, RecordingRules
 
 PERIOD_TOLERANCE = 1e-3
 """Relative difference between the stated control period and that of the times [-]."""
+REST = 0.05
+"""Relative range of p3 within HOLD up to which the control chamber is at rest [-]."""
+LONGEST = 0.6
+"""Time after a switching-off that is looked at [s]."""
+MOST_CHECKED = 20
+"""Openings of a drive that are checked, evenly over the drive."""
+CONTRADICTED = 0.25
+"""Share of these that contradict physics beyond which a drive is refused."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,11 +75,6 @@ class Log:
             )
 
 
-class _Environment(msgspec.Struct):
-    temperature_K: float
-    pressure_bar: float
-
-
 class _Entry(msgspec.Struct):
     file: str
 
@@ -75,30 +83,44 @@ class _Manifest(msgspec.Struct):
     format: str
     name: str
     control_period_s: float
-    environment: _Environment
+    environment: Environment
     drives: list[_Entry]
 
 
-def read_log(folder: str | PathLike[str]) -> Log:
-    """The operation log in a folder. Raises CampaignError: what, where, the rule and the remedy."""
+def read_log(folder: str | PathLike[str], rules: RecordingRules = RULES) -> Log:
+    """The operation log in a folder. Raises CampaignError: what, where, the rule and the remedy.
+
+    rules: what readings of its valve can be.
+    """
     folder = Path(folder)
     remedy = "give the folder of an operation log (docs/reference/files.md)"
     try:
         manifest = read_json(folder / FILE_NAME, _Manifest, version=FORMAT, remedy=remedy)
     except JSONFileError as error:
         raise CampaignError(str(error)) from None
-    if not manifest.drives:
+    temperature, pressure = checked_ambient(folder / FILE_NAME, manifest.environment)
+    files = [entry.file for entry in manifest.drives]
+    if not files:
         raise CampaignError(f"{folder / FILE_NAME}: drives is empty: name at least one file")
+    twice = next((file for file in files if files.count(file) > 1), None)
+    if twice is not None:
+        raise CampaignError(f"{folder / FILE_NAME}: drives names {twice} twice: name each file once")
+    period = manifest.control_period_s
+    columns = {file: _columns(folder, file, period) for file in files}
+    for file, own in columns.items():
+        _check_readings(str(folder / file), own, period, pressure / BAR, rules)
+    _check_reference(folder, list(columns.values()), period, pressure / BAR)
     return Log(
         name=manifest.name,
-        temperature=manifest.environment.temperature_K,
-        pressure=manifest.environment.pressure_bar * BAR,
-        period=manifest.control_period_s,
-        drives=tuple(_drive(folder, entry.file, manifest.control_period_s) for entry in manifest.drives),
+        temperature=temperature,
+        pressure=pressure,
+        period=period,
+        drives=tuple(_drive(file, own) for file, own in columns.items()),
     )
 
 
-def _drive(folder: Path, file: str, period: float) -> Drive:
+def _columns(folder: Path, file: str, period: float) -> dict[str, NDArray]:
+    """A drive's columns by name, each (samples,), in the unit of the name; U_V is the coil's voltage."""
     path = folder / file
     if Path(file).name != file:
         raise CampaignError(f"{folder / FILE_NAME}: file {file!r} leaves the folder: copy it there")
@@ -107,7 +129,7 @@ def _drive(folder: Path, file: str, period: float) -> Drive:
     except OSError as error:
         raise CampaignError(f"{path} cannot be read ({error.strerror}): add the file") from None
     found = sampling_period(str(path), columns["time_s"])
-    if abs(found / period - 1.0) > PERIOD_TOLERANCE:
+    if abs(found - period) > PERIOD_TOLERANCE * found:
         raise CampaignError(
             f"{path}: rows follow each other in {found:g} s, but {FILE_NAME} states a control period of "
             f"{period:g} s: correct control_period_s"
@@ -115,10 +137,67 @@ def _drive(folder: Path, file: str, period: float) -> Drive:
     coil = columns["coil"]
     if not np.all(np.isin(coil, (0.0, 1.0))):
         raise CampaignError(f"{path}: coil is {coil[~np.isin(coil, (0, 1))][0]:g}: give 0 or 1")
+    return columns | {"U_V": coil * columns["U_supply_V"]}
+
+
+def _check_readings(
+    path: str, columns: Mapping[str, NDArray], period: float, ambient: float, rules: RecordingRules
+) -> None:
+    """Check a drive's readings as those of recordings are checked. Raises CampaignError.
+
+    A wrong unit or reference contradicts physics in opening after opening, a fault of the valve in few.
+    ambient: p_env [bar absolute].
+    """
+    found = list(_openings(columns["coil"], columns["p3_bar"], period))
+    told = []
+    for part in found[:: max(1, len(found) // MOST_CHECKED)]:
+        try:
+            check_units("", {name: c[part] for name, c in columns.items()}, period, ambient, rules)
+        except CampaignError as error:
+            reason = str(error).partition(": ")[2].replace("U_V", "U_supply_V")
+            told.append(f"{path}, line {line_number(part.start)}: {reason}")
+    if len(told) > CONTRADICTED * min(len(found), MOST_CHECKED):
+        raise CampaignError(told[0])
+    for name in ("U_supply_V", "p1_bar", "p2_bar", "p3_bar", "I_A"):
+        check_range(path, name, columns[name], rules.sensors[name.split("_")[0]])
+
+
+def _check_reference(
+    folder: Path, drives: Sequence[Mapping[str, NDArray]], period: float, ambient: float
+) -> None:
+    """Raise CampaignError if the openings of all drives show gauge pressure; one is too short for that.
+
+    ambient: p_env [bar absolute].
+    """
+    parts = [(own, part) for own in drives for part in _openings(own["coil"], own["p3_bar"], period)]
+    p3 = np.concatenate([np.empty(0), *(own["p3_bar"][part] for own, part in parts)])
+    on = np.concatenate([np.empty(0), *(own["coil"][part] for own, part in parts)]) > 0.0
+    for found in gauge_contradiction(p3, on, ambient, round(HOLD / period)):
+        raise CampaignError(
+            f"{folder}: {found}: p1_bar, p2_bar and p3_bar look like gauge pressure: give bar absolute "
+            "(add the environment's pressure)"
+        )
+
+
+def _openings(coil: NDArray, p3: NDArray, period: float) -> Iterator[slice]:
+    """Rows from HOLD before to after each switching-off of coil (samples,) before which p3 rests."""
+    hold, changes = round(HOLD / period), np.flatnonzero(np.diff(coil)) + 1
+    for number, i in enumerate(changes):
+        before = slice(max(i - hold, 0), i)
+        if coil[i] == 0.0 and i >= hold and np.all(coil[before]) and _rests(p3[before]):
+            end = changes[number + 1] if number + 1 < len(changes) else len(coil)
+            yield slice(int(before.start), int(min(end, i + LONGEST / period)))
+
+
+def _rests(p3: NDArray) -> bool:
+    return bool(np.ptp(p3) <= REST * np.max(np.abs(p3)))
+
+
+def _drive(file: str, columns: Mapping[str, NDArray]) -> Drive:
     return Drive(
         file=file,
-        coil=coil,
-        U=coil * columns["U_supply_V"],
+        coil=columns["coil"],
+        U=columns["U_V"],
         I=columns["I_A"],
         **{name: columns[f"{name}_bar"] * BAR for name in ("p1", "p2", "p3", "target")},
     )

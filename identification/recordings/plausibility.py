@@ -316,16 +316,27 @@ def _pressures(
     rise = most["p2"] - p2
     if fall > 0.35 and p2 < NEARLY_VENTED * ambient and rise < 2 * margin:
         yield f"p2 rises by only {rise:.2g} bar from {p2:.4g}, although the valve opens"
-    discharges = _discharges(signals["p3"], on, ambient)
+    yield from gauge_contradiction(signals["p3"], on, ambient)
+
+
+def gauge_contradiction(
+    p3: NDArray, on: NDArray, ambient: float, least: int = LEAST_DISCHARGE
+) -> Iterator[str]:
+    """What shows that p3 is gauge pressure, if anything does.
+
+    p3: (samples,) [bar]. on: whether the coil is, boolean (samples,). ambient: p_env [bar absolute].
+    least: samples of a discharge that counts.
+    """
+    discharges = _discharges(p3, on, ambient, least)
     if discharges:
         # Whole discharges and their late parts must agree: a slow sensor bends the beginning.
         late = [slice((2 * part.start + part.stop) // 3, part.stop) for part in discharges]
-        ends = [_median_end(signals["p3"], parts) for parts in (discharges, late)]
+        ends = [_median_end(p3, parts) for parts in (discharges, late)]
         if all(abs(end + ambient) < GAUGE_LIKENESS * ambient for end in ends):
             yield f"p3 vents towards {ends[0]:.2f} bar, and choked flow leads towards 0 bar absolute"
 
 
-def _discharges(p3: NDArray, on: NDArray, ambient: float) -> list[slice]:
+def _discharges(p3: NDArray, on: NDArray, ambient: float, least: int = LEAST_DISCHARGE) -> list[slice]:
     """Samples, from each switching-off, in which p3 (samples,) [bar] falls far through choked flow."""
     found = []
     for first, last in pairwise([0, *(np.flatnonzero(np.diff(on)) + 1), len(p3)]):
@@ -334,7 +345,7 @@ def _discharges(p3: NDArray, on: NDArray, ambient: float) -> list[slice]:
             continue
         inside = first + np.flatnonzero(falling)
         part = slice(int(inside[0]), int(inside[-1]) + 1)
-        long = part.stop - part.start >= LEAST_DISCHARGE
+        long = part.stop - part.start >= least
         if long and p3[part.stop - 1] < (1 - LEAST_FALL) * p3[part.start]:
             found.append(part)
     return found

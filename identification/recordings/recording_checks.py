@@ -67,7 +67,7 @@ def check_recording(
     check_rate(file, period)
     _check_length(file, len(columns["U_V"]), role, period)
     for name, sensor in sensors.items():
-        _check_range(file, name, columns[name], sensor)
+        check_range(file, name, columns[name], sensor)
         # A vented chamber in coarse steps stays at the low end.
         vented = name in steps and abs(ambient_bar - sensor.low) <= _margin(sensor)
         _check_rail(file, name, columns[name], sensor, period, low_end=not vented)
@@ -98,7 +98,7 @@ def _check_length(file: str, samples: int, role: str, period: float) -> None:
         )
 
 
-def _check_range(file: str, name: str, values: NDArray, sensor: Sensor) -> None:
+def check_range(file: str, name: str, values: NDArray, sensor: Sensor) -> None:
     """Values lie in Table 1's range, but for the accuracy."""
     margin = _margin(sensor) + 1e-9
     outside = (values < sensor.low - margin) | (values > sensor.high + margin)

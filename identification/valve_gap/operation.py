@@ -31,6 +31,7 @@ from identification.gap.search.screening import simulate_signatures
 from identification.recordings.log_files import Log, read_log
 from identification.recordings.openings import drive_of, evenly, openings, start_of
 from identification.recordings.recording import OUTPUTS, Campaign, campaign_facts
+from identification.recordings.rules import RULES, rules_of
 from identification.replay.replay import FLOW_RAMP, FLOW_SHIFT
 from identification.valve_gap.diagnose import (
     JOURNAL,
@@ -74,7 +75,7 @@ def diagnose_log(
     """
     began = perf_counter()
     described = load_plant(plant) if plant else Plant.calibrated()
-    log = read_log(folder)
+    log = read_log(folder, rules_of(described) if plant else RULES)
     campaign, steady = steady_openings(log, described)
     valve = LoggedValve(campaign, described, steady, without)
     journal = Journal(out / JOURNAL, subject(valve, without, {}))

@@ -155,7 +155,7 @@ def test_without_pygame_the_remedy_is_named(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setitem(sys.modules, "pygame", None)
     renderer = Renderer("rgb_array", fps=60)
     with pytest.raises(
-        gymnasium.error.DependencyNotInstalled, match=r"pip install 'epv-valve\[render\]'"
+        gymnasium.error.DependencyNotInstalled, match=r"pip install -e '\.\[render\]'"
     ):
         renderer.draw(SHUT)
 

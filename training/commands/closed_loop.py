@@ -15,6 +15,7 @@ from epv_env.common.files import decoded
 from epv_env.plant.plantfile import load_plant
 from identification.gap.report.gap_json import GAP
 from identification.recordings.log_files import read_log
+from identification.recordings.rules import RULES, rules_of
 from training.closed_loop import ClosedLoop
 from training.evaluation.named import HELP, named_controllers
 
@@ -43,7 +44,8 @@ def run(options: argparse.Namespace) -> None:
 
     given = load_plant(options.plant)
     named, _ = named_controllers([options.controller], given)
-    loop = ClosedLoop(read_log(options.log), given, next(iter(named.values())))
+    log = read_log(options.log, rules_of(given) if options.plant else RULES)
+    loop = ClosedLoop(log, given, next(iter(named.values())))
     found = diagnose_log(
         options.log, options.out, plant=options.plant, without=options.without, seed=options.seed,
         more=loop.sections,

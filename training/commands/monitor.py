@@ -26,6 +26,7 @@ from epv_env.common.command_line import (
 from epv_env.common.units import BAR
 from epv_env.plant.plantfile import load_plant
 from identification.recordings.log_files import Log, read_log
+from identification.recordings.rules import RULES, rules_of
 from training.evaluation.plots import save_figure
 from training.monitoring import monitor_model
 
@@ -55,10 +56,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Write the monitor and its picture, and say what it found. Raises ValueError."""
-    log = read_log(options.log)
+    plant = load_plant(options.plant)
+    log = read_log(options.log, rules_of(plant) if options.plant else RULES)
     log.check_period(Monitor.period, "the monitor counts periods of")
     if options.model is None:
-        model = monitor_model(load_plant(options.plant), valves=options.valves, seed=options.seed)
+        model = monitor_model(plant, valves=options.valves, seed=options.seed)
         model.save(options.out / MODEL)
     else:
         model = MonitorModel.load(options.model)

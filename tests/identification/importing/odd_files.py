@@ -111,6 +111,10 @@ READ: dict[str, Callable[[Path, Recording], Path]] = {
     "units in brackets twice": lambda at, r: rows(
         at.with_suffix(".csv"), r, [BRACKETED.replace("bar", "bar(a)")]
     ),
+    "units of gauge pressure with a dot": lambda at, r: text(
+        at.with_suffix(".csv"),
+        {n: (v - 1.0, "bar rel.") if u == "bar" else (v, u) for n, (v, u) in columns_of(r).items()},
+    ),
     "TDMS without an offset": lambda at, r: waveforms(at, r, wf_increment=r.period),
     "TDMS in ms": lambda at, r: waveforms(
         at, r, wf_increment=1e3 * r.period, wf_start_offset=0.0, wf_xunit_string="ms"
@@ -189,6 +193,14 @@ def coarse(at: Path, true: Recording) -> Path:
     return text(at.with_suffix(".csv"), {**columns_of(true), "time": (np.round(true.time, 3), "s")})
 
 
+def times_of_day(at: Path, true: Recording) -> Path:
+    head, *lines = rows(at.with_suffix(".csv"), true, ["Date;" + BRACKETED]).read_text().splitlines()
+    return written(
+        at.with_suffix(".csv"),
+        "\n".join([head, *(f"01.03.2026;10:00:0{line}" for line in lines if line)]).replace(".", ","),
+    )
+
+
 REFUSED: dict[str, tuple[Callable[[Path, Recording], Path], str]] = {
     "a cut last line": (
         lambda at, r: rows(at.with_suffix(".csv"), r, [BRACKETED], last="0.65;0.44;18.9"),
@@ -198,6 +210,11 @@ REFUSED: dict[str, tuple[Callable[[Path, Recording], Path], str]] = {
         lambda at, r: rows(at.with_suffix(".csv"), r, [BRACKETED], last="\nstopped by operator\n"),
         r"line \d+ has not the 6 numbers of the lines above: delete it",
     ),
+    "LabVIEW text with several columns of times": (
+        lambda at, r: rows(at.with_suffix(".lvm"), r, ["X_Value\tI\tX_Value\tp1\tp2\tp3"], sep="\t"),
+        "'X_Value' stands 2 times: write it with one column of times",
+    ),
+    "times of day in a column": (times_of_day, "times of day .*: put date and time into one column"),
     "times of too few digits": (coarse, "time does not increase after .*: print it with more digits"),
     "a text called MDF": (
         lambda at, r: written(at.with_suffix(".mf4"), "a text"),

@@ -153,5 +153,7 @@ def test_wrong_inputs_are_refused_and_nothing_written(bench, tmp_path):
 def test_a_missing_package_is_named_in_one_sentence(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "asammdf", None)
     (tmp_path / "a.mf4").write_bytes(b"MDF     4.10")
-    with pytest.raises(ImportingError, match=r"need the package asammdf.*epv-valve\[bench-files\]"):
+    with pytest.raises(
+        ImportingError, match=r"need the package asammdf.*pip install -e '\.\[bench-files\]'"
+    ):
         import_campaign([tmp_path / "a.mf4"], tmp_path / "out")

@@ -12,7 +12,7 @@ from epv_env.plant.parameters import Parameters
 from identification.bench.programmes import REPORT_SUITE
 from identification.bench.session import run_bench
 from identification.importing.binary_files import ALL_INVALID
-from identification.importing.import_campaign import read_files, read_source
+from identification.importing.import_campaign import read_files, read_source, source_table
 from identification.importing.mapping_file import ChannelEntry, MappingFile
 from identification.importing.source_file import ImportingError
 from tests.identification.importing.dialects import columns_of, text
@@ -61,7 +61,41 @@ def test_readings_that_a_format_marks_as_invalid_are_missing(true, write, tmp_pa
     path = write(tmp_path / "run", true)
     channel = next(c for c in read_source(path).channels if c.name.startswith("p2"))
     assert np.count_nonzero(np.isnan(channel.values)) == 31
-    with pytest.raises(ImportingError, match=r"no samples from .* a gap is not filled"):
+    with pytest.raises(ImportingError, match=r"31 readings are empty or .* is not filled$"):
+        read_files([path], ambient_bar=1.0)
+
+
+def test_a_file_that_was_cut_within_its_last_cell_loses_that_line(true, tmp_path):
+    path = text(tmp_path / "run.csv", columns_of(true))
+    whole = path.read_text()
+    for cut, lost in ((0, 0), (1, 0), (4, 1), (10, 1)):
+        path.write_text(whole[: len(whole) - cut])
+        made = read_files([path], ambient_bar=1.0)
+        assert len(made.campaign.recordings[0]) == len(true) - lost
+        said = f"line {len(true) + 1} is cut off in its last cell and left out" in source_table(
+            made.files[0].source
+        )
+        assert said == bool(lost)
+
+
+def test_all_names_of_two_groups_are_in_one_mapping(true, tmp_path):
+    from nptdms import ChannelObject, TdmsWriter
+
+    with TdmsWriter(tmp_path / "run.tdms") as writer:
+        for group in ("first", "second"):
+            for name, (values, unit) in columns_of(true).items():
+                given = {"unit_string": unit}
+                writer.write_segment([ChannelObject(group, name, values, properties=given)])
+    with pytest.raises(ImportingError, match="p2 may be 'first/p2' or 'second/p2'") as error:
+        read_files([tmp_path / "run.tdms"], ambient_bar=1.0)
+    (tmp_path / "map.json").write_text(str(error.value).partition(" such as ")[2])
+    made = read_files([tmp_path / "run.tdms"], mapping=tmp_path / "map.json", ambient_bar=1.0).campaign
+    np.testing.assert_allclose(made.recordings[0].p2, true.p2, rtol=0, atol=1e-6)
+
+
+def test_a_matrix_without_names_needs_its_times_in_the_mapping(true, tmp_path):
+    path = mat5(tmp_path / "run", {"ans": [values for values, _ in columns_of(true).values()]})
+    with pytest.raises(ImportingError, match=r'"time": \{"source": "NAME", "unit": "s"\}'):
         read_files([path], ambient_bar=1.0)
 
 

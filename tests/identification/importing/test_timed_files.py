@@ -8,11 +8,11 @@ import pytest
 from epv_env.plant.parameters import Parameters
 from identification.bench.programmes import REPORT_SUITE
 from identification.bench.session import run_bench
-from identification.importing.import_campaign import read_files
+from identification.importing.import_campaign import import_text, read_files
 from identification.importing.source_file import ImportingError, points_in_time, seconds
 from identification.recordings.campaign_files import read_campaign
 from identification.recordings.recording import CHANNELS
-from tests.identification.importing.dialects import text
+from tests.identification.importing.dialects import columns_of, text
 from tests.identification.importing.round_trip import assert_same_recordings, import_campaign
 from tests.identification.importing.timed_files import (
     LEAD,
@@ -42,13 +42,55 @@ def test_every_kind_of_time_gives_the_campaign_back(bench, kind, tmp_path):
 def test_channels_of_two_rates_come_to_the_slower_one(bench, kind, tmp_path):
     files = [TWO_RATES[kind](tmp_path / r.name, r) for r in bench.recordings]
     imported = import_campaign(files, tmp_path / "campaign", ambient_bar=1.0)
-    assert set(imported.files[0].gridded.resampled) == {"I", "U"}
+    assert imported.files[0].gridded.resampled == ("I",)
+    assert imported.files[0].gridded.held == ("U",)
     for made, true in zip(
         read_campaign(tmp_path / "campaign").recordings, bench.recordings, strict=True
     ):
         assert made.period == 2 * true.period
-        for name in ("p1", "p2", "p3"):
-            np.testing.assert_allclose(made.channel(name), true.channel(name)[::2], rtol=0, atol=1.0)
+        for name in ("U", "p1", "p2", "p3"):
+            atol = 1e-5 if name == "U" else 1.0
+            np.testing.assert_allclose(made.channel(name), true.channel(name)[::2], rtol=0, atol=atol)
+
+
+def jittering(path, true, size):
+    """The recording at times that are off by up to `size` [s], imported."""
+    columns = columns_of(true)
+    off = np.random.default_rng(2).uniform(-size, size, len(true))
+    return read_files([text(path, {**columns, "time": (true.time + off, "s")})], ambient_bar=1.0)
+
+
+@pytest.mark.parametrize("size", [5e-7, 4e-6])
+def test_times_within_rounding_of_the_grid_leave_every_value_as_it_is(bench, size, tmp_path):
+    true = bench.recordings[0]
+    made, plain = (jittering(tmp_path / "a.csv", true, each) for each in (size, 0.0))
+    assert made.files[0].gridded.resampled == made.files[0].gridded.held == ()
+    assert made.campaign.recordings[0].period == true.period
+    for name in CHANNELS:
+        same = plain.campaign.recordings[0].channel(name)
+        np.testing.assert_array_equal(made.campaign.recordings[0].channel(name), same)
+
+
+def test_a_voltage_at_jittering_times_is_held_and_the_rest_said_to_be_filtered(bench, tmp_path):
+    made = jittering(tmp_path / "a.csv", bench.recordings[0], 1e-4)
+    U = made.campaign.recordings[0].U
+    assert np.all(np.isin(U, made.files[0].channels[1].values))  # no value between or beyond
+    shown = import_text(made)
+    assert "I, p1, p2, p3: other times than the file's, low-pass filtered" in shown
+    assert "U: other times than the file's, each sample is the last entry before it" in shown
+
+
+def test_a_command_logged_on_change_holds_from_one_entry_to_the_next(bench, tmp_path):
+    true = bench.recordings[0]
+    U = np.where(true.energised, 24.0, 0.0)
+    kept = np.concatenate([[True], np.diff(U) != 0.0])
+    assert np.count_nonzero(kept) > 2
+    columns = {**columns_of(true), "U": (np.where(kept, U, np.nan), "V")}
+    path = text(tmp_path / "a.csv", columns)
+    path.write_text(path.read_text().replace("nan", ""))
+    made = read_files([path], ambient_bar=1.0)
+    np.testing.assert_array_equal(made.campaign.recordings[0].U, U)
+    np.testing.assert_allclose(made.campaign.recordings[0].p3, true.p3, rtol=0, atol=1.0)
 
 
 @pytest.mark.parametrize("waveform", [False, True])

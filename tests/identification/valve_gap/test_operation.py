@@ -131,3 +131,74 @@ def test_a_log_is_refused_in_a_sentence(healthy, tmp_path):
         (copy / "drive-1.csv").write_text(change((healthy / "drive-1.csv").read_text()))
         with pytest.raises(CampaignError, match=told):
             read_log(copy)
+
+
+def scaled(column, factor, offset=0.0):
+    """The text of a drive with factor × reading + offset in a column."""
+
+    def change(text):
+        head, *lines = text.splitlines()
+        at = head.split(",").index(column)
+        cells = [line.split(",") for line in lines]
+        rows = [[*c[:at], repr(factor * float(c[at]) + offset), *c[at + 1 :]] for c in cells]
+        return "\n".join([head, *(",".join(row) for row in rows)]) + "\n"
+
+    return change
+
+
+def gauge(text):
+    for column in ("p1_bar", "p2_bar", "p3_bar"):
+        text = scaled(column, 1.0, -1.0)(text)
+    return text
+
+
+def one_wild(text):
+    return text.replace(",24.00,", ",1e300,", 1)
+
+
+@pytest.fixture(scope="module")
+def often_opened(tmp_path_factory):
+    """The log of a drive with an opening of 100 ms each 300 ms."""
+    folder = tmp_path_factory.mktemp("opened") / "log"
+    env = OperationLog(gymnasium.make("EPValve-v0", scenario="none", p2_bar=8.0), folder)
+    env.reset(seed=1)
+    for k in range(1000):
+        env.step(int(k % 60 >= 20))
+    env.close()
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (scaled("p2_bar", 100.0), "p2_bar looks like kPa: give bar absolute"),
+        (gauge, "p3 vents towards -.* p1_bar, p2_bar and p3_bar look like gauge"),
+        (scaled("p3_bar", 1.0, -1.0), "p3_bar looks like gauge pressure"),
+        (scaled("U_supply_V", 1e300), "6 to 32.32 V are usual: check unit, sign"),
+        (scaled("I_A", -1.0), "I_A looks like a current with its sign flipped"),
+        (scaled("I_A", 0.0, -1.0), "line 2?[0-9]+: .*and coils have 8 to 220 ohm"),
+        (one_wild, r"drive-1.csv, line 2: U_supply_V is 1e\+300, outside the sensor's range"),
+    ],
+)  # fmt: skip
+def test_readings_that_no_valve_shows_are_refused(change, told, often_opened, tmp_path):
+    (tmp_path / "log.json").write_text((often_opened / "log.json").read_text())
+    (tmp_path / "drive-1.csv").write_text(change((often_opened / "drive-1.csv").read_text()))
+    with pytest.raises(CampaignError, match=told):
+        read_log(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"drives": [{"file": "drive-1.csv"}] * 2}, "drives names drive-1.csv twice"),
+        ({"control_period_s": 0.0}, "states a control period of 0 s"),
+        ({"environment": {"temperature_K": 0.0, "pressure_bar": 1.0}}, "temperature_K is 0.0"),
+    ],
+)
+def test_a_manifest_that_cannot_be_is_refused(change, told, often_opened, tmp_path):
+    assert len(read_log(often_opened).drives) == 1
+    content = json.loads((often_opened / "log.json").read_text()) | change
+    (tmp_path / "log.json").write_text(json.dumps(content))
+    (tmp_path / "drive-1.csv").write_text((often_opened / "drive-1.csv").read_text())
+    with pytest.raises(CampaignError, match=told):
+        read_log(tmp_path)
