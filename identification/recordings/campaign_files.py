@@ -35,7 +35,9 @@ DECIMALS = {
 """Decimals written: a hundredth of an ADC step or less, and any rate's times as uniform."""
 
 
-class _Environment(msgspec.Struct):
+class Environment(msgspec.Struct):
+    """Field `environment` of campaigns and logs."""
+
     temperature_K: float
     pressure_bar: float
 
@@ -50,7 +52,7 @@ class _Manifest(msgspec.Struct):
 
     format: str
     name: str
-    environment: _Environment
+    environment: Environment
     recordings: list[_Entry]
 
 
@@ -62,7 +64,7 @@ def read_campaign(folder: str | PathLike[str], rules: RecordingRules = RULES) ->
         manifest = read_json(folder / FILE_NAME, _Manifest, version=FORMAT, remedy=remedy)
     except JSONFileError as error:
         raise CampaignError(str(error)) from None
-    temperature, pressure = _ambient(folder, manifest)
+    temperature, pressure = ambient(folder / FILE_NAME, manifest.environment)
     roles = _roles(folder, manifest)
     files = {path: _read_file(path) for path in roles}
     steps = column_steps([columns for _, columns in files.values()], rules)
@@ -114,7 +116,7 @@ def check_campaign(campaign: Campaign, folder: Path) -> list[tuple[Recording, di
     """
     check_vacant(folder)
     manifest = _manifest(campaign)
-    _ambient(folder, manifest)
+    ambient(folder / FILE_NAME, manifest.environment)
     _roles(folder, manifest)
     written = [(recording, _columns(recording)) for recording in campaign.recordings]
     for recording, columns in written:
@@ -130,23 +132,25 @@ def _manifest(campaign: Campaign) -> _Manifest:
     return _Manifest(
         format=FORMAT,
         name=campaign.name,
-        environment=_Environment(float(campaign.temperature), float(campaign.pressure / BAR)),
+        environment=Environment(float(campaign.temperature), float(campaign.pressure / BAR)),
         recordings=[
             _Entry(f"{recording.name}.csv", recording.role) for recording in campaign.recordings
         ],
     )
 
 
-def _ambient(folder: Path, manifest: _Manifest) -> tuple[float, float]:
-    """Temperature [K] and pressure [Pa], inside the domains of the plant's parameters."""
+def ambient(path: Path, environment: Environment) -> tuple[float, float]:
+    """Temperature [K] and pressure [Pa] in a file, inside the domains of the plant's parameters.
+
+    Raises CampaignError.
+    """
     values = []
     for name, symbol, unit in (("temperature_K", "T_env", 1.0), ("pressure_bar", "p_env", BAR)):
-        value = getattr(manifest.environment, name)
+        value = getattr(environment, name)
         try:
             values.append(checked_value(symbol, round(value * unit, 6)))  # 1.1 * 1e5 is above 110000
         except ParameterError as error:
-            place = f"{folder / FILE_NAME}, environment"
-            raise CampaignError(f"{place}: {name} is {value!r}: {error}") from None
+            raise CampaignError(f"{path}, environment: {name} is {value!r}: {error}") from None
     return values[0], values[1]
 
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from epv_env.common.files import JSONFileError, read_bytes, read_json
 from epv_env.common.units import BAR
 from epv_env.operation_log import DECIMALS, FILE_NAME, FORMAT
+from identification.recordings.campaign_files import Environment, ambient
 from identification.recordings.columns import read_named_columns, sampling_period
 from identification.recordings.recording import CampaignError
 
@@ -62,11 +64,6 @@ class Log:
             )
 
 
-class _Environment(msgspec.Struct):
-    temperature_K: float
-    pressure_bar: float
-
-
 class _Entry(msgspec.Struct):
     file: str
 
@@ -74,8 +71,8 @@ class _Entry(msgspec.Struct):
 class _Manifest(msgspec.Struct):
     format: str
     name: str
-    control_period_s: float
-    environment: _Environment
+    control_period_s: Annotated[float, msgspec.Meta(gt=0)]
+    environment: Environment
     drives: list[_Entry]
 
 
@@ -89,10 +86,11 @@ def read_log(folder: str | PathLike[str]) -> Log:
         raise CampaignError(str(error)) from None
     if not manifest.drives:
         raise CampaignError(f"{folder / FILE_NAME}: drives is empty: name at least one file")
+    temperature, pressure = ambient(folder / FILE_NAME, manifest.environment)
     return Log(
         name=manifest.name,
-        temperature=manifest.environment.temperature_K,
-        pressure=manifest.environment.pressure_bar * BAR,
+        temperature=temperature,
+        pressure=pressure,
         period=manifest.control_period_s,
         drives=tuple(_drive(folder, entry.file, manifest.control_period_s) for entry in manifest.drives),
     )

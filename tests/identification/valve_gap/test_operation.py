@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from dataclasses import replace
 
 import gymnasium
@@ -131,3 +132,21 @@ def test_a_log_is_refused_in_a_sentence(healthy, tmp_path):
         (copy / "drive-1.csv").write_text(change((healthy / "drive-1.csv").read_text()))
         with pytest.raises(CampaignError, match=told):
             read_log(copy)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('"control_period_s": 0.005', '"control_period_s": 0', "control_period_s: .*> 0"),
+        ('"temperature_K": 293.0', '"temperature_K": 0', "environment: temperature_K is 0"),
+        ('"temperature_K": 293.0', '"temperature_K": 1e300', "environment: temperature_K is 1e"),
+        ('"pressure_bar": 1.0', '"pressure_bar": 0', "environment: pressure_bar is 0"),
+    ],
+)
+def test_a_log_of_no_period_or_no_air_is_refused(old, new, told, healthy, tmp_path):
+    shutil.copytree(healthy, tmp_path / "log")
+    manifest = tmp_path / "log" / "log.json"
+    assert old in manifest.read_text()
+    manifest.write_text(manifest.read_text().replace(old, new))
+    with pytest.raises(CampaignError, match=told):
+        read_log(tmp_path / "log")
