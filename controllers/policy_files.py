@@ -18,7 +18,7 @@ from safetensors.numpy import load, save
 
 from controllers.knowledge import RULES
 from controllers.valve_learner import LEARNT
-from epv_env.common.files import JSONFileError, read_bytes, read_json, write_bytes, write_json
+from epv_env.common.files import JSONFileError, digest, read_bytes, read_json, write_bytes, write_json
 from epv_env.observation import LAYOUT, contract
 
 FORMAT = "epv-policy/2"
@@ -142,6 +142,11 @@ def learnt_contract() -> list[dict[str, Any]]:
 def holds_policy(folder: Path) -> bool:
     """Whether a policy has been written into a folder: its contract is written last."""
     return (folder / CONTRACT_FILE).exists()
+
+
+def policy_digest(folder: Path) -> str:
+    """Of all that a policy's folder says: results of another policy have another digest."""
+    return digest(read_bytes(folder / CONTRACT_FILE) + read_bytes(folder / WEIGHTS_FILE))
 
 
 def write_policy(

@@ -40,6 +40,13 @@ class Range:
         least = self.low if self.least is None else self.least
         return least, self.high if self.most is None else self.most
 
+    def __str__(self) -> str:
+        return "a number from {:g} to {:g}".format(*self.limits)
+
+    def holds(self, value: float) -> bool:
+        """Whether a value lies within the limits."""
+        return self.limits[0] <= value <= self.limits[1]
+
     def widened(self, value: float) -> "Range":
         """The range for another search, if one ended at `value`; itself if that is not at a bound.
 
@@ -61,6 +68,13 @@ class Choice:
     """A quantity of a search space that takes one of a few values."""
 
     values: tuple[Any, ...]
+
+    def __str__(self) -> str:
+        return f"one of {', '.join(map(str, self.values))}"
+
+    def holds(self, value: Any) -> bool:
+        """Whether a value is one of them."""
+        return value in self.values
 
 
 SearchSpace = Mapping[str, Range | Choice]
@@ -91,7 +105,7 @@ class Registration:
             plant: that it is designed for: parameters and voltage of the coil.
 
         Raises:
-            RegistrationError: a quantity is missing or unknown.
+            RegistrationError: a quantity is missing, unknown or beyond its limits.
             ValueError: the quantities contradict each other.
         """
         expected = set(self.search_space or {})
@@ -102,5 +116,11 @@ class Registration:
                     f"controller {self.kind!r} {problem} {', '.join(sorted(names))}: its search space "
                     "and its tuned values must name the same quantities; tune anew with "
                     f"`epv tune --only {self.kind!r}`"
+                )
+        for name, quantity in (self.search_space or {}).items():
+            if not quantity.holds(values[name]):
+                raise RegistrationError(
+                    f"controller {self.kind!r}: {name} = {values[name]} has no meaning: give "
+                    f"{quantity}, or tune anew with `epv tune --only {self.kind!r}`"
                 )
         return self.build(values, plant)

@@ -89,15 +89,22 @@ class PWM:
         return on_time, duty
 
 
+def check_unmasked(actions: Any) -> None:
+    """Raises ActionError for a mask: NumPy would drop it, and keep what is under it."""
+    parts = actions if isinstance(actions, (list, tuple)) else [actions]
+    if any(map(np.ma.isMaskedArray, parts)):
+        raise ActionError(f"actions {shown(actions)}: give one number for each valve, no mask")
+
+
 def _numbers(actions: Any) -> NDArray:
     """Actions (n,) or (n, 1) of any real type as float64, (n,). Raises ActionError."""
+    check_unmasked(actions)
     try:
         found = np.asarray(actions)
     except ValueError:  # of several lengths
         found = np.empty(0, dtype=object)
-    usable = found.dtype.kind in "biuf" and found.ndim in (1, 2) and found.size == len(found)
-    if not usable or isinstance(actions, np.ma.MaskedArray):
-        raise ActionError(f"actions {shown(actions)}: give one number for each valve, no mask")
+    if not (found.dtype.kind in "biuf" and found.ndim in (1, 2) and found.size == len(found)):
+        raise ActionError(f"actions {shown(actions)}: give one number for each valve")
     return found.astype(np.float64).reshape(len(found))
 
 

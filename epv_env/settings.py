@@ -1,6 +1,6 @@
 """What a user may write for an environment's arguments, and the settings that they become."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from os import PathLike
@@ -249,12 +249,13 @@ ARGUMENTS = (
 """What an environment takes; see `EPValveEnv`."""
 
 
-def make_settings(plant: Plant, **options: Any) -> Settings:
+def make_settings(plant: Plant, *, others: Collection[str] = (), **options: Any) -> Settings:
     """Settings from what a user writes, an environment's arguments but the first three of ARGUMENTS.
 
-    Raises OptionError for an unknown argument, or another ValueError for what cannot be used.
+    others: arguments that the environment takes beside ARGUMENTS. Raises OptionError for an unknown
+    argument, or another ValueError for what cannot be used.
     """
-    check_known("argument", options, ARGUMENTS)
+    check_known("argument", options, (*ARGUMENTS, *others))
     region = as_region(options.pop("parameters", "exact"), plant)
     weights = as_weights(options.pop("weights", None), options.pop("band_bar", None))
     if options.get("supply_voltage") is None:

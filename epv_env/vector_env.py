@@ -19,6 +19,11 @@ from epv_env.task import LimitingTask
 
 MOST_ENVS = 1_000_000
 """Valves of a batch: more are a slip, and would fill the memory."""
+BATCH = (
+    "num_envs", "max_episode_steps", "autoreset_mode", "threads", "device", "to_host", "starts",
+    "precision",
+)  # fmt: skip
+"""What a batch takes beside the arguments of one environment; the last four: `make_vector`."""
 _MASKS = tuple(f"_{key}" for key in KEYS)
 
 
@@ -86,7 +91,7 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         period = self.action_form.default_period if control_period is None else control_period
         self.plant = as_plant(plant)
-        self.settings = make_settings(self.plant, control_period=period, **options)
+        self.settings = make_settings(self.plant, others=BATCH, control_period=period, **options)
         self.num_envs = num_envs
         self.max_episode_steps: Any = _checked_limit(max_episode_steps, num_envs)
         self.render_mode = None

@@ -20,6 +20,7 @@ from types import FrameType
 
 from epv_env.common.compilation import announce_compilation
 from epv_env.common.extras import missing_package
+from epv_env.common.files import check_writable
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
@@ -121,6 +122,10 @@ def writable_file(text: str) -> Path:
     writable_folder(str(path.parent))
     if path.is_dir():
         raise argparse.ArgumentTypeError(f"{path} is a folder: give the name of a file")
+    try:
+        check_writable(path)
+    except OSError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
     return path
 
 
@@ -165,6 +170,8 @@ SEED = Number(int, 0, 2**32 - 1)
 """What NumPy's and torch's generators take."""
 SECONDS = Number(float, 1e-6, 3600.0)
 """Length of an episode [s]: the figures of a longer one than an hour fill the memory."""
+JUDGED_SECONDS = Number(float, 0.55, SECONDS.high)
+"""Length of an episode whose pressures are judged [s]: they count from 0.5 s on."""
 
 
 def add_out(
@@ -207,7 +214,7 @@ def add_device(parser: argparse.ArgumentParser, *, help: str) -> None:
 
 def add_episodes(parser: argparse.ArgumentParser) -> None:
     """Add --duration, --seed, --plant, --workers and --device of the episodes that are compared."""
-    parser.add_argument("--duration", type=SECONDS, default=10.0, help="of an episode [s]")
+    parser.add_argument("--duration", type=JUDGED_SECONDS, default=10.0, help="of an episode [s]")
     add_seed(parser, help="of the first episode, within its range")
     add_plant(parser)
     add_workers(parser)

@@ -1,25 +1,39 @@
 """Files: written whole or not at all; JSON read with one sentence for each way to be wrong."""
 
 import errno
+import hashlib
 import json
 import math
 import os
 import re
+import secrets
 import stat
-import tempfile
 import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from os import PathLike
 from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
 
+LARGEST_FILE = 2**30
+"""Size of the largest file that is read [bytes]: half an hour of the bench at 20 kHz as text."""
+
 
 def read_bytes(path: Path) -> bytes:
     """The content of a regular file. Raises OSError, also for a pipe or a device, which could block."""
-    if not stat.S_ISREG(path.stat().st_mode):
+    found = path.stat()
+    if not stat.S_ISREG(found.st_mode):
         raise OSError(errno.EINVAL, "no regular file", str(path))
+    if found.st_size > LARGEST_FILE:
+        raise OSError(errno.EFBIG, f"larger than {LARGEST_FILE:,} bytes", str(path))
     return path.read_bytes()
+
+
+def digest(content: bytes) -> str:
+    """Sixteen digits that differ for different content."""
+    return hashlib.sha256(content).hexdigest()[:16]
 
 
 def write_text(path: Path, text: str) -> None:
@@ -28,20 +42,45 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """`write_text` for bytes. Raises OSError with the path, also where the disk is full."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    """`write_text` for bytes. A new file has the mode that the umask leaves; another keeps its own.
+
+    Raises OSError with the path, also where the disk is full; see `check_writable`.
+    """
+    check_writable(path)
+    target = Path(os.path.realpath(path))  # a link stays one
+    temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
     try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(content)
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
+        with _named(path):
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with temporary.open("xb") as stream:
+                if target.exists():
+                    os.fchmod(stream.fileno(), stat.S_IMODE(target.stat().st_mode))
+                stream.write(content)
+            os.replace(temporary, target)
+    finally:
+        with suppress(OSError):
+            temporary.unlink()
+
+
+def check_writable(path: Path) -> None:
+    """Raises OSError unless there is nothing at the path, or a regular file that may be written."""
+    with _named(path):
+        if not path.exists():
+            return
+        mode = path.stat().st_mode
+        if not stat.S_ISREG(mode):
+            raise OSError(errno.EINVAL, "what is there is no regular file: give another name")
+        if not mode & 0o222 or not os.access(path, os.W_OK):  # root may write whatever the mode says
+            raise OSError(errno.EACCES, "the file is read-only: give another name, or chmod it")
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Give the system's errors the path of what is written: that of a full disk has none."""
+    try:
+        yield
     except OSError as error:
-        os.unlink(temporary)
         raise OSError(error.errno, f"cannot write: {error.strerror or error}", str(path)) from None
-    except BaseException:
-        os.unlink(temporary)
-        raise
 
 
 Shape = TypeVar("Shape")
@@ -215,9 +254,19 @@ class Journal:
     def __len__(self) -> int:
         return len(self._found)
 
+    def read(self, name: str, as_shape: Callable[[Any], Shape]) -> Shape:
+        """A result as `as_shape` makes it. Raises ValueError if it is of another shape."""
+        try:
+            return as_shape(self._found[name])
+        except (AttributeError, KeyError, TypeError, ValueError):
+            raise ValueError(
+                f"{self.path}: the result {name!r} is of another shape: remove its line, and it is "
+                "computed again"
+            ) from None
+
     def add(self, name: str, result: Any) -> None:
         """Keep a result, JSON-ready; it is on the disk when this returns."""
-        with self.path.open("a", encoding="utf-8") as stream:
+        with _named(self.path), self.path.open("a", encoding="utf-8") as stream:
             line = {"name": name, "result": result, "check": _checksum(name, result)}
             stream.write(json.dumps(line) + "\n")
         self._found[name] = result

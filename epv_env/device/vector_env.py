@@ -8,6 +8,7 @@ from gymnasium.vector import AutoresetMode
 from numba import cuda
 from numba.core import config
 
+from epv_env.actions import check_unmasked
 from epv_env.common.extras import how_to_install
 from epv_env.common.field_types import shown
 from epv_env.device.kernels import THREADS, TRY_STEP, Batch, Results, restart, step_kernel
@@ -158,7 +159,8 @@ def blank_results(n: int) -> Results:
 
 
 def _flat(actions: Any, n: int) -> Any:
-    """Actions as an array of the device, (n,). Raises OptionError."""
+    """Actions as an array of the device, (n,). Raises ActionError or OptionError."""
+    check_unmasked(actions)
     on_device = hasattr(actions, "__cuda_array_interface__") and not SIMULATED
     array = cuda.as_cuda_array(actions) if on_device else cuda.to_device(np.ascontiguousarray(actions))
     if array.size != n:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from epv_env.common.extras import DISTRIBUTION
 from epv_env.common.field_types import check_type
 from epv_env.common.files import JSONFileError, checked, decoded, write_json
 from epv_env.plant.channels import SENSORS, Sensor, changed_fields, own_sensors
@@ -140,10 +142,10 @@ def _content(path: Path) -> _PlantFile:
         content = decoded(path, remedy=remedy, what="plant file", allow_nan=True)
     except JSONFileError as error:
         raise PlantFileError(str(error)) from None
-    version = content.get("format") if isinstance(content, dict) else None
-    if version != FORMAT:
+    found = content.get("format") if isinstance(content, dict) else None
+    if found != FORMAT:
         raise PlantFileError(
-            f"plant file {path} has format {version!r}, this version reads {FORMAT!r}: write it anew "
+            f"plant file {path} has format {found!r}, this version reads {FORMAT!r}: write it anew "
             "with this version's identification"
         )
     try:
@@ -154,6 +156,16 @@ def _content(path: Path) -> _PlantFile:
 
 def save_plant(plant: Plant, path: str | PathLike[str]) -> None:
     """Write a plant file, whole or not at all."""
+    write_json(path, {**_as_json(plant), "provenance": plant.provenance})
+
+
+def plant_subject(plant: Plant) -> dict[str, Any]:
+    """What results depend on, for a `Journal`: a plant but its provenance, and this version."""
+    return {"software": version(DISTRIBUTION), "plant": _as_json(plant)}
+
+
+def _as_json(plant: Plant) -> dict[str, Any]:
+    """The fields of a plant file, but where its values come from."""
     content: dict[str, Any] = {
         "format": FORMAT,
         "name": plant.name,
@@ -162,7 +174,6 @@ def save_plant(plant: Plant, path: str | PathLike[str]) -> None:
         "voltage_V": plant.voltage,
         "sensors": changed_fields(plant.sensors),
         "free": {symbol: _given(freedom) for symbol, freedom in plant.free.items()},
-        "provenance": plant.provenance,
     }
     if plant.diagnosis is not None:
         content["alternatives"] = [
@@ -170,7 +181,7 @@ def save_plant(plant: Plant, path: str | PathLike[str]) -> None:
             | _written(each.region.centre, each.region)
             for each in plant.diagnosis.alternatives
         ]
-    write_json(path, content)
+    return content
 
 
 def _written(parameters: Parameters, region: Region) -> dict[str, Any]:

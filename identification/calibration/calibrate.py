@@ -70,7 +70,7 @@ def calibrate(
 
     Args:
         journal: file of the finished searches.
-        subject: hashes of the recordings, so that a journal of other recordings is not used.
+        subject: of the plant, and hashes of the recordings: a journal of others is not used.
         starts: searches of each method.
         seed: of the starts.
     """

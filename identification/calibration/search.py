@@ -142,7 +142,7 @@ def search_from_all_starts(
         name = f"{method} {index}"
         if name not in journal:
             journal.add(name, searches[method](misfits[method], starts[index]).as_json())
-        searched[method].append(SearchResult.from_json(journal[name]))
+        searched[method].append(journal.read(name, SearchResult.from_json))
     return searched
 
 

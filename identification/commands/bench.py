@@ -4,10 +4,18 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from epv_env.common.command_line import NextStep, add_out, add_plant, add_seed, beside, plant_option
+from epv_env.common.command_line import (
+    NextStep,
+    add_out,
+    add_plant,
+    add_seed,
+    beside,
+    plant_option,
+    writable_file,
+)
 from epv_env.plant.effects.registry import CATALOGUE
-from epv_env.plant.parameters import written_value
-from epv_env.plant.plantfile import load_plant, save_plant
+from epv_env.plant.parameters import Parameters, written_value
+from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from epv_env.plant.region import Region
 from identification.bench.programmes import SUITES, at_voltage, load_programmes
 from identification.bench.session import run_bench
@@ -35,16 +43,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=SIZE",
         help="an effect (docs/explanation/effects.md)",
     )
-    parser.add_argument("--truth", type=Path, default=None, help="plant file to write the truth to")
+    parser.add_argument("--truth", type=writable_file, help="plant file to write the truth to")
 
 
 def run(options: argparse.Namespace) -> None:
     """Write the campaign. Raises ValueError for a wrong value, or a folder that holds a campaign."""
     check_vacant(options.out)
     plant = load_plant(options.plant)
-    own = plant.parameters.own_domains
-    true = {name: written_value(name, value, own) for name, value in _true_values(options).items()}
-    truth = plant.parameters.replace(**true)
+    truth = true_parameters(options, plant)
     if options.programme:
         programmes = load_programmes(options.programme, plant.sensors)
     else:
@@ -64,6 +70,13 @@ def next_step(options: argparse.Namespace) -> NextStep:
     """Calibrate the model on the campaign."""
     words = ("run", options.out, "--out", beside(options.out, "results"), *plant_option(options.plant))
     return NextStep("to calibrate the model on these recordings", words)
+
+
+def true_parameters(options: argparse.Namespace, plant: Plant) -> Parameters:
+    """The plant's parameters with what --set and --effect change. Raises ValueError."""
+    own = plant.parameters.own_domains
+    true = {name: written_value(name, value, own) for name, value in _true_values(options).items()}
+    return plant.parameters.replace(**true)
 
 
 def _true_values(options: argparse.Namespace) -> dict[str, float]:

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from epv_env.common.files import LARGEST_FILE
 from epv_env.common.units import BAR
 from identification.importing.binary_files import read_matlab, read_mdf, read_parquet, read_tdms
 from identification.importing.channels import MappedChannel, mapped_channels, supply_pair_mean
@@ -35,9 +36,6 @@ FORMATS = (
 
 A reader takes a path and returns the version or dialect, and the channels; it may raise ImportingError.
 """
-
-LARGEST_FILE = 2**30
-"""Size of the largest file that is read [bytes]: half an hour of the bench at 20 kHz as text."""
 
 USUAL_TEMPERATURE, USUAL_PRESSURE = 293.0, 1.0 * BAR
 """Ambient conditions that are assumed, and said to be, where nobody gives them [K, Pa absolute]."""

@@ -2,11 +2,10 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from importlib.metadata import version
 from pathlib import Path
 
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.plantfile import Plant
+from epv_env.plant.plantfile import Plant, load_plant, plant_subject
 from identification.calibration.calibrate import STARTS, Calibration, calibrate
 from identification.calibration.problem import CalibrationProblem, calibration_problem
 from identification.confidence.confidence import Confidence, assess_confidence
@@ -50,7 +49,7 @@ class Identification:
             self.problem,
             journal=self.journal,
             subject={
-                "software": version("epv-valve"),
+                **plant_subject(load_plant(self.plant)),
                 "recordings": {r.name: r.digest() for r in self.campaign.recordings},
             },
             starts=self.starts,

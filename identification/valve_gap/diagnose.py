@@ -16,7 +16,7 @@ from scipy.stats import chi2
 from epv_env.common.command_line import NextStep, beside, plant_option
 from epv_env.common.files import Journal
 from epv_env.plant.effects.law import knot_symbols
-from epv_env.plant.plantfile import Plant, load_plant, save_plant
+from epv_env.plant.plantfile import Plant, load_plant, plant_subject, save_plant
 from epv_env.plant.region import Alternative, Mixture, Region
 from identification.bench.programmes import at_voltage, save_programmes
 from identification.gap.diagnosis import Diagnosis, diagnose
@@ -236,9 +236,9 @@ def steps_on_stderr(began: float) -> Callable[[str], None]:
 def subject(valve: Valve, without: Sequence[str], noise: Mapping[str, float]) -> dict:
     """What the fits depend on."""
     return {
-        "software": version("epv-valve"),
+        **plant_subject(valve.plant),
         "recordings": {r.name: [r.role, r.digest()] for r in valve.recordings},
-        "nominal": {p.symbol: p.nominal for p in valve.parameters},
+        "nominal": dict(valve.base),
         "without": sorted(without),
         "noise": dict(noise),
     }

@@ -1,12 +1,17 @@
 """Files that cannot be what they claim: refused in one sentence, at once, and nothing half-written."""
 
+import argparse
 import json
 import os
 import resource
+import socket
+import stat
+from contextlib import contextmanager
 
 import msgspec
 import pytest
 
+from epv_env.common.command_line import writable_file
 from epv_env.common.files import Journal, JSONFileError, decoded, read_bytes, read_json, write_bytes
 
 REMEDY = "write it anew"
@@ -100,17 +105,80 @@ def test_pipes_and_devices_are_no_files(tmp_path):
         decoded("/dev/zero", remedy=REMEDY)
 
 
-def test_a_full_disk_is_named_and_leaves_no_part(tmp_path):
+@contextmanager
+def full_disk():
     """A limit on the size of files stands for the full disk: the system refuses to write on."""
-    path = tmp_path / "result"
-    path.write_bytes(b"before")
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
     try:
-        with pytest.raises(OSError, match=f"cannot write: .*{path}"):
-            write_bytes(path, bytes(10_000))
+        yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def test_a_journal_on_a_full_disk_is_named(tmp_path):
+    journal = Journal(tmp_path / "finished.jsonl", {})
+    with full_disk(), pytest.raises(OSError, match=f"cannot write: .*{journal.path}"):
+        journal.add("one", "x" * 10_000)
+
+
+def test_a_file_of_forty_gigabytes_is_refused_unread(tmp_path):
+    with (tmp_path / "sparse.json").open("wb") as stream:
+        stream.truncate(40 * 10**9)
+    with pytest.raises(JSONFileError, match=r"cannot read .*sparse\.json \(larger than .* bytes\)"):
+        decoded(tmp_path / "sparse.json", remedy=REMEDY)
+
+
+def fifo(path):
+    os.mkfifo(path)
+
+
+def listening(path):
+    with socket.socket(socket.AF_UNIX) as end:
+        end.bind(str(path))
+
+
+def device(path):
+    path.symlink_to("/dev/null")  # a node of its own takes root
+
+
+def read_only(path):
+    path.touch(mode=0o400)
+
+
+@pytest.mark.parametrize("make", [fifo, listening, device, read_only, os.mkdir])
+def test_only_a_regular_file_that_may_be_written_is_replaced(make, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # a socket's path is short
+    path = tmp_path / "out"
+    make(path.relative_to(tmp_path))
+    before = path.lstat()
+    with pytest.raises(OSError, match=f"cannot write: .*: .*{path}"):
+        write_bytes(path, b"new")
+    with pytest.raises(argparse.ArgumentTypeError):
+        writable_file(str(path))
+    assert (path.lstat().st_mode, path.lstat().st_ino) == (before.st_mode, before.st_ino)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_keeps_its_mode_and_a_new_one_follows_the_umask(tmp_path):
+    secret, new, link = (tmp_path / name for name in ("secret", "new", "link"))
+    secret.touch(mode=0o600)
+    link.symlink_to(secret)
+    before = os.umask(0o027)
+    try:
+        write_bytes(link, b"secret")
+        write_bytes(new, b"new")
+    finally:
+        os.umask(before)
+    assert (link.is_symlink(), secret.read_bytes()) == (True, b"secret")
+    assert [stat.S_IMODE(path.stat().st_mode) for path in (secret, new)] == [0o600, 0o640]
+
+
+def test_a_full_disk_is_named_and_leaves_no_part(tmp_path):
+    path = tmp_path / "result"
+    path.write_bytes(b"before")
+    with full_disk(), pytest.raises(OSError, match=f"cannot write: .*{path}"):
+        write_bytes(path, bytes(10_000))
     assert path.read_bytes() == b"before"
     assert [each.name for each in tmp_path.iterdir()] == ["result"]
 

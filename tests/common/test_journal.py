@@ -61,3 +61,14 @@ def test_a_changed_line_is_refused_with_its_number(path, change):
     path.write_text(path.read_text().replace(*change))
     with pytest.raises(ValueError, match="line 2 is damaged: remove this line"):
         Journal(path, SUBJECT)
+
+
+@pytest.mark.parametrize("shape", [lambda found: found["x"], len, lambda found: found.keys(), int])
+def test_a_result_of_another_shape_is_refused_with_its_name(path, shape):
+    """Such as a line from elsewhere, whole in itself."""
+    journal = Journal(path, SUBJECT)
+    assert journal.read("one", dict) == journal["one"]
+    with pytest.raises(
+        ValueError, match=r"journal\.jsonl: the result 'two' is of another shape: remove"
+    ):
+        journal.read("two", shape)

@@ -160,6 +160,26 @@ def test_as_many_list_entries_as_environments_are_needed():
         native("EPValve-v0", 2).reset(options={"target_bar": [6.0, 7.0, 8.0]})
 
 
+def test_a_mistyped_argument_of_a_batch_gets_the_names_of_both():
+    with pytest.raises(OptionError, match=r"'thread': known are plant, .* num_envs, .* threads, device"):
+        gymnasium.make_vec("EPValve-v0", num_envs=2, thread=1)
+
+
+@pytest.mark.parametrize(
+    "action", [np.ma.array([1], mask=[True]), np.ma.masked, np.ma.array(1, mask=True)]
+)
+def test_an_action_under_a_mask_is_none(action):
+    env = gymnasium.make("EPValve-v0")
+    env.reset(seed=0)
+    with pytest.raises(ActionError, match="no mask"):
+        env.step(action)
+    batch = native("EPValve-v0", 2)
+    batch.reset(seed=0)
+    for actions in (np.ma.array([1, 0], mask=[True, False]), [action, action]):
+        with pytest.raises(ActionError, match="no mask"):
+            batch.step(actions)
+
+
 @pytest.mark.parametrize(
     ("mask", "message"),
     [

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.plantfile import FORMAT, Plant, PlantFileError, load_plant, save_plant
+from epv_env.plant.plantfile import FORMAT, Plant, PlantFileError, load_plant, plant_subject, save_plant
 from epv_env.plant.region import Alternative, Mixture, Region
 
 CENTRE = Parameters.calibrated().replace(alphaMV=0.75, R=41.123456789012345)
@@ -39,6 +39,27 @@ def written(path, **content):
     """A plant file with some content."""
     path.write_text(json.dumps({"format": FORMAT, "parameters": {}} | content))
     return path
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"voltage_V": 18.0},
+        {"sensors": {"p2": {"noise": 0.01}}},
+        {"effects": {"command_delay": {"t_delay": 1e-3}}},
+        {"parameters": {"R": 41.0}},
+        {"region": {"boxes": {"R": [40.0, 44.0]}}},
+        {"free": {"R": {"mean": 42.0, "sd": 1.0}}},
+    ],
+)
+def test_results_of_another_plant_have_another_subject(change, tmp_path):
+    """It is all that the file says, but where its values come from."""
+    first, same, other = (
+        json.dumps(plant_subject(load_plant(written(tmp_path / "plant.json", **content))))
+        for content in ({}, {"provenance": {"seed": 1}}, change)
+    )
+    assert first == same
+    assert first != other
 
 
 def assert_equal(found, expected):

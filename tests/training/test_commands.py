@@ -1,6 +1,7 @@
 """The training command: the whole job in its short form, and one clear sentence for a wrong input."""
 
 import json
+import shutil
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
@@ -63,6 +64,17 @@ def test_a_resumed_run_needs_the_same_options(finished):
     result = train(*SHORT, "--out", out, "--resume", "--seed", 5)
     assert (result.returncode, result.stderr.count("\n")) == (2, 1)
     assert "resume with the same" in result.stderr
+
+
+def test_a_resumed_run_needs_the_same_plant(finished, tmp_path):
+    """Not only a file of the same name."""
+    out = Path(shutil.copytree(finished[0], tmp_path / "ppo"))
+    config = json.loads((out / "config.json").read_text())
+    config["plant"]["voltage_V"] = 18.0
+    (out / "config.json").write_text(json.dumps(config))
+    result = train(*SHORT, "--out", out, "--resume")
+    assert (result.returncode, result.stderr.count("\n")) == (2, 1)
+    assert "the plant is another than" in result.stderr
 
 
 def test_a_finished_run_is_not_overwritten_unasked(finished):

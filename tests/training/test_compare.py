@@ -1,6 +1,7 @@
 """Comparisons are fair, repeatable, resumable, and can tell a good controller from a bad one."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ pytest.importorskip("joblib")
 from controllers.hysteresis import Hysteresis
 from epv_env.common.commands import main_of
 from epv_env.common.files import Journal
-from epv_env.plant.plantfile import Plant
+from epv_env.plant.plantfile import Plant, save_plant
 from training.evaluation import batches
 from training.evaluation.batches import Batch, in_batches, run_batches
 from training.evaluation.rollout import decision_times, run_episodes
@@ -164,6 +165,18 @@ def test_a_stopped_comparison_goes_on_where_it_stopped(finished):
     assert len(journal.read_text().splitlines()) == len(lines)
     columns = [line.rsplit(",", 1)[0] for line in (out / "comparison.csv").read_text().splitlines()]
     assert columns == [line.rsplit(",", 1)[0] for line in table.splitlines()]  # the last are times
+
+
+def test_a_plant_of_another_voltage_has_figures_of_its_own(tmp_path):
+    """In the same folder, where the journal holds those of the first."""
+    chosen = ("--controllers", "hysteresis", "--plants", "calibrated", "--episodes", 2, "--workers", 1)
+    for folder, voltage in (("one", 24.0), ("one", 18.0), ("other", 18.0)):
+        save_plant(replace(PLANT, voltage=voltage), tmp_path / "plant.json")
+        plant = ("--plant", tmp_path / "plant.json")
+        assert command(*chosen, *plant, "--out", tmp_path / folder) == 0
+    one, other = ((tmp_path / name / "finished.jsonl").read_bytes() for name in ("one", "other"))
+    assert one == other
+    assert b'"voltage_V": 18.0' in one
 
 
 @pytest.mark.parametrize(

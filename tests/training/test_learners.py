@@ -1,8 +1,13 @@
 """Training: the net is what stable-baselines3 trains, the best is kept, a stopped run goes on."""
 
+import base64
+import json
+import os
+import zipfile
 from pathlib import Path
 from typing import Any
 
+import cloudpickle
 import numpy as np
 import pandas as pd
 import pytest
@@ -25,7 +30,7 @@ from training.learners.environment import (
     make_training_env,
     training_weights,
 )
-from training.learners.ppo import Task, make_model, newest_checkpoint, read_rows, score, train
+from training.learners.ppo import Task, checkpoints, make_model, read_rows, score, train
 
 pytestmark = pytest.mark.training
 TASK = Task(plant=Plant.calibrated())
@@ -98,6 +103,24 @@ def stop(course: ppo.Course) -> bool:
     return True
 
 
+class Trap:
+    """A pickle of it makes a folder where it is loaded."""
+
+    def __init__(self, path: Path):
+        self.path = path
+
+    def __reduce__(self):
+        return os.mkdir, (str(self.path),)
+
+
+def leave_trap(archive: Path, executed: Path) -> None:
+    """A checkpoint as stable-baselines3 writes one, of the most steps, that runs code when loaded."""
+    trap = base64.b64encode(cloudpickle.dumps(Trap(executed))).decode()
+    content = {"policy_class": {":type:": "x", ":serialized:": trap}}
+    with zipfile.ZipFile(archive, "w") as file:
+        file.writestr("data", json.dumps(content))
+
+
 def test_a_stopped_training_ends_with_the_same_policy(tmp_path: Path, monkeypatch):
     monkeypatch.setattr(ppo, "CHECKPOINT_STEPS", 512)
     whole, stopped = tmp_path / "whole", tmp_path / "stopped"
@@ -106,11 +129,13 @@ def test_a_stopped_training_ends_with_the_same_policy(tmp_path: Path, monkeypatc
         patch.setattr(ppo.Course, "_on_step", stop)
         with pytest.raises(KeyboardInterrupt):
             train(TASK, stopped, timesteps=2048, **SHORT)
-    newest = newest_checkpoint(stopped)
-    assert newest is not None
+    newest, *_ = checkpoints(stopped)
+    newest.write_bytes(newest.read_bytes()[:-1])  # torn: the one before is taken up
+    leave_trap(stopped / "checkpoints" / "ppo_99999_steps.zip", tmp_path / "executed")
     assert not (stopped / "policy.json").exists()
     assert train(TASK, stopped, timesteps=2048, resume=True, **SHORT) == rows
     assert [row["timesteps"] for row in read_rows(stopped)] == sorted({r["timesteps"] for r in rows})
+    assert not (tmp_path / "executed").exists()
     name = "policy.safetensors"
     assert (stopped / name).read_bytes() == (whole / name).read_bytes()
     best = max(rows, key=lambda row: row["score"])

@@ -11,13 +11,15 @@ import pytest
 pytest.importorskip("stable_baselines3")
 
 from controllers.hysteresis import Hysteresis
+from controllers.policy_files import policy_digest
 from epv_env.common.commands import main_of
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant, save_plant
 from epv_env.plant.region import Alternative, Mixture, Region
+from identification.commands import bench
 from training.evaluation.scenarios import EVALUATION
 from training.studies.comparison import SCORES, compare
-from training.studies.sim_to_real import MEASURED, SIMULATED, gap_table, share_picture
+from training.studies.sim_to_real import MEASURED, SIMULATED, gap_table, share_picture, trained
 
 pytestmark = pytest.mark.training
 
@@ -123,6 +125,35 @@ def test_what_is_finished_is_kept(finished):
 def test_another_effect_in_the_same_folder_is_refused(finished, capsys):
     assert run_loop(finished, "--effect", "seat_leak=1e-7") == 2
     assert "holds a sim-to-real run with effect command_delay=0.008, not" in capsys.readouterr().err
+
+
+def test_another_effect_is_refused_wherever_the_first_was_stopped(tmp_path, monkeypatch, capsys):
+    record = bench.run
+
+    def stopped(options):
+        record(options)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(bench, "run", stopped)
+        with pytest.raises(KeyboardInterrupt):
+            run_loop(tmp_path, "--effect", "command_delay=0.008")
+    assert run_loop(tmp_path, "--effect", "seat_leak=1e-7") == 2
+    assert "holds a sim-to-real run with effect command_delay=0.008, not" in capsys.readouterr().err
+
+
+def test_deployments_belong_to_both_valves_and_the_policy(finished):
+    header, *lines = (finished / "after" / "deployments.jsonl").read_text().splitlines()
+    subject = json.loads(header)["subject"]
+    assert subject[MEASURED]["plant"]["effects"] == {"command_delay": {"t_delay": 0.008}}
+    assert subject[SIMULATED]["plant"]["parameters"]
+    digest = policy_digest(finished / "after")
+    assert any(f"PPO {digest}" in json.loads(line)["name"] for line in lines)
+
+
+def test_a_policy_of_another_plant_is_not_taken_up(finished):
+    with pytest.raises(ValueError, match="holds a policy with plants"):
+        trained(finished / "after", plant(t_delay=0.004), "exact", seed=0, timesteps=8192)
 
 
 def test_an_unknown_effect_is_refused_before_anything_is_written(tmp_path, capsys):

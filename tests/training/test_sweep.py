@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -15,7 +16,7 @@ pytest.importorskip("joblib")
 from epv_env.common.commands import main_of
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import table
-from epv_env.plant.plantfile import Plant
+from epv_env.plant.plantfile import Plant, save_plant
 from epv_env.settings import make_settings
 from training.studies.sweep_designs import (
     ONE_AT_A_TIME,
@@ -114,6 +115,20 @@ def test_two_workers_and_a_killed_sweep_give_the_same_to_the_bit(tmp_path):
     for name in ("results.json", "points.csv"):
         assert (out / name).read_bytes() == (tmp_path / "alone" / name).read_bytes()
     assert (out / "robustness-conditions.png").exists()
+
+
+def test_a_plant_of_other_sensors_is_swept_anew(tmp_path):
+    """In the same folder, where the journal holds another one's figures."""
+    quick = ("--factors", "sensor noise", "--workers", 1, "--plant", tmp_path / "plant.json")
+    p2 = PLANT.sensors["p2"]
+    subjects = []
+    for noise in (p2.noise, 5 * p2.noise):
+        sensors = {**PLANT.sensors, "p2": replace(p2, noise=noise)}
+        save_plant(replace(PLANT, sensors=sensors), tmp_path / "plant.json")
+        assert sweep(tmp_path / "out", *quick) == 0
+        assert len(set(finished(tmp_path / "out"))) == len(finished(tmp_path / "out")) == 4
+        subjects.append((tmp_path / "out" / "finished.jsonl").read_text().splitlines()[0])
+    assert subjects[0] != subjects[1]
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ A comparison that was stopped goes on where it stopped when it is started again.
 """
 
 import argparse
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -17,13 +16,13 @@ import pandas as pd
 from controllers.tuned import load_tunings
 from epv_env.common.command_line import COUNT, NextStep, add_episodes, add_out, beside, plant_option
 from epv_env.common.files import Journal, write_json, write_text
-from epv_env.plant.plantfile import Plant, load_plant
+from epv_env.plant.plantfile import Plant, load_plant, plant_subject
 from epv_env.plant.valves import available_cores
 from epv_env.vector_entry import check_device
 from training.evaluation.named import HELP, is_own, named_controllers
 from training.evaluation.plots import episode_overlay, save_figure
 from training.evaluation.rollout import decision_times, run_episodes
-from training.evaluation.scenarios import RANDOM, EvaluationScenario, scenario_group
+from training.evaluation.scenarios import RANDOM, scenario_group
 from training.evaluation.seeds import EVALUATION_SEED, check_first_seed
 from training.studies.comparison import (
     PLANTS,
@@ -74,11 +73,13 @@ def run(options: argparse.Namespace) -> None:
         raise ValueError(f"--against {against!r} takes no part: give one of {', '.join(controllers)}")
     scenarios = {k: v for name in options.scenarios for k, v in scenario_group(name).items()}
     first_seed = EVALUATION_SEED + options.seed
+    shown = {name: repr(scenario) for name, scenario in scenarios.items()}
+    about = {**plant_subject(plant), "duration": options.duration, "scenarios": shown}
     results = compare(
         controllers, plant=plant, scenarios=scenarios, episodes=options.episodes,
         duration=options.duration, plant_sets=options.plants, first_seed=first_seed,
         workers=options.workers or available_cores(), digests=digests, device=options.device,
-        journal=Journal(options.out / "finished.jsonl", subject(plant, scenarios, options.duration)),
+        journal=Journal(options.out / "finished.jsonl", about),
     )  # fmt: skip
     times = {
         label: 1e6 * np.median(decision_times(each, options.decisions, plant=plant, scenario="steps"))
@@ -100,16 +101,6 @@ def next_step(options: argparse.Namespace) -> NextStep:
     return NextStep(
         "to see which changes of the valve they bear", ("sweep", *words, *plant_option(options.plant))
     )
-
-
-def subject(plant: Plant, scenarios: dict[str, EvaluationScenario], duration: float) -> dict[str, Any]:
-    """What the figures depend on beside the batches' names: another subject begins the journal anew."""
-    return {
-        "software": version("epv-valve"),
-        "plant": {"parameters": dict(plant.parameters), "region": repr(plant.region)},
-        "duration": duration,
-        "scenarios": {name: repr(scenario) for name, scenario in scenarios.items()},
-    }
 
 
 def write_results(

@@ -12,7 +12,6 @@ import argparse
 import hashlib
 import json
 import os
-import shutil
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -22,14 +21,15 @@ from controllers.policy import TRAINED, load_policy
 from controllers.policy_files import WEIGHTS_FILE, read_contract
 from epv_env.common.command_line import (
     COUNT,
-    SECONDS,
+    JUDGED_SECONDS,
     NextStep,
+    add_out,
     add_plant,
     beside,
     plant_option,
-    writable_folder,
 )
-from epv_env.common.files import write_bytes
+from epv_env.common.files import check_writable, write_bytes
+from epv_env.common.results_folder import LOCK_FILE
 from epv_env.plant.plantfile import Plant, load_plant
 from training.deploy import agreement as verdict
 from training.deploy import compiled, monitor_c
@@ -47,9 +47,7 @@ FILES = {*CODE, "contract.json", "states.csv", "report.json", "epv_policy.fmu"}
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("what", help=f"a folder that training wrote, or `{PLANT}`")
-    parser.add_argument(
-        "--out", dest="folder", type=writable_folder, required=True, help="folder to write"
-    )
+    add_out(parser, help="folder to write")
     parser.add_argument("--monitor", type=Path, help="monitor.json of `epv monitor`: its C code, too")
     parser.add_argument("--fmu", action="store_true", help="an FMU of the policy, too")
     add_plant(parser, help="plant file: exported, or nominal for a policy (default: the report's)")
@@ -58,7 +56,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="C compiler; '' for a plant's sources alone (default: cc)",
     )  # fmt: skip
     parser.add_argument("--episodes", type=COUNT, default=256, help="under the compiled code")
-    parser.add_argument("--duration", type=SECONDS, default=10.0, help="length of one of them [s]")
+    parser.add_argument(
+        "--duration", type=JUDGED_SECONDS, default=10.0, help="length of one of them [s]"
+    )
 
 
 def run(options: argparse.Namespace) -> None:
@@ -68,13 +68,13 @@ def run(options: argparse.Namespace) -> None:
     """
     if options.what == PLANT:
         model = plant_model(load_plant(options.plant))
-        path = options.folder / f"{model.identifier}.fmu"
+        path = options.out / f"{model.identifier}.fmu"
         write_bytes(path, fmu(model, options.compiler))
         print(f"written to {path}")
         if not compiled.compiler_words(options.compiler):
             print("without a library: no C compiler; the importing tool has to compile the sources")
         return
-    check_free(options.folder)
+    check_free(options.out)
     compiler = compiled.find_compiler(options.compiler)
     export = prepared(Path(options.what), load_plant(options.plant))
     if options.monitor is not None and export.period != Monitor.period:
@@ -93,17 +93,17 @@ def run(options: argparse.Namespace) -> None:
     content = {name: text.encode() for name, text in files.items()}
     if options.fmu:
         content["epv_policy.fmu"] = fmu(policy_model(export.period, files), options.compiler)
-    write_folder(options.folder, content)
-    print(f"{verdict.as_text(report, contract)}\nwritten to {options.folder}")
+    write_folder(options.out, content)
+    print(f"{verdict.as_text(report, contract)}\nwritten to {options.out}")
 
 
 def next_step(options: argparse.Namespace) -> NextStep:
     """Export the other half of a closed loop of FMUs: the plant of a policy, the policy of a plant."""
     plant = plant_option(options.plant)
     if options.what == PLANT:
-        words = ("export", TRAINED, "--fmu", "--out", beside(options.folder, "policy"), *plant)
+        words = ("export", TRAINED, "--fmu", "--out", beside(options.out, "policy"), *plant)
         return NextStep("to export the package's policy for the same simulator", words)
-    words = ("export", PLANT, "--out", beside(options.folder, "plant"), *plant)
+    words = ("export", PLANT, "--out", beside(options.out, "plant"), *plant)
     return NextStep("to export the valve that it controls as an FMU", words)
 
 
@@ -151,28 +151,24 @@ def verified(
 
 
 def check_free(folder: Path) -> None:
-    """Raises ExportError if the folder holds anything but the files of an earlier export."""
+    """Raises ExportError or OSError if the folder holds anything but files of an earlier export."""
     there = {path.name for path in folder.iterdir()} if folder.exists() else set()
-    if foreign := sorted(there - FILES - {*monitor_c.FILES}):
+    if foreign := sorted(there - FILES - {*monitor_c.FILES, LOCK_FILE}):
         raise ExportError(
             f"{folder} holds {foreign[0]!r}, which no export writes: give --out a new or empty folder"
         )
+    for name in there:
+        check_writable(folder / name)
 
 
 def write_folder(folder: Path, files: dict[str, bytes]) -> None:
-    """Put a folder with these files in place of an earlier one; a failure leaves the earlier one."""
-    folder = folder.resolve()
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}.") as temporary:
-        new, old = Path(temporary, "new"), Path(temporary, "old")
-        new.mkdir()
+    """Put these files in place of an earlier export's; a failure to write leaves the earlier ones."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder.resolve().parent, prefix=".export.") as new:
         for name, content in files.items():
-            (new / name).write_bytes(content)
-        if folder.exists():
-            os.rename(folder, old)
-        try:
-            os.rename(new, folder)
-        except BaseException:
-            if old.exists():
-                shutil.move(old, folder)
-            raise
+            write_bytes(Path(new, name), content)
+        for path in folder.iterdir():
+            if path.name not in (*files, LOCK_FILE):
+                path.unlink()
+        for name in files:
+            os.replace(Path(new, name), folder / name)

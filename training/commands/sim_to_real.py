@@ -8,17 +8,21 @@ simulation and diagnosis see what a user sees. Finished steps in --out are kept.
 
 import argparse
 import sys
+from importlib.metadata import version
 from typing import Any
 
-from controllers.tuned import tuned_controllers
-from epv_env.common.command_line import COUNT, SECONDS, NextStep, add_out, add_seed, beside
+from controllers.policy_files import policy_digest
+from controllers.tuned import load_tunings
+from epv_env.common.command_line import COUNT, JUDGED_SECONDS, NextStep, add_out, add_seed, beside
 from epv_env.common.commands import parse
+from epv_env.common.extras import DISTRIBUTION
 from epv_env.common.files import Journal, decoded, write_json, write_text
 from epv_env.common.results_folder import check_options, write_options
-from epv_env.plant.plantfile import Plant, load_plant
+from epv_env.plant.plantfile import Plant, load_plant, plant_subject
 from identification.bench.programmes import SUITES
 from identification.commands import bench
 from identification.gap.report.gap_json import GAP
+from training.evaluation.named import named_controllers
 from training.evaluation.plots import COLOURS, save_figure
 from training.evaluation.scenarios import EvaluationScenario
 from training.studies.comparison import Results, as_text, compare, rows
@@ -60,7 +64,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_seed(parser, help="of both trainings, sensors, diagnosis")
     parser.add_argument("--timesteps", type=COUNT, default=1_200_000, help="steps of each training")
     parser.add_argument("--episodes", type=COUNT, default=256, help="episodes of each deployment")
-    parser.add_argument("--duration", type=SECONDS, default=6.0, help="length of one of them [s]")
+    parser.add_argument("--duration", type=JUDGED_SECONDS, default=6.0, help="length of one of them [s]")
     parser.add_argument(
         "--suite", choices=SUITES, default="diagnosis", help="recordings that the bench makes"
     )
@@ -75,13 +79,16 @@ def run(options: argparse.Namespace) -> None:
 
     out, seed = options.out, ("--seed", str(options.seed))
     settings = {name: v for name, v in vars(options).items() if name not in ("out", "quick")}
+    settings["software"] = version(DISTRIBUTION)
     check_options(out, settings, "sim-to-real run")
-    _announce("1 of 4: the bench records its valve")  # first: refuses an effect that cannot be used
+    _announce("1 of 4: the bench records its valve")
+    made = ("--suite", options.suite, "--effect", options.effect, *seed)
+    where = ("--out", str(out / CAMPAIGN), "--truth", str(out / WITHHELD))
+    recording = parse(bench, "bench", [*made, *where])
+    bench.true_parameters(recording, load_plant(None))  # refuses an effect that cannot be used
+    write_options(out, settings)  # before what it belongs to: a run may stop anywhere
     if not (out / WITHHELD).exists():
-        made = ("--suite", options.suite, "--effect", options.effect, *seed)
-        where = ("--out", str(out / CAMPAIGN), "--truth", str(out / WITHHELD))
-        bench.run(parse(bench, "bench", [*made, *where]))
-    write_options(out, settings)
+        bench.run(recording)
     _announce("2 of 4: train on the nominal plant, deploy")
     results = deployed(BEFORE, load_plant(None), options)
     _announce("3 of 4: diagnose the campaign")
@@ -107,15 +114,19 @@ def deployed(stage: str, simulated: Plant, options: argparse.Namespace) -> Resul
     """
     folder, training = options.out / stage, {"seed": options.seed, "timesteps": options.timesteps}
     policy = trained(folder, simulated, REGION, **training)
-    journal = Journal(folder / "deployments.jsonl", {"stage": stage})
-    controllers = {controller.name: controller for controller in (policy, *tuned_controllers())}
+    classic, digests = named_controllers(list(load_tunings()), Plant.calibrated())
+    controllers = {policy.name: policy, **classic}
+    digests[policy.name] = policy_digest(folder)
     scenario = EvaluationScenario(meaning="as in training", options={"scenario": SCENARIO})
+    plants = {SIMULATED: simulated, MEASURED: load_plant(options.out / WITHHELD)}
+    about = {place: plant_subject(plant) for place, plant in plants.items()}
+    journal = Journal(folder / "deployments.jsonl", {**about, "duration": options.duration})
     results: Results = {}
-    for place, plant in ((SIMULATED, simulated), (MEASURED, load_plant(options.out / WITHHELD))):
+    for place, plant in plants.items():
         results |= compare(
             controllers, plant=plant, scenarios={f"{stage}, {place}": scenario},
             episodes=options.episodes, duration=options.duration, plant_sets=("calibrated", REGION),
-            journal=journal,
+            journal=journal, digests=digests,
         )  # fmt: skip
     return results
 

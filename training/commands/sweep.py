@@ -7,7 +7,6 @@ A sweep that was stopped goes on where it stopped when it is started again.
 """
 
 import argparse
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from controllers.policy_files import holds_policy
 from epv_env.common.command_line import COUNT, NextStep, add_episodes, add_out, beside, plant_option
 from epv_env.common.files import Journal, write_json, write_text
 from epv_env.plant.consumption import check_scenario
-from epv_env.plant.plantfile import Plant, load_plant
+from epv_env.plant.plantfile import Plant, load_plant, plant_subject
 from epv_env.plant.valves import available_cores
 from epv_env.vector_entry import check_device
 from training.evaluation.batches import Batch, in_batches, run_batches
@@ -78,20 +77,15 @@ def run(options: argparse.Namespace) -> None:
     points = chosen_points(plant, options.designs, options.factors)
     cells = [(point, label) for point in points for label in controllers]
     batches = [_batches(point, label, digests[label], plant, options) for point, label in cells]
-    subject = {
-        "software": version("epv-valve"),
-        "plant": {"parameters": dict(plant.parameters), "region": repr(plant.region)},
-        "scenario": options.scenario,
-        "duration": options.duration,
-    }
+    about = {**plant_subject(plant), "scenario": options.scenario, "duration": options.duration}
     found = run_batches(
         [batch for each in batches for batch in each], controllers,
-        journal=Journal(options.out / "finished.jsonl", subject),
+        journal=Journal(options.out / "finished.jsonl", about),
         workers=options.workers or available_cores(), what="sweep",
     )  # fmt: skip
     metrics = [EpisodeMetrics.joined([found[batch.name] for batch in each]) for each in batches]
     table = point_table(cells, metrics, SWEEP_SEED + options.seed)
-    write_results(options, table, {**subject, "controllers": digests})
+    write_results(options, table, {**about, "controllers": digests})
     print(f"\nresults in {options.out}")
 
 

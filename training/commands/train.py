@@ -8,6 +8,7 @@ and two pictures, and ends with a verdict. A training that was stopped goes on w
 """
 
 import argparse
+import json
 import shutil
 from importlib.metadata import version
 from pathlib import Path
@@ -21,7 +22,7 @@ from controllers.policy_files import CONTRACT_FILE, WEIGHTS_FILE
 from controllers.tuned import ablation, tuned_controllers
 from epv_env.common.command_line import (
     COUNT,
-    SECONDS,
+    JUDGED_SECONDS,
     NextStep,
     Number,
     add_device,
@@ -34,7 +35,7 @@ from epv_env.common.command_line import (
 from epv_env.common.files import write_text
 from epv_env.common.results_folder import CONFIG, check_same, read_config, write_options
 from epv_env.plant.consumption import check_scenario
-from epv_env.plant.plantfile import Plant, load_plant
+from epv_env.plant.plantfile import Plant, load_plant, plant_subject
 from epv_env.plant.region import DIAGNOSIS, REGIONS
 from epv_env.reward import RewardWeights
 from epv_env.settings import as_region
@@ -70,7 +71,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_out(parser, "runs/ppo")
     parser.add_argument("--timesteps", type=COUNT, default=TIMESTEPS, help="environment steps of PPO")
     parser.add_argument("--episodes", type=COUNT, default=1024, help="of the comparison")
-    parser.add_argument("--duration", type=SECONDS, default=10.0, help="length of one of them [s]")
+    parser.add_argument(
+        "--duration", type=JUDGED_SECONDS, default=10.0, help="length of one of them [s]"
+    )
     add_seed(parser, help="of the training")
     add_plant(parser)
     parser.add_argument("--scenario", default="mixed", help="consumption scenario of the training")
@@ -102,7 +105,7 @@ def run(options: argparse.Namespace) -> None:
         from training.learners.ppo import check_accelerator
 
         check_accelerator()
-    begin_folder(options)
+    begin_folder(options, plant)
     write_options(options.out, configuration(options, plant))
 
     from training.learners.ppo import Task, train  # torch takes seconds to import
@@ -127,7 +130,7 @@ def next_step(options: argparse.Namespace) -> NextStep:
     return NextStep("to compare the policy on three sets of plants", ("compare", *words, *plant))
 
 
-def begin_folder(options: argparse.Namespace) -> None:
+def begin_folder(options: argparse.Namespace, plant: Plant) -> None:
     """Make the folder free for a new training, or check that it holds the one to go on with.
 
     Raises ValueError if the folder holds another training, or none to resume.
@@ -139,6 +142,11 @@ def begin_folder(options: argparse.Namespace) -> None:
             raise ValueError(f"nothing to resume in {folder}: leave --resume out")
         same = {name: _plain(getattr(options, name)) for name in SAME_WHEN_RESUMED}
         check_same(earlier["options"], same, f"{folder} was trained with", "resume with the same")
+        if earlier.get("plant") != configuration(options, plant)["plant"]:
+            raise ValueError(
+                f"the plant is another than {folder} was trained with: resume with the same plant file, "
+                "or choose another --out"
+            )
         return
     if options.force or options.quick:
         for name in OWN:
@@ -160,7 +168,7 @@ def configuration(options: argparse.Namespace, plant: Plant) -> dict[str, Any]:
     """Options, plant and versions: what is needed to repeat the training."""
     return {
         "options": {name: _plain(value) for name, value in vars(options).items()},
-        "plant": {"name": plant.name, "parameters": dict(plant.parameters)},
+        "plant": json.loads(json.dumps(plant_subject(plant)["plant"])),
         "versions": {
             package: version(package)
             for package in ("epv-valve", "gymnasium", "numba", "numpy", "stable-baselines3", "torch")

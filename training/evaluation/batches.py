@@ -97,7 +97,9 @@ def run_batches(
                 journal.add(name, figures)
             bar.update(len(figures["stayed"]))
     return {
-        batch.name: _metrics(found[batch.name] if batch.name in found else (journal or {})[batch.name])
+        batch.name: _metrics(found[batch.name])
+        if journal is None or batch.name in found
+        else journal.read(batch.name, _metrics)
         for batch in batches
     }
 

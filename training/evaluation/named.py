@@ -1,6 +1,5 @@
 """Controllers by what a user calls them: registered kinds, folders of policies, classes of one's own."""
 
-import hashlib
 import importlib
 import inspect
 import json
@@ -14,11 +13,12 @@ from typing import Any
 from controllers.base import Controller
 from controllers.knowledge import WITH_RULES
 from controllers.policy import load_policy
-from controllers.policy_files import CONTRACT_FILE, WEIGHTS_FILE
+from controllers.policy_files import policy_digest
 from controllers.registry import REGISTRY
 from controllers.tuned import build, load_tunings
 from epv_env import MAX_EPISODE_STEPS
 from epv_env.common.field_types import shown
+from epv_env.common.files import digest
 from epv_env.plant.plantfile import Plant
 
 HELP = (
@@ -49,22 +49,23 @@ def named_controllers(
     controllers: dict[str, Controller] = {}
     digests: dict[str, str] = {}
     for source in sources:
-        label, controller, content = _named(source, plant)
+        label, controller, defined = _named(source, plant)
         if label in controllers:
             raise ValueError(f"two controllers are called {label!r}: give one as LABEL=FOLDER")
         controllers[label] = controller
-        digests[label] = hashlib.sha256(content).hexdigest()[:16]
+        digests[label] = defined
     return controllers, digests
 
 
-def _named(source: str, plant: Plant) -> tuple[str, Controller, bytes]:
-    """Label, controller, and the bytes that define it."""
+def _named(source: str, plant: Plant) -> tuple[str, Controller, str]:
+    """Label, controller, and a digest of what defines it."""
     tunings = load_tunings()
     if source.removesuffix(WITH_RULES) in tunings:
         values = tunings[source.removesuffix(WITH_RULES)].values
-        return source, build(source, values, plant), json.dumps(values, sort_keys=True).encode()
+        content = json.dumps(values, sort_keys=True).encode()
+        return source, build(source, values, plant), digest(content)
     if source in UNTUNED:
-        return source, build(source, {}, plant), source.encode()
+        return source, build(source, {}, plant), digest(source.encode())
     if is_import(source):
         return _imported(source)
     label, _, folder = source.rpartition("=")
@@ -75,8 +76,7 @@ def _named(source: str, plant: Plant) -> tuple[str, Controller, bytes]:
             f"{', '.join(tunings)}"
         )
     policy = load_policy(path, plant)
-    content = (path / CONTRACT_FILE).read_bytes() + (path / WEIGHTS_FILE).read_bytes()
-    return label or policy.name, policy, content
+    return label or policy.name, policy, policy_digest(path)
 
 
 def is_own(label: str) -> bool:
@@ -90,8 +90,8 @@ def is_import(source: str) -> bool:
     return bool(colon) and all(part.isidentifier() for part in module.split(".")) and name.isidentifier()
 
 
-def _imported(source: str) -> tuple[str, Controller, bytes]:
-    """The controller that MODULE:CLASS names, made without arguments, and its module's text.
+def _imported(source: str) -> tuple[str, Controller, str]:
+    """The controller that MODULE:CLASS names, made without arguments, and its module's digest.
 
     Raises ValueError if the module or the class is missing, fails, needs arguments, or is no controller.
     """
@@ -122,4 +122,4 @@ def _imported(source: str) -> tuple[str, Controller, bytes]:
             f"controller {source} is called {shown(controller.name)} and acts in the environment "
             f"{shown(controller.environment)}: give a text and one of {', '.join(MAX_EPISODE_STEPS)}"
         )
-    return controller.name, controller, inspect.getsource(module).encode()
+    return controller.name, controller, digest(inspect.getsource(module).encode())

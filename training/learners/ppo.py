@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import torch
+from safetensors import SafetensorError
+from safetensors.torch import load, save
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
@@ -18,7 +20,7 @@ from tqdm import tqdm
 from controllers.policy import Policy
 from controllers.policy_files import read_policy, write_policy
 from epv_env.actions import OnOff
-from epv_env.common.files import write_text
+from epv_env.common.files import read_bytes, write_bytes, write_text
 from epv_env.conditions import Conditions
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Mixture, Region
@@ -62,7 +64,9 @@ VIOLATION_PRICE = 300.0
 loses in all. Violations are rare, so the mean return would hardly show one."""
 
 CHECKPOINTS = "checkpoints"
-"""Folder of stable-baselines3's archives, within that of the training."""
+"""Folder of the checkpoints, within that of the training: arrays, of which none is a program."""
+ADAM = ("step", "exp_avg", "exp_avg_sq")
+"""What the optimiser keeps of each weight: the number of its steps, and two moments of its shape."""
 BEST = "best"
 """Folder of the best validated policy, within that of the training."""
 VALIDATION_FILE = "validation.csv"
@@ -161,7 +165,7 @@ class Course(BaseCallback):
         self._validate_if_due()
         if self.num_timesteps >= self._saved + CHECKPOINT_STEPS:
             self._saved = self.num_timesteps
-            self.model.save(self._folder / CHECKPOINTS / f"ppo_{self.num_timesteps}_steps")
+            save_checkpoint(self.model, self._folder)
             seed_episodes(self.model, self._seed)
             self.model._last_obs = self.training_env.reset()  # type: ignore[assignment]
             self.model._last_episode_starts = np.ones(self.training_env.num_envs, dtype=bool)
@@ -246,10 +250,8 @@ def train(
     """
     torch.set_num_threads(1)  # sums do not depend on the machine's cores; the plant uses them all
     env = make_training_env(num_envs=num_envs, device=device, **vars(task))
-    newest = newest_checkpoint(folder) if resume else None
-    model = (
-        PPO.load(newest, env=env, device=device) if newest else make_model(env, seed=seed, device=device)
-    )
+    model = make_model(env, seed=seed, device=device)
+    resumed = resume and load_checkpoint(model, folder)
     model.set_logger(Logger(folder=None, output_formats=[]))  # the default leaves a folder in /tmp
     seed_episodes(model, seed)
     if model.num_timesteps < timesteps:
@@ -262,17 +264,50 @@ def train(
                 duration=validation_duration, provenance={"seed": seed, **(provenance or {})},
             )  # fmt: skip
             model.learn(
-                timesteps - model.num_timesteps, callback=course, reset_num_timesteps=newest is None
+                timesteps - model.num_timesteps, callback=course, reset_num_timesteps=not resumed
             )
     contract, network = read_policy(folder / BEST)
     write_policy(network, folder, control_period=OnOff.default_period, provenance=contract.provenance)
     return read_rows(folder)
 
 
-def newest_checkpoint(folder: Path) -> Path | None:
-    """The archive with the most environment steps in a training's folder; None if there is none."""
-    archives = (folder / CHECKPOINTS).glob("ppo_*_steps.zip")
-    return max(archives, key=lambda path: int(path.stem.split("_")[1]), default=None)
+def checkpoints(folder: Path) -> list[Path]:
+    """Those of a training's folder, the newest first."""
+    return sorted((folder / CHECKPOINTS).glob("*.safetensors"), reverse=True)
+
+
+def save_checkpoint(model: PPO, folder: Path) -> None:
+    """Write what a training goes on from: weights, Adam's moments, and the number of steps.
+
+    Learning rate and entropy follow from the steps, and what is drawn from `seed_episodes`.
+    """
+    weights = model.policy.state_dict()
+    arrays = {f"weights {name}": array for name, array in weights.items()}
+    states = model.policy.optimizer.state_dict()["state"]
+    for number, name in enumerate(weights):  # as the optimiser counts them
+        arrays |= {f"{kind} {name}": states[number][kind] for kind in ADAM}
+    arrays["timesteps"] = torch.tensor(model.num_timesteps)
+    write_bytes(folder / CHECKPOINTS / f"{model.num_timesteps:010}.safetensors", save(arrays))
+
+
+def load_checkpoint(model: PPO, folder: Path) -> bool:
+    """Take up the newest checkpoint that is whole. Returns whether there is one."""
+    weights, optimiser = model.policy.state_dict(), model.policy.optimizer.state_dict()
+    shapes = {f"{kind} {n}": w.shape for n, w in weights.items() for kind in ("weights", *ADAM[1:])}
+    shapes |= {f"{ADAM[0]} {name}": torch.Size() for name in weights} | {"timesteps": torch.Size()}
+    for path in checkpoints(folder):
+        try:
+            arrays = load(read_bytes(path))
+        except (OSError, ValueError, KeyError, SafetensorError):
+            continue  # torn
+        if {name: array.shape for name, array in arrays.items()} != shapes:
+            continue
+        states = {i: {k: arrays[f"{k} {name}"] for k in ADAM} for i, name in enumerate(weights)}
+        model.policy.load_state_dict({name: arrays[f"weights {name}"] for name in weights})
+        model.policy.optimizer.load_state_dict({**optimiser, "state": states})
+        model.num_timesteps = int(arrays["timesteps"])
+        return True
+    return False
 
 
 def read_rows(folder: Path) -> list[dict[str, float]]:

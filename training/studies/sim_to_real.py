@@ -1,5 +1,6 @@
 """The sim-to-real loop: its trainings, what a diagnosis says, and simulated against measured."""
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,9 @@ from matplotlib.figure import Figure
 from controllers.base import Controller
 from controllers.policy import load_policy
 from controllers.policy_files import holds_policy
-from epv_env.common.files import decoded
-from epv_env.plant.plantfile import Plant, load_plant
+from epv_env.common.files import decoded, digest
+from epv_env.common.results_folder import check_options, write_options
+from epv_env.plant.plantfile import Plant, load_plant, plant_subject
 from epv_env.plant.region import Alternative, Mixture, Region
 from epv_env.reward import RewardWeights
 from identification.gap.report.gap_json import GAP
@@ -39,6 +41,8 @@ def trained(
 ) -> Controller:  # fmt: skip
     """PPO trained on these plants, or as it was trained before.
 
+    Raises ValueError for the folder of another training.
+
     Args:
         folder: of the training.
         plant: that is simulated.
@@ -47,7 +51,11 @@ def trained(
         timesteps: environment steps of the training.
         validation: more of the arguments of `training.learners.ppo.train`.
     """
+    plants = digest(json.dumps([plant_subject(plant), repr(parameters)]).encode())
+    about = {"plants": plants, "seed": seed, "timesteps": timesteps}
+    check_options(folder, about, "policy")
     if not holds_policy(folder):
+        write_options(folder, about)
         from training.learners.ppo import Task, train  # torch takes seconds to import: only now
 
         weights = RewardWeights(switching=SWITCHING_PRICE)

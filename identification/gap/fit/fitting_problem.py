@@ -154,7 +154,7 @@ class FitCache:
         step = self.prefix + step
         self.announce(step)
         if self.journal is not None and step in self.journal:
-            return [self._estimate(entry) for entry in self.journal[step]]
+            return self.journal.read(step, lambda found: [self._estimate(each) for each in found])
         estimates = fit()
         if self.journal is not None:
             self.journal.add(step, [_entry(estimate) for estimate in estimates])

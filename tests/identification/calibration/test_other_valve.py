@@ -1,5 +1,6 @@
 """A valve of half the size, described by a plant file: its truth comes back as the report's does."""
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -13,6 +14,8 @@ from identification.bench.session import measured_campaign, run_programme
 from identification.calibration.problem import CalibrationProblem, calibration_problem
 from identification.calibration.search import weighted_least_squares
 from identification.confidence.covariance import estimate_covariance
+from identification.pipeline import identification
+from identification.recordings.recording import Campaign
 from identification.recordings.rules import rules_of
 
 HALF_SIZE = Path(__file__).parents[3] / "docs/examples/half_size/half-size.json"
@@ -61,3 +64,18 @@ def test_its_data_sheet_does_not():
 def test_the_report_s_limits_would_refuse_it():
     with pytest.raises(ParameterError, match="R = 12 Ohm is outside its domain"):
         Plant.calibrated().parameters.replace(R=plant().parameters["R"])
+
+
+def test_finished_searches_belong_to_the_whole_plant(monkeypatch):
+    """Not only to the parameters that the searches begin with."""
+    subjects = []
+    monkeypatch.setattr(identification, "calibration_problem", lambda *_, **__: None)
+    monkeypatch.setattr(
+        identification, "calibrate", lambda _, **given: subjects.append(given["subject"])
+    )
+    nothing = Campaign(name="", temperature=293.0, pressure=1e5, recordings=())
+    for voltage in (24.0, 24.0, 18.0):
+        valve = replace(plant(), voltage=voltage)
+        assert identification.Identification(nothing, Path("journal"), plant=valve).calibration is None
+    assert subjects[0] == subjects[1]
+    assert subjects[0] != subjects[2]

@@ -12,13 +12,13 @@ import pytest
 
 import epv_env  # noqa: F401 - registers EPValve-v0
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.plantfile import load_plant
+from epv_env.plant.plantfile import Plant, load_plant
 from identification.__main__ import main
 from identification.bench.programmes import DIAGNOSIS_SUITE
 from identification.bench.session import measured_campaign, run_programme
 from identification.recordings.campaign_files import read_campaign, write_campaign
 from identification.recordings.recording import Campaign, CampaignError, Recording
-from identification.valve_gap.diagnose import diagnose_campaign, possible_plants
+from identification.valve_gap.diagnose import diagnose_campaign, possible_plants, subject
 from identification.valve_gap.valve import Valve
 from tests.identification.browser import check_layout
 from tests.identification.valve_gap.small_catalogue import LEFT_OUT
@@ -58,6 +58,16 @@ def test_the_command_names_the_effect_and_writes_its_files(diagnosed):
     assert value == pytest.approx(4e-3, rel=0.03)
     assert found["gap"]["with_cause"] < 1.05 < found["gap"]["recalibrated"]
     assert "<html" in (diagnosed / "out" / "report.html").read_text()
+
+
+def test_finished_fits_belong_to_the_whole_plant_and_its_surroundings():
+    """Not only to the parameters that are fitted."""
+    plant, warm = Plant.calibrated(), replace(campaign(), temperature=313.0)
+    others = replace(plant, voltage=18.0), replace(plant, parameters=plant.parameters.replace(V2=2e-3))
+    found = [Valve(campaign(), each) for each in (plant, *others)]
+    first, again, *rest = (subject(each, (), {}) for each in (found[0], *found, Valve(warm, plant)))
+    assert first == again
+    assert all(first != each for each in rest)
 
 
 def test_its_report_has_words_for_equations_and_parameters(diagnosed, tmp_path):
