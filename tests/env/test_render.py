@@ -154,9 +154,7 @@ def test_an_episode_is_filmed(tmp_path: Path) -> None:
 def test_without_pygame_the_remedy_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pygame", None)
     renderer = Renderer("rgb_array", fps=60)
-    with pytest.raises(
-        gymnasium.error.DependencyNotInstalled, match=r"pip install -e '\.\[render\]'"
-    ):
+    with pytest.raises(gymnasium.error.DependencyNotInstalled, match=r"pip install -e '\.\[render\]'"):
         renderer.draw(SHUT)
 
 
