@@ -27,6 +27,8 @@ LONGEST = 0.6
 """Time after a switching-off that is looked at [s]."""
 MOST_CHECKED = 20
 """Openings of a drive that are checked, evenly over the drive."""
+LEAST_FALLING = 8
+"""Rows of a discharge that tells, together with others, where p3 vents to."""
 CONTRADICTED = 0.25
 """Share of these that contradict physics beyond which a drive is refused."""
 
@@ -149,14 +151,14 @@ def _check_readings(
     ambient: p_env [bar absolute].
     """
     found = list(_openings(columns["coil"], columns["p3_bar"], period))
-    told = []
-    for part in found[:: max(1, len(found) // MOST_CHECKED)]:
+    checked, told = found[:: len(found) // MOST_CHECKED + 1], []
+    for part in checked:
         try:
             check_units("", {name: c[part] for name, c in columns.items()}, period, ambient, rules)
         except CampaignError as error:
             reason = str(error).partition(": ")[2].replace("U_V", "U_supply_V")
             told.append(f"{path}, line {line_number(part.start)}: {reason}")
-    if len(told) > CONTRADICTED * min(len(found), MOST_CHECKED):
+    if len(told) > CONTRADICTED * len(checked):
         raise CampaignError(told[0])
     for name in ("U_supply_V", "p1_bar", "p2_bar", "p3_bar", "I_A"):
         check_range(path, name, columns[name], rules.sensors[name.split("_")[0]])
@@ -172,7 +174,7 @@ def _check_reference(
     parts = [(own, part) for own in drives for part in _openings(own["coil"], own["p3_bar"], period)]
     p3 = np.concatenate([np.empty(0), *(own["p3_bar"][part] for own, part in parts)])
     on = np.concatenate([np.empty(0), *(own["coil"][part] for own, part in parts)]) > 0.0
-    for found in gauge_contradiction(p3, on, ambient, round(HOLD / period)):
+    for found in gauge_contradiction(p3, on, ambient, LEAST_FALLING):
         raise CampaignError(
             f"{folder}: {found}: p1_bar, p2_bar and p3_bar look like gauge pressure: give bar absolute "
             "(add the environment's pressure)"
@@ -181,7 +183,7 @@ def _check_reference(
 
 def _openings(coil: NDArray, p3: NDArray, period: float) -> Iterator[slice]:
     """Rows from HOLD before to after each switching-off of coil (samples,) before which p3 rests."""
-    hold, changes = round(HOLD / period), np.flatnonzero(np.diff(coil)) + 1
+    hold, changes = max(1, round(HOLD / period)), np.flatnonzero(np.diff(coil)) + 1
     for number, i in enumerate(changes):
         before = slice(max(i - hold, 0), i)
         if coil[i] == 0.0 and i >= hold and np.all(coil[before]) and _rests(p3[before]):

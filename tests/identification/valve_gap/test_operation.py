@@ -202,3 +202,11 @@ def test_a_manifest_that_cannot_be_is_refused(change, told, often_opened, tmp_pa
     (tmp_path / "drive-1.csv").write_text((often_opened / "drive-1.csv").read_text())
     with pytest.raises(CampaignError, match=told):
         read_log(tmp_path)
+
+
+def test_a_log_of_another_control_period_is_read(often_opened, tmp_path):
+    content = json.loads((often_opened / "log.json").read_text()) | {"control_period_s": 0.1}
+    (tmp_path / "log.json").write_text(json.dumps(content))
+    slower = scaled("time_s", 20.0)((often_opened / "drive-1.csv").read_text())
+    (tmp_path / "drive-1.csv").write_text(slower)
+    assert read_log(tmp_path).period == 0.1
