@@ -57,6 +57,7 @@ def test_the_first_screen_says_what_shows_it_and_says_what_next(name):
     assert len(pictures(first)) == 1
     models = ["recalibrated", *(["with leak"] if name in ("known", "ambiguous") else [])]
     legend = pictures(first)[0].figure.axes[1].get_legend()
+    assert legend is not None
     assert [text.get_text() for text in legend.get_texts()][: len(models)] == models
 
 
