@@ -219,7 +219,7 @@ def _explaining_periods(time: NDArray) -> tuple[float, float]:
 
 
 def last_digit(time: NDArray) -> float:
-    """Value of the last decimal in which times are printed [s]."""
+    """Value of the last decimal in which times (samples,) are printed [s]."""
     for digits in range(MOST_DIGITS):
         if np.max(np.abs(time - np.round(time, digits))) < 1e-12:
             return 10.0**-digits

@@ -99,7 +99,7 @@ def _check_length(file: str, samples: int, role: str, period: float) -> None:
 
 
 def check_range(file: str, name: str, values: NDArray, sensor: Sensor) -> None:
-    """Values lie in Table 1's range, but for the accuracy."""
+    """Values (samples,) lie in Table 1's range, but for the accuracy."""
     margin = _margin(sensor) + 1e-9
     outside = (values < sensor.low - margin) | (values > sensor.high + margin)
     if np.any(outside):

@@ -187,6 +187,8 @@ def policy_of(
 ) -> Controller:
     """The policy of an arm."""
     nominal, work = load_plant(None), options.work
+    if arm == DISTRIBUTION and is_certain(corrected):
+        arm = SINGLE  # the same plants: the same training
     plant, parameters, where = {
         BEFORE: (nominal, "ten_percent", work / BEFORE),
         SINGLE: (corrected, "confidence", folder / SINGLE),
@@ -194,8 +196,6 @@ def policy_of(
         EVERYTHING: (nominal, whole_catalogue(), work / EVERYTHING),
         TRUTH: (true, "exact", folder / TRUTH),
     }[arm]
-    if arm == DISTRIBUTION and is_certain(corrected):
-        where = folder / SINGLE  # the same plants: the same training
     return trained(
         where / f"seed {seed}, {options.timesteps} steps", plant, parameters,
         seed=seed, timesteps=options.timesteps,

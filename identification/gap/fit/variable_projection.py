@@ -159,7 +159,7 @@ class RunProducts:
         return rest - cross.transpose(0, 2, 1) @ np.linalg.solve(own, cross)
 
     def free(self) -> NDArray:
-        """`reduced` with all run nuisances minimised over."""
+        """`reduced` with all run nuisances minimised over, (runs, 1 + k + m, 1 + k + m) [1]."""
         return self.reduced(np.full(self.bounds.shape, np.nan))
 
     def of(self, kept: NDArray) -> "RunProducts":
@@ -319,7 +319,7 @@ def _shifted(grams: NDArray, first: int, amounts: NDArray) -> NDArray:
 
 
 def eliminated(gram: NDArray, columns: NDArray, kept: NDArray) -> NDArray:
-    """Gram matrix of the kept columns after minimising over the others (Schur complement)."""
+    """Gram matrix (kept, kept) of the kept columns after minimising over the others (Schur complement)."""
     cross = gram[np.ix_(columns, kept)]
     own = gram[np.ix_(columns, columns)]
     return gram[np.ix_(kept, kept)] - cross.T @ np.linalg.solve(own, cross)
