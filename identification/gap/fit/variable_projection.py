@@ -319,7 +319,7 @@ def _shifted(grams: NDArray, first: int, amounts: NDArray) -> NDArray:
 
 
 def eliminated(gram: NDArray, columns: NDArray, kept: NDArray) -> NDArray:
-    """Gram matrix (kept, kept) of the kept columns after minimising over the others (Schur complement)."""
+    """Gram matrix (kept, kept) of columns after minimising over the others (Schur complement)."""
     cross = gram[np.ix_(columns, kept)]
     own = gram[np.ix_(columns, columns)]
     return gram[np.ix_(kept, kept)] - cross.T @ np.linalg.solve(own, cross)
