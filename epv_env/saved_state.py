@@ -74,7 +74,7 @@ class SavedState(msgspec.Struct, frozen=True, kw_only=True, eq=False):
         """The state in a file that `to_bytes` gave. Raises StateError."""
         try:
             return msgspec.msgpack.decode(content, type=cls)
-        except (ValueError, RecursionError) as error:
+        except (msgspec.MsgspecError, ValueError, RecursionError) as error:
             raise StateError(f"this is no saved state ({error}): save it anew") from None
 
 
