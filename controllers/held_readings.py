@@ -10,7 +10,18 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.observation import CENTRE, HISTORY, INDEX, LIMIT, P2_LAGS, P3_LAGS, SCALE, decode, scaled
+from epv_env.observation import (
+    CENTRE,
+    HISTORY,
+    INDEX,
+    LAYOUT,
+    LIMIT,
+    P2_LAGS,
+    P3_LAGS,
+    SCALE,
+    decode,
+    scaled,
+)
 from epv_env.plant.channels import CURRENT, P1, P2, P3, Sensor
 
 HELD = 3
@@ -21,11 +32,8 @@ CHANNELS = {"p1": P1, "p2": P2, "p3": P3, "current": CURRENT, "target": P2}
 READINGS = (*CHANNELS, "coil")
 """Readings of a control unit at the end of a period, in the order of the C structure."""
 _P2, _P3, _TARGET = (READINGS.index(name) for name in ("p2", "p3", "target"))
-
-START = np.array(
-    [CENTRE[INDEX[name]] for name in ("p1", "target", "p3", "I", "target")], dtype=np.float32
-)
-"""What is held before the first good readings [bar, A]."""
+_ENTRIES = [INDEX[name] for name in ("p1", "p2_error", "p3", "I", "target")]
+_SCALE, _CENTRE = SCALE[_ENTRIES], CENTRE[_ENTRIES]
 
 
 def limits(sensors: Mapping[str, Sensor]) -> NDArray:
@@ -38,17 +46,20 @@ def limits(sensors: Mapping[str, Sensor]) -> NDArray:
 
 def readings_of(observations: NDArray) -> dict[str, NDArray]:
     """The readings behind observations (..., entries), float32, in bar, A and 0 or 1, by READINGS."""
-    wide = observations.astype(np.float64)
-    target = decode(wide, "target")
-    values = {
-        "p1": decode(wide, "p1"),
-        "p2": decode(wide, "p2_error") + target,
-        "p3": decode(wide, "p3"),
-        "current": decode(wide, "I"),
-        "target": target,
-        "coil": np.rint(decode(wide, "action")),
-    }
-    return {name: values[name].astype(np.float32) for name in READINGS}
+    columns = np.moveaxis(_read(observations), -1, 0)
+    coil = np.rint(decode(observations.astype(np.float64), "action")).astype(np.float32)
+    return dict(zip(READINGS, (*columns, coil), strict=True))
+
+
+def _read(observations: NDArray) -> NDArray:
+    """CHANNELS behind observations (..., entries), float32 (..., 5) [bar, A]."""
+    read = observations[..., _ENTRIES].astype(np.float64) * _SCALE + _CENTRE
+    read[..., _P2] += read[..., _TARGET]  # an observation shows p2 by its distance from the target
+    return read.astype(np.float32)
+
+
+START = _read(np.zeros(len(LAYOUT)))
+"""What is held before the first good readings, (5,) [bar, A]: the middle of the observation."""
 
 
 class HeldReadings:
@@ -71,13 +82,12 @@ class HeldReadings:
         self.blind = np.zeros(n, dtype=bool)
         """Whether p2 or the target is lost now (n,)."""
 
+    @np.errstate(over="ignore", invalid="ignore")
     def hold(self, observations: NDArray) -> NDArray:
         """Observations (n, entries) as held readings give them; the same ones if none was lost."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            read = readings_of(observations)
-        now = np.stack([read[name] for name in CHANNELS], axis=-1)
+        now = _read(observations)
         lost = ~((now >= self._least) & (now <= self._greatest))
-        lost[:, _P2] |= lost[:, _TARGET]  # an observation shows p2 by its distance from the target
+        lost[:, _P2] |= lost[:, _TARGET]
         self._last = np.where(lost, self._last, now)
         self.blind, any_lost = lost[:, _P2], lost.any(axis=1)
         self.periods = np.where(any_lost, self.periods + 1, 0)
