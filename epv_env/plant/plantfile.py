@@ -240,7 +240,8 @@ def _free(content: _PlantFile, parameters: Parameters) -> Mapping[str, Freedom]:
 
 def _given(freedom: Freedom) -> dict[str, Any]:
     """The fields of a Freedom that say anything, for JSON."""
-    return {name: value for name, value in asdict(freedom).items() if value is not None}
+    given = {name: value for name, value in asdict(freedom).items() if value is not None}
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in given.items()}
 
 
 def _diagnosis(content: _PlantFile) -> Mixture | None:

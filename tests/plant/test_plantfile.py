@@ -62,6 +62,15 @@ def test_results_of_another_plant_have_another_subject(change, tmp_path):
     assert first != other
 
 
+def test_a_subject_is_as_its_file_gives_it_back(tmp_path):
+    """So that what a folder was begun with can be compared with what is given now."""
+    freedom = {"R": {"bounds": [40.0, 44.0]}, "RML": {"mean": 1.7e7, "sd": 1e5}}
+    plant = load_plant(written(tmp_path / "plant.json", free=freedom))
+    subject = plant_subject(plant)
+    assert json.loads(json.dumps(subject)) == subject
+    assert subject["plant"]["free"] == freedom
+
+
 def assert_equal(found, expected):
     assert dict(found.parameters) == dict(expected.parameters)
     assert (found.name, found.provenance) == (expected.name, expected.provenance)

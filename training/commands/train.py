@@ -8,7 +8,6 @@ and two pictures, and ends with a verdict. A training that was stopped goes on w
 """
 
 import argparse
-import json
 import shutil
 from importlib.metadata import version
 from pathlib import Path
@@ -168,7 +167,7 @@ def configuration(options: argparse.Namespace, plant: Plant) -> dict[str, Any]:
     """Options, plant and versions: what is needed to repeat the training."""
     return {
         "options": {name: _plain(value) for name, value in vars(options).items()},
-        "plant": json.loads(json.dumps(plant_subject(plant)["plant"])),
+        "plant": plant_subject(plant)["plant"],
         "versions": {
             package: version(package)
             for package in ("epv-valve", "gymnasium", "numba", "numpy", "stable-baselines3", "torch")
