@@ -116,6 +116,11 @@ class Diagnosis:
         gaps = {name: self.reduction.gaps[name].overall.value for name in (label, NOMINAL)}
         return best if gaps[label] <= (1.0 + NOTICED_WORSENING) * gaps[NOMINAL] else self.nominal
 
+    @property
+    def kept_label(self) -> str:
+        """The causes of the model to use in one line, as in files; else RECALIBRATED or NOMINAL."""
+        return NOMINAL if self.kept is self.nominal else self.kept.label or RECALIBRATED
+
     def surely_helps(self, cause: RankedCause) -> bool:
         """Whether adding a judged cause surely reduces the gap on held-out recordings."""
         return self.share_closed(cause).low > 0.0

@@ -23,7 +23,7 @@ from identification.gap.diagnosis import Diagnosis, diagnose
 from identification.gap.fit.evidence import EvaluatedHypothesis
 from identification.gap.fit.fitting_problem import Estimate, FitCache, FittingProblem
 from identification.gap.fit.laws import COMPONENTS
-from identification.gap.judge.held_out import RECALIBRATED
+from identification.gap.judge.held_out import NOMINAL, RECALIBRATED
 from identification.gap.judge.verdict import AMBIGUOUS, UNKNOWN
 from identification.gap.report.gap_json import fitted_values, parameter_covariance, write_results
 from identification.gap.report.page import sections
@@ -145,17 +145,16 @@ def refitted_plant(found: Diagnosis, valve: Valve, name: str) -> Plant:
     """
     best = found.kept
     region = region_of(found, best, valve)
-    refitted, kind = "recalibration", "recalibrated"
-    if best is found.nominal:
-        refitted, kind = "none: recalibration makes it worse", "nominal"
+    methods = {RECALIBRATED: "recalibration", NOMINAL: "none: recalibration makes it worse"}
+    own = f" with {best.label}" if best.labels else f", {found.kept_label}"
     return replace(
         valve.plant,
         parameters=region.centre,
         region=region,
         diagnosis=possible_plants(found, valve),
-        name=f"{name} with {best.label}" if best.labels else f"{name}, {kind}",
+        name=name + own,
         provenance={
-            "method": "joint refit with the cause of the gap" if best.labels else refitted,
+            "method": methods.get(found.kept_label, "joint refit with the cause of the gap"),
             "software": f"epv-valve {version('epv-valve')}",
             "verdict": found.conclusion.verdict,
             "recordings_sha256": {r.name: r.sha256 for r in valve.recordings},

@@ -289,7 +289,7 @@ def calibrated_values(diagnosis: Diagnosis, status: str) -> Table:
             ]
         )
         statuses.append(own)
-    model = f"with {kept.title}" if kept.labels else "recalibrated, without a cause"
+    model = f"with {kept.title}" if kept.labels else f"{diagnosis.kept_label}, without a cause"
     return Table(
         columns=["Parameter", "nominal", f"fitted ({LEVEL_TEXT} interval)", "trust it"],
         rows=rows,

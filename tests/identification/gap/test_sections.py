@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from docs.examples.tank import Tank, virtual_recordings
+from identification.block_bootstrap import Interval
 from identification.gap.diagnosis import Diagnosis, diagnose
+from identification.gap.judge.held_out import NOMINAL
 from identification.gap.report.figures import location_figure
 from identification.gap.report.gap_json import as_json
 from identification.gap.report.page import calibrated_values, gap_table, sections
@@ -207,6 +209,16 @@ def test_the_values_are_those_of_the_model_to_use(verdict, model):
     symbols = [p.title for p in diagnosed(verdict).ranking.problem.plant.parameters]
     assert [row[0] for row in table.rows] == symbols
     assert {row[-1] for row in table.rows} == {"yes"}
+
+
+def test_a_nominal_model_is_not_called_recalibrated():
+    found = diagnosed("no_gap")
+    gaps = found.reduction.gaps
+    better = replace(gaps[NOMINAL], overall=Interval(value=0.5, low=0.5, high=0.5))
+    reduction = replace(found.reduction, gaps={**gaps, NOMINAL: better})
+    found = replace(found, reduction=reduction)
+    assert found.kept is found.nominal
+    assert "model to use: nominal, without a cause" in calibrated_values(found, "good").caption
 
 
 def test_the_figure_of_a_full_bar_stays_within_the_frame():
