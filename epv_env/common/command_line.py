@@ -125,7 +125,7 @@ def writable_file(text: str) -> Path:
     try:
         check_writable(path)
     except OSError as error:
-        raise argparse.ArgumentTypeError(str(error)) from None
+        raise argparse.ArgumentTypeError(f"{path}: {error.strerror}") from None
     return path
 
 
