@@ -2,7 +2,7 @@
 
 The policy is a small net without memory. Its output is added to the advice of the adaptive pulse, and
 two rules stand in front of it (controllers/knowledge.py). The controller believes p3, so it comes with a
-check of that sensor (controllers/p3_check.py).
+check of that sensor (controllers/sensor_check.py).
 """
 
 from dataclasses import dataclass, field
@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.knowledge import ValveKnowledge
-from controllers.p3_check import P3Check
 from controllers.policy_files import Network, read_policy
+from controllers.sensor_check import P3Check
 from controllers.tuned import tuned
 from epv_env.plant.plantfile import Plant, load_plant
 
@@ -51,12 +51,6 @@ class Policy:
         return np.where(self.knowledge.must_shut | ~(off >= on), 1, 0)
 
 
-def p3_checked(controller: Policy, plant: Plant) -> P3Check:
-    """The controller with a check of its sensors, the best one that does not read p3 behind it."""
-    fallback = tuned(FALLBACK, plant)
-    return P3Check(main=controller, fallback=fallback, sensors=plant.sensors, name=controller.name)
-
-
 def load_policy(
     folder: str | PathLike[str] = TRAINED, plant: Plant | str | PathLike[str] | None = None
 ) -> P3Check:
@@ -70,4 +64,6 @@ def load_policy(
     """
     contract, network = read_policy(folder)
     chosen = load_plant(plant)
-    return p3_checked(Policy(network=network, plant=chosen, name=contract.name), chosen)
+    policy = Policy(network=network, plant=chosen, name=contract.name)
+    fallback = tuned(FALLBACK, chosen)
+    return P3Check(main=policy, fallback=fallback, sensors=chosen.sensors, name=policy.name)

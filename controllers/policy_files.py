@@ -3,7 +3,6 @@
 Loading a policy runs no code from its files: the weights are arrays, the contract is checked data.
 """
 
-import json
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -18,19 +17,14 @@ from safetensors.numpy import load, save
 
 from controllers.knowledge import RULES
 from controllers.valve_learner import LEARNT
+from epv_env import observation
 from epv_env.common.files import JSONFileError, digest, read_bytes, read_json, write_bytes, write_json
-from epv_env.observation import LAYOUT, contract
 
 FORMAT = "epv-policy/2"
 WEIGHTS_FILE = "policy.safetensors"
 CONTRACT_FILE = "policy.json"
-MOST_LAYERS = 64
-"""More than any policy has; a number of layers beyond is a damaged file."""
 ADVICE = "advice.weight"
 """Name of the array of the advice's weights."""
-
-ControlPeriod = Annotated[float, msgspec.Meta(ge=0.5e-3, le=0.1)]
-"""Time between two decisions, as an environment allows it [s]."""
 
 
 class PolicyError(ValueError):
@@ -40,8 +34,8 @@ class PolicyError(ValueError):
 class Observation(msgspec.Struct, kw_only=True):
     """What the policy reads, as `epv_env.observation.contract` writes it."""
 
-    control_period_s: ControlPeriod
-    """Time between two observations [s]."""
+    control_period_s: Annotated[float, msgspec.Meta(ge=0.5e-3, le=0.1)]
+    """Time between two observations, as an environment allows it [s]."""
     format: str = ""
     """Version of the layout's form."""
     entries: list[Any] = []
@@ -53,8 +47,8 @@ class PolicyContract(msgspec.Struct, kw_only=True):
 
     format: str
     """Version of this form."""
-    layers: Annotated[int, msgspec.Meta(ge=1, le=MOST_LAYERS)]
-    """Number of dense layers."""
+    layers: Annotated[int, msgspec.Meta(ge=1, le=64)]
+    """Number of dense layers; more than any policy has is a damaged file."""
     observation: Observation
     """The readings: the first inputs."""
     learnt: list[Any] = []
@@ -171,7 +165,7 @@ def write_policy(
         "activation": "tanh",
         "action": "argmax of the logits plus the advice times its weights: 0 = coil off, 1 = coil on",
         "rules": list(RULES),
-        "observation": contract(control_period),
+        "observation": observation.contract(control_period),
         "learnt": learnt_contract(),
         "provenance": provenance,
     }
@@ -188,7 +182,7 @@ def read_policy(folder: str | PathLike[str]) -> tuple[PolicyContract, Network]:
     if not isinstance(folder, (str, PathLike)):
         raise PolicyError(f"a policy is {folder!r}: give the path of a folder that training wrote")
     folder = Path(folder)
-    found = read_contract(folder)
+    contract = read_contract(folder)
     try:
         arrays = load(read_bytes(folder / WEIGHTS_FILE))
     # KeyError: a type of numbers that NumPy does not know
@@ -197,9 +191,9 @@ def read_policy(folder: str | PathLike[str]) -> tuple[PolicyContract, Network]:
             f"cannot read a policy from {folder}: {error}; give a folder that training wrote, with "
             f"{CONTRACT_FILE} and {WEIGHTS_FILE}"
         ) from None
-    _check_arrays(arrays, found, folder)
-    layers = [(arrays[f"{i}.weight"], arrays[f"{i}.bias"]) for i in range(found.layers)]
-    return found, Network(layers=layers, advice_weight=arrays[ADVICE])
+    _check_arrays(arrays, contract, folder)
+    layers = [(arrays[f"{i}.weight"], arrays[f"{i}.bias"]) for i in range(contract.layers)]
+    return contract, Network(layers=layers, advice_weight=arrays[ADVICE])
 
 
 def read_contract(folder: Path) -> PolicyContract:
@@ -208,26 +202,26 @@ def read_contract(folder: Path) -> PolicyContract:
         f"train it anew, or give a folder that training wrote, with {CONTRACT_FILE} and {WEIGHTS_FILE}"
     )
     try:
-        found = read_json(folder / CONTRACT_FILE, PolicyContract, version=FORMAT, remedy=remedy)
+        read = read_json(folder / CONTRACT_FILE, PolicyContract, version=FORMAT, remedy=remedy)
     except JSONFileError as error:
         raise PolicyError(f"cannot read a policy from {folder}: {error}") from None
-    expected = contract(found.observation.control_period_s), learnt_contract(), list(RULES)
-    own = msgspec.to_builtins(found.observation), found.learnt, found.rules
-    if list(own) != json.loads(json.dumps(expected)):
+    expected = [observation.contract(read.observation.control_period_s), learnt_contract(), list(RULES)]
+    inputs = [msgspec.to_builtins(read.observation), read.learnt, read.rules]
+    if inputs != expected:
         raise PolicyError(
             f"policy {folder} was trained on other observations, learnt quantities or rules than this "
             "version's: train it anew, or use the version that wrote it"
         )
-    return found
+    return read
 
 
-def _check_arrays(arrays: dict[str, NDArray], found: PolicyContract, folder: Path) -> None:
+def _check_arrays(arrays: dict[str, NDArray], contract: PolicyContract, folder: Path) -> None:
     """Raises PolicyError unless the arrays have the contract's shapes, one precision, finite values."""
     shapes: dict[str, tuple[int, ...]] = {ADVICE: (2,)}
-    inputs = len(LAYOUT) + len(LEARNT)
-    for i in range(found.layers):
+    inputs = len(observation.LAYOUT) + len(LEARNT)
+    for i in range(contract.layers):
         bias = arrays.get(f"{i}.bias", np.zeros(0))  # the width of a hidden layer is the policy's own
-        outputs = 2 if i == found.layers - 1 else len(bias) if bias.ndim == 1 else 1
+        outputs = 2 if i == contract.layers - 1 else len(bias) if bias.ndim == 1 else 1
         shapes |= {f"{i}.weight": (outputs, inputs), f"{i}.bias": (outputs,)}
         inputs = outputs
     for name, shape in shapes.items():

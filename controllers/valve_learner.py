@@ -28,7 +28,7 @@ from controllers.pulse_table import (
     opens_at,
     time_to_open,
 )
-from epv_env.observation import CENTRE, INDEX, SCALE, Quantity
+from epv_env.observation import INDEX, Quantity, in_units
 from epv_env.plant.primitives import source_digest
 from epv_env.reward import BAND_BAR
 
@@ -84,36 +84,29 @@ _STATE = (
 )  # fmt: skip
 
 
-def _learnt() -> tuple[Quantity, ...]:
-    def quantity(name: str, unit: str, scale: float, limit: float, centre: float = 0.0) -> Quantity:
-        return Quantity(name=name, unit=unit, centre=centre, scale=scale, limit=limit)
-
-    return (
-        quantity("offset", "bar", 0.5, 8.0),  # of the opening pressure from the table's
-        quantity("offset_deviation", "bar", 0.5, 8.0),
-        quantity("gain", "1", 0.2, 8.0, centre=1.0),  # rise of a pulse over the table's
-        quantity("gain_deviation", "1", 0.2, 8.0),
-        quantity("pace", "1", 0.2, 8.0, centre=1.0),  # venting rate over the table's
-        quantity("pace_deviation", "1", 0.2, 8.0),
-        quantity("error", "bar", 0.5, 4.0),  # p2 - target, filtered while the valve is shut
-        quantity("fall", "bar/s", 2.0, 4.0),  # rate of change of p2 by consumption, at most 0
-        quantity("opens_in", "s", 0.05, 2.0),  # with the coil off from now; negative: it is open
-        quantity("opens_in_early", "s", 0.05, 2.0),  # the same if the valve opens early
-        quantity("opens_from_rest", "s", 0.05, 2.0, centre=0.05),  # from a full control chamber
-        quantity("forecast", "bar", 0.5, 4.0),  # p2 - target at the opening, if the coil goes off now
-        quantity("under_way", "bar", 0.3, 4.0),  # rise of p2 if the coil is switched on now
-        quantity("after_period", "bar", 0.3, 4.0),  # the same after one period more off
-        quantity("after_period_early", "bar", 0.3, 4.0),  # the same if the valve opens early
-        quantity("reserve", "bar", 0.1, 4.0),  # how much higher p2 is held where the valve is slow
-        quantity("deepest", "bar", 0.25, 4.0),  # deepest breakdown lately
-        quantity("head", "bar", 2.0, 2.0),  # p1 - p2
-        quantity("margin", "bar", 0.2, 2.0),  # these three: the adaptive pulse (controllers/pulse.py)
-        quantity("remaining", "s", 0.02, 2.0),
-        quantity("advised", "1", 0.5, 1.0, centre=0.5),
-    )
-
-
-LEARNT = _learnt()
+LEARNT = (
+    Quantity("offset", "bar", 0.0, 0.5, 8.0),  # of the opening pressure from the table's
+    Quantity("offset_deviation", "bar", 0.0, 0.5, 8.0),
+    Quantity("gain", "1", 1.0, 0.2, 8.0),  # rise of a pulse over the table's
+    Quantity("gain_deviation", "1", 0.0, 0.2, 8.0),
+    Quantity("pace", "1", 1.0, 0.2, 8.0),  # venting rate over the table's
+    Quantity("pace_deviation", "1", 0.0, 0.2, 8.0),
+    Quantity("error", "bar", 0.0, 0.5, 4.0),  # p2 - target, filtered while the valve is shut
+    Quantity("fall", "bar/s", 0.0, 2.0, 4.0),  # rate of change of p2 by consumption, at most 0
+    Quantity("opens_in", "s", 0.0, 0.05, 2.0),  # with the coil off from now; negative: it is open
+    Quantity("opens_in_early", "s", 0.0, 0.05, 2.0),  # the same if the valve opens early
+    Quantity("opens_from_rest", "s", 0.05, 0.05, 2.0),  # from a full control chamber
+    Quantity("forecast", "bar", 0.0, 0.5, 4.0),  # p2 - target at the opening, if the coil goes off now
+    Quantity("under_way", "bar", 0.0, 0.3, 4.0),  # rise of p2 if the coil is switched on now
+    Quantity("after_period", "bar", 0.0, 0.3, 4.0),  # the same after one period more off
+    Quantity("after_period_early", "bar", 0.0, 0.3, 4.0),  # the same if the valve opens early
+    Quantity("reserve", "bar", 0.0, 0.1, 4.0),  # how much higher p2 is held where the valve is slow
+    Quantity("deepest", "bar", 0.0, 0.25, 4.0),  # deepest breakdown lately
+    Quantity("head", "bar", 0.0, 2.0, 2.0),  # p1 - p2
+    Quantity("margin", "bar", 0.0, 0.2, 2.0),  # these three: the adaptive pulse (controllers/pulse.py)
+    Quantity("remaining", "s", 0.0, 0.02, 2.0),
+    Quantity("advised", "1", 0.5, 0.5, 1.0),
+)
 """What is known of a valve, as a policy sees it; the advice last."""
 
 VALVE = np.dtype(
@@ -302,22 +295,17 @@ def remember_breakdown(v, period):
 
 @compiled
 def observe(
-    v: Any, table: Any, t: int, reading: Any, period: float, filter_time: float, informed: bool
+    v: Any, table: Any, t: int, seen: Any, period: float, filter_time: float, informed: bool
 ) -> None:
     """Take in one observation (entries,) of one valve.
 
-    v: record of VALVE, changed. table: of the plants. t: the valve's plant in the table. reading: an
-    observation [-], epv_env.observation.LAYOUT. period: control period [s]. filter_time: time in which
-    the weight of a reading of p2 fades by 1/e [s]. informed: whether the table is the valve's own, so
-    that nothing is learnt of the valve.
+    v: record of VALVE, changed. table: of the plants. t: the valve's plant in the table. seen: the
+    entries of epv_env.observation.LAYOUT [bar, A, s]. period: control period [s]. filter_time: time in
+    which the weight of a reading of p2 fades by 1/e [s]. informed: whether the table is the valve's own,
+    so that nothing is learnt of the valve.
     """
-    error = reading[_ERROR] * SCALE[_ERROR] + CENTRE[_ERROR]
-    p1 = reading[_P1] * SCALE[_P1] + CENTRE[_P1]
-    p2 = error + reading[_TARGET] * SCALE[_TARGET] + CENTRE[_TARGET]
-    p3 = reading[_P3] * SCALE[_P3] + CENTRE[_P3]
-    p2_change = reading[_P2_CHANGE] * SCALE[_P2_CHANGE] + CENTRE[_P2_CHANGE]
-    p3_change = reading[_P3_CHANGE] * SCALE[_P3_CHANGE] + CENTRE[_P3_CHANGE]
-    on = reading[_COIL] > 0.0
+    error, p1, p3 = seen[_ERROR], seen[_P1], seen[_P3]
+    p2, on = error + seen[_TARGET], seen[_COIL] > 0.5
     if on and v.off_periods > 0:  # the pulse ended at the last reading
         v.end_p1, v.end_p2, v.end_p3, v.end_fall = v.p1, v.p2, v.p3, v.fall
         v.measuring = 1.0
@@ -326,13 +314,13 @@ def observe(
     if not on:
         v.measuring = 0.0
     if v.off_periods > 1 and not informed:
-        watch_opening(v, table, t, p1, p2, p3, p2_change - min(v.slope, 0.0) * period)
+        watch_opening(v, table, t, p1, p2, p3, seen[_P2_CHANGE] - min(v.slope, 0.0) * period)
         summarise(v)
     v.opens_in = time_to_open(table, t, v.offset, p1, p2, p3) / v.pace
     shut = v.opens_in > 0
     follow_p2(v, error, shut, period, filter_time)
     if shut and v.off_periods >= PERIODS_AFTER_RELEASE and not informed:
-        learn_pace(v, table, t, p3, p3_change, period)
+        learn_pace(v, table, t, p3, seen[_P3_CHANGE], period)
     if v.measuring > 0 and shut and v.on_periods > 1:
         if not informed:
             lasted = v.on_periods * period
@@ -416,7 +404,7 @@ class ValveLearner:
     def observe(self, observations: NDArray) -> Any:
         """Take in observations (n, entries); what is known then, records of VALVE (n,)."""
         _observe_all(
-            self.valves, self.table, np.ascontiguousarray(observations, dtype=np.float64),
+            self.valves, self.table, in_units(observations),
             self.control_period, self._filter_time, self._informed,
         )  # fmt: skip
         return self.valves

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from controllers.held_readings import HELD, HeldReadings
-from controllers.p3_check import P3Check
+from controllers.sensor_check import HELD, HeldReadings, P3Check
 from controllers.tuned import tuned
 from epv_env.observation import LAYOUT, decode, encode
 from epv_env.plant.channels import SENSORS

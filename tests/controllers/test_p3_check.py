@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from controllers.hysteresis import Hysteresis
-from controllers.p3_check import P3Check
 from controllers.pulse import InformedPulse
+from controllers.sensor_check import P3Check
 from epv_env.observation import LAYOUT, encode
 
 VALVES = 3

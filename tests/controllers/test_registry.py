@@ -14,11 +14,11 @@ pytest.importorskip("control")
 import controllers
 import epv_env  # noqa: F401 - registers the environments
 from controllers.knowledge import WithRules
-from controllers.p3_check import P3Check
 from controllers.policy import Policy, load_policy
 from controllers.pulse import InformedPulse
 from controllers.registration import Choice, Range, Registration, RegistrationError
 from controllers.registry import REGISTRY, TUNED_KINDS, registration
+from controllers.sensor_check import P3Check
 from controllers.tuned import (
     ControllersFileError,
     Tuning,

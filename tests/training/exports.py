@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controllers.held_readings import READINGS
 from controllers.hysteresis import Hysteresis
 from controllers.policy_files import Network, write_policy
+from controllers.sensor_check import READINGS
 from epv_env.common.commands import main_of
 from epv_env.observation import LAYOUT
 from training.deploy.agreement import STATES_EPISODES as EPISODES
@@ -96,8 +96,9 @@ def replay(folder: Path, network: Network) -> Replay:
     for k, now in enumerate(readings(folder).ravel()):
         if k % PERIODS == 0:
             memory[:] = np.zeros(1, dtype=MEMORY)
-        before, reading = memory.copy(), np.array([now])
-        code.epv_policy_observe(_at(before), _at(reading), _at(made[k]))
+        before, reading, value = memory.copy(), np.array([now]), np.zeros(len(LAYOUT), dtype=np.float32)
+        code.epv_policy_observe(_at(before), _at(reading), _at(value))
+        code.epv_policy_learn(_at(before), _at(value), _at(made[k]))
         decided.append(code.epv_policy_step(_at(memory), _at(reading)))
     layers = [(weight.astype(float), bias.astype(float)) for weight, bias in network.layers]
     exact = replace(network, layers=layers).logits(rows)

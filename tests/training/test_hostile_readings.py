@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from controllers.held_readings import HELD
 from controllers.policy import TRAINED, load_policy
+from controllers.sensor_check import HELD
 from epv_env.observation import CENTRE, INDEX, LIMIT, P2_LAGS, P3_LAGS, SCALE, decode, scaled
 from epv_env.plant.channels import CURRENT, P1, P2, P3
 from epv_env.plant.plantfile import load_plant

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.base import Controller
-from controllers.held_readings import READINGS, readings_of
 from controllers.knowledge import ValveKnowledge
+from controllers.sensor_check import READINGS, readings_of
 from controllers.valve_learner import LEARNT
 from epv_env.observation import LAYOUT
 from training.deploy.c_code import LEAST_AGREEMENT, Export

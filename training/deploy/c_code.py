@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers import held_readings, knowledge, p3_check, pulse, valve_learner
+from controllers import knowledge, pulse, sensor_check, valve_learner
 from controllers.hysteresis import Hysteresis
-from controllers.p3_check import P3Check
 from controllers.policy import Policy
 from controllers.policy_files import RULES, learnt_contract
+from controllers.sensor_check import P3Check
 from controllers.valve_learner import LEARNT
 from epv_env.observation import HISTORY, INDEX, LAYOUT, LONGEST_WAIT, P2_LAGS, P3_LAGS, contract
 from training.deploy.controller_c import (
@@ -47,7 +47,7 @@ _VALVE_C = np.dtype(
     align=True,
 )
 MEMORY = np.dtype(
-    [("p2", "f4", HISTORY), ("p3", "f4", HISTORY), ("last", "f4", len(held_readings.CHANNELS)),
+    [("p2", "f4", HISTORY), ("p3", "f4", HISTORY), ("last", "f4", len(sensor_check.CHANNELS)),
      ("waited", "u2"), ("newest", "u1"), ("coil", "u1"), ("begun", "u1"), ("lost", "u1"),
      ("fallback", "u1"), ("failed", "u1"), ("periods", "u2"), ("valve", _VALVE_C)],
     align=True,
@@ -155,10 +155,10 @@ def sources(export: Export) -> dict[str, str]:
             f"    {{WEIGHT_{k}, BIAS_{k}, {weight.shape[1]}, {weight.shape[0]}}},\n"
             for k, (weight, _) in enumerate(layers)
         ),
-        "held": held_readings.HELD,
+        "held": sensor_check.HELD,
         **_p3_check_fields(export),
     }
-    ends = (*held_readings.limits(export.controller.sensors), held_readings.START)
+    ends = (*sensor_check.limits(export.controller.sensors), sensor_check.START)
     fields |= {n: listed(v) for n, v in zip(("least", "greatest", "start"), ends, strict=True)}
     for name in ("centre", "scale", "limit"):
         fields[name] = listed(np.array([getattr(entry, name) for entry in LAYOUT]))
@@ -173,14 +173,14 @@ def _p3_check_fields(export: Export) -> dict[str, Any]:
     if not isinstance(behind, Hysteresis):
         raise ExportError(f"{behind.name!r} behind the check of p3 is no hysteresis: extend c_code.py")
     names = {
-        "p1": "p1", "p3": "p3", "p3_change": p3_check.CHANGE, "since": "since_switching",
+        "p1": "p1", "p3": "p3", "p3_change": sensor_check.CHANGE, "since": "since_switching",
         "p2_error": "p2_error", "p2_change": f"p2_change_{behind.lag}",
     }  # fmt: skip
     numbers = {
-        "ambient": p3_check.AMBIENT,
-        "still": p3_check.STILL,
-        "margin": p3_check.MARGIN,
-        "wait": min(p3_check.WAIT, LONGEST_WAIT) - export.period / 2,
+        "ambient": sensor_check.AMBIENT,
+        "still": sensor_check.STILL,
+        "margin": sensor_check.MARGIN,
+        "wait": min(sensor_check.WAIT, LONGEST_WAIT) - export.period / 2,
         "slope_time": behind.lag * export.period,
         "open_below": behind.open_below,
         "shut_above": behind.shut_above,

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.held_readings import READINGS, readings_of
+from controllers.sensor_check import READINGS, readings_of
 from training.deploy.c_code import MEMORY
 from training.deploy.translation import ExportError
 

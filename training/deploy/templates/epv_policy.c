@@ -71,7 +71,7 @@ static float row(const layer *l, int j, const float *signal)
 static const layer NETWORK[LAYERS] = {
 $network};
 
-/* Put the last good readings in place of lost ones (controllers/held_readings.py); a bit for each lost.
+/* Put the last good readings in place of lost ones (controllers/sensor_check.py); a bit for each lost.
  * p2 counts by its distance from the target: without a target it is lost, too. */
 static int hold(epv_policy_memory *m, epv_policy_readings *now)
 {
@@ -122,58 +122,51 @@ static float change(const float *ring, int newest, int lag)
 }
 
 void epv_policy_observe(epv_policy_memory *m, const epv_policy_readings *now,
-                        float inputs[EPV_POLICY_INPUTS])
+                        float value[EPV_POLICY_READINGS])
 {
-    float value[EPV_POLICY_READINGS];
     float since;
-    int i;
     remember(m, now);
     since = (float)m->waited * PERIOD;
     if (since > LONGEST)
         since = LONGEST;
 $values
-    for (i = 0; i < EPV_POLICY_READINGS; i++)
-        inputs[i] = entry(value[i], i);
 }
 
-/* An entry of the observation in its unit. */
-static float seen(const float *inputs, int i)
+/* Whether p3 stands still where the coil should move it (controllers/sensor_check.py). */
+static int implausible(const epv_policy_memory *m, const float *value)
 {
-    return inputs[i] * SCALE[i] + CENTRE[i];
-}
-
-/* Whether p3 stands still where the coil should move it (controllers/p3_check.py). */
-static int implausible(const epv_policy_memory *m, const float *inputs)
-{
-    const float p3 = seen(inputs, $p3), moved = seen(inputs, $p3_change);
-    const float remains = m->coil ? seen(inputs, $p1) - p3 : p3 - $ambient;
-    const float known = lesser(seen(inputs, $since), (float)m->periods * PERIOD);
-    return known > $wait && fabsf(moved) < $still && remains > $margin;
+    const float remains = m->coil ? value[$p1] - value[$p3] : value[$p3] - $ambient;
+    const float known = lesser(value[$since], (float)m->periods * PERIOD);
+    return known > $wait && fabsf(value[$p3_change]) < $still && remains > $margin;
 }
 
 /* Two points with extrapolation (controllers/hysteresis.py), which does not read p3. */
-static void hysteresis(epv_policy_memory *m, const float *inputs)
+static void hysteresis(epv_policy_memory *m, const float *value)
 {
-    const float error = seen(inputs, $p2_error), slope = seen(inputs, $p2_change) / $slope_time;
+    const float error = value[$p2_error], slope = value[$p2_change] / $slope_time;
     if (m->fallback)
         m->fallback = !(error + $open_lookahead * slope < $open_below);
     else
         m->fallback = error + $shut_lookahead * slope > $shut_above;
 }
 
-int epv_policy_learn(epv_policy_memory *m, float inputs[EPV_POLICY_INPUTS])
+int epv_policy_learn(epv_policy_memory *m, const float value[EPV_POLICY_READINGS],
+                     float inputs[EPV_POLICY_INPUTS])
 {
+    int i;
     if (m->periods == 0) {
         fn_begin(&m->valve);
         m->fallback = 1;
     }
     if (m->periods < 65535)
         m->periods++;
-    if (implausible(m, inputs))
+    if (implausible(m, value))
         m->failed = 1;
-    hysteresis(m, inputs);
-    fn_observe(&m->valve, inputs, EPV_POLICY_READINGS, PERIOD, $filter_time, 0.0f);
+    hysteresis(m, value);
+    fn_observe(&m->valve, value, EPV_POLICY_READINGS, PERIOD, $filter_time, 0.0f);
     fn_plan(&m->valve, PERIOD);
+    for (i = 0; i < EPV_POLICY_READINGS; i++)
+        inputs[i] = entry(value[i], i);
 $learnt
     return fn_cannot_raise(&m->valve) != 0.0f || fn_would_rise_too_far(&m->valve) != 0.0f;
 }
@@ -196,11 +189,11 @@ void epv_policy_logits(const float inputs[EPV_POLICY_INPUTS], float logits[2])
 int epv_policy_step(epv_policy_memory *m, const epv_policy_readings *given)
 {
     epv_policy_readings now = *given;
-    float inputs[EPV_POLICY_INPUTS], logits[2];
+    float value[EPV_POLICY_READINGS], inputs[EPV_POLICY_INPUTS], logits[2];
     const int begun = m->begun, lost = hold(m, &now);
     int must_shut;
-    epv_policy_observe(m, &now, inputs);
-    must_shut = epv_policy_learn(m, inputs);
+    epv_policy_observe(m, &now, value);
+    must_shut = epv_policy_learn(m, value, inputs);
     m->begun = begun || !lost || m->lost > $held;
     if (!m->begun || (m->failed && (lost >> P2 & 1)))
         return 1; /* there is nothing to decide by: shut */

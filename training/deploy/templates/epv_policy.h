@@ -56,12 +56,13 @@ typedef struct {
 /* One period: remember the readings, return what the coil shall do next (0 off, 1 on). */
 int epv_policy_step(epv_policy_memory *memory, const epv_policy_readings *now);
 
-/* Its parts, for readings that are all good: the readings as the observation (the first EPV_POLICY_READINGS
- * entries of the inputs), what is learnt and advised (the entries behind them; returns whether a rule keeps
- * the coil on), and the network's {off, on}. */
+/* Its parts, for readings that are all good: the observation, each entry in its unit; the network's inputs,
+ * which are the observation, scaled, and what is learnt and advised (returns whether a rule keeps the coil
+ * on); and the network's {off, on}. */
 void epv_policy_observe(epv_policy_memory *memory, const epv_policy_readings *now,
-                        float inputs[EPV_POLICY_INPUTS]);
-int epv_policy_learn(epv_policy_memory *memory, float inputs[EPV_POLICY_INPUTS]);
+                        float value[EPV_POLICY_READINGS]);
+int epv_policy_learn(epv_policy_memory *memory, const float value[EPV_POLICY_READINGS],
+                     float inputs[EPV_POLICY_INPUTS]);
 void epv_policy_logits(const float inputs[EPV_POLICY_INPUTS], float logits[2]);
 
 #ifdef __cplusplus
