@@ -21,7 +21,8 @@ from markdown.extensions.toc import slugify_unicode  # noqa: E402
 
 from docs.scripts import notebook  # noqa: E402
 from docs.scripts.effects_table import effects_table  # noqa: E402
-from epv_env.common.commands import commands, parse  # noqa: E402
+from epv_env.common.commands import commands  # noqa: E402
+from epv_env.common.options import parse  # noqa: E402
 from epv_env.plant.plantfile import load_plant  # noqa: E402
 from identification.bench.programmes import load_programmes  # noqa: E402
 from identification.importing.mapping_file import read_mapping  # noqa: E402

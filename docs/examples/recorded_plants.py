@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from epv_env.common.command_line import writable_folder
+from epv_env.common.options import writable_folder
 from identification.gap.diagnosis import Diagnosis, diagnose
 from identification.gap.fit.prediction import predict
 from identification.gap.ode_plant import OdePlant

@@ -15,8 +15,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.common.command_line import fail_clearly, writable_folder
+from epv_env.common.command_line import fail_clearly
 from epv_env.common.files import write_text
+from epv_env.common.options import writable_folder
 from identification.gap.diagnosis import diagnose
 from identification.gap.plant import (
     Cause,

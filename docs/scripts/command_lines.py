@@ -5,7 +5,8 @@ import importlib
 import os
 from unittest.mock import patch
 
-from epv_env.common.commands import commands, help_line, parser_of
+from epv_env.common.commands import commands, help_line
+from epv_env.common.options import parser_of
 from training.epv import PACKAGES
 
 WIDTH = "88"

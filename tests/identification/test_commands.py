@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 import epv_env  # noqa: F401 - registers the environments
-from epv_env.common.commands import commands, help_line, parser_of
+from epv_env.common.commands import commands, help_line
+from epv_env.common.options import parser_of
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import load_plant
 from identification.__main__ import main

@@ -11,7 +11,8 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 from epv_env.common.command_line import NextStep
-from epv_env.common.commands import commands, parse
+from epv_env.common.commands import commands
+from epv_env.common.options import parse
 from identification.gap.judge.verdict import AMBIGUOUS, KNOWN, NO_GAP, PARTIAL, UNKNOWN
 from identification.report.page import write_page
 from training.epv import PACKAGES

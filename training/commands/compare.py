@@ -7,15 +7,18 @@
 A comparison that was stopped goes on where it stopped when it is started again.
 """
 
-import argparse
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
 import pandas as pd
 
 from controllers.tuned import load_tunings
-from epv_env.common.command_line import COUNT, NextStep, add_episodes, add_out, beside, plant_option
+from epv_env.common.command_line import NextStep, beside
 from epv_env.common.files import Journal, write_json, write_text
+from epv_env.common.options import Count, Episodes, Folder, Names, Quick
 from epv_env.plant.plantfile import Plant, load_plant, plant_subject
 from epv_env.plant.valves import available_cores
 from epv_env.vector_entry import check_device
@@ -41,25 +44,27 @@ OVERLAID = 3
 """Most controllers in the picture of one episode: more lines could not be told apart."""
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the command's options."""
-    add_out(parser, "runs/comparison")
-    parser.add_argument(
-        "--controllers", nargs="+", metavar="NAME", default=list(load_tunings()),
-        help=f"{HELP} (default: all tuned kinds)",
-    )  # fmt: skip
-    parser.add_argument("--against", metavar="LABEL", help="whom the others are set against (the first)")
-    parser.add_argument("--plants", nargs="+", choices=list(PLANTS), default=list(PLANTS))
-    parser.add_argument(
-        "--scenarios", nargs="+", metavar="NAME", default=[RANDOM],
-        help="scenarios, or the groups named, beyond (beyond training), worn (one effect each)",
-    )  # fmt: skip
-    parser.add_argument("--episodes", type=COUNT, default=1024, help="in each scenario and plant set")
-    parser.add_argument("--decisions", type=COUNT, default=1000, help="whose time is measured")
-    add_episodes(parser)
+@dataclass(frozen=True, kw_only=True)
+class Options(Episodes):
+    """Controllers, plants and scenarios, and how many episodes of each."""
+
+    out: Folder = Path("runs/comparison")
+    controllers: Annotated[Names, f"{HELP} (default: all tuned kinds)"] = tuple(load_tunings())
+    against: Annotated[
+        str | None, {"metavar": "LABEL"}, "whom the others are set against (the first)"
+    ] = None
+    plants: Annotated[Sequence[str], {"nargs": "+", "choices": list(PLANTS)}, "sets of plants"] = tuple(
+        PLANTS
+    )
+    scenarios: Annotated[
+        Names, "scenarios, or the groups named, beyond (beyond training), worn (one effect each)"
+    ] = (RANDOM,)
+    episodes: Annotated[Count, "in each scenario and plant set"] = 1024
+    decisions: Annotated[Count, "whose time is measured"] = 1000
+    quick: Quick = False
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Options) -> None:
     """Run the episodes that --out lacks; write tables, differences and pictures.
 
     Raises ValueError for an unknown controller or scenario.
@@ -95,16 +100,14 @@ def run(options: argparse.Namespace) -> None:
     print(f"results in {options.out}")
 
 
-def next_step(options: argparse.Namespace) -> NextStep:
+def next_step(options: Options) -> NextStep:
     """Sweep the same controllers."""
-    words = ("--controllers", *options.controllers, "--out", beside(options.out, "sweep"))
-    return NextStep(
-        "to see which changes of the valve they bear", ("sweep", *words, *plant_option(options.plant))
-    )
+    words = ("sweep", "--controllers", *options.controllers, "--out", beside(options.out, "sweep"))
+    return NextStep("to see which changes of the valve they bear", words, options.plant)
 
 
 def write_results(
-    options: argparse.Namespace,
+    options: Options,
     table: pd.DataFrame,
     paired: pd.DataFrame,
     results: Results,
@@ -129,7 +132,7 @@ def write_results(
 
 
 def draw(
-    options: argparse.Namespace,
+    options: Options,
     table: pd.DataFrame,
     controllers: dict[str, Any],
     plant: Plant,

@@ -6,15 +6,17 @@
 A sweep that was stopped goes on where it stopped when it is started again.
 """
 
-import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import pandas as pd
 
 from controllers.policy_files import holds_policy
-from epv_env.common.command_line import COUNT, NextStep, add_episodes, add_out, beside, plant_option
+from epv_env.common.command_line import NextStep, beside
 from epv_env.common.files import Journal, write_json, write_text
+from epv_env.common.options import Count, Episodes, Folder, Names, Quick
 from epv_env.plant.consumption import check_scenario
 from epv_env.plant.plantfile import Plant, load_plant, plant_subject
 from epv_env.plant.valves import available_cores
@@ -48,23 +50,23 @@ FIGURES = {
 """Designs of each picture."""
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the command's options."""
-    add_out(parser, "runs/sweep")
-    parser.add_argument("--controllers", nargs="+", default=list(DEFAULT), metavar="NAME", help=HELP)
-    parser.add_argument("--designs", nargs="+", choices=DESIGNS, default=list(DESIGNS))
-    parser.add_argument(
-        "--factors", nargs="+", default=[], help="change only these, one at a time (default: all)"
-    )
-    parser.add_argument(
-        "--episodes", type=COUNT, default=128, help="at each point that changes one thing"
-    )
-    parser.add_argument("--joint-episodes", type=COUNT, default=4096, help="at each region")
-    parser.add_argument("--scenario", default="mixed", help="consumption, where it is not what changes")
-    add_episodes(parser)
+@dataclass(frozen=True, kw_only=True)
+class Options(Episodes):
+    """Controllers, what changes, and how many episodes at each change."""
+
+    out: Folder = Path("runs/sweep")
+    controllers: Annotated[Names, HELP] = DEFAULT
+    designs: Annotated[Sequence[str], {"nargs": "+", "choices": DESIGNS}, "what changes"] = DESIGNS
+    factors: Annotated[
+        Sequence[str], {"nargs": "+"}, "change only these, one at a time (default: all)"
+    ] = ()
+    episodes: Annotated[Count, "at each point that changes one thing"] = 128
+    joint_episodes: Annotated[Count, "at each region"] = 4096
+    scenario: Annotated[str, "consumption, where it is not what changes"] = "mixed"
+    quick: Quick = False
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Options) -> None:
     """Run the episodes that --out lacks; write tables and pictures.
 
     Raises ValueError for an unknown controller, scenario or factor.
@@ -89,20 +91,17 @@ def run(options: argparse.Namespace) -> None:
     print(f"\nresults in {options.out}")
 
 
-def next_step(options: argparse.Namespace) -> NextStep:
+def next_step(options: Options) -> NextStep:
     """Export the policy that was swept; train one if none was."""
     folders = [Path(source.rpartition("=")[2]) for source in options.controllers]
-    plant = plant_option(options.plant)
     if policy := next(filter(holds_policy, folders), None):
-        words = ("export", policy, "--out", beside(options.out, "c"), *plant)
-        return NextStep("to turn the policy into C", words)
-    words = ("train", "--out", beside(options.out, "policy"), *plant)
-    return NextStep("to train a policy beside these controllers", words)
+        words = ("export", policy, "--out", beside(options.out, "c"))
+        return NextStep("to turn the policy into C", words, options.plant)
+    words = ("train", "--out", beside(options.out, "policy"))
+    return NextStep("to train a policy beside these controllers", words, options.plant)
 
 
-def _batches(
-    point: Point, label: str, digest: str, plant: Plant, options: argparse.Namespace
-) -> list[Batch]:
+def _batches(point: Point, label: str, digest: str, plant: Plant, options: Options) -> list[Batch]:
     """A point's episodes under one controller."""
     return in_batches(
         options.joint_episodes if point.design == "regions" else options.episodes,
@@ -118,7 +117,7 @@ def _batches(
     )
 
 
-def write_results(options: argparse.Namespace, points: pd.DataFrame, settings: dict[str, Any]) -> None:
+def write_results(options: Options, points: pd.DataFrame, settings: dict[str, Any]) -> None:
     """Write points.csv, results.json and the pictures; print the tables."""
     write_text(options.out / "points.csv", points.to_csv(index=False))
     content = {"format": "epv-sweep/3", "settings": settings, "points": points.to_dict("records")}

@@ -15,7 +15,7 @@ import pandas as pd
 
 from docs.studies.common import PAGE, ROOT, fill, study_options, study_parser, table
 from epv_env.common.command_line import fail_clearly
-from epv_env.common.commands import parse
+from epv_env.common.options import parse
 from training.commands import compare
 
 FOLDER = Path(__file__).parent

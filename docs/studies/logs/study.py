@@ -23,8 +23,9 @@ from controllers.policy import load_policy
 from docs.studies.blind.forms import deviating_sizes
 from docs.studies.blind.score import named_cause, named_set
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
-from epv_env.common.command_line import COUNT, fail_clearly
+from epv_env.common.command_line import fail_clearly
 from epv_env.common.files import Journal
+from epv_env.common.options import COUNT
 from epv_env.operation_log import OperationLog
 from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at

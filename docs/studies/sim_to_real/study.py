@@ -20,8 +20,9 @@ from controllers.base import Controller
 from docs.studies.blind.bench import NO_OFFSETS, SUITE, run_programme
 from docs.studies.blind.truth import draw_unit
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
-from epv_env.common.command_line import COUNT, fail_clearly
+from epv_env.common.command_line import fail_clearly
 from epv_env.common.files import Journal, write_text
+from epv_env.common.options import COUNT
 from epv_env.episode import WORN
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant, load_plant
