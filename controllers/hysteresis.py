@@ -70,9 +70,9 @@ HYSTERESIS = Registration(
 """The plain two-point controller."""
 
 EXTRAPOLATING_HYSTERESIS = Registration(
-    kind="hysteresis, extrapolating",
+    kind="extrapolating hysteresis",
     controller=Hysteresis,
-    build=lambda values, plant: Hysteresis(name="hysteresis, extrapolating", **values),
+    build=lambda values, plant: Hysteresis(name="extrapolating hysteresis", **values),
     search_space={
         **_THRESHOLDS,
         "open_lookahead": Range(low=0.0, high=0.15, most=0.5),

@@ -180,7 +180,7 @@ class LearntObservation(VectorWrapper):
         return self.knowledge.observe(observations), rewards, terminated, truncated, infos
 
 
-WITH_RULES = ", with rules"
+WITH_RULES = " with rules"
 """Follows the name of a controller that stands behind the rules."""
 
 

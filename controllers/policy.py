@@ -20,7 +20,7 @@ from epv_env.plant.plantfile import Plant, load_plant
 
 TRAINED = Path(__file__).parent / "trained"
 """The policy that comes with the package."""
-FALLBACK = "hysteresis, extrapolating"
+FALLBACK = "extrapolating hysteresis"
 """Takes over where p3 is implausible: the best of the controllers that do not read it."""
 
 

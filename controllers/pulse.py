@@ -102,7 +102,7 @@ class AdaptivePulse:
     """Time in which the weight of a reading of p2 fades by 1/e [s]."""
     control_period: float = 5e-3
     """[s]"""
-    name: str = "pulse, adaptive"
+    name: str = "adaptive pulse"
     environment: str = "EPValve-v0"
     learner: ValveLearner = field(init=False, repr=False)
 
@@ -138,7 +138,7 @@ class InformedPulse:
     """How pulses are planned."""
     filter_time: float = 0.0125
     """Time in which the weight of a reading of p2 fades by 1/e [s]."""
-    name: str = "pulse, informed"
+    name: str = "informed pulse"
     environment: str = "EPValve-v0"
     _learner: ValveLearner | None = field(default=None, repr=False)
 
@@ -176,7 +176,7 @@ def _adaptive(values: Mapping[str, Any], plant: Plant) -> AdaptivePulse:
 
 
 ADAPTIVE_PULSE = Registration(
-    kind="pulse, adaptive",
+    kind="adaptive pulse",
     controller=AdaptivePulse,
     build=_adaptive,
     search_space={
@@ -191,7 +191,7 @@ ADAPTIVE_PULSE = Registration(
 )
 
 INFORMED_PULSE = Registration(
-    kind="pulse, informed",
+    kind="informed pulse",
     controller=InformedPulse,
     build=lambda values, plant: InformedPulse(),
     search_space=None,

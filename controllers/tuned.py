@@ -15,7 +15,7 @@ FORMAT = "epv-controllers/1"
 TUNED_FILE = Path(__file__).parent / "tuned.json"
 """The tunings that come with the package."""
 
-ABLATED = ("hysteresis, extrapolating", "pulse, adaptive")
+ABLATED = ("extrapolating hysteresis", "adaptive pulse")
 """Kinds that stand in tables behind the rules, too."""
 
 

@@ -23,6 +23,9 @@ from typing import Annotated, Any, get_args, get_type_hints
 
 from epv_env.common.files import check_writable
 
+SHOWN_DEFAULT = " (default: %(default)s)"
+"""Ends the help of an option whose default is one value."""
+
 
 def parser_of(module: ModuleType, program: str) -> argparse.ArgumentParser:
     """The parser of a command."""
@@ -57,8 +60,8 @@ def _add(groups: dict[str, Any], entry: Field, kind: Any, *metadata: Any) -> Non
         keywords |= (
             item if isinstance(item, dict) else {"help" if isinstance(item, str) else "type": item}
         )
-    if isinstance(entry.default, (int, float, Path)) and kind is not bool:
-        keywords["help"] += " (default: %(default)s)"
+    if isinstance(entry.default, (int, float, str, Path)) and kind is not bool:
+        keywords["help"] += SHOWN_DEFAULT
     if isinstance(entry.default, tuple):
         keywords["default"] = list(entry.default)  # argparse appends to a copy
     if not entry.kw_only:

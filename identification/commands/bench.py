@@ -7,7 +7,7 @@ from typing import Annotated
 
 from epv_env.common.command_line import NextStep, beside
 from epv_env.common.options import Folder, PlantFile, Seed, writable_file
-from epv_env.plant.effects.registry import CATALOGUE
+from epv_env.plant.effects.registry import CATALOGUE, effect
 from epv_env.plant.parameters import Parameters, written_value
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from epv_env.plant.region import Region
@@ -16,8 +16,6 @@ from identification.bench.session import run_bench
 from identification.recordings.campaign_files import check_vacant, write_campaign
 from identification.recordings.rules import rules_of
 from identification.report_2003 import SAMPLING_RATE
-
-EFFECT = {"action": "append", "metavar": "NAME=SIZE"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +31,10 @@ class Options:
     set: Annotated[
         Sequence[str], {"action": "append", "metavar": "SYMBOL=VALUE"}, "another true value [SI]"
     ] = ()
-    effect: Annotated[Sequence[str], EFFECT, "an effect (docs/explanation/effects.md)"] = ()
+    effect: Annotated[
+        Sequence[str], {"action": "append", "metavar": "NAME[=SIZE]"},
+        "an effect, of typical size unless given (docs/explanation/effects.md)",
+    ] = ()  # fmt: skip
     truth: Annotated[Path | None, writable_file, "plant file to write the truth to"] = None
 
 
@@ -76,11 +77,13 @@ def true_parameters(options: Options, plant: Plant) -> Parameters:
 
 
 def effect_sizes(setting: str) -> dict[str, float]:
-    """Sizes of an effect by symbol, from NAME=SIZE. Raises ValueError for what is not of this form."""
-    name, _, text = setting.partition("=")
+    """Sizes of an effect by symbol: given as NAME=SIZE, or typical for NAME alone. Raises ValueError."""
+    name, given, text = setting.partition("=")
     symbols, sizes = CATALOGUE.get(name), text.split(",")
     if symbols is None:
         raise ValueError(f"--effect {setting}: unknown effect; known are {', '.join(CATALOGUE)}")
+    if not given:
+        return {size.symbol: size.typical for size in effect(name).drawn[0]}
     if len(sizes) != len(symbols):
         raise ValueError(
             f"--effect {setting}: {name} is sized by {', '.join(symbols)}: give a number for each, "

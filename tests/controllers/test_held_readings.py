@@ -120,7 +120,7 @@ def test_what_never_was_is_not_held(channel, decided) -> None:
 
 @pytest.mark.parametrize("value", [0.0, np.nan, np.inf, 1e308])
 def test_the_learner_without_a_check_keeps_numbers(value) -> None:
-    controller: Any = tuned("pulse, adaptive")
+    controller: Any = tuned("adaptive pulse")
     controller.reset(1)
     for k in range(60):
         with np.errstate(all="ignore"):

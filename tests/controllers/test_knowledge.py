@@ -63,7 +63,7 @@ def seen(**values):
 
 def test_a_rule_overrules_the_controller_and_only_then():
     ruled = with_rules(Off(), PLANT)
-    assert ruled.name == "off, with rules"
+    assert ruled.name == "off with rules"
     ruled.reset(1)
     assert ruled.act(seen(p1=8.1, target=8.0, p2_error=0.0, p3=8.1, action=1.0))[0] == 1
     ruled.reset(1)

@@ -157,7 +157,7 @@ def test_classic_controllers_are_tuned_alike_and_come_in_the_tables_order():
     assert {(tuning.trials, tuning.episodes) for tuning in tunings.values()} == {(100, 128)}
     assert [controller.name for controller in tuned_controllers()] == list(TUNED_KINDS)
     for controller in ablation():
-        assert controller.name.removesuffix(", with rules") in TUNED_KINDS
+        assert controller.name.removesuffix(" with rules") in TUNED_KINDS
 
 
 def test_tunings_survive_a_round_trip_and_another_version_is_refused(tmp_path):

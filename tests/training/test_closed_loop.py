@@ -15,7 +15,7 @@ from epv_env.signals import RecordedConsumption
 from identification.recordings.log_files import Drive, Log
 from training import closed_loop
 from training.closed_loop import KINDS, ClosedLoop, consumption, sentence
-from training.monitoring import drives
+from training.drives import drives
 
 PLANT, POLICY, TARGET = Plant.calibrated(), load_policy(), 8.0
 TIME = np.arange(2400) * 0.005

@@ -21,19 +21,19 @@ pytestmark = [pytest.mark.training, pytest.mark.slow]
 
 
 def test_the_comparison(tmp_path, monkeypatch):
-    monkeypatch.setattr(comparison, "CONTROLLERS", ("pulse, adaptive", "hysteresis, extrapolating"))
+    monkeypatch.setattr(comparison, "CONTROLLERS", ("adaptive pulse", "extrapolating hysteresis"))
     assert comparison.main(["--quick", "--out", str(tmp_path)]) == 0
     names = {"comparison.csv", "differences.csv", "beyond.csv", "comparison.png", PAGE}
     assert names <= {path.name for path in tmp_path.iterdir()}
-    assert "| hysteresis, extrapolating |" in (tmp_path / PAGE).read_text(encoding="utf-8")
+    assert "| extrapolating hysteresis |" in (tmp_path / PAGE).read_text(encoding="utf-8")
     assert "restart" in set(pd.read_csv(tmp_path / "beyond.csv")["scenario"])
 
 
 def test_the_sweep(tmp_path, monkeypatch):
-    monkeypatch.setattr(robustness, "CONTROLLERS", ("hysteresis, extrapolating",))
+    monkeypatch.setattr(robustness, "CONTROLLERS", ("extrapolating hysteresis",))
     assert robustness.main(["--quick", "--out", str(tmp_path)]) == 0
     text = (tmp_path / PAGE).read_text(encoding="utf-8")
-    assert "| 13 parameters ±10 % | hysteresis, extrapolating |" in text
+    assert "| 13 parameters ±10 % | extrapolating hysteresis |" in text
     assert (tmp_path / "robustness-conditions.png").exists()
 
 
@@ -50,7 +50,7 @@ def test_an_uneven_lag_without_unevenness_is_the_environment_s_own():
     options = Namespace(episodes=4, duration=1.0)
     valve = Parameters.calibrated().replace(**case.sizes)
     true = Plant(parameters=valve, region=Region(centre=valve))
-    policy = tuned("pulse, adaptive")
+    policy = tuned("adaptive pulse")
     alone = sim_to_real.measured(policy, case, true, options)
     even, uneven = (sim_to_real.UnevenLag(policy, share) for share in (0.0, 0.5))
     assert sim_to_real.measured(even, case, true, options) == alone

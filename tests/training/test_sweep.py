@@ -33,7 +33,7 @@ ROOT = Path(__file__).parents[2]
 SHORT = (
     "--designs", "conditions", "--factors", "sensor noise", "control period",
     "--episodes", 3, "--duration", 0.55,
-    "--controllers", "hysteresis, extrapolating",
+    "--controllers", "extrapolating hysteresis",
 )  # fmt: skip
 """A sweep of a few seconds."""
 BATCHES = 4 + 4

@@ -11,14 +11,13 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import Annotated
 
-from controllers.policy import TRAINED
 from epv_env.common.command_line import NextStep
 from epv_env.common.options import Folder, PlantFile, Seed
 from epv_env.plant.plantfile import load_plant
 from identification.recordings.log_files import read_log
 from identification.recordings.rules import rules_of
 from training.closed_loop import ClosedLoop
-from training.evaluation.named import HELP, named_controllers
+from training.evaluation.named import HELP, SHIPPED, named_controllers
 
 
 @dataclass(frozen=True)
@@ -27,7 +26,7 @@ class Options:
 
     log: Annotated[Path, "folder with log.json (docs/reference/files.md)"]
     _: KW_ONLY
-    controller: Annotated[str, f"that wrote the log: one of {HELP} (default: the package's policy)"] = ""
+    controller: Annotated[str, f"that wrote the log: {HELP}"] = SHIPPED
     out: Folder
     seed: Annotated[Seed, "of resampling"] = 0
     plant: Annotated[PlantFile, "plant file of the nominal model; default: the report's calibration"] = (
@@ -46,7 +45,7 @@ def run(options: Options) -> None:
     from identification.valve_gap.operation import diagnose_log
 
     nominal = load_plant(options.plant)
-    (controller,) = named_controllers([options.controller or str(TRAINED)], nominal)[0].values()
+    (controller,) = named_controllers([options.controller], nominal)[0].values()
     loop = ClosedLoop(read_log(options.log, rules_of(nominal)), nominal, controller)
     found = diagnose_log(
         options.log, options.out, plant=options.plant, without=options.without, seed=options.seed,

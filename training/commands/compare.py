@@ -1,7 +1,7 @@
 """Compare controllers on the same unseen episodes, with intervals of the differences.
 
     python training/compare.py --out runs/comparison
-    python training/compare.py --controllers "pulse, adaptive" PPO=runs/ppo --out runs/mine
+    python training/compare.py --controllers "adaptive pulse" PPO=runs/ppo --out runs/mine
     python training/compare.py --scenarios beyond worn --plants sensitive_ten_percent --out runs/beyond
 
 A comparison that was stopped goes on where it stopped when it is started again.

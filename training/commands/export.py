@@ -49,9 +49,7 @@ class Options:
     plant: Annotated[
         PlantFile, "plant file: exported, or nominal for a policy (default: the report's)"
     ] = None
-    compiler: Annotated[str, "C compiler; '' for a plant's sources alone (default: cc)"] = (
-        os.environ.get("CC", "cc")
-    )
+    compiler: Annotated[str, "C compiler; '' for a plant's sources alone"] = os.environ.get("CC", "cc")
     episodes: Annotated[Count, "under the compiled code"] = 256
     duration: JudgedSeconds = 10.0
 

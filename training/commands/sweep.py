@@ -34,7 +34,7 @@ from training.studies.sweep_report import (
     share_figure,
 )
 
-DEFAULT = ("hysteresis, extrapolating", "pulse, adaptive", "PWM")
+DEFAULT = ("extrapolating hysteresis", "adaptive pulse", "PWM")
 """Controllers that are swept unless others are named: one of each kind."""
 
 QUICK: dict[str, Any] = {

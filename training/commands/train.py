@@ -51,7 +51,7 @@ REGION = "sensitive_ten_percent"
 """Plants that are trained on, and on which the verdict is given."""
 LEFT_OUT = "hysteresis"
 """Not in the verdict's table, which has six rows: it is far worse than the others."""
-RIVAL = "pulse, adaptive"
+RIVAL = "adaptive pulse"
 """Whom the verdict sets the policy against: the best classic controller."""
 SAME_WHEN_RESUMED = ("seed", "plant", "scenario", "parameters", "switching_price", "device")
 """Options that a resumed training must share with its beginning."""

@@ -1,7 +1,7 @@
 """Search the classic controllers' settings with the same budget for each.
 
     epv tune --trials 100 --out controllers/tuned.json
-    epv tune --only "pulse, adaptive" --out controllers/tuned.json    # keeps the file's others
+    epv tune --only "adaptive pulse" --out controllers/tuned.json    # keeps the file's others
 
 The objective is the mean return on the training scenarios.
 """

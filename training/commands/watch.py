@@ -5,6 +5,7 @@ epv watch runs/ppo --file policy.gif        # a policy that training wrote
 epv watch PWM --window                      # on the screen
 """
 
+import argparse
 import io
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
@@ -15,7 +16,7 @@ import numpy as np
 from PIL import Image
 
 import epv_env  # noqa: F401 - registers the ids
-from controllers.base import Controller
+from controllers.base import Controller, Privileged
 from controllers.tuned import load_tunings
 from epv_env.common.command_line import NextStep
 from epv_env.common.files import write_bytes
@@ -31,13 +32,20 @@ SLOWNESS = 4.0
 """How much slower than the valve the film runs: a pulse of 20 ms is to be seen."""
 
 
+def gif_file(text: str) -> Path:
+    """A path for a film, for argparse."""
+    if Path(text).suffix.lower() != ".gif":
+        raise argparse.ArgumentTypeError(f"{text}: films are animated GIFs: give a name in .gif")
+    return writable_file(text)
+
+
 @dataclass(frozen=True)
 class Options:
     """The controller, the episode and the film."""
 
-    controller: Annotated[str, HELP] = "pulse, adaptive"
+    controller: Annotated[str, HELP] = "adaptive pulse"
     _: KW_ONLY
-    file: Annotated[Path, writable_file, "film to write"] = Path("valve.gif")
+    file: Annotated[Path, gif_file, "film to write"] = Path("valve.gif")
     window: Annotated[bool, "show a window; no film"] = False
     scenario: Annotated[str, "consumption"] = "steps"
     duration: Annotated[Seconds, "of the episode [s]"] = 2.4
@@ -79,6 +87,8 @@ def episode(
     frames = []
     observation, _ = env.reset(seed=seed)
     controller.reset(1)
+    if isinstance(controller, Privileged):
+        controller.watch(env.unwrapped.task)  # type: ignore[attr-defined]
     for step in range(round(duration / _period(env))):
         action = controller.act(observation[None])[0]
         observation, *_ = env.step(action)

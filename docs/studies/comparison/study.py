@@ -20,12 +20,12 @@ from training.commands import compare
 
 FOLDER = Path(__file__).parent
 CONTROLLERS = (
-    f"PPO={ROOT / 'controllers' / 'trained'}",
-    "pulse, adaptive, with rules",
-    "pulse, adaptive",
-    "hysteresis, extrapolating",
+    "PPO",
+    "adaptive pulse with rules",
+    "adaptive pulse",
+    "extrapolating hysteresis",
     "PWM",
-    "pulse, informed",
+    "informed pulse",
 )
 """The learned one, then what it is built on, classic ones, and one that knows each valve's
 parameters."""

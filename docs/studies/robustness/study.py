@@ -22,9 +22,9 @@ from training.studies.sweep_report import RANGE_ENDS, harmful_changes, region_ta
 
 FOLDER = Path(__file__).parent
 CONTROLLERS = (
-    f"PPO={ROOT / 'controllers' / 'trained'}",
-    "pulse, adaptive, with rules",
-    "hysteresis, extrapolating",
+    "PPO",
+    "adaptive pulse with rules",
+    "extrapolating hysteresis",
     "PWM",
 )
 """The learned one, the best classic one, a simple one, and the one that the report names."""
