@@ -14,7 +14,7 @@ from epv_env.observation import decode
 from epv_env.operation_log import OperationLog
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.valves import Valves
-from training.evaluation.rollout import make_env
+from training.evaluation.rollout import begin_episodes, make_env
 
 DRIVE = 30.0
 """Length of a drive [s]."""
@@ -89,8 +89,7 @@ def drives(
     """
     options = {"plant": plant, "threads": 1, "supply_voltage": voltage * plant.voltage}
     env = make_env(controller, len(seeds), **options)
-    observation, _ = env.reset(seed=list(seeds), options=chosen)
-    controller.reset(len(seeds))
+    observation = begin_episodes(env, controller, seeds, chosen)
     rows = np.empty((len(seeds), round(duration / env.settings.control_period), 6))
     rows[:, :, 1] = env.settings.supply_voltage
     for k in range(rows.shape[1]):

@@ -38,24 +38,24 @@ def main(packages: Sequence[str], *, program: str, arguments: Sequence[str] | No
         program: what the user types before the command's name.
         arguments: None for those of the process.
     """
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    return fail_clearly(lambda: _run_named(commands(packages), program, given))
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    return fail_clearly(lambda: _run_named(commands(packages), program, words))
 
 
 def main_of(module: str, *, program: str, arguments: Sequence[str] | None = None) -> int:
     """Run the command of one module, such as "training.commands.train"; returns the exit status."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    return fail_clearly(lambda: _run(module, program, given))
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    return fail_clearly(lambda: _run(module, program, words))
 
 
 def commands(packages: Sequence[str]) -> dict[str, str]:
     """Modules of all commands by the commands' names, in alphabetical order."""
-    found = {
+    modules = {
         module.name.strip("_").replace("_", "-"): f"{package}.{module.name}"
         for package in packages
         for module in pkgutil.iter_modules(importlib.import_module(package).__path__)
     }
-    return dict(sorted(found.items()))
+    return dict(sorted(modules.items()))
 
 
 def help_line(module: str) -> str:

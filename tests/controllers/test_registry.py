@@ -22,10 +22,10 @@ from controllers.registry import REGISTRY, TUNED_KINDS, registration
 from controllers.tuned import (
     ControllersFileError,
     Tuning,
-    ablation,
     build,
     load_tunings,
     save_tunings,
+    tuned,
     tuned_controllers,
 )
 from epv_env.plant.plantfile import Plant
@@ -156,8 +156,6 @@ def test_classic_controllers_are_tuned_alike_and_come_in_the_tables_order():
     assert tuple(tunings) == TUNED_KINDS
     assert {(tuning.trials, tuning.episodes) for tuning in tunings.values()} == {(100, 128)}
     assert [controller.name for controller in tuned_controllers()] == list(TUNED_KINDS)
-    for controller in ablation():
-        assert controller.name.removesuffix(" with rules") in TUNED_KINDS
 
 
 def test_tunings_survive_a_round_trip_and_another_version_is_refused(tmp_path):
@@ -170,7 +168,9 @@ def test_tunings_survive_a_round_trip_and_another_version_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "controller", [*tuned_controllers(), *ablation(), load_policy()], ids=lambda each: each.name
+    "controller",
+    [*tuned_controllers(), tuned("adaptive pulse with rules"), load_policy()],
+    ids=lambda each: each.name,
 )
 def test_a_controller_is_printed_in_a_short_line(controller):
     assert "\n" not in repr(controller)

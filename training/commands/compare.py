@@ -20,7 +20,6 @@ from epv_env.common.command_line import NextStep, beside
 from epv_env.common.files import Journal, write_json, write_text
 from epv_env.common.options import Count, Episodes, Folder, Names, Quick
 from epv_env.plant.plantfile import Plant, load_plant, plant_subject
-from epv_env.plant.valves import available_cores
 from epv_env.vector_entry import check_device
 from training.evaluation.named import HELP, is_own, named_controllers
 from training.evaluation.plots import episode_overlay, save_figure
@@ -53,9 +52,7 @@ class Options(Episodes):
     against: Annotated[
         str | None, {"metavar": "LABEL"}, "whom the others are set against (the first)"
     ] = None
-    plants: Annotated[Sequence[str], {"nargs": "+", "choices": list(PLANTS)}, "sets of plants"] = tuple(
-        PLANTS
-    )
+    plants: Annotated[Sequence[str], {"nargs": "+", "choices": PLANTS}, "sets of plants"] = PLANTS
     scenarios: Annotated[
         Names, "scenarios, or the groups named, beyond (beyond training), worn (one effect each)"
     ] = (RANDOM,)
@@ -83,7 +80,7 @@ def run(options: Options) -> None:
     results = compare(
         controllers, plant=plant, scenarios=scenarios, episodes=options.episodes,
         duration=options.duration, plant_sets=options.plants, first_seed=first_seed,
-        workers=options.workers or available_cores(), digests=digests, device=options.device,
+        workers=options.workers, digests=digests, device=options.device,
         journal=Journal(options.out / "finished.jsonl", about),
     )  # fmt: skip
     times = {

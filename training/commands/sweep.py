@@ -18,15 +18,13 @@ from epv_env.common.command_line import NextStep, beside
 from epv_env.common.files import Journal, write_json, write_text
 from epv_env.common.options import Count, Episodes, Folder, Names, Quick
 from epv_env.plant.consumption import check_scenario
-from epv_env.plant.plantfile import Plant, load_plant, plant_subject
-from epv_env.plant.valves import available_cores
+from epv_env.plant.plantfile import load_plant, plant_subject
 from epv_env.vector_entry import check_device
-from training.evaluation.batches import Batch, in_batches, run_batches
-from training.evaluation.metrics import EpisodeMetrics
+from training.evaluation.batches import Batch, run_batches
 from training.evaluation.named import HELP, named_controllers
 from training.evaluation.plots import save_figure
 from training.evaluation.seeds import SWEEP_SEED, check_first_seed
-from training.studies.sweep_designs import DESIGNS, Point, chosen_points
+from training.studies.sweep_designs import DESIGNS, chosen_points
 from training.studies.sweep_report import (
     harmful_changes,
     point_table,
@@ -78,14 +76,23 @@ def run(options: Options) -> None:
     controllers, digests = named_controllers(options.controllers, plant)
     points = chosen_points(plant, options.designs, options.factors)
     cells = [(point, label) for point in points for label in controllers]
-    batches = [_batches(point, label, digests[label], plant, options) for point, label in cells]
     about = {**plant_subject(plant), "scenario": options.scenario, "duration": options.duration}
-    found = run_batches(
-        [batch for each in batches for batch in each], controllers,
-        journal=Journal(options.out / "finished.jsonl", about),
-        workers=options.workers or available_cores(), what="sweep",
+    batches = [
+        Batch(
+            name=f"{point.design}, {point.factor}, {point.level}, {label} {digests[label]}",
+            controller=label,
+            first_seed=SWEEP_SEED + options.seed,
+            episodes=options.joint_episodes if point.design == "regions" else options.episodes,
+            duration=options.duration,
+            device=options.device,
+            options={"plant": plant, "scenario": options.scenario, **point.options},
+        )
+        for point, label in cells
+    ]
+    metrics = run_batches(
+        batches, controllers, journal=Journal(options.out / "finished.jsonl", about),
+        workers=options.workers, what="sweep",
     )  # fmt: skip
-    metrics = [EpisodeMetrics.joined([found[batch.name] for batch in each]) for each in batches]
     table = point_table(cells, metrics, SWEEP_SEED + options.seed)
     write_results(options, table, {**about, "controllers": digests})
     print(f"\nresults in {options.out}")
@@ -99,22 +106,6 @@ def next_step(options: Options) -> NextStep:
         return NextStep("to turn the policy into C", words, options.plant)
     words = ("train", "--out", beside(options.out, "policy"))
     return NextStep("to train a policy beside these controllers", words, options.plant)
-
-
-def _batches(point: Point, label: str, digest: str, plant: Plant, options: Options) -> list[Batch]:
-    """A point's episodes under one controller."""
-    return in_batches(
-        options.joint_episodes if point.design == "regions" else options.episodes,
-        Batch(
-            name=f"{point.design}, {point.factor}, {point.level}, {label} {digest}",
-            controller=label,
-            first_seed=SWEEP_SEED + options.seed,
-            episodes=0,
-            duration=options.duration,
-            device=options.device,
-            options={"plant": plant, "scenario": options.scenario, **point.options},
-        ),
-    )
 
 
 def write_results(options: Options, points: pd.DataFrame, settings: dict[str, Any]) -> None:

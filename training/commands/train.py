@@ -13,12 +13,11 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any
 
+import msgspec
 import pandas as pd
 
-from controllers.base import Controller
 from controllers.policy import load_policy
 from controllers.policy_files import CONTRACT_FILE, WEIGHTS_FILE
-from controllers.tuned import ablation, tuned_controllers
 from epv_env.common.command_line import NextStep, beside
 from epv_env.common.files import write_text
 from epv_env.common.options import (
@@ -37,6 +36,7 @@ from epv_env.plant.plantfile import Plant, load_plant, plant_subject
 from epv_env.plant.region import DIAGNOSIS, REGIONS
 from epv_env.reward import RewardWeights
 from epv_env.settings import as_region
+from training.evaluation.named import named_controllers
 from training.evaluation.plots import plt, save_figure
 from training.evaluation.scenarios import EvaluationScenario
 from training.studies.comparison import as_text, compare, differences, figure, rows
@@ -49,8 +49,11 @@ QUICK_TRAINING: dict[str, Any] = {
 }  # fmt: skip
 REGION = "sensitive_ten_percent"
 """Plants that are trained on, and on which the verdict is given."""
-LEFT_OUT = "hysteresis"
-"""Not in the verdict's table, which has six rows: it is far worse than the others."""
+RIVALS = (
+    "extrapolating hysteresis with rules", "adaptive pulse with rules", "adaptive pulse", "PWM",
+    "extrapolating hysteresis",
+)  # fmt: skip
+"""Beside the policy in the verdict's table."""
 RIVAL = "adaptive pulse"
 """Whom the verdict sets the policy against: the best classic controller."""
 SAME_WHEN_RESUMED = ("seed", "plant", "scenario", "parameters", "switching_price", "device")
@@ -135,9 +138,10 @@ def begin_folder(options: Options, plant: Plant) -> None:
     if options.resume:
         if earlier is None:
             raise ValueError(f"nothing to resume in {folder}: leave --resume out")
-        same = {name: _plain(getattr(options, name)) for name in SAME_WHEN_RESUMED}
+        now = configuration(options, plant)
+        same = {name: now["options"][name] for name in SAME_WHEN_RESUMED}
         check_same(earlier["options"], same, f"{folder} was trained with", "resume with the same")
-        if earlier.get("plant") != configuration(options, plant)["plant"]:
+        if earlier.get("plant") != now["plant"]:
             raise ValueError(
                 f"the plant is another than {folder} was trained with: resume with the same plant file, "
                 "or choose another --out"
@@ -155,14 +159,10 @@ def begin_folder(options: Options, plant: Plant) -> None:
         )
 
 
-def _plain(value: Any) -> Any:
-    return str(value) if isinstance(value, Path) else value
-
-
 def configuration(options: Options, plant: Plant) -> dict[str, Any]:
     """Options, plant and versions: what is needed to repeat the training."""
     return {
-        "options": {name: _plain(value) for name, value in vars(options).items()},
+        "options": msgspec.to_builtins(options, enc_hook=str),
         "plant": plant_subject(plant)["plant"],
         "versions": {
             package: version(package)
@@ -171,17 +171,12 @@ def configuration(options: Options, plant: Plant) -> dict[str, Any]:
     }
 
 
-def contenders(folder: Path, plant: Plant) -> dict[str, Controller]:
-    """The policy and the classic controllers of the verdict's table, by label."""
-    classic = [*ablation(plant), *reversed(tuned_controllers(plant))]
-    every: list[Controller] = [load_policy(folder, plant), *classic]
-    return {controller.name: controller for controller in every if controller.name != LEFT_OUT}
-
-
 def verdict(options: Options, plant: Plant, weights: RewardWeights) -> str:
     """Compare; write table and picture; a sentence, a table, and where the picture lies."""
+    policy = load_policy(options.out, plant)
+    controllers = {policy.name: policy, **named_controllers(RIVALS, plant)[0]}
     results = compare(
-        contenders(options.out, plant), plant=plant, plant_sets=[REGION],
+        controllers, plant=plant, plant_sets=[REGION],
         scenarios={"random": EvaluationScenario(meaning="as in training", options={"weights": weights})},
         episodes=options.episodes, duration=options.duration,
     )  # fmt: skip

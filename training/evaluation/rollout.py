@@ -2,7 +2,7 @@
 
 import gc
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -55,7 +55,8 @@ def make_env(controller: Controller, n: int, **options: Any) -> EPValveVectorEnv
 def begin_episodes(
     env: EPValveVectorEnv | EPValvePWMVectorEnv,
     controller: Controller,
-    seeds: list[int],
+    seeds: Sequence[int],
+    options: dict[str, Any] | None = None,
 ) -> NDArray:
     """Start an episode for each seed under the controller; returns the first observations (n, entries).
 
@@ -65,8 +66,9 @@ def begin_episodes(
         env: of n valves.
         controller: is reset.
         seeds: n of them.
+        options: of the reset.
     """
-    observation, _ = env.reset(seed=list(seeds))
+    observation, _ = env.reset(seed=list(seeds), options=options)
     controller.reset(len(seeds))
     if isinstance(controller, Privileged):
         own: Any = env.unwrapped
