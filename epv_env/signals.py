@@ -106,6 +106,17 @@ class SignalError(ValueError):
     """A signal cannot be used: the message says which, the rule and the remedy."""
 
 
+@dataclass(frozen=True, eq=False)
+class _Interpolated:
+    """Linear between samples (samples,), which its text holds; that of a function has an address."""
+
+    time: NDArray
+    samples: NDArray
+
+    def __call__(self, seconds: float) -> float:
+        return float(np.interp(seconds, self.time, self.samples))
+
+
 @dataclass(frozen=True, kw_only=True)
 class MovingTarget:
     """A target pressure that changes within the episode."""
@@ -123,7 +134,7 @@ class MovingTarget:
         time_s: increasing (samples,) [s]. target_bar: (samples,) [bar absolute]. Raises SignalError.
         """
         time, values = _samples("a recorded target", time_s, target_bar)
-        return cls(at=lambda seconds: float(np.interp(seconds, time, values)))
+        return cls(at=_Interpolated(time, values))
 
     def values(self, time: NDArray, limits: tuple[float, float]) -> NDArray:
         """Targets (n,) [bar absolute] at times (n,) [s].

@@ -113,7 +113,7 @@ def test_a_scenario_may_have_its_own_length():
     found = [
         compare(
             {"good": GOOD}, plant=PLANT, plant_sets=["calibrated"], episodes=2, duration=1.0,
-            scenarios={"s": EvaluationScenario(meaning="", options={"scenario": "none"}, duration=d)},
+            scenarios={"s": EvaluationScenario(options={"scenario": "none"}, duration=d)},
         )
         for d in (None, 0.6)
     ]  # fmt: skip

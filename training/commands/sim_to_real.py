@@ -119,7 +119,7 @@ def deployed(stage: str, simulated: Plant, options: Options) -> Results:
     classic, digests = named_controllers(list(load_tunings()), Plant.calibrated())
     controllers = {policy.name: policy, **classic}
     digests[policy.name] = policy_digest(folder)
-    scenario = EvaluationScenario(meaning="as in training", options={"scenario": SCENARIO})
+    scenario = EvaluationScenario(options={"scenario": SCENARIO})
     plants = {SIMULATED: simulated, MEASURED: load_plant(options.out / WITHHELD)}
     about = {place: plant_subject(plant) for place, plant in plants.items()}
     journal = Journal(folder / "deployments.jsonl", {**about, "duration": options.duration})

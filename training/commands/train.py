@@ -177,7 +177,7 @@ def verdict(options: Options, plant: Plant, weights: RewardWeights) -> str:
     controllers = {policy.name: policy, **named_controllers(RIVALS, plant)[0]}
     results = compare(
         controllers, plant=plant, plant_sets=[REGION],
-        scenarios={"random": EvaluationScenario(meaning="as in training", options={"weights": weights})},
+        scenarios={"random": EvaluationScenario(options={"weights": weights})},
         episodes=options.episodes, duration=options.duration,
     )  # fmt: skip
     table = rows(results)
