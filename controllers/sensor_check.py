@@ -86,7 +86,7 @@ def ends_of(sensors: Mapping[str, Sensor]) -> Ends:
 
 
 @compiled
-def within(value, ends, i):
+def is_good(value, ends, i):
     """Whether a reading is good; NaN is not."""
     return value >= ends.least[i] and value <= ends.greatest[i]
 
@@ -99,10 +99,10 @@ def hold(s, ends):
             s.last[i] = START[i]
         s.whole, s.fallback = HISTORY, 1.0
     s.periods = min(s.periods + 1, MOST_PERIODS)
-    s.blind = 0.0 if within(s.now[_P2], ends, _P2) and within(s.now[_TARGET], ends, _TARGET) else 1.0
+    s.blind = 0.0 if is_good(s.now[_P2], ends, _P2) and is_good(s.now[_TARGET], ends, _TARGET) else 1.0
     lost = 0.0
     for i in range(READINGS):
-        good = within(s.now[i], ends, i)
+        good = is_good(s.now[i], ends, i)
         if i == _P2 and s.blind > 0:
             good = False
         if good:
