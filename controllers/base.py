@@ -14,6 +14,8 @@ from epv_env.task import LimitingTask
 
 compiled: Callable[..., Any] = numba.njit(error_model="numpy")
 """Decorator of the functions of one valve."""
+composed: Callable[..., Any] = numba.njit(error_model="numpy", inline="always")
+"""Decorator of those that mainly call others: numba compiles them together with their caller, once."""
 
 # Closed over by the loops: numba's cache on disk notices a change in their own file only.
 DIGEST = source_digest(*Path(__file__).parent.glob("*.py"))

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 
-from controllers.base import DIGEST, OneValve, compiled, in_unit
+from controllers.base import DIGEST, OneValve, compiled, composed, in_unit
 from controllers.registration import Choice, Range, Registration
 from epv_env.observation import INDEX, P2_LAGS
 
@@ -35,7 +35,7 @@ def two_points(on, observation, thresholds, period):
     return 1.0 if error + thresholds.shut_lookahead * slope > thresholds.shut_above else 0.0
 
 
-@compiled
+@composed
 def decide(m, observation, p, period):
     """One valve's decision (controllers.base.OneValve)."""
     m.off = 1.0 - two_points(1.0 - m.off, observation, p, period)

@@ -18,7 +18,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from controllers.base import DIGEST, Controller, compiled
+from controllers.base import DIGEST, Controller, compiled, composed
 from controllers.pulse import follow, nominal_knowledge
 from controllers.valve_learner import LEARNT, LEAST_HEAD, VALVE
 from epv_env.observation import LAYOUT
@@ -70,7 +70,7 @@ show_learnt: Any = generated(
 """Write the learnt quantities of one valve behind the readings, into inputs (all,) [-]."""
 
 
-@compiled
+@composed
 def describe(v, observation, c, period, inputs):
     """Learn from an observation (entries,) of one valve, and write all that a policy sees into inputs.
 

@@ -14,7 +14,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.base import DIGEST, OneValve, compiled
+from controllers.base import DIGEST, OneValve, composed
 from controllers.hysteresis import Hysteresis, Thresholds
 from controllers.knowledge import READINGS, describe
 from controllers.network import Network, Weights, forward
@@ -40,7 +40,7 @@ class Parts(NamedTuple):
     weights: Weights
 
 
-@compiled
+@composed
 def decide(m, observation, c, period):
     """One valve's decision (controllers.base.OneValve). c: Parts."""
     checked(m.senses, observation, c.ends, c.fallback, period)

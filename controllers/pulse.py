@@ -20,7 +20,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.base import DIGEST, OneValve, compiled
+from controllers.base import DIGEST, OneValve, compiled, composed
 from controllers.pulse_table import PulseTable, duration, nominal_table, pulse_tables
 from controllers.registration import Range, Registration
 from controllers.valve_learner import FILTER_TIME, LEAST_HEAD, VALVE, begin, observe
@@ -91,7 +91,7 @@ def nominal_knowledge(plant: Plant) -> Knowledge:
     return Knowledge(nominal_table(plant), PLAN, FILTER_TIME, False)
 
 
-@compiled
+@composed
 def follow(v, observation, c, period):
     """Learn from one valve's observation (entries,), and plan. c: a Knowledge."""
     if v.begun == 0:
@@ -104,7 +104,7 @@ def follow(v, observation, c, period):
     plan(v, c.table, int(v.plant), c.plan, period)
 
 
-@compiled
+@composed
 def decide(v, observation, c, period):
     """One valve's decision (controllers.base.OneValve)."""
     follow(v, observation, c, period)

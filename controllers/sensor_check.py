@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.base import compiled, in_unit
+from controllers.base import compiled, composed, in_unit
 from controllers.hysteresis import two_points
 from epv_env.observation import CENTRE, HISTORY, INDEX, LIMIT, P2_LAGS, P3_LAGS, SCALE
 from epv_env.plant.channels import CURRENT, P1, P2, P3, Sensor
@@ -173,7 +173,7 @@ def read(s, observation):
     s.now[_P2] += s.now[_TARGET]  # an observation shows p2 by its distance from the target
 
 
-@compiled
+@composed
 def checked(s, observation, ends, thresholds, period):
     """Take in an observation (entries,), and put what is held into it."""
     read(s, observation)

@@ -1,4 +1,4 @@
-"""Lost readings are held, a frozen p3 is found; then the fall-back decides, without p2 the coil is on."""
+"""Lost readings are held, a frozen p3 is found; then the fall-back decides; without p2 it stays on."""
 
 from typing import Any
 
