@@ -10,6 +10,8 @@ PACKAGES := epv_env identification controllers training
 SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile
 
 MAKEFLAGS += --no-print-directory
+# The environments come without bytecode: each of the many processes would compile what it imports anew.
+export PYTHONDONTWRITEBYTECODE :=
 .DEFAULT_GOAL := help
 .PHONY: help venv train test test-oldest bench docs lint check format wheel clean
 
