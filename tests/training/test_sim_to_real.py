@@ -148,4 +148,3 @@ def test_an_unknown_effect_is_refused_before_anything_is_written(tmp_path, capsy
     assert run_loop(tmp_path, "--effect", "gremlins=3") == 2
     assert "unknown effect" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
-

@@ -51,7 +51,7 @@ def test_the_loop(tmp_path, monkeypatch):
 
     monkeypatch.setattr(sim_to_real, "diagnose_campaign", diagnosed)
     monkeypatch.setattr(sim_to_real, "trained", lambda *plants, **options: load_policy())
-    monkeypatch.setattr(sim_to_real, "run_programme", lambda p, programme, **_: run_programme(p, programme))
+    monkeypatch.setattr(sim_to_real, "run_programme", lambda p, each, **_: run_programme(p, each))
     assert sim_to_real.main(["--quick", "--out", str(tmp_path)]) == 0
     text = (tmp_path / PAGE).read_text(encoding="utf-8")
     assert "| piston friction | known: piston friction 1.00 | " in text
