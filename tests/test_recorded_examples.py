@@ -63,7 +63,6 @@ def held_out_error(own: OdePlant, effects: tuple[str, ...]) -> float:
     return float(np.sqrt(np.mean(errors(found.x, True) ** 2)))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "effects", "known"),
     [

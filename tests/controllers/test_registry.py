@@ -104,9 +104,7 @@ def test_tunings_survive_a_round_trip_and_another_version_is_refused(tmp_path):
         load_tunings(tmp_path / "t.json")
 
 
-@pytest.mark.parametrize(
-    "controller", [*tuned_controllers(), *ablation(), load_policy()], ids=lambda each: each.name
-)
-def test_a_controller_is_printed_in_a_short_line(controller):
-    assert "\n" not in repr(controller)
-    assert len(repr(controller)) < 1000
+def test_a_controller_is_printed_in_a_short_line():
+    for controller in (*tuned_controllers(), *ablation(), load_policy()):
+        assert "\n" not in repr(controller)
+        assert len(repr(controller)) < 1000

@@ -78,7 +78,6 @@ def closed_loop(
     return np.array(errors), np.array(actions)
 
 
-@pytest.mark.slow
 def test_the_policy_acts_and_the_plants_go_as_under_scipy():
     errors, actions = closed_loop(step=FINE_STEP)
     expected, by_scipy = closed_loop(scipy=True)
@@ -86,14 +85,12 @@ def test_the_policy_acts_and_the_plants_go_as_under_scipy():
     assert np.max(np.abs(errors - expected)) < MILLIBAR
 
 
-@pytest.mark.slow
 def test_a_consumption_that_is_two_percent_larger_is_seen():
     errors, _ = closed_loop(step=FINE_STEP)
     other, _ = closed_loop(scipy=True, flow_factor=1.02)
     assert np.max(np.abs(errors - other)) > 10 * MILLIBAR
 
 
-@pytest.mark.slow
 def test_the_default_step_agrees_with_scipy_on_average():
     rms = [np.sqrt(np.mean(run[0] ** 2)) for run in (closed_loop(), closed_loop(scipy=True))]
     assert rms[0] == pytest.approx(rms[1], abs=MILLIBAR)

@@ -12,7 +12,9 @@ from docs.studies.blind.study import QUICK_SUITE
 from docs.studies.blind.truth import NOMINAL, ONE_CAUSE, Trial, draw_trial
 from identification.bench import session as bench
 
-SHORT, HELD_OUT, _ = QUICK_SUITE
+pytestmark = pytest.mark.slow
+
+SHORT = QUICK_SUITE[0]
 
 
 @cache

@@ -18,9 +18,10 @@ from epv_env.plant.equations import Inputs, State
 from epv_env.plant.parameters import Parameters
 from tests.reference.hybrid_automaton import COMPILED_RIGHT_HAND_SIDES
 
+pytestmark = pytest.mark.slow
+
 PLANT = COMPILED_RIGHT_HAND_SIDES[True]
-DROP, CURRENT = (State._fields.index(name) for name in ("supply_drop", "I"))
-LEVELS = (1e-3, 0.02, 0.03, 0.2, 1.0, 3.0)
+CURRENT = State._fields.index("I")
 BESIDE_THE_STATE = {
     "pressure_sensor_bias", "pressure_sensor_gain", "current_sensor_gain", "command_delay",
 }  # fmt: skip

@@ -13,6 +13,8 @@ from docs.studies.blind.truth import trial_plan
 from epv_env.common.files import write_text
 from identification.recordings.campaign_files import read_campaign
 
+pytestmark = pytest.mark.slow
+
 N, SEED = 2, 162
 """The first trial has no effect, the second one an effect that the diagnosis lacks."""
 NO_GAP = {"verdict": "no_gap", "where": {"component": {}}, "causes": [], "seconds": 0.5}
