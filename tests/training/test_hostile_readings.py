@@ -24,7 +24,7 @@ pytestmark = [
     pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler (cc) here"),
 ]
 
-READINGS = 1_000_000
+READINGS = 200_000
 
 DRIVE = """
 #include <math.h>
@@ -100,7 +100,7 @@ def folder(tmp_path_factory):
     return made
 
 
-def test_a_million_hostile_readings_stay_within_arrays_and_numbers(folder):
+def test_hostile_readings_stay_within_arrays_and_numbers(folder):
     (folder / "drive.c").write_text(DRIVE)
     defined = (f"-DHELD={HELD}", f"-DREADINGS={READINGS}u")
     program = build(

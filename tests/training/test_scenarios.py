@@ -60,26 +60,6 @@ def test_the_environment_accepts_every_scenario():
         assert make_settings(Plant.calibrated(), **options).control_period > 0, name
 
 
-def test_one_emergency_is_one():
-    drawn = flow("one emergency")
-    assert np.sum(np.diff(drawn > 1.0) == 1) == 2  # it begins, it ends
-    assert 5.0 <= drawn.max() <= 5.5
-
-
-def test_the_anti_lock_is_faster_than_anything_in_training():
-    def bursts(drawn):
-        return np.sum((drawn[1:] > 1.0) & (drawn[:-1] <= 1.0))
-
-    fastest = max(bursts(flow("pumping", seed)) for seed in range(3))
-    assert min(bursts(flow("anti-lock", seed)) for seed in range(3)) > fastest
-
-
-def test_the_staircase_never_pauses():
-    drawn = flow("staircase")
-    first = np.argmax(drawn > 0)
-    assert np.all(drawn[first:] > 0.49)
-
-
 def test_without_the_compressor_the_reservoir_only_sags():
     supply = settings("compressor off").supply
     assert supply.delivery == 0.0

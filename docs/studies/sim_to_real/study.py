@@ -9,6 +9,7 @@ runs/sim_to_real and not repeated.
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -209,6 +210,7 @@ def is_certain(plant: Plant) -> bool:
     return len(possible) == 1 and dict(possible[0].region.centre) == dict(plant.parameters)
 
 
+@cache
 def whole_catalogue() -> Mixture:
     """Plain domain randomisation: one or two effects of any kind, and ±10 % of the calibrated four."""
     rng, nominal = np.random.default_rng(SEED), Parameters.calibrated()

@@ -99,7 +99,6 @@ def test_the_reading_on_which_the_controller_opens_does_not_count(healthy):
         assert np.all(run.trusted[0] == (~doubted if run.name in steady else False))
 
 
-@pytest.mark.slow
 def test_cause_and_onset_are_found(tmp_path):
     eddy = {"eddy_current": {"G_eddy": 0.004}}
     folder = drive(tmp_path / "log", [{}, eddy, eddy], drives=3, seconds=20, scenario="steps")
