@@ -9,7 +9,6 @@ import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,7 +20,7 @@ from epv_env.common.extras import how_to_install
 from epv_env.common.files import write_json, write_text
 
 if TYPE_CHECKING:
-    from jinja2 import Template
+    from jinja2 import Environment
     from matplotlib.figure import Figure
 
 
@@ -31,8 +30,11 @@ LARGEST_CLOUD = 500
 RESOLUTION = 200
 """Of what is drawn as pixels [dots per inch]: sharp in print and at twice the screen's size."""
 
-LABELS = {"good": "good", "doubt": "in doubt", "bad": "not acceptable", "note": "note"}
-"""What the page says for each status of a verdict."""
+LABELS = {
+    "good": "good", "doubt": "in doubt", "bad": "not acceptable", "why": "why", "next": "next",
+    "note": "note",
+}  # fmt: skip
+"""What the page says for each status of a verdict; 'why' is a reason of the doubt before it."""
 
 ANSWERS = {"good": "yes", "doubt": "with care", "bad": "no"}
 """Whether to trust a value, by its status."""
@@ -43,14 +45,9 @@ class Verdict:
     """One conclusion, as a sentence."""
 
     status: str
-    """'good', 'doubt', 'bad' or 'note'."""
+    """One of LABELS."""
     text: str
     """One sentence; the page escapes it."""
-
-    @property
-    def label(self) -> str:
-        """The status in words."""
-        return LABELS[self.status]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,10 +93,10 @@ class Section:
 
     title: str
     """Heading."""
-    verdicts: Sequence[Verdict]
-    blocks: Sequence[Block]
+    verdicts: Sequence[Verdict] = ()
+    blocks: Sequence[Block] = ()
     summary: bool = False
-    """True for the section that answers the reader's question: it stands right under the title."""
+    """True for the section that answers the reader's question: it alone stands open."""
 
 
 def write_page(
@@ -114,7 +111,7 @@ def write_page(
 ) -> None:
     """Write sections as one HTML file that needs no other, whole or not at all.
 
-    Summaries come first, then the contents, which say what is in doubt. The caller closes the figures.
+    The summary stands open with the next step; all other sections are folded, and say what is in doubt.
 
     Args:
         path: the file.
@@ -122,41 +119,41 @@ def write_page(
         sections: in the order of the page.
         facts: what the page rests on, by name: campaign, recordings.
         footer: a sentence at the end.
-        next_step: the command that ends the page; None where the reader's plant has none.
+        next_step: the command to run next; None where the reader's plant has none.
         written: date on the page; None for now.
 
     Raises:
         ImportError: Jinja2 is not installed.
     """
     date = written or datetime.now().astimezone()
-    page = _template().render(
-        title=title,
-        facts={**(facts or {}), "Written": f"{date.day} {date:%B %Y, %H:%M}"},
-        summaries=[section for section in sections if section.summary],
-        sections=[section for section in sections if not section.summary],
-        footer=footer,
-        next_step=next_step,
+    page = (
+        templates(autoescape=True)
+        .get_template("report/page.html")
+        .render(
+            title=title,
+            facts={**(facts or {}), "Written": f"{date.day} {date:%B %Y, %H:%M}"},
+            sections=sections,
+            labels=LABELS,
+            footer=footer,
+            next_step=next_step,
+        )
     )
     write_text(path, page + "\n")
 
 
-@cache
-def _template() -> "Template":
-    """The page's template, every text escaped; only a page that is written needs Jinja2."""
+def templates(*, autoescape: bool) -> "Environment":
+    """The package's templates. Raises ImportError where Jinja2 is not installed."""
     try:
         from jinja2 import Environment, PackageLoader, StrictUndefined
     except ImportError:
         raise ImportError(
-            f"an HTML page needs Jinja2, which is not installed: {how_to_install('identification')}"
+            f"a report needs Jinja2, which is not installed: {how_to_install('identification')}"
         ) from None
-    environment = Environment(
-        loader=PackageLoader("identification.report", package_path=""),
-        autoescape=True,
+    return Environment(
+        loader=PackageLoader("identification", package_path=""),
+        autoescape=autoescape,
         undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
     )
-    return environment.get_template("page.html")
 
 
 def write_results(
@@ -171,7 +168,7 @@ def write_results(
 ) -> None:
     """Write `out/name.json` and the self-contained `out/name.html`, each whole or not at all.
 
-    facts: what the page rests on, by name. next_step: the command that ends the page.
+    facts: what the page rests on, by name. next_step: the command to run next.
     """
     write_json(out / f"{name}.json", content, allow_nan=False)
     write_page(
