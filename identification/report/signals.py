@@ -19,7 +19,7 @@ def over_time(
     rows: Mapping[str, Mapping[str, NDArray]],
     heights: Sequence[float] | None = None,
 ) -> Figure:
-    """A row for each label of an axis, with its lines by name; the first row has the legend.
+    """A row for each label of an axis, with its lines by name; one legend for all.
 
     Args:
         time: (samples,) [s].
@@ -36,8 +36,7 @@ def over_time(
         axes.set_ylabel(label, fontsize="small")
         axes.grid(alpha=0.3)
     drawn[-1].set_xlabel("time [s]")
-    figure.legend(
-        *drawn[0].get_legend_handles_labels(), ncols=4, loc="outside upper center", frameon=False
-    )
+    lines = {line.get_label(): line for axes in drawn for line in axes.lines}
+    figure.legend(lines.values(), lines.keys(), ncols=4, loc="outside upper center", frameon=False)
     figure.align_ylabels()
     return figure
