@@ -52,4 +52,4 @@ def say(found: Diagnosis, out: Path) -> None:
     content = decoded(out / GAP_FILE, remedy="diagnose again")
     print(verdict_sentence(found)[1])
     if content["next_experiment"]:
-        print(f"{content['next_experiment']}.")
+        print(content["next_experiment"])

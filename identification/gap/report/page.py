@@ -120,7 +120,7 @@ def _localisation(diagnosis: Diagnosis, words: Words) -> Section:
             if term
             else forcing_figure(diagnosis.ranking.problem.plant, forcing)
         )
-        caption = f"What the model {named} lacks in {forcing.equation.title} to meet the recordings"
+        caption = f"What the model ({named}) lacks in {forcing.equation.title} to meet the recordings"
         over = f", over the state that explains {term.explained:.0%} of it." if term else ", over time."
         blocks.append(Picture(figure=figure, caption=caption + over))
     verdict = Verdict(status="note", text=words.where)
@@ -283,7 +283,7 @@ def calibrated_values(diagnosis: Diagnosis, status: str) -> Table:
         interval = intervals[parameter.symbol]
         at_end = at_an_end(parameter, interval[0])
         statuses.append("bad" if at_end else status)
-        reason = "at an end of its range" if at_end else "the verdict is in doubt"
+        reason = "at an end of its range" if at_end else "see the verdict"
         rows.append(
             [
                 parameter.title,

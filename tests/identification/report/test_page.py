@@ -9,7 +9,6 @@ from datetime import datetime
 import pytest
 from matplotlib.figure import Figure
 
-from identification.report import page as module
 from identification.report.page import Picture, Section, Table, Text, Verdict, as_svg, write_page
 
 UNSAFE = "<b>5 & 'a' \"b\"</b>"
@@ -38,20 +37,17 @@ def test_every_text_is_escaped(tmp_path):
     assert html.unescape(text).count(UNSAFE) == 6  # an alternative text and a caption for the picture
 
 
-def test_the_contents_say_which_sections_are_in_doubt_and_each_verdict_stands_once(tmp_path):
+def test_the_summary_alone_is_open_and_a_folded_section_says_that_it_is_in_doubt(tmp_path):
     sure = replace(full_section("Second"), verdicts=[Verdict(status="good", text="All is well.")])
-    text = written(tmp_path / "page.html", full_section(), sure)
-    assert re.findall(r"<h[123]>(.*?)</h[123]>", text) == ["Page", "Contents", "First", "Second"]
-    contents = re.findall(r"<li><a .*?>(.*?)</a>(.*?)</li>", text)
-    assert contents == [("First", " in doubt"), ("Second", " ")]
-    assert text.count('<li class="doubt">') == text.count('<li class="good">') == 1
-
-
-def test_the_summary_stands_before_the_contents_and_its_verdicts_stand_once(tmp_path):
     summary = replace(full_section("Answer"), summary=True)
-    text = written(tmp_path / "page.html", full_section(), full_section("Second"), summary)
-    assert text.index("Answer") < text.index("Contents") < text.index("First")
-    assert text.count('<li class="doubt">') == 3
+    text = written(tmp_path / "page.html", full_section(), sure, summary)
+    assert re.findall(r"<h[123]>(.*?)</h[123]>", text) == ["Page", "Answer"]
+    assert "open" not in re.findall(r"<details.*?>", text)[0]
+    folded = [re.sub(r"<.*?>", "", line) for line in re.findall(r"<summary>(.*?)</summary>", text)]
+    assert folded == ["First in doubt", "Second"]
+    assert (text.count('<li class="doubt">'), text.count('<li class="good">')) == (2, 1)
+    alone = written(tmp_path / "page.html", full_section())
+    assert re.findall(r"<details.*?>", alone) == ["<details open>"]
 
 
 def test_the_page_says_what_it_rests_on_and_when_it_was_written(tmp_path):
@@ -76,8 +72,6 @@ def test_a_cloud_of_points_costs_no_more_than_its_pixels():
 
 def test_a_page_without_jinja2_is_refused_in_one_sentence(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "jinja2", None)
-    module._template.cache_clear()
     with pytest.raises(ImportError, match=r"needs Jinja2, which is not installed: pip install"):
         written(tmp_path / "page.html", full_section())
     assert not (tmp_path / "page.html").exists()
-    module._template.cache_clear()
