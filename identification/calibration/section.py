@@ -7,7 +7,7 @@ from identification.calibration.calibrate import Calibration
 from identification.calibration.search import METHODS, reached_best
 from identification.replay.replay import total_response_error
 from identification.replay.response_blocks import error_table, errors_as_json, percent, worst_picture
-from identification.report.page import Section, Table, Text, Verdict
+from identification.report.page import Section, Table, Verdict
 from identification.report_2003 import ACCEPTED_ERROR
 
 
@@ -21,7 +21,7 @@ def calibration_section(calibration: Calibration) -> Section:
         ],
         blocks=[
             _estimates(calibration),
-            Text(text=_offsets(calibration)),
+            _offsets(calibration),
             _starts(calibration),
             error_table(calibration.before, "Errors at the start's parameters."),
             *(error_table(calibration.after[method], f"Errors after {method}.") for method in METHODS),

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from identification.quality.assessment import QualityAssessment, sensor_offsets, white_noise_band
 from identification.quality.verdicts import channel_verdict, check_results, worst_status
 from identification.recordings.recording import CHANNELS, UNITS
-from identification.report.page import Picture, Section, Table, Text
+from identification.report.page import Picture, Section, Table
 from identification.report.signals import over_time
 
 UNIT_COLUMNS = [f"{name} [{UNITS[name][0]}]" for name in CHANNELS]
@@ -39,7 +39,7 @@ def quality_section(quality: QualityAssessment) -> Section:
         title=f"Data quality: {quality.name} ({quality.samples} samples)",
         verdicts=[channel_verdict(quality, name) for name in CHANNELS],
         blocks=[
-            Text(text=_state(quality)),
+            _state(quality),
             _trends(quality),
             _statistics(quality),
             _correlations(quality),

@@ -39,7 +39,7 @@ from identification.gap.report.sentences import (
     look_alikes,
     words_of,
 )
-from identification.report.page import ANSWERS, Block, Picture, Section, Table, Text, Verdict
+from identification.report.page import ANSWERS, Block, Picture, Section, Table, Verdict
 
 LEVEL_TEXT = f"{100 * LEVEL:g} %"
 """Probability within the intervals."""
@@ -69,7 +69,7 @@ def sections(
         Section(title="Values to use", blocks=[calibrated_values(diagnosis, words.status)]),
         Section(
             title="How large the gap is",
-            blocks=[Text(text=GAP_EXPLAINED), gap_table(diagnosis), discrepancy_table(diagnosis)],
+            blocks=[GAP_EXPLAINED, gap_table(diagnosis), discrepancy_table(diagnosis)],
         ),
     ]
     if diagnosis.conclusion.verdict != NO_GAP:

@@ -21,7 +21,7 @@ from identification.gap.report.sentences import (
     verdict_sentence,
     words_of,
 )
-from identification.report.page import Picture, Section, Table, Text
+from identification.report.page import Picture, Section, Table
 from tests.identification.gap.tanks import TANKS, diagnosed
 
 NEXT = "Record a long draining"
@@ -42,7 +42,7 @@ def texts(found: list[Section]) -> str:
 
 @pytest.mark.parametrize("name", TANKS)
 def test_one_screen_says_what_shows_it_and_says_what_next_and_all_else_is_folded(name):
-    first, *others = sections(diagnosed(name), NEXT, plan=[Text(text="The programmes.")])
+    first, *others = sections(diagnosed(name), NEXT, plan=["The programmes."])
     assert (first.title, first.summary, first.verdicts[-1].text) == ("Verdict", True, NEXT)
     assert len(first.blocks) == len(pictures(first)) == 1
     assert not any(section.summary for section in others)

@@ -10,7 +10,6 @@ from identification.report.page import (
     Picture,
     Section,
     Table,
-    Text,
     Verdict,
     write_page,
 )
@@ -42,7 +41,7 @@ def a_section(number: int) -> Section:
     return Section(
         title=f"Stage {number}",
         verdicts=[Verdict(status=s, text="a sentence of some length. " * 4) for s in LABELS],
-        blocks=[Text(text="unbroken" * 30), wide, Picture(figure=a_figure(), caption="A figure.")],
+        blocks=["unbroken" * 30, wide, Picture(figure=a_figure(), caption="A figure.")],
     )
 
 
