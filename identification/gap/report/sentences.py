@@ -65,7 +65,6 @@ def words_of(diagnosis: Diagnosis) -> Words:
         "words": lambda label: in_words(diagnosis, label),
         "inclusion": lambda name: probability_text(diagnosis.ranking.inclusion[name]),
         "plain": lambda name: name.replace("_", " "),
-        "first_upper": lambda text: text[:1].upper() + text[1:],
     }
     template = environment.get_template("gap/report/verdict.jinja")
     said: Any = template.make_module(_context(diagnosis))

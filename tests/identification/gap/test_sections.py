@@ -87,7 +87,7 @@ def test_a_doubt_has_a_reason_and_causes_that_hardly_may_act_have_no_line(name):
     words = words_of(diagnosed(name))
     assert bool(words.doubts) == (words.status == "doubt")
     warned = words_of(replace(diagnosed(name), warnings=["h of test_1 is clipped"]))
-    assert warned.doubts[-1] == "H of test_1 is clipped."
+    assert warned.doubts[-1] == "h of test_1 is clipped."
     assert warned.status == ("bad" if name == "unknown" else "doubt")
     rows = ranking_table(diagnosed(name)).rows
     assert any(row[1] != "< 1 %" for row in rows)
