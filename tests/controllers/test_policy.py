@@ -117,7 +117,7 @@ def test_the_rules_hold_whatever_the_network_says():
     off.layers[-1][1][:] = [1e3, -1e3]
     policy = Policy(network=off, plant=Plant.calibrated())
     options = {"scenario": "none", "parameters": "sensitive_ten_percent"}
-    metrics, _ = run_episodes(policy, seeds=list(range(8)), duration=1.5, options=options)
+    metrics = run_episodes(policy, seeds=list(range(8)), duration=1.5, options=options)
     assert metrics.excursion_bar.max() < 0.6
 
 
@@ -125,6 +125,6 @@ def test_the_package_holds_one_policy_which_holds_the_band_on_unknown_valves():
     files = {path.name for path in TRAINED.iterdir()}
     assert files == {CONTRACT_FILE, WEIGHTS_FILE}
     options = {"parameters": "sensitive_ten_percent"}
-    metrics, _ = run_episodes(load_policy(), seeds=list(range(64)), duration=5.0, options=options)
+    metrics = run_episodes(load_policy(), seeds=list(range(64)), duration=5.0, options=options)
     assert metrics.stayed.mean() > 0.98
     assert metrics.rms_bar.mean() < 0.12

@@ -78,7 +78,7 @@ def test_it_begins_later_where_p3_is_low_already():
 
 def rms(controller, parameters):
     options = {"parameters": parameters, "scenario": "steps"}
-    metrics, _ = run_episodes(controller, seeds=SEEDS, duration=5.0, options=options)
+    metrics = run_episodes(controller, seeds=SEEDS, duration=5.0, options=options)
     return np.sqrt(np.mean(metrics.rms_bar**2))
 
 

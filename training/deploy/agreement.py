@@ -130,7 +130,7 @@ def closed_loop(
     figures = {}
     seeds = list(range(CLOSED_LOOP_SEED, CLOSED_LOOP_SEED + episodes))
     for each in (controller, CompiledPolicy(code=code)):
-        metrics, _ = run_episodes(each, seeds=seeds, duration=duration, options=OPTIONS)
+        metrics = run_episodes(each, seeds=seeds, duration=duration, options=OPTIONS)
         found = summary(metrics)
         figures[each.name] = {name: found[name] for name in FIGURES}
     return figures
