@@ -40,14 +40,6 @@ from identification.gap.prepare.screened import Finding
 from identification.gap.search.cause_search import MOST_CAUSES, HypothesisPool, is_small, search_causes
 from identification.gap.search.screening import assess_separability, simulate_signatures
 
-JUDGED_RUNNERS_UP = 3
-"""Single causes beyond the ambiguity set whose discrepancy reduction is measured too; computing time and
-length of the tables."""
-
-HELPFUL_SHARE = 0.5
-"""Share of the gap on held-out recordings [1]: a cause that surely closes it is to be added, whether its
-name is sure or not."""
-
 NOTICED_WORSENING = 0.05
 """Relative growth of the held-out gap by recalibration that is mentioned [1]."""
 
@@ -99,10 +91,13 @@ class Diagnosis:
 
     @property
     def advised(self) -> RankedCause | None:
-        """The cause to add: the named one where it surely helps, else one that halves the gap."""
+        """The cause to add: the named one where it surely helps, else one that surely halves the gap.
+
+        The latter is to be added whether its name is sure or not.
+        """
         if self.named:
             return self.named if self.surely_helps(self.named) else None
-        helping = [cause for cause in self.judged if self.share_closed(cause).low >= HELPFUL_SHARE]
+        helping = [cause for cause in self.judged if self.share_closed(cause).low >= 0.5]
         return max(helping, key=lambda cause: self.share_closed(cause).value, default=None)
 
     @property
@@ -224,11 +219,11 @@ def _locate(ranking: Ranking, hypothesis: EvaluatedHypothesis, seed: int) -> Loc
 
 
 def _judged_causes(ranking: Ranking) -> list[RankedCause]:
-    """The fewest causes that hold most of the probability of all, and the next single ones."""
+    """The fewest causes that hold most of the probability of all, and the next three single ones."""
     causes = causes_by_name(ranking)
     first = max(len(smallest_set(causes, AMBIGUITY_SHARE)), 1)
     singles = [cause for cause in causes[first:] if len(cause.effects) == 1]
-    return [*causes[:first], *singles[:JUDGED_RUNNERS_UP]]
+    return [*causes[:first], *singles[:3]]
 
 
 def _worse_by_recalibration(reduction: DiscrepancyReduction) -> list[str]:

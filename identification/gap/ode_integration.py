@@ -20,10 +20,6 @@ from numpy.typing import NDArray
 from identification.gap.fit.laws import KNOTS, MOST_LAWS
 from identification.gap.runge_kutta import advancing
 
-STEP_ERROR = 0.05
-"""Largest change of a reading by halving the sub-steps [noise deviations]: far below what the readings
-can show."""
-
 MOST_STEPS = 256
 """Most sub-steps in a sampling period that are tried; a model that needs more is stiff, and an explicit
 method is the wrong one for it."""
@@ -275,7 +271,8 @@ def settled_steps(read: Callable[[int], Sequence[NDArray]]) -> int:
     while 2 * steps <= MOST_STEPS:
         fine = read(2 * steps)
         finite = all(np.all(np.isfinite(reading[..., 0])) for reading in fine)
-        if finite and _largest_change(coarse, fine) <= STEP_ERROR:
+        # Noise deviations: far below what the readings can show.
+        if finite and _largest_change(coarse, fine) <= 0.05:
             return steps
         steps, coarse = 2 * steps, fine
     return steps

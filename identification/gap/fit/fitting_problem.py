@@ -11,13 +11,6 @@ from epv_env.common.files import Journal
 from identification.gap.fit.laws import Law
 from identification.gap.plant import Cause, FreeParameter, GreyBox, NuisanceParameter, noise_weighted
 
-UNSTABLE = 1e9
-"""Weighted output [noise deviations] that only an unstable simulation gives: it counts as failed."""
-
-FAILED_RESIDUAL = 1e3
-"""Residual of a reading whose candidate cannot be simulated [noise deviations]: far above every residual
-of a usable candidate, so that the fit moves away."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Hypothesis:
@@ -302,7 +295,8 @@ class FittingProblem:
             noise_weighted(self.plant, r, output).reshape(-1, len(estimates))
             for r, output in zip(runs, outputs, strict=True)
         ]
-        return [np.where(np.abs(y) < UNSTABLE, y, np.nan) for y in weighted]
+        # What is larger comes from an unstable simulation: it counts as failed.
+        return [np.where(np.abs(y) < 1e9, y, np.nan) for y in weighted]
 
     def residuals(self, estimates: Sequence[Estimate], runs: Sequence[int]) -> list[NDArray]:
         """Weighted measured - model of n estimates, per run (values, n) [noise deviations]."""
@@ -310,4 +304,5 @@ class FittingProblem:
 
     def residual(self, run: int, outputs: NDArray) -> NDArray:
         """Measured less weighted outputs (values, n) of a run [noise deviations]."""
-        return np.nan_to_num(self.measured[run][:, None] - outputs, nan=FAILED_RESIDUAL)
+        # A candidate that cannot be simulated is far worse than every usable one: the fit moves away.
+        return np.nan_to_num(self.measured[run][:, None] - outputs, nan=1e3)

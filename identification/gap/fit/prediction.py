@@ -16,10 +16,6 @@ from identification.gap.fit.variable_projection import (
 from identification.gap.plant import GreyBox, noise_weighted
 from identification.report_2003 import partial_error, relative_error, total_error
 
-SETTLING_STEPS = 3
-"""Gauss-Newton steps for a cause's run parameters when a run is predicted; the outputs are nearly linear
-in them, so that three suffice."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Prediction:
@@ -57,10 +53,11 @@ def predict(problem: FittingProblem, estimate: Estimate) -> Prediction:
 def with_settled_runs(problem: FittingProblem, estimate: Estimate) -> Estimate:
     """The estimate whose run parameters suit every run, held-out ones too, all else as it is.
 
-    The outputs need not be linear in them: a winding that begins 30 K warmer, for one.
+    The outputs need not be linear in them, as with a winding that begins 30 K warmer, but nearly so:
+    three Gauss-Newton steps suffice.
     """
     count = len(estimate.hypothesis.run_parameters)
-    for _ in range(SETTLING_STEPS if count else 0):
+    for _ in range(3 if count else 0):
         runs = _in_run_parameters(problem, estimate)[1]
         shared = _shared(problem, runs)
         steps = [without_run_nuisances(run, shared)[1][:count] for run in runs]

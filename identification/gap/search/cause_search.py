@@ -33,35 +33,14 @@ from identification.gap.search.screening import (
 MOST_CAUSES = 4
 """Largest number of causes that are taken to act together."""
 
-LAW_PRICE = 2.0
-"""Factor by which an open law must lower the misfit [1]: the law of the catalogue is kept where it is
-about as good, and the two laws are left to those causes that need them."""
-
 # Numbers for the sake of computing time.
 
 MULTI_START_CAUSES = 12
 """Largest catalogue of which every cause is refitted from each of its trial values, and every pair:
 causes may help together that do not help alone. A larger one begins at the most promising values."""
 
-PARTNERS = 8
-"""Causes of a large catalogue that are refitted beside a set."""
-
-STARTS = 1
-"""The most promising starts of a set of causes that are fitted, with the law assumed and with an open
-one; in a small catalogue all starts with the law assumed."""
-
-FAR_WORSE = 10.0
-"""Factor on what the best set leaves, beyond which another set of as many causes is not followed [1]."""
-
-HELPED = 0.8
-"""Share of what the sets of one cause less leave, up to which a cause has helped and another one may
-[1]."""
-
 FINALISTS = 4
 """Best sets of one size that are fitted further, with nuisance slopes of their own and other laws."""
-
-BASES = 2
-"""The best sets of one size to which another cause is added."""
 
 FIRST_ITERATIONS = 5
 """Most steps of the first fits: those of finalists go on."""
@@ -103,9 +82,13 @@ class HypothesisPool:
         return self._cost(evaluated), misfit(evaluated)
 
     def _cost(self, evaluated: EvaluatedHypothesis) -> float:
-        """What counts when one of two fits of a set is kept [nats]: an open law must pay."""
+        """What counts when one of two fits of a set is kept [nats]: an open law must halve it.
+
+        So the law of the catalogue is kept where it is about as good, and the two laws are left to those
+        causes that need them.
+        """
         left = max(0.5 * (misfit(evaluated) - self.readings), 0.0)
-        return (left + self.tolerated) * LAW_PRICE ** len(evaluated.estimate.hypothesis.laws)
+        return (left + self.tolerated) * 2.0 ** len(evaluated.estimate.hypothesis.laws)
 
     def __contains__(self, labels: frozenset[str]) -> bool:
         """Whether a set of causes was refitted."""
@@ -130,9 +113,9 @@ class HypothesisPool:
         return min(self.posterior().misfits, default=0.0) > self.tolerated
 
     def promising(self, number: int, most: int) -> list[EvaluatedHypothesis]:
-        """The best sets of a number of causes that do not leave far more than the best of them."""
+        """The best sets of a number of causes, but none that leaves ten times more than the best."""
         ranked = self.ranked(number)[:most]
-        return [each for each in ranked if self._cost(each) <= FAR_WORSE * self._cost(ranked[0])]
+        return [each for each in ranked if self._cost(each) <= 10.0 * self._cost(ranked[0])]
 
     def finish(self, number: int) -> None:
         """Fit the best sets of a number of causes further: own nuisances, then one law more.
@@ -162,7 +145,7 @@ class HypothesisPool:
             for each in chosen:
                 causes = each.estimate.hypothesis.causes
                 found = law_starts(self.problem, [each.estimate] * len(causes), causes)
-                starts += [start.estimate for start in found[:STARTS]]
+                starts += [start.estimate for start in found[:1]]
             return fit(self.problem, starts, iterations=FIRST_ITERATIONS)
 
         name = _names(chosen)
@@ -205,7 +188,7 @@ def search_causes(
     for number in range(2, most_causes + 1):
         if not _another_cause_may_act(pool, number):
             break
-        for smaller in pool.promising(number - 1, BASES):
+        for smaller in pool.promising(number - 1, 2):
             pool.add(_fits_beside(pool, smaller.estimate, signatures))
         if number == 2 and pool.small:
             _fit_pairs(pool, base, signatures)
@@ -214,11 +197,14 @@ def search_causes(
 
 
 def _another_cause_may_act(pool: HypothesisPool, number: int) -> bool:
-    """Whether sets of `number` causes are worth a search: much is left, and the last cause helped."""
+    """Whether sets of `number` causes are worth a search.
+
+    Much is left, and the last cause has removed a fifth of what one cause less leaves.
+    """
     if not pool.much_is_left():
         return False
     best = {len(each.labels): cost for each, cost in reversed(pool.by_cost())}
-    return number <= 2 or pool.small or best.get(number - 1, np.inf) <= HELPED * best[number - 2]
+    return number <= 2 or pool.small or best.get(number - 1, np.inf) <= 0.8 * best[number - 2]
 
 
 def _fits_beside(
@@ -258,12 +244,9 @@ def _fits_beside(
             share = start.chi_square / whole
             promise[start.labels] = min(promise.get(start.labels, np.inf), share)
         best = sorted(promise, key=lambda labels: promise[labels])
-        kept = set(best if pool.small else best[:PARTNERS])
-        starts = [
-            start
-            for part, most in ((assumed, len(assumed) if pool.small else STARTS), (opened, STARTS))
-            for start in _best_starts([start for start in part if start.labels in kept], most)
-        ]
+        kept = set(best if pool.small else best[:8])
+        first, opened = ([s for s in part if s.labels in kept] for part in (assumed, opened))
+        starts = [*(first if pool.small else best_start_of_each(first)), *best_start_of_each(opened)]
         return fit(problem, [s.estimate for s in starts], base.chi_square, iterations=FIRST_ITERATIONS)
 
     return pool.cache(f"beside {name or ' and '.join(hypothesis.labels) or 'nothing'}", fits)
@@ -290,7 +273,7 @@ def _fit_pairs(pool: HypothesisPool, base: Estimate, signatures: Sequence[CauseS
             for first, second in combinations(screened, 2)
             if first.cause.name != second.cause.name
         ]
-        starts = _best_starts(simulated_starts(problem, base, base_runs, together), STARTS)
+        starts = best_start_of_each(simulated_starts(problem, base, base_runs, together))
         return fit(problem, [start.estimate for start in starts], base.chi_square)
 
     pool.add(pool.cache("pairs", fits))
@@ -303,18 +286,6 @@ def _both(problem: FittingProblem, base: Estimate, first: Start, second: Start) 
         values, parameters = problem.values(start.estimate), start.cause.parameters
         joint = with_cause(problem, joint, start.cause, {p.symbol: values[p.symbol] for p in parameters})
     return joint
-
-
-def _best_starts(starts: Sequence[Start], most: int) -> list[Start]:
-    """The best starts of each set of causes, up to a number."""
-    kept: list[Start] = []
-    left = list(starts)
-    for _ in range(most):
-        best = best_start_of_each(left)
-        kept += best
-        taken = {id(start) for start in best}
-        left = [start for start in left if id(start) not in taken]
-    return kept
 
 
 def _leave_causes_out(pool: HypothesisPool) -> None:

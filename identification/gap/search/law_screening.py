@@ -19,17 +19,8 @@ from identification.gap.plant import Cause
 from identification.gap.prepare.prepared_plant import prepared
 from identification.gap.search.screening import Start
 
-SMALL_SIZE = 0.3
-"""Size, in trial sizes, below which a law is opened at the trial size [1]."""
-
 TOGETHER = 4
 """Causes whose laws are linearised together, for memory."""
-
-LEAST_MEAN = 0.1
-"""Least factor on a size that stands for the mean of its law [1]."""
-
-STEP_DAMPING = 1e-3
-"""Damping of the step, relative to the diagonal [1]: nearly none."""
 
 
 def law_starts(
@@ -81,7 +72,7 @@ def _starts(
         places = np.concatenate([np.arange(first), components, behind])
         columns = np.concatenate([[0], 1 + places, shared])
         equations = equations_of(products.of(columns), len(places))
-        step, decrease = equations.step(low[places], high[places], STEP_DAMPING)
+        step, decrease = equations.step(low[places], high[places], damping=1e-3)  # nearly none
         hypothesis = replace(estimate.hypothesis, laws=(*estimate.hypothesis.laws, law))
         yield Start(
             estimate=replace(estimate, hypothesis=hypothesis, vector=whole.vector[places] + step),
@@ -93,7 +84,7 @@ def at_least_trial_size(problem: FittingProblem, estimate: Estimate, cause: Caus
     """The estimate as a start, with a cause at its first trial where its size is nearly nothing."""
     values = problem.values(estimate)
     sizes = [abs((values[p.symbol] - p.nominal) / (p.trials[0] - p.nominal)) for p in cause.sizes]
-    if max(sizes) >= SMALL_SIZE:
+    if max(sizes) >= 0.3:
         return restarted(estimate)
     trial = {p.symbol: p.trials[0] for p in cause.sizes}
     begun = problem.start(estimate.hypothesis, {**values, **trial})
@@ -145,13 +136,12 @@ def over_reached_states(problem: FittingProblem, estimate: Estimate) -> Estimate
         moved = replace(law, low=low, high=high) if low < high else law
         growth = law.at(components, moved.knots)
         mean = float(np.mean(growth))
-        parts = np.linalg.lstsq(COMPONENTS, (growth - mean) / max(1.0 + mean, LEAST_MEAN), rcond=None)[0]
+        factor = max(1.0 + mean, 0.1)  # on the size, which stands for the mean of the law
+        parts = np.linalg.lstsq(COMPONENTS, (growth - mean) / factor, rcond=None)[0]
         parts = np.clip(parts, -LARGEST, LARGEST)
         values |= dict(zip((p.symbol for p in law.parameters), parts, strict=True))
-        values |= {
-            p.symbol: p.nominal + (values[p.symbol] - p.nominal) * max(1.0 + mean, LEAST_MEAN)
-            for p in law.cause.sizes
-        }
+        sizes = law.cause.sizes
+        values |= {p.symbol: p.nominal + (values[p.symbol] - p.nominal) * factor for p in sizes}
         laws.append(moved)
     hypothesis = replace(estimate.hypothesis, laws=tuple(laws))
     begun = problem.start(hypothesis, values)
