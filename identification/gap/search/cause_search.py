@@ -5,18 +5,19 @@ that the law follows promises most by linear prediction. The best sets get one l
 pays.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.gap.fit.evidence import EvaluatedHypothesis, evaluate, misfit
 from identification.gap.fit.fitting_problem import Estimate, FitCache, FittingProblem, Hypothesis
 from identification.gap.fit.gauss_newton import fit, linearise
 from identification.gap.fit.laws import MOST_LAWS
 from identification.gap.fit.recalibration import with_own_nuisances
-from identification.gap.fit.variable_projection import LinearisedRun, normal_equations
+from identification.gap.fit.variable_projection import normal_equations
 from identification.gap.plant import GreyBox
 from identification.gap.search.law_screening import law_starts, over_reached_states
 from identification.gap.search.posterior import Posterior, posterior, tolerated_misfit
@@ -63,6 +64,7 @@ class HypothesisPool:
         self.readings = sum(int(np.sum(run.trusted)) for run in problem.plant.runs)
         self.tolerated = tolerated_misfit(self.readings)
         self._best: dict[frozenset[str], EvaluatedHypothesis] = {}
+        self._posterior: Posterior | None = None
         self._finished: set[str] = set()
 
     def add(self, estimates: Iterable[Estimate]) -> None:
@@ -75,7 +77,7 @@ class HypothesisPool:
             labels = frozenset(evaluated.labels)
             present = self._best.get(labels)
             if present is None or self._order(evaluated) < self._order(present):
-                self._best[labels] = evaluated
+                self._best[labels], self._posterior = evaluated, None
 
     def _order(self, evaluated: EvaluatedHypothesis) -> tuple[float, float]:
         """The less, the better; within noise the better fit counts."""
@@ -95,18 +97,15 @@ class HypothesisPool:
         return labels in self._best
 
     def posterior(self) -> Posterior:
-        """All hypotheses with causes, and their probabilities."""
-        return posterior(self.problem, self.recalibrated, list(self._best.values()))
+        """All hypotheses with causes, and their probabilities; weighed once for each change."""
+        if self._posterior is None:
+            self._posterior = posterior(self.problem, self.recalibrated, list(self._best.values()))
+        return self._posterior
 
-    def ranked(self, number: int | None = None) -> list[EvaluatedHypothesis]:
-        """Hypotheses with a number of causes, or all, the most probable first."""
-        found = self.posterior().hypotheses
-        return [each for each in found if number is None or len(each.labels) == number]
-
-    def by_cost(self) -> list[tuple[EvaluatedHypothesis, float]]:
-        """All hypotheses with what they leave, laws priced [nats], the least first."""
-        pairs = [(each, self._cost(each)) for each in self._best.values()]
-        return sorted(pairs, key=lambda pair: pair[1])
+    def least_cost(self, number: int) -> float:
+        """What the best set of a number of causes leaves, laws priced [nats]; infinity without one."""
+        sets = (each for each in self._best.values() if len(each.labels) == number)
+        return min((self._cost(each) for each in sets), default=np.inf)
 
     def much_is_left(self) -> bool:
         """Whether the best hypothesis leaves more than what no model is free of."""
@@ -114,7 +113,7 @@ class HypothesisPool:
 
     def promising(self, number: int, most: int) -> list[EvaluatedHypothesis]:
         """The best sets of a number of causes, but none that leaves ten times more than the best."""
-        ranked = self.ranked(number)[:most]
+        ranked = [each for each in self.posterior().hypotheses if len(each.labels) == number][:most]
         return [each for each in ranked if self._cost(each) <= 10.0 * self._cost(ranked[0])]
 
     def finish(self, number: int) -> None:
@@ -143,8 +142,9 @@ class HypothesisPool:
         def fits() -> list[Estimate]:
             starts = []
             for each in chosen:
-                causes = each.estimate.hypothesis.causes
-                found = law_starts(self.problem, [each.estimate] * len(causes), causes)
+                base, causes = each.estimate, each.estimate.hypothesis.causes
+                runs = _most_misfitting(self.problem, each.residuals)
+                found = law_starts(self.problem, base, [base] * len(causes), causes, runs)
                 starts += [start.estimate for start in found[:1]]
             return fit(self.problem, starts, iterations=FIRST_ITERATIONS)
 
@@ -203,8 +203,7 @@ def _another_cause_may_act(pool: HypothesisPool, number: int) -> bool:
     """
     if not pool.much_is_left():
         return False
-    best = {len(each.labels): cost for each, cost in reversed(pool.by_cost())}
-    return number <= 2 or pool.small or best.get(number - 1, np.inf) <= 0.8 * best[number - 2]
+    return number <= 2 or pool.small or pool.least_cost(number - 1) <= 0.8 * pool.least_cost(number - 2)
 
 
 def _fits_beside(
@@ -233,9 +232,10 @@ def _fits_beside(
         beside = simulate_signatures(problem, base, causes)
         assumed = screen_causes(problem, base, base_runs, beside, every_start=pool.small)
         # Chi-squares of some of the runs are compared as shares of what the base leaves of them.
-        runs = _most_misfitting(problem, base_runs)
+        residuals = dict(zip(problem.fitted_runs, (run.residual for run in base_runs), strict=True))
+        runs = _most_misfitting(problem, residuals)
         estimates = [start.estimate for start in assumed]
-        opened = law_starts(problem, estimates, [start.cause for start in assumed], runs)
+        opened = law_starts(problem, base, estimates, [start.cause for start in assumed], runs)
         promise = {start.labels: start.chi_square / base.chi_square for start in reversed(assumed)}
         whole = normal_equations(
             [run for run, r in zip(base_runs, problem.fitted_runs, strict=True) if r in runs]
@@ -252,9 +252,12 @@ def _fits_beside(
     return pool.cache(f"beside {name or ' and '.join(hypothesis.labels) or 'nothing'}", fits)
 
 
-def _most_misfitting(problem: FittingProblem, base_runs: Sequence[LinearisedRun]) -> list[int]:
-    """The fitted runs with the largest mean square residuals, up to half of all samples."""
-    squares = [float(np.mean(run.residual**2)) for run in base_runs]
+def _most_misfitting(problem: FittingProblem, residuals: Mapping[int, NDArray]) -> list[int]:
+    """The fitted runs with the largest mean square residuals, up to half of all samples.
+
+    residuals: by index of the run, of any shape [noise deviations].
+    """
+    squares = [float(np.mean(residuals[r] ** 2)) for r in problem.fitted_runs]
     lengths = {r: len(problem.plant.runs[r].time) for r in problem.fitted_runs}
     order = [problem.fitted_runs[i] for i in np.argsort(squares)[::-1]]
     before = np.cumsum([0, *(lengths[r] for r in order)])[:-1]
@@ -295,7 +298,7 @@ def _leave_causes_out(pool: HypothesisPool) -> None:
     """
     problem = pool.problem
     for _ in range(MOST_CAUSES - 1):
-        ranked = pool.ranked()
+        ranked = pool.posterior().hypotheses
         if not ranked or len(ranked[0].labels) < 2:
             return
         best = ranked[0]
@@ -307,5 +310,5 @@ def _leave_causes_out(pool: HypothesisPool) -> None:
         name = f"without one of {' and '.join(best.labels)}"
         pool.add(pool.cache(name, lambda starts=starts: fit(problem, starts)))
         pool.finish(len(hypothesis.causes) - 1)
-        if pool.ranked()[0].labels == best.labels:
+        if pool.posterior().hypotheses[0].labels == best.labels:
             return

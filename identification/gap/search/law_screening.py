@@ -5,7 +5,7 @@ at nearly nothing: with the wrong law a fit may send the true cause there. One s
 says what each law promises.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,21 +25,23 @@ TOGETHER = 4
 
 def law_starts(
     problem: FittingProblem,
+    base: Estimate,
     estimates: Sequence[Estimate],
     causes: Sequence[Cause],
-    runs: Sequence[int] | None = None,
+    runs: Sequence[int],
 ) -> list[Start]:
     """Starts with one more open law, by the chi-square that they promise, the least first.
 
     Args:
         problem: the plant with its readings.
+        base: whose states, which change, the laws may follow.
         estimates: from which the law is opened.
         causes: whose law, by estimate; the estimate has the cause.
-        runs: indices of the runs that count; None: all fitted ones.
+        runs: indices of the runs that count.
     """
-    runs = problem.fitted_runs if runs is None else runs
     if not getattr(problem.plant, "law_arguments", ()):
         return []
+    ranges = {name: ends for name, ends in _ranges(problem, base, runs).items() if ends[0] < ends[1]}
     pairs = [
         (at_least_trial_size(problem, estimate, cause), cause)
         for estimate, cause in zip(estimates, causes, strict=True)
@@ -48,7 +50,7 @@ def law_starts(
     starts: list[Start] = []
     for first in range(0, len(pairs), TOGETHER):
         part = pairs[first : first + TOGETHER]
-        opened = [_with_every_law(problem, estimate, cause, runs) for estimate, cause in part]
+        opened = [_with_every_law(problem, estimate, cause, ranges) for estimate, cause in part]
         linearised = linearise(problem, opened, runs)
         for (estimate, _), whole, own in zip(part, opened, linearised, strict=True):
             starts += _starts(problem, estimate, whole, own)
@@ -92,15 +94,18 @@ def at_least_trial_size(problem: FittingProblem, estimate: Estimate, cause: Caus
 
 
 def _with_every_law(
-    problem: FittingProblem, estimate: Estimate, cause: Cause, runs: Sequence[int]
+    problem: FittingProblem, estimate: Estimate, cause: Cause, ranges: Mapping[str, tuple[float, float]]
 ) -> Estimate:
-    """The estimate with the law of a cause open over every state that changes; all as assumed yet."""
+    """The estimate with the law of a cause open over every state; all as assumed yet.
+
+    ranges: least and greatest value of the states, by name [SI].
+    """
     known = estimate.hypothesis.laws
     taken = {law.argument for law in known if law.cause.label == cause.label}
     laws = [
         Law(cause=cause, argument=argument, low=low, high=high)
-        for argument, (low, high) in _ranges(problem, estimate, runs).items()
-        if argument not in taken and low < high
+        for argument, (low, high) in ranges.items()
+        if argument not in taken
     ]
     hypothesis = replace(estimate.hypothesis, laws=(*known, *laws))
     begun = problem.start(hypothesis, problem.values(estimate))
