@@ -1,4 +1,4 @@
-"""Printed figures of the report checked against its others: noise (Tables 1 to 4), errors (11 and 13)."""
+"""Printed figures of the report checked against its others: noise (Tables 1 to 4), errors (11, 13)."""
 
 from dataclasses import dataclass
 from itertools import combinations

@@ -23,7 +23,6 @@ from identification.gap.search.law_screening import law_starts, over_reached_sta
 from identification.gap.search.posterior import Posterior, posterior, tolerated_misfit
 from identification.gap.search.screening import (
     CauseSignature,
-    Start,
     best_start_of_each,
     screen_causes,
     simulate_signatures,
@@ -179,57 +178,47 @@ def search_causes(
         signatures: of all causes beside it.
         most_causes: largest number of causes of a set.
     """
-    pool.add(_fits_beside(pool, base, signatures))
+    _fit_beside(pool, base, signatures)
     if pool.small:
         # Without the cause recalibration may have ended in a corner, far from the truth.
         nominal = pool.problem.start(Hypothesis(causes=()), {})
-        pool.add(_fits_beside(pool, nominal, signatures, "the nominal model"))
+        _fit_beside(pool, nominal, name="the nominal model")
     pool.finish(1)
     for number in range(2, most_causes + 1):
-        if not _another_cause_may_act(pool, number):
+        if not pool.much_is_left():
             break
+        helped = pool.least_cost(number - 1) <= 0.8 * pool.least_cost(number - 2)
+        if number > 2 and not pool.small and not helped:
+            break  # the last cause has not removed a fifth
         for smaller in pool.promising(number - 1, 2):
-            pool.add(_fits_beside(pool, smaller.estimate, signatures))
+            _fit_beside(pool, smaller.estimate)
         if number == 2 and pool.small:
             _fit_pairs(pool, base, signatures)
         pool.finish(number)
     _leave_causes_out(pool)
 
 
-def _another_cause_may_act(pool: HypothesisPool, number: int) -> bool:
-    """Whether sets of `number` causes are worth a search.
+def _fit_beside(
+    pool: HypothesisPool, base: Estimate, signatures: Sequence[CauseSignature] = (), name: str = ""
+) -> None:
+    """Fit a set with each of the most promising further causes, as assumed and with an open law.
 
-    Much is left, and the last cause has removed a fifth of what one cause less leaves.
-    """
-    if not pool.much_is_left():
-        return False
-    return number <= 2 or pool.small or pool.least_cost(number - 1) <= 0.8 * pool.least_cost(number - 2)
-
-
-def _fits_beside(
-    pool: HypothesisPool, base: Estimate, signatures: Sequence[CauseSignature], name: str = ""
-) -> list[Estimate]:
-    """Fits of a set with each of the most promising further causes, as assumed and with an open law.
-
-    base: the set's estimate. signatures: of all causes beside the recalibrated model; those that promise
-    something beside the set are simulated there. name: of the base where sets that were fitted are
-    fitted again.
+    base: the set's estimate. signatures: of all causes beside it, where they are known. name: of the
+    base where sets that were fitted are fitted again.
     """
     problem, hypothesis = pool.problem, base.hypothesis
-    own = {cause.name for cause in hypothesis.causes}
+    known = {cause.name for cause in hypothesis.causes}
     others = [
-        signature
-        for signature in signatures
-        if signature.cause.name not in own
-        and (name or frozenset((*hypothesis.labels, signature.cause.label)) not in pool)
+        cause
+        for cause in problem.plant.causes
+        if cause.name not in known and (name or frozenset((*hypothesis.labels, cause.label)) not in pool)
     ]
     if not others:
-        return []
+        return
 
     def fits() -> list[Estimate]:
         base_runs = linearise(problem, [base], problem.fitted_runs)[0]
-        causes = list({signature.cause.label: signature.cause for signature in others}.values())
-        beside = simulate_signatures(problem, base, causes)
+        beside = signatures or simulate_signatures(problem, base, others)
         assumed = screen_causes(problem, base, base_runs, beside, every_start=pool.small)
         # Chi-squares of some of the runs are compared as shares of what the base leaves of them.
         residuals = dict(zip(problem.fitted_runs, (run.residual for run in base_runs), strict=True))
@@ -249,7 +238,7 @@ def _fits_beside(
         starts = [*(first if pool.small else best_start_of_each(first)), *best_start_of_each(opened)]
         return fit(problem, [s.estimate for s in starts], base.chi_square, iterations=FIRST_ITERATIONS)
 
-    return pool.cache(f"beside {name or ' and '.join(hypothesis.labels) or 'nothing'}", fits)
+    pool.add(pool.cache(f"beside {name or ' and '.join(hypothesis.labels) or 'nothing'}", fits))
 
 
 def _most_misfitting(problem: FittingProblem, residuals: Mapping[int, NDArray]) -> list[int]:
@@ -271,24 +260,19 @@ def _fit_pairs(pool: HypothesisPool, base: Estimate, signatures: Sequence[CauseS
     def fits() -> list[Estimate]:
         base_runs = linearise(problem, [base], problem.fitted_runs)[0]
         screened = screen_causes(problem, base, base_runs, signatures)
-        together = [
-            _both(problem, base, first, second)
-            for first, second in combinations(screened, 2)
-            if first.cause.name != second.cause.name
-        ]
+        together = []
+        for pair in combinations(screened, 2):
+            if pair[0].cause.name != pair[1].cause.name:
+                joint = base
+                for start in pair:
+                    values = problem.values(start.estimate)
+                    sizes = {p.symbol: values[p.symbol] for p in start.cause.parameters}
+                    joint = with_cause(problem, joint, start.cause, sizes)
+                together.append(joint)
         starts = best_start_of_each(simulated_starts(problem, base, base_runs, together))
         return fit(problem, [start.estimate for start in starts], base.chi_square)
 
     pool.add(pool.cache("pairs", fits))
-
-
-def _both(problem: FittingProblem, base: Estimate, first: Start, second: Start) -> Estimate:
-    """The base with the causes of two starts at their values there."""
-    joint = base
-    for start in (first, second):
-        values, parameters = problem.values(start.estimate), start.cause.parameters
-        joint = with_cause(problem, joint, start.cause, {p.symbol: values[p.symbol] for p in parameters})
-    return joint
 
 
 def _leave_causes_out(pool: HypothesisPool) -> None:
