@@ -87,7 +87,10 @@ def next_recording(
     found = separation(ranking.problem, planned(valve, programmes), first, second)
     best = sorted(zip(programmes, found, strict=True), key=lambda pair: -pair[1])[:MOST_ROWS]
     rows = [(described(programme), gap_text(apart)) for programme, apart in best]
-    titles = [" + ".join(each.hypothesis.titles) or "no cause" for each in (first, second)]
+    titles = [
+        " + ".join(cause.title for cause in each.hypothesis.causes) or "no cause"
+        for each in (first, second)
+    ]
     text = _sentence(rows[0][0], best[0][1], titles, probability)
     return NextRecording(text=text, programme=best[0][0], table=Table(columns=COLUMNS, rows=rows))
 

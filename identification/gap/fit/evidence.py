@@ -56,7 +56,7 @@ class EvaluatedHypothesis:
     @property
     def titles(self) -> tuple[str, ...]:
         """The causes for people."""
-        return self.estimate.hypothesis.titles
+        return tuple(cause.title for cause in self.estimate.hypothesis.causes)
 
     @property
     def label(self) -> str:
@@ -129,7 +129,8 @@ def _covariance(equations: NormalEquations) -> NDArray:
 
 def _unusual(estimate: Estimate) -> bool:
     """Whether a cause's parameter lies at an end of its range and is not merely nominal there."""
-    for p, scaled in zip(estimate.hypothesis.cause_parameters, estimate.cause_vector, strict=True):
+    sizes = estimate.vector[estimate.cause_start :]
+    for p, scaled in zip(estimate.hypothesis.cause_parameters, sizes, strict=True):
         low, high = sorted((p.low, p.high))
         value, margin = scaled * p.scale, 1e-4 * (high - low)  # a margin for rounding
         if min(value - low, high - value) < margin and abs(value - p.nominal) > margin:

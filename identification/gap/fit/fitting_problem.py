@@ -40,11 +40,6 @@ class Hypothesis:
         """Labels of the causes."""
         return tuple(cause.label for cause in self.causes)
 
-    @property
-    def titles(self) -> tuple[str, ...]:
-        """The causes for people."""
-        return tuple(cause.title for cause in self.causes)
-
 
 @dataclass(frozen=True, kw_only=True)
 class NuisanceSlopes:
@@ -82,11 +77,6 @@ class Estimate:
     def cause_start(self) -> int:
         """Index of the vector at which the parameters of the causes begin."""
         return len(self.vector) - len(self.hypothesis.cause_parameters)
-
-    @property
-    def cause_vector(self) -> NDArray:
-        """Scaled parameters of the causes, (parameters of causes,) [1]."""
-        return self.vector[self.cause_start :]
 
     @property
     def laws(self) -> list[tuple[Law, NDArray]]:
@@ -150,7 +140,21 @@ class FitCache:
             return self.journal.read(step, lambda found: [self._estimate(each) for each in found])
         estimates = fit()
         if self.journal is not None:
-            self.journal.add(step, [_entry(estimate) for estimate in estimates])
+            # Nuisance slopes are computed again.
+            entries = [
+                {
+                    "causes": list(estimate.hypothesis.labels),
+                    "vector": estimate.vector.tolist(),
+                    "local": estimate.run_values.tolist(),
+                    "chi_square": estimate.chi_square,
+                    "converged": estimate.converged,
+                    "laws": [
+                        [o.cause.label, o.argument, o.low, o.high] for o in estimate.hypothesis.laws
+                    ],
+                }
+                for estimate in estimates
+            ]
+            self.journal.add(step, entries)
         return estimates
 
     def _estimate(self, entry: dict[str, Any]) -> Estimate:
@@ -169,18 +173,6 @@ class FitCache:
             chi_square=entry["chi_square"],
             converged=entry["converged"],
         )
-
-
-def _entry(estimate: Estimate) -> dict[str, Any]:
-    """An estimate as the journal keeps it; nuisance slopes are computed again."""
-    return {
-        "causes": list(estimate.hypothesis.labels),
-        "vector": estimate.vector.tolist(),
-        "local": estimate.run_values.tolist(),
-        "chi_square": estimate.chi_square,
-        "converged": estimate.converged,
-        "laws": [[o.cause.label, o.argument, o.low, o.high] for o in estimate.hypothesis.laws],
-    }
 
 
 class FittingProblem:

@@ -180,18 +180,25 @@ def regime_gaps(
         parts = squares.shape[1]
         weights = block_weights([parts], seed) if parts >= FEWEST_PARTS else None
         for channel, square, count in zip(plant.channels, squares, counts, strict=True):
-            if np.any(count):
-                gap, low, high = _gap_and_interval(square, count, weights)
-                gaps.append(
-                    RegimeGap(
-                        channel=channel.name,
-                        regime=regime,
-                        gap=gap,
-                        low=low,
-                        high=high,
-                        held_out=held_out,
-                    )
+            if not np.any(count):
+                continue
+            if weights is None:
+                gap = Interval(
+                    value=float(np.sqrt(np.sum(square) / np.sum(count))), low=0.0, high=np.inf
                 )
+            else:
+                least = np.finfo(float).tiny
+                gap = interval(np.sqrt((weights @ square) / np.maximum(weights @ count, least)))
+            gaps.append(
+                RegimeGap(
+                    channel=channel.name,
+                    regime=regime,
+                    gap=gap.value,
+                    low=gap.low,
+                    high=gap.high,
+                    held_out=held_out,
+                )
+            )
     return gaps
 
 
@@ -230,15 +237,3 @@ def _part_sums(
         np.add.reduceat(residual[:, inside] ** 2, first, axis=1),
         np.add.reduceat(run.trusted[:, inside].astype(float), first, axis=1),
     )
-
-
-def _gap_and_interval(
-    squares: NDArray, counts: NDArray, weights: NDArray | None
-) -> tuple[float, float, float]:
-    """Root mean square and its interval from sums over parts (parts,); weights: None for too few."""
-    if weights is None:
-        return float(np.sqrt(np.sum(squares) / np.sum(counts))), 0.0, np.inf
-    least = np.finfo(float).tiny
-    rms = np.sqrt((weights @ squares) / np.maximum(weights @ counts, least))
-    gap = interval(rms)
-    return gap.value, gap.low, gap.high

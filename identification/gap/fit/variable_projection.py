@@ -321,19 +321,16 @@ def _with_priors(grams: NDArray, runs: Sequence[LinearisedRun]) -> RunProducts:
     grams = _shifted(grams, first, -values)
     nuisances = np.arange(first, grams.shape[1])
     grams[:, nuisances, nuisances] += 1.0 / sd**2
-    prior = _prior(runs[0], first)
-    return RunProducts(grams=grams, bounds=LARGEST_DEVIATION * sd, prior=prior)
-
-
-def _prior(run: LinearisedRun, count: int) -> NDArray:
-    """`RunProducts.prior` of `count` columns: residual, slopes, slopes added to them, shared ones."""
-    prior, k, m = np.zeros((count, count)), len(run.slope_precision), run.shared_slopes.shape[1]
+    # Of residual, slopes, slopes that were added to them, and shared nuisances.
+    prior, run = np.zeros((first, first)), runs[0]
+    slopes = np.arange(1, 1 + len(run.slope_precision))
+    shared = np.arange(first - run.shared_slopes.shape[1], first)
     moment = run.slope_precision * run.slope_values
     prior[0, 0] = moment @ run.slope_values
-    prior[0, 1 : 1 + k] = prior[1 : 1 + k, 0] = -moment
-    prior[np.arange(1, 1 + k), np.arange(1, 1 + k)] = run.slope_precision
-    prior[np.arange(count - m, count), np.arange(count - m, count)] = 1.0
-    return prior
+    prior[0, slopes] = prior[slopes, 0] = -moment
+    prior[slopes, slopes] = run.slope_precision
+    prior[shared, shared] = 1.0
+    return RunProducts(grams=grams, bounds=LARGEST_DEVIATION * sd, prior=prior)
 
 
 class ChangedRuns:

@@ -9,7 +9,6 @@ with grouped folds would solve each of them anew and choose one penalty for all 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,16 +22,6 @@ transients, to 40 for what they leave."""
 
 PENALTIES = np.logspace(-3.0, 5.0, 9)
 """Ridge penalties [1]: from none to no prediction, one per decade."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class LearningRun:
-    """A run from which the black box learns."""
-
-    features: NDArray
-    """(samples, features) [SI]."""
-    target: NDArray
-    """The residual, (channels, samples) [noise deviations]; 0 at untrusted readings."""
 
 
 def predict_residuals(plant: GreyBox, model: Prediction, seed: int, scale: float) -> list[NDArray]:
@@ -53,8 +42,7 @@ def predict_residuals(plant: GreyBox, model: Prediction, seed: int, scale: float
     longest = max(1, sum(len(features[r]) for r in fitted) // 2000)
     strides = {r: min(longest, history_stride(plant, r, scale)) for r in fitted}
     learning = [
-        LearningRun(features=features[r][::stride], target=model.residuals[r][:, ::stride])
-        for r, stride in strides.items()
+        (features[r][::stride], model.residuals[r][:, ::stride].T) for r, stride in strides.items()
     ]
     held_out = [features[r] for r, run in enumerate(plant.runs) if run.held_out]
     predictions = iter(ridge_on_random_features(learning, held_out, seed))
@@ -65,12 +53,13 @@ def predict_residuals(plant: GreyBox, model: Prediction, seed: int, scale: float
 
 
 def ridge_on_random_features(
-    learning: Sequence[LearningRun], features: Sequence[NDArray], seed: int
+    learning: Sequence[tuple[NDArray, NDArray]], features: Sequence[NDArray], seed: int
 ) -> list[NDArray]:
     """Ridge regression with the penalty that predicts left-out runs best.
 
     Args:
-        learning: runs to learn from.
+        learning: of each run to learn from, features (samples, features) [SI], and the residual
+            (samples, channels) [noise deviations], 0 at untrusted readings. A single run is cut in two.
         features: of the runs to predict, (samples, features) each [SI].
         seed: of the random features.
 
@@ -78,9 +67,13 @@ def ridge_on_random_features(
         Per run (channels, samples) [noise deviations]; zero where leaving runs out shows nothing that
         carries over.
     """
-    waves = random_fourier_features(np.concatenate([run.features for run in learning]), seed)
-    folds = [(waves(run.features), run.target.T) for run in _folds(learning)]
-    linear = learning[0].features.shape[1]
+    waves = random_fourier_features(np.concatenate([values for values, _ in learning]), seed)
+    if len(learning) == 1:
+        ((values, target),) = learning
+        middle = len(values) // 2
+        learning = [(values[:middle], target[:middle]), (values[middle:], target[middle:])]
+    folds = [(waves(values), target) for values, target in learning]
+    linear = learning[0][0].shape[1]
     grams = np.array([z.T @ z for z, _ in folds])
     moments = np.array([z.T @ y for z, y in folds])
     left = 0.0
@@ -91,17 +84,6 @@ def ridge_on_random_features(
     best = np.argmin(left, axis=0)
     weights = np.take_along_axis(solutions, best[None, None], axis=1)[:, 0]
     return [(waves(values) @ weights).T for values in features]
-
-
-def _folds(learning: Sequence[LearningRun]) -> list[LearningRun]:
-    """Runs to leave out in turn; a single one is cut in two."""
-    if len(learning) > 1:
-        return list(learning)
-    run, middle = learning[0], len(learning[0].features) // 2
-    return [
-        LearningRun(features=run.features[part], target=run.target[:, part])
-        for part in (slice(None, middle), slice(middle, None))
-    ]
 
 
 def _solutions(gram: NDArray, moment: NDArray, linear: int) -> NDArray:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
+from scipy.special import logsumexp, softmax
 
 from identification.gap.fit.fitting_problem import Estimate, FittingProblem
 from identification.gap.fit.gaps import RegimeGap, regime_gaps, regimes_of
@@ -159,7 +159,8 @@ def locate(
     scale = time_scale(plant)
     design, forms = quadratic_forms(problem, estimate, runs, scale)
     fits = fit_processes(forms, design)
-    evidence = np.array([average_log_evidence(own) for own in fits])
+    # The processes of an equation are equally likely before the data.
+    evidence = np.array([logsumexp([f.log_evidence for f in own]) - np.log(len(own)) for own in fits])
     # Sensors are checked more often than physics.
     priors = [1.0 if form.windows else 0.3 for form in forms]
     weights = _probabilities(evidence, priors)
@@ -185,9 +186,7 @@ def _probabilities(evidence: NDArray, priors: Sequence[float]) -> NDArray:
     largest = max(float(np.max(evidence)), 0.0)
     doubt = max(1.0, 0.5 * np.sqrt(largest))  # the assumed forms of a forcing are not exact
     prior = (1 - PRIOR_NOTHING) * np.array(priors) / np.sum(priors)
-    score = np.append(evidence / doubt + np.log(prior), np.log(PRIOR_NOTHING))
-    weights = np.exp(score - np.max(score))
-    return weights / np.sum(weights)
+    return softmax(np.append(evidence / doubt + np.log(prior), np.log(PRIOR_NOTHING)))
 
 
 def _channel_gaps(problem: FittingProblem, residuals: Sequence[NDArray]) -> dict[str, float]:
@@ -258,11 +257,6 @@ def fit_processes(forms: Sequence[QuadraticForm], design: LocalisationDesign) ->
             own_fits += [fit_process(subspace, design, state) for state in design.units]
         own_fits.sort(key=lambda fit: -fit.log_evidence)
     return fits
-
-
-def average_log_evidence(fits: Sequence[ProcessFit]) -> float:
-    """Log evidence of an equation whose processes are equally likely before the data."""
-    return float(logsumexp([fit.log_evidence for fit in fits]) - np.log(len(fits)))
 
 
 def _covariance(form: QuadraticForm, kind: str) -> tuple[NDArray, float]:

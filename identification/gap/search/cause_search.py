@@ -164,19 +164,13 @@ def _names(chosen: Sequence[EvaluatedHypothesis]) -> str:
     return "; ".join(_name(each) for each in chosen)
 
 
-def search_causes(
-    pool: HypothesisPool,
-    base: Estimate,
-    signatures: Sequence[CauseSignature],
-    most_causes: int = MOST_CAUSES,
-) -> None:
+def search_causes(pool: HypothesisPool, base: Estimate, signatures: Sequence[CauseSignature]) -> None:
     """Refit the promising sets of causes into the pool.
 
     Args:
         pool: begins without causes.
         base: the recalibrated model.
         signatures: of all causes beside it.
-        most_causes: largest number of causes of a set.
     """
     _fit_beside(pool, base, signatures)
     if pool.small:
@@ -184,7 +178,7 @@ def search_causes(
         nominal = pool.problem.start(Hypothesis(causes=()), {})
         _fit_beside(pool, nominal, name="the nominal model")
     pool.finish(1)
-    for number in range(2, most_causes + 1):
+    for number in range(2, MOST_CAUSES + 1):
         if not pool.much_is_left():
             break
         helped = pool.least_cost(number - 1) <= 0.8 * pool.least_cost(number - 2)

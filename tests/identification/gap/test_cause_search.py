@@ -70,9 +70,3 @@ def test_a_catalogue_without_the_true_causes_names_none():
     found = rank_hypotheses(Drive(FAINT_AMONG_FOUR, names=("limit", "drag")))
     assert found.unknown > found.no_cause + sum(found.probabilities)
     assert max(found.inclusion.values()) < 0.2
-
-
-@pytest.mark.parametrize("most", [2])
-def test_no_set_is_larger_than_the_search_allows(most):
-    found = rank_hypotheses(Drive(THREE), most_causes=most)
-    assert max(len(each.labels) for each in found.hypotheses) == most
