@@ -24,9 +24,6 @@ from identification.confidence.covariance import (
     estimate_covariance,
 )
 
-GRADIENT_STEP, HESSIAN_STEP = 1e-5, 1e-3
-"""Changes of a scaled parameter for the gradient and the Hessian of the total error."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class ReportInterval:
@@ -160,8 +157,8 @@ def assess_confidence(calibration: Calibration, *, seed: int = 0) -> Confidence:
 
 def _minimum(problem: CalibrationProblem, z: NDArray) -> Minimum:
     error = problem.total_error().error
-    hessian = approx_hess(z, error, epsilon=np.full(len(z), HESSIAN_STEP))
+    hessian = approx_hess(z, error, epsilon=np.full(len(z), 1e-3))
     return Minimum(
-        gradient=np.atleast_1d(approx_fprime(z, error, epsilon=GRADIENT_STEP, centered=True)),
+        gradient=np.atleast_1d(approx_fprime(z, error, epsilon=1e-5, centered=True)),
         eigenvalues=np.linalg.eigvalsh(0.5 * (hessian + hessian.T)),
     )

@@ -10,12 +10,6 @@ from identification.replay.replay import Response, total_response_error
 from identification.report.page import Picture, Table
 from identification.report.signals import over_time
 
-COLUMNS = ["Case", *(f"eps_{output} [%]" for output in OUTPUTS), "eps_partial [%]"]
-"""Headings of an error table."""
-
-MEANING = "Mean distance of model and recording, in percent of the recording's mean."
-"""What an error is."""
-
 
 def error_table(responses: Sequence[Response], caption: str) -> Table:
     """Eqs 19 and 20 by recording, and eq. 21 over all."""
@@ -25,7 +19,11 @@ def error_table(responses: Sequence[Response], caption: str) -> Table:
     ]
     if len(responses) > 1:
         rows.append(["all (eps_total)", "", "", "", percent(total_response_error(responses))])
-    return Table(columns=COLUMNS, rows=rows, caption=f"{caption} {MEANING}")
+    return Table(
+        columns=["Case", *(f"eps_{output} [%]" for output in OUTPUTS), "eps_partial [%]"],
+        rows=rows,
+        caption=f"{caption} Mean distance of model and recording, in percent of the recording's mean.",
+    )
 
 
 def errors_as_json(responses: Sequence[Response]) -> Mapping[str, Any]:
