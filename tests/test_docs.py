@@ -218,7 +218,6 @@ def test_the_page_of_the_architecture_says_who_imports_whom():
             assert others <= allowed[own], f"{path} imports {others - allowed[own]}"
 
 
-@pytest.mark.slow
 def test_the_site_builds_without_a_warning(tmp_path):
     """A warning fails: a broken link, a page outside the navigation."""
     done = run(sys.executable, "-m", "mkdocs", "build", "--strict", "-d", tmp_path / "site", cwd=ROOT)

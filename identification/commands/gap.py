@@ -12,7 +12,6 @@ from epv_env.common.command_line import NextStep
 from epv_env.common.files import decoded
 from epv_env.common.options import Folder, PlantFile, Seed
 from identification.gap.diagnosis import Diagnosis
-from identification.gap.prepare.screened import sentences
 from identification.gap.report.gap_json import GAP as GAP_FILE
 from identification.gap.report.sentences import verdict_sentence
 from identification.valve_gap import diagnose, operation
@@ -52,8 +51,8 @@ def next_step(options: Options) -> NextStep:
 
 
 def say(found: Diagnosis, out: Path) -> None:
-    """Print what the verdict means, and which readings were left out."""
+    """Print what the verdict means, and what to record next."""
     content = decoded(out / GAP_FILE, remedy="diagnose again")
-    print(verdict_sentence(found, content["next_experiment"])[1])
-    for sentence in sentences(found.screened):
-        print(f"Left out: {sentence}.")
+    print(verdict_sentence(found)[1])
+    if content["next_experiment"]:
+        print(content["next_experiment"])

@@ -49,8 +49,8 @@ def results():
 
 
 def test_an_episode_depends_on_its_seed_alone():
-    many, _ = run_episodes(GOOD, seeds=list(range(20)), duration=1.0, options={"scenario": "steps"})
-    alone, _ = run_episodes(GOOD, seeds=[7], duration=1.0, options={"scenario": "steps"})
+    many = run_episodes(GOOD, seeds=list(range(20)), duration=1.0, options={"scenario": "steps"})
+    alone = run_episodes(GOOD, seeds=[7], duration=1.0, options={"scenario": "steps"})
     assert many.episode_return[7] == alone.episode_return[0]
 
 
@@ -75,7 +75,7 @@ def test_batches_hold_the_episodes_of_one_run(monkeypatch):
     assert [part.episodes for part in in_batches(whole)] == [2, 2, 1]
     (in_parts,) = run_batches([whole], {"good": GOOD}, what="test")
     np.testing.assert_array_equal(in_parts.excursion_bar, at_once.excursion_bar)
-    alone, _ = run_episodes(GOOD, seeds=[7], duration=0.8, options=options)
+    alone = run_episodes(GOOD, seeds=[7], duration=0.8, options=options)
     assert in_parts.excursion_bar[2] == alone.excursion_bar[0]
 
 
@@ -144,8 +144,7 @@ def finished(tmp_path_factory):
 def test_the_short_form_writes_everything(finished):
     out, _ = finished
     assert {path.name for path in out.iterdir()} == {
-        "comparison.csv", "differences.csv", "results.json", "comparison.png", "episode.png",
-        "finished.jsonl",
+        "comparison.csv", "differences.csv", "results.json", "comparison.png", "finished.jsonl",
     }  # fmt: skip
     content = json.loads((out / "results.json").read_text())
     assert [row["controller"] for row in content["rows"]] == ["hysteresis", "relay"]

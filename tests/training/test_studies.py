@@ -1,12 +1,14 @@
 """The studies of controllers in their short form: result files, pictures, and the page's tables."""
 
 from argparse import Namespace
+from dataclasses import replace
 
 import pandas as pd
 import pytest
 
 pytest.importorskip("stable_baselines3")
 
+from controllers.policy import load_policy
 from controllers.tuned import tuned
 from docs.studies.common import PAGE
 from docs.studies.comparison import study as comparison
@@ -14,8 +16,9 @@ from docs.studies.robustness import study as robustness
 from docs.studies.sim_to_real import study as sim_to_real
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.plantfile import Plant
-from epv_env.plant.region import Region
+from epv_env.plant.plantfile import Plant, save_plant
+from epv_env.plant.region import Alternative, Mixture, Region
+from identification.bench.session import run_programme
 
 pytestmark = [pytest.mark.training, pytest.mark.slow]
 
@@ -37,7 +40,18 @@ def test_the_sweep(tmp_path, monkeypatch):
     assert (tmp_path / "robustness-conditions.png").exists()
 
 
-def test_the_loop(tmp_path):
+def test_the_loop(tmp_path, monkeypatch):
+    """With a diagnosis that is right, and the package's policy for each training."""
+
+    def diagnosed(campaign, out, *, without):
+        true = sim_to_real.true_valve(sim_to_real.CASES[0])
+        answer = Alternative(name="piston_friction", probability=1.0, region=true.region)
+        save_plant(replace(true, diagnosis=Mixture(alternatives=(answer,))), out / "plant.json")
+        (out / "gap.json").write_text('{"verdict": "known"}')
+
+    monkeypatch.setattr(sim_to_real, "diagnose_campaign", diagnosed)
+    monkeypatch.setattr(sim_to_real, "trained", lambda *plants, **options: load_policy())
+    monkeypatch.setattr(sim_to_real, "run_programme", lambda p, each, **_: run_programme(p, each))
     assert sim_to_real.main(["--quick", "--out", str(tmp_path)]) == 0
     text = (tmp_path / PAGE).read_text(encoding="utf-8")
     assert "| piston friction | known: piston friction 1.00 | " in text

@@ -9,6 +9,7 @@ runs/sim_to_real and not repeated.
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -210,6 +211,7 @@ def is_certain(plant: Plant) -> bool:
     return len(possible) == 1 and dict(possible[0].region.centre) == dict(plant.parameters)
 
 
+@cache
 def whole_catalogue() -> Mixture:
     """Plain domain randomisation: one or two effects of any kind, and ±10 % of the calibrated four."""
     rng, nominal = np.random.default_rng(SEED), Parameters.calibrated()
@@ -228,7 +230,7 @@ def measured(policy: Controller, case: Case, true: Plant, options: Any) -> dict[
         policy = UnevenLag(policy, case.unevenness)
     seeds = list(range(EVALUATION_SEED, EVALUATION_SEED + options.episodes))
     own = {"plant": true, "scenario": SCENARIO}
-    metrics, _ = run_episodes(policy, seeds=seeds, duration=options.duration, options=own)
+    metrics = run_episodes(policy, seeds=seeds, duration=options.duration, options=own)
     return {
         "stayed": metrics.stayed.astype(float).tolist(),
         "rms_mbar": np.round(1e3 * metrics.rms_bar, 1).tolist(),

@@ -84,7 +84,6 @@ def test_the_reading_on_which_the_controller_opens_does_not_count(healthy):
         assert np.all(run.trusted[0] == (~doubted if run.name in steady else False))
 
 
-@pytest.mark.slow
 def test_cause_and_onset_are_found(tmp_path):
     eddy = {"eddy_current": {"G_eddy": 0.004}}
     folder = tmp_path / "log"
