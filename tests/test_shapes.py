@@ -42,11 +42,3 @@ def test_array_functions_say_shapes():
     without = [name for name, text in functions.items() if not SHAPE.search(text)]
     assert len(functions) > 150
     assert len(without) <= WITHOUT_SHAPE * len(functions), without
-
-
-def test_a_missing_shape_is_found():
-    source = "class A:\n    def b(self, x: NDArray):\n        '''Values over time.'''\n"
-    ((name, text),) = array_functions(source)
-    assert name == "A.b"
-    assert not SHAPE.search(text)
-    assert SHAPE.search("Values over time, (runs, samples) [Pa].")

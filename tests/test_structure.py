@@ -1,10 +1,7 @@
-"""The folders of the project depend on each other in one direction, without a loop."""
+"""The diagnosis of a grey-box plant knows no valve."""
 
 import ast
-from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
-
-import pytest
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("epv_env", "identification", "controllers", "training")
@@ -39,36 +36,6 @@ def imports(path: Path, known: dict[str, Path]) -> set[str]:
             submodules = {f"{node.module}.{alias.name}" for alias in node.names} & set(known)
             names |= submodules or {node.module}
     return names & set(known)
-
-
-def folder_graph(root: Path) -> dict[str, set[str]]:
-    """Folders that each folder imports from, as dotted names.
-
-    A file beside folders of its own folder counts as a folder.
-    """
-    known = modules(root)
-    parents = {name: ".".join(path.relative_to(root).parent.parts) for name, path in known.items()}
-    with_folders = {parent.rpartition(".")[0] for parent in parents.values()}
-    folder = {name: name if parent in with_folders else parent for name, parent in parents.items()}
-    graph: dict[str, set[str]] = {}
-    for name, path in known.items():
-        targets = {folder[target] for target in imports(path, known)}
-        graph.setdefault(folder[name], set()).update(targets - {folder[name]})
-    return graph
-
-
-def test_no_folder_imports_itself_by_a_detour():
-    graph = folder_graph(ROOT)
-    assert len(graph) > 15
-    tuple(TopologicalSorter(graph).static_order())
-
-
-def test_a_loop_of_folders_is_found(tmp_path):
-    (tmp_path / "epv_env/plant").mkdir(parents=True)
-    (tmp_path / "epv_env/task.py").write_text("from epv_env.plant.flow import KAPPA\n")
-    (tmp_path / "epv_env/plant/flow.py").write_text("def late():\n    from epv_env import task\n")
-    with pytest.raises(CycleError):
-        tuple(TopologicalSorter(folder_graph(tmp_path)).static_order())
 
 
 def test_the_diagnosis_imports_nothing_of_the_valve():

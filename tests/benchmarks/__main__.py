@@ -15,7 +15,7 @@ from statistics import median
 import numba
 
 from epv_env.plant.valves import available_cores
-from tests.benchmarks.interfaces import INTERFACES, one_valve, rate, startup_seconds, used_by
+from tests.benchmarks.interfaces import INTERFACES, rate, used_by
 
 PROCESSES = {
     "bench: the report's campaign": ("bench", "--out", "bench"),
@@ -49,23 +49,9 @@ def environments(repetitions: int, share: float) -> None:
         row(name, "1/s", rates, ratio=median(rates) / median(found[kernel]) if kernel else None)
 
 
-def beside_scipy(repetitions: int, duration: float) -> None:
-    """One valve under random switching by this plant and by LSODA with located events."""
-    print("\none valve, simulated seconds per CPU second; ratio: to the first row")
-    first = None
-    for name, run in one_valve(duration).items():
-        found = [run() for _ in range(repetitions)]
-        first = first or median(speed for speed, _ in found)
-        speeds = [speed for speed, _ in found]
-        note = f"p2 wrong by {found[0][1]:.2g} Pa"
-        row(name, "s per s", speeds, ratio=median(speeds) / first, note=note)
-
-
-def processes(repetitions: int) -> None:
-    """Time and memory of fresh processes: start-up, and commands of the identification."""
+def processes() -> None:
+    """Time and memory of commands of the identification in fresh processes."""
     print("\nfresh processes, caches warm")
-    for name, seconds in startup_seconds(repetitions).items():
-        row(name, "s", seconds)
     with tempfile.TemporaryDirectory() as folder:
         for name, arguments in PROCESSES.items():
             seconds, peak = used_by(arguments, Path(folder))
@@ -80,8 +66,7 @@ def main() -> None:
     print(f"{platform.machine()}, {available_cores()} cores, numba {numba.__version__}")
     repetitions, share = (3, 0.1) if options.quick else (9, 1.0)
     environments(repetitions, share)
-    beside_scipy(repetitions, duration=2.0 * share)
-    processes(repetitions)
+    processes()
 
 
 if __name__ == "__main__":

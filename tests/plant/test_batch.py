@@ -60,12 +60,6 @@ def test_trajectory_is_the_same_alone_and_in_any_batch(case, size):
     np.testing.assert_array_equal(run(valves, u, np.arange(size)), alone[:, :, :size])
 
 
-def test_trajectory_is_the_same_at_any_place(case):
-    valves, u, alone = case
-    order = np.random.default_rng(4).permutation(N)
-    np.testing.assert_array_equal(run(valves, u, order), alone[:, :, order])
-
-
 def test_trajectory_is_the_same_with_any_number_of_threads(case):
     valves, u, _ = case
     many = np.tile(np.arange(N), 4)

@@ -110,16 +110,6 @@ def test_laws_act_as_in_the_kernel(unit):
     assert felt[3] > 1e-3
 
 
-def test_finer_steps_change_little(unit):
-    """The error of the default step, on the calibrated plant."""
-    fine, default = (Instance(unit).start({"longest_step": step}) for step in (20e-6, 250e-6))
-    for k in range(100):
-        for instance in (fine, default):
-            assert instance.step(PERIOD, U=0.0 if k % 5 < 2 else 24.0, sigma_S=0.01) == OK
-        found, wanted = default.get(*OUTPUTS), fine.get(*OUTPUTS)
-        np.testing.assert_allclose(found[:3], wanted[:3], rtol=0, atol=TENTH_OF_A_MILLIBAR)
-
-
 def test_all_states_come_out(unit):
     p = Parameters.calibrated()
     instance, valves = started(unit, p), kernel_of([p])
@@ -129,16 +119,6 @@ def test_all_states_come_out(unit):
     for name, value in valves.state._asdict().items():
         (found,) = instance.get(f"state.{name}")
         np.testing.assert_allclose(found, value[0], rtol=1e-3, atol=1e-9, err_msg=name)
-
-
-def test_the_length_of_steps_matters_little(unit):
-    long, short = (started(unit, Parameters.calibrated()) for _ in range(2))
-    for k in range(10):
-        U = 24.0 * (k % 2)
-        assert long.step(10e-3, U=U) == OK
-        for step in (0.3e-3, 4.2e-3, 1e-3, 4.5e-3):
-            assert short.step(step, U=U) == OK
-    np.testing.assert_allclose(long.get(*OUTPUTS[:3]), short.get(*OUTPUTS[:3]), atol=TENTH_OF_A_MILLIBAR)
 
 
 @pytest.mark.parametrize("name", list(CATALOGUE))
@@ -265,10 +245,6 @@ def test_a_step_past_the_stop_time_is_refused(unit):
     assert instance.step(1e-3, U=24.0) == instance.step(1e-3) == OK
     assert instance.step(1e-3) == ERROR
     assert instance.said[-1].startswith("the step ends at 0.003 s, after the stop time 0.002 s")
-
-
-def test_another_units_token_is_refused(unit):
-    assert not Instance(unit, token="{another}").handle
 
 
 def test_an_emptied_circuit_ends_the_run_in_a_sentence(unit):
