@@ -9,7 +9,6 @@ from pathlib import Path
 from epv_env.common.command_line import NextStep, add_out, add_plant, add_seed
 from epv_env.common.files import decoded
 from identification.gap.diagnosis import Diagnosis
-from identification.gap.prepare.screened import sentences
 from identification.gap.report.gap_json import GAP as GAP_FILE
 from identification.gap.report.sentences import verdict_sentence
 from identification.valve_gap import diagnose, operation
@@ -49,8 +48,8 @@ def next_step(options: argparse.Namespace) -> NextStep:
 
 
 def say(found: Diagnosis, out: Path) -> None:
-    """Print what the verdict means, and which readings were left out."""
+    """Print what the verdict means, and what to record next."""
     content = decoded(out / GAP_FILE, remedy="diagnose again")
-    print(verdict_sentence(found, content["next_experiment"])[1])
-    for sentence in sentences(found.screened):
-        print(f"Left out: {sentence}.")
+    print(verdict_sentence(found)[1])
+    if content["next_experiment"]:
+        print(content["next_experiment"])

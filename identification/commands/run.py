@@ -75,15 +75,15 @@ def next_step(options: argparse.Namespace) -> NextStep:
 
 def _run_stage(options: argparse.Namespace, identification: Identification) -> None:
     stage = next(stage for stage in STAGES if stage.name == options.stage)
-    result = stage.compute(identification)
+    sections, content = stage.compute(identification)
     write_results(
         options.out,
         stage.name,
+        content,
         title=f"{stage.name}: {options.campaign}",
-        sections=result.sections,
-        content=result.content,
+        sections=sections,
         facts=campaign_facts(identification.campaign),
         next_step=next_step(options),
     )
-    print(as_text(result.sections))
+    print(as_text(sections))
     print(f"\nwritten: {options.out / stage.name}.html and .json")

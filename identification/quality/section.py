@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from identification.quality.assessment import QualityAssessment, sensor_offsets, white_noise_band
 from identification.quality.verdicts import channel_verdict, check_results, worst_status
 from identification.recordings.recording import CHANNELS, UNITS
-from identification.report.page import Picture, Section, Table, Text
+from identification.report.page import Picture, Section, Table
+from identification.report.signals import over_time
 
 UNIT_COLUMNS = [f"{name} [{UNITS[name][0]}]" for name in CHANNELS]
 """Headings of a table with a column per channel."""
@@ -38,7 +39,7 @@ def quality_section(quality: QualityAssessment) -> Section:
         title=f"Data quality: {quality.name} ({quality.samples} samples)",
         verdicts=[channel_verdict(quality, name) for name in CHANNELS],
         blocks=[
-            Text(text=_state(quality)),
+            _state(quality),
             _trends(quality),
             _statistics(quality),
             _correlations(quality),
@@ -49,16 +50,17 @@ def quality_section(quality: QualityAssessment) -> Section:
 
 def signals(quality: QualityAssessment) -> Figure:
     """Readings over time, with the line of the trend (Figure 4)."""
-    figure = Figure(figsize=(9, 7.5), layout="constrained")
-    rows = figure.subplots(len(quality.channels), 1, sharex=True)
     time = np.arange(quality.samples) * quality.period
-    for axes, channel in zip(rows, quality.channels.values(), strict=True):
-        axes.plot(time, channel.readings, color="tab:blue", linewidth=0.3)
-        axes.plot(time[[0, -1]], channel.trend.at(time[[0, -1]]), color="tab:red", linewidth=1.0)
-        axes.set_ylabel(f"{channel.name} [{channel.unit}]")
-    rows[-1].set_xlabel("time [s]")
-    figure.align_ylabels()
-    return figure
+    return over_time(
+        time,
+        {
+            f"{channel.name} [{channel.unit}]": {
+                "readings": channel.readings,
+                "trend": channel.trend.at(time),
+            }
+            for channel in quality.channels.values()
+        },
+    )
 
 
 def _state(quality: QualityAssessment) -> str:

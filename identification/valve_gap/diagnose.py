@@ -35,8 +35,6 @@ from identification.valve_gap.next_recording import CANDIDATES, NextRecording, n
 from identification.valve_gap.next_recording import FILE_NAME as PROGRAMME
 from identification.valve_gap.valve import Valve
 
-GUIDE = "docs/explanation/diagnosis.md"
-
 REPORT, PLANT, JOURNAL = "report.html", "plant.json", "fits.jsonl"
 
 More = Callable[[Diagnosis, Plant], Sequence[Section]]
@@ -131,7 +129,6 @@ def write_report(
             more(found, corrected) if more else (),
         ),
         facts=facts,
-        footer=f"Written by epv-valve {version('epv-valve')}. Figures and fields: {GUIDE}.",
         next_step=step,
     )
 

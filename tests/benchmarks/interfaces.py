@@ -135,6 +135,54 @@ def rate(name: str, run: Run) -> float:
     return periods / (time.process_time() - start)
 
 
+def one_valve(duration: float) -> dict[str, Callable[[], tuple[float, float]]]:
+    """Simulators of one valve, by name: each gives seconds per CPU second and p2's error [Pa]."""
+    from tests.reference.hybrid_automaton import piecewise_schedule
+    from tests.reference.reference_simulation import simulate_reference
+    from tests.reference.schedule import plant_states
+
+    p = Parameters.calibrated()
+    times = np.arange(round(duration / PERIOD) + 1) * PERIOD
+    on = np.cumsum(np.random.default_rng(0).random(len(times) - 1) < SWITCHING) % 2 == 0
+    schedule = piecewise_schedule(
+        p, energised(p, p1=P1, p2=P2, U=U_ON), times, U=U_ON * on, sigma_S=np.full(len(on), 2e-3)
+    )
+    end = [schedule.duration]
+    true = simulate_reference(schedule, end, rtol=1e-11).state.p2[0]
+
+    def timed(simulated: Callable[[], float]) -> tuple[float, float]:
+        start = time.process_time()
+        p2 = simulated()
+        return duration / (time.process_time() - start), abs(p2 - true)
+
+    return {
+        "this plant, a batch of one": lambda: timed(lambda: plant_states(schedule, end).p2[0]),
+        "SciPy LSODA with events, compiled right-hand side, 1e-6": lambda: timed(
+            lambda: simulate_reference(schedule, end, rtol=1e-6).state.p2[0]
+        ),
+    }
+
+
+STARTUP = {
+    "import epv_env": "import epv_env",
+    "import, one valve, first 5 ms simulated": (
+        "from epv_env.plant.valves import Valves; Valves(1).advance(5e-3)"
+    ),
+}
+"""What is timed in a new interpreter, without the interpreter's own start."""
+
+
+def startup_seconds(repetitions: int) -> dict[str, list[float]]:
+    """Times of STARTUP [s]; one process before them fills the caches and is not counted."""
+    found = {}
+    for name, code in STARTUP.items():
+        timed = f"import time; start = time.perf_counter(); {code}; print(time.perf_counter() - start)"
+        command = [sys.executable, "-c", timed]
+        printed = [subprocess.check_output(command, text=True) for _ in range(repetitions + 1)]
+        found[name] = [float(text) for text in printed[1:]]
+    return found
+
+
 LAUNCHER = """
 import json, resource, subprocess, sys, time
 start = time.perf_counter()

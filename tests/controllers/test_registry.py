@@ -13,7 +13,6 @@ pytest.importorskip("control")
 import controllers
 import epv_env  # noqa: F401 - registers the environments
 from controllers.knowledge import WithRules
-from controllers.p3_check import P3Check
 from controllers.policy import Policy, load_policy
 from controllers.registration import Choice, RegistrationError
 from controllers.registry import REGISTRY, TUNED_KINDS, registration
@@ -31,7 +30,6 @@ from epv_env.plant.plantfile import Plant
 UNREGISTERED = {
     Policy: "training writes it into folders, each of which names itself",
     WithRules: "worn around a controller, which has a record of its own",
-    P3Check: "worn around a controller, which has a record of its own",
 }
 """Controllers that the registry does not list, each with the reason."""
 

@@ -5,15 +5,13 @@ import json
 import pytest
 
 from docs.studies.reproduction.errata import (
-    DOUBT,
     ERRATUM,
     HOLDS,
-    interval_position,
-    measurement_points,
+    figure_checks,
     recomputed_total,
+    signal_to_noise,
 )
-from docs.studies.reproduction.noise_errata import signal_to_noise
-from docs.studies.reproduction.study import FOLDER, figure_checks, page_parts
+from docs.studies.reproduction.study import FOLDER, page_parts
 from identification.recordings.recording import CHANNELS
 
 STATUS = {check.where: check.status for check in figure_checks()}
@@ -40,14 +38,3 @@ def test_only_p2_s_signal_to_noise_ratio_follows_from_its_standard_deviation():
 def test_seven_of_ten_pairs_are_correlated():
     (found,) = [check for check in figure_checks() if "non-correlated" in check.where]
     assert found.recomputed.startswith("7 of 10 pairs beyond ±0.0196")
-
-
-def test_eq_23_has_negative_degrees_of_freedom():
-    assert measurement_points() == 3 * (3 * 1301 + 2101)
-    assert STATUS["Eq. 23, degrees of freedom of F(k, v - k, p)"] == ERRATUM
-
-
-def test_estimates_lie_at_the_upper_ends_of_their_intervals():
-    positions = [interval_position(symbol) for symbol in ("alphaMV", "alphaPV", "RML", "R")]
-    assert positions == pytest.approx([0.935, 0.881, 0.993, 0.999], abs=1e-3)
-    assert [status for where, status in STATUS.items() if "95 % interval" in where] == [DOUBT] * 4

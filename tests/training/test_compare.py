@@ -49,8 +49,8 @@ def results():
 
 
 def test_an_episode_depends_on_its_seed_alone():
-    many, _ = run_episodes(GOOD, seeds=list(range(20)), duration=1.0, options={"scenario": "steps"})
-    alone, _ = run_episodes(GOOD, seeds=[7], duration=1.0, options={"scenario": "steps"})
+    many = run_episodes(GOOD, seeds=list(range(20)), duration=1.0, options={"scenario": "steps"})
+    alone = run_episodes(GOOD, seeds=[7], duration=1.0, options={"scenario": "steps"})
     assert many.episode_return[7] == alone.episode_return[0]
 
 
@@ -76,7 +76,7 @@ def test_batches_hold_the_episodes_of_one_run(monkeypatch):
     found = run_batches([*parts, whole], {"good": GOOD}, what="test")
     joined = np.concatenate([found[part.name].excursion_bar for part in parts])
     np.testing.assert_array_equal(joined, found["w"].excursion_bar)
-    alone, _ = run_episodes(GOOD, seeds=[7], duration=0.8, options=options)
+    alone = run_episodes(GOOD, seeds=[7], duration=0.8, options=options)
     assert joined[2] == alone.excursion_bar[0]
 
 
@@ -139,8 +139,7 @@ def finished(tmp_path_factory):
 def test_the_short_form_writes_everything(finished):
     out, _ = finished
     assert {path.name for path in out.iterdir()} == {
-        "comparison.csv", "differences.csv", "results.json", "comparison.png", "episode.png",
-        "finished.jsonl",
+        "comparison.csv", "differences.csv", "results.json", "comparison.png", "finished.jsonl",
     }  # fmt: skip
     content = json.loads((out / "results.json").read_text())
     assert [row["controller"] for row in content["rows"]] == ["hysteresis", "relay"]

@@ -46,7 +46,7 @@ def test_a_module_of_the_working_folder_controls_valves(folder):
     (folder / "my_relay.py").write_text(RELAY)
     controllers, digests = named_controllers(["my_relay:Relay", "pulse, informed"], PLANT)
     assert list(controllers) == list(digests) == ["relay", "pulse, informed"]
-    metrics, _ = run_episodes(controllers["relay"], seeds=[0, 1], duration=1.0, options={})
+    metrics = run_episodes(controllers["relay"], seeds=[0, 1], duration=1.0, options={})
     assert metrics.switchings_per_s.min() > 0
 
 

@@ -16,12 +16,12 @@ import pandas as pd
 from controllers.tuned import load_tunings
 from epv_env.common.command_line import COUNT, NextStep, add_episodes, add_out, beside, plant_option
 from epv_env.common.files import Journal, write_json, write_text
-from epv_env.plant.plantfile import Plant, load_plant, plant_subject
+from epv_env.plant.plantfile import load_plant, plant_subject
 from epv_env.plant.valves import available_cores
 from epv_env.vector_entry import check_device
-from training.evaluation.named import HELP, is_own, named_controllers
-from training.evaluation.plots import episode_overlay, save_figure
-from training.evaluation.rollout import decision_times, run_episodes
+from training.evaluation.named import HELP, named_controllers
+from training.evaluation.plots import save_figure
+from training.evaluation.rollout import decision_times
 from training.evaluation.scenarios import RANDOM, scenario_group
 from training.evaluation.seeds import EVALUATION_SEED, check_first_seed
 from training.studies.comparison import (
@@ -37,8 +37,6 @@ from training.studies.comparison import (
 QUICK: dict[str, Any] = {"episodes": 8, "duration": 0.8, "decisions": 20}
 LISTED = 100
 """Episodes that leave the band are named by their seeds up to this many."""
-OVERLAID = 3
-"""Most controllers in the picture of one episode: more lines could not be told apart."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -73,8 +71,8 @@ def run(options: argparse.Namespace) -> None:
         raise ValueError(f"--against {against!r} takes no part: give one of {', '.join(controllers)}")
     scenarios = {k: v for name in options.scenarios for k, v in scenario_group(name).items()}
     first_seed = EVALUATION_SEED + options.seed
-    shown = {name: repr(scenario) for name, scenario in scenarios.items()}
-    about = {**plant_subject(plant), "duration": options.duration, "scenarios": shown}
+    described = {name: repr(scenario) for name, scenario in scenarios.items()}
+    about = {**plant_subject(plant), "duration": options.duration, "scenarios": described}
     results = compare(
         controllers, plant=plant, scenarios=scenarios, episodes=options.episodes,
         duration=options.duration, plant_sets=options.plants, first_seed=first_seed,
@@ -89,7 +87,8 @@ def run(options: argparse.Namespace) -> None:
     paired = differences(results, against)
     settings = {name: getattr(options, name) for name in ("episodes", "duration", "seed", "plants")}
     write_results(options, table, paired, results, first_seed, {**settings, "controllers": digests})
-    draw(options, table, controllers, plant, first_seed)
+    shown = table[(table["plants"] == options.plants[-1]) & (table["scenario"] == next(iter(scenarios)))]
+    save_figure(figure(shown), options.out / "comparison.png")
     for _, cell in table.groupby(["plants", "scenario"], sort=False):
         print(f"{as_text(cell)}\n")
     print(f"results in {options.out}")
@@ -126,26 +125,3 @@ def write_results(
             "differences": paired.to_dict("records"),
         },
     )
-
-
-def draw(
-    options: argparse.Namespace,
-    table: pd.DataFrame,
-    controllers: dict[str, Any],
-    plant: Plant,
-    first_seed: int,
-) -> None:
-    """Draw comparison.png, of the last plant set's first scenario, and episode.png, one episode."""
-    name = table["scenario"].iloc[0]
-    cell: Any = table[(table["plants"] == options.plants[-1]) & (table["scenario"] == name)]
-    save_figure(figure(cell), options.out / "comparison.png")
-    traces = {}
-    own = next(filter(is_own, controllers), next(iter(controllers)))
-    for label in list(dict.fromkeys([own, *controllers]))[:OVERLAID]:
-        _, trace = run_episodes(
-            controllers[label], seeds=[first_seed], duration=options.duration,
-            options={"plant": plant, "scenario": "mixed"}, trace_of=0,
-        )  # fmt: skip
-        assert trace is not None  # since one was asked for
-        traces[label] = trace
-    episode_overlay(traces, own, options.out / "episode.png")

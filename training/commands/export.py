@@ -111,7 +111,7 @@ def prepared(folder: Path, plant: Plant) -> Export:
     """The controller in a folder that training wrote. plant: nominal, from which the learner starts."""
     content = read_contract(folder)
     return Export(
-        controller=load_policy(folder, plant),
+        policy=load_policy(folder, plant),
         period=content.observation.control_period_s,
         weights_sha256=hashlib.sha256((folder / WEIGHTS_FILE).read_bytes()).hexdigest(),
         provenance=content.provenance,
@@ -132,7 +132,7 @@ def verified(
     Raises:
         ExportError: the code does not compile, or does not decide as the controller.
     """
-    states = verdict.visit(export.controller)
+    states = verdict.visit(export.policy)
     inputs = verdict.inputs_along(export, states)
     files = sources(export)
     with tempfile.TemporaryDirectory() as temporary:
@@ -141,7 +141,7 @@ def verified(
             (folder / name).write_text(text, encoding="utf-8")
         code = compiled.library(compiler, folder)
         agreement = verdict.agreement(export, code, states, inputs)
-        loop = verdict.closed_loop(export.controller, code, episodes=episodes, duration=duration)
+        loop = verdict.closed_loop(export.policy, code, episodes=episodes, duration=duration)
         report = {
             "agreement": agreement,
             "closed_loop": {"episodes": episodes, "duration_s": duration, "controllers": loop},

@@ -96,7 +96,7 @@ def _mean_return(kind: str, values: dict[str, Any], **scenarios: Any) -> float:
         controller = registration(kind).built(values, Plant.calibrated())
     except ValueError as contradiction:
         raise optuna.TrialPruned(str(contradiction)) from None
-    metrics, _ = run_episodes(controller, **scenarios)
+    metrics = run_episodes(controller, **scenarios)
     return float(metrics.episode_return.mean())
 
 

@@ -114,7 +114,7 @@ def _run(batch: Batch, controller: Controller) -> tuple[str, dict[str, list[Any]
     if batch.device != "cpu":  # each episode begins with its own seed
         device = {"device": batch.device, "to_host": True, "starts": batch.episodes}
     with threadpool_limits(1):  # the figures must not depend on the threads of the linear algebra
-        metrics, _ = run_episodes(
+        metrics = run_episodes(
             replace(own, **known) if known else own,
             seeds=seeds,
             duration=batch.duration,

@@ -79,11 +79,6 @@ def _named(source: str, plant: Plant) -> tuple[str, Controller, str]:
     return label or policy.name, policy, policy_digest(path)
 
 
-def is_own(label: str) -> bool:
-    """Whether a controller is the user's: a policy or a class, and no kind of this package."""
-    return label.removesuffix(WITH_RULES) not in {entry.kind for entry in REGISTRY}
-
-
 def is_import(source: str) -> bool:
     """Whether a controller's name has the form MODULE:CLASS."""
     module, colon, name = source.partition(":")

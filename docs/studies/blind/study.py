@@ -52,13 +52,9 @@ TRIALS, QUICK = 300, 2
 QUICK_SUITE = tuple(p for p in SUITE if p.name in ("test1", "validation", "low_supply"))
 """Recordings of a campaign under --quick."""
 CAMPAIGN, DIAGNOSIS, LABEL, COMMITMENTS = "campaign", "diagnosis", "sealed.json", "commitments.sha256"
-SALT_BYTES = 16
-"""Length of the salt in a label [bytes]: its hash tells nothing of the content."""
 EXPLAINABLE = 1.02
 """Noise-free gap after recalibration below which nothing is left to explain [-]; `no_gap` is then the
 correct verdict."""
-ATTEMPTS = 5
-"""Draws of a trial with the same causes before the study gives up [-]."""
 AT_LEAST = {
     "Truth in the ambiguity set": {"usual": 0.96, "strong": 0.92},
     "First cause right (a tie counts as wrong)": {"usual": 0.92, "strong": 0.85},
@@ -125,7 +121,7 @@ def generate_trial(
 
     Raises RuntimeError where no solver follows any of the valves drawn with these causes.
     """
-    for attempt in range(ATTEMPTS):
+    for attempt in range(5):
         trial = draw_trial(seed, number, kind, causes, forms, attempt)
         try:
             truths = true_recordings(trial, seed, suite)
@@ -166,7 +162,8 @@ def truth_label(trial: Trial, gap: float, alone: Mapping[str, float], *, seed: i
         "parameters": dict(trial.parameters),
         "gap": {"explainable": gap},
         "gap_alone": dict(alone),
-        "salt": np.random.default_rng([seed, trial.number, 0, 5]).bytes(SALT_BYTES).hex(),
+        # So that the hash tells nothing of the content.
+        "salt": np.random.default_rng([seed, trial.number, 0, 5]).bytes(16).hex(),
     }
 
 

@@ -229,7 +229,7 @@ def measured(policy: Controller, case: Case, true: Plant, options: Any) -> dict[
         policy = UnevenLag(policy, case.unevenness)
     seeds = list(range(EVALUATION_SEED, EVALUATION_SEED + options.episodes))
     own = {"plant": true, "scenario": SCENARIO}
-    metrics, _ = run_episodes(policy, seeds=seeds, duration=options.duration, options=own)
+    metrics = run_episodes(policy, seeds=seeds, duration=options.duration, options=own)
     return {
         "stayed": metrics.stayed.astype(float).tolist(),
         "rms_mbar": np.round(1e3 * metrics.rms_bar, 1).tolist(),

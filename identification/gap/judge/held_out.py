@@ -15,7 +15,7 @@ from identification.block_bootstrap import Interval, block_starts
 from identification.gap.fit.fitting_problem import Estimate, FittingProblem
 from identification.gap.fit.gaps import FLOOR, Gap, GapDraws, block_samples
 from identification.gap.fit.prediction import Prediction, percentage_errors, predict
-from identification.gap.judge.black_box import Learner, predict_residuals, ridge_on_random_features
+from identification.gap.judge.black_box import predict_residuals
 from identification.gap.plant import GreyBox
 from identification.gap.prepare.time_scale import time_scale
 
@@ -26,9 +26,8 @@ PERMUTATIONS, SIGNIFICANCE = 1999, 0.01
 """Random orders of blocks behind a p-value, which is then at least 0.0005, and the p-value below which a
 prediction is not chance."""
 
-LEAST_GAP_CLOSED, LEAST_SHARE_CLOSED = 0.02, 0.05
-"""Gap that a prediction must close to matter [noise deviations], and share of the explainable gap [1];
-the larger of both holds."""
+LEAST_GAP_CLOSED = 0.02
+"""Gap that a prediction must close to matter [noise deviations]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,7 +70,6 @@ class DiscrepancyReduction:
 def measure_discrepancy_reduction(
     problem: FittingProblem,
     estimates: Mapping[str, Estimate],
-    learner: Learner = ridge_on_random_features,
     seed: int = 0,
 ) -> DiscrepancyReduction:
     """Judge fitted models on the held-out runs.
@@ -79,7 +77,6 @@ def measure_discrepancy_reduction(
     Args:
         problem: the plant with its readings.
         estimates: 'nominal', 'recalibrated' and the causes by label, the best cause first.
-        learner: the black box.
         seed: of the bootstrap, the random features and the permutations.
 
     Raises:
@@ -94,7 +91,7 @@ def measure_discrepancy_reduction(
     scale = time_scale(plant)
     boxes = {}
     for label in {RECALIBRATED, best}:
-        box = predict_residuals(plant, predictions[label], learner, seed, scale)
+        box = predict_residuals(plant, predictions[label], seed, scale)
         before, after = _held_out_squares(plant, predictions[label].residuals, box)
         # A box that makes the held-out residuals larger predicts nothing.
         boxes[label] = box if after.sum() < before.sum() else [np.zeros_like(block) for block in box]
@@ -126,7 +123,7 @@ def measure_discrepancy_reduction(
 def predictable_shares(problem: FittingProblem, estimate: Estimate) -> list[float]:
     """Share of a model's held-out squares that a black box foresees, by channel [1]."""
     plant, model = problem.plant, predict(problem, estimate)
-    box = predict_residuals(plant, model, ridge_on_random_features, 0, time_scale(plant))
+    box = predict_residuals(plant, model, 0, time_scale(plant))
     before, after = _held_out_squares(plant, model.residuals, box)
     return list(1.0 - after / np.maximum(before, np.finfo(float).tiny))
 
@@ -179,7 +176,7 @@ def _unexplained(draws: GapDraws, best: str, significance: float) -> Unexplained
     recalibrated = draws.gap(RECALIBRATED).overall
     left, boxed = draws.overall(best)[0], draws.overall(_boxed(best))[0]
     explainable = max(recalibrated.value - FLOOR, 0.0)
-    matters = max(LEAST_GAP_CLOSED, LEAST_SHARE_CLOSED * explainable)
+    matters = max(LEAST_GAP_CLOSED, 0.05 * explainable)
     return Unexplained(
         fraction=float(np.clip((left - FLOOR) / explainable, 0.0, 1.0))
         if min(recalibrated.low, recalibrated.value) > FLOOR

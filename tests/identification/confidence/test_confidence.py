@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from identification.confidence.confidence import assess_confidence
 from identification.confidence.section import confidence_section
@@ -53,11 +52,3 @@ def test_beside_it_the_gradient_is_not_zero():
     assert np.max(np.abs(away.minimum.gradient)) > 0.1
     assert away.disagreement > away.chi_square
     assert verdicts(away) == ["good", "doubt", "doubt"]
-
-
-def test_profiles_are_least_at_the_estimate():
-    minimum = twin_confidence().minimum
-    assert minimum.profiles.shape == (4, len(minimum.offsets))
-    for profile in minimum.profiles:
-        assert minimum.offsets[np.argmin(profile)] == pytest.approx(0.0, abs=1e-12)
-        assert np.min(profile) == pytest.approx(twin_confidence().report.error, rel=1e-9)

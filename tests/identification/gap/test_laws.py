@@ -106,7 +106,7 @@ def test_the_law_is_said_drawn_and_written():
     growth = law.growth(components)
     words = in_words(best.estimate.laws)
     assert words.startswith(f"the strength of drag follows s: {growth[0]:+.0%} at its least value")
-    assert f"The law differs from the one assumed: {words}." in verdict_sentence(found, "")[1]
+    assert f"The law differs from the one assumed: {words}." in verdict_sentence(found)[1]
     ends = {"effect": "drag", "argument": "s", "low": law.low, "high": law.high}
     assert as_json(found)["causes"][0]["laws"] == [ends | {"growth": growth.tolist()}]
     assert len(drawn_laws(found, best)) == 1

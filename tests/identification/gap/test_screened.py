@@ -195,4 +195,4 @@ def test_what_was_screened_is_said():
         own["kind"] == "wild" and 100 in own["samples"] for own in screened if own["channel"] == "h"
     )
     assert any("h of test_1 at sample" in warning for warning in of_spoilt().warnings)
-    assert verdict_sentence(of_spoilt(), "")[0] == "doubt"
+    assert verdict_sentence(of_spoilt())[0] == "doubt"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from docs.studies.reproduction.noise_errata import (
+from docs.studies.reproduction.errata import (
     SAMPLES,
     STATISTICS,
     TREND_OFFSETS,
