@@ -1,5 +1,6 @@
 """Checks of the noise statistics: Tables 1 to 4 and sections 3 and 4."""
 
+from dataclasses import fields
 from itertools import combinations
 
 import numpy as np
@@ -8,7 +9,6 @@ from scipy import stats
 from docs.studies.reproduction.errata import CONFIDENCE, DOUBT, ERRATUM, HOLDS, FigureCheck
 from epv_env.plant.channels import SENSORS
 from identification.quality.channel import DescriptiveStatistics
-from identification.quality.section import STATISTIC_NAMES
 from identification.recordings.recording import UNITS
 from identification.report_2003 import correlation_matrix
 
@@ -30,7 +30,9 @@ _TABLE_3 = {
 }
 
 STATISTICS = {
-    name: DescriptiveStatistics(**dict(zip(STATISTIC_NAMES, column, strict=True)))
+    name: DescriptiveStatistics(
+        **{field.name: value for field, value in zip(fields(DescriptiveStatistics), column, strict=True)}
+    )
     for name, column in _TABLE_3.items()
 }
 """Table 3 by channel."""
