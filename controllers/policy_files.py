@@ -3,28 +3,33 @@
 Loading a policy runs no code from its files: the weights are arrays, the contract is checked data.
 """
 
-from dataclasses import dataclass
+import json
 from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import msgspec
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from controllers.knowledge import RULES
+from controllers.network import Network
 from controllers.valve_learner import LEARNT
-from epv_env import observation
 from epv_env.common.files import JSONFileError, digest, read_bytes, read_json, write_bytes, write_json
+from epv_env.observation import LAYOUT, contract
 
 FORMAT = "epv-policy/2"
 WEIGHTS_FILE = "policy.safetensors"
 CONTRACT_FILE = "policy.json"
+MOST_LAYERS = 64
+"""More than any policy has; a number of layers beyond is a damaged file."""
 ADVICE = "advice.weight"
 """Name of the array of the advice's weights."""
+
+ControlPeriod = Annotated[float, msgspec.Meta(ge=0.5e-3, le=0.1)]
+"""Time between two decisions, as an environment allows it [s]."""
 
 
 class PolicyError(ValueError):
@@ -34,8 +39,8 @@ class PolicyError(ValueError):
 class Observation(msgspec.Struct, kw_only=True):
     """What the policy reads, as `epv_env.observation.contract` writes it."""
 
-    control_period_s: Annotated[float, msgspec.Meta(ge=0.5e-3, le=0.1)]
-    """Time between two observations, as an environment allows it [s]."""
+    control_period_s: ControlPeriod
+    """Time between two observations [s]."""
     format: str = ""
     """Version of the layout's form."""
     entries: list[Any] = []
@@ -47,8 +52,8 @@ class PolicyContract(msgspec.Struct, kw_only=True):
 
     format: str
     """Version of this form."""
-    layers: Annotated[int, msgspec.Meta(ge=1, le=64)]
-    """Number of dense layers; more than any policy has is a damaged file."""
+    layers: Annotated[int, msgspec.Meta(ge=1, le=MOST_LAYERS)]
+    """Number of dense layers."""
     observation: Observation
     """The readings: the first inputs."""
     learnt: list[Any] = []
@@ -65,67 +70,6 @@ class PolicyContract(msgspec.Struct, kw_only=True):
     """What the network's outputs mean, for readers."""
     provenance: dict[str, Any] = {}
     """Of the training, free-form."""
-
-
-@numba.njit(cache=True, nogil=True)
-def _sums(signal: NDArray, weight: NDArray, bias: NDArray) -> NDArray:
-    """bias + signal @ weight, added in the order of the inputs; weight: (inputs, outputs).
-
-    The products of a linear algebra library are summed in blocks that depend on the number of rows: the
-    same episode could end differently in a larger batch, or on another machine.
-    """
-    inputs, outputs = weight.shape
-    out = np.empty((len(signal), outputs), signal.dtype)
-    for row in range(len(signal)):
-        for j in range(outputs):
-            out[row, j] = bias[j]
-        for i in range(inputs % 4):  # the inner loop runs over outputs: a CPU can vectorise it
-            for j in range(outputs):
-                out[row, j] += signal[row, i] * weight[i, j]
-        for i in range(inputs % 4, inputs, 4):  # four inputs at a time: fewer reads of the output row
-            a, b, c, d = signal[row, i], signal[row, i + 1], signal[row, i + 2], signal[row, i + 3]
-            for j in range(outputs):
-                total = out[row, j] + a * weight[i, j]
-                total = total + b * weight[i + 1, j]
-                total = total + c * weight[i + 2, j]
-                out[row, j] = total + d * weight[i + 3, j]
-    return out
-
-
-def dense_layer(signal: NDArray, weight: NDArray, bias: NDArray) -> NDArray:
-    """signal @ weight.T + bias.
-
-    Args:
-        signal: (n, inputs).
-        weight: (outputs, inputs), of the signal's precision.
-        bias: (outputs,), of the signal's precision.
-
-    Returns:
-        (n, outputs), of the same precision, in which the sums are also taken.
-    """
-    return _sums(np.ascontiguousarray(signal), np.ascontiguousarray(weight.T), bias)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Network:
-    """A multilayer perceptron with tanh layers, and the weight of the advice beside it."""
-
-    layers: list[tuple[NDArray, NDArray]]
-    """Weight (outputs, inputs) and bias (outputs,) of each layer; the last gives two logits."""
-    advice_weight: NDArray
-    """Weights (2,) of the advice, the last of the inputs (-1: off, 1: on), in the logits."""
-
-    def __repr__(self) -> str:
-        widths = [self.layers[0][0].shape[1], *(len(bias) for _, bias in self.layers)]
-        return f"Network({' x '.join(map(str, widths))}, {self.advice_weight.dtype})"
-
-    def logits(self, inputs: NDArray) -> NDArray:
-        """Logits (n, 2) of coil off and coil on; inputs: readings and learnt quantities (n, all)."""
-        signal = inputs.astype(self.layers[0][0].dtype)
-        advice = signal[:, -1:]
-        for weight, bias in self.layers[:-1]:
-            signal = np.tanh(dense_layer(signal, weight, bias))
-        return dense_layer(signal, *self.layers[-1]) + advice * self.advice_weight
 
 
 def learnt_contract() -> list[dict[str, Any]]:
@@ -165,7 +109,7 @@ def write_policy(
         "activation": "tanh",
         "action": "argmax of the logits plus the advice times its weights: 0 = coil off, 1 = coil on",
         "rules": list(RULES),
-        "observation": observation.contract(control_period),
+        "observation": contract(control_period),
         "learnt": learnt_contract(),
         "provenance": provenance,
     }
@@ -182,7 +126,7 @@ def read_policy(folder: str | PathLike[str]) -> tuple[PolicyContract, Network]:
     if not isinstance(folder, (str, PathLike)):
         raise PolicyError(f"a policy is {folder!r}: give the path of a folder that training wrote")
     folder = Path(folder)
-    contract = read_contract(folder)
+    found = read_contract(folder)
     try:
         arrays = load(read_bytes(folder / WEIGHTS_FILE))
     # KeyError: a type of numbers that NumPy does not know
@@ -191,9 +135,9 @@ def read_policy(folder: str | PathLike[str]) -> tuple[PolicyContract, Network]:
             f"cannot read a policy from {folder}: {error}; give a folder that training wrote, with "
             f"{CONTRACT_FILE} and {WEIGHTS_FILE}"
         ) from None
-    _check_arrays(arrays, contract, folder)
-    layers = [(arrays[f"{i}.weight"], arrays[f"{i}.bias"]) for i in range(contract.layers)]
-    return contract, Network(layers=layers, advice_weight=arrays[ADVICE])
+    _check_arrays(arrays, found, folder)
+    layers = [(arrays[f"{i}.weight"], arrays[f"{i}.bias"]) for i in range(found.layers)]
+    return found, Network(layers=layers, advice_weight=arrays[ADVICE])
 
 
 def read_contract(folder: Path) -> PolicyContract:
@@ -202,26 +146,26 @@ def read_contract(folder: Path) -> PolicyContract:
         f"train it anew, or give a folder that training wrote, with {CONTRACT_FILE} and {WEIGHTS_FILE}"
     )
     try:
-        read = read_json(folder / CONTRACT_FILE, PolicyContract, version=FORMAT, remedy=remedy)
+        found = read_json(folder / CONTRACT_FILE, PolicyContract, version=FORMAT, remedy=remedy)
     except JSONFileError as error:
         raise PolicyError(f"cannot read a policy from {folder}: {error}") from None
-    expected = [observation.contract(read.observation.control_period_s), learnt_contract(), list(RULES)]
-    inputs = [msgspec.to_builtins(read.observation), read.learnt, read.rules]
-    if inputs != expected:
+    expected = contract(found.observation.control_period_s), learnt_contract(), list(RULES)
+    own = msgspec.to_builtins(found.observation), found.learnt, found.rules
+    if list(own) != json.loads(json.dumps(expected)):
         raise PolicyError(
             f"policy {folder} was trained on other observations, learnt quantities or rules than this "
             "version's: train it anew, or use the version that wrote it"
         )
-    return read
+    return found
 
 
-def _check_arrays(arrays: dict[str, NDArray], contract: PolicyContract, folder: Path) -> None:
+def _check_arrays(arrays: dict[str, NDArray], found: PolicyContract, folder: Path) -> None:
     """Raises PolicyError unless the arrays have the contract's shapes, one precision, finite values."""
     shapes: dict[str, tuple[int, ...]] = {ADVICE: (2,)}
-    inputs = len(observation.LAYOUT) + len(LEARNT)
-    for i in range(contract.layers):
+    inputs = len(LAYOUT) + len(LEARNT)
+    for i in range(found.layers):
         bias = arrays.get(f"{i}.bias", np.zeros(0))  # the width of a hidden layer is the policy's own
-        outputs = 2 if i == contract.layers - 1 else len(bias) if bias.ndim == 1 else 1
+        outputs = 2 if i == found.layers - 1 else len(bias) if bias.ndim == 1 else 1
         shapes |= {f"{i}.weight": (outputs, inputs), f"{i}.bias": (outputs,)}
         inputs = outputs
     for name, shape in shapes.items():

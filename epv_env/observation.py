@@ -74,21 +74,15 @@ def scaled(value, centre, scale, limit):
 
 
 def encode(values: dict[str, NDArray]) -> NDArray:
-    """Entries (n, names) float32 [-], in the order of their values by name, each (n,) [bar, A, s]."""
-    rows = [INDEX[name] for name in values]
-    columns = np.stack(list(values.values()), axis=-1)
-    return scaled(columns, CENTRE[rows], SCALE[rows], LIMIT[rows]).astype(np.float32)
+    """Observations (n, entries) float32 [-] from physical values (n,) by entry name [bar, A, s]."""
+    columns = np.stack([values[quantity.name] for quantity in LAYOUT], axis=-1)
+    return scaled(columns, CENTRE, SCALE, LIMIT).astype(np.float32)
 
 
 def decode(observations: NDArray, name: str) -> NDArray:
     """One entry of observations (n, entries) [-] in its unit, (n,) [bar, A, s]; KeyError if unknown."""
     row = INDEX[name]
     return observations[..., row] * LAYOUT[row].scale + LAYOUT[row].centre
-
-
-def in_units(observations: NDArray) -> NDArray:
-    """All entries of observations (..., entries) [-] in their units, in double precision [bar, A, s]."""
-    return np.asarray(observations, dtype=np.float64) * SCALE + CENTRE
 
 
 def contract(control_period: float) -> dict[str, Any]:

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from controllers.hysteresis import Hysteresis
-from controllers.policy_files import Network, write_policy
-from controllers.sensor_check import READINGS
+from controllers.network import Network
+from controllers.policy_files import write_policy
 from epv_env.common.commands import main_of
 from epv_env.observation import LAYOUT
 from training.deploy.agreement import STATES_EPISODES as EPISODES
 from training.deploy.agreement import STATES_PERIODS as PERIODS
 from training.deploy.c_code import INPUTS, MEMORY
-from training.deploy.compiled import READINGS_TYPE, library, logits_of
+from training.deploy.compiled import READINGS, READINGS_TYPE, library, logits_of
 
 GOOD = Hysteresis(open_below=-0.1, shut_above=0.0, shut_lookahead=0.03, name="good")
 QUICK = ("--episodes", "4", "--duration", "1")
@@ -96,9 +96,8 @@ def replay(folder: Path, network: Network) -> Replay:
     for k, now in enumerate(readings(folder).ravel()):
         if k % PERIODS == 0:
             memory[:] = np.zeros(1, dtype=MEMORY)
-        before, reading, value = memory.copy(), np.array([now]), np.zeros(len(LAYOUT), dtype=np.float32)
-        code.epv_policy_observe(_at(before), _at(reading), _at(value))
-        code.epv_policy_learn(_at(before), _at(value), _at(made[k]))
+        before, reading = memory.copy(), np.array([now])
+        code.epv_policy_observe(_at(before), _at(reading), _at(made[k]))
         decided.append(code.epv_policy_step(_at(memory), _at(reading)))
     layers = [(weight.astype(float), bias.astype(float)) for weight, bias in network.layers]
     exact = replace(network, layers=layers).logits(rows)

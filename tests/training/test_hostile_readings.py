@@ -24,7 +24,7 @@ pytestmark = [
     pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler (cc) here"),
 ]
 
-READINGS = 1_000_000
+READINGS = 200_000
 
 DRIVE = """
 #include <math.h>
@@ -82,7 +82,7 @@ int main(void)
             if (!isfinite(learnt[i]))
                 return 3;
         decisions[coil]++;
-        if (m.failed && left == 0 && draw(200) == 0)
+        if (m.senses.failed && left == 0 && draw(200) == 0)
             m = fresh, again++;
     }
     printf("%lu %lu %lu %lu %lu\\n", decisions[0], decisions[1], failures, blind, again);
@@ -100,7 +100,7 @@ def folder(tmp_path_factory):
     return made
 
 
-def test_a_million_hostile_readings_stay_within_arrays_and_numbers(folder):
+def test_hostile_readings_stay_within_arrays_and_numbers(folder):
     (folder / "drive.c").write_text(DRIVE)
     defined = (f"-DHELD={HELD}", f"-DREADINGS={READINGS}u")
     program = build(
