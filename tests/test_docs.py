@@ -142,15 +142,6 @@ def test_make_targets_shown_exist():
             assert target in targets or target.startswith("study-"), f"{page}: make {target}"
 
 
-def test_a_wrong_option_on_a_page_is_found():
-    assert list(shell_commands("A=1 epv run x --out y # why\ncd z && make q")) == [
-        ["epv", "run", "x", "--out", "y"], ["cd", "z"], ["make", "q"],
-    ]  # fmt: skip
-    module, options = command_of(["epv", "run", "--no-such-option"]) or ("", [])
-    with pytest.raises(SystemExit):
-        parse(importlib.import_module(module), module, options)
-
-
 def anchors(page: str) -> set[str]:
     """The names under which the headings of a page can be linked to."""
     headings = re.findall(r"^#+ +(.*)$", FENCE.sub("", text(page)), re.M)

@@ -15,7 +15,7 @@ from epv_env.common.files import Journal
 from epv_env.plant.plantfile import Plant, save_plant
 from training.evaluation import batches
 from training.evaluation.batches import Batch, in_batches, run_batches
-from training.evaluation.rollout import decision_times, run_episodes
+from training.evaluation.rollout import run_episodes
 from training.evaluation.scenarios import EVALUATION, EvaluationScenario
 from training.studies.comparison import PLANTS, as_text, compare, differences, rows
 
@@ -119,12 +119,6 @@ def test_a_scenario_may_have_its_own_length():
     ]  # fmt: skip
     long, short = (each["calibrated", "s", "good"].episode_return for each in found)
     assert np.all(long < short)
-
-
-def test_what_a_decision_computes_is_what_is_timed():
-    times = decision_times(GOOD, 40)
-    assert len(times) == 40
-    assert 0 < np.median(times) < 1e-3
 
 
 def command(*arguments):

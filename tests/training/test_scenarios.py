@@ -1,7 +1,5 @@
 """The evaluation's scenarios are what their names say, and can be controlled."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -9,7 +7,7 @@ pytest.importorskip("pandas")
 
 from controllers.hysteresis import Hysteresis
 from epv_env.common.units import BAR
-from epv_env.plant.consumption import SCENARIOS, Profiles, Scenario, draw_profile
+from epv_env.plant.consumption import Profiles, draw_profile
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import REFERENCE_PERIOD
@@ -20,8 +18,6 @@ from training.evaluation.scenarios import (
     BEYOND,
     EVALUATION,
     LEVELS,
-    NAMED,
-    RANDOM,
     REFILL_TIME,
     TUNING_REGION,
     VENTED_DROP_BAR,
@@ -49,11 +45,6 @@ def flow(name, seed=0):
     return np.array([1e3 * profiles.mean_flow(np.array([t]), 0.005)[0] for t in TIME])
 
 
-def test_there_are_a_dozen_and_a_random_one():
-    assert len(NAMED) >= 12
-    assert set(EVALUATION) == {RANDOM, *NAMED}
-
-
 def test_a_scenario_has_the_same_text_in_every_process():
     """It belongs to the subject of a journal: with an address, a comparison would begin anew."""
     for scenario in {**EVALUATION, **BEYOND, **worn_scenarios()}.values():
@@ -64,19 +55,6 @@ def test_the_environment_accepts_every_scenario():
     for name, scenario in {**EVALUATION, **BEYOND, **worn_scenarios()}.items():
         options = {"control_period": REFERENCE_PERIOD, "parameters": TUNING_REGION, **scenario.options}
         assert make_settings(Plant.calibrated(), **options).control_period > 0, name
-
-
-def test_without_the_compressor_the_reservoir_only_sags():
-    supply = settings("compressor off").supply
-    assert supply.delivery == 0.0
-    assert supply.volume < settings(RANDOM).supply.volume
-
-
-def test_a_scenario_of_ones_own_is_drawn_like_a_named_one():
-    own = replace(SCENARIOS["steps"], meaning="mine")
-    assert isinstance(own, Scenario)
-    ours, named = (draw_profile(each, np.random.default_rng(3)) for each in (own, "steps"))
-    np.testing.assert_array_equal(ours.applications, named.applications)
 
 
 class Shut(Hysteresis):
