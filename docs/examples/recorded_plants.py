@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.common.command_line import writable_folder
+from epv_env.common.options import writable_folder
 from identification.gap.diagnosis import Diagnosis, diagnose
 from identification.gap.fit.evidence import predict
 from identification.gap.ode_plant import OdePlant
@@ -85,7 +85,7 @@ def command(title: str, plant_of: Callable[[Path], OdePlant]) -> int:
     write_results(diagnosis, chosen.out)
     heading = f"Gap between model and recordings: {title}"
     write_page(chosen.out / "report.html", title=heading, sections=sections(diagnosis))
-    print(verdict_sentence(diagnosis, "")[1])
+    print(verdict_sentence(diagnosis)[1])
     print(held_out_errors(diagnosis))
     return 0
 

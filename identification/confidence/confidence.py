@@ -79,10 +79,6 @@ class Minimum:
     """By the scaled parameters (k,); a fraction per fraction."""
     eigenvalues: NDArray
     """Of the Hessian (k,); all positive at a minimum."""
-    offsets: NDArray
-    """Relative changes of one parameter at a time (points,)."""
-    profiles: NDArray
-    """Total error with one parameter changed and the others held (k, points)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,11 +157,8 @@ def assess_confidence(calibration: Calibration, *, seed: int = 0) -> Confidence:
 
 def _minimum(problem: CalibrationProblem, z: NDArray) -> Minimum:
     error = problem.total_error().error
-    offsets = np.linspace(-0.01, 0.01, 41)
     hessian = approx_hess(z, error, epsilon=np.full(len(z), 1e-3))
     return Minimum(
         gradient=np.atleast_1d(approx_fprime(z, error, epsilon=1e-5, centered=True)),
         eigenvalues=np.linalg.eigvalsh(0.5 * (hessian + hessian.T)),
-        offsets=offsets,
-        profiles=np.array([[error(z * (1 + d * axis)) for d in offsets] for axis in np.eye(len(z))]),
     )

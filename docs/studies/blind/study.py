@@ -37,8 +37,9 @@ from docs.studies.blind.truth import (
     trial_plan,
 )
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
-from epv_env.common.command_line import COUNT, add_seed, fail_clearly
+from epv_env.common.command_line import fail_clearly
 from epv_env.common.files import write_json, write_text
+from epv_env.common.options import COUNT, SEED
 from epv_env.common.results_folder import progress
 from epv_env.plant.valves import available_cores
 from identification.bench.programmes import Programme
@@ -245,7 +246,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study; returns the exit status."""
     parser = study_parser(__doc__ or "", FOLDER)
     parser.add_argument("--trials", type=COUNT, default=TRIALS, help="number of campaigns")
-    add_seed(parser, help="of truths and noise")
+    parser.add_argument("--seed", type=SEED, default=0, help="of truths and noise")
     ranges = [f"{name} {100 * a:.0f} to {100 * b:.0f} %%" for name, (a, b) in FORM_DEVIATIONS.items()]
     parser.add_argument(
         "--forms",
