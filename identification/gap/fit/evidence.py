@@ -57,7 +57,7 @@ class EvaluatedHypothesis:
     @property
     def titles(self) -> tuple[str, ...]:
         """The causes for people."""
-        return tuple(cause.title for cause in self.estimate.hypothesis.causes)
+        return self.estimate.hypothesis.titles
 
     @property
     def label(self) -> str:
