@@ -1,6 +1,6 @@
 """Printed figures of the report checked against its others: noise (Tables 1 to 4), errors (11, 13)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import combinations
 
 import numpy as np
@@ -8,7 +8,6 @@ from scipy import stats
 
 from epv_env.plant.channels import SENSORS
 from identification.quality.channel import DescriptiveStatistics
-from identification.quality.section import STATISTIC_NAMES
 from identification.recordings.recording import UNITS
 from identification.report_2003 import correlation_matrix, printed_errors, printed_total, total_error
 
@@ -33,7 +32,9 @@ _TABLE_3 = {
 }
 
 STATISTICS = {
-    name: DescriptiveStatistics(**dict(zip(STATISTIC_NAMES, column, strict=True)))
+    name: DescriptiveStatistics(
+        **{field.name: value for field, value in zip(fields(DescriptiveStatistics), column, strict=True)}
+    )
     for name, column in _TABLE_3.items()
 }
 """Table 3 by channel."""
