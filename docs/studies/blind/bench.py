@@ -102,7 +102,10 @@ def _start_temperature(trial: Trial, index: int, seed: int) -> float:
 def _delayed(
     schedule: Schedule, delay: float, form_deviation: float, rng: np.random.Generator
 ) -> Schedule:
-    """The schedule with every switching later by a delay of its own. delay: their mean [s]."""
+    """The schedule with every switching later by a delay of its own, by a controller's cycle.
+
+    delay: their mean [s].
+    """
     inner = schedule.borders[1:-1]
     if delay == 0 or len(inner) == 0:
         return schedule
@@ -128,7 +131,7 @@ def _simulated(schedule: Schedule, time: NDArray, rates: RightHandSide) -> State
 
 
 def _sensed(state: State, p: Parameters, form_deviation: float) -> dict[str, NDArray]:
-    """Sensor inputs by channel [SI], (samples,): errors grow with the pressure or the current read."""
+    """Sensor inputs by channel [SI], (samples,): errors grow with the reading (curved sensors)."""
     p1, p2, p3 = (1.0 + form_deviation * (own / 8e5 - 1.0) for own in (state.p1, state.p2, state.p3))
     sensors = {
         "g_p1": p["g_p1"] * p1,

@@ -1,8 +1,11 @@
 """The bench's own forms of the effects, unlike those that the diagnosis fits.
 
-If the data were made with the fitted forms, the check would be too easy. Two things differ, of which
-docs/studies/blind/forms.md has the tables: each size depends on the state, and two effects may follow
-another law. Without the effect both are the plant.
+If the data were made with the fitted forms, the check would be too easy. Two things differ: each size
+depends on the state by a share d of itself, as in a real valve (comments say why), and two effects may
+follow another law. The supply's drop is then that of the flow at once, which agrees at a steady flow;
+saturation follows Langevin's curve (1905), the anhysteretic one of Jiles and Atherton (1986), which
+agrees at low and at high currents. Without the effect both are the plant. Errors of sensors and the
+command's delay deviate in bench.py.
 """
 
 import math
@@ -28,13 +31,13 @@ from epv_env.plant.primitives import FLAGS, inlined, replacing, source_digest
 from tests.reference.hybrid_automaton import RightHandSide
 
 FILM_THICKNESS = 20e-6
-"""Thickness of the air film that an armature squeezes out as it lands [m]."""
+"""Thickness of the air film that an armature squeezes out as it lands [m]: slow landings bounce less."""
 
 FILM_SPEED = 0.1
 """Speed that the film takes from a bouncing armature on each way through it, at d eMV = 1 [m/s]."""
 
 IRON_TIME_CONSTANT = 1.0
-"""Time constant with which the winding's heat flows into the iron, at d = 1 [s]."""
+"""Time constant with which the winding's heat flows into the iron, at d = 1 [s]: it is not alone."""
 
 INSTANT_DROP, LANGEVIN = "supply_restriction", "magnetic_saturation"
 
@@ -76,14 +79,14 @@ def _solenoid_sizes(q, u, c, e, d):
     steady = max(u.U - e.U_drop, OFF_VOLTAGE) / heated(c.R, q.coil_heat)
     return _with_electric(
         e,
-        e.eddy * (1.0 + d * closed),
-        e.U_clamp * (1.0 + d * (abs(q.I) / 0.3 - 1.0)),
-        e.U_drop * (1.0 + d * (abs(q.I) / steady - 1.0)),
-        e.saturation * saturated,
+        e.eddy * (1.0 + d * closed),  # a closed iron path links the shorted turn better
+        e.U_clamp * (1.0 + d * (abs(q.I) / 0.3 - 1.0)),  # a diode's or Zener's slope resistance
+        e.U_drop * (1.0 + d * (abs(q.I) / steady - 1.0)),  # part of the drop is resistive
+        e.saturation * saturated,  # iron stays linear longer, then bends sharper
         e.force_saturation * saturated,
-        e.I_rem * (1.0 + d * closed),
-        e.friction_MV * (1.0 + d * (abs(q.vMV) / 0.3 - 1.0)),
-        e.inlet_area * (1.0 - d * closed),
+        e.I_rem * (1.0 + d * closed),  # an open gap demagnetises
+        e.friction_MV * (1.0 + d * (abs(q.vMV) / 0.3 - 1.0)),  # a viscous share
+        e.inlet_area * (1.0 - d * closed),  # an open seat's jet sucks
         e.exhaust_area * (1.0 + d * closed),
     )
 
@@ -99,16 +102,16 @@ def _gas_sizes(q, c, e, d):
     supply = max((through + inlet) / 0.02, 1e-3)
     return _with_gas(
         e,
-        e.leak_inlet * (1.0 + d * (abs(q.p1 - q.p3) / (6.0 * BAR) - 1.0)),
+        e.leak_inlet * (1.0 + d * (abs(q.p1 - q.p3) / (6.0 * BAR) - 1.0)),  # pressure lifts the seat
         e.leak_exhaust * (1.0 + d * (abs(q.p3 - c.p_env) / (6.0 * BAR) - 1.0)),
-        e.exchange_3 * (1.0 + d * (2.0 * control / (control + 3e-4) - 1.0)),
-        e.swept * (1.0 + d * opened),
-        e.drop_deficit * (1.0 + d * opened),
+        e.exchange_3 * (1.0 + d * (2.0 * control / (control + 3e-4) - 1.0)),  # moving gas exchanges more
+        e.swept * (1.0 + d * opened),  # a piston with a shoulder
+        e.drop_deficit * (1.0 + d * opened),  # the ratio falls as the seat opens
         e.leak_PV * (1.0 + d * (abs(q.p1 - q.p2) / (4.0 * BAR) - 1.0)),
         e.leak_circuit * (1.0 + d * (abs(q.p2 - c.p_env) / (6.0 * BAR) - 1.0)),
         e.exchange_2 * (1.0 + d * (2.0 * through / (through + 0.02) - 1.0)),
-        e.pipe_area * (1.0 + d * (1.0 - 2.0 * pipe / (pipe + 0.2 * BAR))),
-        e.supply_loss * supply ** (-2.0 * d),
+        e.pipe_area * (1.0 + d * (1.0 - 2.0 * pipe / (pipe + 0.2 * BAR))),  # wall friction, too
+        e.supply_loss * supply ** (-2.0 * d),  # smooth pipes: exponent below 2 (Blasius)
     )
 
 
@@ -120,11 +123,11 @@ def _piston_sizes(q, c, e, d):
     return _with_piston(
         e,
         e.discharge_slope * (1.0 + d * (3.0 * (1.0 - min(q.p2 / q.p1, 1.0)) - 1.0)),
-        e.friction_PV * (1.0 + d * (lip + abs(q.vPV) / 0.2 - 0.5)),
-        e.flow_force * (1.0 - d * opened),
-        e.a1 * (1.0 + d * opened),
+        e.friction_PV * (1.0 + d * (lip + abs(q.vPV) / 0.2 - 0.5)),  # the lip's pressure, viscosity
+        e.flow_force * (1.0 - d * opened),  # the jet's angle grows with the stroke
+        e.a1 * (1.0 + d * opened),  # the cone widens
         e.a2 * (1.0 + d * opened),
-        e.lag_2_rate * (1.0 - d * q.lag_2 / (abs(q.lag_2) + 5e3)),
+        e.lag_2_rate * (1.0 - d * q.lag_2 / (abs(q.lag_2) + 5e3)),  # empties slower than it fills
         e.lag_3_rate * (1.0 - d * q.lag_3 / (abs(q.lag_3) + 5e3)),
     )
 
