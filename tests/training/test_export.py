@@ -318,7 +318,7 @@ def test_a_failed_export_leaves_the_earlier_one(fitted, copy, capsys):
 
 
 def test_the_task_of_the_guide_compiles(any_copy):
-    page = (ROOT / "docs/how-to/deploy-a-policy.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/reference/exported-policy.md").read_text(encoding="utf-8")
     task = re.findall(r"^```c\n(.*?)^```", page, re.S | re.M)[0]
     reads = [f"float {name}(void);\n" for name in re.findall(r"(\w+)\(\)[,;]?", task)]
     (any_copy / "task.c").write_text(
