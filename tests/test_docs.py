@@ -240,7 +240,7 @@ def _shown(cell: notebook.Cell) -> list[tuple[str, list[str]]]:
 
 def test_how_good_it_is_stands_behind_each_row():
     """Every figure of an answer is one of the page that the row links to."""
-    page = "docs/results/how-good-is-it.md"
+    page = "docs/studies/README.md"
     rows = re.findall(r"^\| .*\? \| (.*) \| .*\]\(([^)#]*)[^)]*\) \|$", text(page), re.M)
     assert 4 < len(rows) <= 6
     for answer, link in rows:
