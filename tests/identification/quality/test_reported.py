@@ -1,4 +1,4 @@
-"""What docs/explanation/data-quality.md says about the report's section 4, from printed tables."""
+"""What docs/explanation/identification.md says about the report's section 4, from printed tables."""
 
 import numpy as np
 import pytest
