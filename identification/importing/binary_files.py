@@ -9,15 +9,13 @@ import numpy as np
 import scipy.io
 from numpy.typing import NDArray
 
+from identification.importing import times
 from identification.importing.mapping_file import meaning
 from identification.importing.source_file import (
-    STAMP,
     SourceChannel,
     check_number,
     limited,
     needed_package,
-    points_in_time,
-    seconds,
     unread,
 )
 from identification.importing.units import parsed_unit
@@ -85,7 +83,7 @@ def _tdms_channel(group: str, channel: Any) -> SourceChannel:
     """A waveform with its times and their begin, or a channel whose times are another channel."""
     if channel.dtype.kind not in "iufM":
         return unread(channel.name, group)
-    values, begin = seconds(np.asarray(channel[:]))
+    values, begin = times.seconds(np.asarray(channel[:]))
     time = _waveform_times(channel.properties, len(values))
     given = channel.properties
     unit = next((str(given[name]) for name in UNIT_PROPERTIES if name in given), "")
@@ -124,7 +122,7 @@ def _parquet_channels(path: Path, table: Any) -> Iterator[SourceChannel]:
         else:
             unit = (field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace")
             timed = values.dtype.kind in "Mm"
-            numbers, begin = seconds(values)
+            numbers, begin = times.seconds(values)
             yield SourceChannel(
                 name=field.name, unit="s" if timed else unit, values=numbers, begin=begin
             )
@@ -136,7 +134,8 @@ def _numbers_or_times(place: str, column: Any) -> NDArray:
     first = next((value for value in values if value is not None), None)
     if isinstance(first, Decimal):
         return values.astype(float)
-    return points_in_time(place, values) if isinstance(first, str) and STAMP.match(first) else values
+    timed = isinstance(first, str) and times.is_point(first)
+    return times.points_in_time(place, values) if timed else values
 
 
 HDF5_SIGNATURE = b"\x89HDF"
@@ -180,9 +179,11 @@ def _matlab_channels(path: str, content: Mapping[str, Any]) -> Iterator[SourceCh
         for channel in _matlab_field(path, f"{path}.{name}" if path else name, value, units.get(name))
     ]
     yield from found
-    times = _times_of_interval(content)
-    if times is not None and not any(meaning(channel) == "time" for channel in found):
-        yield from _matlab_columns(f"{path}.time" if path else "time", times, "s", path)
+    steady = _times_of_interval(content)
+    if steady is not None and not any(
+        meaning(channel.name, channel.unit) == "time" for channel in found
+    ):
+        yield from _matlab_columns(f"{path}.time" if path else "time", steady, "s", path)
 
 
 def _matlab_field(path: str, full: str, value: Any, unit: Any) -> Iterator[SourceChannel]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import firwin, kaiserord, oaconvolve
 
-from identification.importing.channels import MappedChannel
+from identification.importing.channels import COMMANDS, MappedChannel
 from identification.importing.source_file import ImportingError
 from identification.recordings.columns import LEAST_RATE, last_digit, roundest
 
@@ -36,8 +36,6 @@ SAME_TIME = 1e-2
 which the steepest pressure changes by less than its noise."""
 LEAST_STEP = 0.1
 """Least change over the range of a channel that goes in steps; what is measured changes by less."""
-COMMANDS = ("U", "sigma_S")
-"""Channels that may be logged on change only."""
 GREATEST_RATE = 20_000.0
 """Greatest rate of a campaign [1/s]; a faster bench is brought down to it. Valve and sensors are
 slower, and longer files only cost time."""
@@ -120,8 +118,9 @@ def _check_times(place: str, channel: MappedChannel) -> None:
     steps = np.diff(channel.time)
     backward = np.flatnonzero(steps <= 0)
     if backward.size:
-        at, equal = channel.time[backward[0]], steps[backward[0]] == 0
-        remedy = "print it with more digits" if equal else "sort the samples"
+        at, falls = channel.time[backward[0]], steps[backward[0]] < 0
+        remedy = "cut the recording there, or sort its samples if they are out of order"
+        remedy = remedy if falls else "print it with more digits"
         raise ImportingError(f"{place}: time does not increase after {at:.6g} s: {remedy}")
     if _is_logged_on_change(channel):
         return

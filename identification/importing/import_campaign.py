@@ -185,6 +185,7 @@ def _file_provenance(file: ImportedFile) -> dict[str, Any]:
             "to_SI": channel.conversion,
             "resampled": channel.name in file.gridded.resampled,
             "held": channel.name in file.gridded.held,
+            "filled": channel.filled,
         }
         for channel in file.channels
     }
@@ -243,7 +244,9 @@ def source_table(source: SourceFile) -> str:
         span = f"{np.min(values):.5g} to {np.max(values):.5g}" if len(values) else "empty"
         timed = channel.time is not None and len(channel.time) > 1 and np.ptp(channel.time) > 0
         rate = f"{usual_rate(channel.time):.6g} Hz" if timed and channel.time is not None else ""
-        rows.append((source.label(channel), channel.unit, span, rate, meaning(channel) or ""))
+        rows.append(
+            (source.label(channel), channel.unit, span, rate, meaning(channel.name, channel.unit) or "")
+        )
     heads = ("channel", "unit", "range", "rate", "proposed")
     return f"{source.path} ({source.format})\n{_table(heads, rows)}"
 
@@ -264,7 +267,8 @@ def _file_text(file: ImportedFile) -> str:
             f"{channel.unit.text} {channel.reference}".strip(),
             channel.conversion,
             f"{usual_rate(channel.time):.6g} Hz",
-            treated.get(channel.name, "as recorded"),
+            treated.get(channel.name, "as recorded")
+            + (f", {channel.filled} missing filled" if channel.filled else ""),
         )
         for channel in file.channels
     ]
