@@ -175,7 +175,7 @@ def _matlab_channels(path: str, content: Mapping[str, Any]) -> Iterator[SourceCh
     found = [
         channel
         for name, value in content.items()
-        if not name.startswith("__")
+        if not name.startswith(("__", "#"))  # HDF5 keeps MATLAB's objects behind a #
         for channel in _matlab_field(path, f"{path}.{name}" if path else name, value, units.get(name))
     ]
     yield from found
