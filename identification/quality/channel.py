@@ -21,27 +21,6 @@ SIGNIFICANCE = 1e-4
 
 
 @dataclass(frozen=True, kw_only=True)
-class Trend:
-    """The straight line through a signal by linear least squares (Table 2).
-
-    A signal that never changes has no standard errors: they are NaN.
-    """
-
-    factor: float
-    """Slope [unit/s]."""
-    factor_error: float
-    """Standard error of the slope, for white noise [unit/s]."""
-    offset: float
-    """Value of the line at time 0 [unit]."""
-    offset_error: float
-    """Standard error of the offset, for white noise [unit]."""
-
-    def at(self, time: NDArray) -> NDArray:
-        """The line [unit] at some times (times,) [s], (times,)."""
-        return self.offset + self.factor * time
-
-
-@dataclass(frozen=True, kw_only=True)
 class DescriptiveStatistics:
     """Central, dispersion and distribution properties of a detrended signal y (Table 3).
 
@@ -70,17 +49,6 @@ class DescriptiveStatistics:
     """Fourth moment about the mean over the squared variance; 3 for a normal signal."""
     skewness: float
     """Third moment about the mean over sigma cubed; 0 for a symmetric signal."""
-
-
-def fit_trend(time: NDArray, signal: NDArray) -> Trend:
-    """Line through a signal (samples,) [unit] over time (samples,) [s]; at least three samples."""
-    line: Any = stats.linregress(time, signal)
-    return Trend(
-        factor=float(line.slope),
-        factor_error=float(line.stderr),
-        offset=float(line.intercept),
-        offset_error=float(line.intercept_stderr),
-    )
 
 
 def descriptive_statistics(residual: NDArray, *, greatest: float) -> DescriptiveStatistics:
@@ -141,7 +109,9 @@ class ChannelAssessment:
     """Of the record [s]."""
     rest: float
     """What a perfect sensor reads with the coil off and the chambers vented [A, V or bar]."""
-    trend: Trend
+    trend: Any
+    """The line through the readings by least squares (Table 2), from `scipy.stats.linregress`, with
+    standard errors for white noise [unit, unit/s]."""
     description: DescriptiveStatistics
     quantum: float
     """Step of the readings: as they show it, otherwise as the campaign does; 0.0 without a grid."""
@@ -171,7 +141,7 @@ class ChannelAssessment:
     @property
     def drift(self) -> float:
         """Change of the line over the record [unit]."""
-        return self.trend.factor * self.duration
+        return float(self.trend.slope) * self.duration
 
     @property
     def within_accuracy(self) -> bool:
@@ -216,9 +186,9 @@ def assess_channel(
         sensor: of the channel.
     """
     time = np.arange(len(readings)) * period
-    trend = fit_trend(time, readings)
-    moves = np.ptp(readings) > 0
-    residual = readings - trend.at(time) if moves else np.zeros_like(readings)
+    trend: Any = stats.linregress(time, readings)
+    line = trend.intercept + trend.slope * time
+    residual = readings - line if np.ptp(readings) > 0 else np.zeros_like(readings)
     return ChannelAssessment(
         name=name,
         readings=readings,

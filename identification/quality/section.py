@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from identification.quality.assessment import QualityAssessment, sensor_offsets, white_noise_band
+from identification.quality.channel import DescriptiveStatistics
 from identification.quality.verdicts import channel_verdict, check_results, worst_status
 from identification.recordings.recording import CHANNELS, UNITS
 from identification.report.page import Picture, Section, Table, Text
@@ -15,21 +16,8 @@ from identification.report.page import Picture, Section, Table, Text
 UNIT_COLUMNS = [f"{name} [{UNITS[name][0]}]" for name in CHANNELS]
 """Headings of a table with a column per channel."""
 
-
-STATISTIC_NAMES = {
-    "arithmetic_mean": "arithmetic mean",
-    "trimmed_mean": "trimmed mean [by 5 %]",
-    "median": "median",
-    "standard_deviation": "standard deviation",
-    "interquartile_range": "interquartile range",
-    "absolute_deviation": "absolute deviation",
-    "range": "range",
-    "signal_to_noise": "SNR [dB]",
-    "outlier_factor": "outlier factor",
-    "kurtosis": "kurtosis",
-    "skewness": "skewness",
-}
-"""Names by field of `DescriptiveStatistics`."""
+LABELS = {"trimmed_mean": "trimmed mean [by 5 %]", "signal_to_noise": "SNR [dB]"}
+"""Names of fields of `DescriptiveStatistics` that are not the field's."""
 
 
 def quality_section(quality: QualityAssessment) -> Section:
@@ -54,7 +42,8 @@ def signals(quality: QualityAssessment) -> Figure:
     time = np.arange(quality.samples) * quality.period
     for axes, channel in zip(rows, quality.channels.values(), strict=True):
         axes.plot(time, channel.readings, color="tab:blue", linewidth=0.3)
-        axes.plot(time[[0, -1]], channel.trend.at(time[[0, -1]]), color="tab:red", linewidth=1.0)
+        line = channel.trend.intercept + channel.trend.slope * time[[0, -1]]
+        axes.plot(time[[0, -1]], line, color="tab:red", linewidth=1.0)
         axes.set_ylabel(f"{channel.name} [{channel.unit}]")
     rows[-1].set_xlabel("time [s]")
     figure.align_ylabels()
@@ -75,10 +64,17 @@ def _state(quality: QualityAssessment) -> str:
 
 
 def _trends(quality: QualityAssessment) -> Table:
-    trends = [quality.channels[name].trend for name in CHANNELS]
-    slopes = [_estimate(trend.factor, trend.factor_error) for trend in trends]
-    offsets = [_estimate(trend.offset, trend.offset_error) for trend in trends]
-    rows = [["factor [unit/s]", *slopes], ["offset [unit]", *offsets]]
+    rows = []
+    for title, value, error in (
+        ("factor [unit/s]", "slope", "stderr"), ("offset [unit]", "intercept", "intercept_stderr")
+    ):  # fmt: skip
+        row = [title]
+        for name in CHANNELS:
+            trend = quality.channels[name].trend
+            scatter = getattr(trend, error)
+            shown = f" ± {scatter:.6f}" if math.isfinite(scatter) else ""
+            row.append(f"{getattr(trend, value):z.6f}{shown}")
+        rows.append(row)
     return Table(
         columns=["Parameter", *UNIT_COLUMNS],
         rows=rows,
@@ -86,15 +82,12 @@ def _trends(quality: QualityAssessment) -> Table:
     )
 
 
-def _estimate(value: float, error: float) -> str:
-    return f"{value:z.6f} ± {error:.6f}" if math.isfinite(error) else f"{value:z.6f}"
-
-
 def _statistics(quality: QualityAssessment) -> Table:
     rows = []
-    for field, label in STATISTIC_NAMES.items():
+    for field in DescriptiveStatistics.__dataclass_fields__:
         values = [getattr(quality.channels[name].description, field) for name in CHANNELS]
         digits = ".2f" if field == "signal_to_noise" else "z.4f"
+        label = LABELS.get(field, field.replace("_", " "))
         rows.append([label, *(format(v, digits) if math.isfinite(v) else "–" for v in values)])
     return Table(
         columns=["Parameter", *UNIT_COLUMNS],
@@ -114,34 +107,36 @@ def _correlations(quality: QualityAssessment) -> Table:
 
 def as_json(quality: QualityAssessment) -> dict[str, Any]:
     """Figures in A, V and bar (sensor_offsets in SI units) and findings; None for what is undefined."""
+    channels = {}
+    for name, channel in quality.channels.items():
+        results, trend = check_results(quality, name), channel.trend
+        line = {
+            "factor": trend.slope, "factor_error": trend.stderr,
+            "offset": trend.intercept, "offset_error": trend.intercept_stderr,
+        }  # fmt: skip
+        channels[name] = {
+            "unit": channel.unit,
+            "status": worst_status(results),
+            "findings": [
+                {"check": check, "status": result.status, "text": result.text}
+                for check, result in results.items()
+            ],
+            "trend": _finite({key: float(value) for key, value in line.items()}),
+            "statistics": _finite(asdict(channel.description)),
+            "offset": channel.offset,
+            "quantum": channel.quantum,
+        }
     return {
         "recording": quality.name,
         "samples": quality.samples,
         "period_s": quality.period,
         "at_rest": quality.at_rest,
         "sensor_offsets_SI": {n: _finite(asdict(o)) for n, o in sensor_offsets(quality).items()},
-        "channels": {name: _channel_json(quality, name) for name in CHANNELS},
+        "channels": channels,
         "correlations": [
             {"channels": list(pair), "correlation": value}
             for pair, value in quality.correlations.items()
         ],
-    }
-
-
-def _channel_json(quality: QualityAssessment, name: str) -> dict[str, Any]:
-    channel = quality.channels[name]
-    results = check_results(quality, name)
-    return {
-        "unit": channel.unit,
-        "status": worst_status(results),
-        "findings": [
-            {"check": check, "status": result.status, "text": result.text}
-            for check, result in results.items()
-        ],
-        "trend": _finite(asdict(channel.trend)),
-        "statistics": _finite(asdict(channel.description)),
-        "offset": channel.offset,
-        "quantum": channel.quantum,
     }
 
 

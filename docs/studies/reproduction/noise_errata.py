@@ -8,7 +8,6 @@ from scipy import stats
 from docs.studies.reproduction.errata import CONFIDENCE, DOUBT, ERRATUM, HOLDS, FigureCheck
 from epv_env.plant.channels import SENSORS
 from identification.quality.channel import DescriptiveStatistics
-from identification.quality.section import STATISTIC_NAMES
 from identification.recordings.recording import UNITS
 from identification.report_2003 import correlation_matrix
 
@@ -30,7 +29,9 @@ _TABLE_3 = {
 }
 
 STATISTICS = {
-    name: DescriptiveStatistics(**dict(zip(STATISTIC_NAMES, column, strict=True)))
+    name: DescriptiveStatistics(
+        **dict(zip(DescriptiveStatistics.__dataclass_fields__, column, strict=True))
+    )
     for name, column in _TABLE_3.items()
 }
 """Table 3 by channel."""

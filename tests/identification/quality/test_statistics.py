@@ -5,27 +5,11 @@ import pytest
 
 from identification.quality.channel import (
     descriptive_statistics,
-    fit_trend,
     longest_run,
     run_limit,
 )
 
 TIME = np.arange(10_000) / 2000
-
-
-def test_a_ramp_s_factor_and_offset_come_back_without_error():
-    trend = fit_trend(TIME, 3.0 - 0.2 * TIME)
-    assert (trend.factor, trend.offset) == (pytest.approx(-0.2), pytest.approx(3.0))
-    assert trend.factor_error == pytest.approx(0.0, abs=1e-9)
-    np.testing.assert_allclose(trend.at(TIME), 3.0 - 0.2 * TIME)
-
-
-def test_the_standard_error_of_the_slope_is_that_of_white_noise():
-    """sigma sqrt(12/n)/T for n samples over the time T."""
-    noise = np.random.default_rng(0).standard_normal(len(TIME))
-    trend = fit_trend(TIME, noise)
-    assert trend.factor_error == pytest.approx(np.sqrt(12 / len(TIME)) / 5, rel=0.02)
-    assert trend.offset_error == pytest.approx(2 / np.sqrt(len(TIME)), rel=0.02)
 
 
 def test_a_sine_has_its_closed_forms():
