@@ -116,6 +116,8 @@ class MappedChannel:
     """(samples,) [SI; pressures absolute]."""
     filled: int
     """Missing readings that were filled from their neighbours."""
+    period: float | None = None
+    """Between samples [s], once they lie on a uniform grid; None: not known, or they jitter."""
 
     @property
     def conversion(self) -> str:

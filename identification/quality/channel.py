@@ -11,6 +11,7 @@ from scipy import stats
 from epv_env.plant.channels import Sensor
 from identification.readings_noise import quantisation_step, rounding_error
 from identification.recordings.recording import UNITS
+from identification.recordings.recording_checks import longest_run
 
 DRIFT_LEVELS = (0.1, 1.0)
 """Drift over the record, relative to Table 1's accuracy, from which it is in doubt, and bad."""
@@ -71,12 +72,6 @@ def descriptive_statistics(residual: NDArray, *, greatest: float) -> Descriptive
         kurtosis=float(stats.kurtosis(residual, fisher=False)) if moves else np.nan,
         skewness=float(stats.skew(residual)) if moves else np.nan,
     )
-
-
-def longest_run(readings: NDArray) -> int:
-    """Length of the longest run of one and the same reading [samples]; readings: (samples,)."""
-    changes = np.flatnonzero(np.diff(readings) != 0)
-    return int(np.max(np.diff(np.concatenate(([-1], changes, [len(readings) - 1])))))
 
 
 def run_limit(readings: NDArray, rounding: float) -> int:
@@ -167,7 +162,7 @@ class ChannelAssessment:
     @property
     def stands_still(self) -> tuple[int, int] | None:
         """Longest run of one reading and its limit [samples]; None if independent noise explains it."""
-        longest = longest_run(self.readings)
+        longest = longest_run(np.diff(self.readings) == 0)[1] + 1
         limit = run_limit(self.readings, self.quantum / self.description.standard_deviation)
         return (longest, limit) if longest > limit else None
 

@@ -5,7 +5,7 @@ sigma_S = -V2/(R T) dp2/dt. Where it is steady before and after an opening, and 
 be steady during the opening, too. An opening begins with the coil on and every chamber at rest.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from epv_env.common.units import BAR, GRAM
 from identification.recordings.log_files import Drive, Log
-from identification.recordings.recording import HOLD, Campaign, CampaignError, Recording
+from identification.recordings.recording import CHANNELS, HOLD, Campaign, CampaignError, Recording
 
 REST_RANGE = 0.1 * BAR
 """Range of p3 within HOLD below which the control chamber is at rest [Pa]."""
@@ -90,10 +90,18 @@ def openings(log: Log, p: Mapping[str, float]) -> tuple[Campaign, set[str]]:
     storage = p["V2"] / (p["R_gas"] * log.temperature)
     recordings, steady = list[Recording](), set[str]()
     for drive in log.drives:
-        for stretch in _of_drive(drive, log.period, storage):
-            recordings.append(_recording(drive, stretch, log.period))
+        for stretch in _stretches(drive, log.period, storage):
+            rows = slice(stretch.first, stretch.end)
+            recording = Recording(
+                name=f"{drive.file} at {stretch.first * log.period:.3f} s",
+                role="calibration",
+                period=log.period,
+                sigma_S=np.full(stretch.end - stretch.first, stretch.flow),
+                **{name: getattr(drive, name)[rows] for name in CHANNELS},
+            )
+            recordings.append(recording)
             if stretch.steady:
-                steady.add(recordings[-1].name)
+                steady.add(recording.name)
     campaign = Campaign(
         name=log.name,
         temperature=log.temperature,
@@ -110,12 +118,11 @@ def evenly(campaign: Campaign, preferred: Collection[str]) -> Campaign:
     """
     chosen: list[Recording] = []
     for _, group in groupby(campaign.recordings, key=lambda recording: drive_of(recording.name)):
-        own = list(group)
-        first = _spread([r for r in own if r.name in preferred], OPENINGS_PER_DRIVE)
-        others = [r for r in own if r.name not in preferred]
-        chosen += sorted(
-            [*first, *_spread(others, OPENINGS_PER_DRIVE - len(first))], key=lambda r: start_of(r.name)
-        )
+        drive = list(group)
+        first = _spread([r for r in drive if r.name in preferred], OPENINGS_PER_DRIVE)
+        others = [r for r in drive if r.name not in preferred]
+        first += _spread(others, OPENINGS_PER_DRIVE - len(first))
+        chosen += sorted(first, key=lambda recording: start_of(recording.name))
     roles = ("calibration",) * (HELD_OUT_EVERY - 1) + ("validation",)
     recordings = tuple(
         replace(recording, role=roles[number % HELD_OUT_EVERY])
@@ -149,23 +156,20 @@ def start_of(recording: str) -> float:
     return float(recording.split(" ")[-2])
 
 
-def _of_drive(drive: Drive, period: float, storage: float) -> list[_Stretch]:
+def _stretches(drive: Drive, period: float, storage: float) -> Iterator[_Stretch]:
     """The openings of a drive; storage: V2/(R T) [kg/Pa]."""
-    at_rest = _at_rest(drive, period)
-    commands = np.flatnonzero(np.diff(drive.coil) < 0.0) + 1
-    starts = [int(i) for i in commands if at_rest[i - 1]]
-    found = [_stretch(drive, i, commands, at_rest, period, storage) for i in starts]
-    return [stretch for stretch in found if stretch is not None]
-
-
-def _at_rest(drive: Drive, period: float) -> NDArray:
-    """Whether the coil has been on and p3 constant for HOLD, up to each sample; boolean (samples,)."""
     hold = round(HOLD / period)
     if len(drive.coil) < hold:
-        return np.zeros(len(drive.coil), dtype=bool)
+        return
     on = np.all(sliding_window_view(drive.coil, hold) > 0.0, axis=1)
     flat = np.ptp(sliding_window_view(drive.p3, hold), axis=1) < REST_RANGE
-    return np.concatenate([np.zeros(hold - 1, dtype=bool), on & flat])
+    at_rest = np.concatenate([np.zeros(hold - 1, dtype=bool), on & flat])  # on and constant for HOLD
+    commands = np.flatnonzero(np.diff(drive.coil) < 0.0) + 1
+    for i in commands:
+        if at_rest[i - 1]:
+            stretch = _stretch(drive, int(i), commands, at_rest, period, storage)
+            if stretch is not None:
+                yield stretch
 
 
 def _stretch(
@@ -189,25 +193,9 @@ def _stretch(
 
 def _flow(p2: NDArray, period: float, storage: float) -> _Flow:
     """Air consumed while the valve is shut; p2: (samples,) [Pa], storage: V2/(R T) [kg/Pa]."""
-    time = np.arange(len(p2)) * period
-    centred = time - np.mean(time)
+    centred = (np.arange(len(p2)) - 0.5 * (len(p2) - 1)) * period
     spread = np.sum(centred**2)
     slope = float(centred @ p2 / spread)
     noise = float(np.sqrt(0.5 * np.var(np.diff(p2)))) + 1.0
     rest = float(np.std(p2 - slope * centred))
     return _Flow(-storage * slope, storage * noise / float(np.sqrt(spread)), rest / noise)
-
-
-def _recording(drive: Drive, stretch: _Stretch, period: float) -> Recording:
-    own = slice(stretch.first, stretch.end)
-    return Recording(
-        name=f"{drive.file} at {stretch.first * period:.3f} s",
-        role="calibration",
-        period=period,
-        U=drive.U[own],
-        I=drive.I[own],
-        p1=drive.p1[own],
-        p2=drive.p2[own],
-        p3=drive.p3[own],
-        sigma_S=np.full(stretch.end - stretch.first, stretch.flow),
-    )

@@ -55,7 +55,13 @@ def check_recording(
         # The supply may read the same in coarse steps, and any pressure of a steady record.
         may_rest = name in steps and (CHANNEL_OF[name] == "p1" or role == "quality")
         if name != "U_V" and not may_rest:  # a voltage may be fed back without noise
-            _check_alive(file, name, columns[name])
+            values = columns[name]
+            if np.min(values) == np.max(values):
+                raise CampaignError(
+                    f"{file}, {_lines(0, len(values))}: {name} is {values[0]:g} throughout, and noise "
+                    "moves every live channel: check its sensor, or give simulated data the sensors' "
+                    "noise"
+                )
     if role != "quality" and not switches(columns["U_V"]):
         _check_length(file, len(columns["U_V"]), role, period)
         U = columns["U_V"]
@@ -77,15 +83,6 @@ def check_recording(
             if name != "U_V":
                 _check_steady_start(file, name, columns[name], sensor, period)
     return period
-
-
-def _check_alive(file: str, name: str, values: NDArray) -> None:
-    """Noise and the ADC's steps move every channel that is connected; a dead one tells nothing."""
-    if np.min(values) == np.max(values):
-        raise CampaignError(
-            f"{file}, {_lines(0, len(values))}: {name} is {values[0]:g} throughout, and noise moves "
-            "every live channel: check its sensor, or give simulated data the sensors' noise"
-        )
 
 
 def _check_length(file: str, samples: int, role: str, period: float) -> None:
@@ -116,7 +113,7 @@ def _check_rail(
 ) -> None:
     """No reading stays at an end of the range, or where the ADC saturates."""
     at_end = (low_end & (values <= sensor.low)) | (values >= sensor.high - sensor.resolution)
-    first, length = _longest_run(at_end[1:] & (values[1:] == values[:-1]))
+    first, length = longest_run(at_end[1:] & (values[1:] == values[:-1]))
     if length >= max(_samples(STUCK_TIME, period), STUCK_SAMPLES):
         raise CampaignError(
             f"{file}, {_lines(first, length + 1)}: {name} is stuck at {values[first]:g}, an end of the "
@@ -163,7 +160,7 @@ def _lines(first: int, count: int) -> str:
     return f"lines {line_number(first)} to {line_number(first + count - 1)}"
 
 
-def _longest_run(mask: NDArray) -> tuple[int, int]:
+def longest_run(mask: NDArray) -> tuple[int, int]:
     """First index and length of the longest run of true in a boolean array (samples,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
     lengths = edges[1::2] - edges[::2]

@@ -85,7 +85,12 @@ def test_a_second_process_is_refused(package, tmp_path, capsys):
 
 def test_what_a_killed_writer_left_goes_with_the_next_one(tmp_path):
     """A kill between writing and renaming leaves the new content under a hidden name."""
-    for name in (".report.json.0123abcd", ".export.0123abcd/epv_policy.c", "kept.0123abcd", ".hidden"):
+    for name in (
+        ".report.json.0123abcd",
+        ".export.0123abcd/.epv_policy.c.0123abcd",
+        "kept.0123abcd",
+        ".hidden",
+    ):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).touch()
     with only_writer(tmp_path):

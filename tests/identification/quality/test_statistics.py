@@ -5,9 +5,9 @@ import pytest
 
 from identification.quality.channel import (
     descriptive_statistics,
-    longest_run,
     run_limit,
 )
+from identification.recordings.recording_checks import longest_run
 
 TIME = np.arange(10_000) / 2000
 
@@ -36,10 +36,10 @@ def test_a_signal_that_never_changes_has_no_shape():
 
 def test_runs():
     coin = np.random.default_rng(0).integers(2, size=10_000)
-    assert longest_run(np.array([1, 1, 2, 2, 2, 3])) == 3
-    assert longest_run(np.ones(7)) == 7
+    assert longest_run(np.array([1, 0, 0, 1, 1, 1, 0], dtype=bool)) == (3, 3)
+    assert longest_run(np.zeros(7, dtype=bool)) == (0, 0)
     assert run_limit(coin, rounding=0.0) == pytest.approx(np.log2(1e8), abs=2)
-    assert longest_run(coin) < run_limit(coin, rounding=0.0)
+    assert longest_run(np.diff(coin) == 0)[1] + 1 < run_limit(coin, rounding=0.0)
 
 
 def test_a_drift_does_not_shorten_the_run_that_is_allowed():
