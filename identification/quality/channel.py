@@ -124,11 +124,6 @@ class ChannelAssessment:
         return bool(np.ptp(self.readings) > 0)
 
     @property
-    def accuracy(self) -> float:
-        """What the supplier allows a reading to be off (Table 1) [unit]."""
-        return self.sensor.accuracy * self.sensor.high
-
-    @property
     def offset(self) -> float:
         """Mean reading minus rest value [unit]; an offset error only if the record is at rest."""
         return float(np.mean(self.readings)) - self.rest
@@ -141,12 +136,12 @@ class ChannelAssessment:
     @property
     def within_accuracy(self) -> bool:
         """Whether the line stays within the accuracy of the rest value from start to end."""
-        return abs(self.offset) + abs(self.drift) / 2 <= self.accuracy
+        return abs(self.offset) + abs(self.drift) / 2 <= self.sensor.margin
 
     @property
     def at_rest(self) -> bool:
         """Whether the channel is steady, and within the accuracy of its rest value."""
-        return self.within_accuracy and abs(self.drift) < DRIFT_LEVELS[0] * self.accuracy
+        return self.within_accuracy and abs(self.drift) < DRIFT_LEVELS[0] * self.sensor.margin
 
     @property
     def usual_noise(self) -> float:

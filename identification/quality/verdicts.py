@@ -53,9 +53,9 @@ def check_offset(quality: QualityAssessment, channel: ChannelAssessment) -> Judg
         mean = f"the mean reading is {channel.rest + channel.offset:.4g} {channel.unit}, but {reason}"
         return Judgement("note", f"{mean}, so no offset can be read off; record at rest for it")
     return _judged(
-        "good" if abs(channel.offset) <= channel.accuracy else "bad",
+        "good" if abs(channel.offset) <= channel.sensor.margin else "bad",
         f"offset {_milli(channel, channel.offset)} against an accuracy of "
-        f"±{_milli(channel, channel.accuracy)}",
+        f"±{_milli(channel, channel.sensor.margin)}",
         f"{'vent this chamber' if pressure else 'switch the coil off'} and record again, "
         "or have the sensor calibrated",
     )
@@ -63,7 +63,7 @@ def check_offset(quality: QualityAssessment, channel: ChannelAssessment) -> Judg
 
 def check_trend(quality: QualityAssessment, channel: ChannelAssessment) -> Judgement:
     """Is the drift over the record small against the accuracy?"""
-    ratio = abs(channel.drift) / channel.accuracy
+    ratio = abs(channel.drift) / channel.sensor.margin
     return _judged(
         _graded(ratio, DRIFT_LEVELS),
         f"drift {_milli(channel, channel.drift)} in {channel.duration:.3g} s, "

@@ -29,7 +29,7 @@ PERIOD_TOLERANCE = 1e-3
 REST = 0.05
 """Relative range of p3 within HOLD up to which the control chamber is at rest [-]."""
 LONGEST = 0.6
-"""Time after a switching-off that is looked at [s]."""
+"""Longest opening [s]: a longer one tells less and takes longer to simulate."""
 MOST_CHECKED = 20
 """Openings of a drive that are checked, evenly over the drive."""
 LEAST_FALLING = 8

@@ -14,7 +14,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from epv_env.common.units import BAR, GRAM
-from identification.recordings.log_files import Drive, Log
+from identification.recordings.log_files import LONGEST, Drive, Log
 from identification.recordings.recording import CHANNELS, HOLD, Campaign, CampaignError, Recording
 
 REST_RANGE = 0.1 * BAR
@@ -25,9 +25,6 @@ SHUT_BEFORE, SHUT_AFTER = 0.1, 0.1
 
 VENTING = 0.03
 """Time after the command in which p3 is still too high for the valve to open [s]."""
-
-LONGEST = 0.6
-"""Longest opening [s]: a longer one tells less and takes longer to simulate."""
 
 SAME_FLOW, DEVIATIONS = 0.2 * GRAM, 3.0
 """Consumption is the same before and after an opening if it differs by less than this [kg/s] and this

@@ -245,7 +245,7 @@ def _electrical(U: NDArray, current: NDArray, period: float, rules: RecordingRul
     level = float(np.median(U[start]))
     if switches(U) and not np.any(on):
         yield f"U switches at {np.max(np.abs(U)):.4g} V, and {low:g} to {high:g} V are usual"
-    if not on[0] and abs(level) > rules.sensors["U"].accuracy * rules.sensors["U"].high:
+    if not on[0] and abs(level) > rules.sensors["U"].margin:
         yield f"the voltage is {level:.4g} V, neither off nor on"
     settled = current[start]
     if on[0]:

@@ -75,7 +75,7 @@ def check_recording(
     for name, sensor in sensors.items():
         check_range(file, name, columns[name], sensor)
         # A vented chamber in coarse steps stays at the low end.
-        vented = name in steps and abs(ambient_bar - sensor.low) <= _margin(sensor)
+        vented = name in steps and abs(ambient_bar - sensor.low) <= sensor.margin
         _check_rail(file, name, columns[name], sensor, period, low_end=not vented)
     if role != "quality":
         _check_energised_start(file, columns["U_V"], period)
@@ -97,14 +97,14 @@ def _check_length(file: str, samples: int, role: str, period: float) -> None:
 
 def check_range(file: str, name: str, values: NDArray, sensor: Sensor) -> None:
     """Values (samples,) lie in Table 1's range, but for the accuracy."""
-    margin = _margin(sensor) + 1e-9
+    margin = sensor.margin + 1e-9
     outside = (values < sensor.low - margin) | (values > sensor.high + margin)
     if np.any(outside):
         sample = int(np.argmax(outside))
         raise CampaignError(
             f"{file}, line {line_number(sample)}: {name} is {values[sample]:g}, outside the sensor's "
             f"range [{sensor.low:g}, {sensor.high:g}] by more than its accuracy of "
-            f"{_margin(sensor):g}: check unit and scaling, or cut the recording there"
+            f"{sensor.margin:g}: check unit and scaling, or cut the recording there"
         )
 
 
@@ -138,17 +138,12 @@ def _check_steady_start(file: str, name: str, values: NDArray, sensor: Sensor, p
     start = values[: _samples(HOLD, period)]
     quarter = len(start) // 4
     change = float(np.mean(start[-quarter:]) - np.mean(start[:quarter]))
-    if abs(change) > _margin(sensor):
+    if abs(change) > sensor.margin:
         raise CampaignError(
             f"{file}, {_lines(0, len(start))}: {name} changes by {change:g} in the first "
             f"{1e3 * HOLD:g} ms, which must be steady: let the bench settle, energised, before "
             "recording"
         )
-
-
-def _margin(sensor: Sensor) -> float:
-    """Accuracy in the sensor's unit."""
-    return sensor.accuracy * sensor.high
 
 
 def _samples(duration: float, period: float) -> int:
