@@ -200,9 +200,9 @@ def _header(
             "add a header"
         )
     names, units = _names_and_units(above)
-    channels = len(names) - names.count(X_COLUMN)
-    for row in higher:  # LabVIEW's units of channels that have a column of times each
-        if row[0] == UNIT_LABEL and len(row) <= channels + 1 < width:
+    several = names.count(X_COLUMN) > 1  # LabVIEW's channels have a column of times each
+    for row in higher if several else ():
+        if row[0] == UNIT_LABEL and len(row) <= len(names) - names.count(X_COLUMN) + 1:
             told = iter(row[1:])
             units = ["" if name == X_COLUMN else next(told, "") for name in names]
         if row[0] == "Time" and len({*filter(None, row[1:])}) > 1:
@@ -237,7 +237,7 @@ def _names_and_units(above: Sequence[list[str]]) -> tuple[list[str], list[str]]:
         units = next((row for row in reversed(above) if _are_units(row)), units)
     typed = [row for row in above if all(map(TYPES.fullmatch, filter(None, row)))]
     rest = [row for row in above if row is not units and row not in typed]
-    rest = [row for row in rest if not _are_units(row)] or rest[-1:]
+    rest = [row for row in rest if not _are_units(row)] or rest[-1:] or above[-1:]
     names = max(reversed(rest), key=lambda row: sum(meaning(cell) is not None for cell in row))
     return names, ["" if cell == UNIT_LABEL else cell for cell in units]
 

@@ -112,10 +112,10 @@ def clock(true: Recording, form: str, begin: str = "2026-03-01T23:59:59.9") -> l
     return [f"{t:{form}}" for t in pd.date_range(begin, periods=len(true), freq=f"{true.period}s")]
 
 
-def multi(at: Path, true: Recording) -> Path:
+def multi(at: Path, true: Recording, begin: str = "Time" + 5 * "\t10:00:00.0") -> Path:
     """LabVIEW's X_Columns Multi: a column of times before each channel."""
     head = ["X_Columns\tMulti", "***End_of_Header***", "Date" + 5 * "\t2026/03/01",
-            "Time" + 5 * "\t10:00:00.0", "\t".join(["Y_Unit_Label", *UNITS[1:]]),
+            begin, "\t".join(["Y_Unit_Label", *UNITS[1:]]),
             "\t".join(f"X_Value\t{name}" for name in NAMES[1:]) + "\tComment"]  # fmt: skip
     values = np.transpose([v for name in NAMES[1:] for v in (true.time, columns_of(true)[name][0])])
     lines = ["\t".join(f"{value:.6f}" for value in row) for row in values]
@@ -201,7 +201,7 @@ READ: dict[str, Callable[[Path, Recording], Path]] = {
         r,
         [
             "Trace;;;;;",
-            ";".join(NAMES),
+            ";".join(["Time", *NAMES[1:]]),
             5 * "REAL;" + "REAL",
             ";".join(UNITS),
             "DT0;DT2;DT4;DT6;DT8;DT10",
@@ -309,6 +309,10 @@ REFUSED: dict[str, tuple[Callable[[Path, Recording], Path], str]] = {
     "a name without end": (
         lambda at, r: table(at, ["time", "a" + " " * 10_000 + "b"]),
         f"more than {LONGEST_NAME} characters: shorten it",
+    ),
+    "LabVIEW's channels that begin apart": (
+        lambda at, r: multi(at, r, "Time\t10:00:00.0\t10:00:00.5"),
+        "begin at different times of day",
     ),
     "a MATLAB file of texts": (
         lambda at, r: mat5(at, {"a": np.array(["text"], dtype=object)}),
