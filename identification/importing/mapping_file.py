@@ -46,9 +46,9 @@ NAMES: Mapping[str, tuple[str, ...]] = {name: (name.lower(),) for name in CHANNE
 """Names in lower case, without anything but letters and digits; English and German. A channel of the
 bench that is not listed has its own name."""
 
-INSIDE = r"(?:[^\[\](){}]|\([^()]{0,20}\)){1,30}?"
-BRACKETED = re.compile(rf"^(.*?)\s*(?:[\[({{]({INSIDE})[\])}}]|\s(?:in|/)\s(\S+)|/(\S+))\s*$")
-"""A name with its unit, of bounded length: "p1 [bar]", "p1 (bar(g))", "p1 in bar", "p1/bar"."""
+INSIDE = r"(?:[^\[\](){}]|\([^()]{0,20}\)|\[[^\[\]]{0,20}\]){1,30}?"
+BRACKETED = re.compile(rf"^(.*?)\s*(?:[\[({{]({INSIDE})[\])}}]|\s(?:in|/)\s(\S+(?:\s\S+)?)|/(\S+))\s*$")
+"""A name with its unit, of bounded length: "p1 [bar]", "p1 [bar[g]]", "p1 in bar rel.", "p1/bar"."""
 
 
 def split_name(name: str) -> tuple[str, str]:

@@ -173,7 +173,7 @@ READ: dict[str, Callable[[Path, Recording], Path]] = {
         at.with_suffix(".csv"), r, [BRACKETED + ";"]
     ),
     "units in brackets twice": lambda at, r: rows(
-        at.with_suffix(".csv"), r, [BRACKETED.replace("bar", "bar(a)")]
+        at.with_suffix(".csv"), r, [BRACKETED.replace("bar", "bar[a]").replace("bar[a]", "bar(a)", 1)]
     ),
     "units of gauge pressure with a dot": lambda at, r: text(
         at.with_suffix(".csv"),
