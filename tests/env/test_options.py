@@ -16,7 +16,7 @@ CENTRE = Parameters.calibrated()
 RECORDED = Supply.recorded(np.array([0.0, 0.1, 0.3]), np.array([9.0, 9.5, 8.0]))
 MIXTURE = Mixture(
     alternatives=tuple(
-        Alternative(name=str(sizes), probability=0.5, region=Region.from_choices(sizes, CENTRE))
+        Alternative(name=str(sizes), probability=0.5, region=Region(centre=CENTRE).changed(sizes))
         for sizes in ({"t_delay": (0.002, 0.01)}, {"G_eddy": 0.004, "R": (40.0, 41.0)})
     )
 )
@@ -81,13 +81,6 @@ def test_an_autoreset_forgets_the_options(mode):
     seen, usual = ([one.step(off)[0] for _ in range(4)] for one in (env, plain))
     assert np.any(seen[0] != usual[0])
     np.testing.assert_array_equal(seen[-1], usual[-1])
-
-
-def test_a_range_is_drawn_from_for_each_episode():
-    drawn = [p["alphaMV"] for p in episodes(valve(parameters={"alphaMV": (0.6, 0.7)}))]
-    assert 0.6 <= min(drawn) < 0.61
-    assert 0.69 < max(drawn) <= 0.7
-    assert len(set(drawn)) == len(drawn)
 
 
 def test_a_plant_file_is_the_centre_and_its_region_is_confidence(tmp_path):

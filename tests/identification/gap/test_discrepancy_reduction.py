@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from docs.examples.tank import NOISE, Tank, virtual_recordings
+from identification.gap.fit.evidence import percentage_errors, predict
 from identification.gap.fit.fitting_problem import Estimate, FittingProblem, Hypothesis
 from identification.gap.fit.gauss_newton import fit
-from identification.gap.fit.prediction import percentage_errors, predict
 from identification.gap.fit.recalibration import recalibrate
 from identification.gap.judge.held_out import (
     DiscrepancyReduction,
@@ -85,16 +85,6 @@ def test_the_gap_is_that_of_known_noise_and_misfit():
     tank.runs[2].measured[:] += 3 * NOISE * np.sqrt(2) * np.sin(tank.runs[2].time / 4)
     gap = measure_discrepancy_reduction(FittingProblem(tank, problem.slopes), found).gaps["leak"].overall
     assert gap.value == pytest.approx(np.sqrt(1 + 9), rel=0.12)
-
-
-def test_percent_is_eq_19():
-    tank = Tank(virtual_recordings({}))
-    scaled = [1.02 * run.measured for run in tank.runs]
-    mean = np.mean(tank.runs[2].measured)
-    rms = np.sqrt(np.mean(tank.runs[2].measured ** 2))
-    found = percentage_errors(tank, scaled)
-    assert found is not None
-    assert found["overall"] == found["h"] == pytest.approx(2 * rms / mean, rel=0.01)
 
 
 @pytest.mark.parametrize(
