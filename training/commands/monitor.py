@@ -7,13 +7,14 @@ Without --model the plant is simulated first, with every effect of the catalogue
 """
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from controllers.monitor import FEATURES, Monitor, MonitorModel
+from controllers.monitor import RETURN, Change, Monitor, MonitorModel
 from epv_env.common.command_line import (
     NextStep,
     Number,
@@ -33,8 +34,6 @@ from training.monitoring import monitor_model
 MODEL, FIGURE = "monitor.json", "monitor.png"
 """What is written."""
 RATE = Number(float, 1e-6, 100.0)
-VALVES = Number(int, 2 * len(FEATURES), 10_000)
-"""With fewer, the scatter between valves is not known in all features: false alarms."""
 LIKELY = 0.05
 """Probability from which a cause is named."""
 
@@ -45,9 +44,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--model", type=Path, help=f"{MODEL} of an earlier call; default: made anew")
     parser.add_argument(
         "--false-alarms", type=RATE, default=0.01, help="per hour of operation (default: 0.01)"
-    )
-    parser.add_argument(
-        "--valves", type=VALVES, default=48, help="simulated valves of the plant (default: 48)"
     )
     add_out(parser, "runs/monitor")
     add_plant(parser, help="plant file of the identified valve; default: the report's calibration")
@@ -60,14 +56,14 @@ def run(options: argparse.Namespace) -> None:
     log = read_log(options.log, rules_of(plant) if options.plant else RULES)
     log.check_period(Monitor.period, "the monitor counts periods of")
     if options.model is None:
-        model = monitor_model(plant, valves=options.valves, seed=options.seed)
+        model = monitor_model(plant, seed=options.seed)
         model.save(options.out / MODEL)
     else:
         model = MonitorModel.load(options.model)
     monitor = Monitor(model, false_alarms_per_hour=options.false_alarms)
     ends = follow(monitor, log)
     save_figure(picture(monitor, ends), options.out / FIGURE)
-    print(sentence(monitor))
+    print(*sentences(monitor, log, ends), sep="\n")
     print(f"written: {options.out / FIGURE}")
 
 
@@ -94,19 +90,28 @@ def follow(monitor: Monitor, log: Log) -> list[float]:
     return ends
 
 
-def sentence(monitor: Monitor) -> str:
-    """What the monitor says at the end."""
+def sentences(monitor: Monitor, log: Log, ends: Sequence[float]) -> list[str]:
+    """What the monitor says at the end, a sentence for each change."""
     if not monitor.history:
-        return "No opening of the log can be used: the coil must have been on before, and p3 at p1."
-    count = monitor.restarts
-    again = f" Restarts because its state was not finite: {count}." if count else ""
-    if not monitor.alarm:
-        return f"Nothing has changed: probability {monitor.probability:.2g} that something has.{again}"
-    causes = [f"{name} {p:.2f}" for name, p in monitor.causes().items() if p >= LIKELY]
-    parts = [f"{name} {p:.2f}" for name, p in monitor.components().items() if p >= LIKELY]
+        return ["No opening of the log can be used: the coil must have been on before, and p3 at p1."]
+    found = [_sentence(change, log, ends) for change in monitor.changes]
+    if not found:
+        found = [f"Nothing has changed: probability {monitor.probability:.2g} that something has."]
+    if monitor.restarts:
+        found.append(f"Restarts because its state was not finite: {monitor.restarts}.")
+    return found
+
+
+def _sentence(change: Change, log: Log, ends: Sequence[float]) -> str:
+    """When a change came, and what it is."""
+    number = min(int(np.searchsorted(ends, change.onset, side="right")), len(ends) - 1)
+    when = change.onset - (ends[number - 1] if number else 0.0)
+    causes = [f"{name} {p:.2f}" for name, p in change.causes.items() if p >= LIKELY]
+    parts = [f"{name} {p:.2f}" for name, p in change.components.items() if p >= LIKELY]
+    what = "The latest change is gone" if causes[0].startswith(RETURN) else "Something has changed"
     return (
-        f"Something has changed (probability {monitor.probability:.4g}), at {monitor.onset:.0f} s. "
-        f"Effects: {', '.join(causes)}. Components: {', '.join(parts)}.{again}"
+        f"{what} (probability {change.probability:.4g}), in {log.drives[number].file} at {when:.0f} s. "
+        f"Effects: {', '.join(causes)}. Components: {', '.join(parts)}."
     )
 
 
