@@ -27,7 +27,7 @@ from controllers.monitor import (
 from epv_env.common.files import JSONFileError
 from epv_env.operation_log import OperationLog
 from epv_env.plant.plantfile import Plant
-from identification.recordings.log_files import read_log
+from identification.recordings.log_files import Log, read_log
 from tests.training.exports import sanitisers
 from training.commands.monitor import follow, sentences
 from training.deploy.compiled import build
@@ -217,7 +217,8 @@ def test_a_state_that_is_not_finite_restarts_and_says_so() -> None:
     observe(monitor, np.zeros(N))
     assert monitor.restarts == 1
     assert np.isfinite(monitor.log_odds)
-    assert monitor.history
+    log = Log(name="", temperature=293.0, pressure=1e5, period=5e-3, drives=())
+    assert "Restarts because its state was not finite: 1." in sentences(monitor, log, [])
 
 
 HOSTILE = """
