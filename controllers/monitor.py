@@ -9,6 +9,7 @@ becomes the reference, from which the next one, or the return, is told. Memory i
 from collections import deque
 from dataclasses import dataclass
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -20,6 +21,8 @@ from epv_env.common.files import JSONFileError, read_json, write_json
 
 FORMAT = "epv-monitor/1"
 REMEDY = "make the monitor anew with `epv monitor`"
+SHIPPED = Path(__file__).with_name("monitor.json")
+"""The model of a monitor for the report's valve; `python -m training.monitoring` makes it."""
 
 BEFORE, AFTER = 8, 5
 """Control periods with the coil on that an opening needs before and after."""

@@ -19,6 +19,7 @@ from controllers.monitor import (
     LINEAR,
     RETURN,
     RISE,
+    SHIPPED,
     TERMS,
     Monitor,
     MonitorModel,
@@ -29,7 +30,7 @@ from epv_env.operation_log import OperationLog
 from epv_env.plant.plantfile import Plant
 from identification.recordings.log_files import Log, read_log
 from tests.training.exports import sanitisers
-from training.commands.monitor import follow, sentences
+from training.commands.monitor import agreement, follow, sentences
 from training.deploy.compiled import build
 from training.deploy.monitor_c import effects_of, sources
 from training.monitoring import drives
@@ -219,6 +220,32 @@ def test_a_state_that_is_not_finite_restarts_and_says_so() -> None:
     assert np.isfinite(monitor.log_odds)
     log = Log(name="", temperature=293.0, pressure=1e5, period=5e-3, drives=())
     assert "Restarts because its state was not finite: 1." in sentences(monitor, log, [])
+
+
+def test_a_diagnosis_that_differs_is_explained() -> None:
+    content = {"verdict": "no_gap", "ambiguity_set": [], "absorbed": ["second (x)"], "onset": None}
+    monitor = Monitor(white_model())
+    assert "agrees: no_gap" in agreement(monitor, content)
+    monitor._log[1] = 50.0
+    assert "second (no_gap): this effect is absorbed" in agreement(monitor, content)
+    content["ambiguity_set"] = [["second"], ["third"]]
+    assert "agrees" in agreement(monitor, content)
+    content["ambiguity_set"] = [["third"]]
+    assert "names third: it simulates every effect" in agreement(monitor, content)
+    assert "hardly shows" in agreement(Monitor(white_model()), content)
+
+
+def test_what_is_shipped_finds_a_change_and_its_return() -> None:
+    plant, model = Plant.calibrated(), MonitorModel.load(SHIPPED)
+    eddy = plant.parameters.replace(G_eddy=0.004)
+    monitor = Monitor(model)
+    for part, p in enumerate([plant.parameters, eddy, plant.parameters]):
+        chosen = {"parameters": [p] * 2}
+        for drive in drives(plant, Hysteresis(open_below=-0.3, shut_above=0.0), [part, 9], chosen):
+            monitor.follow(drive)
+        assert len(monitor.changes) == part
+    assert [next(iter(c.causes)) for c in monitor.changes] == ["eddy_current", RETURN]
+    assert [c.onset for c in monitor.changes] == pytest.approx([60.0, 120.0], abs=6.0)
 
 
 HOSTILE = """

@@ -1,20 +1,23 @@
 """Follow the operation log of a valve with a monitor: has it changed, when, and what.
 
+    epv monitor logs/valve-00 --out runs/monitor
     epv monitor logs/valve-01 --plant runs/plant.json --out runs/monitor
     epv monitor logs/valve-02 --model runs/monitor/monitor.json
 
-Without --model the plant is simulated first, with every effect of the catalogue: a minute or two.
+What the monitor knows of the report's valve is shipped. Another plant is simulated first, with every
+effect of the catalogue: a minute or two, once.
 """
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from controllers.monitor import RETURN, Change, Monitor, MonitorModel
+from controllers.monitor import RETURN, SHIPPED, Change, Monitor, MonitorModel
 from epv_env.common.command_line import (
     NextStep,
     Number,
@@ -24,6 +27,7 @@ from epv_env.common.command_line import (
     beside,
     plant_option,
 )
+from epv_env.common.files import decoded
 from epv_env.common.units import BAR
 from epv_env.plant.plantfile import load_plant
 from identification.recordings.log_files import Log, read_log
@@ -41,7 +45,8 @@ LIKELY = 0.05
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the log, the plant or its monitor, and where the results go."""
     parser.add_argument("log", type=Path, help="folder with log.json (docs/reference/files.md)")
-    parser.add_argument("--model", type=Path, help=f"{MODEL} of an earlier call; default: made anew")
+    parser.add_argument("--model", type=Path, help=f"{MODEL} of an earlier call; default: of --plant")
+    parser.add_argument("--gap", type=Path, help="gap.json of the same log: do both agree, or why not")
     parser.add_argument(
         "--false-alarms", type=RATE, default=0.01, help="per hour of operation (default: 0.01)"
     )
@@ -55,15 +60,17 @@ def run(options: argparse.Namespace) -> None:
     plant = load_plant(options.plant)
     log = read_log(options.log, rules_of(plant) if options.plant else RULES)
     log.check_period(Monitor.period, "the monitor counts periods of")
-    if options.model is None:
+    if options.plant and not options.model:
         model = monitor_model(plant, seed=options.seed)
-        model.save(options.out / MODEL)
     else:
-        model = MonitorModel.load(options.model)
+        model = MonitorModel.load(options.model or SHIPPED)
+    model.save(options.out / MODEL)
     monitor = Monitor(model, false_alarms_per_hour=options.false_alarms)
     ends = follow(monitor, log)
     save_figure(picture(monitor, ends), options.out / FIGURE)
     print(*sentences(monitor, log, ends), sep="\n")
+    if options.gap:
+        print(agreement(monitor, decoded(options.gap, remedy="diagnose the log")))
     print(f"written: {options.out / FIGURE}")
 
 
@@ -113,6 +120,32 @@ def _sentence(change: Change, log: Log, ends: Sequence[float]) -> str:
         f"{what} (probability {change.probability:.4g}), in {log.drives[number].file} at {when:.0f} s. "
         f"Effects: {', '.join(causes)}. Components: {', '.join(parts)}."
     )
+
+
+def agreement(monitor: Monitor, content: Mapping[str, Any]) -> str:
+    """Whether the diagnosis of the same log says the same, and why not; content: of gap.json."""
+    named = {name for effects in content["ambiguity_set"] for name in effects}
+    seen = {next(iter(change.causes)) for change in monitor.changes} - {RETURN}
+    if named & seen or not (named or seen):
+        return f"The diagnosis agrees: {content['verdict']}."
+    listed, both = ", ".join(sorted(named or seen)), bool(named and seen)
+    absorbed = {label.split(" ")[0] for label in content["absorbed"]}
+    if both:
+        why = "it simulates every effect and its law, the monitor compares openings with usual sizes"
+    elif seen and seen <= absorbed:
+        why = "this effect is absorbed there, by recalibration or the unknown consumption"
+    elif seen:
+        why = (
+            "it allows for a misfit that no model is free of, the monitor compares the valve with itself"
+        )
+    elif not named & set(monitor.model.effects):
+        why = "this effect hardly shows in the features of an opening, which the monitor reads"
+    elif not content["onset"]:
+        why = "the effect acts in all drives, and the monitor takes it for the valve's own offset"
+    else:
+        why = "at the stated rate of false alarms the monitor needs a larger effect, or more openings"
+    missed = f"names {listed}" if named else f"does not see {listed} ({content['verdict']})"
+    return f"The diagnosis {missed}: {why}."
 
 
 def picture(monitor: Monitor, ends: list[float]) -> Figure:

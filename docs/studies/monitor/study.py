@@ -16,7 +16,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from controllers.base import Controller
-from controllers.monitor import RETURN, Monitor, MonitorModel
+from controllers.monitor import RETURN, SHIPPED, Monitor, MonitorModel
 from controllers.policy import load_policy
 from controllers.tuned import tuned
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
@@ -26,7 +26,7 @@ from epv_env.common.results_folder import progress
 from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import load_plant
-from training.monitoring import DRIVE, drives, monitor_model
+from training.monitoring import DRIVE, drives
 
 FOLDER = Path(__file__).parent
 SEED = 4977
@@ -165,14 +165,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study; returns the exit status."""
     options = study_options(study_parser(__doc__ or "", FOLDER), arguments)
     runs, count = (1, 1) if options.quick else (RUNS, DRIVES)
-    path = options.work / "monitor.json"
-    if not path.exists():
-        monitor_model(load_plant(None)).save(path)
     subject = {"seed": SEED, "valves": VALVES, "quick": options.quick}
     journal = Journal(options.out / "results.jsonl", subject)
     missing = {
         name: task
-        for name, task in tasks(MonitorModel.load(path), runs, count).items()
+        for name, task in tasks(MonitorModel.load(SHIPPED), runs, count).items()
         if name not in journal
     }
     for name in progress(missing, what="monitor"):

@@ -43,9 +43,12 @@ def verdict_sentence(diagnosis: Diagnosis, next_experiment: str) -> tuple[str, s
     next_experiment: a sentence for an ambiguous verdict; empty where none was sought.
     """
     status, text = _status_and_text(diagnosis, next_experiment)
-    if diagnosis.onset:
-        drive, probability = diagnosis.onset
-        text += f" It begins with {drive} ({probability_text(probability)})."
+    for label, onset in diagnosis.onsets_of(diagnosis.best).items() if diagnosis.best else ():
+        end = f" and is mended in {onset.mended}" if onset.mended else ""
+        text += (
+            f" {in_words(diagnosis, label)} begins with {onset.drive}{end} "
+            f"({probability_text(onset.probability)})."
+        )
     return status, text
 
 
@@ -55,7 +58,8 @@ def _status_and_text(diagnosis: Diagnosis, next_experiment: str) -> tuple[str, s
     if conclusion.verdict == NO_GAP:
         likely = diagnosis.ranking.no_cause > LIKELY_PROBABILITY
         good = likely and no_warning and not _far_above_noise(diagnosis)
-        return ("good" if good else "doubt"), _no_gap(diagnosis)
+        text = f"{_no_gap(diagnosis)} {hidden_causes_sentence(diagnosis)}"
+        return ("good" if good else "doubt"), text
     if conclusion.verdict == KNOWN:
         helps = diagnosis.surely_helps(diagnosis.judged[0])
         good = helps and no_warning and diagnosis.reduction.left.overall.value <= FAR_ABOVE_NOISE
@@ -272,13 +276,16 @@ def component_at_fault(diagnosis: Diagnosis) -> str:
 
 def hidden_causes_sentence(diagnosis: Diagnosis) -> str:
     """Causes that the recordings cannot show, whatever the residual."""
-    absorbed = [in_words(diagnosis, label) for label in diagnosis.ranking.separability.absorbed]
-    if not absorbed:
+    hidden, flow = diagnosis.ranking.separability.absorbed, diagnosis.as_consumption
+    absorbed = [in_words(diagnosis, label) for label in hidden if label not in flow]
+    alike = ", ".join(in_words(diagnosis, label) for label in flow)
+    if not (absorbed or flow):
         return "At its usual size every cause of the catalogue would show in these recordings."
-    return (
-        f"At the usual size these recordings would not show {', '.join(absorbed)}: recalibration, run "
-        "offsets and the scatter of units absorb these causes. The diagnosis says nothing about them."
+    text = (
+        f"Absorbed at the usual size, neither seen nor ruled out: {', '.join(absorbed) or 'none'}, by "
     )
+    text += "recalibration, run offsets and the scatter of units"
+    return f"{text}; {alike}, the same as consumption." if flow else f"{text}."
 
 
 def look_alikes(diagnosis: Diagnosis, cause: RankedCause) -> str:
