@@ -124,13 +124,16 @@ def _in_its_drives(valve: "LoggedValve", seed: int, cache: FitCache) -> Diagnosi
     signatures = simulate_signatures(problem, base, problem.plant.causes)
     drives = [drive_of(problem.plant.runs[r].name) for r in problem.fitted_runs]
     numbers = np.array([valve.drives.index(drive) for drive in drives])
-    spans = spans_of_causes(runs, signatures, numbers, len(valve.drives), problem.readings)
+    spans = spans_of_causes(
+        runs, signatures, numbers, len(valve.drives), problem.readings, valve.lasting
+    )
     found = diagnose(valve.acting_in(spans), seed=seed, cache=cache)
     onsets = {label: span.onset(valve.drives) for label, span in spans.items()}
+    hidden = set(found.ranking.separability.absorbed)
     return replace(
         found,
         onsets={label: onset for label, onset in onsets.items() if onset},
-        as_consumption=as_consumption(runs, signatures),
+        as_consumption=tuple(c for c in as_consumption(runs, signatures) if c in hidden),
     )
 
 
@@ -175,19 +178,21 @@ class LoggedValve(Valve):
                 p2[:] = False
         self.screened = tuple(_in_drive(finding, campaign) for finding in self.screened)
         self.drives = list(dict.fromkeys(drive_of(r.name) for r in campaign.recordings))
+        kept = {p.symbol for p in self.parameters} | {t.symbol for t in self.tolerances}
+        self.lasting = {c.label for c in self.causes if kept & {p.symbol for p in c.parameters}}
+        """Labels of causes that act in all drives: parameters off their values."""
         self.acting: dict[str, NDArray] = {}
         """In which runs a cause acts that does not act in all, boolean (runs,), by symbol."""
 
     def acting_in(self, spans: Mapping[str, Span]) -> "LoggedValve":
         """The same with causes, by label, that act in some drives only."""
         other = copy(self)
-        kept = {p.symbol for p in self.parameters} | {t.symbol for t in self.tolerances}
         drives = np.array([self.drives.index(drive_of(r.name)) for r in self.recordings])
         other.acting = {
             p.symbol: in_span(drives, spans[cause.label].first, spans[cause.label].end)
             for cause in self.causes
             for p in cause.parameters
-            if p.symbol not in kept and not spans[cause.label].whole
+            if not spans[cause.label].whole
         }
         return other
 

@@ -4,7 +4,7 @@ A cause changes the runs outside its span not at all, and those within it in pro
 So one simulation of each cause serves every span.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -57,10 +57,12 @@ def spans_of_causes(
     drives: NDArray,
     count: int,
     readings: int,
+    lasting: Collection[str] = (),
 ) -> dict[str, Span]:
     """The most probable drives of each cause by its label, by linear prediction.
 
-    Each cause alone; where the best one leaves more than the tolerated misfit, the others beside it.
+    Each cause alone; where the best one leaves more than the tolerated misfit, those that are worse by
+    more than that beside it: alone they do not count.
 
     Args:
         runs: the model without a cause, linearised.
@@ -68,17 +70,26 @@ def spans_of_causes(
         drives: number of each run's drive, (runs,).
         count: of drives.
         readings: how many the runs have.
+        lasting: labels of causes that act in all drives.
     """
     spans = [s for s in combinations(range(count + 1), 2) if np.any(in_span(drives, *s))]
     acting = np.array([in_span(drives, *span) for span in spans])
-    squares = least_squares_by_span(runs, signatures, acting)
+    excluded = np.outer([s.cause.label in lasting for s in signatures], [s != (0, count) for s in spans])
+    squares = np.where(excluded, np.inf, least_squares_by_span(runs, signatures, acting))
     first, at = np.unravel_index(np.argmin(squares), squares.shape)
     found = _likeliest(signatures, squares, spans, count, readings)
-    if np.min(squares) > readings + 2.0 * tolerated_misfit(readings):
+    tolerated = 2.0 * tolerated_misfit(readings)
+    if np.min(squares) > readings + tolerated:
         beside = least_squares_by_span(runs, signatures, acting, (signatures[first], acting[at]))
-        label = signatures[first].cause.label
+        beside = np.where(excluded, np.inf, beside)
         second = _likeliest(signatures, beside, spans, count, readings)
-        found = second | {label: found[label]}
+        least = np.min(squares, axis=1)
+        near = {
+            s.cause.label
+            for s, own in zip(signatures, least, strict=True)
+            if own <= np.min(least) + tolerated
+        }
+        found = second | {label: found[label] for label in near}
     return found
 
 
