@@ -179,8 +179,13 @@ class LoggedValve(Valve):
         self.screened = tuple(_in_drive(finding, campaign) for finding in self.screened)
         self.drives = list(dict.fromkeys(drive_of(r.name) for r in campaign.recordings))
         kept = {p.symbol for p in self.parameters} | {t.symbol for t in self.tolerances}
-        self.lasting = {c.label for c in self.causes if kept & {p.symbol for p in c.parameters}}
-        """Labels of causes that act in all drives: parameters off their values."""
+        self.lasting = {
+            cause.label
+            for cause in self.causes
+            if cause.run_parameters or kept & {p.symbol for p in cause.parameters}
+        }
+        """Labels of causes that act in all drives: parameters off their values, and causes whose state
+        at the start of each opening is fitted, for which a linear prediction does not hold."""
         self.acting: dict[str, NDArray] = {}
         """In which runs a cause acts that does not act in all, boolean (runs,), by symbol."""
 
