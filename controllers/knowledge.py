@@ -18,12 +18,12 @@ from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from controllers.base import Controller
-from controllers.pulse import PLAN, PulsePlan, plan
-from controllers.pulse_table import compiled, nominal_table
-from controllers.valve_learner import DIGEST, LEARNT, LEAST_HEAD, VALVE, ValveLearner
+from controllers.base import DIGEST, Controller, compiled, composed
+from controllers.pulse import follow, nominal_knowledge
+from controllers.valve_learner import LEARNT, LEAST_HEAD, VALVE
 from epv_env.observation import LAYOUT
 from epv_env.plant.plantfile import Plant
+from epv_env.plant.primitives import generated
 
 CEILING = 0.2
 """p2 - target that a pulse may reach if the valve opens early [bar]."""
@@ -38,11 +38,6 @@ READINGS = len(LAYOUT)
 _CENTRE, _SCALE, _LIMIT = (
     np.array([getattr(quantity, name) for quantity in LEARNT]) for name in ("centre", "scale", "limit")
 )
-
-
-_FIELDS: Any = VALVE.fields
-_COLUMNS = np.array([_FIELDS[quantity.name][1] // 8 for quantity in LEARNT])
-"""Of the learnt quantities in a record of VALVE, which holds eight bytes for each number."""
 
 
 @compiled
@@ -65,18 +60,36 @@ def would_rise_too_far(v):
     return v.error + v.fall * HORIZON + v.after_period_early > CEILING
 
 
-def _loop(digest: str) -> Any:
-    """Advice, learnt quantities and rules of a batch of valves."""
+show_learnt: Any = generated(
+    "show_learnt",
+    "v, inputs",
+    "; ".join(f"inputs[{READINGS + k}] = shown(v.{entry.name}, {k})" for k, entry in enumerate(LEARNT)),
+    compiled,
+    shown=shown,
+)
+"""Write the learnt quantities of one valve behind the readings, into inputs (all,) [-]."""
 
+
+@composed
+def describe(v, observation, c, period, inputs):
+    """Learn from an observation (entries,) of one valve, and write all that a policy sees into inputs.
+
+    c: a Knowledge. Returns whether a rule keeps the coil on.
+    """
+    follow(v, observation, c, period)
+    for i in range(READINGS):
+        inputs[i] = observation[i]
+    show_learnt(v, inputs)
+    return cannot_raise(v) or would_rise_too_far(v)
+
+
+def _loop(digest: str) -> Any:
     @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def describe_all(valves, numbers, table, p, period, out, must_shut):
+    def describe_all(valves, observations, c, period, inputs, must_shut):
         if digest == "":
             return
         for i in range(len(valves)):
-            plan(valves[i], table, 0, p, period)
-            for k, column in enumerate(_COLUMNS):
-                out[i, READINGS + k] = shown(numbers[i, column], k)
-            must_shut[i] = cannot_raise(valves[i]) or would_rise_too_far(valves[i])
+            must_shut[i] = describe(valves[i], observations[i], c, period, inputs[i])
 
     return describe_all
 
@@ -87,42 +100,38 @@ _describe_all = _loop(DIGEST)
 class ValveKnowledge:
     """Observations with the learnt quantities behind the readings, and what the rules forbid."""
 
-    def __init__(self, plant: Plant, *, control_period: float = 5e-3, pulse: PulsePlan = PLAN):
-        """
-        Args:
-            plant: the nominal plant.
-            control_period: [s].
-            pulse: how the advice is planned.
-        """
-        self.learner = ValveLearner(nominal_table(plant), control_period=control_period)
-        self._pulse = pulse
-        self.must_shut = np.zeros(0, dtype=bool)
-        """Whether a rule keeps the coil on (n,)."""
+    def __init__(self, plant: Plant, *, control_period: float = 5e-3):
+        """plant: the nominal plant. control_period: [s]."""
+        self._constants, self._period = nominal_knowledge(plant), control_period
+        self.reset(0)
 
     def reset(self, n: int) -> None:
         """Forget the valves; n episodes begin."""
-        self.learner.reset(n)
+        self.valves = np.zeros(n, VALVE)
+        """What is known of each valve, records (n,)."""
         self.must_shut = np.zeros(n, dtype=bool)
+        """Whether a rule keeps the coil on (n,)."""
+
+    def forget(self, who: NDArray) -> None:
+        """Forget the valves of these episodes, indices (m,): others begin in their place."""
+        self.valves[who] = 0
 
     def observe(self, observations: NDArray) -> NDArray:
         """Take in observations (n, readings); returns them with the learnt quantities (n, all)."""
-        return self._described(self.learner.observe(observations), observations, self.must_shut)
+        return self._described(self.valves, observations, self.must_shut)
 
     def last(self, who: NDArray, observations: NDArray) -> NDArray:
         """What `observe` gives for the last observations (m, entries) of episodes `who` (m,) that end;
-        the learner forgets these valves."""
-        ending = ValveLearner(self.learner.table, control_period=self.learner.control_period)
-        ending.valves = self.learner.valves[who]
-        self.learner.forget(who)
-        return self._described(ending.observe(observations), observations, np.zeros(len(who), bool))
+        their valves are forgotten."""
+        ending = self.valves[who]
+        self.forget(who)
+        return self._described(ending, observations, np.zeros(len(who), bool))
 
-    def _described(self, valves: Any, observations: NDArray, must_shut: NDArray) -> NDArray:
-        out = np.empty((len(observations), READINGS + len(LEARNT)), dtype=np.float32)
-        out[:, :READINGS] = observations
-        table, period = self.learner.table, self.learner.control_period
-        numbers = valves.view(np.float64).reshape(len(valves), VALVE.itemsize // 8)
-        _describe_all(valves, numbers, table, self._pulse, period, out, must_shut)
-        return out
+    def _described(self, valves: NDArray, observations: NDArray, must_shut: NDArray) -> NDArray:
+        inputs = np.empty((len(observations), READINGS + len(LEARNT)), dtype=np.float32)
+        seen = np.asarray(observations, dtype=np.float32)
+        _describe_all(valves, seen, self._constants, self._period, inputs, must_shut)
+        return inputs
 
 
 class LearntObservation(VectorWrapper):
@@ -160,7 +169,7 @@ class LearntObservation(VectorWrapper):
         if mask is None:
             self.knowledge.reset(self.num_envs)
         else:
-            self.knowledge.learner.forget(np.flatnonzero(mask))
+            self.knowledge.forget(np.flatnonzero(mask))
         self._done = np.zeros(self.num_envs, dtype=bool)
         return self.knowledge.observe(observations), infos
 
@@ -170,7 +179,7 @@ class LearntObservation(VectorWrapper):
             actions = np.where(self.knowledge.must_shut, 1, actions)
         observations, rewards, terminated, truncated, infos = self.env.step(actions)
         if self._mode is AutoresetMode.NEXT_STEP:
-            self.knowledge.learner.forget(np.flatnonzero(self._done))
+            self.knowledge.forget(np.flatnonzero(self._done))
         self._done = terminated | truncated
         ended = np.flatnonzero(self._done)
         if self._mode is AutoresetMode.SAME_STEP and len(ended):
@@ -180,7 +189,7 @@ class LearntObservation(VectorWrapper):
         return self.knowledge.observe(observations), rewards, terminated, truncated, infos
 
 
-WITH_RULES = ", with rules"
+WITH_RULES = " with rules"
 """Follows the name of a controller that stands behind the rules."""
 
 

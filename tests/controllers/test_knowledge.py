@@ -63,7 +63,7 @@ def seen(**values):
 
 def test_a_rule_overrules_the_controller_and_only_then():
     ruled = with_rules(Off(), PLANT)
-    assert ruled.name == "off, with rules"
+    assert ruled.name == "off with rules"
     ruled.reset(1)
     assert ruled.act(seen(p1=8.1, target=8.0, p2_error=0.0, p3=8.1, action=1.0))[0] == 1
     ruled.reset(1)
@@ -73,7 +73,7 @@ def test_a_rule_overrules_the_controller_and_only_then():
 def test_rules_keep_a_careless_controller_from_the_upper_edge():
     options = {"parameters": "sensitive_ten_percent", "scenario": "none"}
     bare, ruled = (
-        run_episodes(each, seeds=list(range(8)), duration=1.5, options=options)[0]
+        run_episodes(each, seeds=list(range(8)), duration=1.5, options=options)
         for each in (Off(), with_rules(Off(), PLANT))
     )
     assert bare.excursion_bar.min() > 0.5

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from controllers.held_readings import HELD
 from controllers.policy import TRAINED, load_policy
+from controllers.sensor_check import HELD
 from epv_env.observation import CENTRE, INDEX, LIMIT, P2_LAGS, P3_LAGS, SCALE, decode, scaled
 from epv_env.plant.channels import CURRENT, P1, P2, P3
 from epv_env.plant.plantfile import load_plant
@@ -24,7 +24,7 @@ pytestmark = [
     pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler (cc) here"),
 ]
 
-READINGS = 1_000_000
+READINGS = 200_000
 
 DRIVE = """
 #include <math.h>
@@ -82,7 +82,7 @@ int main(void)
             if (!isfinite(learnt[i]))
                 return 3;
         decisions[coil]++;
-        if (m.failed && left == 0 && draw(200) == 0)
+        if (m.senses.failed && left == 0 && draw(200) == 0)
             m = fresh, again++;
     }
     printf("%lu %lu %lu %lu %lu\\n", decisions[0], decisions[1], failures, blind, again);
@@ -100,7 +100,7 @@ def folder(tmp_path_factory):
     return made
 
 
-def test_a_million_hostile_readings_stay_within_arrays_and_numbers(folder):
+def test_hostile_readings_stay_within_arrays_and_numbers(folder):
     (folder / "drive.c").write_text(DRIVE)
     defined = (f"-DHELD={HELD}", f"-DREADINGS={READINGS}u")
     program = build(

@@ -26,7 +26,7 @@ from epv_env.common.results_folder import progress
 from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import load_plant
-from training.monitoring import DRIVE, drives
+from training.drives import DRIVE, drives
 
 FOLDER = Path(__file__).parent
 SEED = 4977
