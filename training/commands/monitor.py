@@ -30,6 +30,8 @@ from training.monitoring import monitor_model
 
 MODEL, FIGURE = "monitor.json", "monitor.png"
 """What is written."""
+START = 1.0
+"""Time up to which a change has come before the start [s]."""
 LIKELY = 0.05
 """Probability from which a cause is named."""
 
@@ -120,6 +122,8 @@ def agreement(monitor: Monitor, content: Mapping[str, Any]) -> str:
     absorbed = {label.split(" ")[0] for label in content["absorbed"]}
     if both:
         why = "it simulates every effect and its law, the monitor compares openings with usual sizes"
+    elif seen and all(change.onset < START for change in monitor.changes):
+        why = "the valve differs from the start on, and there the four parameters are refitted"
     elif seen and seen <= absorbed:
         why = "this effect is absorbed there, by recalibration or the unknown consumption"
     elif seen:
