@@ -219,6 +219,8 @@ def test_a_diagnosis_that_differs_is_explained() -> None:
     monitor = Monitor(white_model())
     assert "agrees: no_gap" in agreement(monitor, content)
     monitor._log[1] = 50.0
+    assert "second (no_gap): the valve differs from the start on" in agreement(monitor, content)
+    monitor._since[1] = 60.0
     assert "second (no_gap): this effect is absorbed" in agreement(monitor, content)
     content["ambiguity_set"] = [["second"], ["third"]]
     assert "agrees" in agreement(monitor, content)
