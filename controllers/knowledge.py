@@ -6,6 +6,15 @@ adaptive pulse (controllers/pulse.py). Two rules keep the coil on, whatever the 
 1. The supply cannot raise p2: its pressure is less than LEAST_HEAD above the circuit's. A valve that
    stood open would let p2 follow a refill of the supply far above the target.
 2. p2 might rise too far: if the valve opened early, p2 would pass the target by more than CEILING.
+
+Two shields turn what an ordinary episode shows into what no reading can change:
+
+3. p2 as read lies above the band: coil on. It stands in front of whatever decides, the controller that
+   takes over where sensors fail included.
+4. p2 as read lies below the band, the supply is high and nothing is under way, since the coil is on and
+   the control chamber full: coil off, unless a rule above says on. One period off cannot open the valve.
+
+A policy's file names the rules it was trained behind; the shields need no training.
 """
 
 from dataclasses import dataclass, field
@@ -22,17 +31,23 @@ from controllers.base import Controller
 from controllers.pulse import PLAN, PulsePlan, plan
 from controllers.pulse_table import compiled, nominal_table
 from controllers.valve_learner import DIGEST, LEARNT, LEAST_HEAD, VALVE, ValveLearner
-from epv_env.observation import LAYOUT
+from epv_env.observation import INDEX, LAYOUT, SCALE
 from epv_env.plant.plantfile import Plant
+from epv_env.reward import BAND_BAR
 
 CEILING = 0.2
 """p2 - target that a pulse may reach if the valve opens early [bar]."""
 RULES = ("supply cannot raise p2: coil on", "early opening would raise p2 too far: coil on")
 """The rules in front of a policy, as its file names them."""
+SHIELDS = ("p2 above the band: coil on", "p2 below the band and nothing under way: coil off")
+"""What stands in front of every policy beside its rules."""
+HIGH_HEAD, FULL = 1.0, 0.5
+"""p1 - p2 from which the supply is high, and p1 - p3 up to which the control chamber is full [bar]."""
 HORIZON = 0.1
 """Time over which consumption lowers p2 there [s]: an overshoot in an emergency does not last."""
 
 
+_ERROR, _ERROR_SCALE = INDEX["p2_error"], SCALE[INDEX["p2_error"]]
 READINGS = len(LAYOUT)
 """Number of the readings, which come first."""
 _CENTRE, _SCALE, _LIMIT = (
@@ -65,18 +80,36 @@ def would_rise_too_far(v):
     return v.error + v.fall * HORIZON + v.after_period_early > CEILING
 
 
+def above_band(error):
+    """Shield 3: whether p2 - target as read [bar] lies above the band; a number or an array."""
+    return error >= BAND_BAR
+
+
+compiled_above_band = compiled(above_band)
+"""The same for one valve in compiled code, and in C."""
+
+
+@compiled
+def below_band(v, error):
+    """Shield 4: whether p2 - target as read [bar] lies below the band, and the valve can be opened."""
+    return error <= -BAND_BAR and v.on > 0 and v.head >= HIGH_HEAD and v.p1 - v.p3 <= FULL
+
+
 def _loop(digest: str) -> Any:
-    """Advice, learnt quantities and rules of a batch of valves."""
+    """Advice, learnt quantities, rules and shields of a batch of valves."""
 
     @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def describe_all(valves, numbers, table, p, period, out, must_shut):
+    def describe_all(valves, numbers, table, p, period, out, must_shut, must_open):
         if digest == "":
             return
         for i in range(len(valves)):
             plan(valves[i], table, 0, p, period)
             for k, column in enumerate(_COLUMNS):
                 out[i, READINGS + k] = shown(numbers[i, column], k)
-            must_shut[i] = cannot_raise(valves[i]) or would_rise_too_far(valves[i])
+            error = out[i, _ERROR] * _ERROR_SCALE
+            v = valves[i]
+            must_shut[i] = cannot_raise(v) or would_rise_too_far(v) or compiled_above_band(error)
+            must_open[i] = below_band(v, error) and not must_shut[i]
 
     return describe_all
 
@@ -96,17 +129,21 @@ class ValveKnowledge:
         """
         self.learner = ValveLearner(nominal_table(plant), control_period=control_period)
         self._pulse = pulse
-        self.must_shut = np.zeros(0, dtype=bool)
-        """Whether a rule keeps the coil on (n,)."""
+        self._forced = np.zeros((2, 0), dtype=bool)
 
     def reset(self, n: int) -> None:
         """Forget the valves; n episodes begin."""
         self.learner.reset(n)
-        self.must_shut = np.zeros(n, dtype=bool)
+        self._forced = np.zeros((2, n), dtype=bool)
 
     def observe(self, observations: NDArray) -> NDArray:
         """Take in observations (n, readings); returns them with the learnt quantities (n, all)."""
-        return self._described(self.learner.observe(observations), observations, self.must_shut)
+        return self._described(self.learner.observe(observations), observations, self._forced)
+
+    def overruled(self, actions: NDArray) -> NDArray:
+        """Actions (n,) as rules and shields leave them, for the observations taken in last."""
+        must_shut, must_open = self._forced
+        return np.where(must_shut, 1, np.where(must_open, 0, actions))
 
     def last(self, who: NDArray, observations: NDArray) -> NDArray:
         """What `observe` gives for the last observations (m, entries) of episodes `who` (m,) that end;
@@ -114,14 +151,15 @@ class ValveKnowledge:
         ending = ValveLearner(self.learner.table, control_period=self.learner.control_period)
         ending.valves = self.learner.valves[who]
         self.learner.forget(who)
-        return self._described(ending.observe(observations), observations, np.zeros(len(who), bool))
+        unused = np.zeros((2, len(who)), dtype=bool)
+        return self._described(ending.observe(observations), observations, unused)
 
-    def _described(self, valves: Any, observations: NDArray, must_shut: NDArray) -> NDArray:
+    def _described(self, valves: Any, observations: NDArray, forced: NDArray) -> NDArray:
         out = np.empty((len(observations), READINGS + len(LEARNT)), dtype=np.float32)
         out[:, :READINGS] = observations
         table, period = self.learner.table, self.learner.control_period
         numbers = valves.view(np.float64).reshape(len(valves), VALVE.itemsize // 8)
-        _describe_all(valves, numbers, table, self._pulse, period, out, must_shut)
+        _describe_all(valves, numbers, table, self._pulse, period, out, *forced)
         return out
 
 
@@ -136,7 +174,7 @@ class LearntObservation(VectorWrapper):
         Args:
             env: n valves of EPValve-v0, in any autoreset mode.
             plant: the nominal plant that the learner starts from; None: the environment's.
-            rules: whether the rules overrule the actions.
+            rules: whether rules and shields overrule the actions.
         """
         super().__init__(env)
         own: Any = env.unwrapped
@@ -167,7 +205,7 @@ class LearntObservation(VectorWrapper):
     def step(self, actions: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray, dict[str, Any]]:
         """Advance by one control period. Observations (n, all)."""
         if self._rules:
-            actions = np.where(self.knowledge.must_shut, 1, actions)
+            actions = self.knowledge.overruled(actions)
         observations, rewards, terminated, truncated, infos = self.env.step(actions)
         if self._mode is AutoresetMode.NEXT_STEP:
             self.knowledge.learner.forget(np.flatnonzero(self._done))
@@ -186,7 +224,7 @@ WITH_RULES = ", with rules"
 
 @dataclass(kw_only=True)
 class WithRules:
-    """A controller of the on/off environment behind the two rules."""
+    """A controller of the on/off environment behind rules and shields."""
 
     main: Controller
     """Decides where no rule does."""
@@ -209,7 +247,7 @@ class WithRules:
     def act(self, observations: NDArray) -> NDArray:
         """0 (off) or 1 (on) for each valve, (n,)."""
         self._knowledge.observe(observations)
-        return np.where(self._knowledge.must_shut, 1, self.main.act(observations))
+        return self._knowledge.overruled(self.main.act(observations))
 
 
 def with_rules(controller: Controller, plant: Plant) -> WithRules:

@@ -3,7 +3,8 @@
 The coil decides where p3 goes: on, the control chamber fills up to p1; off, it empties to the ambient
 pressure. A reading far from that end that stands still contradicts the coil. From then on a controller
 that does not read p3 takes over. So it does where readings are lost (controllers/held_readings.py) for
-more than HELD periods; without p2 and a target it is blind, and the coil stays on.
+more than HELD periods; without p2 and a target it is blind, and the coil stays on. Where p2 lies above the
+band it is on, too, whoever decides (shield 3 of controllers/knowledge.py).
 """
 
 from collections.abc import Mapping
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from controllers.base import Controller, Privileged
 from controllers.held_readings import HELD, HeldReadings
+from controllers.knowledge import above_band
 from epv_env.observation import LONGEST_WAIT, decode
 from epv_env.plant.channels import SENSORS, Sensor
 
@@ -83,7 +85,8 @@ class P3Check:
         # Both follow every valve: the one that takes over knows what has happened.
         actions = self.main.act(observations), self.fallback.act(observations)
         blind = ~read.begun | (self._failed & read.blind)
-        return np.where(blind, 1, np.where(self._failed, actions[1], actions[0]))
+        above = above_band(decode(observations, "p2_error"))
+        return np.where(blind | above, 1, np.where(self._failed, actions[1], actions[0]))
 
     def _implausible(self, observations: NDArray) -> NDArray:
         """Whether p3 stands still where the coil should move it, bool (n,)."""

@@ -1,7 +1,7 @@
 """A learned policy as a controller: readings and learnt quantities in, a coil's state out.
 
 The policy is a small net without memory. Its output is added to the advice of the adaptive pulse, and
-two rules stand in front of it (controllers/knowledge.py). The controller believes p3, so it comes with a
+rules and shields stand in front of it (controllers/knowledge.py). The controller believes p3, so it comes with a
 check of that sensor (controllers/p3_check.py).
 """
 
@@ -48,7 +48,7 @@ class Policy:
         """0 (off) or 1 (on) for each valve, (n,)."""
         inputs = self.knowledge.observe(observations)
         off, on = self.network.logits(inputs).T
-        return np.where(self.knowledge.must_shut | ~(off >= on), 1, 0)
+        return self.knowledge.overruled(np.where(off >= on, 0, 1))
 
 
 def p3_checked(controller: Policy, plant: Plant) -> P3Check:

@@ -17,7 +17,8 @@ from controllers import held_readings, knowledge, p3_check, pulse, valve_learner
 from controllers.hysteresis import Hysteresis
 from controllers.p3_check import P3Check
 from controllers.policy import Policy
-from controllers.policy_files import RULES, learnt_contract
+from controllers.knowledge import RULES, SHIELDS
+from controllers.policy_files import learnt_contract
 from controllers.valve_learner import LEARNT
 from epv_env.observation import HISTORY, INDEX, LAYOUT, LONGEST_WAIT, P2_LAGS, P3_LAGS, contract
 from training.deploy.controller_c import (
@@ -118,6 +119,8 @@ def learner_c(export: Export) -> ControllerC:
     c.function(knowledge.shown, (REAL, REAL))
     c.function(knowledge.cannot_raise, (VALVE,))
     c.function(knowledge.would_rise_too_far, (VALVE,))
+    c.function(knowledge.compiled_above_band, (REAL,))
+    c.function(knowledge.below_band, (VALVE, REAL))
     return c
 
 
@@ -213,7 +216,7 @@ def deployment_contract(export: Export) -> dict[str, Any]:
         "policy": {"weights_sha256": export.weights_sha256, "provenance": export.provenance},
         "observation": contract(export.period),
         "learnt": learnt_contract(),
-        "rules": list(RULES),
+        "rules": [*RULES, *SHIELDS],
         "readings": {"pressure": "bar absolute", "current": "A"},
         "memory": {
             "p2_lags_periods": P2_LAGS,
@@ -225,7 +228,8 @@ def deployment_contract(export: Export) -> dict[str, Any]:
         },
         "actions": {"0": "coil off: the protection valve opens", "1": "coil on: it shuts"},
         "decision": "1 if a rule says so; else 0 if the logit of off is at least that of on, else 1; "
-        "where p3 is implausible or readings are lost, a hysteresis that does not read p3 decides",
+        "where p3 is implausible or readings are lost, a hysteresis that does not read p3 decides, and "
+        "of the rules the shield above the band remains",
         "timing": "read, decide and switch at each period's start; the coil stays so through it",
         "operations": {
             "multiply_accumulates": sum(weights for weights, _ in sizes),

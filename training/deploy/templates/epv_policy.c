@@ -198,14 +198,20 @@ int epv_policy_step(epv_policy_memory *m, const epv_policy_readings *given)
     epv_policy_readings now = *given;
     float inputs[EPV_POLICY_INPUTS], logits[2];
     const int begun = m->begun, lost = hold(m, &now);
+    float error;
     int must_shut;
     epv_policy_observe(m, &now, inputs);
     must_shut = epv_policy_learn(m, inputs);
+    error = seen(inputs, $p2_error);
     m->begun = begun || !lost || m->lost > $held;
     if (!m->begun || (m->failed && (lost >> P2 & 1)))
         return 1; /* there is nothing to decide by: shut */
+    if (fn_above_band(error) != 0.0f) /* shield 3: whoever decides */
+        return 1;
     if (m->failed)
         return m->fallback;
+    if (must_shut || fn_below_band(&m->valve, error) != 0.0f)
+        return must_shut;
     epv_policy_logits(inputs, logits);
-    return must_shut || !(logits[0] >= logits[1]);
+    return !(logits[0] >= logits[1]);
 }
