@@ -3,8 +3,8 @@
 The coil decides where p3 goes: on, the control chamber fills up to p1; off, it empties to the ambient
 pressure. A reading far from that end that stands still contradicts the coil. From then on a controller
 that does not read p3 takes over. So it does where readings are lost (controllers/held_readings.py) for
-more than HELD periods; without p2 and a target it is blind, and the coil stays on. Where p2 lies above the
-band it is on, too, whoever decides (shield 3 of controllers/knowledge.py).
+more than HELD periods; without p2 and a target it is blind, and the coil stays on. Above the band it is
+on, too, whoever decides (shield 3 of controllers/knowledge.py).
 """
 
 from collections.abc import Mapping

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from controllers import held_readings, knowledge, p3_check, pulse, valve_learner
 from controllers.hysteresis import Hysteresis
+from controllers.knowledge import RULES, SHIELDS
 from controllers.p3_check import P3Check
 from controllers.policy import Policy
-from controllers.knowledge import RULES, SHIELDS
 from controllers.policy_files import learnt_contract
 from controllers.valve_learner import LEARNT
 from epv_env.observation import HISTORY, INDEX, LAYOUT, LONGEST_WAIT, P2_LAGS, P3_LAGS, contract
