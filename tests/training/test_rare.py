@@ -9,16 +9,17 @@ pytest.importorskip("joblib")
 from scipy.special import ndtri
 from scipy.stats import kstest
 
+from controllers.knowledge import cannot_raise, would_rise_too_far
 from controllers.policy import load_policy
 from controllers.tuned import tuned
-from docs.studies.rare.closed_forms import CASES, coverage, naive
-from docs.studies.rare.properties import counterexamples, logit_bounds, random_observations
+from controllers.valve_learner import LEARNT
 from epv_env.common.commands import main_of
-from epv_env.observation import decode
+from epv_env.observation import INDEX, LAYOUT, LIMIT, decode
 from epv_env.plant.consumption import SCENARIOS
+from tests.training.closed_forms import CASES, coverage
 from training.evaluation.rollout import run_episodes
 from training.rare.episodes import DISTURBANCE, PLANT, Episodes, NormalsAsDraws
-from training.rare.splitting import Moves, Problem, interval
+from training.rare.splitting import CHAIN, Moves, Problem, interval
 
 pytestmark = pytest.mark.training
 
@@ -35,19 +36,25 @@ def test_moves_leave_normal_numbers_normal_and_change_what_they_may():
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_the_interval_holds_a_known_probability(name):
-    """In 93 of 100 trials: the study has them all, with more particles."""
-    hits, ratio = coverage(CASES[name], trials=10, particles=512, repetitions=10)
-    assert hits >= 8  # of 10 with a coverage of 0.95: a lower count has a probability of 0.01
-    assert ratio == pytest.approx(1.0, abs=0.25)
+@pytest.mark.parametrize(("trials", "least"), [(10, 8), pytest.param(100, 93, marks=pytest.mark.slow)])
+def test_the_interval_holds_a_known_probability(name, trials, least):
+    hits, ratio = coverage(CASES[name], trials=trials, particles=512, repetitions=10)
+    assert hits >= least
+    assert ratio == pytest.approx(1.0, abs=1.0 / np.sqrt(trials))
 
 
 def test_an_assumed_share_is_biased_where_levels_tie_and_a_counted_one_is_not():
     case = CASES["birth-death chain"]
-    assumed = np.mean([naive(case, seed, particles=512) for seed in range(20)])
-    counted = np.mean([case.estimates(seed, particles=512, repetitions=1) for seed in range(20)])
-    assert assumed / case.truth > 1.3
-    assert counted == pytest.approx(case.truth, rel=0.25)
+    problem = Problem(level=case.level, moves=case.moves, particles=512)
+    assumed, counted = [], []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        found = problem.thresholds(case.threshold, 1e-9, rng)
+        repetition = problem.repetition(found, rng)
+        assumed.append(repetition.shares[-1] / CHAIN ** (len(found) - 1))
+        counted.append(repetition.probability)
+    assert np.mean(assumed) / case.truth > 1.3
+    assert np.mean(counted) == pytest.approx(case.truth, rel=0.25)
 
 
 def test_a_level_that_is_never_reached_gives_no_estimate_above_zero():
@@ -97,22 +104,59 @@ def test_the_command_resumes_and_describes_the_episodes_that_leave(tmp_path, cap
     assert "PWM leaves" in capsys.readouterr().out
 
 
-def test_above_the_band_no_reading_opens_and_below_it_none_keeps_shut():
+def random_observations(n, rng):
+    """Observations with nothing in common but the box of the 13 readings, all near the band."""
+    seen = LIMIT * rng.uniform(-1.0, 1.0, (n, len(LAYOUT)))
+    seen[:, INDEX["p2_error"]] = rng.uniform(-3.0, 3.0, n)
+    seen[:, INDEX["target"]] = rng.uniform(-0.5, 0.5, n)
+    seen[:, INDEX["action"]] = rng.choice([-1.0, 1.0], n)
+    return seen.astype(np.float32)
+
+
+def outside(seen):
+    """Whether p2 lies above the band, and whether shield 4 is asked for, (n,) each."""
+    error, target, p1, p3, coil = (
+        decode(seen, name) for name in ("p2_error", "target", "p1", "p3", "action")
+    )
+    ready = (coil > 0.5) & (p1 - error - target >= 1.0) & (p1 - p3 <= 0.5)
+    return error >= 0.5, (error <= -0.5) & ready
+
+
+def test_no_reading_opens_above_the_band_or_keeps_shut_below_it_and_without_shields_some_do():
     rng = np.random.default_rng(0)
-    controller, n = load_policy(), 500
-    controller.reset(n)
+    controller, policy = load_policy(), load_policy().main
+    controller.reset(500)
+    policy.reset(500)
+    without = {"above": 0, "opened": 0, "below": 0, "stayed shut": 0}
     for _ in range(20):
-        seen = random_observations(n, rng)
+        seen = random_observations(500, rng)
+        above, below = outside(seen)
+        off, on = policy.network.logits(policy.knowledge.observe(seen)).T
+        v = policy.knowledge.learner.valves
+        ruled = np.array([cannot_raise(each) or would_rise_too_far(each) for each in v])
+        bare = np.where(ruled | ~(off >= on), 1, 0)
+        shielded = policy.knowledge.overruled(bare)
+        assert np.all(shielded[above] == 1)
+        assert np.all(shielded[below & ~ruled] == 0)
+        counts = above, above & (bare == 0), below & ~ruled, below & ~ruled & (bare == 1)
+        for name, which in zip(without, counts, strict=True):
+            without[name] += int(which.sum())
         lost = rng.random(seen.shape) < 0.01
         seen[lost] = rng.choice([np.nan, np.inf, -np.inf], lost.sum())
         actions = controller.act(seen)
         assert set(actions) <= {0, 1}
         assert np.all(actions[decode(seen, "p2_error") >= 0.5] == 1)
+    print(without)
+    assert min(without.values()) > 0
 
 
-def test_without_the_shields_readings_do_both():
-    found = counterexamples(episodes=200)
-    assert found["opened"] > 0
-    assert found["stayed shut"] > 0
-    low, high = logit_bounds(load_policy().main.network)  # type: ignore[attr-defined]
-    assert np.all((low > -20) & (high < 20))  # no input of the box makes a logit that is no number
+def test_no_input_of_the_box_makes_a_logit_that_is_no_number():
+    """Interval arithmetic (Moore, Interval Analysis, 1966): sound bounds of every layer."""
+    network = load_policy().main.network
+    box = np.array([quantity.limit for quantity in (*LAYOUT, *LEARNT)])
+    low, high = -box, box
+    for weight, bias in network.layers:
+        middle, reach = weight @ (low + high) / 2 + bias, np.abs(weight) @ (high - low) / 2
+        assert np.all(np.abs(middle) + reach < 1e3)
+        low, high = np.tanh(middle - reach), np.tanh(middle + reach)
+    assert np.all(np.isfinite(network.advice_weight))

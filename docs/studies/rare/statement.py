@@ -3,7 +3,7 @@
     python -m docs.studies.rare.statement --episodes 24000    # so many of each region; it resumes
 
 The statement names the policy by its digest, the plants and the seeds. Finished batches lie in
-statement.jsonl beside it. Every batch holds the seeds that left, and the digest of the code that ran it.
+statement.jsonl beside it, each with the seeds that left.
 """
 
 import argparse
@@ -20,7 +20,7 @@ from controllers.policy import TRAINED, load_policy
 from controllers.policy_files import policy_digest
 from docs.studies.common import PAGE, fill, table
 from epv_env.common.command_line import COUNT, add_workers, fail_clearly
-from epv_env.common.files import Journal, digest, read_json
+from epv_env.common.files import Journal, read_json
 from epv_env.plant.valves import available_cores
 from training.evaluation.batches import run_jobs
 from training.evaluation.metrics import violation_interval
@@ -34,8 +34,6 @@ BATCH = 1000
 """Episodes of a batch: half a minute of one core."""
 WORST = 5
 """Largest excursions of a batch that are kept with their seeds."""
-DECIDING = ("controllers", "epv_env")
-"""Packages whose code an episode depends on."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,13 +56,6 @@ class Statement:
     """Excursions whose exceedances are counted [bar]; the last is the band's."""
 
 
-def code_digest() -> str:
-    """Of all Python sources of DECIDING."""
-    root = FOLDER.parents[2]
-    paths = sorted(path for package in DECIDING for path in (root / package).rglob("*.py"))
-    return digest(b"".join(path.read_bytes() for path in paths))
-
-
 def announced() -> Statement:
     """The statement. Raises ValueError if it is about another policy than the package's."""
     statement = read_json(STATEMENT, Statement, version=FORMAT, remedy="restore it from the history")
@@ -84,7 +75,6 @@ def batch(statement: Statement, region: str, first: int) -> dict[str, Any]:
     )  # fmt: skip
     worst = np.argsort(metrics.excursion_bar)[: -WORST - 1 : -1]
     return {
-        "code": code_digest(),
         "left": (first + np.flatnonzero(~metrics.stayed)).tolist(),
         "above": [int(np.sum(metrics.excursion_bar > level)) for level in statement.tail_bar],
         "worst": [[first + int(k), float(metrics.excursion_bar[k])] for k in worst],

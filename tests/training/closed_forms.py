@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 from scipy.special import ndtr
 from scipy.stats import norm
 
-from training.rare.splitting import CHAIN, Moves, Problem, interval
+from training.rare.splitting import Moves, Problem, interval
 
 MEMORY, SAMPLES = 0.9, 50
 """Correlation of neighbouring samples of the Ornstein-Uhlenbeck process, and their number."""
@@ -95,14 +95,3 @@ def coverage(case: Case, *, trials: int, particles: int, repetitions: int) -> tu
         hits += low <= case.truth <= high
         means.append(estimates.mean())
     return hits, float(np.mean(means)) / case.truth
-
-
-def naive(case: Case, seed: int, *, particles: int) -> float:
-    """The estimate that assumes a share of 1 / CHAIN above each threshold but the last.
-
-    It is right where levels never tie, but for the bias of adapted thresholds.
-    """
-    problem = Problem(level=case.level, moves=case.moves, particles=particles)
-    rng = np.random.default_rng(seed)
-    found = problem.thresholds(case.threshold, 1e-9, rng)
-    return problem.repetition(found, rng).shares[-1] / CHAIN ** (len(found) - 1)
