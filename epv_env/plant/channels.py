@@ -47,6 +47,11 @@ class Sensor:
         """One step of the ADC [unit of the sensor]: 12 bit (section 3)."""
         return (self.high - self.low) / 2**12
 
+    @property
+    def margin(self) -> float:
+        """Accuracy in the unit of the sensor."""
+        return self.accuracy * self.high
+
     def measure(self, value: NDArray, standard_normal: NDArray) -> NDArray:
         """The readings for true values, any shape [unit of the sensor]; offset and trend not included.
 
@@ -57,8 +62,8 @@ class Sensor:
 
     def constants(self) -> tuple[float, float, float, float, float]:
         """What `digitised` needs: least value, noise, resolution, least and greatest reading."""
-        margin = self.accuracy * self.high
-        return self.low, self.noise, self.resolution, self.low - margin, self.high + margin
+        ends = self.low - self.margin, self.high + self.margin
+        return self.low, self.noise, self.resolution, *ends
 
 
 Reading = Callable[[State, Mapping[str, Value]], Value]

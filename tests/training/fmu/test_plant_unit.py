@@ -133,14 +133,20 @@ def test_all_states_come_out(unit):
         np.testing.assert_allclose(found, value[0], rtol=1e-3, atol=1e-9, err_msg=name)
 
 
-def test_the_length_of_steps_matters_little(unit):
-    long, short = (started(unit, Parameters.calibrated()) for _ in range(2))
+@pytest.mark.parametrize("longest", [20e-3, 5e-3, 1e-3, 0.7e-3])
+def test_the_length_of_steps_matters_little(unit, longest):
+    """U is discrete: an importer ends its steps at the edges, which therefore stay where they are."""
+    (U,) = (v for v in unit.description.iter("ScalarVariable") if v.attrib["name"] == "U")
+    assert U.attrib["variability"] == "discrete"
+    whole, parts = (started(unit, Parameters.calibrated(), U=0.0) for _ in range(2))
     for k in range(10):
-        U = 24.0 * (k % 2)
-        assert long.step(10e-3, U=U) == OK
-        for step in (0.3e-3, 4.2e-3, 1e-3, 4.5e-3):
-            assert short.step(step, U=U) == OK
-    np.testing.assert_allclose(long.get(*OUTPUTS[:3]), short.get(*OUTPUTS[:3]), atol=TENTH_OF_A_MILLIBAR)
+        inputs = {"U": 24.0 * (k % 2)} if k else {}  # the start value of U stays until it is set
+        assert whole.step(35e-3, **inputs) == OK
+        for step in np.diff([*np.arange(0.0, 35e-3 - 1e-9, longest), 35e-3]):
+            assert parts.step(step, **inputs) == OK
+    np.testing.assert_allclose(
+        whole.get(*OUTPUTS[:3]), parts.get(*OUTPUTS[:3]), atol=TENTH_OF_A_MILLIBAR
+    )
 
 
 @pytest.mark.parametrize("name", list(CATALOGUE))
@@ -161,6 +167,7 @@ def test_a_parameter_counts_if_it_is_set_in_time(unit):
     instance = Instance(unit).start({"R": 50.0})
     assert instance.step(QUICK, U=24.0) == OK
     assert instance.get("I") == pytest.approx([24 / 50])
+    assert instance.set({"R": 50.0}) == OK  # its own value: nothing changes
     assert instance.set({"R": 40.0}) == ERROR
     assert instance.said == [
         "parameter R cannot be set while it runs: set it before initialisation ends"
