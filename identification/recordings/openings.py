@@ -39,6 +39,16 @@ OPENINGS_PER_DRIVE = 20
 HELD_OUT_EVERY = 3
 """Every third opening is held out."""
 
+PAUSE = 0.3
+"""Length of a stretch with the valve shut in which consumption is read off p2 [s]: to 0.02 g/s."""
+
+PAUSES_PER_DRIVE, LEAST_PAUSES = 4, 8
+"""Pauses of a drive that are compared, and without which nothing says that consumption rests."""
+
+REST_FLOW, APART = 0.02 * GRAM, 6.0
+"""Level of the lowest readings of consumption up to which nothing is consumed [kg/s], and how far
+apart these readings are, in standard deviations [1]."""
+
 LEAST_OPENINGS = 6
 """Openings without which a log says too little."""
 
@@ -126,6 +136,31 @@ def evenly(campaign: Campaign, preferred: Collection[str]) -> Campaign:
         for number, recording in enumerate(chosen)
     )
     return _enough(replace(campaign, recordings=recordings))
+
+
+def pauses(log: Log, p: Mapping[str, float]) -> tuple[Recording, ...]:
+    """Stretches with the valve shut in which nothing is consumed, as recordings with sigma_S = 0.
+
+    Consumption is never negative: where p2 rises while the valve is shut, something leaks into it. The
+    lowest readings of a drive, as far as noise scatters them, are taken for no consumption unless their
+    level is above that. p: V2 and R_gas by symbol [SI].
+    """
+    storage, length = p["V2"] / (p["R_gas"] * log.temperature), round(PAUSE / log.period)
+    recordings = list[Recording]()
+    for drive in log.drives:
+        at_rest = _at_rest(drive, log.period)
+        ends = np.flatnonzero(np.diff(at_rest.astype(int), prepend=0, append=0)).reshape(-1, 2)
+        starts = [i for first, end in ends for i in range(first, end - length + 1, length)]
+        flows = [_flow(drive.p2[i : i + length], log.period, storage) for i in starts]
+        straight = [(f, i) for f, i in zip(flows, starts, strict=True) if f.scatter <= STRAIGHT]
+        low = min((f.value for f, _ in straight), default=0.0)
+        lowest = [(f.value, i) for f, i in straight if f.value <= low + APART * f.sd]
+        if len(lowest) < LEAST_PAUSES or np.median([value for value, _ in lowest]) > REST_FLOW:
+            continue
+        none = _Flow(0.0, 1.0, 1.0)
+        resting = [_recording(drive, _Stretch(i, i + length, none, none), log.period) for _, i in lowest]
+        recordings += _spread(resting, PAUSES_PER_DRIVE)
+    return tuple(recordings)
 
 
 def _spread(recordings: Sequence[Recording], most: int) -> list[Recording]:
