@@ -98,14 +98,7 @@ def openings(log: Log, p: Mapping[str, float]) -> tuple[Campaign, set[str]]:
     recordings, steady = list[Recording](), set[str]()
     for drive in log.drives:
         for stretch in _stretches(drive, log.period, storage):
-            rows = slice(stretch.first, stretch.end)
-            recording = Recording(
-                name=f"{drive.file} at {stretch.first * log.period:.3f} s",
-                role="calibration",
-                period=log.period,
-                sigma_S=np.full(stretch.end - stretch.first, stretch.flow),
-                **{name: getattr(drive, name)[rows] for name in CHANNELS},
-            )
+            recording = _recording(drive, stretch, log.period)
             recordings.append(recording)
             if stretch.steady:
                 steady.add(recording.name)
@@ -163,6 +156,17 @@ def pauses(log: Log, p: Mapping[str, float]) -> tuple[Recording, ...]:
     return tuple(recordings)
 
 
+def _recording(drive: Drive, stretch: _Stretch, period: float) -> Recording:
+    rows = slice(stretch.first, stretch.end)
+    return Recording(
+        name=f"{drive.file} at {stretch.first * period:.3f} s",
+        role="calibration",
+        period=period,
+        sigma_S=np.full(stretch.end - stretch.first, stretch.flow),
+        **{name: getattr(drive, name)[rows] for name in CHANNELS},
+    )
+
+
 def _spread(recordings: Sequence[Recording], most: int) -> list[Recording]:
     """At most a number of recordings, evenly over them."""
     count = min(len(recordings), most)
@@ -190,18 +194,23 @@ def start_of(recording: str) -> float:
 
 def _stretches(drive: Drive, period: float, storage: float) -> Iterator[_Stretch]:
     """The openings of a drive; storage: V2/(R T) [kg/Pa]."""
-    hold = round(HOLD / period)
-    if len(drive.coil) < hold:
-        return
-    on = np.all(sliding_window_view(drive.coil, hold) > 0.0, axis=1)
-    flat = np.ptp(sliding_window_view(drive.p3, hold), axis=1) < REST_RANGE
-    at_rest = np.concatenate([np.zeros(hold - 1, dtype=bool), on & flat])  # on and constant for HOLD
+    at_rest = _at_rest(drive, period)
     commands = np.flatnonzero(np.diff(drive.coil) < 0.0) + 1
     for i in commands:
         if at_rest[i - 1]:
             stretch = _stretch(drive, int(i), commands, at_rest, period, storage)
             if stretch is not None:
                 yield stretch
+
+
+def _at_rest(drive: Drive, period: float) -> NDArray:
+    """Whether the coil has been on and p3 constant for HOLD, up to each sample; boolean (samples,)."""
+    hold = round(HOLD / period)
+    if len(drive.coil) < hold:
+        return np.zeros(len(drive.coil), dtype=bool)
+    on = np.all(sliding_window_view(drive.coil, hold) > 0.0, axis=1)
+    flat = np.ptp(sliding_window_view(drive.p3, hold), axis=1) < REST_RANGE
+    return np.concatenate([np.zeros(hold - 1, dtype=bool), on & flat])
 
 
 def _stretch(
