@@ -53,8 +53,8 @@ typedef struct {
 int epv_policy_step(epv_policy_memory *memory, const epv_policy_readings *now);
 
 /* Its parts: the readings as the observation (the first EPV_POLICY_READINGS
- * entries of the inputs), what is learnt and advised (the entries behind them; returns whether a rule keeps
- * the coil on), and the network's {off, on}. */
+ * entries of the inputs), what is learnt and advised (the entries behind them; returns 1 if a rule keeps the
+ * coil on, -1 if a shield switches it off, else 0), and the network's {off, on}. */
 void epv_policy_observe(epv_policy_memory *memory, const epv_policy_readings *now,
                         float inputs[EPV_POLICY_INPUTS]);
 int epv_policy_learn(epv_policy_memory *memory, float inputs[EPV_POLICY_INPUTS]);
