@@ -6,6 +6,15 @@ adaptive pulse (controllers/pulse.py). Two rules keep the coil on, whatever the 
 1. The supply cannot raise p2: its pressure is less than LEAST_HEAD above the circuit's. A valve that
    stood open would let p2 follow a refill of the supply far above the target.
 2. p2 might rise too far: if the valve opened early, p2 would pass the target by more than CEILING.
+
+Two shields turn what an ordinary episode shows into what no reading can change:
+
+3. p2 as read lies above the band: coil on. It stands in front of whatever decides, the controller that
+   takes over where sensors fail included.
+4. p2 as read lies below the band, the supply is high and nothing is under way, since the coil is on and
+   the control chamber full: coil off, unless a rule above says on. One period off cannot open the valve.
+
+A policy's file names the rules it was trained behind; the shields need no training.
 """
 
 from dataclasses import dataclass, field
@@ -18,21 +27,27 @@ from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from controllers.base import DIGEST, Controller, compiled, composed
+from controllers.base import DIGEST, Controller, compiled, composed, in_unit
 from controllers.pulse import follow, nominal_knowledge
 from controllers.valve_learner import LEARNT, LEAST_HEAD, VALVE
-from epv_env.observation import LAYOUT
+from epv_env.observation import INDEX, LAYOUT
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.primitives import generated
+from epv_env.reward import BAND_BAR
 
 CEILING = 0.2
 """p2 - target that a pulse may reach if the valve opens early [bar]."""
 RULES = ("supply cannot raise p2: coil on", "early opening would raise p2 too far: coil on")
 """The rules in front of a policy, as its file names them."""
+SHIELDS = ("p2 above the band: coil on", "p2 below the band and nothing under way: coil off")
+"""What stands in front of every policy beside its rules."""
+HIGH_HEAD, FULL = 1.0, 0.5
+"""p1 - p2 from which the supply is high, and p1 - p3 up to which the control chamber is full [bar]."""
 HORIZON = 0.1
 """Time over which consumption lowers p2 there [s]: an overshoot in an emergency does not last."""
 
 
+_ERROR = INDEX["p2_error"]
 READINGS = len(LAYOUT)
 """Number of the readings, which come first."""
 _CENTRE, _SCALE, _LIMIT = (
@@ -60,6 +75,26 @@ def would_rise_too_far(v):
     return v.error + v.fall * HORIZON + v.after_period_early > CEILING
 
 
+@compiled
+def above_band(error):
+    """Shield 3: whether p2 - target as read [bar] lies above the band."""
+    return error >= BAND_BAR
+
+
+@compiled
+def below_band(v, error):
+    """Shield 4: whether p2 - target as read [bar] lies below the band, and the valve can be opened."""
+    return error <= -BAND_BAR and v.on > 0 and v.head >= HIGH_HEAD and v.p1 - v.p3 <= FULL
+
+
+@compiled
+def forced(v, error):
+    """What rules and shields force for p2 - target as read [bar]: 1 coil on, -1 coil off, 0 nothing."""
+    if cannot_raise(v) or would_rise_too_far(v) or above_band(error):
+        return 1.0
+    return -1.0 if below_band(v, error) else 0.0
+
+
 show_learnt: Any = generated(
     "show_learnt",
     "v, inputs",
@@ -74,22 +109,22 @@ show_learnt: Any = generated(
 def describe(v, observation, c, period, inputs):
     """Learn from an observation (entries,) of one valve, and write all that a policy sees into inputs.
 
-    c: a Knowledge. Returns whether a rule keeps the coil on.
+    c: a Knowledge. Returns what rules and shields force.
     """
     follow(v, observation, c, period)
     for i in range(READINGS):
         inputs[i] = observation[i]
     show_learnt(v, inputs)
-    return cannot_raise(v) or would_rise_too_far(v)
+    return forced(v, in_unit(observation, _ERROR))
 
 
 def _loop(digest: str) -> Any:
     @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def describe_all(valves, observations, c, period, inputs, must_shut):
+    def describe_all(valves, observations, c, period, inputs, forces):
         if digest == "":
             return
         for i in range(len(valves)):
-            must_shut[i] = describe(valves[i], observations[i], c, period, inputs[i])
+            forces[i] = describe(valves[i], observations[i], c, period, inputs[i])
 
     return describe_all
 
@@ -109,8 +144,7 @@ class ValveKnowledge:
         """Forget the valves; n episodes begin."""
         self.valves = np.zeros(n, VALVE)
         """What is known of each valve, records (n,)."""
-        self.must_shut = np.zeros(n, dtype=bool)
-        """Whether a rule keeps the coil on (n,)."""
+        self._forces = np.zeros(n)
 
     def forget(self, who: NDArray) -> None:
         """Forget the valves of these episodes, indices (m,): others begin in their place."""
@@ -118,19 +152,23 @@ class ValveKnowledge:
 
     def observe(self, observations: NDArray) -> NDArray:
         """Take in observations (n, readings); returns them with the learnt quantities (n, all)."""
-        return self._described(self.valves, observations, self.must_shut)
+        return self._described(self.valves, observations, self._forces)
+
+    def overruled(self, actions: NDArray) -> NDArray:
+        """Actions (n,) as rules and shields leave them, for the observations taken in last."""
+        return np.where(self._forces > 0, 1, np.where(self._forces < 0, 0, actions))
 
     def last(self, who: NDArray, observations: NDArray) -> NDArray:
         """What `observe` gives for the last observations (m, entries) of episodes `who` (m,) that end;
         their valves are forgotten."""
         ending = self.valves[who]
         self.forget(who)
-        return self._described(ending, observations, np.zeros(len(who), bool))
+        return self._described(ending, observations, np.zeros(len(who)))
 
-    def _described(self, valves: NDArray, observations: NDArray, must_shut: NDArray) -> NDArray:
+    def _described(self, valves: NDArray, observations: NDArray, forces: NDArray) -> NDArray:
         inputs = np.empty((len(observations), READINGS + len(LEARNT)), dtype=np.float32)
         seen = np.asarray(observations, dtype=np.float32)
-        _describe_all(valves, seen, self._constants, self._period, inputs, must_shut)
+        _describe_all(valves, seen, self._constants, self._period, inputs, forces)
         return inputs
 
 
@@ -145,7 +183,7 @@ class LearntObservation(VectorWrapper):
         Args:
             env: n valves of EPValve-v0, in any autoreset mode.
             plant: the nominal plant that the learner starts from; None: the environment's.
-            rules: whether the rules overrule the actions.
+            rules: whether rules and shields overrule the actions.
         """
         super().__init__(env)
         own: Any = env.unwrapped
@@ -176,7 +214,7 @@ class LearntObservation(VectorWrapper):
     def step(self, actions: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray, dict[str, Any]]:
         """Advance by one control period. Observations (n, all)."""
         if self._rules:
-            actions = np.where(self.knowledge.must_shut, 1, actions)
+            actions = self.knowledge.overruled(actions)
         observations, rewards, terminated, truncated, infos = self.env.step(actions)
         if self._mode is AutoresetMode.NEXT_STEP:
             self.knowledge.forget(np.flatnonzero(self._done))
@@ -195,7 +233,7 @@ WITH_RULES = " with rules"
 
 @dataclass(kw_only=True)
 class WithRules:
-    """A controller of the on/off environment behind the two rules."""
+    """A controller of the on/off environment behind rules and shields."""
 
     main: Controller
     """Decides where no rule does."""
@@ -218,7 +256,7 @@ class WithRules:
     def act(self, observations: NDArray) -> NDArray:
         """0 (off) or 1 (on) for each valve, (n,)."""
         self._knowledge.observe(observations)
-        return np.where(self._knowledge.must_shut, 1, self.main.act(observations))
+        return self._knowledge.overruled(self.main.act(observations))
 
 
 def with_rules(controller: Controller, plant: Plant) -> WithRules:

@@ -5,7 +5,7 @@ sigma_S = -V2/(R T) dp2/dt. Where it is steady before and after an opening, and 
 be steady during the opening, too. An opening begins with the coil on and every chamber at rest.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
@@ -14,8 +14,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from epv_env.common.units import BAR, GRAM
-from identification.recordings.log_files import Drive, Log
-from identification.recordings.recording import HOLD, Campaign, CampaignError, Recording
+from identification.recordings.log_files import LONGEST, Drive, Log
+from identification.recordings.recording import CHANNELS, HOLD, Campaign, CampaignError, Recording
 
 REST_RANGE = 0.1 * BAR
 """Range of p3 within HOLD below which the control chamber is at rest [Pa]."""
@@ -25,9 +25,6 @@ SHUT_BEFORE, SHUT_AFTER = 0.1, 0.1
 
 VENTING = 0.03
 """Time after the command in which p3 is still too high for the valve to open [s]."""
-
-LONGEST = 0.6
-"""Longest opening [s]: a longer one tells less and takes longer to simulate."""
 
 SAME_FLOW, DEVIATIONS = 0.2 * GRAM, 3.0
 """Consumption is the same before and after an opening if it differs by less than this [kg/s] and this
@@ -100,10 +97,11 @@ def openings(log: Log, p: Mapping[str, float]) -> tuple[Campaign, set[str]]:
     storage = p["V2"] / (p["R_gas"] * log.temperature)
     recordings, steady = list[Recording](), set[str]()
     for drive in log.drives:
-        for stretch in _of_drive(drive, log.period, storage):
-            recordings.append(_recording(drive, stretch, log.period))
+        for stretch in _stretches(drive, log.period, storage):
+            recording = _recording(drive, stretch, log.period)
+            recordings.append(recording)
             if stretch.steady:
-                steady.add(recordings[-1].name)
+                steady.add(recording.name)
     campaign = Campaign(
         name=log.name,
         temperature=log.temperature,
@@ -120,12 +118,11 @@ def evenly(campaign: Campaign, preferred: Collection[str]) -> Campaign:
     """
     chosen: list[Recording] = []
     for _, group in groupby(campaign.recordings, key=lambda recording: drive_of(recording.name)):
-        own = list(group)
-        first = _spread([r for r in own if r.name in preferred], OPENINGS_PER_DRIVE)
-        others = [r for r in own if r.name not in preferred]
-        chosen += sorted(
-            [*first, *_spread(others, OPENINGS_PER_DRIVE - len(first))], key=lambda r: start_of(r.name)
-        )
+        drive = list(group)
+        first = _spread([r for r in drive if r.name in preferred], OPENINGS_PER_DRIVE)
+        others = [r for r in drive if r.name not in preferred]
+        first += _spread(others, OPENINGS_PER_DRIVE - len(first))
+        chosen += sorted(first, key=lambda recording: start_of(recording.name))
     roles = ("calibration",) * (HELD_OUT_EVERY - 1) + ("validation",)
     recordings = tuple(
         replace(recording, role=roles[number % HELD_OUT_EVERY])
@@ -159,6 +156,17 @@ def pauses(log: Log, p: Mapping[str, float]) -> tuple[Recording, ...]:
     return tuple(recordings)
 
 
+def _recording(drive: Drive, stretch: _Stretch, period: float) -> Recording:
+    rows = slice(stretch.first, stretch.end)
+    return Recording(
+        name=f"{drive.file} at {stretch.first * period:.3f} s",
+        role="calibration",
+        period=period,
+        sigma_S=np.full(stretch.end - stretch.first, stretch.flow),
+        **{name: getattr(drive, name)[rows] for name in CHANNELS},
+    )
+
+
 def _spread(recordings: Sequence[Recording], most: int) -> list[Recording]:
     """At most a number of recordings, evenly over them."""
     count = min(len(recordings), most)
@@ -184,13 +192,15 @@ def start_of(recording: str) -> float:
     return float(recording.split(" ")[-2])
 
 
-def _of_drive(drive: Drive, period: float, storage: float) -> list[_Stretch]:
+def _stretches(drive: Drive, period: float, storage: float) -> Iterator[_Stretch]:
     """The openings of a drive; storage: V2/(R T) [kg/Pa]."""
     at_rest = _at_rest(drive, period)
     commands = np.flatnonzero(np.diff(drive.coil) < 0.0) + 1
-    starts = [int(i) for i in commands if at_rest[i - 1]]
-    found = [_stretch(drive, i, commands, at_rest, period, storage) for i in starts]
-    return [stretch for stretch in found if stretch is not None]
+    for i in commands:
+        if at_rest[i - 1]:
+            stretch = _stretch(drive, int(i), commands, at_rest, period, storage)
+            if stretch is not None:
+                yield stretch
 
 
 def _at_rest(drive: Drive, period: float) -> NDArray:
@@ -224,25 +234,9 @@ def _stretch(
 
 def _flow(p2: NDArray, period: float, storage: float) -> _Flow:
     """Air consumed while the valve is shut; p2: (samples,) [Pa], storage: V2/(R T) [kg/Pa]."""
-    time = np.arange(len(p2)) * period
-    centred = time - np.mean(time)
+    centred = (np.arange(len(p2)) - 0.5 * (len(p2) - 1)) * period
     spread = np.sum(centred**2)
     slope = float(centred @ p2 / spread)
     noise = float(np.sqrt(0.5 * np.var(np.diff(p2)))) + 1.0
     rest = float(np.std(p2 - slope * centred))
     return _Flow(-storage * slope, storage * noise / float(np.sqrt(spread)), rest / noise)
-
-
-def _recording(drive: Drive, stretch: _Stretch, period: float) -> Recording:
-    own = slice(stretch.first, stretch.end)
-    return Recording(
-        name=f"{drive.file} at {stretch.first * period:.3f} s",
-        role="calibration",
-        period=period,
-        U=drive.U[own],
-        I=drive.I[own],
-        p1=drive.p1[own],
-        p2=drive.p2[own],
-        p3=drive.p3[own],
-        sigma_S=np.full(stretch.end - stretch.first, stretch.flow),
-    )

@@ -8,6 +8,8 @@ from controllers.knowledge import (
     READINGS,
     LearntObservation,
     ValveKnowledge,
+    above_band,
+    below_band,
     cannot_raise,
     with_rules,
     would_rise_too_far,
@@ -41,6 +43,16 @@ def test_rule_2_an_early_opening_that_would_raise_p2_too_far():
     assert not would_rise_too_far(valve(error=-0.1, after_period_early=0.25))
     assert not would_rise_too_far(valve(error=0.0, fall=-1.0, after_period_early=0.25))
     assert not would_rise_too_far(valve(error=0.4, after_period_early=0.0))  # nothing would open
+
+
+def test_shields_act_outside_the_band_only():
+    full = {"on": 1.0, "head": 1.0, "p1": 9.0, "p3": 8.5}
+    assert above_band(0.5)
+    assert not above_band(np.nextafter(0.5, 0))
+    assert below_band(valve(**full), -0.5)
+    assert not below_band(valve(**full), -0.49)
+    for change in ({"on": 0.0}, {"head": 0.9}, {"p3": 8.4}):  # a pulse, a low supply, one under way
+        assert not below_band(valve(**full | change), -0.5)
 
 
 class Off:

@@ -91,6 +91,72 @@ int main(void)
 """
 
 
+RANDOM = """
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "epv_policy.h"
+
+static unsigned long long seed = 1;
+static float between(float low, float high)
+{
+    seed = seed * 6364136223846793005u + 1442695040888963407u;
+    return low + (high - low) * (float)((seed >> 33) / 2147483648.0);
+}
+
+/* Random readings in a row, each lost once in 50; what must hold after each decision. */
+int main(void)
+{
+    static epv_policy_memory fresh;
+    epv_policy_memory m = fresh, other;
+    unsigned long k, above = 0, below = 0, lost = 0;
+    for (k = 0; k < READINGS; k++) {
+        epv_policy_readings now, held;
+        float *const given[] = {&now.p1, &now.p2, &now.p3, &now.current, &now.target};
+        float *const good[] = {&held.p1, &held.p2, &held.p3, &held.current, &held.target};
+        int i, gone = 0, coil, error_lost;
+        float error;
+        if (k % 20 == 0)
+            m = fresh;
+        now.p1 = between(6, 16), now.p2 = between(1, 16), now.current = between(-1, 1);
+        now.p3 = between(0, 1) < 0.5f ? now.p1 - between(0, 0.5f) : between(1, 16);
+        now.target = now.p2 + between(-2, 2), now.coil = between(0, 1) < 0.5f;
+        held = now;
+        for (i = 0; i < 5; i++)
+            if (between(0, 50) < 1) {
+                const float odd[] = {NAN, INFINITY, -INFINITY, -9.0f, 17.0f};
+                *given[i] = odd[(int)between(0, 5)], gone |= 1 << i;
+                *good[i] = m.last[i];
+                if (i == 1 || i == 4)
+                    held.p2 = m.last[1];
+            } else if (!(*given[i] > (i == 3 ? -1.0f : 1.0f) && *given[i] < (i == 3 ? 1.0f : 16.0f)))
+                gone |= 32; /* near an end: not judged */
+        other = m;
+        coil = epv_policy_step(&m, &now);
+        error_lost = gone & 2 || gone & 16;
+        error = now.p2 - now.target;
+        if (gone & 32)
+            continue;
+        if (!error_lost && error >= 0.5f && ++above && !coil)
+            return 1;
+        if (!gone && error <= -0.5f && now.coil && now.p1 - now.p2 > 1.001f &&
+            now.p1 - now.p3 < 0.499f && !m.failed && m.begun && !(m.valve.after_period_early > 0)) {
+            below++;
+            if (coil)
+                return 2;
+        }
+        if (gone && other.begun && !m.failed) { /* as if the last good readings stood there */
+            lost++;
+            if (epv_policy_step(&other, &held) != coil)
+                return 3;
+        }
+    }
+    printf("%lu %lu %lu\\n", above, below, lost);
+    return 0;
+}
+"""
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """The C files of the package's policy."""
@@ -112,6 +178,15 @@ def test_hostile_readings_stay_within_arrays_and_numbers(folder):
     assert off + on == READINGS
     assert min(off, on) > READINGS / 20  # both decisions were taken
     assert min(failures, blind, again) > 100
+
+
+def test_no_reading_opens_above_the_band_nor_keeps_shut_below_it_nor_a_lost_one_anything(folder):
+    (folder / "random.c").write_text(RANDOM)
+    defined = f"-DREADINGS={READINGS}u"
+    program = build(["cc"], folder, defined, "random.c", "epv_policy.c", "-lm", output="random")
+    done = subprocess.run([program], capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    assert min(map(int, done.stdout.split())) > READINGS / 1000
 
 
 def damaged(observations, rng):

@@ -5,7 +5,7 @@ in whatever process and order it runs. Finished batches lie in a journal (epv_en
 """
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
@@ -17,6 +17,7 @@ from tqdm import tqdm
 
 from controllers.base import Controller
 from epv_env.common.files import Journal
+from epv_env.common.results_folder import progress
 from epv_env.plant.valves import available_cores
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.rollout import run_episodes
@@ -104,6 +105,26 @@ def run_batches(
         return journal.read(part.name, _metrics)
 
     return [EpisodeMetrics.joined([metrics(part) for part in each]) for each in parts]
+
+
+def run_jobs(
+    jobs: Mapping[str, Callable[[], Any]], *, journal: Journal, workers: int, what: str
+) -> list[Any]:
+    """Results of jobs by name, JSON-ready, in their order; those in the journal are not run again.
+
+    what: name of the progress bar.
+    """
+    missing = {name: job for name, job in jobs.items() if name not in journal}
+    pool: Any = Parallel(n_jobs=workers, return_as="generator_unordered")
+    done = pool(delayed(_named)(name, job) for name, job in missing.items())
+    for name, result in progress(done, what=what, total=len(missing)):
+        journal.add(name, result)
+    return [journal[name] for name in jobs]
+
+
+def _named(name: str, job: Callable[[], Any]) -> tuple[str, Any]:
+    with threadpool_limits(1):
+        return name, job()
 
 
 def _run(batch: Batch, controller: Controller) -> tuple[str, dict[str, list[Any]]]:

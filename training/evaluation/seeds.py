@@ -30,6 +30,9 @@ CLOSED_LOOP_SEED = 8_000_000
 TIMING_SEED = 9_000_000
 """Of the episode in which decisions are timed."""
 
+STATEMENT_SEED = 10_000_000
+"""Of the episodes that docs/studies/rare announces before it runs them."""
+
 RANGE = 1_000_000
 """Seeds of a range."""
 

@@ -174,7 +174,7 @@ def test_a_log_is_refused_in_a_sentence(healthy, tmp_path):
     with pytest.raises(OptionError, match="holds files already"):
         OperationLog(gymnasium.make("EPValve-v0"), healthy)
     for change, told in [
-        (lambda text: text.replace(",target_bar", ",goal"), "target_bar stands 0 times"),
+        (lambda text: text.replace(",target_bar", ",goal"), "missing target_bar"),
         (lambda text: text.replace("0.005000,", "0.004000,", 1), "time"),
         (lambda text: re.sub(r"\n0.000000,\d,", "\n0.000000,2,", text), "coil is 2"),
     ]:
@@ -244,7 +244,7 @@ def test_readings_that_no_valve_shows_are_refused(change, told, often_opened, tm
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        ({"drives": [{"file": "drive-1.csv"}] * 2}, "drives names drive-1.csv twice"),
+        ({"drives": [{"file": "drive-1.csv"}] * 2}, "drive 2: drive-1.csv is named twice"),
         ({"control_period_s": 0.0}, "states a control period of 0 s"),
         ({"environment": {"temperature_K": 0.0, "pressure_bar": 1.0}}, "temperature_K is 0.0"),
     ],

@@ -1,0 +1,1 @@
+"""Rare episodes: what is proved, bounded and searched."""

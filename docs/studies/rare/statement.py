@@ -1,0 +1,149 @@
+"""Run the episodes that statement.json announced before any of them was run.
+
+    python -m docs.studies.rare.statement --episodes 24000    # so many of each region; it resumes
+
+The statement names the policy by its digest, the plants and the seeds. Finished batches lie in
+statement.jsonl beside it, each with the seeds that left.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from controllers.policy import TRAINED, load_policy
+from controllers.policy_files import policy_digest
+from docs.studies.common import PAGE, fill, table
+from epv_env.common.command_line import COUNT, add_workers, fail_clearly
+from epv_env.common.files import Journal, read_json
+from epv_env.plant.valves import available_cores
+from training.evaluation.batches import run_jobs
+from training.evaluation.metrics import violation_interval
+from training.evaluation.plots import in_words
+from training.evaluation.rollout import run_episodes
+
+FOLDER = Path(__file__).parent
+STATEMENT, RESULTS = FOLDER / "statement.json", FOLDER / "statement.jsonl"
+FORMAT = "epv-statement/1"
+BATCH = 1000
+"""Episodes of a batch: half a minute of one core."""
+WORST = 5
+"""Largest excursions of a batch that are kept with their seeds."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Statement:
+    """What was announced."""
+
+    policy: str
+    """Digest of the policy's files."""
+    regions: list[str]
+    """From which the plants are drawn."""
+    scenario: str
+    """Consumption."""
+    episodes: int
+    """Of each region."""
+    first_seed: int
+    """Of each region; the next episodes have the next seeds."""
+    duration_s: float
+    """Of an episode [s]."""
+    tail_bar: list[float]
+    """Excursions whose exceedances are counted [bar]; the last is the band's."""
+
+
+def announced() -> Statement:
+    """The statement. Raises ValueError if it is about another policy than the package's."""
+    statement = read_json(STATEMENT, Statement, version=FORMAT, remedy="restore it from the history")
+    if statement.policy != policy_digest(TRAINED):
+        raise ValueError(
+            f"{STATEMENT} is about the policy {statement.policy}, and this is {policy_digest(TRAINED)}: "
+            "restore the policy, or announce a new statement in another file"
+        )
+    return statement
+
+
+def batch(statement: Statement, region: str, first: int) -> dict[str, Any]:
+    """Figures of the episodes of BATCH seeds from `first` on."""
+    metrics, _ = run_episodes(
+        load_policy(), seeds=list(range(first, first + BATCH)), duration=statement.duration_s,
+        options={"threads": 1, "scenario": statement.scenario, "parameters": region},
+    )  # fmt: skip
+    worst = np.argsort(metrics.excursion_bar)[: -WORST - 1 : -1]
+    return {
+        "left": (first + np.flatnonzero(~metrics.stayed)).tolist(),
+        "above": [int(np.sum(metrics.excursion_bar > level)) for level in statement.tail_bar],
+        "worst": [[first + int(k), float(metrics.excursion_bar[k])] for k in worst],
+    }
+
+
+def results(statement: Statement, journal: Journal, region: str) -> dict[str, Any]:
+    """What is known of a region: episodes, seeds that left, exceedances, the worst."""
+    found = [journal[name] for name in names(statement, region) if name in journal]
+    return {
+        "episodes": BATCH * len(found),
+        "left": [seed for each in found for seed in each["left"]],
+        "above": np.sum([each["above"] for each in found] or [[0]], axis=0).tolist(),
+        "worst": max(
+            (tuple(reversed(pair)) for each in found for pair in each["worst"]), default=(0, 0)
+        ),
+    }
+
+
+def names(statement: Statement, region: str) -> dict[str, int]:
+    """First seed of each batch of a region by the batch's name, in their order."""
+    first = statement.first_seed
+    return {f"{region}, {k}": k for k in range(first, first + statement.episodes, BATCH)}
+
+
+def page_table(statement: Statement, journal: Journal) -> str:
+    """A row for each region."""
+    rows = []
+    for region in statement.regions:
+        known = results(statement, journal, region)
+        n, left = known["episodes"], known["left"]
+        low, high = violation_interval(np.arange(n) >= len(left)) if n else (0.0, 1.0)
+        rows.append([
+            in_words(region), f"{n:,} of {statement.episodes:,}", str(len(left)),
+            f"{low:.2g} to {high:.2g}",
+            f"{known['worst'][0]:.3f} (seed {known['worst'][1]})", ", ".join(map(str, left)) or "none",
+        ])  # fmt: skip
+    headings = [
+        "plants",
+        "episodes",
+        "left",
+        "95 % interval",
+        "worst excursion [bar]",
+        "seeds that left",
+    ]
+    return table(headings, rows)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run what is missing; returns the exit status."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--episodes", type=COUNT, help="of each region, from the first (default: all)")
+    add_workers(parser)
+    options = parser.parse_args(arguments)
+    statement = announced()
+    journal = Journal(RESULTS, {"statement": vars(statement)})
+    count = -(-min(options.episodes or statement.episodes, statement.episodes) // BATCH)
+    seeds = [
+        (name, region, first)
+        for region in statement.regions
+        for name, first in list(names(statement, region).items())[:count]
+    ]
+    jobs = {name: partial(batch, statement, region, first) for name, region, first in seeds}
+    run_jobs(jobs, journal=journal, workers=options.workers or available_cores(), what="statement")
+    text = page_table(statement, journal)
+    fill(FOLDER / PAGE, {"statement": text})
+    print(text)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(fail_clearly(main))

@@ -1,0 +1,142 @@
+"""Estimate how rarely an episode leaves target ±500 mbar, by splitting, with an interval.
+
+    epv rare --controller "pulse, adaptive" --region ten-percent --out runs/rare
+
+Repetitions that are finished are kept in --out and not run again. Beside the probability it writes the
+probabilities of smaller excursions, and a picture of the episodes that leave: plants and applications.
+"""
+
+import argparse
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from controllers.policy import TRAINED
+from epv_env.common.command_line import (
+    JUDGED_SECONDS,
+    NextStep,
+    Number,
+    add_out,
+    add_plant,
+    add_seed,
+    add_workers,
+    plant_option,
+)
+from epv_env.common.files import Journal, write_json, write_text
+from epv_env.plant.plantfile import load_plant, plant_subject
+from epv_env.plant.valves import available_cores
+from epv_env.reward import BAND_BAR
+from training.evaluation.batches import run_jobs
+from training.evaluation.named import HELP, named_controllers
+from training.evaluation.plots import save_figure
+from training.evaluation.scenarios import EVALUATION, RANDOM
+from training.rare.episodes import Episodes
+from training.rare.report import plain_episodes, rare_figure, tail
+from training.rare.splitting import CHAIN, Problem
+from training.studies.comparison import plant_region
+
+REGIONS = {"confidence": "confidence", "ten-percent": "sensitive_ten_percent"}
+"""Plants by what a user calls them."""
+QUICK: dict[str, Any] = {"particles": 16, "repetitions": 2, "duration": 1.0, "least": 0.05}
+KEPT = 4
+"""Rare episodes of a repetition that are described."""
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    add_out(parser, "runs/rare")
+    parser.add_argument("--controller", default=str(TRAINED), metavar="NAME", help=f"one of: {HELP}")
+    parser.add_argument("--region", choices=list(REGIONS), default="ten-percent", help="plants")
+    parser.add_argument(
+        "--particles", type=Number(int, 2 * CHAIN, 10**6), default=512, help="episodes of a level"
+    )
+    parser.add_argument(
+        "--repetitions", type=Number(int, 2, 10**4), default=10, help="independent estimates"
+    )
+    parser.add_argument(
+        "--least", type=Number(float, 1e-12, 0.5), default=1e-8, help="probability to search down to"
+    )
+    parser.add_argument("--duration", type=JUDGED_SECONDS, default=10.0, help="of an episode [s]")
+    add_seed(parser, help="of the random numbers behind all episodes")
+    add_plant(parser)
+    add_workers(parser)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Run the repetitions that --out lacks; write results.json, tail.csv and rare.png.
+
+    Raises ValueError for an unknown controller.
+    """
+    plant = load_plant(options.plant)
+    controllers, digests = named_controllers([options.controller], plant)
+    ((label, controller),) = controllers.items()
+    names = ("region", "particles", "least", "duration", "seed")
+    settings = {**{name: getattr(options, name) for name in names}, "controller": digests[label]}
+    episodes = Episodes(
+        controller=controller, duration=options.duration,
+        options={
+            "plant": plant, "parameters": plant_region(REGIONS[options.region], plant),
+            **EVALUATION[RANDOM].options,
+        },
+    )  # fmt: skip
+    problem = Problem(
+        level=episodes.worst, moves=episodes.moves, particles=options.particles // CHAIN * CHAIN
+    )
+    journal = Journal(options.out / "finished.jsonl", {**plant_subject(plant), **settings})
+    work = {"journal": journal, "workers": options.workers or available_cores()}
+    pilot = partial(
+        problem.thresholds, BAND_BAR, options.least, np.random.default_rng([options.seed, 0])
+    )
+    (thresholds,) = run_jobs({"thresholds": pilot}, what="thresholds", **work)
+    jobs = {
+        f"repetition {k}": partial(repetition, problem, episodes, thresholds, [options.seed, k])
+        for k in range(1, options.repetitions + 1)
+    }
+    found = run_jobs(jobs, what="repetitions", **work)
+    table = tail(thresholds, found)
+    write_text(options.out / "tail.csv", table.to_csv(index=False))
+    result = {"format": "epv-rare/1", "label": label, "settings": settings, **summary(thresholds, found)}
+    rare = [episode for each in found for episode in each["rare"]]
+    write_json(options.out / "results.json", {**result, "episodes": rare})
+    if rare:
+        save_figure(rare_figure(rare, options.duration), options.out / "rare.png")
+    print(f"{table.to_string(index=False)}\n\n{sentence(result)}\nresults in {options.out}")
+
+
+def repetition(
+    problem: Problem, episodes: Episodes, thresholds: list[float], seed: list[int]
+) -> dict[str, Any]:
+    """One repetition, ready for JSON: shares, runs, and some of its rare episodes described."""
+    found = problem.repetition(thresholds, np.random.default_rng(seed))
+    rare = np.unique(found.rare, axis=0)[:KEPT]
+    described = episodes.described(rare) if len(rare) else []
+    return {"shares": found.shares, "runs": found.runs, "rare": described}
+
+
+def summary(thresholds: list[float], found: list[dict[str, Any]]) -> dict[str, Any]:
+    """Probability of the largest excursion that was reached, its interval, and what it took."""
+    last = tail(thresholds, found).iloc[-1].to_dict()
+    plain = plain_episodes(found)
+    return {
+        **last,
+        "runs": sum(each["runs"] for each in found),
+        "plain_episodes": plain if np.isfinite(plain) else None,
+    }
+
+
+def sentence(result: dict[str, Any]) -> str:
+    """What was found, in words."""
+    interval = f"{result['low']:.2g} to {result['high']:.2g}"
+    if result["excursion_bar"] < BAND_BAR:
+        return (
+            f"{result['label']} leaves with a probability below {result['high']:.2g}: an excursion of "
+            f"{result['excursion_bar']:.3f} bar has {result['probability']:.2g} ({interval})."
+        )
+    return f"{result['label']} leaves with a probability of {result['probability']:.2g} ({interval})."
+
+
+def next_step(options: argparse.Namespace) -> NextStep:
+    """Compare the controller with the others."""
+    words = ("compare", "--controllers", options.controller, *plant_option(options.plant))
+    return NextStep("to compare it on ordinary episodes", words)

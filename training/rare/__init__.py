@@ -1,0 +1,1 @@
+"""Probabilities of rare episodes, and what a controller can never do."""
