@@ -21,7 +21,8 @@ from identification.gap.fit.variable_projection import LinearisedRun
 from identification.gap.search.onset import Onset, Span, in_span, spans_of_causes
 from identification.recordings.log_files import Drive, Log, read_log
 from identification.recordings.openings import drive_of, openings, pauses, start_of
-from identification.recordings.recording import CampaignError
+from identification.recordings.recording import CampaignError, Recording
+from identification.replay.model_inputs import model_inputs
 from identification.valve_gap.operation import LoggedValve, steady_openings
 from training.drives import write_log
 
@@ -125,6 +126,18 @@ def test_nothing_is_consumed_where_consumption_is_lowest_and_not_above_zero(gram
     resting = pauses(log, p)
     assert len(resting) == count
     assert all(np.all(recording.sigma_S == 0.0) for recording in resting)
+
+
+def test_an_opening_begins_at_the_pressure_of_its_first_sample():
+    """Consumption of 5 g/s lowers p2 while it is averaged over the hold."""
+    time, p = 0.005 * np.arange(40), PLANT.parameters
+    slope = -5.0 * GRAM * p["R_gas"] * p["T_env"] / p["V2"]
+    same = {name: np.full(40, value) for name, value in {"U": 24.0, "I": 0.5, "p1": 11e5}.items()}
+    recording = Recording(
+        name="opening", role="calibration", period=0.005, p2=8e5 + slope * time,
+        p3=same["p1"], sigma_S=np.full(40, 5.0 * GRAM), **same,
+    )  # fmt: skip
+    assert model_inputs(recording, p).p2_start == pytest.approx(8e5, abs=1.0)
 
 
 def test_the_reading_on_which_the_controller_opens_does_not_count(healthy):
