@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -272,7 +273,7 @@ def _bridged(values: NDArray, longest: int, *, holds: bool = False) -> NDArray:
     missing = series.isna()
     if missing.mean() > 0.25:
         return series.to_numpy()
-    run = missing.groupby((~missing).cumsum()).transform("sum")
+    run: Any = missing.groupby((~missing).cumsum()).transform("sum")
     filled = series.ffill() if holds else series.interpolate(limit_area="inside")
     return filled.where(~missing | (run <= longest)).to_numpy()
 

@@ -61,9 +61,9 @@ def _local_points(cells: pd.Series) -> NDArray:
     """Dates and times of day, (samples,). Raises ValueError."""
     parts = cells.str.extract(f"^{LOCAL}$").to_numpy(dtype=object)
     date, clock, half = (pd.Series(parts[:, k]) for k in (0, 2, 3))
-    wrong = cells[clock.isna() & (cells != "")]
-    if len(wrong):
-        raise ValueError(wrong.iloc[0])
+    wrong = np.flatnonzero(clock.isna() & (cells != ""))
+    if wrong.size:
+        raise ValueError(cells.iloc[wrong[0]])
     time = pd.to_timedelta(clock).to_numpy("m8[ns]")
     twelve = half.notna().to_numpy()
     time[twelve] = time[twelve] % HALF_DAY + half.str.lower().eq("p").to_numpy()[twelve] * HALF_DAY
@@ -71,7 +71,9 @@ def _local_points(cells: pd.Series) -> NDArray:
         days = {text: pd.to_datetime(text, dayfirst="." in text) for text in date.dropna().unique()}
         return date.map(days).to_numpy("M8[ns]") + time
     known = ~np.isnat(time)
-    time[known] = np.unwrap(time[known].astype(np.int64), period=2 * HALF_DAY // np.timedelta64(1, "ns"))
+    time[known] = np.unwrap(
+        time[known].astype(np.int64), period=int(2 * HALF_DAY / np.timedelta64(1, "ns"))
+    )
     return np.datetime64(0, "ns") + time
 
 
@@ -119,5 +121,5 @@ def begin_offsets(place: str, begins: Sequence[np.datetime64 | None]) -> list[fl
             f"{place}: some channels have points in time and others only times from a start that the "
             "file does not tell: export all with the same kind of time"
         )
-    first = min(known, default=None)
+    first = min(known) if known else np.datetime64(0, "s")
     return [float((begin - first) / np.timedelta64(1, "s")) for begin in known] or [0.0] * len(begins)

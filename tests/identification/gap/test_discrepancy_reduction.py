@@ -57,12 +57,15 @@ def test_without_the_true_cause_the_rest_is_predictable():
     assert found.black_box.overall.value < found.gaps["recalibrated"].overall.value
 
 
-def test_a_black_box_that_does_harm_is_left_out():
+def test_a_black_box_that_does_harm_is_left_out(monkeypatch):
     """It predicts the opposite of what the recalibrated model leaves."""
     tank = Tank(virtual_recordings({"c": 0.021, "leak": 4e-3}))
     problem, found = estimates(tank, ())
     model = predict(problem, found["recalibrated"])
-    judged = measure_discrepancy_reduction(problem, found, lambda *_: [-model.residuals[2]])
+    first, second, held_out = model.residuals
+    opposite = [np.zeros_like(first), np.zeros_like(second), -held_out]
+    monkeypatch.setattr("identification.gap.judge.held_out.predict_residuals", lambda *_: opposite)
+    judged = measure_discrepancy_reduction(problem, found)
     assert not judged.black_box_helps
     assert judged.black_box.overall == judged.gaps["recalibrated"].overall
     assert judged.unexplained.p_value == 1

@@ -90,7 +90,8 @@ def left(name: str, opened: bool) -> float:
     problem, (cause,) = ranking.problem, (c for c in ranking.problem.plant.causes if c.name == name)
     (fitted,) = fit(problem, [problem.start(Hypothesis(causes=(cause,)), {name: 0.1})])
     if opened:
-        (fitted,) = fit(problem, [law_starts(problem, [fitted], [cause])[0].estimate])
+        starts = law_starts(problem, fitted, [fitted], [cause], problem.fitted_runs)
+        (fitted,) = fit(problem, [starts[0].estimate])
     return misfit_beyond_noise(evaluate(problem, [fitted])[0], ranking.noise)
 
 
